@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "image/flip.h"
+#include "image/image_io.h"
+#include "image/metrics.h"
+#include "image/tonemap.h"
+
+namespace etendue {
+namespace {
+
+/// Colours of one layer of a file.
+struct Picture {
+    int width = 0, height = 0;
+    std::vector<Rgb> pixels;
+};
+
+struct DiffCommand {
+    std::string image, reference, reference2, layer, map, map_metric = "flip", flip = "auto";
+    float ignore_above = std::numeric_limits<float>::infinity();
+    bool json = false;
+
+    void run() const;
+
+private:
+    Picture read(const std::string& path) const;
+    Picture read_like(const std::string& path, const Picture& first) const;
+    bool is_hdr() const;
+    void print(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const;
+    void print_json(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const;
+    void write_map(const std::vector<float>& errors, int width, int height) const;
+};
+
+Picture DiffCommand::read(const std::string& path) const {
+    const Image image = read_image(path);
+    try {
+        return {image.width, image.height, rgb_pixels(image, layer)};
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(fmt::format("cannot compare \"{}\": {}", path, e.what()));
+    }
+}
+
+Picture DiffCommand::read_like(const std::string& path, const Picture& first) const {
+    Picture p = read(path);
+    if (p.width != first.width || p.height != first.height)
+        throw std::runtime_error(fmt::format("\"{}\" has {} x {} pixels, but \"{}\" has {} x {}", image, first.width,
+                                             first.height, path, p.width, p.height));
+    return p;
+}
+
+bool DiffCommand::is_hdr() const {
+    if (flip != "auto") return flip == "hdr";
+    return std::ranges::all_of(std::initializer_list<std::string>{image, reference}, [](const std::string& path) {
+        const std::string e = std::filesystem::path(path).extension().string();
+        return e == ".exr" || e == ".pfm" || e == ".hdr";
+    });
+}
+
+void DiffCommand::print(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const {
+    const auto line = [](const char* name, double value) { fmt::print("{:<16} {:.6g}\n", name, value); };
+    line("RMSE", e.rmse);
+    line("relMSE", e.rel_mse);
+    line("relMSE, trimmed", e.rel_mse_trimmed);
+    line("L1", e.l1);
+    line("MAPE", e.mape);
+    line("SMAPE", e.smape);
+    if (flip_result) line(is_hdr() ? "FLIP (HDR)" : "FLIP (LDR)", flip_result->mean);
+    line("mean ratio", e.mean_ratio);
+    if (e.ignored > 0) fmt::print("{} of {} pixels are above {} and count for means only\n", e.ignored, e.pixels, ignore_above);
+    if (e.not_finite > 0)
+        fmt::print("{} of {} pixels are infinite or not a number: left out\n", e.not_finite, e.pixels);
+}
+
+void DiffCommand::print_json(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const {
+    nlohmann::ordered_json j = {{"image", image},
+                                {"reference", reference},
+                                {"pixels", e.pixels},
+                                {"not_finite", e.not_finite},
+                                {"ignored", e.ignored},
+                                {"mse", e.mse},
+                                {"rmse", e.rmse},
+                                {"rel_mse", e.rel_mse},
+                                {"rel_mse_trimmed", e.rel_mse_trimmed},
+                                {"l1", e.l1},
+                                {"mape", e.mape},
+                                {"smape", e.smape},
+                                {"mean_ratio", e.mean_ratio}};
+    if (flip_result) j[is_hdr() ? "flip_hdr" : "flip_ldr"] = flip_result->mean;
+    fmt::print("{}\n", j.dump(2));
+}
+
+// PNG shows the errors in false colours; the other formats hold their values.
+void DiffCommand::write_map(const std::vector<float>& errors, int width, int height) const {
+    Image out(width, height, {"Y"});
+    out.data = errors;
+    if (std::filesystem::path(map).extension() == ".png") {
+        std::vector<Rgb> colours;
+        for (float v : errors) colours.push_back(magma(v));
+        out = rgb_image(width, height, colours);
+    }
+    write_image(map, out);
+}
+
+void DiffCommand::run() const {
+    if (!map.empty()) check_image_extension(map);
+    const Picture x = read(image), r = read_like(reference, x);
+    const Picture r2 = reference2.empty() ? Picture() : read_like(reference2, x);
+    const ImageErrors errors = image_errors(x.pixels, r.pixels, {r2.pixels, ignore_above});
+    const bool flip_map = !map.empty() && map_metric == "flip";
+    std::optional<FlipResult> flip_result;
+    if (flip != "none")
+        flip_result = is_hdr() ? hdr_flip(x.pixels, r.pixels, x.width, x.height)
+                               : ldr_flip(x.pixels, r.pixels, x.width, x.height);
+    if (flip_map && !flip_result) throw std::runtime_error("--map needs FLIP or --map-metric relse");
+    json ? print_json(errors, flip_result) : print(errors, flip_result);
+    if (!map.empty())
+        write_map(flip_map ? flip_result->map : relative_squared_errors(x.pixels, r.pixels, r2.pixels), x.width,
+                  x.height);
+}
+
+}  // namespace
+
+void add_diff_command(CLI::App& app) {
+    auto command = std::make_shared<DiffCommand>();
+    CLI::App& c = *app.add_subcommand("diff", "Compare an image with a reference");
+    c.add_option("IMAGE", command->image, "Image to judge")->required();
+    c.add_option("REFERENCE", command->reference, "Image of the same size to judge it by")->required();
+    c.add_option("--reference2", command->reference2, "A second, independent reference: takes the references' noise out of squared errors");
+    c.add_option("--layer", command->layer, "Compare this layer, e.g. albedo, instead of the picture");
+    c.add_option("--ignore-above", command->ignore_above, "Leave out pixels whose reference is brighter, such as lamps");
+    c.add_option("--flip", command->flip, "Which FLIP: hdr, ldr, none; auto: hdr for .exr, .pfm and .hdr")->capture_default_str()->check(CLI::IsMember({"auto", "hdr", "ldr", "none"}));
+    c.add_option("--map", command->map, "Write an error map: false colours to .png, values to .exr or .pfm");
+    c.add_option("--map-metric", command->map_metric, "Error of the map: flip, or relse for the summands of relMSE")->capture_default_str()->check(CLI::IsMember({"flip", "relse"}));
+    c.add_flag("--json", command->json, "Print JSON");
+    c.callback([command] { command->run(); });
+}
+
+}  // namespace etendue

@@ -1,0 +1,72 @@
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "scene_options.h"
+
+namespace etendue {
+namespace {
+
+std::string mebibytes(size_t bytes) {
+    return fmt::format("{:.1f} MiB", double(bytes) / (1 << 20));
+}
+
+void info(const SceneOptions& options, bool as_json) {
+    const Scene s = load_scene(options);
+    const Scene::Statistics& st = s.statistics();
+    const Bounds3& b = s.bounds();
+    double power = 0;
+    for (const auto& e : s.emitters()) power += e->power();
+    if (as_json) {
+        const nlohmann::json j{{"scene", s.file()},
+                               {"shapes", s.shapes().size()},
+                               {"triangles", st.triangles},
+                               {"quadrics", st.quadrics},
+                               {"instances", st.instances},
+                               {"materials", st.materials},
+                               {"textures", st.textures},
+                               {"emitters", s.emitters().size()},
+                               {"emitters_at_infinity", s.infinite_emitters().size()},
+                               {"emitted_power", power},
+                               {"bounds", {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}}},
+                               {"width", s.film().width},
+                               {"height", s.film().height},
+                               {"filter", s.filter().name()},
+                               {"geometry_bytes", st.geometry_bytes},
+                               {"texture_bytes", st.texture_bytes},
+                               {"accelerator_bytes", st.accelerator_bytes},
+                               {"warnings", s.warnings()}};
+        fmt::print("{}\n", j.dump(2));
+        return;
+    }
+    fmt::print("{}\n", s.file());
+    fmt::print("  image       {} x {}", s.film().width, s.film().height);
+    if (s.film().pixel_count() != uint64_t(s.film().width) * s.film().height)
+        fmt::print(", crop {} x {} at ({}, {})", s.film().crop_width, s.film().crop_height, s.film().crop_x, s.film().crop_y);
+    fmt::print(", {} filter\n", s.filter().name());
+    fmt::print("  rendering   {}, sampler {}, {} spp\n", s.defaults().integrator.empty() ? "path" : s.defaults().integrator, s.defaults().sampler, s.defaults().spp);
+    fmt::print("  shapes      {}: {} triangles, {} quadrics, {} instances\n", s.shapes().size(), st.triangles, st.quadrics, st.instances);
+    fmt::print("  materials   {}\n", st.materials);
+    fmt::print("  textures    {}\n", st.textures);
+    fmt::print("  emitters    {}, of them {} at infinity; {:.6g} W (luminance)\n", s.emitters().size(), s.infinite_emitters().size(), power);
+    if (!b.is_empty()) fmt::print("  bounds      ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g})\n", b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z);
+    fmt::print("  memory      geometry {}, hierarchy {}, textures {}\n", mebibytes(st.geometry_bytes), mebibytes(st.accelerator_bytes), mebibytes(st.texture_bytes));
+    for (const std::string& w : s.warnings()) fmt::print("  warning     {}\n", w);
+}
+
+}  // namespace
+
+void add_info_command(CLI::App& app) {
+    struct Options {
+        SceneOptions scene;
+        bool json = false;
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App& c = *app.add_subcommand("info", "Tell what is in a scene");
+    options->scene.add_to(c);
+    c.add_flag("--json", options->json, "As JSON");
+    c.callback([options] { info(options->scene, options->json); });
+}
+
+}  // namespace etendue

@@ -1,0 +1,14 @@
+find_package(Threads REQUIRED)
+find_package(TBB REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(pugixml REQUIRED)
+find_package(OpenImageIO REQUIRED)
+find_package(ZLIB REQUIRED)
+
+# Embree 3.13 is what Debian 12 has; the code also compiles against 4.
+find_package(embree 4 QUIET)
+if(NOT embree_FOUND)
+    find_package(embree 3.13 REQUIRED)
+endif()
+message(STATUS "Embree ${embree_VERSION}")

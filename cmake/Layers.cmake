@@ -1,0 +1,42 @@
+# One static library per folder of src/. A layer sees its own headers and those of the layers it names, nothing
+# else: each folder is reached through a directory that holds a link to that folder alone, so that
+# #include "scene/scene.h" does not compile in a layer below the scene.
+
+set(ETENDUE_LAYER_INCLUDES ${CMAKE_BINARY_DIR}/layers)
+
+add_library(etendue_options INTERFACE)
+target_compile_features(etendue_options INTERFACE cxx_std_20)
+target_compile_options(etendue_options INTERFACE
+    -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
+    $<IF:$<CXX_COMPILER_ID:GNU>,-Wshadow=local,-Wshadow> -Werror
+    -fno-math-errno -fno-trapping-math)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # GCC 12 fires these in inlined code of optionals, variants and strings where nothing is wrong (GCC bug 105329).
+    target_compile_options(etendue_options INTERFACE -Wno-maybe-uninitialized -Wno-restrict)
+endif()
+if(ETENDUE_ARCH)
+    target_compile_options(etendue_options INTERFACE -march=${ETENDUE_ARCH})
+endif()
+if(ETENDUE_SANITIZE)
+    target_compile_options(etendue_options INTERFACE
+        -fsanitize=${ETENDUE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_link_options(etendue_options INTERFACE -fsanitize=${ETENDUE_SANITIZE})
+endif()
+
+# etendue_layer(NAME [DEPENDS layers or targets...]): every *.cpp of the folder.
+function(etendue_layer name)
+    cmake_parse_arguments(ARG "" "" "DEPENDS;PRIVATE" ${ARGN})
+    file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cpp)
+    set(include ${ETENDUE_LAYER_INCLUDES}/${name})
+    file(MAKE_DIRECTORY ${include})
+    file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR}/${name} ${include}/${name} SYMBOLIC)
+    if(sources)
+        add_library(${name} STATIC ${sources})
+        target_include_directories(${name} PUBLIC ${include})
+        target_link_libraries(${name} PUBLIC etendue_options ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE})
+    else()
+        add_library(${name} INTERFACE)
+        target_include_directories(${name} INTERFACE ${include})
+        target_link_libraries(${name} INTERFACE etendue_options ${ARG_DEPENDS})
+    endif()
+endfunction()

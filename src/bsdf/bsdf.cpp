@@ -1,0 +1,142 @@
+#include "bsdf/bsdf.h"
+
+namespace etendue {
+
+static_assert(sizeof(Lobe) <= 64 && std::is_trivially_copyable_v<Lobe>);
+
+namespace {
+
+/// One component seen with the geometric normal: its local directions, and what they do to the lobe's value.
+class Side {
+public:
+    Side(Vec3 ng, const BsdfComponent& c, Vec3 wo) : c_(c), ng_(dot(ng, c.frame.n) < 0 ? -ng : ng), wo_(local(wo)) {}
+
+    struct Local {
+        Vec3 w;    ///< In the shading frame.
+        float ng;  ///< cos to the geometric normal, turned to the side of the shading normal.
+        /// Whether both normals see the direction on the same side; nothing scatters otherwise.
+        bool is_consistent() const { return w.z * ng > 0; }
+    };
+    Local local(Vec3 w) const { return {c_.frame.to_local(w), dot(w, ng_)}; }
+    const Local& wo() const { return wo_; }
+
+    /// From the lobe's f|wi·ns| to f̃|wi·ng|: radiance loses η² at refraction, importance is corrected for the shading
+    /// normal [Veach 1997, p. 155].
+    float correction(const Local& wi, float eta, TransportMode mode) const {
+        if (mode == TransportMode::Radiance) return 1 / sqr(eta);
+        return std::fabs(wo_.w.z * wi.ng / (wo_.ng * wi.w.z));
+    }
+
+private:
+    const BsdfComponent& c_;
+    Vec3 ng_;
+    Local wo_;
+};
+
+BsdfEval eval_lobe(const Lobe& lobe, Vec3 wo, Vec3 wi) {
+    if (const auto* diffuse = std::get_if<DiffuseLobe>(&lobe)) return diffuse->eval(wo, wi);
+    return std::visit([&](const auto& l) { return l.eval(wo, wi); }, lobe);
+}
+
+std::optional<BsdfSample> sample_lobe(const Lobe& lobe, Vec3 wo, float u_lobe, Vec2 u) {
+    if (const auto* diffuse = std::get_if<DiffuseLobe>(&lobe)) return diffuse->sample(wo, u_lobe, u);
+    return std::visit([&](const auto& l) { return l.sample(wo, u_lobe, u); }, lobe);
+}
+
+BsdfEval eval_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, Vec3 wi, TransportMode mode) {
+    const Side side(ng, c, wo);
+    const Side::Local i = side.local(wi);
+    if (!side.wo().is_consistent() || !i.is_consistent()) return {};
+    BsdfEval e = eval_lobe(c.lobe, side.wo().w, i.w);
+    e.f *= c.weight * side.correction(i, e.eta, mode);
+    e.pdf *= c.weight;
+    e.pdf_rev *= c.weight;
+    return e;
+}
+
+/// As if `c` were chosen for certain.
+std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, float u_lobe, Vec2 u,
+                                           TransportMode mode) {
+    const Side side(ng, c, wo);
+    if (!side.wo().is_consistent()) return {};
+    std::optional<BsdfSample> s = sample_lobe(c.lobe, side.wo().w, u_lobe, u);
+    if (!s) return {};
+    const Vec3 local_wi = s->wi;
+    s->wi = c.frame.to_world(local_wi);
+    const Side::Local i{local_wi, side.local(s->wi).ng};
+    if (!i.is_consistent()) return {};
+    s->weight *= side.correction(i, s->eta, mode);
+    s->pdf *= c.weight;
+    s->pdf_rev *= c.weight;
+    return s;
+}
+
+/// Adds another component's share; η is that of whoever has a value.
+void add(BsdfEval& sum, const BsdfEval& e) {
+    if (sum.f.is_zero()) sum.eta = e.eta;
+    sum.f += e.f;
+    sum.pdf += e.pdf;
+    sum.pdf_rev += e.pdf_rev;
+}
+
+}  // namespace
+
+BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
+    BsdfEval sum = eval_component(ng_, first_, wo, wi, mode);
+    for (const BsdfComponent* c = first_.next; c; c = c->next) add(sum, eval_component(ng_, *c, wo, wi, mode));
+    return sum;
+}
+
+std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const {
+    const BsdfComponent* chosen = &first_;
+    while (chosen && u_lobe >= chosen->weight) {
+        u_lobe -= chosen->weight;
+        chosen = chosen->next;
+    }
+    if (!chosen) return {};  // beyond the sum of the weights
+    u_lobe = std::fmin(u_lobe / chosen->weight, kOneMinusEpsilon);
+    std::optional<BsdfSample> s = sample_component(ng_, *chosen, wo, u_lobe, u, mode);
+    const bool is_mixture = first_.next != nullptr;
+    if (!s || s->is_delta || !is_mixture) return s;
+
+    // The other components sample the same direction: weight = Σ f / Σ pdf.
+    BsdfEval sum{s->weight * s->pdf, s->pdf, s->pdf_rev, s->eta};
+    for (const BsdfComponent* c = &first_; c; c = c->next)
+        if (c != chosen) add(sum, eval_component(ng_, *c, wo, s->wi, mode));
+    s->weight = sum.f / sum.pdf;
+    s->pdf = sum.pdf;
+    s->pdf_rev = sum.pdf_rev;
+    return s;
+}
+
+bool Bsdf::has_smooth() const {
+    for (const BsdfComponent* c = &first_; c; c = c->next)
+        if (std::visit([](const auto& l) { return l.has_smooth(); }, c->lobe)) return true;
+    return false;
+}
+
+bool Bsdf::has_delta() const {
+    for (const BsdfComponent* c = &first_; c; c = c->next)
+        if (std::visit([](const auto& l) { return l.has_delta(); }, c->lobe)) return true;
+    return false;
+}
+
+float Bsdf::roughness() const {
+    float sharpest = kInf;
+    for (const BsdfComponent* c = &first_; c; c = c->next)
+        std::visit(
+            [&](const auto& l) {
+                if (l.has_smooth()) sharpest = std::fmin(sharpest, l.roughness());
+            },
+            c->lobe);
+    return std::isfinite(sharpest) ? sharpest : 0;
+}
+
+Rgb Bsdf::albedo_estimate() const {
+    Rgb sum;
+    for (const BsdfComponent* c = &first_; c; c = c->next)
+        sum += std::visit([](const auto& l) { return l.albedo_estimate(); }, c->lobe) * c->weight;
+    return sum;
+}
+
+}  // namespace etendue

@@ -1,0 +1,59 @@
+#pragma once
+// Scattering at a surface point in world space. `Bsdf` puts one lobe, or a mixture of lobes, into its shading frame and
+// applies, in one place, what depends on the direction of transport: the shading-normal correction and the η² of
+// refraction [Veach 1997, §5.2–5.3].
+
+#include <variant>
+
+#include "bsdf/conductor.h"
+#include "bsdf/dielectric.h"
+#include "bsdf/diffuse.h"
+#include "bsdf/phong.h"
+#include "bsdf/plastic.h"
+#include "bsdf/principled.h"
+#include "bsdf/roughconductor.h"
+#include "bsdf/roughdielectric.h"
+#include "bsdf/roughplastic.h"
+#include "bsdf/thindielectric.h"
+
+namespace etendue {
+
+/// The closed set of lobes; trivially copyable, at most 64 bytes each.
+using Lobe = std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, DielectricLobe, ThinDielectricLobe,
+                          RoughDielectricLobe, PlasticLobe, RoughPlasticLobe, PhongLobe, PrincipledLobe>;
+
+/// One lobe in its shading frame; a mixture is a list of them whose weights sum to one.
+struct BsdfComponent {
+    Frame frame;
+    Lobe lobe;
+    float weight = 1;
+    const BsdfComponent* next = nullptr;  ///< In the arena of the walk that made it; nullptr for the last.
+};
+
+/// Everything that scatters at one surface point.
+class Bsdf {
+public:
+    Bsdf() = default;
+    Bsdf(Vec3 ng, const BsdfComponent& first) : ng_(ng), first_(first) {}
+
+    /// Path-space scattering value for the edge pair: f̃(…)·|wi·ng|, where f̃ is the radiance BSDF for light arriving
+    /// from the light's side and leaving to the eye's, corrected for shading normals; with pdfs in solid angle.
+    /// `wo` points to the predecessor of the walk in `mode`. Zero where `wi` or `wo` lies on different sides of the
+    /// geometric and the shading surface.
+    BsdfEval eval(Vec3 wo, Vec3 wi, TransportMode mode) const;
+    /// A direction with weight f̃·|wi·ng| / pdf; nothing where the walk ends.
+    std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const;
+
+    bool has_smooth() const;
+    bool has_delta() const;
+    /// α of the sharpest smooth lobe, 0 where there is only a delta one.
+    float roughness() const;
+    Rgb albedo_estimate() const;
+    Vec3 shading_normal() const { return first_.frame.n; }
+
+private:
+    Vec3 ng_;
+    BsdfComponent first_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,61 @@
+// Bump mapping [Blinn 1978]: shades a material with the normal of the surface displaced along its
+// normal.
+//   displacement (required)  texture of heights in units of the scene; its name may be left out
+//   scale (1)                factor of the heights
+//   nested: one bsdf
+// With the height h(u, v) the tangents become ∂p/∂u + n ∂h/∂u and ∂p/∂v + n ∂h/∂v, both with their
+// parts along n replaced; the change of n along the surface is neglected. Inside a two-sided
+// material the bumps stand out on both sides. Surfaces without tangents stay as they are.
+
+#include "bsdf/wrapper.h"
+
+namespace etendue {
+namespace {
+
+class BumpMap final : public WrapperMaterial {
+public:
+    BumpMap(const Params& params, MaterialContext& context)
+        : WrapperMaterial(params, context), scale_(params.number("scale", 1)) {
+        refuse_view_dependence(params);
+        const auto textures = params.children("texture");
+        if (textures.size() > 1 || (textures.empty() && !params.has("displacement")))
+            params.fail("bsdf \"bumpmap\" must hold exactly one texture, the displacement");
+        height_ = context.texture(params, textures.empty() ? "displacement" : textures.front().name,
+                                  Rgb(0));
+    }
+
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
+        nested_->append(point, bumped(point, frame), weight, list);
+    }
+
+private:
+    Frame bumped(const SurfacePoint& point, const Frame& frame) const {
+        if (height_.is_constant()) return frame;
+        const Vec2 slope = height_.texture()->gradient(point.uv) * scale_;
+        const Vec3 n = frame.n;
+        const Vec3 normal = cross(point.dpdu + n * (slope.x - dot(n, point.dpdu)),
+                                  point.dpdv + n * (slope.y - dot(n, point.dpdv)));
+        return perturbed_frame(point, frame, dot(normal, n) < 0 ? -normal : normal);
+    }
+
+    TextureRef height_;
+    float scale_;
+};
+
+}  // namespace
+
+MaterialEntry bumpmap_entry() {
+    return {{"bsdf",
+             "bumpmap",
+             "Shades a material with the normals of a displaced surface [Blinn 1978].",
+             {{"displacement", ParamKind::Texture, "",
+               "Heights in units of the scene; an unnamed texture will do."},
+              {"scale", ParamKind::Float, "1", "Factor of the heights."},
+              {"flip_invalid_normals", ParamKind::Bool, "false", kFlipInvalidNormalsDoc},
+              {"use_shadowing_function", ParamKind::Bool, "false", kShadowingFunctionDoc},
+              {"bsdf", ParamKind::Object, "", "The nested material."}}},
+            make_material<BumpMap>};
+}
+
+}  // namespace etendue

@@ -1,0 +1,37 @@
+#pragma once
+
+#include "bsdf/fresnel.h"
+
+namespace etendue {
+
+/// Smooth boundary between two dielectrics: reflection with probability F, refraction with 1 − F.
+struct DielectricLobe {
+    float eta;                       ///< η below the surface (side of −n) over η above.
+    Rgb reflectance, transmittance;  ///< Factors on F and 1 − F.
+
+    BsdfEval eval(Vec3 /*wo*/, Vec3 /*wi*/) const { return {}; }
+    std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 /*u*/) const {
+        if (wo.z == 0) return {};
+        // F is the same from both ends of a refracted path, and so is the choice by it.
+        const DielectricFresnel fresnel = fresnel_dielectric(wo.z, eta);
+        if (u_lobe < fresnel.R)
+            return BsdfSample{.wi = reflect(wo),
+                              .weight = reflectance,
+                              .pdf = fresnel.R,
+                              .pdf_rev = fresnel.R,
+                              .is_delta = true};
+        const float T = 1 - fresnel.R;
+        return BsdfSample{.wi = normalize(refract(wo, fresnel)),
+                          .weight = transmittance,
+                          .pdf = T,
+                          .pdf_rev = T,
+                          .eta = fresnel.eta,
+                          .is_delta = true};
+    }
+    Rgb albedo_estimate() const { return lerp(fresnel_dielectric(1, eta).R, transmittance, reflectance); }
+    float roughness() const { return 0; }
+    bool has_smooth() const { return false; }
+    bool has_delta() const { return true; }
+};
+
+}  // namespace etendue

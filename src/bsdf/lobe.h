@@ -1,0 +1,49 @@
+#pragma once
+// A lobe is one closed-form scattering model with its parameters looked up. It works in local coordinates (z = shading
+// normal) and knows nothing of the direction of transport; `Bsdf` (bsdf.h) adds that.
+
+#include <cstdint>
+#include <optional>
+
+#include "color/rgb.h"
+#include "math/frame.h"
+
+namespace etendue {
+
+/// What the walk carries: radiance from the eye (`wo` points toward the eye's side), importance from a light.
+enum class TransportMode : uint8_t { Radiance, Importance };
+
+/// Value of the smooth part of a lobe for a pair of directions. Delta components contribute nothing here.
+struct BsdfEval {
+    Rgb f;              ///< f(wo, wi)·|cos θ_i|, in the convention of importance transport (no η² of radiance).
+    float pdf = 0;      ///< Solid-angle density of sampling wi from wo, lobe choice included, not renormalised.
+    float pdf_rev = 0;  ///< The same for sampling wo from wi.
+    /// η on wi's side over η on wo's side; 1 for reflection.
+    float eta = 1;
+};
+
+struct BsdfSample {
+    Vec3 wi;
+    Rgb weight;         ///< f·|cos θ_i| / pdf in the convention of BsdfEval::f; for a delta event f / pmf.
+    float pdf = 0;      ///< As BsdfEval; for a delta event its discrete probability.
+    float pdf_rev = 0;  ///< As BsdfEval; for a delta event the discrete probability of the reverse event.
+    float eta = 1;      ///< As BsdfEval.
+    bool is_delta = false;
+};
+
+/// The sample of a smooth lobe from its value and densities; nothing where it cannot have been sampled.
+inline std::optional<BsdfSample> make_sample(Vec3 wi, const BsdfEval& e) {
+    if (!(e.pdf > 0)) return {};
+    return BsdfSample{.wi = wi, .weight = e.f / e.pdf, .pdf = e.pdf, .pdf_rev = e.pdf_rev, .eta = e.eta};
+}
+
+// ---- Lobes: each has
+//   BsdfEval eval(Vec3 wo, Vec3 wi) const
+//   std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const      nothing where the walk ends
+//   Rgb albedo_estimate() const       rough hemispherical reflectance, for AOVs and heuristics
+//   float roughness() const           GGX-like α of the *sharpest smooth* lobe: 0 delta only … 1 diffuse
+//   bool has_smooth() const, has_delta() const
+// `wo` and `wi` are unit vectors in local coordinates, away from the surface. A reflecting-only lobe is black for
+// wo.z <= 0 (Material's two-sided wrapper turns the frame). A smooth lobe may share its model with a delta one.
+
+}  // namespace etendue

@@ -1,0 +1,46 @@
+// Opacity mask: a ray meets the nested material with probability `opacity`, else it passes
+// unchanged.
+//   opacity (0.5)  number or texture; values above one count as one
+//   nested: one bsdf
+// The walk of rays decides about passing; where a ray does meet the surface, the nested material is
+// not scaled.
+
+#include "bsdf/wrapper.h"
+
+namespace etendue {
+namespace {
+
+class Mask final : public WrapperMaterial {
+public:
+    Mask(const Params& params, MaterialContext& context)
+        : WrapperMaterial(params, context),
+          opacity_(context.texture(params, "opacity", Rgb(0.5f), 1)) {}
+
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
+        nested_->append(point, frame, weight, list);
+    }
+    float opacity(Vec2 uv) const override {
+        return clamp(opacity_.eval_scalar(uv), 0, 1) * nested_->opacity(uv);
+    }
+    bool is_opaque() const override {
+        return nested_->is_opaque() && opacity_.is_constant() && opacity_.eval_scalar({}) >= 1;
+    }
+
+private:
+    TextureRef opacity_;
+};
+
+}  // namespace
+
+MaterialEntry mask_entry() {
+    return {{"bsdf",
+             "mask",
+             "Lets light pass through a material where its opacity is below one.",
+             {{"opacity", ParamKind::Texture, "0.5",
+               "Probability that a ray meets the surface, in [0, 1]."},
+              {"bsdf", ParamKind::Object, "", "The nested material."}}},
+            make_material<Mask>};
+}
+
+}  // namespace etendue

@@ -1,0 +1,97 @@
+#pragma once
+// Materials: what a scene file's <bsdf> becomes. A material looks up its textures at a surface point and returns the
+// `Bsdf` there; it is immutable and shared by all threads.
+
+#include <deque>
+#include <memory>
+
+#include "bsdf/bsdf.h"
+#include "description/params.h"
+#include "texture/texture.h"
+
+namespace etendue {
+
+/// A point on a surface as materials see it. Directions are unit vectors.
+struct SurfacePoint {
+    Vec3 p;
+    Vec3 ng;          ///< Geometric normal of the shape's own orientation (not turned toward wo).
+    Vec3 ns;          ///< Interpolated normal, on ng's side.
+    Vec3 dpdu, dpdv;  ///< Tangents; may be zero where there is no parametrisation.
+    Vec2 uv;
+    Vec3 wo;          ///< Toward the predecessor.
+};
+
+/// Where mixtures keep their second and further components until the walk is over; reset() keeps the memory.
+class ComponentArena {
+public:
+    const BsdfComponent* keep(const BsdfComponent& c) {
+        if (used_ == store_.size()) store_.emplace_back();
+        store_[used_] = c;
+        return &store_[used_++];
+    }
+    void reset() { used_ = 0; }
+
+private:
+    std::deque<BsdfComponent> store_;
+    size_t used_ = 0;
+};
+
+class Material {
+public:
+    virtual ~Material() = default;
+    /// Adds this material's lobes at `point`, scaled by `weight`, in `frame` (whose n is the shading normal to use;
+    /// a two-sided material turns it toward wo). Components are appended to `list`.
+    virtual void append(const SurfacePoint& point, const Frame& frame, float weight, class ComponentList& list) const = 0;
+    /// Probability that a ray meets the surface at all; 1 unless masked. 0 everywhere for `null`.
+    virtual float opacity(Vec2) const { return 1; }
+    virtual bool is_opaque() const { return true; }  ///< opacity is 1 everywhere
+    /// Whether light can pass (so that both sides of the surface see each other).
+    virtual bool is_transmissive() const { return false; }
+    virtual bool is_two_sided() const { return is_transmissive(); }
+    /// False where every lobe at every point is delta: no connection can ever be made there.
+    virtual bool may_be_smooth() const { return true; }
+    /// Whether SurfacePoint::dpdu and dpdv matter.
+    virtual bool needs_tangents() const { return true; }
+    /// Average reflectance for `info` and for heuristics.
+    virtual Rgb mean_albedo() const = 0;
+
+    Bsdf bsdf(const SurfacePoint& point, ComponentArena& arena) const;
+};
+
+/// Gathers components while a material tree is walked, first one inline and the rest in the arena.
+class ComponentList {
+public:
+    explicit ComponentList(ComponentArena& arena) : arena_(&arena) {}
+    void add(const Frame& frame, const Lobe& lobe, float weight);
+    bool empty() const { return count_ == 0; }
+    const BsdfComponent& first() const { return first_; }
+
+private:
+    ComponentArena* arena_;
+    BsdfComponent first_;
+    int count_ = 0;
+};
+
+/// What a material's maker may ask of the scene builder.
+class MaterialContext {
+public:
+    virtual ~MaterialContext() = default;
+    /// Colour or texture parameter; checks that constants lie in [0, hi]. An empty name is the unnamed texture child.
+    virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback, float hi = kInf) = 0;
+    /// The nested materials in file order.
+    virtual std::vector<const Material*> nested(const Params& params) = 0;
+};
+
+struct MaterialEntry {
+    PluginInfo info;
+    std::unique_ptr<Material> (*make)(const Params& params, MaterialContext& context);
+};
+/// The `make` of a material class with a constructor from the same arguments.
+template <class M>
+std::unique_ptr<Material> make_material(const Params& params, MaterialContext& context) {
+    return std::make_unique<M>(params, context);
+}
+/// All BSDF plug-ins, in the order `list` prints them.
+const std::vector<MaterialEntry>& material_registry();
+
+}  // namespace etendue

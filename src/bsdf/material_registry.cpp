@@ -1,0 +1,32 @@
+#include "bsdf/material.h"
+
+namespace etendue {
+
+MaterialEntry diffuse_entry();
+MaterialEntry conductor_entry();
+MaterialEntry roughconductor_entry();
+MaterialEntry dielectric_entry();
+MaterialEntry thindielectric_entry();
+MaterialEntry roughdielectric_entry();
+MaterialEntry plastic_entry();
+MaterialEntry roughplastic_entry();
+MaterialEntry phong_entry();
+MaterialEntry principled_entry();
+MaterialEntry twosided_entry();
+MaterialEntry mask_entry();
+MaterialEntry blendbsdf_entry();
+MaterialEntry bumpmap_entry();
+MaterialEntry normalmap_entry();
+MaterialEntry null_entry();
+
+const std::vector<MaterialEntry>& material_registry() {
+    static const std::vector<MaterialEntry> entries = {
+        diffuse_entry(),   conductor_entry(),      roughconductor_entry(),  dielectric_entry(),
+        plastic_entry(),   thindielectric_entry(), roughdielectric_entry(), roughplastic_entry(),
+        phong_entry(),     principled_entry(),     twosided_entry(),        mask_entry(),
+        blendbsdf_entry(), bumpmap_entry(),        normalmap_entry(),       null_entry(),
+    };
+    return entries;
+}
+
+}  // namespace etendue

@@ -1,0 +1,48 @@
+// Normal mapping: shades a material with normals from a texture.
+//   normalmap (required)  texture of (n + 1)/2 in the shading frame with x along ∂p/∂u; raw, not
+//                         sRGB
+//   nested: one bsdf
+// Inside a two-sided material the tilt is the same on both sides, as in Mitsuba 3.
+
+#include "bsdf/wrapper.h"
+
+namespace etendue {
+namespace {
+
+class NormalMap final : public WrapperMaterial {
+public:
+    NormalMap(const Params& params, MaterialContext& context) : WrapperMaterial(params, context) {
+        refuse_view_dependence(params);
+        if (!params.has("normalmap"))
+            params.fail("bsdf \"normalmap\" needs a texture \"normalmap\"");
+        normals_ = context.texture(params, "normalmap", Rgb(0.5f, 0.5f, 1), 1);
+    }
+
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
+        const Rgb c = normals_.eval(point.uv);
+        // A frame turned by a two-sided material has its t reversed with n; the map's y has not.
+        const float t_sign = dot(frame.n, point.ng) < 0 ? -1.0f : 1.0f;
+        const Vec3 n = frame.to_world({2 * c.r - 1, (2 * c.g - 1) * t_sign, 2 * c.b - 1});
+        nested_->append(point, perturbed_frame(point, frame, n), weight, list);
+    }
+
+private:
+    TextureRef normals_;
+};
+
+}  // namespace
+
+MaterialEntry normalmap_entry() {
+    return {{"bsdf",
+             "normalmap",
+             "Shades a material with normals from a texture.",
+             {{"normalmap", ParamKind::Texture, "",
+               "Raw texture of (n + 1)/2 in the shading frame; required."},
+              {"flip_invalid_normals", ParamKind::Bool, "false", kFlipInvalidNormalsDoc},
+              {"use_shadowing_function", ParamKind::Bool, "false", kShadowingFunctionDoc},
+              {"bsdf", ParamKind::Object, "", "The nested material."}}},
+            make_material<NormalMap>};
+}
+
+}  // namespace etendue

@@ -1,0 +1,89 @@
+// Modified Phong model [Lafortune & Willems 1994], made reciprocal: a diffuse part and a cosine
+// lobe about the mirror direction, as in Mitsuba 0.6.
+//   diffuse_reflectance (0.5)   colour or texture in [0, 1]
+//   specular_reflectance (0.2)  colour or texture in [0, 1]
+//   exponent (30)               number or texture, at least 0
+// Where the two colours add up to more than one, both are scaled down. The part of the lobe below
+// the surface is lost. One-sided.
+
+#include "bsdf/phong.h"
+
+#include "bsdf/material.h"
+#include "math/warp.h"
+
+namespace etendue {
+
+BsdfEval PhongLobe::eval(Vec3 wo, Vec3 wi) const {
+    if (!(wo.z > 0 && wi.z > 0)) return {};
+    const float cos_alpha = dot(reflect(wo), wi);
+    const float lobe = cos_alpha > 0 ? std::pow(cos_alpha, exponent) * (0.5f * kInvPi) : 0;
+    const float specular_pdf = specular_probability * (exponent + 1) * lobe;
+    const float diffuse_share = (1 - specular_probability) * kInvPi;
+    return {.f = (diffuse * kInvPi + specular * ((exponent + 2) * lobe)) * wi.z,
+            .pdf = specular_pdf + diffuse_share * wi.z,
+            .pdf_rev = specular_pdf + diffuse_share * wo.z};
+}
+
+std::optional<BsdfSample> PhongLobe::sample(Vec3 wo, float u_lobe, Vec2 u) const {
+    if (!(wo.z > 0)) return {};
+    if (u_lobe >= specular_probability) {
+        const Vec3 wi = sample_cosine_hemisphere(u);
+        return make_sample(wi, eval(wo, wi));
+    }
+    // Density (n + 1)/(2π) cosⁿ α about the mirror direction; what falls below the surface ends the
+    // walk.
+    const float cos_alpha = std::pow(u.x, 1 / (exponent + 1)),
+                sin_alpha = safe_sqrt(1 - sqr(cos_alpha));
+    float s, c;
+    sincosf(2 * kPi * u.y, &s, &c);
+    const Vec3 wi = normalize(
+        Frame::from_normal(reflect(wo)).to_world({sin_alpha * c, sin_alpha * s, cos_alpha}));
+    return make_sample(wi, eval(wo, wi));
+}
+
+namespace {
+
+class Phong final : public Material {
+public:
+    Phong(const Params& params, MaterialContext& context)
+        : diffuse_(context.texture(params, "diffuse_reflectance", Rgb(0.5f), 1)),
+          specular_(context.texture(params, "specular_reflectance", Rgb(0.2f), 1)),
+          exponent_(context.texture(params, "exponent", Rgb(30))) {}
+
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
+        const Rgb d = diffuse_.eval(point.uv), s = specular_.eval(point.uv);
+        const float excess = std::max((d + s).max(), 1.0f), sum = d.mean() + s.mean();
+        list.add(frame,
+                 PhongLobe{.diffuse = d / excess,
+                           .specular = s / excess,
+                           .exponent = exponent_.eval_scalar(point.uv),
+                           .specular_probability = sum > 0 ? s.mean() / sum : 0},
+                 weight);
+    }
+    Rgb mean_albedo() const override {
+        const Rgb sum = diffuse_.mean() + specular_.mean();
+        return sum / std::max(sum.max(), 1.0f);
+    }
+
+private:
+    TextureRef diffuse_, specular_, exponent_;
+};
+
+}  // namespace
+
+MaterialEntry phong_entry() {
+    return {
+        {"bsdf",
+         "phong",
+         "Modified Phong model: diffuse, and a cosine lobe about the mirror direction [Lafortune & "
+         "Willems 1994].",
+         {{"diffuse_reflectance", ParamKind::Texture, "0.5",
+           "Albedo of the diffuse part, in [0, 1]."},
+          {"specular_reflectance", ParamKind::Texture, "0.2",
+           "Albedo of the lobe at normal incidence, in [0, 1]."},
+          {"exponent", ParamKind::Texture, "30", "Exponent of the lobe's cosine, at least 0."}}},
+        make_material<Phong>};
+}
+
+}  // namespace etendue

@@ -1,0 +1,51 @@
+#pragma once
+
+#include "bsdf/fresnel.h"
+#include "math/warp.h"
+
+namespace etendue {
+
+/// Probability of the specular one of two parts that get `F` and 1 − `F` of the light, with
+/// `specular_share` the share of the specular colour in the sum of both colours.
+inline float coat_probability(float F, float specular_share) {
+    const float s = F * specular_share, d = (1 - F) * (1 - specular_share);
+    return s + d > 0 ? s / (s + d) : 0;
+}
+
+/// Smooth dielectric coat over a diffuse base: a mirror reflection ρ_s F(θo) and
+///     f = (1 − F(θo)) (1 − F(θi)) ρ_d / π.
+struct PlasticLobe {
+    Rgb diffuse;           ///< ρ_d, see PlasticParams::eval.
+    Rgb specular;          ///< ρ_s
+    float eta;             ///< η of the coat over η outside.
+    float specular_share;  ///< As for coat_probability.
+
+    BsdfEval eval(Vec3 wo, Vec3 wi) const {
+        if (!(wo.z > 0 && wi.z > 0)) return {};
+        const float Fo = fresnel_dielectric(wo.z, eta).R, Fi = fresnel_dielectric(wi.z, eta).R;
+        return {.f = diffuse * ((1 - Fo) * (1 - Fi) * wi.z * kInvPi),
+                .pdf = (1 - coat_probability(Fo, specular_share)) * wi.z * kInvPi,
+                .pdf_rev = (1 - coat_probability(Fi, specular_share)) * wo.z * kInvPi};
+    }
+    std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const {
+        if (!(wo.z > 0)) return {};
+        const float F = fresnel_dielectric(wo.z, eta).R, q = coat_probability(F, specular_share);
+        if (u_lobe < q)
+            return BsdfSample{.wi = reflect(wo),
+                              .weight = specular * (F / q),
+                              .pdf = q,
+                              .pdf_rev = q,
+                              .is_delta = true};
+        const Vec3 wi = sample_cosine_hemisphere(u);
+        return make_sample(wi, eval(wo, wi));
+    }
+    Rgb albedo_estimate() const {
+        const float F = fresnel_dielectric(1, eta).R;
+        return specular * F + diffuse * sqr(1 - F);
+    }
+    float roughness() const { return 1; }
+    bool has_smooth() const { return true; }
+    bool has_delta() const { return true; }
+};
+
+}  // namespace etendue

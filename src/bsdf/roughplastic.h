@@ -1,0 +1,57 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+
+#include "bsdf/microfacet.h"
+#include "bsdf/plastic.h"
+
+namespace etendue {
+
+/// Rough transmittance T(θ) of a dielectric boundary: the share of light from outside that is
+/// refracted at a first facet and leaves it unhindered.
+class RoughTransmittance {
+public:
+    /// `eta` is η of the inside over η outside.
+    RoughTransmittance(const Microfacet& distribution, float eta);
+
+    /// T at `cos_theta` >= 0 from `table()`.
+    static float lookup(const float* table, float cos_theta) {
+        const float x = cos_theta * (kSize - 1);
+        const int i = std::min(int(x), kSize - 2);
+        return lerp(x - float(i), table[i], table[i + 1]);
+    }
+    const float* table() const { return external_.data(); }
+    /// Share of diffuse light from inside that is reflected at a first facet.
+    float internal_reflectance() const { return internal_reflectance_; }
+
+private:
+    static constexpr int kSize = 64;
+
+    std::array<float, kSize> external_;
+    float internal_reflectance_;
+};
+
+/// Rough dielectric coat over a diffuse base:
+///     f = ρ_s F(wo·m) D(m) G(wo, wi) / (4 cos θo cos θi) + T(θo) T(θi) ρ_d / π,
+/// with the rough transmittance T(θ) in place of the 1 − F(θ) of smooth plastic.
+struct RoughPlasticLobe {
+    Rgb diffuse;   ///< ρ_d, see PlasticParams::eval.
+    Rgb specular;  ///< ρ_s
+    Microfacet distribution;
+    float eta;                   ///< η of the coat over η outside.
+    float specular_share;        ///< As for coat_probability.
+    const float* transmittance;  ///< table() of the material's RoughTransmittance.
+
+    BsdfEval eval(Vec3 wo, Vec3 wi) const;
+    std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const;
+    Rgb albedo_estimate() const {
+        const float T = RoughTransmittance::lookup(transmittance, 1);
+        return specular * (1 - T) + diffuse * sqr(T);
+    }
+    float roughness() const { return distribution.min_alpha(); }
+    bool has_smooth() const { return true; }
+    bool has_delta() const { return false; }
+};
+
+}  // namespace etendue

@@ -1,0 +1,61 @@
+// Makes a reflecting material visible from both sides.
+//   nested: one bsdf for both sides, or two, the first where the normal points, the second behind
+// The frame is turned toward the side of the geometric surface that wo is on. What is nested must
+// reflect only.
+
+#include "bsdf/wrapper.h"
+
+namespace etendue {
+namespace {
+
+class TwoSided final : public Material {
+public:
+    TwoSided(const Params& params, MaterialContext& context) {
+        const auto nested = nested_materials(params, context, 1, 2);
+        for (const Material* m : nested)
+            if (m->is_transmissive() || !m->is_opaque())
+                params.fail("bsdf \"twosided\" can hold only materials that reflect, none that "
+                            "lets light pass "
+                            "(put a \"mask\" around the \"twosided\" instead)");
+        front_ = nested.front();
+        back_ = nested.back();
+    }
+
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
+        // Relative to the given frame, which an outer material may have turned already.
+        const bool is_front = (dot(point.wo, point.ng) < 0) == (dot(frame.n, point.ng) < 0);
+        if (is_front)
+            front_->append(point, frame, weight, list);
+        else
+            back_->append(point, frame.flipped(), weight, list);
+    }
+    bool is_two_sided() const override { return true; }
+    bool may_be_smooth() const override {
+        return front_->may_be_smooth() || back_->may_be_smooth();
+    }
+    bool needs_tangents() const override {
+        return front_->needs_tangents() || back_->needs_tangents();
+    }
+    Rgb mean_albedo() const override {
+        return (front_->mean_albedo() + back_->mean_albedo()) * 0.5f;
+    }
+
+private:
+    const Material* front_;
+    const Material* back_;
+};
+
+}  // namespace
+
+MaterialEntry twosided_entry() {
+    return {{"bsdf",
+             "twosided",
+             "Makes one reflecting material visible from both sides, or puts two on the front and "
+             "the back.",
+             {{"bsdf", ParamKind::Object, "",
+               "One or two nested materials without transmission; front, then back."}}},
+            make_material<TwoSided>};
+}
+
+}  // namespace etendue

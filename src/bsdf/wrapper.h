@@ -1,0 +1,74 @@
+#pragma once
+// What the materials that change another material share.
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "bsdf/material.h"
+
+namespace etendue {
+
+/// The materials nested in `params`; an error where there are fewer than `lo` or more than `hi`.
+inline std::vector<const Material*> nested_materials(const Params& params, MaterialContext& context,
+                                                     size_t lo, size_t hi) {
+    std::vector<const Material*> nested = context.nested(params);
+    if (nested.size() < lo || nested.size() > hi)
+        params.fail(fmt::format("bsdf \"{}\" must hold {} nested bsdf{}, but holds {}",
+                                params.object().type,
+                                lo == hi ? std::to_string(lo) : fmt::format("{} or {}", lo, hi),
+                                hi == 1 ? "" : "s", nested.size()));
+    return nested;
+}
+
+/// A material that changes one nested material and passes on the rest.
+class WrapperMaterial : public Material {
+public:
+    float opacity(Vec2 uv) const override { return nested_->opacity(uv); }
+    bool is_opaque() const override { return nested_->is_opaque(); }
+    bool is_transmissive() const override { return nested_->is_transmissive(); }
+    bool is_two_sided() const override { return nested_->is_two_sided(); }
+    bool may_be_smooth() const override { return nested_->may_be_smooth(); }
+    Rgb mean_albedo() const override { return nested_->mean_albedo(); }
+
+protected:
+    WrapperMaterial(const Params& params, MaterialContext& context)
+        : nested_(nested_materials(params, context, 1, 1).front()) {}
+
+    const Material* nested_;
+};
+
+// Options of Mitsuba 3.7's bump and normal maps that are known but not supported.
+inline constexpr const char* kFlipInvalidNormalsDoc =
+    "Turning normals toward the view; must be false.";
+inline constexpr const char* kShadowingFunctionDoc =
+    "Softening the terminator of the light; must be false.";
+
+/// Refuses these options: they make the material depend on which of the two directions is the
+/// view's.
+inline void refuse_view_dependence(const Params& params) {
+    for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
+        if (params.flag(name, false))
+            params.fail(
+                name,
+                fmt::format("\"{}\" must be false: it has no meaning for paths from the lights",
+                            name));
+}
+
+/// The shading frame turned to the normal `n` (of any length, in world space). The result stays on
+/// that side of the geometric surface on which `frame` is: an `n` beyond it has its tilt turned
+/// around, as Mitsuba 3 does [Schüssler et al. 2017], but by ng and never by the direction of
+/// view, so that both ends of a path see the same surface. An `n` that cannot be used leaves the
+/// frame as it is.
+inline Frame perturbed_frame(const SurfacePoint& point, const Frame& frame, Vec3 n) {
+    const float len = length(n);
+    if (!(len > 0 && std::isfinite(len))) return frame;
+    n = n * (1 / len);
+    auto is_inside = [&](Vec3 m) {
+        return dot(m, frame.n) > 0 && dot(m, point.ng) * dot(frame.n, point.ng) > 0;
+    };
+    if (!is_inside(n)) n = reflect(n, frame.n);
+    return is_inside(n) ? Frame::from_normal_and_tangent(n, frame.s) : frame;
+}
+
+}  // namespace etendue

@@ -1,0 +1,17 @@
+#pragma once
+// The transfer function of sRGB [IEC 61966-2-1].
+
+#include "color/rgb.h"
+
+namespace etendue {
+
+/// Code value in [0, 1] to linear.
+inline float srgb_to_linear(float v) {
+    return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
+}
+/// Linear to code value; not clamped.
+inline float linear_to_srgb(float v) {
+    return v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1 / 2.4f) - 0.055f;
+}
+
+}  // namespace etendue

@@ -1,0 +1,109 @@
+#include "description/mesh_data.h"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+namespace etendue {
+namespace {
+
+/// Unit normal of a triangle; nothing where it has no area that float arithmetic could tell from
+/// zero. Products of floats are exact in double, so exactly parallel edges give exactly zero, with
+/// fused multiply-add or without.
+std::optional<Vec3> face_normal(const MeshData& mesh, const MeshData::Triangle& t) {
+    const Vec3 a = mesh.positions[t[1]] - mesh.positions[t[0]];
+    const Vec3 b = mesh.positions[t[2]] - mesh.positions[t[0]];
+    const double ax = a.x, ay = a.y, az = a.z, bx = b.x, by = b.y, bz = b.z;
+    const double x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx;
+    const double length2 = x * x + y * y + z * z;
+    if (!(float(length2) > 0) || !std::isfinite(float(length2))) return {};
+    const double scale = 1 / std::sqrt(length2);
+    return Vec3{float(x * scale), float(y * scale), float(z * scale)};
+}
+
+/// Unit vector from a to b.
+Vec3 direction(Vec3 a, Vec3 b) {
+    const double x = double(b.x) - a.x, y = double(b.y) - a.y, z = double(b.z) - a.z;
+    const double scale = 1 / std::sqrt(x * x + y * y + z * z);
+    return {float(x * scale), float(y * scale), float(z * scale)};
+}
+
+void check_vertices(const MeshData& mesh, const SourceLocation& where) {
+    for (size_t i = 0; i < mesh.positions.size(); ++i)
+        if (!is_finite(mesh.positions[i]))
+            throw SceneError(where, "position of vertex " + std::to_string(i) + " is not finite");
+    for (size_t i = 0; i < mesh.uvs.size(); ++i)
+        if (!std::isfinite(mesh.uvs[i].x) || !std::isfinite(mesh.uvs[i].y))
+            throw SceneError(where, "texture coordinate of vertex " + std::to_string(i) +
+                                        " is not finite");
+}
+
+void check_indices(const MeshData& mesh, const SourceLocation& where) {
+    for (size_t i = 0; i < mesh.triangles.size(); ++i)
+        for (const uint32_t v : mesh.triangles[i])
+            if (v >= mesh.positions.size())
+                throw SceneError(where, "triangle " + std::to_string(i) + " refers to vertex " +
+                                            std::to_string(v) + ", but there are only " +
+                                            std::to_string(mesh.positions.size()));
+}
+
+void drop_degenerate(MeshData& mesh) {
+    mesh.dropped_degenerate += uint32_t(
+        std::erase_if(mesh.triangles, [&](const auto& t) { return !face_normal(mesh, t); }));
+}
+
+void repair_normals(MeshData& mesh) {
+    std::vector<uint32_t> missing;
+    for (uint32_t i = 0; i < mesh.normals.size(); ++i) {
+        const float length2 = etendue::length2(mesh.normals[i]);
+        if (length2 > 0 && std::isfinite(length2))
+            mesh.normals[i] = mesh.normals[i] / std::sqrt(length2);
+        else
+            missing.push_back(i);
+    }
+    if (missing.empty()) return;
+    std::vector<Vec3> given = std::move(mesh.normals);
+    compute_vertex_normals(mesh);
+    for (const uint32_t i : missing) given[i] = mesh.normals[i];
+    mesh.normals = std::move(given);
+    mesh.replaced_normals += uint32_t(missing.size());
+}
+
+}  // namespace
+
+void compute_vertex_normals(MeshData& mesh) {
+    mesh.normals.assign(mesh.positions.size(), Vec3{});
+    for (const MeshData::Triangle& t : mesh.triangles) {
+        const std::optional<Vec3> n = face_normal(mesh, t);
+        if (!n) continue;
+        for (int i = 0; i < 3; ++i) {
+            const Vec3 corner = mesh.positions[t[i]];
+            const Vec3 a = direction(corner, mesh.positions[t[(i + 1) % 3]]);
+            const Vec3 b = direction(corner, mesh.positions[t[(i + 2) % 3]]);
+            // The angle between unit vectors, also where it is small or flat [Kahan 2006, §12].
+            mesh.normals[t[i]] += *n * (2 * std::atan2(length(a - b), length(a + b)));
+        }
+    }
+    // Where the faces cancel, the vertex takes the normal of one of them.
+    constexpr float kCancelled2 = 1e-12f;
+    for (const MeshData::Triangle& t : mesh.triangles)
+        for (const uint32_t v : t)
+            if (length2(mesh.normals[v]) <= kCancelled2)
+                mesh.normals[v] = face_normal(mesh, t).value_or(Vec3{});
+    for (Vec3& n : mesh.normals) n = length2(n) > 0 ? normalize(n) : Vec3{0, 0, 1};
+}
+
+void finish_mesh(MeshData& mesh, const MeshOptions& options, const SourceLocation& where) {
+    check_vertices(mesh, where);
+    check_indices(mesh, where);
+    drop_degenerate(mesh);
+    if (mesh.triangles.empty())
+        throw SceneError(where, mesh.dropped_degenerate ? "none of the mesh's triangles has an area"
+                                                        : "the mesh has no triangles");
+    if (mesh.face_normals) mesh.normals.clear();
+    repair_normals(mesh);
+    if (options.flip_tex_coords)
+        for (Vec2& uv : mesh.uvs) uv.y = 1 - uv.y;
+}
+
+}  // namespace etendue

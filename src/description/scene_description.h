@@ -1,0 +1,84 @@
+#pragma once
+// What a scene file says, as plain data: a flat list of objects with named parameters and children. Readers fill it;
+// the scene builder is the only one that knows what an object means. Names are those of Mitsuba 3 (snake_case),
+// whatever the file's dialect.
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "color/rgb.h"
+#include "math/transform.h"
+#include "math/vec.h"
+
+namespace etendue {
+
+struct SourceLocation {
+    std::string file;
+    int line = 0;  ///< Counted from 1; 0 where unknown.
+
+    bool operator==(const SourceLocation&) const = default;
+};
+
+/// The one exception of readers and of the scene builder. what() is "file:line: message".
+class SceneError : public std::runtime_error {
+public:
+    SceneError(const SourceLocation& where, const std::string& message);
+    const SourceLocation& where() const { return where_; }
+    const std::string& message() const { return message_; }
+
+private:
+    SourceLocation where_;
+    std::string message_;
+};
+
+/// What a `ParamValue` holds, in the order of its alternatives.
+enum class ParamType { Bool, Int, Float, String, Vector, Rgb, Transform };
+using ParamValue = std::variant<bool, int64_t, double, std::string, Vec3, Rgb, Transform>;
+
+struct Param {
+    std::string name;
+    ParamValue value;
+    SourceLocation where;
+
+    ParamType type() const { return ParamType(value.index()); }
+};
+
+/// One `<bsdf>`, `<shape>`, ... of the file.
+struct SceneObject {
+    /// integrator, sensor, sampler, film, rfilter, shape, bsdf, texture, emitter, medium
+    std::string category;
+    std::string type;  ///< The plug-in's name, e.g. "roughconductor".
+    std::string id;    ///< Empty where the file gives none.
+    SourceLocation where;
+    std::vector<Param> params;
+    struct Child {
+        std::string name;  ///< Parameter name of the child ("reflectance", "interior", ...); empty where unnamed.
+        int object;        ///< Index into SceneDescription::objects; shared where the file used a reference.
+        SourceLocation where;
+    };
+    std::vector<Child> children;
+
+    const Param* find(std::string_view name) const;
+};
+
+struct SceneDescription {
+    std::vector<SceneObject> objects;  ///< Children precede nothing in particular; no cycles.
+    std::vector<int> roots;            ///< The scene's own children, in file order.
+    std::string file;                  ///< The scene file, as given.
+    /// Directories in which relative file names are looked up, in order; the scene file's own comes first.
+    std::vector<std::string> search_paths;
+    /// What was dropped or replaced (only under `lenient`), one line each.
+    std::vector<std::string> warnings;
+};
+
+/// The candidate nearest to `name` by edit distance, if it is near enough to be meant; else empty.
+std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
+
+/// Canonical text of a description (for golden tests): one line per object and parameter, sorted by parameter name,
+/// without source locations.
+std::string dump(const SceneDescription& scene);
+
+}  // namespace etendue

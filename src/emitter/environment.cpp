@@ -1,0 +1,142 @@
+#include "emitter/environment.h"
+
+#include <cmath>
+
+#include "description/resolve_file.h"
+#include "image/image_io.h"
+#include "math/distribution.h"
+
+namespace etendue {
+namespace {
+
+/// The interpolated image is bilinear between pixel centres, so the cells of the sampling density lie between centres
+/// too: a cell is dark only where the whole interpolant is.
+class EnvironmentEmitter final : public InfiniteEmitter {
+public:
+    EnvironmentEmitter(int width, int height, std::vector<Rgb> pixels, const Transform& to_world)
+        : width_(width), height_(height), pixels_(std::move(pixels)), to_world_(to_world), to_local_(to_world.inverse()) {
+        // Rows of cells: one above the first row of centres, one between each two, one below the last.
+        std::vector<float> weights(size_t(width) * (height + 1));
+        for (int y = 0; y <= height; ++y) {
+            const double top = std::max(0.0, (y - 0.5) / height), bottom = std::min(1.0, (y + 0.5) / height);
+            // Solid angle of the row over that of its share of the (u, v) square, up to a constant.
+            const double area = (std::cos(double(kPi) * top) - std::cos(double(kPi) * bottom)) / (bottom - top);
+            for (int x = 0; x < width; ++x) {
+                const Rgb sum = texel(x, y - 1) + texel(x + 1, y - 1) + texel(x, y) + texel(x + 1, y);
+                weights[size_t(y) * width + x] = float(0.25 * luminance(sum) * area);
+                mean_ += 0.25 * luminance(sum) * area * (bottom - top) / width / 2;
+            }
+        }
+        distribution_ = PiecewiseConstant2D(weights, width, height + 1);
+    }
+
+    double power() const override { return 4 * double(kPi) * double(kPi) * sqr(double(scene_radius())) * mean_; }
+
+private:
+    // The square of the density: u runs over the cells' columns, v over height + 1 rows, of which the first and the last
+    // are half as high on the image.
+    Sample sample_direction(Vec2 u) const override {
+        const auto s = distribution_.sample(u);
+        Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};
+        const Vec3 d = to_direction(uv);
+        return {d, radiance(d), pdf_direction(d)};
+    }
+
+    float pdf_direction(Vec3 d) const override {
+        const Vec2 uv = to_uv(d);
+        const float sin_theta = std::sin(kPi * uv.y);
+        if (!(sin_theta > 0)) return 0;
+        float x = uv.x - 0.5f / float(width_);
+        if (x < 0) x += 1;
+        return distribution_.pdf({x, to_cell_v(uv.y)}) * cell_v_derivative(uv.y) / (2 * kPi * kPi * sin_theta);
+    }
+
+    Rgb radiance(Vec3 d) const override {
+        const Vec2 uv = to_uv(d);
+        const float x = uv.x * float(width_) - 0.5f, y = uv.y * float(height_) - 0.5f;
+        const int x0 = int(std::floor(x)), y0 = int(std::floor(y));
+        const float fx = x - float(x0), fy = y - float(y0);
+        return lerp(fy, lerp(fx, texel(x0, y0), texel(x0 + 1, y0)), lerp(fx, texel(x0, y0 + 1), texel(x0 + 1, y0 + 1)));
+    }
+
+    /// Position among the rows of cells, in [0, 1), of an image coordinate v, piecewise linear.
+    float to_cell_v(float v) const {
+        const float y = v * float(height_);
+        const float rows = float(height_ + 1);
+        if (y < 0.5f) return 2 * y / rows;
+        if (y >= float(height_) - 0.5f) return std::min((float(height_) + 2 * (y - float(height_) + 0.5f)) / rows, kOneMinusEpsilon);
+        return (y + 0.5f) / rows;
+    }
+    float to_image_v(float cell_v) const {
+        const float c = cell_v * float(height_ + 1);
+        if (c < 1) return 0.5f * c / float(height_);
+        if (c >= float(height_)) return (float(height_) - 0.5f + 0.5f * (c - float(height_))) / float(height_);
+        return (c - 0.5f) / float(height_);
+    }
+    /// d to_cell_v / dv
+    float cell_v_derivative(float v) const {
+        const float y = v * float(height_);
+        const float slope = float(height_) / float(height_ + 1);
+        return y < 0.5f || y >= float(height_) - 0.5f ? 2 * slope : slope;
+    }
+
+    Vec2 to_uv(Vec3 d) const {
+        const Vec3 w = normalize(to_local_.vector(d));
+        float u = std::atan2(w.x, -w.z) / (2 * kPi);
+        if (u < 0) u += 1;
+        return {std::min(u, kOneMinusEpsilon), std::min(std::acos(clamp(w.y, -1, 1)) / kPi, kOneMinusEpsilon)};
+    }
+    Vec3 to_direction(Vec2 uv) const {
+        float sp, cp, st, ct;
+        sincosf(2 * kPi * uv.x, &sp, &cp);
+        sincosf(kPi * uv.y, &st, &ct);
+        return normalize(to_world_.vector({sp * st, ct, -cp * st}));
+    }
+
+    Rgb texel(int x, int y) const {
+        x %= width_;
+        if (x < 0) x += width_;
+        return pixels_[size_t(std::clamp(y, 0, height_ - 1)) * width_ + x];
+    }
+
+    int width_, height_;
+    std::vector<Rgb> pixels_;
+    Transform to_world_, to_local_;
+    PiecewiseConstant2D distribution_;
+    double mean_ = 0;  ///< Mean luminance over the sphere.
+};
+
+}  // namespace
+
+std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb> pixels, const Transform& to_world) {
+    return std::make_unique<EnvironmentEmitter>(width, height, std::move(pixels), to_world);
+}
+
+EmitterEntry envmap_entry() {
+    return {{"emitter", "envmap", "Environment as a latitude-longitude image, importance-sampled.",
+             {{"filename", ParamKind::String, "", "Image, any format; up is its upper edge."},
+              {"scale", ParamKind::Float, "1", "Factor of the radiance."},
+              {"to_world", ParamKind::Transform, "identity", "Rotation of the environment; its own up is +y."},
+              {"mis_compensation", ParamKind::Bool, "false", "Accepted; without effect."}}},
+            [](const Params& p, EmitterContext&) {
+                const std::string path = resolve_file(p);
+                Image image;
+                try {
+                    image = read_image(path);
+                } catch (const std::exception& e) {
+                    p.fail("filename", e.what());
+                }
+                std::vector<Rgb> pixels = rgb_pixels(image);
+                const float scale = p.number("scale", 1, 0);
+                for (Rgb& c : pixels) {
+                    c *= scale;
+                    if (!is_finite(c) || std::min({c.r, c.g, c.b}) < 0)
+                        p.fail("filename", path + ": the image has a pixel that is not finite or is negative");
+                }
+                std::vector<std::unique_ptr<Emitter>> made;
+                made.push_back(make_environment(image.width, image.height, std::move(pixels), p.transform("to_world")));
+                return made;
+            }};
+}
+
+}  // namespace etendue

@@ -1,0 +1,44 @@
+#pragma once
+// Emitters at infinity: what they share, and their entries.
+
+#include "emitter/emitter.h"
+
+namespace etendue {
+
+/// An emitter of which every point is a direction. Light arriving from direction `d` travels along -d.
+class InfiniteEmitter : public Emitter {
+public:
+    EmissionSample sample_emission(Vec2 u_y0, Vec2 u_d) const final;
+    bool sample_direct(Vec3 from, Vec2 u, DirectSample& out) const final;
+    EmitterHit eval_infinite(Vec3 d) const final;
+    Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const final;
+    bool is_infinite() const final { return true; }
+    void set_scene_bounds(Vec3 center, float radius) final;
+
+protected:
+    /// Direction d the light comes from, radiance and solid-angle density.
+    struct Sample {
+        Vec3 d;
+        Rgb L;
+        float pdf;
+    };
+    virtual Sample sample_direction(Vec2 u) const = 0;
+    virtual Rgb radiance(Vec3 d) const = 0;
+    virtual float pdf_direction(Vec3 d) const = 0;
+    float scene_radius() const { return radius_; }
+    /// Density on the bounding disc, 1/(πR²).
+    float pdf_disk() const { return pdf_disk_; }
+
+private:
+    Vec3 center_;
+    float radius_ = 1, pdf_disk_ = kInvPi;
+};
+
+EmitterEntry constant_entry();
+EmitterEntry envmap_entry();
+EmitterEntry directional_entry();
+EmitterEntry sky_entry();
+EmitterEntry sun_entry();
+EmitterEntry sunsky_entry();
+
+}  // namespace etendue

@@ -1,0 +1,112 @@
+// Emitters at a point: `point` (the same intensity in all directions) and `spot` (a cone with a linear fall-off in
+// angle between beam width and cut-off). y_0 is discrete; its cosine is not part of G.
+
+#include "emitter/point.h"
+
+#include "math/frame.h"
+#include "math/warp.h"
+
+namespace etendue {
+namespace {
+
+class PointEmitter : public Emitter {
+public:
+    PointEmitter(Vec3 p, Rgb intensity) : p_(p), intensity_(intensity) {}
+
+    EmissionSample sample_emission(Vec2, Vec2 u_d) const override {
+        const Vec3 d = sample_direction(u_d);
+        return {p_, d, d, intensity(d), 1, pdf_direction(d), {}, 0};
+    }
+
+    bool sample_direct(Vec3 from, Vec2, DirectSample& out) const override {
+        const Vec3 v = p_ - from;
+        const float dist2 = length2(v);
+        if (!(dist2 > 0)) return false;
+        const float dist = std::sqrt(dist2);
+        const Vec3 wi = v * (1 / dist);
+        const Rgb I = intensity(-wi);
+        if (I.is_zero()) return false;
+        out = {p_, -wi, wi, dist, I, 1, 1, pdf_direction(-wi), {}, 0};
+        return true;
+    }
+
+    Emission eval_emission(Vec3, Vec2, Vec3 w) const override { return {intensity(w), pdf_direction(w)}; }
+    double power() const override { return 4 * double(kPi) * luminance(intensity_); }
+    bool is_delta() const override { return true; }
+
+protected:
+    virtual Rgb intensity(Vec3) const { return intensity_; }
+    virtual Vec3 sample_direction(Vec2 u) const { return sample_uniform_sphere(u); }
+    virtual float pdf_direction(Vec3) const { return kUniformSpherePdf; }
+
+    Vec3 p_;
+    Rgb intensity_;
+};
+
+class SpotEmitter final : public PointEmitter {
+public:
+    SpotEmitter(Vec3 p, Vec3 axis, Rgb intensity, float cutoff_degrees, float beam_degrees)
+        : PointEmitter(p, intensity),
+          frame_(Frame::from_normal(axis)),
+          cutoff_(cutoff_degrees * kPi / 180),
+          beam_(beam_degrees * kPi / 180),
+          cos_cutoff_(std::cos(cutoff_)),
+          cos_beam_(std::cos(beam_)) {}
+
+    double power() const override {
+        return 2 * double(kPi) * luminance(intensity_) * (1 - 0.5 * (double(cos_cutoff_) + cos_beam_));
+    }
+
+private:
+    Rgb intensity(Vec3 d) const override {
+        const float c = dot(d, frame_.n);
+        if (c <= cos_cutoff_) return Rgb();
+        if (c >= cos_beam_) return intensity_;
+        return intensity_ * ((cutoff_ - std::acos(c)) / (cutoff_ - beam_));
+    }
+    Vec3 sample_direction(Vec2 u) const override { return frame_.to_world(sample_uniform_cone(u, cos_cutoff_)); }
+    float pdf_direction(Vec3 d) const override {
+        return dot(d, frame_.n) > cos_cutoff_ ? pdf_uniform_cone(cos_cutoff_) : 0.0f;
+    }
+
+    Frame frame_;
+    float cutoff_, beam_, cos_cutoff_, cos_beam_;
+};
+
+std::vector<std::unique_ptr<Emitter>> one(std::unique_ptr<Emitter> e) {
+    std::vector<std::unique_ptr<Emitter>> v;
+    v.push_back(std::move(e));
+    return v;
+}
+
+}  // namespace
+
+EmitterEntry point_entry() {
+    return {{"emitter", "point", "Isotropic point light.",
+             {{"intensity", ParamKind::Rgb, "1", "Radiant intensity in W/sr."},
+              {"position", ParamKind::Vector, "0, 0, 0", "Instead of to_world."},
+              {"to_world", ParamKind::Transform, "identity", "Its origin is the light's position."}}},
+            [](const Params& p, EmitterContext&) {
+                if (p.has("position") && p.has("to_world")) p.fail("to_world", "give either position or to_world, not both");
+                const Vec3 at = p.has("position") ? p.vector("position", {}) : p.transform("to_world").point({0, 0, 0});
+                return one(std::make_unique<PointEmitter>(at, p.rgb("intensity", Rgb(1))));
+            }};
+}
+
+EmitterEntry spot_entry() {
+    return {{"emitter", "spot", "Spot light along +z.",
+             {{"intensity", ParamKind::Rgb, "1", "Radiant intensity in the beam, W/sr."},
+              {"cutoff_angle", ParamKind::Float, "20", "Half-angle in degrees beyond which nothing is emitted."},
+              {"beam_width", ParamKind::Float, "3/4 of cutoff_angle", "Half-angle in degrees of full intensity."},
+              {"to_world", ParamKind::Transform, "identity", "Position, and +z as axis."}}},
+            [](const Params& p, EmitterContext&) {
+                const Transform t = p.transform("to_world");
+                const float cutoff = p.number("cutoff_angle", 20, 0.01f, 179.9f);
+                const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
+                if (beam > cutoff) p.fail("beam_width", "beam_width must not exceed cutoff_angle");
+                return one(std::make_unique<SpotEmitter>(t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})),
+                                                         p.rgb("intensity", Rgb(1)), cutoff, beam));
+            }};
+}
+
+}  // namespace etendue

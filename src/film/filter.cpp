@@ -1,0 +1,125 @@
+#include "film/filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace etendue {
+namespace {
+
+constexpr int kSteps = 2048;
+
+double box_shape(double, double, double) {
+    return 1;
+}
+double tent_shape(double x, double radius, double) {
+    return std::max(0.0, 1 - std::fabs(x) / radius);
+}
+/// Gaussian of standard deviation `sigma`, lowered so that it meets zero at `radius`.
+double gaussian_shape(double x, double sigma, double radius) {
+    const double k = -0.5 / (sigma * sigma);
+    return std::max(0.0, std::exp(k * x * x) - std::exp(k * radius * radius));
+}
+/// [Mitchell & Netravali 1988, eq. 8]
+double mitchell_shape(double x, double b, double c) {
+    x = std::fabs(x);
+    const double x2 = x * x, x3 = x2 * x;
+    if (x < 1) return ((12 - 9 * b - 6 * c) * x3 + (-18 + 12 * b + 6 * c) * x2 + (6 - 2 * b)) / 6;
+    if (x < 2) return ((-b - 6 * c) * x3 + (6 * b + 30 * c) * x2 + (-12 * b - 48 * c) * x + (8 * b + 24 * c)) / 6;
+    return 0;
+}
+double lanczos_shape(double x, double lobes, double) {
+    x = std::fabs(x);
+    if (x < 1e-9) return 1;
+    if (x >= lobes) return 0;
+    const double px = x * double(kPi);
+    return std::sin(px) * std::sin(px / lobes) * lobes / (px * px);
+}
+
+}  // namespace
+
+ReconstructionFilter::ReconstructionFilter(const char* name, float radius, double (*shape)(double, double, double),
+                                           double a, double b)
+    : name_(name), radius_(radius), shape_(shape), a_(a), b_(b), cdf_(kSteps + 1, 0.0) {
+    // Midpoint rule; the shapes are smooth between the steps.
+    double signed_sum = 0;
+    const double step = 2.0 * radius / kSteps;
+    for (int i = 0; i < kSteps; ++i) {
+        const double h = shape(-double(radius) + (i + 0.5) * step, a, b);
+        signed_sum += h * step;
+        cdf_[i + 1] = cdf_[i] + std::fabs(h) * step;
+    }
+    scale_ = 1 / signed_sum;
+    for (double& c : cdf_) c /= cdf_.back();
+}
+
+ReconstructionFilter ReconstructionFilter::box() {
+    ReconstructionFilter f("box", 0.5f, box_shape);
+    f.box_ = true;
+    return f;
+}
+
+float ReconstructionFilter::eval_1d(float x) const {
+    return std::fabs(x) < radius_ ? float(shape_(x, a_, b_) * scale_) : 0.0f;
+}
+
+float ReconstructionFilter::eval(Vec2 o) const {
+    if (box_) return o.x >= -0.5f && o.x < 0.5f && o.y >= -0.5f && o.y < 0.5f ? 1.0f : 0.0f;
+    return eval_1d(o.x) * eval_1d(o.y);
+}
+
+/// The inverse of the tabulated CDF; `sign` becomes h/density over the absolute integral: exact for the true h, since
+/// the density is that of the table's cell.
+float ReconstructionFilter::sample_1d(float u, float& factor) const {
+    const auto it = std::upper_bound(cdf_.begin() + 1, cdf_.end() - 1, double(u));
+    const int i = int(it - cdf_.begin()) - 1;
+    const double mass = cdf_[i + 1] - cdf_[i];
+    const double f = mass > 0 ? std::min((u - cdf_[i]) / mass, 1.0) : 0.5;
+    const double step = 2.0 * radius_ / kSteps;
+    const double x = -double(radius_) + (i + f) * step;
+    factor = mass > 0 ? float(shape_(x, a_, b_) * scale_ * step / mass) : 0.0f;
+    return float(x);
+}
+
+ReconstructionFilter::Sample ReconstructionFilter::sample(Vec2 u) const {
+    if (box_) return {{u.x - 0.5f, u.y - 0.5f}, 1.0f};
+    float fx, fy;
+    const float x = sample_1d(u.x, fx), y = sample_1d(u.y, fy);
+    return {{x, y}, fx * fy};
+}
+
+const std::vector<FilterEntry>& filter_registry() {
+    static const std::vector<FilterEntry> entries = {
+        {{"rfilter", "box", "Box of one pixel.", {}}, [](const Params&) { return ReconstructionFilter::box(); }},
+        {{"rfilter", "tent", "Linear ramp from the pixel's centre.",
+          {{"radius", ParamKind::Float, "1", "Half width in pixels, above 0 and at most 16."}}},
+         [](const Params& p) {
+             const float r = p.number("radius", 1, 0.01f, 16);
+             return ReconstructionFilter("tent", r, tent_shape, r);
+         }},
+        {{"rfilter", "gaussian", "Gaussian cut off, and lowered to zero, at four standard deviations.",
+          {{"stddev", ParamKind::Float, "0.5", "Standard deviation in pixels."}}},
+         [](const Params& p) {
+             const float sigma = p.number("stddev", 0.5f, 0.01f, 4);
+             return ReconstructionFilter("gaussian", 4 * sigma, gaussian_shape, sigma, 4.0 * sigma);
+         }},
+        {{"rfilter", "mitchell", "Mitchell and Netravali's cubic; has negative lobes.",
+          {{"b", ParamKind::Float, "0.333333", "Blur."}, {"c", ParamKind::Float, "0.333333", "Ringing."},
+           {"B", ParamKind::Float, "0.333333", "As b."}, {"C", ParamKind::Float, "0.333333", "As c."}}},
+         [](const Params& p) {
+             const float third = 1.0f / 3;
+             return ReconstructionFilter("mitchell", 2, mitchell_shape, p.number("b", p.number("B", third, 0, 1), 0, 1),
+                                         p.number("c", p.number("C", third, 0, 1), 0, 1));
+         }},
+        {{"rfilter", "catmullrom", "Catmull–Rom spline; has negative lobes.", {}},
+         [](const Params&) { return ReconstructionFilter("catmullrom", 2, mitchell_shape, 0, 0.5); }},
+        {{"rfilter", "lanczos", "Windowed sinc; has negative lobes.",
+          {{"lobes", ParamKind::Int, "3", "Number of lobes, 1 to 8."}}},
+         [](const Params& p) {
+             const int n = int(p.integer("lobes", 3, 1, 8));
+             return ReconstructionFilter("lanczos", float(n), lanczos_shape, n);
+         }},
+    };
+    return entries;
+}
+
+}  // namespace etendue

@@ -1,0 +1,223 @@
+#include "geometry/accelerator.h"
+
+#include <atomic>
+#include <stdexcept>
+#include <string>
+
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+namespace etendue {
+namespace {
+
+void bounds_callback(const RTCBoundsFunctionArguments* args) {
+    const auto* shape = static_cast<const AnalyticShape*>(args->geometryUserPtr);
+    Bounds3 b = shape->bounds();
+    // Flat boxes are widened a little: traversal rounds, and the callback decides exactly.
+    const float pad = 1e-5f * (b.radius() + length(b.center()));
+    b.lo = b.lo - Vec3{pad, pad, pad};
+    b.hi = b.hi + Vec3{pad, pad, pad};
+    RTCBounds* out = args->bounds_o;
+    out->lower_x = b.lo.x, out->lower_y = b.lo.y, out->lower_z = b.lo.z;
+    out->upper_x = b.hi.x, out->upper_y = b.hi.y, out->upper_z = b.hi.z;
+}
+
+bool intersect_analytic(const AnalyticShape& shape, const RTCRay& ray, AnalyticShape::Hit& hit) {
+    return shape.intersect({ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z}, ray.tnear,
+                           ray.tfar, hit);
+}
+
+// Only single rays are ever traced, so the packets that Embree hands over have one element.
+void intersect_callback(const RTCIntersectFunctionNArguments* args) {
+    if (!args->valid[0]) return;
+    auto* rayhit = reinterpret_cast<RTCRayHit*>(args->rayhit);
+    AnalyticShape::Hit hit;
+    if (!intersect_analytic(*static_cast<const AnalyticShape*>(args->geometryUserPtr), rayhit->ray, hit)) return;
+    rayhit->ray.tfar = float(hit.t);
+    rayhit->hit.u = hit.u;
+    rayhit->hit.v = hit.v;
+    rayhit->hit.geomID = args->geomID;
+    rayhit->hit.primID = args->primID;
+    rayhit->hit.instID[0] = args->context->instID[0];
+}
+
+void occluded_callback(const RTCOccludedFunctionNArguments* args) {
+    if (!args->valid[0]) return;
+    auto* ray = reinterpret_cast<RTCRay*>(args->ray);
+    AnalyticShape::Hit hit;
+    if (intersect_analytic(*static_cast<const AnalyticShape*>(args->geometryUserPtr), *ray, hit))
+        ray->tfar = -kInf;
+}
+
+bool memory_callback(void* user, ssize_t bytes, bool) {
+    static_cast<std::atomic<int64_t>*>(user)->fetch_add(bytes, std::memory_order_relaxed);
+    return true;
+}
+
+}  // namespace
+
+struct Accelerator::Impl {
+    std::atomic<int64_t> bytes{0};
+    RTCDevice device = nullptr;
+    RTCScene top = nullptr;
+    std::vector<RTCScene> groups;
+    struct Instance {
+        Transform to_world;
+        uint32_t first_shape;
+    };
+    std::vector<uint32_t> group_first;   ///< Index of each group's first shape.
+    std::vector<uint32_t> shape_of_geom; ///< By geometry id of the top scene; instances hold their index instead.
+    std::vector<Instance> instances;
+    uint32_t shape_count = 0;
+
+    Impl() {
+        device = rtcNewDevice(nullptr);
+        if (!device) throw std::runtime_error("Embree: no device could be made");
+        rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &bytes);
+        top = new_scene();
+    }
+    ~Impl() {
+        if (top) rtcReleaseScene(top);
+        for (RTCScene g : groups) rtcReleaseScene(g);
+        if (device) rtcReleaseDevice(device);
+    }
+
+    void check() const {
+        const RTCError error = rtcGetDeviceError(device);
+        if (error == RTC_ERROR_NONE) return;
+        throw std::runtime_error(error == RTC_ERROR_OUT_OF_MEMORY
+                                     ? "Embree: not enough memory for the ray-tracing hierarchy"
+                                     : "Embree: error " + std::to_string(int(error)));
+    }
+
+    RTCScene new_scene() const {
+        RTCScene scene = rtcNewScene(device);
+        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+        return scene;
+    }
+
+    uint32_t attach(RTCScene scene, const Shape& shape) const {
+        RTCGeometry geometry;
+        if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape)) {
+            geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+            // Copied, not shared: Embree reads 16 bytes a vertex, beyond the end of a packed array.
+            auto* p = static_cast<Vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                                 RTC_FORMAT_FLOAT3, sizeof(Vec3),
+                                                                 mesh->positions.size()));
+            auto* t = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                              3 * sizeof(uint32_t), mesh->triangles.size());
+            if (!p || !t) check();
+            std::copy(mesh->positions.begin(), mesh->positions.end(), p);
+            std::copy(mesh->triangles.begin(), mesh->triangles.end(),
+                      static_cast<std::array<uint32_t, 3>*>(t));
+        } else {
+            geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+            rtcSetGeometryUserPrimitiveCount(geometry, 1);
+            rtcSetGeometryUserData(geometry, const_cast<AnalyticShape*>(dynamic_cast<const AnalyticShape*>(&shape)));
+            rtcSetGeometryBoundsFunction(geometry, bounds_callback, nullptr);
+            rtcSetGeometryIntersectFunction(geometry, intersect_callback);
+            rtcSetGeometryOccludedFunction(geometry, occluded_callback);
+        }
+        rtcCommitGeometry(geometry);
+        const uint32_t id = rtcAttachGeometry(scene, geometry);
+        rtcReleaseGeometry(geometry);
+        check();
+        return id;
+    }
+};
+
+Accelerator::Accelerator() : impl_(std::make_unique<Impl>()) {}
+Accelerator::~Accelerator() = default;
+Accelerator::Accelerator(Accelerator&&) noexcept = default;
+Accelerator& Accelerator::operator=(Accelerator&&) noexcept = default;
+
+uint32_t Accelerator::add_shape(const Shape& shape) {
+    const uint32_t id = impl_->attach(impl_->top, shape);
+    impl_->shape_of_geom.resize(id + 1);
+    return impl_->shape_of_geom[id] = impl_->shape_count++;
+}
+
+uint32_t Accelerator::add_group(const std::vector<const Shape*>& shapes) {
+    RTCScene scene = impl_->new_scene();
+    impl_->group_first.push_back(impl_->shape_count);
+    impl_->groups.push_back(scene);
+    for (const Shape* s : shapes) impl_->attach(scene, *s);  // geometry ids count from 0
+    impl_->shape_count += uint32_t(shapes.size());
+    rtcCommitScene(scene);
+    impl_->check();
+    return uint32_t(impl_->groups.size() - 1);
+}
+
+uint32_t Accelerator::add_instance(uint32_t group, const Transform& to_world) {
+    RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(geometry, impl_->groups[group]);
+    float m[12];
+    for (int row = 0; row < 3; ++row)
+        for (int col = 0; col < 4; ++col) m[row * 4 + col] = float(to_world.matrix()[row][col]);
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, m);
+    rtcCommitGeometry(geometry);
+    const uint32_t id = rtcAttachGeometry(impl_->top, geometry);
+    rtcReleaseGeometry(geometry);
+    impl_->check();
+    impl_->shape_of_geom.resize(id + 1);
+    impl_->shape_of_geom[id] = uint32_t(impl_->instances.size());
+    impl_->instances.push_back({to_world, impl_->group_first[group]});
+    return uint32_t(impl_->instances.size() - 1);
+}
+
+void Accelerator::commit() {
+    rtcCommitScene(impl_->top);
+    impl_->check();
+}
+
+bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
+    RTCRayHit rh;
+    rh.ray = {ray.o.x, ray.o.y, ray.o.z, 0, ray.d.x, ray.d.y, ray.d.z, 0, ray.tmax, 0xffffffffu, 0, 0};
+    rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+#if RTC_VERSION_MAJOR >= 4
+    rtcIntersect1(impl_->top, &rh, nullptr);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(impl_->top, &context, &rh);
+#endif
+    if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    out.t = rh.ray.tfar;
+    out.prim = rh.hit.primID;
+    out.u = rh.hit.u;
+    out.v = rh.hit.v;
+    if (rh.hit.instID[0] == RTC_INVALID_GEOMETRY_ID) {
+        out.instance = kNoInstance;
+        out.shape = impl_->shape_of_geom[rh.hit.geomID];
+    } else {
+        out.instance = impl_->shape_of_geom[rh.hit.instID[0]];
+        out.shape = impl_->instances[out.instance].first_shape + rh.hit.geomID;
+    }
+    return true;
+}
+
+bool Accelerator::occluded(const Ray& ray) const {
+    RTCRay r{ray.o.x, ray.o.y, ray.o.z, 0, ray.d.x, ray.d.y, ray.d.z, 0, ray.tmax, 0xffffffffu, 0, 0};
+#if RTC_VERSION_MAJOR >= 4
+    rtcOccluded1(impl_->top, &r, nullptr);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(impl_->top, &context, &r);
+#endif
+    return r.tfar < 0;
+}
+
+const Transform& Accelerator::instance_transform(uint32_t instance) const {
+    return impl_->instances[instance].to_world;
+}
+
+size_t Accelerator::memory_bytes() const {
+    return size_t(std::max<int64_t>(0, impl_->bytes.load()));
+}
+
+}  // namespace etendue

@@ -1,0 +1,50 @@
+#pragma once
+// Ray queries over shapes and instances, by Embree. The only part that includes it.
+
+#include <memory>
+#include <vector>
+
+#include "geometry/ray.h"
+#include "geometry/shape.h"
+
+namespace etendue {
+
+/// What a ray met.
+struct RayHit {
+    float t;
+    uint32_t shape;     ///< Index of the shape in the order of add_shape / add_group.
+    uint32_t prim;
+    uint32_t instance;  ///< Index of the instance, or kNoInstance.
+    float u, v;
+};
+inline constexpr uint32_t kNoInstance = 0xffffffffu;
+
+/// Shapes are added, then committed once; queries are thread-safe after that.
+class Accelerator {
+public:
+    Accelerator();
+    ~Accelerator();
+    Accelerator(Accelerator&&) noexcept;
+    Accelerator& operator=(Accelerator&&) noexcept;
+
+    /// The shape must outlive the accelerator. Returns its index.
+    uint32_t add_shape(const Shape& shape);
+    /// Shapes that appear only through instances. Returns the group's index; indices of the shapes continue the count.
+    uint32_t add_group(const std::vector<const Shape*>& shapes);
+    uint32_t add_instance(uint32_t group, const Transform& to_world);
+    /// Builds the hierarchies; throws std::runtime_error with Embree's own message.
+    void commit();
+
+    bool intersect(const Ray& ray, RayHit& hit) const;
+    /// Whether anything lies within (0, ray.tmax).
+    bool occluded(const Ray& ray) const;
+
+    const Transform& instance_transform(uint32_t instance) const;
+    size_t memory_bytes() const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,278 @@
+#include "geometry/shape.h"
+
+#include <algorithm>
+
+#include "math/frame.h"
+#include "math/warp.h"
+
+namespace etendue {
+
+// ---- TriangleMesh
+
+Bounds3 TriangleMesh::bounds() const {
+    Bounds3 b;
+    for (Vec3 p : positions) b.extend(p);
+    return b;
+}
+
+double TriangleMesh::primitive_area(uint32_t prim) const {
+    const auto [a, b, c] = triangles[prim];
+    return 0.5 * length(cross(positions[b] - positions[a], positions[c] - positions[a]));
+}
+
+double TriangleMesh::area() const {
+    double sum = 0;
+    for (uint32_t i = 0; i < triangles.size(); ++i) sum += primitive_area(i);
+    return sum;
+}
+
+SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tangents) const {
+    const auto [ia, ib, ic] = triangles[prim];
+    const Vec3 a = positions[ia], e1 = positions[ib] - a, e2 = positions[ic] - a;
+    const float w = 1 - u - v;
+    SurfaceGeometry g;
+    g.p = a + e1 * u + e2 * v;
+    g.ng = normalize(cross(e1, e2));
+    g.ns = g.ng;
+    if (!normals.empty()) {
+        const Vec3 n = normals[ia] * w + normals[ib] * u + normals[ic] * v;
+        const float len2 = length2(n);
+        if (len2 > 0) {
+            g.ns = n * (1.0f / std::sqrt(len2));
+            if (dot(g.ng, g.ns) < 0) g.ng = -g.ng;
+        }
+    }
+    if (uvs.empty()) {
+        g.uv = {u, v};
+        if (tangents) g.dpdu = e1, g.dpdv = e2;
+        return g;
+    }
+    const Vec2 ta = uvs[ia], tb = uvs[ib], tc = uvs[ic];
+    g.uv = {ta.x * w + tb.x * u + tc.x * v, ta.y * w + tb.y * u + tc.y * v};
+    if (tangents) {
+        const Vec2 d1 = tb - ta, d2 = tc - ta;
+        const float det = d1.x * d2.y - d1.y * d2.x;
+        if (det != 0) {
+            const float inv = 1 / det;
+            g.dpdu = (e1 * d2.y - e2 * d1.y) * inv;
+            g.dpdv = (e2 * d1.x - e1 * d2.x) * inv;
+        }
+    }
+    return g;
+}
+
+ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
+    const Vec2 b = sample_uniform_triangle(u);
+    const SurfaceGeometry g = surface(prim, b.x, b.y, false);
+    return {g.p, g.ng, g.ns, g.uv, prim};
+}
+
+size_t TriangleMesh::memory_bytes() const {
+    return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) + uvs.size() * sizeof(Vec2) +
+           triangles.size() * sizeof(triangles[0]);
+}
+
+// ---- Sphere
+
+Sphere::Sphere(const Transform& to_world, bool flip_normals) : flip_(flip_normals) {
+    center_ = to_world.point({0, 0, 0});
+    radius_ = length(to_world.vector({1, 0, 0}));
+    Transform::Matrix m = to_world.matrix();
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) m[i][j] /= radius_;
+        m[i][3] = 0;
+    }
+    orientation_ = Transform(m);
+}
+
+Bounds3 Sphere::bounds() const {
+    const Vec3 r{radius_, radius_, radius_};
+    return {center_ - r, center_ + r};
+}
+
+double Sphere::area() const {
+    return 4.0 * kPi * double(radius_) * radius_;
+}
+
+SurfaceGeometry Sphere::at(Vec3 local) const {
+    const Vec3 n = normalize(orientation_.vector(local));
+    SurfaceGeometry g;
+    g.p = center_ + n * radius_;
+    g.ng = g.ns = flip_ ? -n : n;
+    return g;
+}
+
+SurfaceGeometry Sphere::surface(uint32_t, float u, float v, bool tangents) const {
+    float sp, cp, st, ct;
+    sincosf(2 * kPi * u, &sp, &cp);
+    sincosf(kPi * v, &st, &ct);
+    SurfaceGeometry g = at({st * cp, st * sp, ct});
+    g.uv = {u, v};
+    if (tangents) {
+        g.dpdu = orientation_.vector({-st * sp, st * cp, 0}) * (2 * kPi * radius_);
+        g.dpdv = orientation_.vector({ct * cp, ct * sp, -st}) * (kPi * radius_);
+    }
+    return g;
+}
+
+ShapeSample Sphere::sample(uint32_t, Vec2 u) const {
+    const Vec3 local = sample_uniform_sphere(u);
+    const SurfaceGeometry g = at(local);
+    float phi = std::atan2(local.y, local.x);
+    if (phi < 0) phi += 2 * kPi;
+    return {g.p, g.ng, g.ns, {phi / (2 * kPi), std::acos(clamp(local.z, -1, 1)) / kPi}, 0};
+}
+
+bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
+    const double ox = double(o.x) - center_.x, oy = double(o.y) - center_.y, oz = double(o.z) - center_.z;
+    const double dx = d.x, dy = d.y, dz = d.z;
+    const double a = dx * dx + dy * dy + dz * dz;
+    const double b = ox * dx + oy * dy + oz * dz;
+    const double c = ox * ox + oy * oy + oz * oz - double(radius_) * radius_;
+    const double disc = b * b - a * c;
+    if (!(disc >= 0)) return false;
+    // q has the larger magnitude of the two numerators, so that neither root cancels.
+    const double root = std::sqrt(disc);
+    const double q = b < 0 ? -b + root : -b - root;
+    double t0 = q / a, t1 = q != 0 ? c / q : -q / a;
+    if (t0 > t1) std::swap(t0, t1);
+    const double t = t0 > tmin ? t0 : t1;
+    if (!(t > tmin && t < tmax)) return false;
+    const Vec3 world{float((ox + t * dx) / radius_), float((oy + t * dy) / radius_), float((oz + t * dz) / radius_)};
+    const Vec3 n = orientation_.inverse().vector(world);
+    float phi = std::atan2(n.y, n.x);
+    if (phi < 0) phi += 2 * kPi;
+    hit = {t, phi / (2 * kPi), std::acos(clamp(n.z, -1, 1)) / kPi};
+    return true;
+}
+
+// ---- Disk
+
+Disk::Disk(const Transform& to_world, bool flip_normals) : to_world_(to_world), to_local_(to_world.inverse()) {
+    ng_ = normalize(to_world.normal({0, 0, 1}));
+    if (flip_normals) ng_ = -ng_;
+}
+
+Bounds3 Disk::bounds() const {
+    // The ellipse's extent along an axis is the length of that row of the linear part.
+    const Vec3 c = to_world_.point({0, 0, 0}), x = to_world_.vector({1, 0, 0}), y = to_world_.vector({0, 1, 0});
+    const Vec3 e{std::hypot(x.x, y.x), std::hypot(x.y, y.y), std::hypot(x.z, y.z)};
+    return {c - e, c + e};
+}
+
+double Disk::area() const {
+    return kPi * length(cross(to_world_.vector({1, 0, 0}), to_world_.vector({0, 1, 0})));
+}
+
+SurfaceGeometry Disk::surface(uint32_t, float u, float v, bool tangents) const {
+    float s, c;
+    sincosf(2 * kPi * v, &s, &c);
+    SurfaceGeometry g;
+    g.p = to_world_.point({u * c, u * s, 0});
+    g.ng = g.ns = ng_;
+    g.uv = {u, v};
+    if (tangents) {
+        g.dpdu = to_world_.vector({c, s, 0});
+        g.dpdv = to_world_.vector({-s, c, 0}) * (2 * kPi * u);
+    }
+    return g;
+}
+
+ShapeSample Disk::sample(uint32_t, Vec2 u) const {
+    const Vec2 d = sample_uniform_disk(u);
+    float phi = std::atan2(d.y, d.x);
+    if (phi < 0) phi += 2 * kPi;
+    return {to_world_.point({d.x, d.y, 0}), ng_, ng_, {std::hypot(d.x, d.y), phi / (2 * kPi)}, 0};
+}
+
+bool Disk::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
+    const Transform::Matrix& m = to_local_.matrix();
+    double lo[3], ld[3];
+    for (int i = 0; i < 3; ++i) {
+        lo[i] = m[i][0] * o.x + m[i][1] * o.y + m[i][2] * o.z + m[i][3];
+        ld[i] = m[i][0] * d.x + m[i][1] * d.y + m[i][2] * d.z;
+    }
+    if (ld[2] == 0) return false;
+    const double t = -lo[2] / ld[2];
+    if (!(t > tmin && t < tmax)) return false;
+    const double x = lo[0] + t * ld[0], y = lo[1] + t * ld[1];
+    const double r2 = x * x + y * y;
+    if (!(r2 <= 1)) return false;
+    double phi = std::atan2(y, x) / (2 * double(kPi));
+    if (phi < 0) phi += 1;
+    hit = {t, float(std::sqrt(r2)), float(phi)};
+    return true;
+}
+
+// ---- Cylinder
+
+Cylinder::Cylinder(const Transform& to_world, bool flip_normals)
+    : to_world_(to_world), to_local_(to_world.inverse()), flip_(flip_normals) {
+    radius_ = length(to_world.vector({1, 0, 0}));
+    height_ = length(to_world.vector({0, 0, 1}));
+}
+
+Bounds3 Cylinder::bounds() const {
+    const Vec3 x = to_world_.vector({1, 0, 0}), y = to_world_.vector({0, 1, 0});
+    const Vec3 e{std::hypot(x.x, y.x), std::hypot(x.y, y.y), std::hypot(x.z, y.z)};
+    Bounds3 b;
+    for (float z : {0.0f, 1.0f}) {
+        const Vec3 c = to_world_.point({0, 0, z});
+        b.extend(c - e);
+        b.extend(c + e);
+    }
+    return b;
+}
+
+double Cylinder::area() const {
+    return 2.0 * kPi * radius_ * height_;
+}
+
+SurfaceGeometry Cylinder::surface(uint32_t, float u, float v, bool tangents) const {
+    float s, c;
+    sincosf(2 * kPi * u, &s, &c);
+    SurfaceGeometry g;
+    g.p = to_world_.point({c, s, v});
+    const Vec3 n = normalize(to_world_.normal({c, s, 0}));
+    g.ng = g.ns = flip_ ? -n : n;
+    g.uv = {u, v};
+    if (tangents) {
+        g.dpdu = to_world_.vector({-s, c, 0}) * (2 * kPi);
+        g.dpdv = to_world_.vector({0, 0, 1});
+    }
+    return g;
+}
+
+ShapeSample Cylinder::sample(uint32_t, Vec2 u) const {
+    const SurfaceGeometry g = surface(0, u.x, u.y, false);
+    return {g.p, g.ng, g.ns, g.uv, 0};
+}
+
+bool Cylinder::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
+    const Transform::Matrix& m = to_local_.matrix();
+    double lo[3], ld[3];
+    for (int i = 0; i < 3; ++i) {
+        lo[i] = m[i][0] * o.x + m[i][1] * o.y + m[i][2] * o.z + m[i][3];
+        ld[i] = m[i][0] * d.x + m[i][1] * d.y + m[i][2] * d.z;
+    }
+    const double a = ld[0] * ld[0] + ld[1] * ld[1];
+    const double b = lo[0] * ld[0] + lo[1] * ld[1];
+    const double c = lo[0] * lo[0] + lo[1] * lo[1] - 1;
+    const double disc = b * b - a * c;
+    if (!(a > 0) || !(disc >= 0)) return false;
+    const double root = std::sqrt(disc);
+    const double q = b < 0 ? -b + root : -b - root;
+    double roots[2] = {q / a, q != 0 ? c / q : -q / a};
+    if (roots[0] > roots[1]) std::swap(roots[0], roots[1]);
+    for (double t : roots) {
+        const double z = lo[2] + t * ld[2];
+        if (!(t > tmin && t < tmax && z >= 0 && z <= 1)) continue;
+        double phi = std::atan2(lo[1] + t * ld[1], lo[0] + t * ld[0]) / (2 * double(kPi));
+        if (phi < 0) phi += 1;
+        hit = {t, float(phi), float(z)};
+        return true;
+    }
+    return false;
+}
+
+}  // namespace etendue

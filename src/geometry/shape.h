@@ -1,0 +1,129 @@
+#pragma once
+// Shapes: triangle meshes, and the quadrics that must not be tessellated because a caustic shows their curvature.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "math/bounds.h"
+#include "math/transform.h"
+#include "math/vec.h"
+
+namespace etendue {
+
+/// A point on a shape with the differential geometry that shading needs. World space.
+struct SurfaceGeometry {
+    Vec3 p;
+    Vec3 ng;          ///< Unit geometric normal, on the side of ns.
+    Vec3 ns;          ///< Unit interpolated normal.
+    Vec3 dpdu, dpdv;  ///< Zero unless asked for.
+    Vec2 uv;
+};
+
+/// A point drawn from a shape's surface.
+struct ShapeSample {
+    Vec3 p, ng, ns;
+    Vec2 uv;
+    uint32_t prim;
+};
+
+class Shape {
+public:
+    virtual ~Shape() = default;
+    virtual Bounds3 bounds() const = 0;
+    virtual double area() const = 0;
+    virtual size_t primitive_count() const { return 1; }
+    virtual double primitive_area(uint32_t) const { return area(); }
+    /// Geometry at parameters (u, v) of primitive `prim` as reported by an intersection.
+    virtual SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const = 0;
+    /// Uniform in area on primitive `prim`.
+    virtual ShapeSample sample(uint32_t prim, Vec2 u) const = 0;
+    virtual size_t memory_bytes() const { return sizeof(*this); }
+};
+
+class TriangleMesh final : public Shape {
+public:
+    std::vector<Vec3> positions;
+    std::vector<Vec3> normals;  ///< Empty, or unit and one per vertex.
+    std::vector<Vec2> uvs;      ///< Empty, or one per vertex.
+    std::vector<std::array<uint32_t, 3>> triangles;
+
+    Bounds3 bounds() const override;
+    double area() const override;
+    size_t primitive_count() const override { return triangles.size(); }
+    double primitive_area(uint32_t prim) const override;
+    /// Inline on the hot path: (u, v) are the barycentric coordinates of the second and third corner.
+    SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const override;
+    ShapeSample sample(uint32_t prim, Vec2 u) const override;
+    size_t memory_bytes() const override;
+};
+
+/// A shape that Embree intersects through a callback.
+class AnalyticShape : public Shape {
+public:
+    /// Nearest intersection with o + t·d for t in (tmin, tmax), in double because `o` may be far away.
+    struct Hit {
+        double t;
+        float u, v;
+    };
+    virtual bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const = 0;
+};
+
+/// Sphere of a centre and radius; u is the azimuth over 2π about +z, v the polar angle over π.
+class Sphere final : public AnalyticShape {
+public:
+    Sphere(Vec3 center, float radius, bool flip_normals) : center_(center), radius_(radius), flip_(flip_normals) {}
+    /// The unit sphere under a transform of uniform scale.
+    Sphere(const Transform& to_world, bool flip_normals);
+
+    Bounds3 bounds() const override;
+    double area() const override;
+    SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    ShapeSample sample(uint32_t, Vec2 u) const override;
+    bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
+
+private:
+    SurfaceGeometry at(Vec3 local_unit) const;
+    Transform orientation_;  ///< Rotation alone; moves the parametrisation, not the surface.
+    Vec3 center_;
+    float radius_;
+    bool flip_;
+};
+
+/// The unit disc of the xy plane under any affine map; normal +z; (u, v) = (radius, azimuth over 2π).
+class Disk final : public AnalyticShape {
+public:
+    Disk(const Transform& to_world, bool flip_normals);
+
+    Bounds3 bounds() const override;
+    double area() const override;
+    SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    ShapeSample sample(uint32_t, Vec2 u) const override;
+    bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
+
+private:
+    Transform to_world_, to_local_;
+    Vec3 ng_;
+};
+
+/// Open cylinder from p0 to p1 under a transform without shear; normals point outward; (u, v) = (azimuth over 2π,
+/// height over length).
+class Cylinder final : public AnalyticShape {
+public:
+    /// `to_world` maps the unit cylinder about +z (radius 1, z in [0, 1]) to the world.
+    Cylinder(const Transform& to_world, bool flip_normals);
+
+    Bounds3 bounds() const override;
+    double area() const override;
+    SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    ShapeSample sample(uint32_t, Vec2 u) const override;
+    bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
+
+private:
+    Transform to_world_, to_local_;
+    float radius_, height_;
+    bool flip_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,68 @@
+#pragma once
+// Pixels with named channels, in linear floats; and pixels as a file stores them.
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "color/rgb.h"
+
+namespace etendue {
+
+/// Rows from the top, channels fastest; colours are linear. A layer's channels carry its name: "albedo.R".
+struct Image {
+    int width = 0, height = 0;
+    std::vector<std::string> channels;
+    std::vector<float> data;
+    /// Text and numbers that EXR files carry along.
+    std::map<std::string, std::variant<std::string, double>> attributes;
+
+    Image() = default;
+    Image(int width, int height, std::vector<std::string> channels);  ///< Black.
+
+    size_t pixel_count() const { return size_t(width) * height; }
+    float& at(int x, int y, int c) { return data[offset(x, y) + c]; }
+    float at(int x, int y, int c) const { return data[offset(x, y) + c]; }
+    int channel(std::string_view name) const;  ///< Index, or -1.
+    /// Names of the layers in order of appearance; "" for channels without a prefix.
+    std::vector<std::string> layers() const;
+
+private:
+    size_t offset(int x, int y) const { return (size_t(y) * width + x) * channels.size(); }
+};
+
+/// The colours of a layer: its R, G and B, or its only channel (any, or "Y") as grey; throws where it has neither.
+std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer = "");
+/// Appends the channels R, G, B (prefixed with "layer." unless that is empty); an empty image takes the given size.
+void add_rgb_layer(Image& image, int width, int height, std::string_view layer, std::span<const Rgb> pixels);
+Image rgb_image(int width, int height, std::span<const Rgb> pixels);
+
+/// IEEE 754 binary16, as bits.
+struct Half {
+    uint16_t bits;
+};
+inline float to_float(Half h) {
+    // The 5 exponent bits land in the 8 of a float; 2^(127 - 15) corrects the bias, also of subnormal numbers.
+    const uint32_t sign = uint32_t(h.bits & 0x8000u) << 16;
+    uint32_t magnitude = std::bit_cast<uint32_t>(std::bit_cast<float>(uint32_t(h.bits & 0x7fffu) << 13) * 0x1p112f);
+    if ((h.bits & 0x7c00u) == 0x7c00u) magnitude |= 0x7f800000u;  // infinity and NaN
+    return std::bit_cast<float>(sign | magnitude);
+}
+
+/// Pixels in the file's own precision: 8-bit codes, or linear values of 16 or 32 bits. Rows from the top, channels
+/// fastest; alpha is not multiplied in.
+struct PixelBuffer {
+    int width = 0, height = 0, channels = 0;
+    std::variant<std::vector<uint8_t>, std::vector<Half>, std::vector<float>> data;
+    int alpha_channel = -1;  ///< Index, or -1.
+
+    size_t memory_bytes() const;
+};
+
+}  // namespace etendue

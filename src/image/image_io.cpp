@@ -1,0 +1,253 @@
+#include "image/image_io.h"
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <new>
+#include <stdexcept>
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include "color/srgb.h"
+#include "image/atomic_file.h"
+
+namespace etendue {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kMaxHalf = 65504;
+
+[[noreturn]] void fail_read(const std::string& path, const std::string& why) {
+    throw std::runtime_error(fmt::format("cannot read \"{}\": {}", path, why));
+}
+[[noreturn]] void fail_write(const std::string& path, const std::string& why) {
+    throw std::runtime_error(fmt::format("cannot write \"{}\": {}", path, why));
+}
+
+// OpenImageIO's reports may have several lines and end in a newline.
+std::string one_line(std::string s) {
+    while (!s.empty() && std::isspace(static_cast<unsigned char>(s.back()))) s.pop_back();
+    std::replace(s.begin(), s.end(), '\n', ' ');
+    return s.empty() ? "unknown error" : s;
+}
+
+// ------------------------------------------------------------------------------------------------------- reading
+
+std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path) {
+    std::error_code error;
+    const fs::file_status status = fs::status(path, error);
+    if (!fs::exists(status)) fail_read(path, "there is no such file");
+    if (!fs::is_regular_file(status)) fail_read(path, "it is not a file");
+    OIIO::ImageSpec config;
+    config["oiio:UnassociatedAlpha"] = 1;  // the file's own colours, not premultiplied
+    auto input = OIIO::ImageInput::open(path, &config);
+    if (!input) fail_read(path, one_line(OIIO::geterror()));
+    const OIIO::ImageSpec& spec = input->spec();
+    if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep)
+        fail_read(path, "it is not a flat image with at least one pixel and one channel");
+    // No codec packs better than this; a larger claim is a damaged header that would exhaust the memory.
+    constexpr uint64_t kBestRatio = 4096, kAlwaysFine = 256u << 20;
+    const uint64_t bytes = spec.image_bytes();
+    if (bytes > kAlwaysFine && bytes / kBestRatio > fs::file_size(path))
+        fail_read(path, fmt::format("its header claims {} x {} pixels, too many for the file's size", spec.width,
+                                    spec.height));
+    return input;
+}
+
+template <class T>
+std::vector<T> read_all(OIIO::ImageInput& input, const std::string& path, OIIO::TypeDesc type) {
+    const OIIO::ImageSpec& spec = input.spec();
+    try {
+        std::vector<T> data(size_t(spec.width) * spec.height * spec.nchannels);
+        if (!input.read_image(0, 0, 0, spec.nchannels, type, data.data()))
+            fail_read(path, one_line(input.geterror()));
+        return data;
+    } catch (const std::bad_alloc&) {
+        fail_read(path, fmt::format("{} x {} pixels do not fit into memory", spec.width, spec.height));
+    }
+}
+
+// Integer formats hold sRGB unless they say that they do not.
+bool holds_srgb(const OIIO::ImageSpec& spec) {
+    return !spec.format.is_floating_point() && spec.get_string_attribute("oiio:ColorSpace") != "Linear";
+}
+
+void linearize(std::vector<float>& data, const OIIO::ImageSpec& spec) {
+    for (size_t i = 0; i < data.size(); ++i)
+        if (int(i % spec.nchannels) != spec.alpha_channel) data[i] = srgb_to_linear(data[i]);
+}
+
+// Text and numbers, but for what describes the encoding of this one file.
+void read_attributes(Image& image, const OIIO::ImageSpec& spec) {
+    for (const OIIO::ParamValue& a : spec.extra_attribs) {
+        const std::string name = a.name().string();
+        if (name.find(':') != std::string::npos || name == "compression" || name == "PixelAspectRatio" ||
+            name == "DateTime" || name.starts_with("screenWindow"))
+            continue;
+        if (a.type() == OIIO::TypeString)
+            image.attributes[name] = a.get_string();
+        else if (a.type() == OIIO::TypeFloat)
+            image.attributes[name] = double(a.get_float());
+        else if (a.type() == OIIO::TypeDesc(OIIO::TypeDesc::DOUBLE))
+            image.attributes[name] = *static_cast<const double*>(a.data());
+        else if (a.type() == OIIO::TypeInt)
+            image.attributes[name] = double(a.get_int());
+    }
+}
+
+// ------------------------------------------------------------------------------------------------------- writing
+
+std::vector<Rgb> colours(const PendingFile& file, const Image& image) {
+    try {
+        return rgb_pixels(image);
+    } catch (const std::runtime_error& e) {
+        file.fail(e.what());
+    }
+}
+
+void write_with_oiio(const PendingFile& file, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, const void* pixels) {
+    const auto output = OIIO::ImageOutput::create(file.temporary());
+    if (!output) file.fail(one_line(OIIO::geterror()));
+    if (!output->open(file.temporary(), spec)) file.fail(one_line(output->geterror()));
+    const bool written = output->write_image(type, pixels);
+    const std::string why = written ? "" : one_line(output->geterror());
+    if (!output->close() || !written) file.fail(written ? one_line(output->geterror()) : why);
+}
+
+void write_exr(const PendingFile& file, const Image& image, ExrPrecision precision) {
+    const bool half = precision == ExrPrecision::Half;
+    OIIO::ImageSpec spec(image.width, image.height, int(image.channels.size()),
+                         half ? OIIO::TypeHalf : OIIO::TypeFloat);
+    spec.channelnames = image.channels;
+    spec.alpha_channel = image.channel("A");
+    spec["compression"] = "zip";
+    spec["DateTime"] = "";  // else the time of day, and no two files are the same
+    for (const auto& [name, value] : image.attributes) {
+        if (const auto* text = std::get_if<std::string>(&value))
+            spec.attribute(name, *text);
+        else
+            spec.attribute(name, OIIO::TypeDesc(OIIO::TypeDesc::DOUBLE), &std::get<double>(value));
+    }
+    if (!half) return write_with_oiio(file, spec, OIIO::TypeFloat, image.data.data());
+    std::vector<float> clamped = image.data;
+    for (float& v : clamped)
+        if (std::isfinite(v)) v = std::clamp(v, -kMaxHalf, kMaxHalf);
+    write_with_oiio(file, spec, OIIO::TypeFloat, clamped.data());
+}
+
+// Portable float map: rows from the bottom, little-endian where the scale is negative.
+void write_pfm(const PendingFile& file, const Image& image, ExrPrecision) {
+    static_assert(std::endian::native == std::endian::little);
+    const bool grey = image.channels.size() == 1;
+    const std::vector<Rgb> pixels = colours(file, image);
+    errno = 0;
+    std::ofstream out(file.temporary(), std::ios::binary);
+    out << fmt::format("{}\n{} {}\n-1.0\n", grey ? "Pf" : "PF", image.width, image.height);
+    std::vector<float> row;
+    for (int y = image.height - 1; y >= 0; --y) {
+        row.clear();
+        for (int x = 0; x < image.width; ++x)
+            for (int c = 0; c < (grey ? 1 : 3); ++c) row.push_back(pixels[size_t(y) * image.width + x][c]);
+        out.write(reinterpret_cast<const char*>(row.data()), std::streamsize(row.size() * sizeof(float)));
+    }
+    out.close();
+    if (!out) file.fail(std::generic_category().message(errno));
+}
+
+void write_hdr(const PendingFile& file, const Image& image, ExrPrecision) {
+    const std::vector<Rgb> pixels = colours(file, image);
+    static_assert(sizeof(Rgb) == 3 * sizeof(float));
+    write_with_oiio(file, OIIO::ImageSpec(image.width, image.height, 3, OIIO::TypeFloat), OIIO::TypeFloat,
+                    pixels.data());
+}
+
+uint8_t srgb_code(float v) {
+    return uint8_t(linear_to_srgb(std::clamp(v, 0.0f, 1.0f)) * 255 + 0.5f);
+}
+
+// OpenImageIO's writer of PNG does not notice a full disk.
+bool holds(const std::string& path, const std::vector<uint8_t>& codes) try {
+    return std::get<std::vector<uint8_t>>(read_pixels(path, true).data) == codes;
+} catch (const std::runtime_error&) {
+    return false;
+}
+
+void write_png(const PendingFile& file, const Image& image, ExrPrecision) {
+    std::vector<uint8_t> codes;
+    for (const Rgb c : colours(file, image)) {
+        if (std::isnan(c.r) || std::isnan(c.g) || std::isnan(c.b))
+            codes.insert(codes.end(), {255, 0, 255});
+        else
+            codes.insert(codes.end(), {srgb_code(c.r), srgb_code(c.g), srgb_code(c.b)});
+    }
+    OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeUInt8);
+    spec["oiio:ColorSpace"] = "sRGB";
+    write_with_oiio(file, spec, OIIO::TypeUInt8, codes.data());
+    if (!holds(file.temporary(), codes)) file.fail("what was written cannot be read back; the disk may be full");
+}
+
+struct Writer {
+    const char* extension;
+    void (*write)(const PendingFile& file, const Image& image, ExrPrecision precision);
+};
+constexpr Writer kWriters[] = {{".exr", write_exr}, {".pfm", write_pfm}, {".hdr", write_hdr}, {".png", write_png}};
+
+const Writer& writer_for(const std::string& path) {
+    std::string e = fs::path(path).extension().string();
+    std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    for (const Writer& w : kWriters)
+        if (e == w.extension) return w;
+    fail_write(path, fmt::format("its name must end in .exr, .pfm, .hdr or .png, not in \"{}\"", e));
+}
+
+}  // namespace
+
+Image read_image(const std::string& path) {
+    const auto input = open_input(path);
+    const OIIO::ImageSpec& spec = input->spec();
+    Image image;
+    image.width = spec.width;
+    image.height = spec.height;
+    image.channels = spec.channelnames;
+    image.data = read_all<float>(*input, path, OIIO::TypeFloat);
+    if (holds_srgb(spec)) linearize(image.data, spec);
+    read_attributes(image, spec);
+    return image;
+}
+
+PixelBuffer read_pixels(const std::string& path, bool raw) {
+    const auto input = open_input(path);
+    const OIIO::ImageSpec& spec = input->spec();
+    PixelBuffer buffer{.width = spec.width, .height = spec.height, .channels = spec.nchannels, .data = {},
+                       .alpha_channel = spec.alpha_channel};
+    if (spec.format == OIIO::TypeUInt8) {
+        buffer.data = read_all<uint8_t>(*input, path, OIIO::TypeUInt8);
+    } else if (spec.format == OIIO::TypeHalf) {
+        buffer.data = read_all<Half>(*input, path, OIIO::TypeHalf);
+    } else {
+        auto data = read_all<float>(*input, path, OIIO::TypeFloat);
+        if (!raw && holds_srgb(spec)) linearize(data, spec);
+        buffer.data = std::move(data);
+    }
+    return buffer;
+}
+
+void check_image_extension(const std::string& path) {
+    writer_for(path);
+}
+
+void write_image(const std::string& path, const Image& image, ExrPrecision precision) {
+    const Writer& writer = writer_for(path);
+    if (image.pixel_count() == 0 || image.data.size() != image.pixel_count() * image.channels.size())
+        fail_write(path, "the image is empty");
+    PendingFile file(path);
+    writer.write(file, image, precision);
+    file.commit();
+}
+
+}  // namespace etendue

@@ -1,0 +1,88 @@
+#pragma once
+// Integrators: which sub-paths are traced, which techniques join them, how many samples each takes. Nothing else.
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "description/params.h"
+#include "pathspace/join.h"
+#include "pathspace/sink.h"
+
+namespace etendue {
+
+/// Statistical nature of an estimator; written into reports and images.
+enum class Estimator { Unbiased, Consistent, Biased };
+
+/// Buffers of one worker, reused from sample to sample.
+struct Workspace {
+    SubPath y, z;
+    RenderStats stats;
+};
+
+/// One sample: the eye path of a pixel, the light path of the same index, or both.
+struct SampleContext {
+    const Scene& scene;
+    const Film& film;
+    uint64_t pixel;           ///< Index within the crop; also that of the light path.
+    uint64_t light_paths;     ///< N_L of the pass.
+    float splat_scale;        ///< 1 / N_L: what a splat is worth on the film.
+    Sampler& sampler;
+    ContributionSink& sink;
+};
+
+class Integrator {
+public:
+    virtual ~Integrator() = default;
+    /// Traces sample `context.pixel` and reports its contributions.
+    virtual void sample(const SampleContext& context, Workspace& work) const = 0;
+    /// Light paths per pixel in one pass: 0 or 1.
+    virtual bool traces_light_paths() const = 0;
+    virtual Estimator estimator() const = 0;
+};
+
+/// The text after an integrator's name: `bdpt:max_depth=12,rr_depth=5`. Checked against the integrator's table.
+struct IntegratorSpec {
+    std::string name;
+    std::map<std::string, std::string> params;
+
+    /// Throws std::runtime_error with one clear message.
+    static IntegratorSpec parse(const std::string& text);
+    std::string to_string() const;
+};
+
+/// Typed access to a spec's parameters; the table's defaults where absent.
+class IntegratorParams {
+public:
+    IntegratorParams(const IntegratorSpec& spec, const PluginInfo& info);
+    int integer(const char* name) const;
+    float number(const char* name) const;
+    bool flag(const char* name) const;
+
+private:
+    const std::string& text(const char* name) const;
+    std::map<std::string, std::string> values_;
+    std::string integrator_;
+};
+
+struct IntegratorEntry {
+    PluginInfo info;
+    std::unique_ptr<Integrator> (*make)(const IntegratorParams& params);
+};
+const std::vector<IntegratorEntry>& integrator_registry();
+std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec);
+
+/// Longest path and start of roulette, as all integrators have them.
+struct DepthOptions {
+    int max_depth;  ///< Edges of the longest path; INT_MAX where unlimited.
+    int rr_depth;
+
+    static DepthOptions from(const IntegratorParams& params);
+    /// Vertices of a sub-path that can still be joined.
+    WalkOptions walk() const { return {max_depth == kUnlimited ? kUnlimited : max_depth + 1, rr_depth}; }
+    static constexpr int kUnlimited = 1 << 20;
+};
+std::vector<ParamInfo> depth_params();
+
+}  // namespace etendue

@@ -1,0 +1,49 @@
+// Light tracing, or particle tracing: light paths are connected to the lens [Dutré & Willems 1995].
+//
+// Techniques: C(s,1) splats and, with a finite lens, C(s,0). Unbiased for the paths it can make. Limits: whatever the
+// eye sees in a mirror or through glass is missing with a pinhole.
+
+#include "integrator/light.h"
+
+namespace etendue {
+namespace {
+
+class LightIntegrator final : public Integrator {
+public:
+    explicit LightIntegrator(const DepthOptions& depth) : depth_(depth) {}
+
+    void sample(const SampleContext& c, Workspace& work) const override {
+        const float N = float(c.light_paths);
+        const TechniqueCounts counts{.splat = N, .hit_lens = c.scene.sensor().has_finite_lens() ? N : 0.0f};
+        // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
+        const WalkOptions walk{depth_.max_depth + c.scene.sensor().has_finite_lens(), depth_.rr_depth};
+        SubPath& y = work.y;
+        if (!start_light_path(c.scene, c.sampler, y, work.stats)) return;
+        for (int s = 1; s <= y.size(); ++s) {
+            if (s > depth_.max_depth) break;
+            if (const auto j = join_splat(c.scene, y, s, c.sampler, counts))
+                if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
+                    c.sink.add_splat(j->film, j->technique, j->contribution * Tr, j->mis_weight);
+            if (s >= 2) extend<TransportMode::Importance>(c.scene, c.sampler, walk, counts, y, work.stats);
+            if (const auto j = join_hit_lens(c.scene, y, s, counts))
+                c.sink.add_splat(j->film, j->technique, j->contribution, j->mis_weight);
+        }
+    }
+
+    bool traces_light_paths() const override { return true; }
+    Estimator estimator() const override { return Estimator::Unbiased; }
+
+private:
+    DepthOptions depth_;
+};
+
+}  // namespace
+
+IntegratorEntry light_entry() {
+    return {{"integrator", "light", "Light tracing: light paths connected to the lens. Unbiased for the paths it can make.", depth_params()},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                return std::make_unique<LightIntegrator>(DepthOptions::from(p));
+            }};
+}
+
+}  // namespace etendue

@@ -1,0 +1,48 @@
+// Path tracing with next event estimation [Kajiya 1986; Veach 1997, §9.3].
+//
+// Techniques: C(0,t) hits and C(1,t) next events, combined by the power heuristic. Unbiased. Limits: light that reaches
+// diffuse surfaces over mirrors or glass from small emitters is found only by chance, from point and directional
+// emitters never.
+
+#include "integrator/path.h"
+
+namespace etendue {
+namespace {
+
+class PathIntegrator final : public Integrator {
+public:
+    explicit PathIntegrator(const DepthOptions& depth) : depth_(depth) {}
+
+    void sample(const SampleContext& c, Workspace& work) const override {
+        constexpr TechniqueCounts counts{.hit = 1, .next_event = 1};
+        const WalkOptions walk = depth_.walk();
+        SubPath& z = work.z;
+        start_eye_path(c.scene, c.film, c.pixel, c.sampler, z, work.stats);
+        for (int t = 2; t <= z.size(); ++t) {
+            for_each_hit(c.scene, z, t, counts,
+                         [&](const Join& j) { c.sink.add_eye(j.technique, j.contribution, j.mis_weight); });
+            if (t > depth_.max_depth) break;
+            if (const auto j = join_next_event(c.scene, z, t, c.sampler, counts))
+                if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
+                    c.sink.add_eye(j->technique, j->contribution * Tr, j->mis_weight);
+            extend<TransportMode::Radiance>(c.scene, c.sampler, walk, counts, z, work.stats);
+        }
+    }
+
+    bool traces_light_paths() const override { return false; }
+    Estimator estimator() const override { return Estimator::Unbiased; }
+
+private:
+    DepthOptions depth_;
+};
+
+}  // namespace
+
+IntegratorEntry path_entry() {
+    return {{"integrator", "path", "Path tracing with next event estimation and MIS; the reference. Unbiased.", depth_params()},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                return std::make_unique<PathIntegrator>(DepthOptions::from(p));
+            }};
+}
+
+}  // namespace etendue

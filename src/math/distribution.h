@@ -1,0 +1,78 @@
+#pragma once
+// Tabulated distributions: alias table over indices, piecewise-constant densities in one and two dimensions.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "math/vec.h"
+
+namespace etendue {
+
+/// Draws an index with probability proportional to its weight in constant time [Walker 1977; Vose 1991].
+class AliasTable {
+public:
+    AliasTable() = default;
+    /// Weights must be finite and not negative; a table whose weights are all zero is empty.
+    explicit AliasTable(std::span<const double> weights);
+
+    struct Draw {
+        uint32_t index;
+        float pmf;
+        float u;  ///< `u` rescaled to [0, 1), to be used again.
+    };
+    Draw sample(float u) const;
+    float pmf(uint32_t i) const { return cells_[i].pmf; }
+    double total() const { return total_; }
+    size_t size() const { return cells_.size(); }
+    bool empty() const { return cells_.empty(); }
+
+private:
+    struct Cell {
+        float keep;  ///< Probability that the cell's own index is taken.
+        uint32_t alias;
+        float pmf;
+    };
+    std::vector<Cell> cells_;
+    double total_ = 0;
+};
+
+/// Piecewise-constant density on [0, 1).
+class PiecewiseConstant1D {
+public:
+    PiecewiseConstant1D() = default;
+    explicit PiecewiseConstant1D(std::span<const float> values);
+    /// Position in [0, 1), its density, and the cell it fell in.
+    struct Sample {
+        float x, pdf;
+        int cell;
+    };
+    Sample sample(float u) const;
+    float pdf(float x) const;
+    double integral() const { return integral_; }
+    int size() const { return int(values_.size()); }
+
+private:
+    std::vector<float> values_, cdf_;
+    double integral_ = 0;
+};
+
+/// Piecewise-constant density on [0, 1)², `width` × `height` cells, row by row.
+class PiecewiseConstant2D {
+public:
+    PiecewiseConstant2D() = default;
+    PiecewiseConstant2D(std::span<const float> values, int width, int height);
+    struct Sample {
+        Vec2 uv;
+        float pdf;
+    };
+    Sample sample(Vec2 u) const;
+    float pdf(Vec2 uv) const;
+    double integral() const { return marginal_.integral(); }
+
+private:
+    std::vector<PiecewiseConstant1D> rows_;
+    PiecewiseConstant1D marginal_;
+};
+
+}  // namespace etendue

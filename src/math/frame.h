@@ -1,0 +1,64 @@
+#pragma once
+// Orthonormal frames and the local shading coordinates (z = normal) that every BSDF works in.
+
+#include "math/vec.h"
+
+namespace etendue {
+
+struct Frame {
+    Vec3 s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};
+
+    /// Any right-handed frame about the unit vector `n` [Duff et al. 2017].
+    static Frame from_normal(Vec3 n) {
+        const float sign = std::copysign(1.0f, n.z);
+        const float a = -1.0f / (sign + n.z);
+        const float b = n.x * n.y * a;
+        return {{1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x},
+                {b, sign + n.y * n.y * a, -n.y},
+                n};
+    }
+
+    /// Frame about `n` whose `s` is the part of `dpdu` in the tangent plane; any frame where `dpdu` is parallel to `n`.
+    static Frame from_normal_and_tangent(Vec3 n, Vec3 dpdu) {
+        const Vec3 s = dpdu - n * dot(n, dpdu);
+        const float len2 = length2(s);
+        // Closer than 1e-3 radians to n, cancellation leaves too little of s.
+        if (!(len2 > 1e-6f * length2(dpdu)) || !(len2 > 0)) return from_normal(n);
+        const Vec3 unit = s * (1.0f / std::sqrt(len2));
+        return {unit, cross(n, unit), n};
+    }
+
+    Vec3 to_local(Vec3 v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
+    Vec3 to_world(Vec3 v) const { return s * v.x + t * v.y + n * v.z; }
+    /// The same tangent with the normal turned to the other side (left-handed frames are avoided by turning t too).
+    Frame flipped() const { return {s, -t, -n}; }
+};
+
+inline float cos_theta(Vec3 w) {
+    return w.z;
+}
+inline float abs_cos_theta(Vec3 w) {
+    return std::fabs(w.z);
+}
+constexpr float cos2_theta(Vec3 w) {
+    return w.z * w.z;
+}
+inline float sin2_theta(Vec3 w) {
+    return std::fmax(0.0f, 1.0f - w.z * w.z);
+}
+inline float tan2_theta(Vec3 w) {
+    return sin2_theta(w) / cos2_theta(w);
+}
+constexpr bool same_hemisphere(Vec3 a, Vec3 b) {
+    return a.z * b.z > 0;
+}
+/// Mirror direction about the local normal.
+constexpr Vec3 reflect(Vec3 w) {
+    return {-w.x, -w.y, w.z};
+}
+/// Mirror direction about the unit vector `m`.
+constexpr Vec3 reflect(Vec3 w, Vec3 m) {
+    return m * (2.0f * dot(w, m)) - w;
+}
+
+}  // namespace etendue

@@ -1,0 +1,25 @@
+#pragma once
+// Integer mixing for counter-based random numbers and hash tables.
+
+#include <cstdint>
+
+namespace etendue {
+
+/// Finaliser of SplitMix64 [Steele et al. 2014]: a bijection with full avalanche.
+constexpr uint64_t mix64(uint64_t x) {
+    x ^= x >> 30;
+    x *= 0xbf58476d1ce4e5b9ull;
+    x ^= x >> 27;
+    x *= 0x94d049bb133111ebull;
+    x ^= x >> 31;
+    return x;
+}
+constexpr uint64_t hash_combine(uint64_t a, uint64_t b) {
+    return mix64(a + 0x9e3779b97f4a7c15ull * (b + 1));
+}
+/// Uniform in [0, 1) with 24 bits.
+constexpr float to_unit_float(uint32_t bits) {
+    return float(bits >> 8) * 0x1p-24f;
+}
+
+}  // namespace etendue

@@ -1,0 +1,65 @@
+#pragma once
+// Maps from the unit square to discs, hemispheres, cones and triangles, each with its density.
+
+#include <algorithm>
+
+#include "math/vec.h"
+
+namespace etendue {
+
+/// Uniform on the unit disc, concentric map [Shirley & Chiu 1997].
+inline Vec2 sample_uniform_disk(Vec2 u) {
+    const float a = 2 * u.x - 1, b = 2 * u.y - 1;
+    if (a == 0 && b == 0) return {0, 0};
+    float r, phi;
+    if (a * a > b * b) {
+        r = a;
+        phi = (kPi / 4) * (b / a);
+    } else {
+        r = b;
+        phi = (kPi / 2) - (kPi / 4) * (a / b);
+    }
+    float s, c;
+    sincosf(phi, &s, &c);
+    return {r * c, r * s};
+}
+inline constexpr float kUniformDiskPdf = kInvPi;
+
+/// Density cos θ / π on the upper hemisphere.
+inline Vec3 sample_cosine_hemisphere(Vec2 u) {
+    const Vec2 d = sample_uniform_disk(u);
+    return {d.x, d.y, safe_sqrt(1 - d.x * d.x - d.y * d.y)};
+}
+inline float pdf_cosine_hemisphere(float cos_theta) {
+    return std::max(cos_theta, 0.0f) * kInvPi;
+}
+
+inline Vec3 sample_uniform_sphere(Vec2 u) {
+    const float z = 1 - 2 * u.x;
+    const float r = safe_sqrt(1 - z * z);
+    float s, c;
+    sincosf(2 * kPi * u.y, &s, &c);
+    return {r * c, r * s, z};
+}
+inline constexpr float kUniformSpherePdf = kInvPi / 4;
+
+/// Uniform in solid angle within the cone about +z whose half-angle has cosine `cos_max`.
+inline Vec3 sample_uniform_cone(Vec2 u, float cos_max) {
+    // sin² θ = (1 - cos θ)(1 + cos θ): a narrow cone's 1 - cos² θ would have few digits left.
+    const float versine = u.x * (1 - cos_max);
+    const float r = safe_sqrt(versine * (2 - versine));
+    float s, c;
+    sincosf(2 * kPi * u.y, &s, &c);
+    return {r * c, r * s, 1 - versine};
+}
+inline float pdf_uniform_cone(float cos_max) {
+    return kInvPi / (2 * (1 - cos_max));
+}
+
+/// Barycentric coordinates (of the second and third corner), uniform in area.
+inline Vec2 sample_uniform_triangle(Vec2 u) {
+    const float r = std::sqrt(u.x);
+    return {1 - r, u.y * r};
+}
+
+}  // namespace etendue

@@ -1,0 +1,185 @@
+#include "pathspace/join.h"
+
+namespace etendue {
+namespace {
+
+/// Attenuation of the edge between two surface points by the media they say lie on it. Where they differ (a scene whose
+/// surfaces contradict each other) the choice does not depend on the side it is seen from.
+Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b, float distance) {
+    return scene.attenuation(std::min(a.medium_toward(a_to_b), b.medium_toward(-a_to_b)), distance);
+}
+
+}  // namespace
+
+float visibility(const Scene& scene, const Join& join, RenderStats& stats) {
+    if (!join.needs_test) return 1;
+    ++stats.shadow_rays;
+    const float Tr = join.to_infinity ? scene.transmittance_to_infinity(join.a, join.ng_a, join.b)
+                                      : scene.transmittance(join.a, join.ng_a, join.b, join.ng_b);
+    stats.visible += Tr > 0;
+    return Tr;
+}
+
+std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter, const TechniqueCounts& counts) {
+    const int last = t - 1;
+    const Vertex& v = z[last];
+    if (!(counts.hit > 0)) return {};
+    const EmitterHit e = v.is_infinite ? emitter.eval_infinite(v.p) : emitter.eval_surface(v.ng, v.uv, v.prim, v.wo);
+    if (e.Le.is_zero()) return {};
+
+    // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
+    const double p_NE = double(emitter.selection_pmf) * e.pdf / v.pdf_fwd;
+    const double p_L = double(emitter.selection_pmf) * e.pdf_y0 / v.pdf_fwd;
+    double others = 0;
+    if (last >= 2 && !z[last - 1].is_delta) others += sqr(counts.next_event * p_NE);
+    if (counts.uses_light_paths()) {
+        const double rev_prev = to_area(e.pdf_d, v, z[last - 1]);
+        double inner = sqr(split_count<Side::Eye>(z, last - 1, z[last - 1].is_delta, counts)) + v.weight_sum;
+        inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
+        if (last == 1) inner += sqr(double(counts.splat));
+        others += sqr(p_L) * inner;
+    }
+    return Join{.technique = connection_technique(0, t),
+                .contribution = v.beta * e.Le,
+                .mis_weight = power_heuristic(counts.hit, others),
+                .film = z.film,
+                .needs_test = false};
+}
+
+std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,
+                                    const TechniqueCounts& counts) {
+    const int last = t - 1;
+    const Vertex& v = z[last];
+    if (!v.may_connect || !scene.has_emitters()) return {};
+    sampler.seek(Stream::Connection, uint32_t(last));
+    const Scene::EmitterChoice choice = scene.sample_emitter(sampler.next_1d());
+    const Emitter& emitter = *choice.emitter;
+    DirectSample d;
+    if (!emitter.sample_direct(v.p, sampler.next_2d(), d)) return {};
+    const BsdfEval f = v.bsdf.eval(v.wo, d.wi, TransportMode::Radiance);
+    if (f.f.is_zero()) return {};
+
+    // |cos θ_0| / d² of a surface, 1 / d² of a point, 1 at infinity.
+    const bool infinite = emitter.is_infinite();
+    const float inv_dist2 = infinite ? 1.0f : 1 / sqr(d.dist);
+    const float to_x0 = emitter.is_area() ? abs_dot(d.ng, d.wi) * inv_dist2 : inv_dist2;
+    const float p_NE = emitter.selection_pmf * d.pdf;
+    Rgb C = v.beta * f.f * d.Le * (to_x0 / p_NE);
+    const MediumId medium = v.medium_toward(d.wi);
+    if (medium != kVacuum) C *= scene.attenuation(medium, d.dist);
+
+    double others = emitter.is_delta() ? 0.0 : sqr(double(counts.hit) * f.pdf * to_x0 / p_NE);
+    if (counts.uses_light_paths()) {
+        const double rev_last = double(d.pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
+        const double rev_prev = to_area(f.pdf_rev, v, z[last - 1]);
+        const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
+        others += sqr(p_L / p_NE) * outward_sum<Side::Eye>(z, last, false, rev_last, rev_prev, counts);
+    }
+    return Join{.technique = {Strategy::NextEvent, 1, t},
+                .contribution = C,
+                .mis_weight = power_heuristic(counts.next_event, others),
+                .film = z.film,
+                .a = v.p,
+                .ng_a = v.ng,
+                .b = d.p,
+                .ng_b = emitter.is_area() ? d.ng : Vec3{},
+                .to_infinity = infinite};
+}
+
+std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z, int t,
+                                 const TechniqueCounts& counts) {
+    const Vertex& a = y[s - 1];
+    const Vertex& b = z[t - 1];
+    if (!a.may_connect || !b.may_connect) return {};
+    const Vec3 edge = b.p - a.p;
+    const float dist2 = length2(edge);
+    if (!(dist2 > 0)) return {};
+    const float inv_dist = 1 / std::sqrt(dist2);
+    const Vec3 w = edge * inv_dist;
+    const BsdfEval fb = b.bsdf.eval(b.wo, -w, TransportMode::Radiance);
+    if (fb.f.is_zero()) return {};
+    const BsdfEval fa = a.bsdf.eval(a.wo, w, TransportMode::Importance);
+    if (fa.f.is_zero()) return {};
+    const float inv_dist2 = sqr(inv_dist);
+    const Rgb C = a.beta * fa.f * fb.f * b.beta * inv_dist2 * edge_attenuation(scene, a, b, w, dist2 * inv_dist);
+
+    const double others =
+        outward_sum<Side::Light>(y, s - 1, false, fb.pdf * abs_dot(a.ng, w) * inv_dist2, to_area(fa.pdf_rev, a, y[s - 2]), counts) +
+        outward_sum<Side::Eye>(z, t - 1, false, fa.pdf * abs_dot(b.ng, w) * inv_dist2, to_area(fb.pdf_rev, b, z[t - 2]), counts);
+    return Join{.technique = {Strategy::Connect, s, t},
+                .contribution = C,
+                .mis_weight = power_heuristic(counts.connect, others),
+                .film = z.film,
+                .a = a.p,
+                .ng_a = a.ng,
+                .b = b.p,
+                .ng_b = b.ng};
+}
+
+std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler, const TechniqueCounts& counts) {
+    const Vertex& a = y[s - 1];
+    if (!a.may_connect) return {};
+    sampler.seek(Stream::Connection, uint32_t(s) + 0x8000u);
+    const Sensor& sensor = scene.sensor();
+    if (a.is_infinite && sensor.is_orthographic()) return {};
+    const auto lens = sensor.sample_connection(a.p, a.is_infinite, sampler.next_2d());
+    if (!lens) return {};
+    const Vec3 edge = lens->p - a.p;
+    // Toward the sensor. Neither an emitter nor a sensor at infinity has a distance in G.
+    const bool no_distance = a.is_infinite || sensor.is_orthographic();
+    const float inv_dist = no_distance ? 1.0f : 1 / length(edge);
+    const Vec3 w = a.is_infinite ? -a.p : sensor.is_orthographic() ? -lens->ng : edge * inv_dist;
+    const float inv_dist2 = sqr(inv_dist);
+
+    BsdfEval f;
+    if (s == 1) {
+        const Emitter::Emission e = a.emitter->eval_emission(a.ng, a.uv, w);
+        f.f = e.Le_cos;
+        f.pdf = e.pdf_d;
+    } else {
+        f = a.bsdf.eval(a.wo, w, TransportMode::Importance);
+    }
+    if (f.f.is_zero()) return {};
+    Rgb C = a.beta * f.f * (lens->We_cos / lens->pdf_pos * inv_dist2);
+    const MediumId medium = a.medium_toward(w);
+    if (medium != kVacuum) C *= scene.attenuation(medium, length(edge));
+
+    const double rev_last = a.is_infinite ? lens->pdf_dir : lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, w) : 1.0f) * inv_dist2;
+    const double rev_prev = s >= 2 ? to_area(f.pdf_rev, a, y[s - 2]) : 0.0f;
+    double others = outward_sum<Side::Light>(y, s - 1, false, rev_last, rev_prev, counts);
+    if (counts.hit_lens > 0) others += sqr(double(counts.hit_lens) * f.pdf * abs_dot(lens->ng, w) * inv_dist2 / lens->pdf_pos);
+    Join join{.technique = {Strategy::Splat, s, 1},
+              .contribution = C,
+              .mis_weight = power_heuristic(counts.splat, others),
+              .film = lens->film,
+              .a = lens->p,
+              .ng_a = Vec3{},
+              .b = a.p,
+              .ng_b = a.has_cosine ? a.ng : Vec3{},
+              .to_infinity = a.is_infinite};
+    return join;
+}
+
+std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s, const TechniqueCounts& counts) {
+    const Vertex& a = y[s - 1];
+    const Flight& flight = y.flight;
+    if (!(counts.hit_lens > 0) || !(flight.pdf_sa > 0) || a.is_infinite) return {};
+    const auto lens = scene.sensor().hit_lens(a.p, flight.d, flight.length);
+    if (!lens) return {};
+    const float dist2 = length2(lens->p - a.p);
+    const float cos_lens = abs_dot(lens->ng, flight.d);
+    const Rgb C = flight.beta * (lens->We_cos / cos_lens) * scene.attenuation(flight.medium, std::sqrt(dist2));
+
+    const double p_fwd = a.is_delta ? flight.pdf_sa : flight.pdf_sa * cos_lens / dist2;
+    const double p_lens = lens->pdf_pos / p_fwd;
+    const double rev_last = lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, flight.d) : 1.0f) / dist2;
+    double others = sqr(p_lens) * outward_sum<Side::Light>(y, s - 1, a.is_delta, rev_last, s >= 2 ? y[s - 2].pdf_rev : 0.0f, counts);
+    if (!a.is_delta) others += sqr(counts.splat * p_lens);
+    return Join{.technique = {Strategy::HitLens, s + 1, 0},
+                .contribution = C,
+                .mis_weight = power_heuristic(counts.hit_lens, others),
+                .film = lens->film,
+                .needs_test = false};
+}
+
+}  // namespace etendue

@@ -1,0 +1,86 @@
+#pragma once
+// Vertices and sub-paths. A sub-path is walked once and then only read: joins and weights never change it.
+
+#include <optional>
+#include <vector>
+
+#include "bsdf/material.h"
+#include "emitter/emitter.h"
+#include "scene/scene.h"
+
+namespace etendue {
+
+/// One end or scattering point with everything that connections and weights need.
+struct Vertex {
+    enum class Kind : uint8_t { Sensor, Emitter, Surface };
+
+    Vec3 p;               ///< Position; for an emitter at infinity the unit direction toward it.
+    Vec3 ng;              ///< Unit geometric normal; zero-cosine points (point lights) have the direction of the walk.
+    Vec3 wo;              ///< Toward the predecessor; unused at the first vertex.
+    Rgb beta;             ///< Throughput up to, not including, scattering here.
+    float pdf_fwd = 0;    ///< Area density as sampled from the predecessor; discrete after a delta event.
+    float pdf_rev = 0;    ///< Area density as it would be sampled from the successor; known two vertices later.
+    /// Σ over the techniques whose split lies before vertex i-2, relative to the density of the split there; see mis.h.
+    double weight_sum = 0;
+    /// p_NE / p_L of an emitter vertex y_0 seen from here (stored at y_1); see mis.h.
+    float next_event_ratio = 1;
+    Kind kind = Kind::Surface;
+    bool is_delta = false;      ///< The walk left this vertex by a delta event.
+    bool is_infinite = false;   ///< At infinity; p is a direction.
+    bool has_cosine = true;     ///< A surface: |cos θ| belongs to G here.
+    bool may_connect = false;   ///< Has a smooth lobe, or is an end point.
+    MediumId medium = kVacuum;  ///< On the edge to the predecessor.
+    const SceneShape* shape = nullptr;
+    const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or on the surface.
+    uint32_t prim = 0;
+    Vec2 uv;
+    Bsdf bsdf;
+
+    /// Medium on the edge that leaves along `w`.
+    MediumId medium_toward(Vec3 w) const {
+        if (!shape || !shape->is_interface) return medium;
+        return dot(ng, w) < 0 ? shape->interior : shape->exterior;
+    }
+};
+
+/// The last ray of a walk, whether or not it met a surface: a finite lens may lie on it.
+struct Flight {
+    Vec3 d;
+    float length = kInf;     ///< Distance to what it met.
+    Rgb beta;                ///< Throughput along it: that of the vertex it left, times scattering over density.
+    float pdf_sa = 0;        ///< Density of d; discrete for a delta event; 0: the last step traced no ray.
+    MediumId medium = kVacuum;
+};
+
+/// A walk from one end of the path space: y_0 … or z_0 …
+struct SubPath {
+    std::vector<Vertex> vertices;
+    ComponentArena arena;
+    Vec2 film;                ///< Film point of an eye sub-path.
+    float film_weight = 1;    ///< Factor of the reconstruction filter, for contributions to the own pixel.
+    Flight flight;
+    float eta2 = 1;           ///< Product of η² over the refractions of an eye sub-path.
+
+    int size() const { return int(vertices.size()); }
+    const Vertex& operator[](int i) const { return vertices[size_t(i)]; }
+    Vertex& operator[](int i) { return vertices[size_t(i)]; }
+    void clear() {
+        vertices.clear();
+        arena.reset();
+        eta2 = 1;
+        flight.pdf_sa = 0;
+    }
+};
+
+/// Solid-angle density at `from` to area density at `to`: p_A = p_σ |cos θ_to| / d². At infinity it stays as it is.
+inline float to_area(float pdf_sa, const Vertex& from, const Vertex& to) {
+    if (to.is_infinite) return pdf_sa;
+    // From infinity: pdf_sa is the density on the bounding disc.
+    if (from.is_infinite) return pdf_sa * abs_dot(to.ng, from.p);
+    const Vec3 v = to.p - from.p;
+    const float dist2 = length2(v);
+    const float pdf = pdf_sa / dist2;
+    return to.has_cosine ? pdf * abs_dot(to.ng, v) / std::sqrt(dist2) : pdf;
+}
+
+}  // namespace etendue

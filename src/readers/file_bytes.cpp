@@ -1,0 +1,38 @@
+#include "readers/file_bytes.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+#include "description/scene_description.h"
+
+namespace etendue {
+
+std::string read_file_bytes(const std::string& path) {
+    const auto fail = [&] {
+        throw SceneError({path, 0}, std::string("cannot read: ") + std::strerror(errno));
+    };
+    const auto close = [](std::FILE* f) { std::fclose(f); };
+    const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
+    if (!file) fail();
+
+    std::string bytes;
+    size_t used = 0;
+    // The size is a hint only: pipes and devices have none.
+    if (std::fseek(file.get(), 0, SEEK_END) == 0) {
+        if (const long size = std::ftell(file.get()); size > 0) bytes.resize(size_t(size) + 1);
+        std::rewind(file.get());
+    }
+    for (;;) {
+        if (used == bytes.size()) bytes.resize(bytes.size() + (size_t(1) << 16));
+        const size_t got = std::fread(&bytes[used], 1, bytes.size() - used, file.get());
+        if (got == 0) break;
+        used += got;
+    }
+    if (std::ferror(file.get())) fail();
+    bytes.resize(used);
+    return bytes;
+}
+
+}  // namespace etendue

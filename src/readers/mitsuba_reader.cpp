@@ -1,0 +1,425 @@
+#include "readers/mitsuba_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "readers/mitsuba_upgrade.h"
+#include "readers/mitsuba_values.h"
+#include "readers/object_graph.h"
+
+namespace etendue {
+namespace {
+
+// Far beyond any real scene; they keep hostile files from exhausting the stack, the time or the
+// memory.
+constexpr int kDeepestNesting = 64;
+constexpr size_t kDeepestInclude = 32;
+constexpr int kMostIncludes = 10'000;
+constexpr int kMostElements = 20'000'000;
+constexpr size_t kLongestName = 1024;
+
+/// The categories of objects, and those that may stand in each.
+struct Nesting {
+    const char* category;
+    const char* children;
+};
+constexpr Nesting kNesting[] = {
+    {"bsdf", "bsdf texture"},
+    {"emitter", "texture medium"},
+    {"film", "rfilter"},
+    {"integrator", "integrator sampler"},
+    {"medium", "phase texture volume"},
+    {"phase", "phase texture"},
+    {"rfilter", ""},
+    {"sampler", ""},
+    {"sensor", "film medium sampler"},
+    {"shape", "bsdf emitter medium sensor shape texture"},
+    {"texture", "texture"},
+    {"volume", "texture volume"},
+    {"spectrum", ""},
+};
+
+const Nesting* find_nesting(std::string_view category) {
+    const auto it = std::find_if(std::begin(kNesting), std::end(kNesting),
+                                 [&](const Nesting& n) { return n.category == category; });
+    return it == std::end(kNesting) ? nullptr : it;
+}
+
+bool is_category(std::string_view element) {
+    return element != "spectrum" && find_nesting(element);
+}
+
+bool has_word(std::string_view words, std::string_view word) {
+    for (size_t at = words.find(word); at != words.npos; at = words.find(word, at + 1)) {
+        const size_t end = at + word.size();
+        if ((at == 0 || words[at - 1] == ' ') && (end == words.size() || words[end] == ' '))
+            return true;
+    }
+    return false;
+}
+
+void check_nesting(std::string_view parent, std::string_view child, const SourceLocation& where) {
+    if (parent == "scene") return;
+    const char* allowed = find_nesting(parent)->children;
+    if (has_word(allowed, child)) return;
+    throw SceneError(where, *allowed ? fmt::format("a <{}> cannot stand in a <{}>, which takes: {}",
+                                                   child, parent, allowed)
+                                     : fmt::format("a <{}> cannot stand in a <{}>", child, parent));
+}
+
+std::vector<std::string> words(std::string_view list) {
+    std::vector<std::string> found;
+    for (size_t begin = 0; begin < list.size();) {
+        const size_t end = std::min(list.find(' ', begin), list.size());
+        found.emplace_back(list.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    return found;
+}
+
+std::string directory_of(const std::string& file) {
+    const auto directory = std::filesystem::path(file).parent_path();
+    return directory.empty() ? std::string(".") : directory.string();
+}
+
+std::string join(const std::string& directory, const std::string& name) {
+    if (directory == ".") return name;
+    return (std::filesystem::path(directory) / name).string();
+}
+
+}  // namespace
+
+MitsubaReader::Source::Source(const std::string& name, std::string_view contents, bool old)
+    : file(name), directory(directory_of(name)), text(contents), old_dialect(old) {
+    for (size_t i = 0; i < text.size(); ++i)
+        if (text[i] == '\n') line_ends.push_back(i);
+}
+
+int MitsubaReader::Source::line(ptrdiff_t offset) const {
+    if (offset < 0) return 0;
+    return 1 + int(std::lower_bound(line_ends.begin(), line_ends.end(), size_t(offset)) -
+                   line_ends.begin());
+}
+
+MitsubaReader::MitsubaReader(const std::string& file, const ReadOptions& options)
+    : options_(options), parameters_(options.defines) {
+    scene_.file = file;
+}
+
+SceneDescription MitsubaReader::read(std::string_view text) {
+    Scope root;
+    read_document(text, scene_.file, root, nullptr);
+    resolve_references();
+    check_object_graph(scene_, kDeepestNesting);
+    parameters_.check_overrides(scene_.file);
+    return std::move(scene_);
+}
+
+void MitsubaReader::reject(const SourceLocation& where, const std::string& what,
+                           const std::string& more) {
+    if (!options_.lenient) throw SceneError(where, what + more);
+    scene_.warnings.push_back(fmt::format("{}:{}: {}; dropped", where.file, where.line, what));
+}
+
+SourceLocation MitsubaReader::locate(const pugi::xml_node& node) const {
+    return {source_->file, source_->line(node.offset_debug())};
+}
+
+void MitsubaReader::fail_text(const pugi::xml_node& text) const {
+    const size_t visible = source_->text.find_first_not_of(
+        " \t\r\n", size_t(std::max<ptrdiff_t>(0, text.offset_debug())));
+    std::string_view value = text.value();
+    value.remove_prefix(std::min(value.find_first_not_of(" \t\r\n"), value.size()));
+    throw SceneError({source_->file, source_->line(ptrdiff_t(visible))},
+                     fmt::format("unexpected text {}: values belong in attributes", quote(value)));
+}
+
+void MitsubaReader::check_leaf(const pugi::xml_node& node) const {
+    const pugi::xml_node child = node.first_child();
+    if (!child) return;
+    if (child.type() != pugi::node_element) fail_text(child);
+    throw SceneError(locate(child),
+                     fmt::format("a <{}> cannot contain a <{}>", node.name(), child.name()));
+}
+
+// ---- Documents
+
+void MitsubaReader::read_document(std::string_view text, const std::string& file, Scope& scope,
+                                  const Element* include) {
+    Source source(file, text, source_ && source_->old_dialect);
+    if (const size_t zero = text.find('\0'); zero != text.npos)
+        throw SceneError({file, source.line(ptrdiff_t(zero))},
+                         "a zero byte: this is not an XML text");
+    pugi::xml_document document;
+    // As a fragment, so that text outside the root is seen; as UTF-8, so that offsets are those of
+    // `text`.
+    const auto parsed = document.load_buffer(
+        text.data(), text.size(), pugi::parse_default | pugi::parse_fragment, pugi::encoding_utf8);
+    if (!parsed)
+        throw SceneError({file, source.line(parsed.offset)},
+                         fmt::format("malformed XML: {}", parsed.description()));
+
+    Source* const includer = source_;
+    source_ = &source;
+    open_files_.push_back(std::filesystem::path(file).lexically_normal().string());
+    if (!include) scene_.search_paths.push_back(source.directory);
+
+    const pugi::xml_node root = find_root(document);
+    if (std::string_view(root.name()) == "scene") {
+        read_version(root);
+        open(root, include ? "" : "version", include ? "version" : "");
+        read_children(root, scope);
+    } else if (include && is_category(root.name())) {
+        read_version(root);
+        Element e = open(root, "type", "id version");
+        if (const std::string* name = include->find("name"))
+            e.attributes.emplace_back("name", *name);
+        read_object(e, root, scope);
+    } else {
+        throw SceneError(locate(root),
+                         fmt::format("the root element must be <scene>, not <{}>", root.name()));
+    }
+    open_files_.pop_back();
+    source_ = includer;
+}
+
+pugi::xml_node MitsubaReader::find_root(const pugi::xml_document& document) const {
+    pugi::xml_node root;
+    for (const pugi::xml_node& node : document.children()) {
+        if (node.type() == pugi::node_pcdata || node.type() == pugi::node_cdata) fail_text(node);
+        if (node.type() != pugi::node_element) continue;
+        if (root)
+            throw SceneError(locate(node), fmt::format("a second root element, <{}>", node.name()));
+        root = node;
+    }
+    if (!root) throw SceneError({source_->file, 1}, "the file is empty: expected a <scene>");
+    return root;
+}
+
+void MitsubaReader::read_version(const pugi::xml_node& root) {
+    const pugi::xml_attribute attribute = root.attribute("version");
+    if (!attribute) return;
+    const std::string text = attribute.value();
+    std::array<int, 3> version{};
+    size_t part = 0;
+    bool valid = !text.empty() && text.size() < 16;
+    for (char c : text) {
+        if (c == '.')
+            valid = valid && ++part < version.size();
+        else if (c >= '0' && c <= '9' && valid)
+            version[part] = version[part] * 10 + (c - '0');
+        else
+            valid = false;
+        if (!valid || version[part] > 9999) break;
+    }
+    if (!valid || part != 2)
+        throw SceneError(locate(root), fmt::format("expected a version such as \"3.0.0\", found {}",
+                                                   quote(text)));
+    if (version < std::array{0, 4, 0} || version[0] > 3)
+        throw SceneError(
+            locate(root),
+            fmt::format("version {} is not one this reader knows (0.4.0 to 3.x)", quote(text)));
+    source_->old_dialect = version[0] < 2;
+}
+
+// ---- Elements
+
+void MitsubaReader::read_children(const pugi::xml_node& parent, Scope& scope) {
+    if (scope.depth > kDeepestNesting)
+        throw SceneError(locate(parent),
+                         fmt::format("elements nest more than {} deep", kDeepestNesting));
+    for (const pugi::xml_node& node : parent.children()) {
+        if (node.type() != pugi::node_element) fail_text(node);
+        read_element(node, scope);
+    }
+}
+
+void MitsubaReader::read_element(const pugi::xml_node& node, Scope& scope) {
+    const std::string_view name = node.name();
+    if (is_category(name)) {
+        read_object(open(node, "type", "name id"), node, scope);
+        return;
+    }
+    auto same_name = [&](const Rule& rule) { return rule.element == name; };
+    const auto rule = std::find_if(kRules.begin(), kRules.end(), same_name);
+    if (rule != kRules.end()) {
+        (this->*rule->read)(open(node, rule->required, rule->optional), node, scope);
+        return;
+    }
+    if (std::any_of(kTransformSteps.begin(), kTransformSteps.end(), same_name))
+        throw SceneError(locate(node), fmt::format("a <{}> can only stand in a <transform>", name));
+    std::vector<std::string> known;
+    for (const Nesting& n : kNesting) known.push_back(n.category);
+    for (const Rule& r : kRules) known.push_back(r.element);
+    reject(locate(node), fmt::format("unknown element <{}>", name.substr(0, kLongestName)),
+           hint(name, known));
+}
+
+Element MitsubaReader::open(const pugi::xml_node& node, std::string_view required,
+                            std::string_view optional) {
+    Element e{node.name(), locate(node), {}};
+    if (++elements_ > kMostElements)
+        throw SceneError(e.where,
+                         fmt::format("the scene has more than {} elements", kMostElements));
+    for (const pugi::xml_attribute& attribute : node.attributes()) {
+        const std::string name = attribute.name();
+        if (!has_word(required, name) && !has_word(optional, name)) {
+            std::vector<std::string> known = words(required);
+            for (const std::string& word : words(optional)) known.push_back(word);
+            reject(e.where, fmt::format("<{}> has no attribute {}", e.name, quote(name)),
+                   hint(name, known));
+            continue;
+        }
+        if (e.find(name))
+            throw SceneError(e.where,
+                             fmt::format("<{}> has the attribute {} twice", e.name, quote(name)));
+        e.attributes.emplace_back(name, parameters_.substitute(attribute.value(), e.where));
+    }
+    for (const std::string& name : words(required))
+        if (!e.find(name))
+            throw SceneError(e.where, fmt::format("<{}> needs the attribute \"{}\"", e.name, name));
+    for (const char* name : {"name", "id", "as", "type", "filename"})
+        if (const std::string* value = e.find(name);
+            value && (value->empty() || value->size() > kLongestName))
+            throw SceneError(
+                e.where, fmt::format("the attribute \"{}\" of <{}> must have 1 to {} characters",
+                                     name, e.name, kLongestName));
+    return e;
+}
+
+std::string MitsubaReader::claim_name(const Element& e, Scope& scope) {
+    const std::string* given = e.find("name");
+    if (!given) return {};
+    const std::string name = source_->old_dialect ? snake_case(*given) : *given;
+    if (scope.object >= 0 && !scope.names.insert(name).second)
+        throw SceneError(e.where, fmt::format("parameter {} is given twice", quote(name)));
+    return name;
+}
+
+// ---- Objects and references
+
+void MitsubaReader::read_object(const Element& e, const pugi::xml_node& node, Scope& scope) {
+    check_nesting(scope.category, e.name, e.where);
+    const int index = int(scene_.objects.size());
+    scene_.objects.push_back({.category = e.name,
+                              .type = e["type"],
+                              .id = {},
+                              .where = e.where,
+                              .params = {},
+                              .children = {}});
+    if (const std::string* id = e.find("id")) {
+        declare_id(*id, index, e.where);
+        scene_.objects[index].id = *id;
+    }
+    add_child(scope, claim_name(e, scope), index, e.where);
+    Scope inner{index, e.name, scope.depth + 1, scope.in_emitter || e.name == "emitter", {}};
+    read_children(node, inner);
+    if (source_->old_dialect) upgrade_object(scene_.objects[index]);
+}
+
+void MitsubaReader::add_child(const Scope& scope, const std::string& name, int object,
+                              const SourceLocation& where) {
+    if (scope.object < 0)
+        scene_.roots.push_back(object);
+    else
+        scene_.objects[scope.object].children.push_back({name, object, where});
+}
+
+void MitsubaReader::declare_id(const std::string& id, int object, const SourceLocation& where) {
+    const auto [it, inserted] = ids_.emplace(id, object);
+    if (inserted) return;
+    const SourceLocation& first = scene_.objects[it->second].where;
+    throw SceneError(where,
+                     fmt::format("the id {} is taken by the <{}> at {}:{}", quote(id),
+                                 scene_.objects[it->second].category, first.file, first.line));
+}
+
+int MitsubaReader::find_id(const std::string& id, const SourceLocation& where) const {
+    if (const auto it = ids_.find(id); it != ids_.end()) return it->second;
+    std::vector<std::string> known;
+    for (const auto& [name, object] : ids_) known.push_back(name);
+    throw SceneError(where, fmt::format("no object has the id {}{}", quote(id), hint(id, known)));
+}
+
+void MitsubaReader::read_ref(const Element& e, const pugi::xml_node& node, Scope& scope) {
+    check_leaf(node);
+    if (scope.category == "spectrum")
+        throw SceneError(e.where, "a <ref> cannot stand in a <spectrum>");
+    const size_t slot =
+        scope.object < 0 ? scene_.roots.size() : scene_.objects[scope.object].children.size();
+    add_child(scope, claim_name(e, scope), -1, e.where);
+    references_.push_back({scope.object, slot, e["id"], e.where});
+}
+
+void MitsubaReader::read_alias(const Element& e, const pugi::xml_node& node, Scope&) {
+    check_leaf(node);
+    declare_id(e["as"], find_id(e["id"], e.where), e.where);
+}
+
+void MitsubaReader::resolve_references() {
+    for (const Reference& r : references_) {
+        const int target = find_id(r.id, r.where);
+        if (r.parent < 0) {
+            scene_.roots[r.slot] = target;
+            continue;
+        }
+        SceneObject& parent = scene_.objects[r.parent];
+        check_nesting(parent.category, scene_.objects[target].category, r.where);
+        parent.children[r.slot].object = target;
+    }
+}
+
+// ---- Parameters of the scene and files
+
+void MitsubaReader::read_default(const Element& e, const pugi::xml_node& node, Scope&) {
+    check_leaf(node);
+    const std::string& name = e["name"];
+    if (!std::all_of(name.begin(), name.end(),
+                     [](unsigned char c) { return std::isalnum(c) || c == '_'; }))
+        throw SceneError(
+            e.where, fmt::format("a parameter's name has letters, digits and '_' only, unlike {}",
+                                 quote(name)));
+    parameters_.declare(name, e["value"]);
+}
+
+void MitsubaReader::read_path(const Element& e, const pugi::xml_node& node, Scope& scope) {
+    check_leaf(node);
+    if (scope.object >= 0) throw SceneError(e.where, "a <path> can only stand in the <scene>");
+    scene_.search_paths.push_back(join(source_->directory, e["value"]));
+}
+
+void MitsubaReader::read_include(const Element& e, const pugi::xml_node& node, Scope& scope) {
+    check_leaf(node);
+    if (++includes_ > kMostIncludes)
+        throw SceneError(e.where,
+                         fmt::format("the scene includes more than {} files", kMostIncludes));
+    if (open_files_.size() > kDeepestInclude)
+        throw SceneError(
+            e.where, fmt::format("files include each other more than {} deep", kDeepestInclude));
+    std::string path;
+    const std::string text = load(e["filename"], e.where, path);
+    const std::string normal = std::filesystem::path(path).lexically_normal().string();
+    if (std::find(open_files_.begin(), open_files_.end(), normal) != open_files_.end())
+        throw SceneError(e.where, fmt::format("{} includes itself", quote(path)));
+    read_document(text, path, scope, &e);
+}
+
+std::string MitsubaReader::load(const std::string& name, const SourceLocation& where,
+                                std::string& path) {
+    std::vector<std::string> directories = {source_->directory};
+    for (const std::string& directory : scene_.search_paths)
+        if (directory != source_->directory) directories.push_back(directory);
+    for (const std::string& directory : directories) {
+        path = join(directory, name);
+        if (!options_.read_file) continue;
+        if (auto contents = options_.read_file(path)) return *std::move(contents);
+    }
+    throw SceneError(where, fmt::format("cannot read the file {}; searched: {}", quote(name),
+                                        fmt::join(directories, ", ")));
+}
+
+}  // namespace etendue

@@ -1,0 +1,114 @@
+#pragma once
+// The machine behind mitsuba_xml.h: one object reads one scene.
+
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <pugixml.hpp>
+
+#include "readers/mitsuba_element.h"
+#include "readers/mitsuba_parameters.h"
+#include "readers/mitsuba_spectrum.h"
+#include "readers/read_options.h"
+
+namespace etendue {
+
+class MitsubaReader {
+public:
+    /// `options` must outlive the reader.
+    MitsubaReader(const std::string& file, const ReadOptions& options);
+    /// Reads the scene of which `text` is the main file; to be called once.
+    SceneDescription read(std::string_view text);
+
+private:
+    /// One XML file being read.
+    struct Source {
+        Source(const std::string& name, std::string_view contents, bool old);
+        int line(ptrdiff_t offset) const;
+
+        std::string file, directory;
+        std::string_view text;
+        std::vector<size_t> line_ends;
+        bool old_dialect;  ///< Mitsuba 0.4 to 0.6.
+    };
+    /// The object, or the scene itself, whose children are being read.
+    struct Scope {
+        int object = -1;  ///< Index of the object; -1 for the scene.
+        std::string category = "scene";
+        int depth = 0;
+        bool in_emitter = false;
+        std::set<std::string> names;  ///< Of its parameters and children so far.
+    };
+    struct Rule {
+        const char* element;
+        const char* required;  ///< Attributes, between blanks.
+        const char* optional;
+        void (MitsubaReader::*read)(const Element&, const pugi::xml_node&, Scope&);
+    };
+    struct Reference {
+        int parent;   ///< -1 for the scene.
+        size_t slot;  ///< Index among the parent's children.
+        std::string id;
+        SourceLocation where;
+    };
+    static const std::vector<Rule> kRules;
+    static const std::vector<Rule> kTransformSteps;
+
+    // Documents, objects and the references between them: mitsuba_reader.cpp.
+    void read_document(std::string_view text, const std::string& file, Scope& scope,
+                       const Element* include);
+    pugi::xml_node find_root(const pugi::xml_document& document) const;
+    void read_version(const pugi::xml_node& root);
+    void read_children(const pugi::xml_node& parent, Scope& scope);
+    void read_element(const pugi::xml_node& node, Scope& scope);
+    void read_object(const Element& e, const pugi::xml_node& node, Scope& scope);
+    void read_include(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_ref(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_alias(const Element& e, const pugi::xml_node&, Scope&);
+    void read_default(const Element& e, const pugi::xml_node&, Scope&);
+    void read_path(const Element& e, const pugi::xml_node&, Scope& scope);
+    Element open(const pugi::xml_node& node, std::string_view required, std::string_view optional);
+    std::string claim_name(const Element& e, Scope& scope);
+    void add_child(const Scope& scope, const std::string& name, int object,
+                   const SourceLocation& where);
+    void declare_id(const std::string& id, int object, const SourceLocation& where);
+    int find_id(const std::string& id, const SourceLocation& where) const;
+    void resolve_references();
+    std::string load(const std::string& name, const SourceLocation& where, std::string& path);
+
+    // Elements that are a parameter of the object they stand in: mitsuba_reader_params.cpp.
+    void read_boolean(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_integer(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_float(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_string(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_vector(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_rgb(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_srgb(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_blackbody(const Element& e, const pugi::xml_node&, Scope& scope);
+    void read_spectrum(const Element& e, const pugi::xml_node& node, Scope& scope);
+    void read_transform(const Element& e, const pugi::xml_node& node, Scope& scope);
+    void add_param(const Element& e, Scope& scope, ParamValue value);
+    Rgb spectrum_from_value(const Element& e, SpectrumRole role) const;
+    Rgb spectrum_from_plugin(const Element& e, const pugi::xml_node& node, const Scope& scope,
+                             SpectrumRole role);
+
+    SourceLocation locate(const pugi::xml_node& node) const;
+    [[noreturn]] void fail_text(const pugi::xml_node& text) const;
+    void check_leaf(const pugi::xml_node& node) const;
+    /// An error, or under `lenient` a warning that something was dropped.
+    void reject(const SourceLocation& where, const std::string& what, const std::string& hint);
+
+    const ReadOptions& options_;
+    SceneParameters parameters_;
+    SceneDescription scene_;
+    std::map<std::string, int> ids_;
+    std::vector<Reference> references_;
+    Source* source_ = nullptr;
+    std::vector<std::string> open_files_;  ///< The chain of includes.
+    int includes_ = 0, elements_ = 0;
+};
+
+}  // namespace etendue

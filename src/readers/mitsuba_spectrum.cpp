@@ -1,0 +1,120 @@
+#include "readers/mitsuba_spectrum.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace etendue {
+namespace {
+
+/// The parameters of one spectrum plug-in, taken one after the other; what is left at the end is
+/// unknown.
+class Taker {
+public:
+    explicit Taker(const SceneObject& spectrum) : spectrum_(spectrum) {}
+
+    double number(const char* name, std::optional<double> fallback = {}) {
+        const Param* p = find(name, !fallback);
+        if (!p) return *fallback;
+        if (const auto* i = std::get_if<int64_t>(&p->value)) return double(*i);
+        if (const auto* d = std::get_if<double>(&p->value)) return *d;
+        throw SceneError(p->where, fmt::format("parameter \"{}\" must be a number", name));
+    }
+    std::vector<double> numbers(const char* name) {
+        const Param* p = find(name, true);
+        if (const auto* s = std::get_if<std::string>(&p->value)) return parse_floats(*s, p->where);
+        throw SceneError(p->where,
+                         fmt::format("parameter \"{}\" must be a string of numbers", name));
+    }
+    Rgb colour(const char* name, std::optional<Rgb> fallback = {}) {
+        const Param* p = find(name, !fallback);
+        if (!p) return *fallback;
+        if (const auto* c = std::get_if<Rgb>(&p->value)) return *c;
+        throw SceneError(p->where, fmt::format("parameter \"{}\" must be a colour", name));
+    }
+    void finish() const {
+        for (const Param& p : spectrum_.params)
+            if (std::find(taken_.begin(), taken_.end(), p.name) == taken_.end())
+                throw SceneError(p.where,
+                                 fmt::format("spectrum \"{}\" has no parameter \"{}\"{}",
+                                             spectrum_.type, p.name, hint(p.name, taken_)));
+    }
+
+private:
+    const Param* find(const char* name, bool required) {
+        taken_.push_back(name);
+        const Param* p = spectrum_.find(name);
+        if (!p && required)
+            throw SceneError(
+                spectrum_.where,
+                fmt::format("spectrum \"{}\" needs the parameter \"{}\"", spectrum_.type, name));
+        return p;
+    }
+
+    const SceneObject& spectrum_;
+    std::vector<std::string> taken_;
+};
+
+Rgb blackbody(Taker& take, const SourceLocation& where) {
+    const double kelvin = take.number("temperature"), scale = take.number("scale", 1);
+    if (!(kelvin > 0))
+        throw SceneError(where, fmt::format("a temperature must be positive, but is {} K", kelvin));
+    return blackbody_rgb(kelvin) * float(scale);
+}
+
+Rgb irregular(Taker& take, SpectrumRole role, const SourceLocation& where) {
+    const SpectrumSamples samples{take.numbers("wavelengths"), take.numbers("values")};
+    if (samples.wavelengths.size() != samples.values.size())
+        throw SceneError(where, fmt::format("a spectrum has {} wavelengths but {} values",
+                                            samples.wavelengths.size(), samples.values.size()));
+    check_samples(samples, where);
+    return spectrum_colour(samples, role);
+}
+
+Rgb regular(Taker& take, SpectrumRole role, const SourceLocation& where) {
+    const double lo = take.number("wavelength_min"), hi = take.number("wavelength_max");
+    SpectrumSamples samples{{}, take.numbers("values")};
+    const size_t n = samples.values.size();
+    for (size_t i = 0; i < n; ++i)
+        samples.wavelengths.push_back(lo + (hi - lo) * double(i) / double(n - 1));
+    check_samples(samples, where);
+    return spectrum_colour(samples, role);
+}
+
+}  // namespace
+
+Rgb spectrum_colour(const SpectrumSamples& samples, SpectrumRole role) {
+    const Illuminant seen_by =
+        role == SpectrumRole::Emission ? Illuminant::EqualEnergy : Illuminant::D65;
+    Rgb c = spectrum_to_rgb(samples.wavelengths, samples.values, seen_by);
+    if (role == SpectrumRole::Reflectance)
+        c = {std::min(c.r, 1.0f), std::min(c.g, 1.0f), std::min(c.b, 1.0f)};
+    return c;
+}
+
+Rgb spectrum_plugin_colour(const SceneObject& spectrum, SpectrumRole role) {
+    Taker take(spectrum);
+    const std::string& type = spectrum.type;
+    Rgb c;
+    if (type == "blackbody")
+        c = blackbody(take, spectrum.where);
+    else if (type == "uniform")
+        c = Rgb(float(take.number("value", 1)));
+    else if (type == "d65")
+        c = take.colour("color", Rgb(1)) * float(take.number("scale", 1));
+    else if (type == "irregular")
+        c = irregular(take, role, spectrum.where);
+    else if (type == "regular")
+        c = regular(take, role, spectrum.where);
+    else if (type == "srgb")
+        c = take.colour("color");
+    else
+        throw SceneError(spectrum.where, fmt::format("unknown spectrum type \"{}\"{}", type,
+                                                     hint(type, {"blackbody", "d65", "irregular",
+                                                                 "regular", "srgb", "uniform"})));
+    take.finish();
+    if (!is_finite(c)) throw SceneError(spectrum.where, "the spectrum's colour is out of range");
+    return c;
+}
+
+}  // namespace etendue

@@ -1,0 +1,115 @@
+#include "readers/mitsuba_upgrade.h"
+
+#include <algorithm>
+#include <optional>
+
+#include <fmt/format.h>
+
+namespace etendue {
+namespace {
+
+bool is_lower(char c) {
+    return c >= 'a' && c <= 'z';
+}
+bool is_upper(char c) {
+    return c >= 'A' && c <= 'Z';
+}
+
+bool has(const SceneObject& object, std::string_view name) {
+    return object.find(name) || std::any_of(object.children.begin(), object.children.end(),
+                                            [&](const auto& child) { return child.name == name; });
+}
+
+/// Removes a parameter and returns it.
+std::optional<Param> take(SceneObject& object, std::string_view name) {
+    const auto it = std::find_if(object.params.begin(), object.params.end(),
+                                 [&](const Param& p) { return p.name == name; });
+    if (it == object.params.end()) return {};
+    Param p = *it;
+    object.params.erase(it);
+    return p;
+}
+
+double number(const Param& p) {
+    if (const auto* i = std::get_if<int64_t>(&p.value)) return double(*i);
+    if (const auto* d = std::get_if<double>(&p.value)) return *d;
+    throw SceneError(p.where, fmt::format("parameter \"{}\" must be a number", p.name));
+}
+
+void rename(SceneObject& object, std::string_view from, const std::string& to) {
+    if (has(object, to)) return;
+    for (Param& p : object.params)
+        if (p.name == from) p.name = to;
+    for (auto& child : object.children)
+        if (child.name == from) child.name = to;
+}
+
+void upgrade_uv(SceneObject& object) {
+    const char* names[] = {"uscale", "vscale", "uoffset", "voffset"};
+    double values[] = {1, 1, 0, 0};
+    SourceLocation where;
+    for (int i = 0; i < 4; ++i)
+        if (const auto p = take(object, names[i])) {
+            values[i] = number(*p);
+            where = p->where;
+        }
+    if (where.file.empty()) return;
+    const Transform to_uv(Transform::Matrix{
+        {{values[0], 0, 0, values[2]}, {0, values[1], 0, values[3]}, {0, 0, 1, 0}, {0, 0, 0, 1}}});
+    object.params.push_back({"to_uv", to_uv, where});
+}
+
+void upgrade_bitmap(SceneObject& object) {
+    if (const auto gamma = take(object, "gamma")) {
+        const double g = number(*gamma);
+        if (g != 1 && g != -1)
+            throw SceneError(
+                gamma->where,
+                fmt::format("gamma {} is not supported: use 1 (linear) or -1 (sRGB)", g));
+        object.params.push_back({"raw", g == 1, gamma->where});
+    }
+    for (Param& p : object.params)
+        if (auto* filter = std::get_if<std::string>(&p.value))
+            if (p.name == "filter_type" && (*filter == "ewa" || *filter == "trilinear"))
+                *filter = "bilinear";
+    const Param *u = object.find("wrap_mode_u"), *v = object.find("wrap_mode_v");
+    if (u && v && u->value == v->value) {
+        rename(object, "wrap_mode_u", "wrap_mode");
+        take(object, "wrap_mode_v");
+    }
+}
+
+void upgrade_bsdf(SceneObject& object) {
+    if (object.type == "bump") object.type = "bumpmap";
+    if (object.type == "diffuse" || object.type == "roughdiffuse")
+        rename(object, "diffuse_reflectance", "reflectance");
+    const bool conductor = object.type == "conductor" || object.type == "roughconductor";
+    if (conductor && !has(object, "material") && !has(object, "eta") && !has(object, "k"))
+        object.params.push_back({"material", std::string("Cu"), object.where});
+}
+
+}  // namespace
+
+std::string snake_case(std::string_view camel_case) {
+    std::string snake;
+    bool in_capitals = false;  // all capitals of a run are lowered: "IOR" is one word
+    for (size_t i = 0; i < camel_case.size(); ++i) {
+        const char c = camel_case[i];
+        if (is_upper(c) && i > 0 && is_lower(camel_case[i - 1])) {
+            snake += '_';
+            in_capitals = true;
+        }
+        in_capitals = in_capitals && is_upper(c);
+        snake += in_capitals ? char(c - 'A' + 'a') : c;
+    }
+    return snake;
+}
+
+void upgrade_object(SceneObject& object) {
+    upgrade_uv(object);
+    if (object.category == "bsdf") upgrade_bsdf(object);
+    if (object.category == "texture" && object.type == "bitmap") upgrade_bitmap(object);
+    if (object.category == "integrator" && object.type == "volpath_simple") object.type = "volpath";
+}
+
+}  // namespace etendue

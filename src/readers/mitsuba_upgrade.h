@@ -1,0 +1,25 @@
+#pragma once
+// From the dialect of Mitsuba 0.4–0.6 to that of Mitsuba 3.
+
+#include <string>
+#include <string_view>
+
+#include "description/scene_description.h"
+
+namespace etendue {
+
+/// "maxDepth" → "max_depth", "intIOR" → "int_ior".
+std::string snake_case(std::string_view camel_case);
+
+/// Renames plug-ins and parameters of an object whose names are in snake case already, and
+/// translates values, so that the object means the same as in Mitsuba 0.6:
+///   uscale, vscale, uoffset, voffset   → to_uv, scale before offset
+///   bitmap: gamma 1 or -1              → raw true or false
+///   bitmap: filter_type ewa, trilinear → bilinear (there are no mip maps to select from)
+///   bitmap: wrap_mode_u = wrap_mode_v  → wrap_mode
+///   diffuse, roughdiffuse: diffuse_reflectance → reflectance
+///   conductor, roughconductor without a material, eta or k → material Cu, the default then
+///   bsdf bump → bumpmap; integrator volpath_simple → volpath
+void upgrade_object(SceneObject& object);
+
+}  // namespace etendue

@@ -1,0 +1,50 @@
+#pragma once
+// The values in a scene file's attributes: numbers, colours and spectra, from text. Everything
+// throws SceneError at `where` and quotes what it could not read.
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "color/rgb.h"
+#include "color/spectrum.h"
+#include "description/scene_description.h"
+
+namespace etendue {
+
+/// `text` in quotes for a message; shortened where it is long.
+std::string quote(std::string_view text);
+/// What to tell after an unknown name: " (did you mean "x"?)", or the names there are, or that
+/// there are none.
+std::string hint(std::string_view name, const std::vector<std::string>& candidates);
+
+/// A finite number and nothing else but blanks around it.
+double parse_float(std::string_view text, const SourceLocation& where);
+int64_t parse_integer(std::string_view text, const SourceLocation& where);
+bool parse_boolean(std::string_view text, const SourceLocation& where);
+/// Numbers between blanks or commas.
+std::vector<double> parse_floats(std::string_view text, const SourceLocation& where);
+/// Three numbers, or one that stands for all three.
+std::vector<double> parse_triple(std::string_view text, const SourceLocation& where);
+Vec3 to_vec3(const std::vector<double>& xyz, const SourceLocation& where);
+Rgb to_rgb(const std::vector<double>& rgb, const SourceLocation& where);
+
+/// "#rrggbb" as three fractions of 255, still encoded; empty where `text` does not begin with '#'.
+std::vector<double> parse_hex_colour(std::string_view text, const SourceLocation& where);
+/// sRGB in [0, 1], one or three numbers or "#rrggbb", as a linear colour.
+Rgb parse_srgb(std::string_view text, const SourceLocation& where);
+
+/// A spectrum's samples; wavelengths in nm, strictly increasing.
+struct SpectrumSamples {
+    std::vector<double> wavelengths, values;
+};
+/// "400:0.1, 500:0.2, ...".
+SpectrumSamples parse_spectrum_list(std::string_view text, const SourceLocation& where);
+/// A spectrum file: a wavelength and a value on each line, '#' begins a comment. Errors name the
+/// line of `file`.
+SpectrumSamples parse_spectrum_file(std::string_view text, const std::string& file);
+/// Throws unless there are at least two samples at strictly increasing wavelengths.
+void check_samples(const SpectrumSamples& samples, const SourceLocation& where);
+
+}  // namespace etendue

@@ -1,0 +1,181 @@
+#include "readers/serialized.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <iterator>
+#include <limits>
+
+#include "readers/file_bytes.h"
+
+namespace etendue {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "binary readers assume it");
+
+constexpr uint16_t kMagic = 0x041C;
+constexpr uint16_t kOldVersion = 3, kVersion = 4;
+constexpr size_t kMeshHeaderBytes = 4;
+
+enum Flags : uint32_t {
+    kHasNormals = 0x0001,
+    kHasTexcoords = 0x0002,
+    kHasColors = 0x0008,
+    kFaceNormals = 0x0010,
+    kSinglePrecision = 0x1000,
+    kDoublePrecision = 0x2000,
+};
+
+template <class T>
+T load(const char* at) {
+    T value;
+    std::memcpy(&value, at, sizeof(T));
+    return value;
+}
+
+/// Inflates a zlib stream piece by piece, so that memory is spent only on data that is there.
+class InflateStream {
+public:
+    InflateStream(std::string_view compressed, const SourceLocation& where) : where_(where) {
+        z_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(compressed.data()));
+        z_.avail_in = uInt(std::min<size_t>(compressed.size(), std::numeric_limits<uInt>::max()));
+        if (inflateInit(&z_) != Z_OK) throw SceneError(where_, "cannot start decompression");
+    }
+    InflateStream(const InflateStream&) = delete;
+    InflateStream& operator=(const InflateStream&) = delete;
+    ~InflateStream() { inflateEnd(&z_); }
+
+    void read(void* to, size_t bytes) {
+        z_.next_out = static_cast<Bytef*>(to);
+        z_.avail_out = uInt(bytes);
+        while (z_.avail_out > 0) {
+            const int status = inflate(&z_, Z_NO_FLUSH);
+            if (status != Z_OK && !(status == Z_STREAM_END && z_.avail_out == 0))
+                throw SceneError(where_, status == Z_DATA_ERROR ? "damaged compressed data"
+                                                                : "the compressed data ends early");
+        }
+    }
+    template <class T>
+    T read() {
+        T value;
+        read(&value, sizeof(T));
+        return value;
+    }
+    /// `count` items of type `Stored`, each passed through `convert`.
+    template <class Stored, class Convert>
+    auto read_array(uint64_t count, Convert convert) {
+        constexpr uint64_t kPiece = 1 << 16;
+        std::vector<decltype(convert(Stored{}))> items;
+        std::vector<Stored> piece;
+        while (items.size() < count) {
+            piece.resize(std::min(kPiece, count - items.size()));
+            read(piece.data(), piece.size() * sizeof(Stored));
+            std::transform(piece.begin(), piece.end(), std::back_inserter(items), convert);
+        }
+        return items;
+    }
+
+private:
+    z_stream z_{};
+    SourceLocation where_;
+};
+
+class SerializedMesh {
+public:
+    SerializedMesh(std::string_view compressed, uint16_t version, const SourceLocation& where)
+        : in_(compressed, where), version_(version), where_(where) {}
+
+    MeshData parse() {
+        flags_ = in_.read<uint32_t>();
+        if (((flags_ & kSinglePrecision) != 0) == ((flags_ & kDoublePrecision) != 0))
+            throw SceneError(where_, "the flags name neither single nor double precision");
+        MeshData mesh;
+        if (version_ == kVersion)
+            for (char c = in_.read<char>(); c != 0; c = in_.read<char>()) mesh.name += c;
+        const uint64_t vertices = count("vertices"), triangles = count("triangles");
+        mesh.positions = points<Vec3>(vertices);
+        if (flags_ & kHasNormals) mesh.normals = points<Vec3>(vertices);
+        if (flags_ & kHasTexcoords) mesh.uvs = points<Vec2>(vertices);
+        if (flags_ & kHasColors) points<Vec3>(vertices);
+        mesh.triangles = in_.read_array<MeshData::Triangle>(
+            triangles, [](const MeshData::Triangle& t) { return t; });
+        mesh.face_normals = (flags_ & kFaceNormals) != 0;
+        return mesh;
+    }
+
+private:
+    uint64_t count(const char* what) {
+        const auto n = in_.read<uint64_t>();
+        if (n > std::numeric_limits<uint32_t>::max())
+            throw SceneError(where_,
+                             std::to_string(n) + " " + what + " are more than 32 bits can count");
+        return n;
+    }
+    template <class Vec>
+    std::vector<Vec> points(uint64_t count) {
+        constexpr size_t n = sizeof(Vec) / sizeof(float);
+        const auto to_vec = [](const auto& p) {
+            if constexpr (n == 2)
+                return Vec2{float(p[0]), float(p[1])};
+            else
+                return Vec3{float(p[0]), float(p[1]), float(p[2])};
+        };
+        return flags_ & kSinglePrecision ? in_.read_array<std::array<float, n>>(count, to_vec)
+                                         : in_.read_array<std::array<double, n>>(count, to_vec);
+    }
+
+    InflateStream in_;
+    uint16_t version_;
+    uint32_t flags_ = 0;
+    SourceLocation where_;
+};
+
+/// Version of the mesh that begins at `offset`.
+uint16_t check_mesh_header(std::string_view bytes, uint64_t offset, const SourceLocation& where) {
+    if (offset > bytes.size() || bytes.size() - offset < kMeshHeaderBytes)
+        throw SceneError(where, "a mesh begins beyond the end of the file");
+    if (load<uint16_t>(&bytes[offset]) != kMagic)
+        throw SceneError(where, "not a .serialized file: the mark 0x041C is missing");
+    const auto version = load<uint16_t>(&bytes[offset + 2]);
+    if (version != kOldVersion && version != kVersion)
+        throw SceneError(where, "version " + std::to_string(version) + " of the format is unknown");
+    return version;
+}
+
+/// Where mesh number `shape_index` begins, from the table at the end of the file.
+uint64_t mesh_offset(std::string_view bytes, int shape_index, uint16_t version,
+                     const SourceLocation& where) {
+    const auto meshes = load<uint32_t>(&bytes[bytes.size() - sizeof(uint32_t)]);
+    const size_t entry = version == kVersion ? sizeof(uint64_t) : sizeof(uint32_t);
+    const size_t body = bytes.size() - sizeof(uint32_t);
+    if (meshes == 0 || meshes > body / entry)
+        throw SceneError(where, "the table of meshes at the end of the file is damaged");
+    if (shape_index < 0 || uint32_t(shape_index) >= meshes)
+        throw SceneError(where, "mesh " + std::to_string(shape_index) + " of a file that has " +
+                                    std::to_string(meshes) + " (counted from 0)");
+    const char* at = &bytes[body - entry * (meshes - uint32_t(shape_index))];
+    return version == kVersion ? load<uint64_t>(at) : load<uint32_t>(at);
+}
+
+}  // namespace
+
+MeshData parse_serialized(std::string_view bytes, const std::string& name, int shape_index,
+                          const MeshOptions& options) {
+    const SourceLocation where{name, 0};
+    const uint16_t file_version = check_mesh_header(bytes, 0, where);
+    const uint64_t offset = mesh_offset(bytes, shape_index, file_version, where);
+    const uint16_t version = check_mesh_header(bytes, offset, where);
+    MeshData mesh = SerializedMesh(bytes.substr(offset + kMeshHeaderBytes), version, where).parse();
+    if (mesh.name.empty()) mesh.name = name;
+    finish_mesh(mesh, options, where);
+    return mesh;
+}
+
+MeshData read_serialized(const std::string& path, int shape_index, const MeshOptions& options) {
+    return parse_serialized(read_file_bytes(path), path, shape_index, options);
+}
+
+}  // namespace etendue

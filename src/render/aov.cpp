@@ -1,0 +1,66 @@
+#include "render/aov.h"
+
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "pathspace/subpath.h"
+
+namespace etendue {
+namespace {
+
+Rgb to_rgb(Vec3 v) {
+    return {v.x, v.y, v.z};
+}
+
+Rgb value(const std::string& name, const Vertex& v, const SubPath& z) {
+    if (name == "albedo") return v.bsdf.albedo_estimate();
+    if (name == "normal") return to_rgb(v.bsdf.shading_normal());
+    if (name == "depth") return Rgb(z.flight.length);
+    if (name == "position") return to_rgb(v.p);
+    if (name == "uv") return {v.uv.x, v.uv.y, 0};
+    return Rgb();
+}
+
+}  // namespace
+
+const std::vector<AovInfo>& aov_registry() {
+    static const std::vector<AovInfo> entries = {
+        {"albedo", "Approximate reflectance of the first surface."},
+        {"normal", "Shading normal of the first surface, world space."},
+        {"depth", "Distance from the lens to the first surface; 0 where there is none."},
+        {"position", "Position of the first surface, world space."},
+        {"uv", "Texture coordinates of the first surface."},
+        {"variance", "Variance of the pixel's mean, from the spread of the passes."},
+    };
+    return entries;
+}
+
+std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names, int samples, uint64_t seed, int threads) {
+    std::vector<AovImage> images;
+    const uint64_t pixels = scene.film().pixel_count();
+    for (const std::string& n : names)
+        if (n != "variance") images.push_back({n, std::vector<Rgb>(pixels)});
+    if (images.empty()) return images;
+    const Film film(scene.film(), scene.filter());
+    tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+    arena.execute([&] {
+        tbb::parallel_for(0, scene.film().crop_height, [&](int row) {
+            SubPath z;
+            RenderStats stats;
+            Sampler sampler(SamplerKind::Sobol, seed);
+            for (int x = 0; x < scene.film().crop_width; ++x) {
+                const uint64_t pixel = uint64_t(row) * scene.film().crop_width + x;
+                for (int i = 0; i < samples; ++i) {
+                    sampler.start(uint32_t(i), pixel);
+                    start_eye_path(scene, film, pixel, sampler, z, stats);
+                    if (z.size() < 2 || z[1].kind != Vertex::Kind::Surface) continue;
+                    for (AovImage& image : images) image.pixels[pixel] += value(image.name, z[1], z) * (z.film_weight / float(samples));
+                }
+            }
+        });
+    });
+    return images;
+}
+
+}  // namespace etendue

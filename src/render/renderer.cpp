@@ -1,0 +1,155 @@
+#include "render/renderer.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+namespace etendue {
+namespace {
+
+/// Samples in a chunk of parallel work; fixed, whatever the number of threads.
+constexpr uint64_t kChunk = 256;
+
+/// The sink of a rendering: the film, and the technique images where they are asked for.
+class FilmSink final : public ContributionSink {
+public:
+    FilmSink(Film& film, TechniqueImages* techniques, float splat_scale, RenderStats& stats)
+        : film_(film), techniques_(techniques), splat_scale_(splat_scale), stats_(stats) {}
+
+    void begin(uint64_t pixel, const float& film_weight) {
+        pixel_ = pixel;
+        film_weight_ = &film_weight;
+        sum_ = Rgb();
+    }
+    void end() { film_.add_eye(pixel_, sum_); }
+
+    void add_eye(const Technique& technique, Rgb contribution, float mis_weight) override {
+        contribution *= *film_weight_;
+        const Rgb value = contribution * mis_weight;
+        if (!is_finite(value)) {
+            ++stats_.rejected;
+            return;
+        }
+        sum_ += value;
+        if (techniques_) techniques_->add_eye(pixel_, technique, contribution, mis_weight);
+    }
+
+    void add_splat(Vec2 film, const Technique& technique, Rgb contribution, float mis_weight) override {
+        const Rgb value = contribution * mis_weight;
+        if (!is_finite(value)) {
+            ++stats_.rejected;
+            return;
+        }
+        film_.add_splat(film, value);
+        if (techniques_) techniques_->add_splat(film, technique, contribution, mis_weight, splat_scale_);
+    }
+
+private:
+    Film& film_;
+    TechniqueImages* techniques_;
+    float splat_scale_;
+    RenderStats& stats_;
+    uint64_t pixel_ = 0;
+    const float* film_weight_ = nullptr;
+    Rgb sum_;
+};
+
+}  // namespace
+
+const char* to_string(StopReason reason) {
+    switch (reason) {
+        case StopReason::Samples: return "samples";
+        case StopReason::Time: return "time";
+        case StopReason::Error: return "error";
+        case StopReason::Interrupted: return "interrupted";
+    }
+    return "";
+}
+
+const char* to_string(Estimator estimator) {
+    switch (estimator) {
+        case Estimator::Unbiased: return "unbiased";
+        case Estimator::Consistent: return "consistent";
+        case Estimator::Biased: return "biased";
+    }
+    return "";
+}
+
+struct Renderer::Workers {
+    explicit Workers(int threads)
+        : limit(tbb::global_control::max_allowed_parallelism, size_t(threads > 0 ? threads : tbb::this_task_arena::max_concurrency())),
+          arena(threads > 0 ? threads : tbb::task_arena::automatic) {}
+
+    tbb::global_control limit;
+    tbb::task_arena arena;
+    tbb::enumerable_thread_specific<Workspace> spaces;
+};
+
+Renderer::Renderer(const Scene& scene, const RenderSettings& settings)
+    : scene_(scene),
+      settings_(settings),
+      integrator_(make_integrator(settings.integrator)),
+      film_(scene.film(), scene.filter()),
+      workers_(std::make_unique<Workers>(settings.threads)) {
+    if (settings.technique_depth > 0)
+        techniques_ = std::make_unique<TechniqueImages>(scene.film(), scene.filter(), settings.technique_depth);
+}
+
+Renderer::~Renderer() = default;
+
+void Renderer::pass(uint32_t index) {
+    const uint64_t pixels = scene_.film().pixel_count();
+    const uint64_t light_paths = integrator_->traces_light_paths() ? pixels : 0;
+    const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
+    film_.begin_pass(light_paths);
+    workers_->arena.execute([&] {
+        tbb::parallel_for(uint64_t(0), (pixels + kChunk - 1) / kChunk, [&](uint64_t chunk) {
+            Workspace& work = workers_->spaces.local();
+            Sampler sampler(settings_.sampler, settings_.seed);
+            FilmSink sink(film_, techniques_.get(), splat_scale, work.stats);
+            const uint64_t end = std::min(pixels, (chunk + 1) * kChunk);
+            for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
+                sampler.start(index, pixel);
+                sink.begin(pixel, work.z.film_weight);
+                integrator_->sample({scene_, film_, pixel, light_paths, splat_scale, sampler, sink}, work);
+                sink.end();
+            }
+        });
+        film_.end_pass();
+        if (techniques_) techniques_->end_pass();
+    });
+}
+
+StopReason Renderer::run(const std::function<void(const Progress&)>& progress, const std::atomic<bool>& interrupted) {
+    using Clock = std::chrono::steady_clock;
+    const auto begin = Clock::now();
+    for (uint32_t index = 0;; ++index) {
+        pass(index);
+        seconds_ = std::chrono::duration<double>(Clock::now() - begin).count();
+        const double one_pass = seconds_ / double(index + 1);
+        stats_ = RenderStats();
+        for (const Workspace& w : workers_->spaces) stats_ += w.stats;
+
+        Progress now{film_.passes(), seconds_, {}, double(stats_.rays()) / seconds_, film_.error()};
+        if (settings_.spp) now.fraction = double(now.passes) / double(*settings_.spp);
+        if (settings_.seconds) now.fraction = std::max(now.fraction.value_or(0), seconds_ / *settings_.seconds);
+        // The error falls with the square root of the number of passes.
+        if (settings_.error && now.error.valid)
+            now.fraction = std::max(now.fraction.value_or(0), sqr(*settings_.error / now.error.relative_rms));
+        if (now.fraction) now.fraction = std::min(*now.fraction, 1.0);
+        progress(now);
+
+        if (interrupted.load(std::memory_order_relaxed)) return StopReason::Interrupted;
+        if (settings_.spp && film_.passes() >= *settings_.spp) return StopReason::Samples;
+        // The next pass is begun only if its larger part fits.
+        if (settings_.seconds && seconds_ + 0.5 * one_pass > *settings_.seconds) return StopReason::Time;
+        if (settings_.error && now.error.valid && now.error.relative_rms <= *settings_.error) return StopReason::Error;
+    }
+}
+
+}  // namespace etendue

@@ -1,0 +1,72 @@
+#pragma once
+// Passes over the film: the parallel loop, when to stop, statistics.
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "integrator/integrator.h"
+#include "render/technique_images.h"
+
+namespace etendue {
+
+struct RenderSettings {
+    IntegratorSpec integrator{"path", {}};
+    SamplerKind sampler = SamplerKind::Independent;
+    uint64_t seed = 0;
+    int threads = 0;  ///< 0: all.
+    // When to stop: at whichever comes first. At least one pass is made.
+    std::optional<uint64_t> spp;
+    std::optional<double> seconds;
+    std::optional<double> error;  ///< Relative RMS error of the image, see ErrorEstimate.
+    /// Technique images up to this many edges; 0 for none.
+    int technique_depth = 0;
+};
+
+struct Progress {
+    uint64_t passes;
+    double seconds;                  ///< Since the first pass began.
+    std::optional<double> fraction;  ///< Of the work, where that can be told.
+    double rays_per_second;
+    ErrorEstimate error;
+};
+
+/// Why a rendering ended.
+enum class StopReason { Samples, Time, Error, Interrupted };
+const char* to_string(StopReason reason);
+const char* to_string(Estimator estimator);
+
+class Renderer {
+public:
+    /// Throws std::runtime_error where the integrator's parameters are wrong. The scene must outlive the renderer.
+    Renderer(const Scene& scene, const RenderSettings& settings);
+    ~Renderer();
+
+    /// Renders until a limit is reached or `interrupted` is set; the pass in flight is always finished. `progress` is
+    /// called after every pass, from the calling thread.
+    StopReason run(const std::function<void(const Progress&)>& progress, const std::atomic<bool>& interrupted);
+
+    const Film& film() const { return film_; }
+    const Integrator& integrator() const { return *integrator_; }
+    const RenderStats& stats() const { return stats_; }
+    double seconds() const { return seconds_; }
+    const TechniqueImages* techniques() const { return techniques_.get(); }
+
+private:
+    void pass(uint32_t index);
+
+    const Scene& scene_;
+    RenderSettings settings_;
+    std::unique_ptr<Integrator> integrator_;
+    Film film_;
+    std::unique_ptr<TechniqueImages> techniques_;
+    struct Workers;
+    std::unique_ptr<Workers> workers_;
+    RenderStats stats_;
+    double seconds_ = 0;
+};
+
+}  // namespace etendue

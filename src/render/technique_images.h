@@ -1,0 +1,41 @@
+#pragma once
+// One image per technique, weighted and unweighted: Veach's pyramid.
+
+#include <memory>
+#include <vector>
+
+#include "film/film.h"
+#include "pathspace/technique.h"
+
+namespace etendue {
+
+class TechniqueImages {
+public:
+    /// For paths of at most `max_edges` edges.
+    TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter, int max_edges);
+    ~TechniqueImages();
+
+    void add_eye(uint64_t pixel, const Technique& technique, Rgb contribution, float mis_weight);
+    void add_splat(Vec2 film, const Technique& technique, Rgb contribution, float mis_weight, float scale);
+    void end_pass();
+
+    struct Entry {
+        Technique technique;
+        std::vector<Rgb> weighted, unweighted;  ///< Means over the passes.
+    };
+    /// Those that received anything, by length, then s.
+    std::vector<Entry> images() const;
+    static size_t memory_bytes(uint64_t pixels, int max_edges);
+
+private:
+    struct Layer;
+    Layer* layer(const Technique& technique) const;
+
+    FilmGeometry geometry_;
+    const ReconstructionFilter& filter_;
+    int max_edges_;
+    uint64_t passes_ = 0;
+    std::vector<std::unique_ptr<Layer>> layers_;  ///< By number of vertices, then s.
+};
+
+}  // namespace etendue

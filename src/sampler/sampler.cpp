@@ -1,0 +1,70 @@
+#include "sampler/sampler.h"
+
+#include <array>
+
+namespace etendue {
+namespace {
+
+constexpr uint32_t reverse_bits(uint32_t x) {
+    x = __builtin_bswap32(x);
+    x = (x & 0x0f0f0f0fu) << 4 | (x & 0xf0f0f0f0u) >> 4;
+    x = (x & 0x33333333u) << 2 | (x & 0xccccccccu) >> 2;
+    return (x & 0x55555555u) << 1 | (x & 0xaaaaaaaau) >> 1;
+}
+
+/// Owen scrambling of an integer whose bits stand in reverse: a hash in which bits influence higher
+/// bits only [Laine & Karras 2011; constants of Vegdahl 2021].
+constexpr uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
+    x ^= x * 0x3d20adeau;
+    x += seed;
+    x *= (seed >> 16) | 1u;
+    x ^= x * 0x05526c56u;
+    x ^= x * 0x53a22864u;
+    return x;
+}
+
+/// Second dimension of the Sobol' sequence with its bits in reverse, by bytes of the index: columns
+/// v, v ^ v >> 1, ... (Pascal's matrix mod 2). The first dimension in reverse is the index itself.
+constexpr auto kSecondReversed = [] {
+    std::array<std::array<uint32_t, 256>, 4> table{};
+    std::array<uint32_t, 32> columns{};
+    uint32_t v = 1u << 31;
+    for (uint32_t& c : columns) {
+        c = reverse_bits(v);
+        v ^= v >> 1;
+    }
+    for (uint32_t byte = 0; byte < 4; ++byte)
+        for (uint32_t value = 0; value < 256; ++value)
+            for (uint32_t bit = 0; bit < 8; ++bit)
+                if (value >> bit & 1) table[byte][value] ^= columns[byte * 8 + bit];
+    return table;
+}();
+
+constexpr uint32_t second_reversed(uint32_t i) {
+    return kSecondReversed[0][i & 255] ^ kSecondReversed[1][i >> 8 & 255] ^
+           kSecondReversed[2][i >> 16 & 255] ^ kSecondReversed[3][i >> 24];
+}
+
+}  // namespace
+
+float Sampler::next_1d_structured() {
+    if (kind_ == SamplerKind::PrimarySample) return source_->value(stream_, vertex_, slot_++);
+    return next_2d_structured().x;
+}
+
+Vec2 Sampler::next_2d_structured() {
+    if (kind_ == SamplerKind::PrimarySample) {
+        const uint32_t slot = slot_;
+        slot_ += 2;
+        return {source_->value(stream_, vertex_, slot), source_->value(stream_, vertex_, slot + 1)};
+    }
+    // Each pair of dimensions is the same two-dimensional sequence over the passes, with an order
+    // and a scrambling of its own.
+    const uint64_t seed = bits(), scramble = mix64(seed);
+    const uint32_t index = reverse_bits(scramble_reversed(reverse_bits(pass_), uint32_t(seed)));
+    const uint32_t x = scramble_reversed(index, uint32_t(scramble));
+    const uint32_t y = scramble_reversed(second_reversed(index), uint32_t(scramble >> 32));
+    return {to_unit_float(reverse_bits(x)), to_unit_float(reverse_bits(y))};
+}
+
+}  // namespace etendue

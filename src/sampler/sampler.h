@@ -1,0 +1,81 @@
+#pragma once
+// Random numbers by address. Every number belongs to (seed, pass, path, stream, vertex, slot); there is no hidden state, so
+// an image does not depend on threads, and a walk that changes at vertex 3 leaves the numbers of vertex 4 alone.
+
+#include <cstdint>
+
+#include "math/hash.h"
+#include "math/vec.h"
+
+namespace etendue {
+
+/// Which part of a sample the numbers are for.
+enum class Stream : uint8_t {
+    Eye,         ///< Film point, lens point and the eye sub-path's vertices.
+    Light,       ///< Emission and the light sub-path's vertices.
+    Connection,  ///< Next event, lens points of splats, roulette of connections; vertex = that of the sub-path.
+    Auxiliary,   ///< Loops of unbounded length.
+};
+
+enum class SamplerKind : uint8_t {
+    Independent,      ///< Counter-based pseudo-random numbers.
+    Sobol,            ///< Owen-scrambled Sobol' points over the passes, padded by dimension pairs [Burley 2020].
+    PrimarySample,    ///< Numbers from a PrimarySource.
+};
+
+/// Where a Markov chain keeps its point of primary sample space. Values lie in [0, 1).
+class PrimarySource {
+public:
+    virtual ~PrimarySource() = default;
+    virtual float value(Stream stream, uint32_t vertex, uint32_t slot) = 0;
+};
+
+class Sampler {
+public:
+    Sampler(SamplerKind kind, uint64_t seed) : seed_(mix64(seed + 0x5851f42d4c957f2dull)), kind_(kind) {}
+    explicit Sampler(PrimarySource& source) : source_(&source), kind_(SamplerKind::PrimarySample) {}
+
+    /// Begins the sample `path` of pass `pass`.
+    void start(uint32_t pass, uint64_t path) {
+        pass_ = pass;
+        key_ = hash_combine(seed_, path);
+        if (kind_ == SamplerKind::Independent) key_ = hash_combine(key_, pass);
+    }
+    /// Moves to the block of numbers of one vertex, at its first slot.
+    void seek(Stream stream, uint32_t vertex) {
+        stream_ = stream;
+        vertex_ = vertex;
+        slot_ = 0;
+    }
+
+    float next_1d() {
+        if (kind_ == SamplerKind::Independent) [[likely]]
+            return to_unit_float(uint32_t(bits() >> 32));
+        return next_1d_structured();
+    }
+    Vec2 next_2d() {
+        if (kind_ == SamplerKind::Independent) [[likely]] {
+            const uint64_t b = bits();
+            return {to_unit_float(uint32_t(b >> 32)), to_unit_float(uint32_t(b))};
+        }
+        return next_2d_structured();
+    }
+    SamplerKind kind() const { return kind_; }
+
+private:
+    /// 64 bits of the present address; moves on by one slot.
+    uint64_t bits() {
+        const uint64_t address = uint64_t(stream_) << 56 ^ uint64_t(vertex_) << 32 ^ slot_++;
+        return mix64(key_ + 0x9e3779b97f4a7c15ull * (address + 1));
+    }
+    float next_1d_structured();
+    Vec2 next_2d_structured();
+
+    uint64_t seed_ = 0, key_ = 0;
+    PrimarySource* source_ = nullptr;
+    uint32_t pass_ = 0, vertex_ = 0, slot_ = 0;
+    Stream stream_ = Stream::Eye;
+    SamplerKind kind_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,202 @@
+#include "scene/shape_registry.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "description/mesh_data.h"
+#include "description/resolve_file.h"
+#include "readers/obj.h"
+#include "readers/ply.h"
+#include "readers/serialized.h"
+
+namespace etendue {
+namespace {
+
+using Warn = std::function<void(const std::string&)>;
+
+std::vector<ParamInfo> with_common(std::vector<ParamInfo> params) {
+    params.push_back({"to_world", ParamKind::Transform, "identity", "Object to world."});
+    params.push_back({"flip_normals", ParamKind::Bool, "false", "Turns the shape inside out."});
+    params.push_back({"bsdf", ParamKind::Object, "diffuse", "Material; black where the shape emits and names none."});
+    params.push_back({"emitter", ParamKind::Object, "", "An area emitter."});
+    params.push_back({"interior", ParamKind::Object, "", "Medium behind the surface."});
+    params.push_back({"exterior", ParamKind::Object, "", "Medium before the surface."});
+    return params;
+}
+
+std::vector<ParamInfo> mesh_params(const char* flip) {
+    return with_common({{"filename", ParamKind::String, "", "Mesh file."},
+                        {"face_normals", ParamKind::Bool, "false", "Flat shading: vertex normals are dropped."},
+                        {"flip_tex_coords", ParamKind::Bool, flip, "v becomes 1 - v."},
+                        {"collapse", ParamKind::Bool, "false", "Accepted; a file is always one shape."},
+                        {"shape_index", ParamKind::Int, "0", "Which mesh of a .serialized file."},
+                        {"max_smooth_angle", ParamKind::Float, "", "Accepted; without effect."},
+                        {"srgb", ParamKind::Bool, "false", "Accepted; vertex colours are not used."}});
+}
+
+/// Turns file data into a world-space mesh.
+std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& warn) {
+    if (data.dropped_degenerate > 0)
+        warn(fmt::format("{}: {} triangle{} without area left out", data.name, data.dropped_degenerate,
+                         data.dropped_degenerate == 1 ? "" : "s"));
+    const Transform t = params.transform("to_world");
+    const bool flat = params.flag("face_normals", false) || data.face_normals;
+    if (flat)
+        data.normals.clear();
+    else if (data.normals.empty())
+        compute_vertex_normals(data);
+    auto mesh = std::make_unique<TriangleMesh>();
+    if (!t.is_identity()) {
+        for (Vec3& p : data.positions) p = t.point(p);
+        for (Vec3& n : data.normals) n = normalize(t.normal(n));
+    }
+    if (params.flag("flip_normals", false)) {
+        for (Vec3& n : data.normals) n = -n;
+        if (flat)
+            for (auto& tri : data.triangles) std::swap(tri[1], tri[2]);
+    }
+    mesh->positions = std::move(data.positions);
+    mesh->normals = std::move(data.normals);
+    mesh->uvs = std::move(data.uvs);
+    mesh->triangles = std::move(data.triangles);
+    for (Vec3 p : mesh->positions)
+        if (!is_finite(p)) params.fail("to_world", "the transform takes a vertex of the mesh out of the range of floats");
+    return mesh;
+}
+
+template <MeshData (*read)(const std::string&, const MeshOptions&)>
+std::unique_ptr<Shape> make_file_mesh(const Params& params, const Warn& warn, bool flip_by_default) {
+    return finish(read(resolve_file(params), {.flip_tex_coords = params.flag("flip_tex_coords", flip_by_default)}), params, warn);
+}
+
+struct Corner {
+    Vec3 p;
+    Vec2 uv;
+};
+
+/// Quads given by their corners, counter-clockwise seen from the front; flat, oriented by the transformed normal.
+std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quads, const Params& params) {
+    const Transform t = params.transform("to_world");
+    // A mirroring transform would turn the winding, but not the normal that the shape is documented to have.
+    const bool turn = (t.determinant3() < 0) != params.flag("flip_normals", false);
+    auto mesh = std::make_unique<TriangleMesh>();
+    for (const auto& q : quads) {
+        const auto base = uint32_t(mesh->positions.size());
+        for (const Corner& c : q) {
+            mesh->positions.push_back(t.point(c.p));
+            mesh->uvs.push_back(c.uv);
+        }
+        for (std::array<uint32_t, 3> tri : {std::array<uint32_t, 3>{0, 1, 2}, {0, 2, 3}}) {
+            if (turn) std::swap(tri[1], tri[2]);
+            mesh->triangles.push_back({base + tri[0], base + tri[1], base + tri[2]});
+        }
+    }
+    if (!(mesh->area() > 0)) params.fail("to_world", "the transform leaves the shape without area");
+    return mesh;
+}
+
+std::unique_ptr<Shape> make_rectangle(const Params& params, const Warn&) {
+    return make_quads({{Corner{{-1, -1, 0}, {0, 0}}, {{1, -1, 0}, {1, 0}}, {{1, 1, 0}, {1, 1}}, {{-1, 1, 0}, {0, 1}}}}, params);
+}
+
+/// The cube [-1, 1]³; the texture coordinates of each face as Mitsuba's cube has them.
+std::unique_ptr<Shape> make_cube(const Params& params, const Warn&) {
+    // Normal, and the directions of u and v.
+    struct Face {
+        Vec3 n, u, v;
+    };
+    const Face faces[] = {{{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},  {{0, 0, -1}, {0, -1, 0}, {1, 0, 0}},
+                          {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}, {{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                          {{0, 1, 0}, {-1, 0, 0}, {0, 0, -1}}, {{0, -1, 0}, {0, 0, 1}, {1, 0, 0}}};
+    std::vector<std::array<Corner, 4>> quads;
+    for (const Face& f : faces) {
+        std::array<Corner, 4> q = {Corner{f.n - f.u - f.v, {0, 0}}, {f.n + f.u - f.v, {1, 0}}, {f.n + f.u + f.v, {1, 1}}, {f.n - f.u + f.v, {0, 1}}};
+        if (dot(cross(f.u, f.v), f.n) < 0) std::swap(q[1], q[3]);
+        quads.push_back(q);
+    }
+    return make_quads(quads, params);
+}
+
+/// Lengths of the transformed axes; refuses shear (and, for `uniform`, different lengths).
+void check_similarity(const Transform& t, const Params& params, bool uniform) {
+    const Vec3 x = t.vector({1, 0, 0}), y = t.vector({0, 1, 0}), z = t.vector({0, 0, 1});
+    const float lx = length(x), ly = length(y), lz = length(z);
+    const bool orthogonal = std::fabs(dot(x, y)) < 1e-3f * lx * ly && std::fabs(dot(y, z)) < 1e-3f * ly * lz &&
+                            std::fabs(dot(z, x)) < 1e-3f * lz * lx;
+    const bool round = std::fabs(lx - ly) < 1e-3f * lx && (!uniform || std::fabs(lx - lz) < 1e-3f * lx);
+    if (!orthogonal || !round)
+        params.fail("to_world", fmt::format("a {} needs a transform without shear and with {} scale", params.object().type,
+                                            uniform ? "a uniform" : "the same x and y"));
+}
+
+std::unique_ptr<Shape> make_sphere(const Params& params, const Warn&) {
+    const Transform t = params.transform("to_world");
+    check_similarity(t, params, true);
+    const float radius = params.number("radius", 1, 1e-20f);
+    const Transform local = Transform::translate(params.vector("center", {0, 0, 0})) * Transform::scale({radius, radius, radius});
+    return std::make_unique<Sphere>(t * local, params.flag("flip_normals", false));
+}
+
+std::unique_ptr<Shape> make_disk(const Params& params, const Warn&) {
+    return std::make_unique<Disk>(params.transform("to_world"), params.flag("flip_normals", false));
+}
+
+std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn&) {
+    const Vec3 p0 = params.vector("p0", {0, 0, 0}), p1 = params.vector("p1", {0, 0, 1});
+    const float radius = params.number("radius", 1, 1e-20f);
+    const Vec3 axis = p1 - p0;
+    const float height = length(axis);
+    if (!(height > 0)) params.fail("p1", "a cylinder's p0 and p1 must differ");
+    const Transform t = params.transform("to_world");
+    // Columns: two unit vectors normal to the axis times the radius, the axis, p0.
+    const Vec3 n = axis / height;
+    const Vec3 s = std::fabs(n.z) > 0.999999f ? Vec3{1, 0, 0} : normalize(cross({0, 0, 1}, n));
+    const Vec3 r = cross(n, s);
+    const Transform local(Transform::Matrix{{{s.x * radius, r.x * radius, axis.x, p0.x},
+                                             {s.y * radius, r.y * radius, axis.y, p0.y},
+                                             {s.z * radius, r.z * radius, axis.z, p0.z},
+                                             {0, 0, 0, 1}}});
+    check_similarity(t * local, params, false);
+    return std::make_unique<Cylinder>(t * local, params.flag("flip_normals", false));
+}
+
+}  // namespace
+
+const std::vector<ShapeEntry>& shape_registry() {
+    static const std::vector<ShapeEntry> entries = {
+        {{"shape", "obj", "Wavefront mesh.", mesh_params("true")},
+         [](const Params& p, const Warn& w) { return make_file_mesh<read_obj>(p, w, true); }},
+        {{"shape", "ply", "PLY mesh, ascii or binary.", mesh_params("false")},
+         [](const Params& p, const Warn& w) { return make_file_mesh<read_ply>(p, w, false); }},
+        {{"shape", "serialized", "Mitsuba 0.6's compressed meshes.", mesh_params("false")},
+         [](const Params& p, const Warn& w) {
+             return finish(read_serialized(resolve_file(p), int(p.integer("shape_index", 0, 0, 1 << 24)),
+                                           {.flip_tex_coords = p.flag("flip_tex_coords", false)}),
+                           p, w);
+         }},
+        {{"shape", "rectangle", "The square [-1, 1]² in the xy plane, normal +z.", with_common({})}, make_rectangle},
+        {{"shape", "cube", "The cube [-1, 1]³, normals outward.", with_common({})}, make_cube},
+        {{"shape", "sphere", "Sphere, normals outward.",
+          with_common({{"center", ParamKind::Vector, "0, 0, 0", "Centre."}, {"radius", ParamKind::Float, "1", "Radius."}})},
+         make_sphere},
+        {{"shape", "disk", "The unit disc in the xy plane, normal +z.", with_common({})}, make_disk},
+        {{"shape", "cylinder", "Open cylinder, normals outward.",
+          with_common({{"p0", ParamKind::Vector, "0, 0, 0", "Start of the axis."},
+                       {"p1", ParamKind::Vector, "0, 0, 1", "End of the axis."},
+                       {"radius", ParamKind::Float, "1", "Radius."}})},
+         make_cylinder},
+    };
+    return entries;
+}
+
+const std::vector<PluginInfo>& group_infos() {
+    static const std::vector<PluginInfo> infos = {
+        {"shape", "shapegroup", "Shapes that appear only through instances.", {{"shape", ParamKind::Object, "", "Nested shapes."}}},
+        {"shape", "instance", "A copy of a shapegroup.",
+         {{"to_world", ParamKind::Transform, "identity", "Group to world."}, {"shapegroup", ParamKind::Object, "", "Reference to the group."}}}};
+    return infos;
+}
+
+}  // namespace etendue

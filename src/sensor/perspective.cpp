@@ -1,0 +1,198 @@
+// Perspective cameras: pinhole (`perspective`) and with a finite round lens (`thinlens`).
+//
+// Camera space looks along +z with x to the left and y up, as Mitsuba's look-at matrices have it. A film point maps to
+// the plane z = 1; a pixel's area there is `pixel_area_`. The density of a direction per pixel is
+//     pdf_σ = 1 / (pixel_area · cos³θ)
+// for the pinhole and for any point of the lens alike, since the plane in focus is a scaled copy of z = 1.
+
+#include "sensor/perspective.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "math/warp.h"
+
+namespace etendue {
+namespace {
+
+class PerspectiveSensor final : public Sensor {
+public:
+    PerspectiveSensor(const PerspectiveCamera& camera, const Transform& to_world, float filter_radius)
+        : camera_(camera), to_world_(to_world), to_local_(to_world.inverse()) {
+        pixel_area_ = (2 * camera.half_width / float(camera.film.width)) * (2 * camera.half_height / float(camera.film.height));
+        origin_ = to_world.point({0, 0, 0});
+        forward_ = normalize(to_world.vector({0, 0, 1}));
+        const FilmGeometry& f = camera.film;
+        lo_ = {float(f.crop_x) - filter_radius + 0.5f, float(f.crop_y) - filter_radius + 0.5f};
+        hi_ = {float(f.crop_x + f.crop_width) + filter_radius - 0.5f,
+               float(f.crop_y + f.crop_height) + filter_radius - 0.5f};
+        pdf_pos_ = has_finite_lens() ? 1 / (kPi * sqr(camera.lens_radius)) : 1.0f;
+    }
+
+    SensorRay sample_ray(Vec2 film, Vec2 u_lens) const override {
+        const Vec2 on_plane = film_to_plane(film);
+        Vec3 target{on_plane.x, on_plane.y, 1}, origin;
+        if (has_finite_lens()) {
+            const Vec2 lens = sample_uniform_disk(u_lens);
+            origin = {lens.x * camera_.lens_radius, lens.y * camera_.lens_radius, 0};
+            target = target * camera_.focus_distance - origin;
+        }
+        const Vec3 d = normalize(target);
+        return {has_finite_lens() ? to_world_.point(origin) : origin_, forward_, normalize(to_world_.vector(d)), pdf_pos_,
+                pdf_of_cosine(d.z)};
+    }
+
+    std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity, Vec2 u_lens) const override {
+        Vec3 lens = origin_;
+        if (has_finite_lens()) {
+            const Vec2 u = sample_uniform_disk(u_lens);
+            lens = to_world_.point({u.x * camera_.lens_radius, u.y * camera_.lens_radius, 0});
+        }
+        return measure(lens, from_infinity ? from : from - lens);
+    }
+
+    std::optional<SensorSample> hit_lens(Vec3 o, Vec3 d, float tmax) const override {
+        const Vec3 lo = to_local_.point(o), ld = to_local_.vector(d);
+        if (!(ld.z < 0)) return {};  // from behind
+        const float t = -lo.z / ld.z;
+        if (!(t > 0 && t < tmax)) return {};
+        const Vec3 lens = lo + ld * t;
+        if (sqr(lens.x) + sqr(lens.y) > sqr(camera_.lens_radius)) return {};
+        return measure(o + d * t, -d);
+    }
+
+    bool has_finite_lens() const override { return camera_.lens_radius > 0; }
+    float pdf_direction(Vec3, Vec3 d) const override { return pdf_of_cosine(dot(forward_, d)); }
+
+private:
+    float pdf_of_cosine(float c) const { return c > 0 ? 1 / (pixel_area_ * c * c * c) : 0.0f; }
+
+    Vec2 film_to_plane(Vec2 film) const {
+        return {camera_.half_width * (1 - 2 * (film.x / float(camera_.film.width) + camera_.offset.x)),
+                camera_.half_height * (1 - 2 * (film.y / float(camera_.film.height) + camera_.offset.y))};
+    }
+
+    /// What light leaving the scene along -v (v: from the lens point to the scene) measures.
+    std::optional<SensorSample> measure(Vec3 lens, Vec3 v) const {
+        const float dist2 = length2(v);
+        if (!(dist2 > 0)) return {};
+        const Vec3 d = v * (1 / std::sqrt(dist2));
+        const float cos = dot(forward_, d);
+        if (!(cos > 0)) return {};
+        Vec3 local = to_local_.vector(v);
+        Vec2 plane;
+        if (has_finite_lens()) {
+            const Vec3 origin = to_local_.point(lens);
+            const float k = camera_.focus_distance / local.z;
+            plane = {(origin.x + local.x * k) / camera_.focus_distance, (origin.y + local.y * k) / camera_.focus_distance};
+        } else {
+            plane = {local.x / local.z, local.y / local.z};
+        }
+        const Vec2 film{((1 - plane.x / camera_.half_width) * 0.5f - camera_.offset.x) * float(camera_.film.width),
+                        ((1 - plane.y / camera_.half_height) * 0.5f - camera_.offset.y) * float(camera_.film.height)};
+        if (!(film.x >= lo_.x && film.x < hi_.x && film.y >= lo_.y && film.y < hi_.y)) return {};
+        const float pdf = pdf_of_cosine(cos);
+        return SensorSample{lens, forward_, film, pdf_pos_ * pdf, pdf_pos_, pdf};
+    }
+
+    PerspectiveCamera camera_;
+    Transform to_world_, to_local_;
+    Vec3 origin_, forward_;
+    Vec2 lo_, hi_;  ///< Film points that reach some pixel of the crop.
+    float pixel_area_, pdf_pos_;
+};
+
+/// The camera's transform with any scale taken out: lengths (lens radius, focus distance) are in world units.
+Transform rigid(const Params& params) {
+    const Transform t = params.transform("to_world");
+    Transform::Matrix m = t.matrix();
+    if (m[3][0] != 0 || m[3][1] != 0 || m[3][2] != 0 || m[3][3] != 1)
+        params.fail("to_world", "a sensor's to_world must be an affine transform");
+    for (int c = 0; c < 3; ++c) {
+        const double len = std::sqrt(m[0][c] * m[0][c] + m[1][c] * m[1][c] + m[2][c] * m[2][c]);
+        for (int r = 0; r < 3; ++r) m[r][c] /= len;
+    }
+    return Transform(m);
+}
+
+/// Half extents of the image on the plane z = 1.
+void set_field_of_view(const Params& params, PerspectiveCamera& camera) {
+    const double aspect = double(camera.film.width) / camera.film.height;
+    double half_width;
+    const std::string focal = params.text("focal_length", "");
+    if (!params.has("fov")) {
+        // A 35 mm film's diagonal of 43.27 mm is kept, whatever the aspect ratio.
+        const std::string text = focal.empty() ? "50mm" : focal;
+        char* end = nullptr;
+        const double mm = std::strtod(text.c_str(), &end);
+        if (end == text.c_str() || (std::string(end) != "mm" && std::string(end) != "") || !(mm > 0) || !std::isfinite(mm))
+            params.fail("focal_length", fmt::format("focal_length is \"{}\", but must be a length in mm, like \"50mm\"", focal));
+        const double half_diagonal = std::hypot(36.0, 24.0) / 2 / mm;
+        half_width = half_diagonal * aspect / std::hypot(aspect, 1.0);
+    } else {
+        if (!focal.empty()) params.fail("focal_length", "give either fov or focal_length, not both");
+        const double tangent = std::tan(params.number("fov", 0, 1e-3f, 179.9f) * double(kPi) / 360);
+        switch (params.choice("fov_axis", {"x", "y", "diagonal", "smaller", "larger"}, 0)) {
+            case 0: half_width = tangent; break;
+            case 1: half_width = tangent * aspect; break;
+            case 2: half_width = tangent * aspect / std::hypot(aspect, 1.0); break;
+            case 3: half_width = aspect > 1 ? tangent * aspect : tangent; break;
+            default: half_width = aspect > 1 ? tangent : tangent * aspect; break;
+        }
+    }
+    camera.half_width = float(half_width);
+    camera.half_height = float(half_width / aspect);
+}
+
+std::unique_ptr<Sensor> make(const Params& params, const SensorContext& context, bool lens) {
+    PerspectiveCamera camera;
+    camera.film = context.film;
+    set_field_of_view(params, camera);
+    camera.offset = {params.number("principal_point_offset_x", 0, -10, 10),
+                     params.number("principal_point_offset_y", 0, -10, 10)};
+    if (lens) {
+        camera.lens_radius = params.number("aperture_radius", 0, 0);
+        if (!params.has("aperture_radius")) params.fail("thinlens needs an aperture_radius (world units)");
+        camera.focus_distance = params.number("focus_distance", 0, 1e-6f);
+        if (!params.has("focus_distance")) params.fail("thinlens needs a focus_distance (world units)");
+    }
+    return make_perspective(camera, rigid(params), context.filter_radius);
+}
+
+std::vector<ParamInfo> shared_params(std::vector<ParamInfo> more) {
+    std::vector<ParamInfo> all = {
+        {"to_world", ParamKind::Transform, "identity", "Camera to world; looks along +z, x to the left, y up."},
+        {"fov", ParamKind::Float, "", "Field of view in degrees along fov_axis."},
+        {"fov_axis", ParamKind::String, "x", "x, y, diagonal, smaller or larger."},
+        {"focal_length", ParamKind::String, "50mm", "Instead of fov: focal length for a 35 mm film."},
+        {"principal_point_offset_x", ParamKind::Float, "0", "Shift of the image centre, as a fraction of the width."},
+        {"principal_point_offset_y", ParamKind::Float, "0", "Shift of the image centre, as a fraction of the height."},
+        {"near_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
+        {"far_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
+        {"shutter_open", ParamKind::Float, "0", "Accepted; nothing moves."},
+        {"shutter_close", ParamKind::Float, "0", "Accepted; nothing moves."},
+    };
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+}
+
+}  // namespace
+
+std::unique_ptr<Sensor> make_perspective(const PerspectiveCamera& camera, const Transform& to_world, float filter_radius) {
+    return std::make_unique<PerspectiveSensor>(camera, to_world, filter_radius);
+}
+
+SensorEntry perspective_entry() {
+    return {{"sensor", "perspective", "Pinhole camera.", shared_params({})},
+            [](const Params& p, const SensorContext& c) { return make(p, c, false); }};
+}
+
+SensorEntry thinlens_entry() {
+    return {{"sensor", "thinlens", "Perspective camera with a finite round lens.",
+             shared_params({{"aperture_radius", ParamKind::Float, "", "Radius of the lens, world units."},
+                            {"focus_distance", ParamKind::Float, "", "Distance of the plane in focus along +z, world units."}})},
+            [](const Params& p, const SensorContext& c) { return make(p, c, true); }};
+}
+
+}  // namespace etendue

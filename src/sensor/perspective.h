@@ -1,0 +1,21 @@
+#pragma once
+
+#include "sensor/sensor.h"
+
+namespace etendue {
+
+struct PerspectiveCamera {
+    FilmGeometry film;
+    float half_width = 1, half_height = 1;  ///< Of the image on the plane z = 1.
+    Vec2 offset;                            ///< Principal point, fractions of the image.
+    float lens_radius = 0;                  ///< 0: pinhole.
+    float focus_distance = 1;
+};
+
+/// `to_world` must be rigid.
+std::unique_ptr<Sensor> make_perspective(const PerspectiveCamera& camera, const Transform& to_world, float filter_radius);
+
+SensorEntry perspective_entry();
+SensorEntry thinlens_entry();
+
+}  // namespace etendue

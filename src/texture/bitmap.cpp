@@ -1,0 +1,208 @@
+// Image texture. (u, v) = (0, 0) is the upper left corner of the image, (1, 1) its lower right one, and texel centres lie
+// at half-integers, as in Mitsuba 3 (whose readers of meshes turn v around, not its textures).
+//   filename (required)       any format OpenImageIO reads
+//   filter_type (bilinear)    or nearest
+//   wrap_mode (repeat)        or mirror, clamp
+//   raw (false)               integer formats hold linear data; otherwise they hold sRGB, floating-point ones never do
+//   channel (all)             r, g, b or a alone, as grey; alpha is never sRGB. "all" is the colours without alpha
+//   to_uv (identity)          affine map of (u, v) before the look-up; the upper 2D part of a 4×4 matrix
+// eval_scalar() is the luminance of coloured images, as where Mitsuba 3 uses one for opacity or roughness.
+
+#include "texture/bitmap.h"
+
+#include <array>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "color/srgb.h"
+#include "description/resolve_file.h"
+#include "texture/texture_cache.h"
+
+namespace etendue {
+namespace {
+
+std::array<float, 256> decoding_table(bool srgb) {
+    std::array<float, 256> table;
+    for (int i = 0; i < 256; ++i) table[i] = srgb ? srgb_to_linear(float(i) / 255) : float(i) / 255;
+    return table;
+}
+
+const float* decoding(bool srgb) {
+    static const std::array<float, 256> kLinear = decoding_table(false), kSrgb = decoding_table(true);
+    return srgb ? kSrgb.data() : kLinear.data();
+}
+
+/// A coordinate brought into [0, 1], and its derivative.
+struct Wrapped {
+    float t, slope;
+};
+
+Wrapped wrap(float u, TextureWrap mode) {
+    Wrapped w = {u, 1};
+    switch (mode) {
+        case TextureWrap::Repeat: w.t = u - std::floor(u); break;
+        case TextureWrap::Mirror:
+            w.t = u - 2 * std::floor(u * 0.5f);
+            if (w.t > 1) w = {2 - w.t, -1};
+            break;
+        case TextureWrap::Clamp: break;
+    }
+    // Not a number becomes zero: indices must be good whatever the mesh holds.
+    return {w.t > 0 ? std::min(w.t, 1.0f) : 0.0f, w.slope};
+}
+
+/// Two neighbouring texels along one axis and the weight of the second.
+struct Neighbours {
+    int i0, i1;
+    float weight;
+};
+
+Neighbours neighbours(float t, int n, bool repeat) {
+    const float x = t * float(n) - 0.5f, floor = std::floor(x);
+    int i0 = int(floor), i1 = i0 + 1;
+    // A mirrored image meets its own edge texel there, so that mirroring clamps too.
+    if (i0 < 0) i0 = repeat ? n - 1 : 0;
+    if (i1 >= n) i1 = repeat ? 0 : n - 1;
+    return {i0, i1, x - floor};
+}
+
+}  // namespace
+
+/// The four texels around a point, with ∂t/∂u of the wrapping.
+struct BitmapTexture::Footprint {
+    Neighbours x, y;
+    Vec2 slope;
+};
+
+BitmapTexture::BitmapTexture(const PixelBuffer& image, const Options& options)
+    : image_(&image), options_(options), is_grey_(options.channel >= 0 || image.channels < 3),
+      first_channel_(std::max(options.channel, 0)),
+      decode_(decoding(!options.raw && !(is_grey_ && first_channel_ == image.alpha_channel))) {
+    mean_ = std::visit([&](const auto& texels) { return image_mean(texels); }, image.data);
+}
+
+BitmapTexture::Footprint BitmapTexture::footprint(Vec2 uv) const {
+    const Vec2 p = options_.to_uv.point(uv);
+    const Wrapped u = wrap(p.x, options_.wrap), v = wrap(p.y, options_.wrap);
+    if (options_.filter == TextureFilter::Nearest) {
+        const int x = std::min(int(u.t * float(image_->width)), image_->width - 1);
+        const int y = std::min(int(v.t * float(image_->height)), image_->height - 1);
+        return {{x, x, 0}, {y, y, 0}, {}};
+    }
+    const bool repeat = options_.wrap == TextureWrap::Repeat;
+    return {neighbours(u.t, image_->width, repeat), neighbours(v.t, image_->height, repeat), {u.slope, v.slope}};
+}
+
+template <class Texels>
+inline Rgb BitmapTexture::texel(const Texels& texels, int x, int y) const {
+    const auto* p = texels.data() + (size_t(y) * image_->width + x) * image_->channels + first_channel_;
+    const auto value = [&](int c) {
+        if constexpr (std::is_same_v<Texels, std::vector<uint8_t>>)
+            return decode_[p[c]];
+        else if constexpr (std::is_same_v<Texels, std::vector<Half>>)
+            return to_float(p[c]);
+        else
+            return p[c];
+    };
+    return is_grey_ ? Rgb(value(0)) : Rgb(value(0), value(1), value(2));
+}
+
+template <class Texels>
+inline Rgb BitmapTexture::filtered(const Texels& texels, const Footprint& f) const {
+    if (options_.filter == TextureFilter::Nearest) return texel(texels, f.x.i0, f.y.i0);
+    return lerp(f.y.weight,
+                lerp(f.x.weight, texel(texels, f.x.i0, f.y.i0), texel(texels, f.x.i1, f.y.i0)),
+                lerp(f.x.weight, texel(texels, f.x.i0, f.y.i1), texel(texels, f.x.i1, f.y.i1)));
+}
+
+Rgb BitmapTexture::eval(Vec2 uv) const {
+    return std::visit([&](const auto& texels) { return filtered(texels, footprint(uv)); }, image_->data);
+}
+
+float BitmapTexture::eval_scalar(Vec2 uv) const {
+    const Rgb c = eval(uv);
+    return is_grey_ ? c.r : luminance(c);
+}
+
+Vec2 BitmapTexture::gradient(Vec2 uv) const {
+    const Footprint f = footprint(uv);
+    const auto slopes = [&](const auto& texels) -> Vec2 {
+        const auto scalar = [&](int x, int y) {
+            const Rgb c = texel(texels, x, y);
+            return is_grey_ ? c.r : luminance(c);
+        };
+        const float h00 = scalar(f.x.i0, f.y.i0), h10 = scalar(f.x.i1, f.y.i0);
+        const float h01 = scalar(f.x.i0, f.y.i1), h11 = scalar(f.x.i1, f.y.i1);
+        return {lerp(f.y.weight, h10 - h00, h11 - h01) * float(image_->width) * f.slope.x,
+                lerp(f.x.weight, h01 - h00, h11 - h10) * float(image_->height) * f.slope.y};
+    };
+    return options_.to_uv.gradient(std::visit(slopes, image_->data));
+}
+
+void BitmapTexture::resolution(int& width, int& height) const {
+    width = image_->width;
+    height = image_->height;
+    options_.to_uv.resolution(width, height);
+}
+
+// Over the unit square of the image every texel weighs the same, whatever the filter and the wrapping.
+template <class Texels>
+Rgb BitmapTexture::image_mean(const Texels& texels) const {
+    double sum[3] = {};
+    const auto add = [&](Rgb c) {
+        for (int i = 0; i < 3; ++i) sum[i] += c[i];
+    };
+    constexpr int kGrid = 256;  // look-ups along each axis where `to_uv` selects another part of the plane
+    const bool whole = options_.to_uv.is_identity();
+    const int width = whole ? image_->width : kGrid, height = whole ? image_->height : kGrid;
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            add(whole ? texel(texels, x, y)
+                      : filtered(texels, footprint({(float(x) + 0.5f) / kGrid, (float(y) + 0.5f) / kGrid})));
+    const double n = double(width) * height;
+    return {float(sum[0] / n), float(sum[1] / n), float(sum[2] / n)};
+}
+
+namespace {
+
+std::unique_ptr<Texture> make_bitmap(const Params& params, TextureContext& context) {
+    BitmapTexture::Options options;
+    options.filter = TextureFilter(params.choice("filter_type", {"bilinear", "nearest"}, 0));
+    options.wrap = TextureWrap(params.choice("wrap_mode", {"repeat", "mirror", "clamp"}, 0));
+    options.raw = params.flag("raw", false);
+    options.to_uv = UvTransform(params.transform("to_uv"));
+    const int channel = params.choice("channel", {"all", "r", "g", "b", "a"}, 0);
+    const std::string path = resolve_file(params);
+    try {
+        const PixelBuffer& image = context.images().load(path, options.raw);
+        if (channel == 4)
+            options.channel = image.alpha_channel;
+        else if (channel > 0)
+            options.channel = image.channels < 3 ? 0 : channel - 1;
+        if (channel == 4 && options.channel < 0)
+            params.fail("channel", fmt::format("image \"{}\" has no alpha channel", path));
+        return std::make_unique<BitmapTexture>(image, options);
+    } catch (const SceneError&) {
+        throw;
+    } catch (const std::runtime_error& e) {
+        params.fail("filename", e.what());
+    }
+}
+
+}  // namespace
+
+TextureEntry bitmap_entry() {
+    return {{"texture",
+             "bitmap",
+             "An image; (0, 0) is its upper left corner.",
+             {{"filename", ParamKind::String, "", "File of any format that OpenImageIO reads."},
+              {"filter_type", ParamKind::String, "bilinear", "bilinear or nearest."},
+              {"wrap_mode", ParamKind::String, "repeat", "repeat, mirror or clamp."},
+              {"raw", ParamKind::Bool, "false", "Integer formats hold linear data instead of sRGB."},
+              {"channel", ParamKind::String, "all", "all (the colours), or r, g, b or a alone as grey."},
+              {"to_uv", ParamKind::Transform, "identity", "Affine map of (u, v) before the look-up."}}},
+            make_bitmap};
+}
+
+}  // namespace etendue

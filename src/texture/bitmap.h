@@ -1,0 +1,53 @@
+#pragma once
+
+#include <string>
+
+#include "image/image.h"
+#include "texture/texture.h"
+#include "texture/uv_transform.h"
+
+namespace etendue {
+
+enum class TextureFilter { Bilinear, Nearest };
+enum class TextureWrap { Repeat, Mirror, Clamp };
+
+/// An image over the unit square; (0, 0) is the upper left corner of its first row. See bitmap.cpp.
+class BitmapTexture final : public Texture {
+public:
+    struct Options {
+        TextureFilter filter = TextureFilter::Bilinear;
+        TextureWrap wrap = TextureWrap::Repeat;
+        bool raw = false;  ///< 8-bit codes are linear values, not sRGB.
+        int channel = -1;  ///< The only channel to use, or -1 for colours (the sole one of grey images).
+        UvTransform to_uv = {};
+    };
+
+    BitmapTexture(const PixelBuffer& image, const Options& options);  ///< The image must outlive the texture.
+
+    Rgb eval(Vec2 uv) const override;
+    float eval_scalar(Vec2 uv) const override;
+    Vec2 gradient(Vec2 uv) const override;
+    Rgb mean() const override { return mean_; }
+    void resolution(int& width, int& height) const override;
+    size_t memory_bytes() const override { return sizeof(*this); }
+
+private:
+    struct Footprint;
+
+    Footprint footprint(Vec2 uv) const;
+    template <class Texels>
+    Rgb texel(const Texels& texels, int x, int y) const;
+    template <class Texels>
+    Rgb filtered(const Texels& texels, const Footprint& f) const;
+    template <class Texels>
+    Rgb image_mean(const Texels& texels) const;
+
+    const PixelBuffer* image_;
+    Options options_;
+    bool is_grey_;
+    int first_channel_;
+    const float* decode_;  ///< Of 8-bit codes: 256 linear values.
+    Rgb mean_;
+};
+
+}  // namespace etendue

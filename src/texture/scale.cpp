@@ -1,0 +1,60 @@
+// Product of two textures, as `scale` of Mitsuba 0.6 and of pbrt.
+//   value (required)   texture; its name may be left out
+//   scale (1)          factor: number, colour or texture
+
+#include <algorithm>
+
+#include "texture/texture.h"
+
+namespace etendue {
+namespace {
+
+class Scale final : public Texture {
+public:
+    Scale(const Params& params, TextureContext& context)
+        : value_(context.texture(params, value_name(params), Rgb(1))),
+          scale_(context.texture(params, "scale", Rgb(1))) {}
+
+    Rgb eval(Vec2 uv) const override { return value_.eval(uv) * scale_.eval(uv); }
+    Vec2 gradient(Vec2 uv) const override {
+        if (!scale_.is_constant() || !is_grey(scale_.eval(uv))) return Texture::gradient(uv);
+        return value_.gradient(uv) * scale_.eval(uv).r;
+    }
+    Rgb mean() const override {  // exact where one of the two is constant
+        return value_.mean() * scale_.mean();
+    }
+    void resolution(int& width, int& height) const override {
+        int w, h;
+        value_.resolution(width, height);
+        scale_.resolution(w, h);
+        width = std::max(width, w);
+        height = std::max(height, h);
+    }
+
+private:
+    static bool is_grey(Rgb c) { return c.r == c.g && c.g == c.b; }
+
+    static std::string value_name(const Params& params) {
+        if (params.has("value")) return "value";
+        for (const auto& c : params.children("texture"))
+            if (c.name != "scale") return c.name;
+        params.fail("texture \"scale\" needs a texture to scale");
+    }
+
+    TextureRef value_, scale_;
+};
+
+}  // namespace
+
+TextureEntry scale_entry() {
+    return {{"texture",
+             "scale",
+             "Product of a texture and a number, a colour or another texture.",
+             {{"value", ParamKind::Texture, "", "The texture to scale; an unnamed one will do."},
+              {"scale", ParamKind::Texture, "1", "The factor."}}},
+            [](const Params& params, TextureContext& context) -> std::unique_ptr<Texture> {
+                return std::make_unique<Scale>(params, context);
+            }};
+}
+
+}  // namespace etendue

@@ -1,0 +1,22 @@
+#include "texture/texture.h"
+
+namespace etendue {
+
+TextureEntry bitmap_entry();
+TextureEntry checkerboard_entry();
+TextureEntry scale_entry();
+
+Vec2 Texture::gradient(Vec2 uv) const {
+    int width, height;
+    resolution(width, height);
+    const Vec2 h = {0.1f / float(width), 0.1f / float(height)};
+    return {(eval_scalar({uv.x + h.x, uv.y}) - eval_scalar({uv.x - h.x, uv.y})) / (2 * h.x),
+            (eval_scalar({uv.x, uv.y + h.y}) - eval_scalar({uv.x, uv.y - h.y})) / (2 * h.y)};
+}
+
+const std::vector<TextureEntry>& texture_registry() {
+    static const std::vector<TextureEntry> entries = {bitmap_entry(), checkerboard_entry(), scale_entry()};
+    return entries;
+}
+
+}  // namespace etendue

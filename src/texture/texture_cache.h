@@ -1,0 +1,24 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "image/image.h"
+
+namespace etendue {
+
+/// The images of a scene's textures, each loaded once. Must outlive the textures made with it.
+class TextureCache {
+public:
+    /// See read_pixels(). Throws std::runtime_error, also where a value is not finite; negative values count as zero
+    /// unless `raw`.
+    const PixelBuffer& load(const std::string& path, bool raw);
+    size_t memory_bytes() const;
+
+private:
+    std::map<std::pair<std::string, bool>, std::unique_ptr<const PixelBuffer>> images_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/transform.h"
+
+namespace etendue {
+
+/// The affine map of (u, v) that is in the upper left and the last column of a 4×4 matrix (parameter `to_uv`).
+class UvTransform {
+public:
+    /// Finest grid that resolution() asks for along one axis.
+    static constexpr int kMaxResolution = 4096;
+
+    UvTransform() = default;
+    explicit UvTransform(const Transform& t) {
+        for (int row = 0; row < 2; ++row)
+            for (int column = 0; column < 3; ++column)
+                m_[row][column] = float(t.matrix()[row][column == 2 ? 3 : column]);
+    }
+
+    Vec2 point(Vec2 uv) const {
+        return {m_[0][0] * uv.x + m_[0][1] * uv.y + m_[0][2], m_[1][0] * uv.x + m_[1][1] * uv.y + m_[1][2]};
+    }
+    /// Gradient with respect to uv from the one with respect to point(uv).
+    Vec2 gradient(Vec2 g) const {
+        return {m_[0][0] * g.x + m_[1][0] * g.y, m_[0][1] * g.x + m_[1][1] * g.y};
+    }
+    /// Grid of the unit square of uv that resolves `width` × `height` cells of the unit square of point(uv).
+    void resolution(int& width, int& height) const {
+        const auto cells = [&](int column) {
+            const float n = std::hypot(m_[0][column] * float(width), m_[1][column] * float(height));
+            return int(std::clamp(std::ceil(n), 1.0f, float(kMaxResolution)));
+        };
+        const int u = cells(0), v = cells(1);
+        width = u;
+        height = v;
+    }
+    bool is_identity() const {
+        return m_[0][0] == 1 && m_[0][1] == 0 && m_[0][2] == 0 && m_[1][0] == 0 && m_[1][1] == 1 && m_[1][2] == 0;
+    }
+
+private:
+    float m_[2][3] = {{1, 0, 0}, {0, 1, 0}};
+};
+
+}  // namespace etendue

@@ -1,0 +1,149 @@
+#include "readers/ply.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "expect_mesh.h"
+#include "expect_scene_error.h"
+#include "shared_scenes.h"
+
+namespace etendue {
+namespace {
+
+MeshData parse(std::string_view bytes, const MeshOptions& options = {}) {
+    return parse_ply(bytes, "test.ply", options);
+}
+
+/// Appends the bytes of a number, in big-endian order if wanted.
+template <class T>
+void put(std::string& bytes, T value, bool big_endian) {
+    std::string raw(reinterpret_cast<const char*>(&value), sizeof(T));
+    if (big_endian) std::reverse(raw.begin(), raw.end());
+    bytes += raw;
+}
+
+constexpr const char* kXyz = "property float x\nproperty float y\nproperty float z\n";
+
+TEST(Ply, AsciiWithNormalsAndTextureCoordinates) {
+    const MeshData m =
+        parse("ply\nformat ascii 1.0\ncomment made by hand\nobj_info none\nelement vertex 4\n"
+              "property float x\nproperty float y\nproperty float z\n"
+              "property float nx\nproperty float ny\nproperty float nz\n"
+              "property float u\nproperty float v\nelement face 2\n"
+              "property list uchar int vertex_indices\nend_header\n"
+              "0 0 0 0 0 2 0 0.25\n1 0 0 0 0 1 1 0\n1 1 0 0 0 1 1 1\n0 1 0 0 0 1 0 1\n"
+              "3 0 1 2\n3 0 2 3\n");
+    EXPECT_EQ(m.positions.size(), 4u);
+    EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 2, 3}}));
+    EXPECT_EQ(m.normals[0], (Vec3{0, 0, 1}));
+    EXPECT_EQ(m.uvs[0], (Vec2{0, 0.25f}));
+}
+
+TEST(Ply, PolygonsBecomeFansAndShorterListsAreDropped) {
+    const MeshData m = parse(std::string("ply\nformat ascii 1.0\nelement vertex 5\n") + kXyz +
+                             "element face 3\nproperty list uchar int vertex_index\nend_header\n"
+                             "0 0 0\n1 0 0\n2 1 0\n1 2 0\n0 1 0\n"
+                             "5 0 1 2 3 4\n2 0 1\n4 0 1 2 4\n");
+    EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{
+                               {0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 1, 2}, {0, 2, 4}}));
+    EXPECT_EQ(m.dropped_degenerate, 1u);
+}
+
+TEST(Ply, NamesOfTextureCoordinates) {
+    const std::pair<const char*, const char*> names[] = {
+        {"u", "v"}, {"s", "t"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}};
+    for (const auto& [u, v] : names) {
+        const std::string text = std::string("ply\nformat ascii 1.0\nelement vertex 3\n") +
+                                 "property float " + v + "\n" + kXyz + "property float " + u +
+                                 "\nelement face 1\nproperty list uchar int vertex_indices\n"
+                                 "end_header\n.1 0 0 0 .2\n.3 1 0 0 .4\n.5 0 1 0 .6\n3 0 1 2\n";
+        const MeshData m = parse(text);
+        ASSERT_EQ(m.uvs.size(), 3u) << u;
+        EXPECT_EQ(m.uvs[1], (Vec2{0.4f, 0.3f}));
+        EXPECT_EQ(parse(text, {.flip_tex_coords = true}).uvs[1], (Vec2{0.4f, 0.7f}));
+    }
+}
+
+/// The same mesh in both byte orders, with every type of number, and with elements and properties
+/// to be passed over.
+class PlyBinary : public ::testing::TestWithParam<bool> {};
+
+TEST_P(PlyBinary, AllTypesInAnyOrder) {
+    const bool big = GetParam();
+    std::string bytes = std::string("ply\nformat binary_") + (big ? "big" : "little") +
+                        "_endian 1.0\nelement camera 2\nproperty double focus\n"
+                        "property list ushort short shots\n"
+                        "element vertex 4\nproperty uchar red\nproperty double z\n"
+                        "property short x\nproperty list int8 float32 weights\nproperty int8 y\n"
+                        "element face 2\nproperty int32 group\n"
+                        "property list uint16 uint32 vertex_indices\nproperty list uint8 float uv\n"
+                        "element empty 1000000000000\nend_header\n";
+    for (int i = 0; i < 2; ++i) {
+        put<double>(bytes, 35, big);
+        put<uint16_t>(bytes, 2, big);
+        put<int16_t>(bytes, -1, big);
+        put<int16_t>(bytes, 7, big);
+    }
+    const int xy[4][2] = {{-300, 0}, {300, 0}, {300, 100}, {-300, 100}};
+    for (int i = 0; i < 4; ++i) {
+        put<uint8_t>(bytes, 255, big);
+        put<double>(bytes, 0.5 * i, big);
+        put<int16_t>(bytes, int16_t(xy[i][0]), big);
+        put<int8_t>(bytes, int8_t(i), big);
+        for (int k = 0; k < i; ++k) put<float>(bytes, 1, big);
+        put<int8_t>(bytes, int8_t(xy[i][1]), big);
+    }
+    for (const auto& face : {std::vector<uint32_t>{0, 1, 2, 3}, std::vector<uint32_t>{2, 1, 0}}) {
+        put<int32_t>(bytes, -5, big);
+        put<uint16_t>(bytes, uint16_t(face.size()), big);
+        for (const uint32_t v : face) put<uint32_t>(bytes, v, big);
+        put<uint8_t>(bytes, 1, big);
+        put<float>(bytes, 3, big);
+    }
+    const MeshData m = parse(bytes);
+    EXPECT_EQ(m.positions,
+              (std::vector<Vec3>{{-300, 0, 0}, {300, 0, 0.5f}, {300, 100, 1}, {-300, 100, 1.5f}}));
+    EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 2, 3}, {2, 1, 0}}));
+    EXPECT_TRUE(m.uvs.empty());
+    EXPECT_TRUE(m.normals.empty());
+
+    // Whatever byte the file ends at, it is an error and nothing worse.
+    const size_t body = bytes.find("end_header\n") + 11;
+    for (size_t n = body; n < bytes.size(); ++n)
+        EXPECT_THROW(parse(std::string_view(bytes).substr(0, n)), SceneError) << n;
+}
+
+INSTANTIATE_TEST_SUITE_P(ByteOrders, PlyBinary, ::testing::Values(false, true),
+                         [](const auto& order) { return order.param ? "Big" : "Little"; });
+
+TEST(Ply, FacesMayComeBeforeTheirVertices) {
+    const std::string text = std::string("ply\nformat ascii 1.0\nelement face 1\n") +
+                             "property list uchar int vertex_indices\nelement vertex 3\n" + kXyz +
+                             "end_header\n3 0 1 2\n0 0 0\n1 0 0\n0 1 0\n";
+    EXPECT_EQ(parse(text).triangles.size(), 1u);
+    std::string wrong = text;
+    wrong.replace(wrong.find("3 0 1 2"), 7, "3 0 1 3");
+    expect_scene_error(0, "triangle 0 refers to vertex 3", [&] { parse(wrong); });
+}
+
+TEST(Ply, LineEndingsOfWindows) {
+    std::string text = std::string("ply\nformat ascii 1.0\nelement vertex 3\n") + kXyz +
+                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                       "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    for (size_t i = 0; (i = text.find('\n', i)) != std::string::npos; i += 2) text.insert(i, "\r");
+    EXPECT_EQ(parse(text).triangles.size(), 1u);
+}
+
+TEST(Ply, SharedScenesLoad) {
+    const auto files = testing::shared_files(".ply");
+    if (files.empty()) GTEST_SKIP() << "shared scenes are absent";
+    for (const std::string& file : files) {
+        SCOPED_TRACE(file);
+        expect_well_formed(read_ply(file));
+    }
+}
+
+}  // namespace
+}  // namespace etendue
