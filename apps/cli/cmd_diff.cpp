@@ -18,12 +18,6 @@
 namespace etendue {
 namespace {
 
-/// Colours of one layer of a file.
-struct Picture {
-    int width = 0, height = 0;
-    std::vector<Rgb> pixels;
-};
-
 struct DiffCommand {
     std::string image, reference, reference2, layer, map, map_metric = "flip", flip = "auto";
     float ignore_above = std::numeric_limits<float>::infinity();
@@ -32,41 +26,35 @@ struct DiffCommand {
     void run() const;
 
 private:
-    Picture read(const std::string& path) const;
-    Picture read_like(const std::string& path, const Picture& first) const;
+    RgbImage read_like(const std::string& path, const RgbImage& first) const;
     bool is_hdr() const;
     void print(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const;
     void print_json(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const;
     void write_map(const std::vector<float>& errors, int width, int height) const;
 };
 
-Picture DiffCommand::read(const std::string& path) const {
-    const Image image = read_image(path);
-    try {
-        return {image.width, image.height, rgb_pixels(image, layer)};
-    } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("cannot compare \"{}\": {}", path, e.what()));
-    }
-}
-
-Picture DiffCommand::read_like(const std::string& path, const Picture& first) const {
-    Picture p = read(path);
+RgbImage DiffCommand::read_like(const std::string& path, const RgbImage& first) const {
+    RgbImage p = read_rgb(path, layer);
     if (p.width != first.width || p.height != first.height)
-        throw std::runtime_error(fmt::format("\"{}\" has {} x {} pixels, but \"{}\" has {} x {}", image, first.width,
-                                             first.height, path, p.width, p.height));
+        throw std::runtime_error(fmt::format("\"{}\" has {} x {} pixels, but \"{}\" has {} x {}",
+                                             image, first.width, first.height, path, p.width,
+                                             p.height));
     return p;
 }
 
 bool DiffCommand::is_hdr() const {
     if (flip != "auto") return flip == "hdr";
-    return std::ranges::all_of(std::initializer_list<std::string>{image, reference}, [](const std::string& path) {
-        const std::string e = std::filesystem::path(path).extension().string();
-        return e == ".exr" || e == ".pfm" || e == ".hdr";
-    });
+    return std::ranges::all_of(
+        std::initializer_list<std::string>{image, reference}, [](const std::string& path) {
+            const std::string e = std::filesystem::path(path).extension().string();
+            return e == ".exr" || e == ".pfm" || e == ".hdr";
+        });
 }
 
 void DiffCommand::print(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const {
-    const auto line = [](const char* name, double value) { fmt::print("{:<16} {:.6g}\n", name, value); };
+    const auto line = [](const char* name, double value) {
+        fmt::print("{:<16} {:.6g}\n", name, value);
+    };
     line("RMSE", e.rmse);
     line("relMSE", e.rel_mse);
     line("relMSE, trimmed", e.rel_mse_trimmed);
@@ -75,12 +63,16 @@ void DiffCommand::print(const ImageErrors& e, const std::optional<FlipResult>& f
     line("SMAPE", e.smape);
     if (flip_result) line(is_hdr() ? "FLIP (HDR)" : "FLIP (LDR)", flip_result->mean);
     line("mean ratio", e.mean_ratio);
-    if (e.ignored > 0) fmt::print("{} of {} pixels are above {} and count for means only\n", e.ignored, e.pixels, ignore_above);
+    if (e.ignored > 0)
+        fmt::print("{} of {} pixels are above {} and count for means only\n", e.ignored, e.pixels,
+                   ignore_above);
     if (e.not_finite > 0)
-        fmt::print("{} of {} pixels are infinite or not a number: left out\n", e.not_finite, e.pixels);
+        fmt::print("{} of {} pixels are infinite or not a number: left out\n", e.not_finite,
+                   e.pixels);
 }
 
-void DiffCommand::print_json(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const {
+void DiffCommand::print_json(const ImageErrors& e,
+                             const std::optional<FlipResult>& flip_result) const {
     nlohmann::ordered_json j = {{"image", image},
                                 {"reference", reference},
                                 {"pixels", e.pixels},
@@ -112,19 +104,21 @@ void DiffCommand::write_map(const std::vector<float>& errors, int width, int hei
 
 void DiffCommand::run() const {
     if (!map.empty()) check_image_extension(map);
-    const Picture x = read(image), r = read_like(reference, x);
-    const Picture r2 = reference2.empty() ? Picture() : read_like(reference2, x);
+    const RgbImage x = read_rgb(image, layer), r = read_like(reference, x);
+    const RgbImage r2 = reference2.empty() ? RgbImage() : read_like(reference2, x);
     const ImageErrors errors = image_errors(x.pixels, r.pixels, {r2.pixels, ignore_above});
     const bool flip_map = !map.empty() && map_metric == "flip";
     std::optional<FlipResult> flip_result;
     if (flip != "none")
         flip_result = is_hdr() ? hdr_flip(x.pixels, r.pixels, x.width, x.height)
                                : ldr_flip(x.pixels, r.pixels, x.width, x.height);
-    if (flip_map && !flip_result) throw std::runtime_error("--map needs FLIP or --map-metric relse");
+    if (flip_map && !flip_result)
+        throw std::runtime_error("--map needs FLIP or --map-metric relse");
     json ? print_json(errors, flip_result) : print(errors, flip_result);
     if (!map.empty())
-        write_map(flip_map ? flip_result->map : relative_squared_errors(x.pixels, r.pixels, r2.pixels), x.width,
-                  x.height);
+        write_map(flip_map ? flip_result->map
+                           : relative_squared_errors(x.pixels, r.pixels, r2.pixels),
+                  x.width, x.height);
 }
 
 }  // namespace
@@ -133,13 +127,25 @@ void add_diff_command(CLI::App& app) {
     auto command = std::make_shared<DiffCommand>();
     CLI::App& c = *app.add_subcommand("diff", "Compare an image with a reference");
     c.add_option("IMAGE", command->image, "Image to judge")->required();
-    c.add_option("REFERENCE", command->reference, "Image of the same size to judge it by")->required();
-    c.add_option("--reference2", command->reference2, "A second, independent reference: takes the references' noise out of squared errors");
-    c.add_option("--layer", command->layer, "Compare this layer, e.g. albedo, instead of the picture");
-    c.add_option("--ignore-above", command->ignore_above, "Leave out pixels whose reference is brighter, such as lamps");
-    c.add_option("--flip", command->flip, "Which FLIP: hdr, ldr, none; auto: hdr for .exr, .pfm and .hdr")->capture_default_str()->check(CLI::IsMember({"auto", "hdr", "ldr", "none"}));
-    c.add_option("--map", command->map, "Write an error map: false colours to .png, values to .exr or .pfm");
-    c.add_option("--map-metric", command->map_metric, "Error of the map: flip, or relse for the summands of relMSE")->capture_default_str()->check(CLI::IsMember({"flip", "relse"}));
+    c.add_option("REFERENCE", command->reference, "Image of the same size to judge it by")
+        ->required();
+    c.add_option(
+        "--reference2", command->reference2,
+        "A second, independent reference: takes the references' noise out of squared errors");
+    c.add_option("--layer", command->layer,
+                 "Compare this layer, e.g. albedo, instead of the picture");
+    c.add_option("--ignore-above", command->ignore_above,
+                 "Leave out pixels whose reference is brighter, such as lamps");
+    c.add_option("--flip", command->flip,
+                 "Which FLIP: hdr, ldr, none; auto: hdr for .exr, .pfm and .hdr")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"auto", "hdr", "ldr", "none"}));
+    c.add_option("--map", command->map,
+                 "Write an error map: false colours to .png, values to .exr or .pfm");
+    c.add_option("--map-metric", command->map_metric,
+                 "Error of the map: flip, or relse for the summands of relMSE")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"flip", "relse"}));
     c.add_flag("--json", command->json, "Print JSON");
     c.callback([command] { command->run(); });
 }

@@ -1,9 +1,7 @@
 #include <memory>
-#include <stdexcept>
 #include <string>
 
 #include <CLI/CLI.hpp>
-#include <fmt/format.h>
 
 #include "commands.h"
 #include "image/image_io.h"
@@ -18,14 +16,10 @@ struct TonemapCommand {
 
     void run() const {
         check_image_extension(output);
-        const Image image = read_image(input);
+        const RgbImage image = read_rgb(input, layer);
         ToneMapping m = mapping;
         m.op = *tone_operator(op);
-        try {
-            write_image(output, rgb_image(image.width, image.height, tone_map(rgb_pixels(image, layer), m)));
-        } catch (const ImageLayerError& e) {
-            throw std::runtime_error(fmt::format("cannot tone map \"{}\": {}", input, e.what()));
-        }
+        write_image(output, rgb_image(image.width, image.height, tone_map(image.pixels, m)));
     }
 };
 
@@ -33,12 +27,19 @@ struct TonemapCommand {
 
 void add_tonemap_command(CLI::App& app) {
     auto command = std::make_shared<TonemapCommand>();
-    CLI::App& c = *app.add_subcommand("tonemap", "Turn a picture of radiance into one for displays");
+    CLI::App& c =
+        *app.add_subcommand("tonemap", "Turn a picture of radiance into one for displays");
     c.add_option("INPUT", command->input, "Image to read")->required();
     c.add_option("OUTPUT", command->output, "Image to write, usually .png")->required();
-    c.add_option("--operator", command->op, "aces, reinhard, or srgb for clamping alone")->capture_default_str()->check(CLI::IsMember({"aces", "reinhard", "srgb"}));
-    c.add_option("--exposure", command->mapping.exposure, "Exposure in stops")->capture_default_str();
-    c.add_option("--white", command->mapping.white, "Luminance that becomes white under reinhard; 0: the image's largest")->capture_default_str()->check(CLI::NonNegativeNumber);
+    c.add_option("--operator", command->op, "aces, reinhard, or srgb for clamping alone")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"aces", "reinhard", "srgb"}));
+    c.add_option("--exposure", command->mapping.exposure, "Exposure in stops")
+        ->capture_default_str();
+    c.add_option("--white", command->mapping.white,
+                 "Luminance that becomes white under reinhard; 0: the image's largest")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
     c.add_option("--layer", command->layer, "Take this layer, e.g. albedo, instead of the picture");
     c.callback([command] { command->run(); });
 }

@@ -1,15 +1,19 @@
 #include "bsdf/bsdf.h"
 
+#include <type_traits>
+
 namespace etendue {
 
 static_assert(sizeof(Lobe) <= 64 && std::is_trivially_copyable_v<Lobe>);
 
 namespace {
 
-/// One component seen with the geometric normal: its local directions, and what they do to the lobe's value.
+/// One component seen with the geometric normal: its local directions, and what they do to the
+/// lobe's value.
 class Side {
 public:
-    Side(Vec3 ng, const BsdfComponent& c, Vec3 wo) : c_(c), ng_(dot(ng, c.frame.n) < 0 ? -ng : ng), wo_(local(wo)) {}
+    Side(Vec3 ng, const BsdfComponent& c, Vec3 wo)
+        : c_(c), ng_(dot(ng, c.frame.n) < 0 ? -ng : ng), wo_(local(wo)) {}
 
     struct Local {
         Vec3 w;    ///< In the shading frame.
@@ -20,8 +24,8 @@ public:
     Local local(Vec3 w) const { return {c_.frame.to_local(w), dot(w, ng_)}; }
     const Local& wo() const { return wo_; }
 
-    /// From the lobe's f|wi·ns| to f̃|wi·ng|: radiance loses η² at refraction, importance is corrected for the shading
-    /// normal [Veach 1997, p. 155].
+    /// From the lobe's f|wi·ns| to f̃|wi·ng|: radiance loses η² at refraction, importance is
+    /// corrected for the shading normal [Veach 1997, p. 155].
     float correction(const Local& wi, float eta, TransportMode mode) const {
         if (mode == TransportMode::Radiance) return 1 / sqr(eta);
         return std::fabs(wo_.w.z * wi.ng / (wo_.ng * wi.w.z));
@@ -39,7 +43,8 @@ BsdfEval eval_lobe(const Lobe& lobe, Vec3 wo, Vec3 wi) {
 }
 
 std::optional<BsdfSample> sample_lobe(const Lobe& lobe, Vec3 wo, float u_lobe, Vec2 u) {
-    if (const auto* diffuse = std::get_if<DiffuseLobe>(&lobe)) return diffuse->sample(wo, u_lobe, u);
+    if (const auto* diffuse = std::get_if<DiffuseLobe>(&lobe))
+        return diffuse->sample(wo, u_lobe, u);
     return std::visit([&](const auto& l) { return l.sample(wo, u_lobe, u); }, lobe);
 }
 
@@ -55,8 +60,8 @@ BsdfEval eval_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, Vec3 wi, Trans
 }
 
 /// As if `c` were chosen for certain.
-std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, float u_lobe, Vec2 u,
-                                           TransportMode mode) {
+std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, float u_lobe,
+                                           Vec2 u, TransportMode mode) {
     const Side side(ng, c, wo);
     if (!side.wo().is_consistent()) return {};
     std::optional<BsdfSample> s = sample_lobe(c.lobe, side.wo().w, u_lobe, u);
@@ -83,7 +88,8 @@ void add(BsdfEval& sum, const BsdfEval& e) {
 
 BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
     BsdfEval sum = eval_component(ng_, first_, wo, wi, mode);
-    for (const BsdfComponent* c = first_.next; c; c = c->next) add(sum, eval_component(ng_, *c, wo, wi, mode));
+    for (const BsdfComponent* c = first_.next; c; c = c->next)
+        add(sum, eval_component(ng_, *c, wo, wi, mode));
     return sum;
 }
 

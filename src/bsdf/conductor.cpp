@@ -1,6 +1,6 @@
 // Smooth metal, or a perfect mirror.
 //   material (none), or eta, k   named metal, "none" for reflectance 1, or its complex index
-//   specular_reflectance (1)     factor of the reflectance; values other than 1 are not physical
+//   specular_reflectance (1)     factor of the reflectance; only 1 is physical
 // One-sided: black from behind.
 
 #include "bsdf/conductor.h"
@@ -13,11 +13,14 @@ namespace {
 class Conductor final : public Material {
 public:
     Conductor(const Params& params, MaterialContext& context)
-        : ior_(params, context), reflectance_(context.texture(params, "specular_reflectance", Rgb(1))) {}
+        : ior_(params, context),
+          reflectance_(context.texture(params, "specular_reflectance", Rgb(1))) {}
 
-    void append(const SurfacePoint& point, const Frame& frame, float weight, ComponentList& list) const override {
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
         const Vec2 uv = point.uv;
-        list.add(frame, ConductorLobe{ior_.eta.eval(uv), ior_.k.eval(uv), reflectance_.eval(uv)}, weight);
+        list.add(frame, ConductorLobe{ior_.eta.eval(uv), ior_.k.eval(uv), reflectance_.eval(uv)},
+                 weight);
     }
     bool may_be_smooth() const override { return false; }
     Rgb mean_albedo() const override {

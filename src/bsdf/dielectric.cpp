@@ -1,6 +1,6 @@
 // Smooth boundary between two dielectrics: the surface of glass or water.
 //   int_ior (bk7), ext_ior (air)   indices behind and in front of the surface; numbers or names
-//   specular_reflectance (1), specular_transmittance (1)   factors; values other than 1 are not physical
+//   specular_reflectance (1), specular_transmittance (1)   factors; only 1 is physical
 
 #include "bsdf/dielectric.h"
 
@@ -12,11 +12,15 @@ namespace {
 class Dielectric final : public Material {
 public:
     Dielectric(const Params& params, MaterialContext& context)
-        : eta_(read_relative_ior(params)), reflectance_(context.texture(params, "specular_reflectance", Rgb(1))),
+        : eta_(read_relative_ior(params)),
+          reflectance_(context.texture(params, "specular_reflectance", Rgb(1))),
           transmittance_(context.texture(params, "specular_transmittance", Rgb(1))) {}
 
-    void append(const SurfacePoint& point, const Frame& frame, float weight, ComponentList& list) const override {
-        list.add(frame, DielectricLobe{eta_, reflectance_.eval(point.uv), transmittance_.eval(point.uv)}, weight);
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
+        list.add(frame,
+                 DielectricLobe{eta_, reflectance_.eval(point.uv), transmittance_.eval(point.uv)},
+                 weight);
     }
     bool is_transmissive() const override { return true; }
     bool may_be_smooth() const override { return false; }
@@ -32,7 +36,8 @@ private:
 }  // namespace
 
 MaterialEntry dielectric_entry() {
-    return {{"bsdf", "dielectric", "Smooth boundary between two dielectrics, such as glass and air.",
+    return {{"bsdf", "dielectric",
+             "Smooth boundary between two dielectrics, such as glass and air.",
              dielectric_params()},
             make_material<Dielectric>};
 }

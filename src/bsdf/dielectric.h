@@ -28,7 +28,9 @@ struct DielectricLobe {
                           .eta = fresnel.eta,
                           .is_delta = true};
     }
-    Rgb albedo_estimate() const { return lerp(fresnel_dielectric(1, eta).R, transmittance, reflectance); }
+    Rgb albedo_estimate() const {
+        return lerp(fresnel_dielectric(1, eta).R, transmittance, reflectance);
+    }
     float roughness() const { return 0; }
     bool has_smooth() const { return false; }
     bool has_delta() const { return true; }

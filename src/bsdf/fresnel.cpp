@@ -6,7 +6,8 @@ namespace {
 
 /// For n > 1.
 double external_diffuse_reflectance(double n) {
-    // Nearer to one the terms cancel to fewer digits than the answer has; it is below 1e-3 there and falls to zero.
+    // Nearer to one the terms cancel to fewer digits than the answer has; it is below 1e-3 there
+    // and falls to zero.
     constexpr double kNearlyOne = 1.0005;
     if (n < kNearlyOne)
         return external_diffuse_reflectance(kNearlyOne) * (n - 1) / (kNearlyOne - 1);

@@ -7,12 +7,15 @@ namespace etendue {
 
 /// Reflection and refraction of one direction at a smooth dielectric boundary.
 struct DielectricFresnel {
-    float R;      ///< Reflectance; 1 under total internal reflection. The transmittance is 1 − R.
-    float cos_t;  ///< Cosine of the refracted direction to the same normal, of opposite sign to cos_i; 0 where none.
-    float eta;    ///< η of the refracted side over η of the incident side.
+    /// Reflectance; 1 under total internal reflection. The transmittance is 1 − R.
+    float R;
+    /// Cosine of the refracted direction to the same normal, of opposite sign to cos_i; 0 if none.
+    float cos_t;
+    float eta;  ///< η of the refracted side over η of the incident side.
 };
 
-/// `eta` is η below the boundary (side of −n) over η above; `cos_i` > 0 comes from above, < 0 from below.
+/// `eta` is η below the boundary (side of −n) over η above; `cos_i` > 0 comes from above, < 0 from
+/// below.
 inline DielectricFresnel fresnel_dielectric(float cos_i, float eta) {
     const float eta_ti = cos_i >= 0 ? eta : 1 / eta;
     const float ci = std::fabs(cos_i);
@@ -24,15 +27,16 @@ inline DielectricFresnel fresnel_dielectric(float cos_i, float eta) {
     return {0.5f * (sqr(rs) + sqr(rp)), cos_i >= 0 ? -ct : ct, eta_ti};
 }
 
-/// 1 − R for a direction and its refraction, from the cosines of both to the normal (of any sign) and η of the refracted
-/// side over η of the incident side: symmetric in the two, and accurate where R is near one.
+/// 1 − R for a direction and its refraction, from the cosines of both to the normal (of any sign)
+/// and η of the refracted side over η of the incident side: symmetric in the two, and accurate
+/// where R is near one.
 inline float fresnel_transmittance(float cos_i, float cos_t, float eta) {
     const float ci = std::fabs(cos_i), ct = std::fabs(cos_t);
     return 2 * eta * ci * ct * (1 / sqr(ci + eta * ct) + 1 / sqr(eta * ci + ct));
 }
 
-/// The direction into which `w` is refracted at a facet with normal `m` (either side), with fresnel =
-/// fresnel_dielectric(dot(w, m), η).
+/// The direction into which `w` is refracted at a facet with normal `m` (either side), with fresnel
+/// = fresnel_dielectric(dot(w, m), η).
 inline Vec3 refract(Vec3 w, Vec3 m, const DielectricFresnel& fresnel) {
     return m * (dot(w, m) / fresnel.eta + fresnel.cos_t) - w * (1 / fresnel.eta);
 }
@@ -41,9 +45,11 @@ inline Vec3 refract(Vec3 w, const DielectricFresnel& fresnel) {
     return {-w.x / fresnel.eta, -w.y / fresnel.eta, fresnel.cos_t};
 }
 
-/// Reflectance of a conductor with index η + ik relative to the outside, per channel; `cos_i` in [0, 1].
+/// Reflectance of a conductor with index η + ik relative to the outside, per channel; `cos_i` in
+/// [0, 1].
 inline Rgb fresnel_conductor(float cos_i, Rgb eta, Rgb k) {
-    // a² + b² and a of the complex cosine, with t = η² − k² − sin² θ; the floor keeps η = 1, k = 0 from 0/0 at 90°.
+    // a² + b² and a of the complex cosine, with t = η² − k² − sin² θ; the floor keeps η = 1, k = 0
+    // from 0/0 at 90°.
     const float cos2 = sqr(clamp(cos_i, 1e-6f, 1));
     const float sin2 = 1 - cos2;
     const float cos1 = std::sqrt(cos2);
@@ -60,9 +66,9 @@ inline Rgb fresnel_conductor(float cos_i, Rgb eta, Rgb k) {
     return result;
 }
 
-/// Reflectance of a smooth dielectric boundary for diffuse light from outside, 2 ∫ F(μ) μ dμ; `eta` is η of the other
-/// side over η of the light's side. For eta > 1 in closed form [Walsh 1926; Duntley 1942]; the inside follows from
-/// 1 − F_int = (1 − F_ext)/η².
+/// Reflectance of a smooth dielectric boundary for diffuse light from outside, 2 ∫ F(μ) μ dμ; `eta`
+/// is η of the other side over η of the light's side. For eta > 1 in closed form [Walsh 1926;
+/// Duntley 1942]; the inside follows from 1 − F_int = (1 − F_ext)/η².
 float fresnel_diffuse_reflectance(float eta);
 
 }  // namespace etendue

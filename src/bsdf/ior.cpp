@@ -14,7 +14,8 @@ struct NamedIor {
     float ior;
 };
 
-/// At about 589 nm and room temperature; values and names as in Mitsuba's documentation, so that scenes carry over.
+/// At about 589 nm and room temperature; values and names as in Mitsuba's documentation, so that
+/// scenes carry over.
 constexpr NamedIor kNamedIors[] = {
     {"vacuum", 1.0f},
     {"helium", 1.000036f},
@@ -41,21 +42,28 @@ constexpr NamedIor kNamedIors[] = {
     {"diamond", 2.419f},
 };
 
+/// Far beyond any metal; larger numbers overflow in Fresnel's equations.
+constexpr float kMaxConductorIndex = 1e4f;
+
 float named_ior(const Params& params, const char* parameter, const std::string& name) {
     const auto it = std::find_if(std::begin(kNamedIors), std::end(kNamedIors),
                                  [&](const NamedIor& n) { return name == n.name; });
     if (it != std::end(kNamedIors)) return it->ior;
     std::vector<std::string> names;
     for (const NamedIor& n : kNamedIors) names.push_back(n.name);
-    params.fail(parameter, fmt::format("parameter \"{}\" names no known material: \"{}\"; it may be a number or one of: {}",
-                                       parameter, name, fmt::join(names, ", ")));
+    params.fail(
+        parameter,
+        fmt::format(
+            "parameter \"{}\" names no known material: \"{}\"; it may be a number or one of: {}",
+            parameter, name, fmt::join(names, ", ")));
 }
 
 }  // namespace
 
 float read_ior(const Params& params, const char* name, const char* fallback) {
     const Param* p = params.object().find(name);
-    if (!p || p->type() == ParamType::String) return named_ior(params, name, params.text(name, fallback));
+    if (!p || p->type() == ParamType::String)
+        return named_ior(params, name, params.text(name, fallback));
     const float ior = params.number(name, 1, 0);
     if (!(ior > 0)) params.fail(name, fmt::format("parameter \"{}\" must be above zero", name));
     return ior;
@@ -69,20 +77,23 @@ ConductorIndex::ConductorIndex(const Params& params, MaterialContext& context) {
     const std::string name = params.text("material", "none");
     const bool has_index = params.has("eta") || params.has("k");
     if (name != "none") {
-        if (has_index) params.fail("material", "give either \"material\", or \"eta\" and \"k\", not both");
+        if (has_index)
+            params.fail("material", "give either \"material\", or \"eta\" and \"k\", not both");
         const std::optional<ConductorIor> metal = named_metal(name);
         if (!metal) {
             const std::string near = nearest_name(name, metal_names());
-            params.fail("material", fmt::format("parameter \"material\" names no known metal: \"{}\"{}", name,
-                                                near.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", near)));
+            params.fail(
+                "material",
+                fmt::format("parameter \"material\" names no known metal: \"{}\"{}", name,
+                            near.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", near)));
         }
         eta = metal->eta;
         k = metal->k;
         return;
     }
     // η = 0, k = 1 reflects everything.
-    eta = context.texture(params, "eta", Rgb(0));
-    k = context.texture(params, "k", Rgb(1));
+    eta = context.texture(params, "eta", Rgb(0), kMaxConductorIndex);
+    k = context.texture(params, "k", Rgb(1), kMaxConductorIndex);
 }
 
 Roughness::Roughness(const Params& params, MaterialContext& context)
@@ -102,25 +113,33 @@ Microfacet::Kind read_distribution(const Params& params) {
 }
 
 std::vector<ParamInfo> dielectric_params() {
-    return {{"int_ior", ParamKind::FloatOrName, "bk7", "Index of refraction behind the surface, above 0."},
-            {"ext_ior", ParamKind::FloatOrName, "air", "Index of refraction in front of it, above 0."},
-            {"specular_reflectance", ParamKind::Texture, "1", "Factor of the reflection."},
-            {"specular_transmittance", ParamKind::Texture, "1", "Factor of the transmission."}};
+    return {
+        {"int_ior", ParamKind::FloatOrName, "bk7",
+         "Index of refraction behind the surface, above 0."},
+        {"ext_ior", ParamKind::FloatOrName, "air", "Index of refraction in front of it, above 0."},
+        {"specular_reflectance", ParamKind::Texture, "1", "Factor of the reflection."},
+        {"specular_transmittance", ParamKind::Texture, "1", "Factor of the transmission."}};
 }
 
 std::vector<ParamInfo> conductor_params() {
-    return {{"material", ParamKind::String, "none", "Named metal (Au, Cu, Ag, ...), or none for a perfect mirror."},
-            {"eta", ParamKind::Texture, "0", "Real part of the index of refraction relative to the outside."},
+    return {{"material", ParamKind::String, "none",
+             "Named metal (Au, Cu, Ag, ...), or none for a perfect mirror."},
+            {"eta", ParamKind::Texture, "0",
+             "Real part of the index of refraction relative to the outside."},
             {"k", ParamKind::Texture, "1", "Imaginary part of it."},
             {"specular_reflectance", ParamKind::Texture, "1", "Factor of the reflectance."}};
 }
 
 std::vector<ParamInfo> roughness_params() {
-    return {{"distribution", ParamKind::String, "beckmann", "Distribution of facet normals: beckmann or ggx."},
-            {"alpha", ParamKind::Texture, "0.1", "Roughness: RMS slope of the facets, clamped to [0.0001, 100]."},
-            {"alpha_u", ParamKind::Texture, "", "Roughness along the first tangent; with alpha_v, instead of alpha."},
+    return {{"distribution", ParamKind::String, "beckmann",
+             "Distribution of facet normals: beckmann or ggx."},
+            {"alpha", ParamKind::Texture, "0.1",
+             "Roughness: RMS slope of the facets, clamped to [0.0001, 100]."},
+            {"alpha_u", ParamKind::Texture, "",
+             "Roughness along the first tangent; with alpha_v, instead of alpha."},
             {"alpha_v", ParamKind::Texture, "", "Roughness along the second tangent."},
-            {"sample_visible", ParamKind::Bool, "true", "Accepted; visible normals are always sampled."}};
+            {"sample_visible", ParamKind::Bool, "true",
+             "Accepted; visible normals are always sampled."}};
 }
 
 std::vector<ParamInfo> concat(std::vector<ParamInfo> a, const std::vector<ParamInfo>& b) {

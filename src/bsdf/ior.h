@@ -1,12 +1,14 @@
 #pragma once
-// Indices of refraction and roughness as scene files give them, and their rows in the plug-ins' tables.
+// Indices of refraction and roughness as scene files give them, and their rows in the plug-ins'
+// tables.
 
 #include "bsdf/material.h"
 #include "bsdf/microfacet.h"
 
 namespace etendue {
 
-/// Index of refraction given by parameter `name`: a number above zero, or a name such as "water" (table in ior.cpp).
+/// Index of refraction given by parameter `name`: a number above zero, or a name such as "water"
+/// (table in ior.cpp).
 float read_ior(const Params& params, const char* name, const char* fallback);
 
 /// η inside over η outside, from "int_ior" (bk7) and "ext_ior" (air).
@@ -14,7 +16,8 @@ float read_relative_ior(const Params& params);
 /// Rows for that and for the factors "specular_reflectance" and "specular_transmittance".
 std::vector<ParamInfo> dielectric_params();
 
-/// Complex index of a metal: "material" (a name of color/metals.h, or "none", a perfect mirror), or "eta" and "k".
+/// Complex index of a metal: "material" (a name of color/metals.h, or "none", a perfect mirror), or
+/// "eta" and "k".
 struct ConductorIndex {
     TextureRef eta, k;
     ConductorIndex(const Params& params, MaterialContext& context);
@@ -29,7 +32,9 @@ Microfacet::Kind read_distribution(const Params& params);
 class Roughness {
 public:
     Roughness(const Params& params, MaterialContext& context);
-    Microfacet eval(Vec2 uv) const { return {kind_, alpha_u_.eval_scalar(uv), alpha_v_.eval_scalar(uv)}; }
+    Microfacet eval(Vec2 uv) const {
+        return {kind_, alpha_u_.eval_scalar(uv), alpha_v_.eval_scalar(uv)};
+    }
 
 private:
     Microfacet::Kind kind_;

@@ -13,14 +13,14 @@ float erf_inv(float x) {
     if (w < 5) {
         w -= 2.5f;
         p = 2.81022636e-08f;
-        for (float c : {3.43273939e-07f, -3.5233877e-06f, -4.39150654e-06f, 0.00021858087f, -0.00125372503f,
-                        -0.00417768164f, 0.246640727f, 1.50140941f})
+        for (float c : {3.43273939e-07f, -3.5233877e-06f, -4.39150654e-06f, 0.00021858087f,
+                        -0.00125372503f, -0.00417768164f, 0.246640727f, 1.50140941f})
             p = c + p * w;
     } else {
         w = std::sqrt(w) - 3;
         p = -0.000200214257f;
-        for (float c : {0.000100950558f, 0.00134934322f, -0.00367342844f, 0.00573950773f, -0.0076224613f,
-                        0.00943887047f, 1.00167406f, 2.83297682f})
+        for (float c : {0.000100950558f, 0.00134934322f, -0.00367342844f, 0.00573950773f,
+                        -0.0076224613f, 0.00943887047f, 1.00167406f, 2.83297682f})
             p = c + p * w;
     }
     return p * x;
@@ -31,9 +31,10 @@ float sample_gaussian_slope(float u) {
     return erf_inv(clamp(2 * u - 1, -kOneMinusEpsilon, kOneMinusEpsilon));
 }
 
-/// Slope along the direction of view, for unit roughness and a view at angle θ. Its density is proportional to
-/// max(0, cos θ − x sin θ) exp(−x²), so that with b = erf(x) the cumulative distribution is
-///     C(b) = (1 + b) cos θ + sin θ exp(−x²)/√π,   dC/db = cos θ − x sin θ,    b in [−1, erf(cot θ)].
+/// Slope along the direction of view, for unit roughness and a view at angle θ. Its density is
+/// proportional to max(0, cos θ − x sin θ) exp(−x²), so that with b = erf(x) the cumulative
+/// distribution is
+///     C(b) = (1 + b) cos θ + sin θ exp(−x²)/√π,   dC/db = cos θ − x sin θ,  b in [−1, erf(cot θ)].
 /// C is concave in b: Newton's steps, kept in a bracket, converge from the left [Jakob 2014].
 float sample_visible_slope(float cos_theta, float sin_theta, float u) {
     constexpr float kInvSqrtPi = 0.56418958354775628695f;
@@ -82,7 +83,8 @@ Vec3 sample_visible_ggx(Vec3 w_std, Vec2 u) {
 Vec3 Microfacet::sample_visible(Vec3 w, Vec2 u) const {
     // Stretched so that the roughness is one; normals stretch back with the inverse transpose.
     const Vec3 w_std = normalize({alpha_x_ * w.x, alpha_y_ * w.y, w.z});
-    const Vec3 m = kind_ == Kind::Ggx ? sample_visible_ggx(w_std, u) : sample_visible_beckmann(w_std, u);
+    const Vec3 m =
+        kind_ == Kind::Ggx ? sample_visible_ggx(w_std, u) : sample_visible_beckmann(w_std, u);
     return normalize({alpha_x_ * m.x, alpha_y_ * m.y, std::fmax(m.z, 1e-7f)});
 }
 

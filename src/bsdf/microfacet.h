@@ -1,11 +1,12 @@
 #pragma once
-// Distributions of microfacet normals, GGX and Beckmann, with anisotropic roughness and Smith shadowing.
+// Distributions of microfacet normals, GGX and Beckmann, with anisotropic roughness and Smith
+// shadowing.
 //
 // Everything is written with the projected area of the microsurface seen from w,
 //     σ(w) = ∫ max(w·m, 0) D(m) dm = |cos θ| (1 + Λ(w)) = |cos θ| / G1(w),
 // which stays finite and above zero at grazing angles. With it
-//     D_w(m)     = max(w·m, 0) D(m) / σ(w)                    density of visible normals [Heitz 2014, eq. 2]
-//     G(wo, wi)  = |cos θ_o| |cos θ_i| / (σ(wo) σ(wi))        separable Smith masking and shadowing.
+//     D_w(m)    = max(w·m, 0) D(m) / σ(w)               density of visible normals [Heitz 2014],
+//     G(wo, wi) = |cos θ_o| |cos θ_i| / (σ(wo) σ(wi))   separable Smith shadowing.
 
 #include "bsdf/lobe.h"
 
@@ -20,7 +21,8 @@ public:
 
     Microfacet() = default;
     Microfacet(Kind kind, float alpha_x, float alpha_y)
-        : alpha_x_(clamp(alpha_x, kMinAlpha, kMaxAlpha)), alpha_y_(clamp(alpha_y, kMinAlpha, kMaxAlpha)), kind_(kind) {}
+        : alpha_x_(clamp(alpha_x, kMinAlpha, kMaxAlpha)),
+          alpha_y_(clamp(alpha_y, kMinAlpha, kMaxAlpha)), kind_(kind) {}
 
     /// Density of normals about z: ∫ D(m) cos θ_m dm = 1 over the upper hemisphere, 0 below it.
     float D(Vec3 m) const {
@@ -46,8 +48,8 @@ public:
 
     /// Solid-angle density of sample_visible(w): D_w(m), with w.z > 0.
     float pdf_visible(Vec3 w, Vec3 m) const { return std::fmax(dot(w, m), 0.0f) * D(m) / sigma(w); }
-    /// A normal with density D_w(m), for w.z > 0: GGX by spherical caps [Dupuy & Benyoub 2023], Beckmann by inverting
-    /// the slope distribution [Heitz & d'Eon 2014].
+    /// A normal with density D_w(m), for w.z > 0: GGX by spherical caps [Dupuy & Benyoub 2023],
+    /// Beckmann by inverting the slope distribution [Heitz & d'Eon 2014].
     Vec3 sample_visible(Vec3 w, Vec2 u) const;
 
     float alpha_x() const { return alpha_x_; }

@@ -1,11 +1,12 @@
-// Rough metal: a microfacet surface with the Fresnel reflectance of a conductor, single scattering only.
+// Rough metal: a microfacet surface with the Fresnel reflectance of a conductor, single scattering
+// only.
 //   distribution (beckmann)            beckmann or ggx
-//   alpha (0.1), or alpha_u, alpha_v   RMS slope of the facets along the two tangents; numbers or textures
+//   alpha (0.1), or alpha_u, alpha_v   RMS slope of the facets along the tangents; or textures
 //   material (none), or eta, k         named metal, "none" for reflectance 1, or its complex index
-//   specular_reflectance (1)           factor of the reflectance; values other than 1 are not physical
+//   specular_reflectance (1)           factor of the reflectance; only 1 is physical
 //   sample_visible (true)              accepted; visible normals are always sampled
-// References: [Walter et al. 2007], [Heitz 2014]. One-sided; Smith's separable masking; light that would scatter
-// several times between facets is lost, which darkens metals from about alpha 0.3 on.
+// References: [Walter et al. 2007], [Heitz 2014]. One-sided; Smith's separable masking; light that
+// would scatter several times between facets is lost, which darkens metals from about alpha 0.3 on.
 
 #include "bsdf/roughconductor.h"
 
@@ -13,7 +14,8 @@
 
 namespace etendue {
 
-// With σ of microfacet.h: f |cos θ_i| = ρ F D |cos θ_i| / (4 σ_o σ_i) and pdf = D_wo(m) / (4 wo·m) = D / (4 σ_o).
+// With σ of microfacet.h: f |cos θ_i| = ρ F D |cos θ_i| / (4 σ_o σ_i) and pdf = D_wo(m) / (4 wo·m)
+// = D / (4 σ_o).
 
 BsdfEval RoughConductorLobe::eval(Vec3 wo, Vec3 wi) const {
     if (!(wo.z > 0 && wi.z > 0)) return {};
@@ -21,7 +23,8 @@ BsdfEval RoughConductorLobe::eval(Vec3 wo, Vec3 wi) const {
     const float quarter_D = 0.25f * distribution.D(m);
     const float sigma_o = distribution.sigma(wo), sigma_i = distribution.sigma(wi);
     const float pdf = quarter_D / sigma_o;
-    return {reflectance * fresnel_conductor(dot(wo, m), eta, k) * (pdf * (wi.z / sigma_i)), pdf, quarter_D / sigma_i};
+    return {reflectance * fresnel_conductor(dot(wo, m), eta, k) * (pdf * (wi.z / sigma_i)), pdf,
+            quarter_D / sigma_i};
 }
 
 std::optional<BsdfSample> RoughConductorLobe::sample(Vec3 wo, float /*u_lobe*/, Vec2 u) const {
@@ -33,7 +36,8 @@ std::optional<BsdfSample> RoughConductorLobe::sample(Vec3 wo, float /*u_lobe*/, 
     if (!(quarter_D > 0)) return {};
     const float sigma_i = distribution.sigma(wi);
     return BsdfSample{.wi = wi,
-                      .weight = reflectance * fresnel_conductor(dot(wo, m), eta, k) * (wi.z / sigma_i),
+                      .weight =
+                          reflectance * fresnel_conductor(dot(wo, m), eta, k) * (wi.z / sigma_i),
                       .pdf = quarter_D / distribution.sigma(wo),
                       .pdf_rev = quarter_D / sigma_i};
 }
@@ -46,10 +50,12 @@ public:
         : roughness_(params, context), ior_(params, context),
           reflectance_(context.texture(params, "specular_reflectance", Rgb(1))) {}
 
-    void append(const SurfacePoint& point, const Frame& frame, float weight, ComponentList& list) const override {
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
         const Vec2 uv = point.uv;
         list.add(frame,
-                 RoughConductorLobe{roughness_.eval(uv), ior_.eta.eval(uv), ior_.k.eval(uv), reflectance_.eval(uv)},
+                 RoughConductorLobe{roughness_.eval(uv), ior_.eta.eval(uv), ior_.k.eval(uv),
+                                    reflectance_.eval(uv)},
                  weight);
     }
     Rgb mean_albedo() const override {

@@ -5,7 +5,8 @@
 
 namespace etendue {
 
-/// Rough metal: f |cos θ_i| = ρ F(wo·m) D(m) G(wo, wi) / (4 |cos θ_o|), m the half vector [Walter et al. 2007, eq. 20].
+/// Rough metal: f |cos θ_i| = ρ F(wo·m) D(m) G(wo, wi) / (4 |cos θ_o|), m the half vector [Walter
+/// et al. 2007, eq. 20].
 struct RoughConductorLobe {
     Microfacet distribution;
     Rgb eta, k;

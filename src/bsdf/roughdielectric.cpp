@@ -1,10 +1,11 @@
 // Rough boundary between two dielectrics, such as ground glass; single scattering only.
 //   distribution (beckmann)            beckmann or ggx
-//   alpha (0.1), or alpha_u, alpha_v   RMS slope of the facets along the two tangents; numbers or textures
-//   int_ior (bk7), ext_ior (air)       indices behind and in front of the surface; numbers or names; not equal
-//   specular_reflectance (1), specular_transmittance (1)   factors; values other than 1 are not physical
+//   alpha (0.1), or alpha_u, alpha_v   RMS slope of the facets along the tangents; or textures
+//   int_ior (bk7), ext_ior (air)       indices behind and in front; numbers or names; not equal
+//   specular_reflectance (1), specular_transmittance (1)   factors; only 1 is physical
 //   sample_visible (true)              accepted; visible normals are always sampled
-// References: [Walter et al. 2007], [Heitz 2014]. Light that would scatter several times between facets is lost.
+// References: [Walter et al. 2007], [Heitz 2014]. Light that would scatter several times between
+// facets is lost.
 
 #include "bsdf/roughdielectric.h"
 
@@ -14,7 +15,8 @@ namespace etendue {
 
 namespace {
 
-/// D(m), σ(wo) and σ(wi) of one facet and pair of directions; value and densities of both events follow from them.
+/// D(m), σ(wo) and σ(wi) of one facet and pair of directions; value and densities of both events
+/// follow from them.
 struct Facet {
     float D, sigma_o, sigma_i;
 
@@ -23,12 +25,14 @@ struct Facet {
         const float FD = 0.25f * F * D, pdf = FD / sigma_o;
         return {reflectance * (pdf * (std::fabs(cos_i) / sigma_i)), pdf, FD / sigma_i};
     }
-    /// pdf = (1 − F) D_wo(m) dω_m/dω_i with dω_m/dω_i = |wi·m| / (wi·m + wo·m / η)² [Walter et al. 2007, eq. 17],
-    /// `eta` being η on wi's side over η on wo's; from wi the same with 1/η.
+    /// pdf = (1 − F) D_wo(m) dω_m/dω_i with dω_m/dω_i = |wi·m| / (wi·m + wo·m / η)² [Walter et al.
+    /// 2007, eq. 17], `eta` being η on wi's side over η on wo's; from wi the same with 1/η.
     BsdfEval refraction(Rgb transmittance, float cos_i, float wo_m, float wi_m, float eta) const {
         const float T = fresnel_transmittance(wo_m, wi_m, eta);
-        const float TD = T * D * std::fabs(wo_m * wi_m) / sqr(wi_m + wo_m / eta), pdf = TD / sigma_o;
-        return {transmittance * (pdf * (std::fabs(cos_i) / sigma_i)), pdf, TD / (sigma_i * sqr(eta)), eta};
+        const float TD = T * D * std::fabs(wo_m * wi_m) / sqr(wi_m + wo_m / eta),
+                    pdf = TD / sigma_o;
+        return {transmittance * (pdf * (std::fabs(cos_i) / sigma_i)), pdf,
+                TD / (sigma_i * sqr(eta)), eta};
     }
 };
 
@@ -61,12 +65,14 @@ std::optional<BsdfSample> RoughDielectricLobe::sample(Vec3 wo, float u_lobe, Vec
     const Vec3 wi = normalize(is_reflection ? reflect(wo, m) : refract(wo, m, fresnel));
     if (wi.z == 0 || ((wo.z > 0) == (wi.z > 0)) != is_reflection) return {};
     const Facet facet{distribution.D(m), distribution.sigma(wo), distribution.sigma(wi)};
-    const BsdfEval e = is_reflection ? facet.reflection(reflectance, wi.z, fresnel.R)
-                                     : facet.refraction(transmittance, wi.z, wo_m, fresnel.cos_t, fresnel.eta);
+    const BsdfEval e =
+        is_reflection ? facet.reflection(reflectance, wi.z, fresnel.R)
+                      : facet.refraction(transmittance, wi.z, wo_m, fresnel.cos_t, fresnel.eta);
     if (!(e.pdf > 0)) return {};
     // All but the masking G1(wi) = |cos θ_i| / σ_i cancels from f / pdf.
     return BsdfSample{.wi = wi,
-                      .weight = (is_reflection ? reflectance : transmittance) * (std::fabs(wi.z) / facet.sigma_i),
+                      .weight = (is_reflection ? reflectance : transmittance) *
+                                (std::fabs(wi.z) / facet.sigma_i),
                       .pdf = e.pdf,
                       .pdf_rev = e.pdf_rev,
                       .eta = e.eta};
@@ -81,17 +87,22 @@ public:
           reflectance_(context.texture(params, "specular_reflectance", Rgb(1))),
           transmittance_(context.texture(params, "specular_transmittance", Rgb(1))) {
         if (eta_ == 1)
-            params.fail("bsdf \"roughdielectric\" needs different \"int_ior\" and \"ext_ior\" (use \"null\")");
+            params.fail("bsdf \"roughdielectric\" needs different \"int_ior\" and \"ext_ior\" (use "
+                        "\"null\")");
     }
 
-    void append(const SurfacePoint& point, const Frame& frame, float weight, ComponentList& list) const override {
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
         const Vec2 uv = point.uv;
-        list.add(frame, RoughDielectricLobe{roughness_.eval(uv), eta_, reflectance_.eval(uv), transmittance_.eval(uv)},
+        list.add(frame,
+                 RoughDielectricLobe{roughness_.eval(uv), eta_, reflectance_.eval(uv),
+                                     transmittance_.eval(uv)},
                  weight);
     }
     bool is_transmissive() const override { return true; }
     Rgb mean_albedo() const override {
-        return RoughDielectricLobe{{}, eta_, reflectance_.mean(), transmittance_.mean()}.albedo_estimate();
+        return RoughDielectricLobe{{}, eta_, reflectance_.mean(), transmittance_.mean()}
+            .albedo_estimate();
     }
 
 private:
@@ -103,7 +114,8 @@ private:
 }  // namespace
 
 MaterialEntry roughdielectric_entry() {
-    return {{"bsdf", "roughdielectric", "Rough boundary between two dielectrics [Walter et al. 2007].",
+    return {{"bsdf", "roughdielectric",
+             "Rough boundary between two dielectrics [Walter et al. 2007].",
              concat(roughness_params(), dielectric_params())},
             make_material<RoughDielectric>};
 }

@@ -5,17 +5,19 @@
 
 namespace etendue {
 
-/// Rough boundary between two dielectrics [Walter et al. 2007]: reflection as of a rough metal with the dielectric's
-/// F(wo·m), and refraction at facets m ∝ ±(wo + η wi). A facet drawn among those visible from wo reflects with
-/// probability F.
+/// Rough boundary between two dielectrics [Walter et al. 2007]: reflection as of a rough metal with
+/// the dielectric's F(wo·m), and refraction at facets m ∝ ±(wo + η wi). A facet drawn among those
+/// visible from wo reflects with probability F.
 struct RoughDielectricLobe {
     Microfacet distribution;
-    float eta;                       ///< η below the surface (side of −n) over η above; not one.
+    float eta;  ///< η below the surface (side of −n) over η above; not one.
     Rgb reflectance, transmittance;  ///< Factors on reflection and refraction.
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const;
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const;
-    Rgb albedo_estimate() const { return lerp(fresnel_dielectric(1, eta).R, transmittance, reflectance); }
+    Rgb albedo_estimate() const {
+        return lerp(fresnel_dielectric(1, eta).R, transmittance, reflectance);
+    }
     float roughness() const { return distribution.min_alpha(); }
     bool has_smooth() const { return true; }
     bool has_delta() const { return false; }

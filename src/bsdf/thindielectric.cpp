@@ -1,6 +1,6 @@
 // Pane so thin that what it transmits goes straight on; internal reflections are included.
 //   int_ior (bk7), ext_ior (air)   indices of the pane and of what is around it; numbers or names
-//   specular_reflectance (1), specular_transmittance (1)   factors; values other than 1 are not physical
+//   specular_reflectance (1), specular_transmittance (1)   factors; only 1 is physical
 
 #include "bsdf/thindielectric.h"
 
@@ -12,16 +12,22 @@ namespace {
 class ThinDielectric final : public Material {
 public:
     ThinDielectric(const Params& params, MaterialContext& context)
-        : eta_(read_relative_ior(params)), reflectance_(context.texture(params, "specular_reflectance", Rgb(1))),
+        : eta_(read_relative_ior(params)),
+          reflectance_(context.texture(params, "specular_reflectance", Rgb(1))),
           transmittance_(context.texture(params, "specular_transmittance", Rgb(1))) {}
 
-    void append(const SurfacePoint& point, const Frame& frame, float weight, ComponentList& list) const override {
-        list.add(frame, ThinDielectricLobe{eta_, reflectance_.eval(point.uv), transmittance_.eval(point.uv)}, weight);
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
+        list.add(
+            frame,
+            ThinDielectricLobe{eta_, reflectance_.eval(point.uv), transmittance_.eval(point.uv)},
+            weight);
     }
     bool is_transmissive() const override { return true; }
     bool may_be_smooth() const override { return false; }
     Rgb mean_albedo() const override {
-        return ThinDielectricLobe{eta_, reflectance_.mean(), transmittance_.mean()}.albedo_estimate();
+        return ThinDielectricLobe{eta_, reflectance_.mean(), transmittance_.mean()}
+            .albedo_estimate();
     }
 
 private:
@@ -32,9 +38,11 @@ private:
 }  // namespace
 
 MaterialEntry thindielectric_entry() {
-    return {{"bsdf", "thindielectric", "Thin pane of glass: reflects, and transmits straight ahead, with internal reflections.",
-             dielectric_params()},
-            make_material<ThinDielectric>};
+    return {
+        {"bsdf", "thindielectric",
+         "Thin pane of glass: reflects, and transmits straight ahead, with internal reflections.",
+         dielectric_params()},
+        make_material<ThinDielectric>};
 }
 
 }  // namespace etendue

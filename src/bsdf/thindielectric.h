@@ -4,8 +4,8 @@
 
 namespace etendue {
 
-/// A pane too thin to displace light: mirror reflection, and transmission straight ahead, each with all internal
-/// reflections R' = R + T² R (1 + R² + …) = 2R / (1 + R).
+/// A pane too thin to displace light: mirror reflection, and transmission straight ahead, each with
+/// all internal reflections R' = R + T² R (1 + R² + …) = 2R / (1 + R).
 struct ThinDielectricLobe {
     float eta;                       ///< η of the pane over η around it.
     Rgb reflectance, transmittance;  ///< Factors on R' and 1 − R'.

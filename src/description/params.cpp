@@ -170,9 +170,18 @@ void check_params(const SceneDescription& scene, int index, const PluginInfo& in
             report(p.where, fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", p.name,
                                         info.category, info.name, kind_name(it->kind), type_name(p)));
     }
-    for (const auto& c : object.children)
-        if (!c.name.empty() && find(c.name) == info.params.end() && scene.objects[c.object].category == "texture")
-            unknown(c.where, c.name);
+    for (const auto& c : object.children) {
+        if (c.name.empty()) continue;
+        const std::string& category = scene.objects[c.object].category;
+        const bool is_texture = category == "texture";
+        const auto it = find(c.name);
+        if (it == info.params.end()) {
+            if (is_texture) unknown(c.where, c.name);
+        } else if (it->kind != ParamKind::Object && !(is_texture && it->kind == ParamKind::Texture)) {
+            report(c.where, fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", c.name,
+                                        info.category, info.name, kind_name(it->kind), category));
+        }
+    }
 }
 
 }  // namespace etendue

@@ -23,13 +23,14 @@ std::string nearest_file(const fs::path& path) {
 std::string resolve_file(const Params& params, std::string_view name) {
     const std::string file = params.text(name, "");
     if (file.empty())
-        params.fail(name, fmt::format("{} \"{}\" needs the parameter \"{}\"", params.object().category,
-                                      params.object().type, name));
+        params.fail(name, fmt::format("{} \"{}\" needs the parameter \"{}\"",
+                                      params.object().category, params.object().type, name));
     std::vector<fs::path> places;
     if (fs::path(file).is_absolute())
         places.emplace_back(file);
     else
-        for (const std::string& folder : params.scene().search_paths) places.push_back(fs::path(folder) / file);
+        for (const std::string& folder : params.scene().search_paths)
+            places.push_back(fs::path(folder) / file);
     if (places.empty()) places.emplace_back(file);
 
     std::vector<std::string> folders;
@@ -41,7 +42,8 @@ std::string resolve_file(const Params& params, std::string_view name) {
         folders.push_back(folder.empty() ? "." : folder.string());
         if (near.empty()) near = nearest_file(place);
     }
-    params.fail(name, fmt::format("there is no file \"{}\" (looked in {}{})", file, fmt::join(folders, ", "),
+    params.fail(name, fmt::format("there is no file \"{}\" (looked in {}{})", file,
+                                  fmt::join(folders, ", "),
                                   near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
 }
 

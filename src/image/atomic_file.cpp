@@ -20,7 +20,8 @@ PendingFile::PendingFile(const std::string& path) : path_(path) {
         fs::create_directories(target.parent_path(), error);
         if (error) fail("cannot make its folder: " + error.message());
     }
-    temporary_ = target.parent_path() / fmt::format(".{}.{}", ::getpid(), target.filename().string());
+    temporary_ =
+        target.parent_path() / fmt::format(".{}.{}", ::getpid(), target.filename().string());
 }
 
 PendingFile::~PendingFile() {
@@ -30,7 +31,8 @@ PendingFile::~PendingFile() {
 
 void PendingFile::fail(std::string why) const {
     const std::string name = temporary();
-    for (size_t at = 0; !name.empty() && (at = why.find(name, at)) != std::string::npos; at += path_.size())
+    for (size_t at = 0; !name.empty() && (at = why.find(name, at)) != std::string::npos;
+         at += path_.size())
         why.replace(at, name.size(), path_);
     throw std::runtime_error(fmt::format("cannot write \"{}\": {}", path_, why));
 }

@@ -18,7 +18,7 @@ public:
     ~PendingFile();
 
     std::string temporary() const { return temporary_.string(); }  ///< Where to write.
-    [[noreturn]] void fail(std::string why) const;                 ///< Speaks of the final name only.
+    [[noreturn]] void fail(std::string why) const;  ///< Speaks of the final name only.
     void commit();
 
 private:

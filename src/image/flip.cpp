@@ -52,14 +52,16 @@ Triple ycxcz(Rgb c) {
 Rgb rgb_from_ycxcz(const Triple& t) {
     const float y = (t[0] + 16) / 116, x = y + t[1] / 500, z = y - t[2] / 200;
     const Triple c = kRgbFromXyz * Triple{x * kWhite[0], y * kWhite[1], z * kWhite[2]};
-    return {std::clamp(c[0], 0.0f, 1.0f), std::clamp(c[1], 0.0f, 1.0f), std::clamp(c[2], 0.0f, 1.0f)};
+    return {std::clamp(c[0], 0.0f, 1.0f), std::clamp(c[1], 0.0f, 1.0f),
+            std::clamp(c[2], 0.0f, 1.0f)};
 }
 
 /// L*a*b* whose chroma shrinks with the lightness, after Hunt.
 Triple hunt_lab(Rgb c) {
     Triple f = relative_xyz(c);
     constexpr float kDelta = 6.0f / 29;
-    for (float& v : f) v = v > kDelta * kDelta * kDelta ? std::cbrt(v) : v / (3 * kDelta * kDelta) + 4.0f / 29;
+    for (float& v : f)
+        v = v > kDelta * kDelta * kDelta ? std::cbrt(v) : v / (3 * kDelta * kDelta) + 4.0f / 29;
     const float L = 116 * f[1] - 16;
     return {L, 0.01f * L * 500 * (f[0] - f[1]), 0.01f * L * 200 * (f[1] - f[2])};
 }
@@ -87,7 +89,8 @@ Plane convolve(const Plane& in, const Kernel& rows, const Kernel& columns) {
     std::vector<float> padded(size_t(in.width) + 2 * radius_x);
     for (int y = 0; y < in.height; ++y) {
         const float* from = in.data.data() + size_t(y) * in.width;
-        for (int i = 0; i < int(padded.size()); ++i) padded[i] = from[std::clamp(i - radius_x, 0, in.width - 1)];
+        for (int i = 0; i < int(padded.size()); ++i)
+            padded[i] = from[std::clamp(i - radius_x, 0, in.width - 1)];
         float* to = along_x.data.data() + size_t(y) * in.width;
         for (size_t k = 0; k < rows.size(); ++k)
             for (int x = 0; x < in.width; ++x) to[x] += rows[k] * padded[x + k];
@@ -95,7 +98,8 @@ Plane convolve(const Plane& in, const Kernel& rows, const Kernel& columns) {
     for (int y = 0; y < in.height; ++y) {
         float* to = out.data.data() + size_t(y) * in.width;
         for (int k = -radius_y; k <= radius_y; ++k) {
-            const float* from = along_x.data.data() + size_t(std::clamp(y + k, 0, in.height - 1)) * in.width;
+            const float* from =
+                along_x.data.data() + size_t(std::clamp(y + k, 0, in.height - 1)) * in.width;
             for (int x = 0; x < in.width; ++x) to[x] += columns[k + radius_y] * from[x];
         }
     }
@@ -125,7 +129,8 @@ constexpr Sensitivity kAchromatic = {1, 0.0047, 0, 1e-5}, kRedGreen = {1, 0.0053
 Plane filter_by_sensitivity(const Plane& in, const Sensitivity& s, double ppd) {
     const int radius = int(std::ceil(3 * std::sqrt(kBlueYellow.b1 / (2 * kPi * kPi)) * ppd));
     const auto gaussian = [&](double b) {
-        return sampled(radius, [&](double i) { return std::exp(-kPi * kPi * (i / ppd) * (i / ppd) / b); });
+        return sampled(radius,
+                       [&](double i) { return std::exp(-kPi * kPi * (i / ppd) * (i / ppd) / b); });
     };
     Kernel g1 = gaussian(s.b1), g2 = gaussian(s.b2);
     // The sum over both dimensions is one. Each term is separable.
@@ -186,7 +191,8 @@ struct Perceived {
 };
 
 Perceived perceive(std::span<const Rgb> pixels, int width, int height, double ppd) {
-    std::array<Plane, 3> opponent = {Plane(width, height), Plane(width, height), Plane(width, height)};
+    std::array<Plane, 3> opponent = {Plane(width, height), Plane(width, height),
+                                     Plane(width, height)};
     Plane lightness(width, height);
     for (size_t i = 0; i < pixels.size(); ++i) {
         const Triple t = ycxcz(pixels[i]);
@@ -198,7 +204,8 @@ Perceived perceive(std::span<const Rgb> pixels, int width, int height, double pp
     opponent[2] = filter_by_sensitivity(opponent[2], kBlueYellow, ppd);
     std::vector<Triple> lab(pixels.size());
     for (size_t i = 0; i < lab.size(); ++i)
-        lab[i] = hunt_lab(rgb_from_ycxcz({opponent[0].data[i], opponent[1].data[i], opponent[2].data[i]}));
+        lab[i] = hunt_lab(
+            rgb_from_ycxcz({opponent[0].data[i], opponent[1].data[i], opponent[2].data[i]}));
     return {std::move(lab), features(lightness, ppd)};
 }
 
@@ -207,7 +214,8 @@ constexpr float kColourExponent = 0.7f, kFeatureExponent = 0.5f;
 /// Maps HyAB^q_c to [0, 1]: distances up to 0.4 of the largest take 0.95 of the range.
 float redistribute(float e) {
     constexpr float kCut = 0.4f, kTarget = 0.95f;
-    static const float kLargest = std::pow(hyab(hunt_lab({0, 1, 0}), hunt_lab({0, 0, 1})), kColourExponent);
+    static const float kLargest =
+        std::pow(hyab(hunt_lab({0, 1, 0}), hunt_lab({0, 0, 1})), kColourExponent);
     const float cut = kCut * kLargest;
     return e < cut ? e * kTarget / cut : kTarget + (e - cut) / (kLargest - cut) * (1 - kTarget);
 }
@@ -215,7 +223,8 @@ float redistribute(float e) {
 std::vector<float> flip_map(const Perceived& image, const Perceived& reference) {
     std::vector<float> map(image.lab.size());
     for (size_t i = 0; i < map.size(); ++i) {
-        const float colour = redistribute(std::pow(hyab(image.lab[i], reference.lab[i]), kColourExponent));
+        const float colour =
+            redistribute(std::pow(hyab(image.lab[i], reference.lab[i]), kColourExponent));
         const float edge = std::fabs(image.features.edge[i] - reference.features.edge[i]);
         const float point = std::fabs(image.features.point[i] - reference.features.point[i]);
         const float feature = std::pow(std::max(edge, point) / std::sqrt(2.0f), kFeatureExponent);
@@ -224,7 +233,8 @@ std::vector<float> flip_map(const Perceived& image, const Perceived& reference) 
     return map;
 }
 
-void check_sizes(std::span<const Rgb> image, std::span<const Rgb> reference, int width, int height) {
+void check_sizes(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
+                 int height) {
     if (image.size() != size_t(width) * height || reference.size() != image.size() || image.empty())
         throw std::invalid_argument("images of different sizes cannot be compared");
 }
@@ -237,7 +247,8 @@ std::vector<Rgb> finite_or_black(std::span<const Rgb> pixels) {
     return v;
 }
 
-FlipResult finished(std::vector<float> map, std::span<const Rgb> image, std::span<const Rgb> reference) {
+FlipResult finished(std::vector<float> map, std::span<const Rgb> image,
+                    std::span<const Rgb> reference) {
     double total = 0;
     for (size_t i = 0; i < map.size(); ++i) {
         if (!is_finite(image[i]) || !is_finite(reference[i])) map[i] = 1;
@@ -246,18 +257,20 @@ FlipResult finished(std::vector<float> map, std::span<const Rgb> image, std::spa
     return {std::move(map), total / double(image.size())};
 }
 
-std::vector<float> flip_at(std::span<const Rgb> image, std::span<const Rgb> reference, int width, int height,
-                           float ppd, const ToneMapping& mapping) {
+std::vector<float> flip_at(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
+                           int height, float ppd, const ToneMapping& mapping) {
     return flip_map(perceive(tone_map(image, mapping), width, height, ppd),
                     perceive(tone_map(reference, mapping), width, height, ppd));
 }
 
 }  // namespace
 
-FlipResult ldr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width, int height, float ppd) {
+FlipResult ldr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
+                    int height, float ppd) {
     check_sizes(image, reference, width, height);
-    return finished(flip_at(finite_or_black(image), finite_or_black(reference), width, height, ppd, {}), image,
-                    reference);
+    return finished(
+        flip_at(finite_or_black(image), finite_or_black(reference), width, height, ppd, {}), image,
+        reference);
 }
 
 std::vector<float> flip_exposures(std::span<const Rgb> reference) {
@@ -275,16 +288,19 @@ std::vector<float> flip_exposures(std::span<const Rgb> reference) {
     const double start = std::log2(bright / largest), stop = std::log2(bright / median);
     const int count = std::max(2, int(std::ceil(stop - start)));
     std::vector<float> exposures;
-    for (int i = 0; i < count; ++i) exposures.push_back(float(start + (stop - start) * i / (count - 1)));
+    for (int i = 0; i < count; ++i)
+        exposures.push_back(float(start + (stop - start) * i / (count - 1)));
     return exposures;
 }
 
-FlipResult hdr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width, int height, float ppd) {
+FlipResult hdr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
+                    int height, float ppd) {
     check_sizes(image, reference, width, height);
     const std::vector<Rgb> x = finite_or_black(image), r = finite_or_black(reference);
     std::vector<float> largest(image.size());
     for (const float exposure : flip_exposures(r)) {
-        const auto map = flip_at(x, r, width, height, ppd, {.op = ToneOperator::Aces, .exposure = exposure});
+        const auto map =
+            flip_at(x, r, width, height, ppd, {.op = ToneOperator::Aces, .exposure = exposure});
         for (size_t i = 0; i < map.size(); ++i) largest[i] = std::max(largest[i], map[i]);
     }
     return finished(std::move(largest), image, reference);

@@ -17,12 +17,12 @@ struct FlipResult {
 };
 
 /// LDR-ꟻLIP of displayed images, linear colours that are clamped to [0, 1].
-FlipResult ldr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width, int height,
-                    float pixels_per_degree = kFlipPixelsPerDegree);
+FlipResult ldr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
+                    int height, float pixels_per_degree = kFlipPixelsPerDegree);
 
 /// HDR-ꟻLIP: the largest LDR-ꟻLIP over the exposures that the reference asks for, under the ACES curve.
-FlipResult hdr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width, int height,
-                    float pixels_per_degree = kFlipPixelsPerDegree);
+FlipResult hdr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
+                    int height, float pixels_per_degree = kFlipPixelsPerDegree);
 
 /// Exposures, in stops, of HDR-ꟻLIP for a reference [Andersson et al. 2021, §3.2].
 std::vector<float> flip_exposures(std::span<const Rgb> reference);

@@ -20,7 +20,8 @@ std::string channel_name(std::string_view layer, std::string_view name) {
 }  // namespace
 
 Image::Image(int width, int height, std::vector<std::string> names)
-    : width(width), height(height), channels(std::move(names)), data(pixel_count() * channels.size()) {}
+    : width(width), height(height), channels(std::move(names)),
+      data(pixel_count() * channels.size()) {}
 
 int Image::channel(std::string_view name) const {
     const auto it = std::find(channels.begin(), channels.end(), name);
@@ -37,7 +38,8 @@ std::vector<std::string> Image::layers() const {
 
 std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer) {
     int rgb[3];
-    for (int i = 0; i < 3; ++i) rgb[i] = image.channel(channel_name(layer, std::string_view("RGB").substr(i, 1)));
+    for (int i = 0; i < 3; ++i)
+        rgb[i] = image.channel(channel_name(layer, std::string_view("RGB").substr(i, 1)));
     if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) {
         int grey = image.channel(channel_name(layer, "Y"));
         if (grey < 0) {
@@ -47,9 +49,10 @@ std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer) {
                            image.channels.begin());
         }
         if (grey < 0)
-            throw std::runtime_error(fmt::format("the image has no channels R, G, B{}; it has {}",
-                                                 layer.empty() ? "" : fmt::format(" in layer \"{}\"", layer),
-                                                 fmt::join(image.channels, ", ")));
+            throw std::runtime_error(
+                fmt::format("the image has no channels R, G, B{}; it has {}",
+                            layer.empty() ? "" : fmt::format(" in layer \"{}\"", layer),
+                            fmt::join(image.channels, ", ")));
         std::fill(rgb, rgb + 3, grey);
     }
     std::vector<Rgb> pixels(image.pixel_count());
@@ -61,7 +64,8 @@ std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer) {
     return pixels;
 }
 
-void add_rgb_layer(Image& image, int width, int height, std::string_view layer, std::span<const Rgb> pixels) {
+void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
+                   std::span<const Rgb> pixels) {
     if (image.channels.empty()) image = Image(width, height, {});
     if (image.width != width || image.height != height || pixels.size() != image.pixel_count())
         throw std::invalid_argument(fmt::format("layer \"{}\" is not of the image's size", layer));

@@ -40,7 +40,8 @@ private:
 /// The colours of a layer: its R, G and B, or its only channel (any, or "Y") as grey; throws where it has neither.
 std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer = "");
 /// Appends the channels R, G, B (prefixed with "layer." unless that is empty); an empty image takes the given size.
-void add_rgb_layer(Image& image, int width, int height, std::string_view layer, std::span<const Rgb> pixels);
+void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
+                   std::span<const Rgb> pixels);
 Image rgb_image(int width, int height, std::span<const Rgb> pixels);
 
 /// IEEE 754 binary16, as bits.
@@ -50,7 +51,8 @@ struct Half {
 inline float to_float(Half h) {
     // The 5 exponent bits land in the 8 of a float; 2^(127 - 15) corrects the bias, also of subnormal numbers.
     const uint32_t sign = uint32_t(h.bits & 0x8000u) << 16;
-    uint32_t magnitude = std::bit_cast<uint32_t>(std::bit_cast<float>(uint32_t(h.bits & 0x7fffu) << 13) * 0x1p112f);
+    uint32_t magnitude =
+        std::bit_cast<uint32_t>(std::bit_cast<float>(uint32_t(h.bits & 0x7fffu) << 13) * 0x1p112f);
     if ((h.bits & 0x7c00u) == 0x7c00u) magnitude |= 0x7f800000u;  // infinity and NaN
     return std::bit_cast<float>(sign | magnitude);
 }

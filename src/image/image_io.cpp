@@ -54,8 +54,9 @@ std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path) {
     constexpr uint64_t kBestRatio = 4096, kAlwaysFine = 256u << 20;
     const uint64_t bytes = spec.image_bytes();
     if (bytes > kAlwaysFine && bytes / kBestRatio > fs::file_size(path))
-        fail_read(path, fmt::format("its header claims {} x {} pixels, too many for the file's size", spec.width,
-                                    spec.height));
+        fail_read(path,
+                  fmt::format("its header claims {} x {} pixels, too many for the file's size",
+                              spec.width, spec.height));
     return input;
 }
 
@@ -68,13 +69,15 @@ std::vector<T> read_all(OIIO::ImageInput& input, const std::string& path, OIIO::
             fail_read(path, one_line(input.geterror()));
         return data;
     } catch (const std::bad_alloc&) {
-        fail_read(path, fmt::format("{} x {} pixels do not fit into memory", spec.width, spec.height));
+        fail_read(path,
+                  fmt::format("{} x {} pixels do not fit into memory", spec.width, spec.height));
     }
 }
 
 // Integer formats hold sRGB unless they say that they do not.
 bool holds_srgb(const OIIO::ImageSpec& spec) {
-    return !spec.format.is_floating_point() && spec.get_string_attribute("oiio:ColorSpace") != "Linear";
+    return !spec.format.is_floating_point() &&
+           spec.get_string_attribute("oiio:ColorSpace") != "Linear";
 }
 
 void linearize(std::vector<float>& data, const OIIO::ImageSpec& spec) {
@@ -86,8 +89,8 @@ void linearize(std::vector<float>& data, const OIIO::ImageSpec& spec) {
 void read_attributes(Image& image, const OIIO::ImageSpec& spec) {
     for (const OIIO::ParamValue& a : spec.extra_attribs) {
         const std::string name = a.name().string();
-        if (name.find(':') != std::string::npos || name == "compression" || name == "PixelAspectRatio" ||
-            name == "DateTime" || name.starts_with("screenWindow"))
+        if (name.find(':') != std::string::npos || name == "compression" ||
+            name == "PixelAspectRatio" || name == "DateTime" || name.starts_with("screenWindow"))
             continue;
         if (a.type() == OIIO::TypeString)
             image.attributes[name] = a.get_string();
@@ -110,7 +113,8 @@ std::vector<Rgb> colours(const PendingFile& file, const Image& image) {
     }
 }
 
-void write_with_oiio(const PendingFile& file, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, const void* pixels) {
+void write_with_oiio(const PendingFile& file, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
+                     const void* pixels) {
     const auto output = OIIO::ImageOutput::create(file.temporary());
     if (!output) file.fail(one_line(OIIO::geterror()));
     if (!output->open(file.temporary(), spec)) file.fail(one_line(output->geterror()));
@@ -152,8 +156,10 @@ void write_pfm(const PendingFile& file, const Image& image, ExrPrecision) {
     for (int y = image.height - 1; y >= 0; --y) {
         row.clear();
         for (int x = 0; x < image.width; ++x)
-            for (int c = 0; c < (grey ? 1 : 3); ++c) row.push_back(pixels[size_t(y) * image.width + x][c]);
-        out.write(reinterpret_cast<const char*>(row.data()), std::streamsize(row.size() * sizeof(float)));
+            for (int c = 0; c < (grey ? 1 : 3); ++c)
+                row.push_back(pixels[size_t(y) * image.width + x][c]);
+        out.write(reinterpret_cast<const char*>(row.data()),
+                  std::streamsize(row.size() * sizeof(float)));
     }
     out.close();
     if (!out) file.fail(std::generic_category().message(errno));
@@ -162,8 +168,8 @@ void write_pfm(const PendingFile& file, const Image& image, ExrPrecision) {
 void write_hdr(const PendingFile& file, const Image& image, ExrPrecision) {
     const std::vector<Rgb> pixels = colours(file, image);
     static_assert(sizeof(Rgb) == 3 * sizeof(float));
-    write_with_oiio(file, OIIO::ImageSpec(image.width, image.height, 3, OIIO::TypeFloat), OIIO::TypeFloat,
-                    pixels.data());
+    write_with_oiio(file, OIIO::ImageSpec(image.width, image.height, 3, OIIO::TypeFloat),
+                    OIIO::TypeFloat, pixels.data());
 }
 
 uint8_t srgb_code(float v) {
@@ -188,21 +194,25 @@ void write_png(const PendingFile& file, const Image& image, ExrPrecision) {
     OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeUInt8);
     spec["oiio:ColorSpace"] = "sRGB";
     write_with_oiio(file, spec, OIIO::TypeUInt8, codes.data());
-    if (!holds(file.temporary(), codes)) file.fail("what was written cannot be read back; the disk may be full");
+    if (!holds(file.temporary(), codes))
+        file.fail("what was written cannot be read back; the disk may be full");
 }
 
 struct Writer {
     const char* extension;
     void (*write)(const PendingFile& file, const Image& image, ExrPrecision precision);
 };
-constexpr Writer kWriters[] = {{".exr", write_exr}, {".pfm", write_pfm}, {".hdr", write_hdr}, {".png", write_png}};
+constexpr Writer kWriters[] = {
+    {".exr", write_exr}, {".pfm", write_pfm}, {".hdr", write_hdr}, {".png", write_png}};
 
 const Writer& writer_for(const std::string& path) {
     std::string e = fs::path(path).extension().string();
-    std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    std::transform(e.begin(), e.end(), e.begin(),
+                   [](unsigned char c) { return char(std::tolower(c)); });
     for (const Writer& w : kWriters)
         if (e == w.extension) return w;
-    fail_write(path, fmt::format("its name must end in .exr, .pfm, .hdr or .png, not in \"{}\"", e));
+    fail_write(path,
+               fmt::format("its name must end in .exr, .pfm, .hdr or .png, not in \"{}\"", e));
 }
 
 }  // namespace
@@ -220,10 +230,22 @@ Image read_image(const std::string& path) {
     return image;
 }
 
+RgbImage read_rgb(const std::string& path, std::string_view layer) {
+    const Image image = read_image(path);
+    try {
+        return {image.width, image.height, rgb_pixels(image, layer)};
+    } catch (const std::runtime_error& e) {
+        fail_read(path, e.what());
+    }
+}
+
 PixelBuffer read_pixels(const std::string& path, bool raw) {
     const auto input = open_input(path);
     const OIIO::ImageSpec& spec = input->spec();
-    PixelBuffer buffer{.width = spec.width, .height = spec.height, .channels = spec.nchannels, .data = {},
+    PixelBuffer buffer{.width = spec.width,
+                       .height = spec.height,
+                       .channels = spec.nchannels,
+                       .data = {},
                        .alpha_channel = spec.alpha_channel};
     if (spec.format == OIIO::TypeUInt8) {
         buffer.data = read_all<uint8_t>(*input, path, OIIO::TypeUInt8);
@@ -243,7 +265,8 @@ void check_image_extension(const std::string& path) {
 
 void write_image(const std::string& path, const Image& image, ExrPrecision precision) {
     const Writer& writer = writer_for(path);
-    if (image.pixel_count() == 0 || image.data.size() != image.pixel_count() * image.channels.size())
+    if (image.pixel_count() == 0 ||
+        image.data.size() != image.pixel_count() * image.channels.size())
         fail_write(path, "the image is empty");
     PendingFile file(path);
     writer.write(file, image, precision);

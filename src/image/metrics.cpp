@@ -24,14 +24,18 @@ struct Greys {
 
     double r() const { return (r1 + r2) / 2; }
     double squared_error() const { return (x - r1) * (x - r2); }
-    double relative_squared_error(double m) const { return ratio(squared_error(), r() * r() + 0.01 * m * m); }
+    double relative_squared_error(double m) const {
+        return ratio(squared_error(), r() * r() + 0.01 * m * m);
+    }
     bool is_finite() const { return std::isfinite(x + r1 + r2); }
 };
 
 class Comparison {
 public:
-    Comparison(std::span<const Rgb> image, std::span<const Rgb> reference, std::span<const Rgb> reference2)
-        : image_(image), reference_(reference), reference2_(reference2.empty() ? reference : reference2) {
+    Comparison(std::span<const Rgb> image, std::span<const Rgb> reference,
+               std::span<const Rgb> reference2)
+        : image_(image), reference_(reference),
+          reference2_(reference2.empty() ? reference : reference2) {
         if (image.size() != reference.size() || image.size() != reference2_.size())
             throw std::invalid_argument("images of different sizes cannot be compared");
         for (size_t i = 0; i < size(); ++i) {
@@ -45,7 +49,9 @@ public:
 
     size_t size() const { return image_.size(); }
     size_t finite() const { return finite_; }
-    Greys at(size_t i) const { return {grey(image_[i]), grey(reference_[i]), grey(reference2_[i])}; }
+    Greys at(size_t i) const {
+        return {grey(image_[i]), grey(reference_[i]), grey(reference2_[i])};
+    }
     double reference_mean() const { return sum_r_ / double(finite_); }
     double mean_ratio() const { return sum_x_ / sum_r_; }
 
@@ -63,7 +69,8 @@ double mean(std::span<const double> v) {
 
 }  // namespace
 
-ImageErrors image_errors(std::span<const Rgb> image, std::span<const Rgb> reference, const ErrorOptions& options) {
+ImageErrors image_errors(std::span<const Rgb> image, std::span<const Rgb> reference,
+                         const ErrorOptions& options) {
     const Comparison pixels(image, reference, options.reference2);
     const double m = pixels.reference_mean();
     std::vector<double> squared, relative, absolute, mape, smape;
@@ -96,7 +103,8 @@ ImageErrors image_errors(std::span<const Rgb> image, std::span<const Rgb> refere
     return e;
 }
 
-std::vector<float> relative_squared_errors(std::span<const Rgb> image, std::span<const Rgb> reference,
+std::vector<float> relative_squared_errors(std::span<const Rgb> image,
+                                           std::span<const Rgb> reference,
                                            std::span<const Rgb> reference2) {
     const Comparison pixels(image, reference, reference2);
     const double m = pixels.reference_mean();

@@ -20,9 +20,10 @@ struct ErrorOptions {
 
 /// With X and R grey and all means over pixels; m = mean R.
 struct ImageErrors {
-    size_t pixels = 0;      ///< Of the image.
-    size_t not_finite = 0;  ///< Pixels that are infinite or not a number in X or R: left out of all that follows.
-    size_t ignored = 0;     ///< Pixels above ErrorOptions::ignore_above.
+    size_t pixels = 0;  ///< Of the image.
+    size_t not_finite =
+        0;  ///< Pixels that are infinite or not a number in X or R: left out of all that follows.
+    size_t ignored = 0;          ///< Pixels above ErrorOptions::ignore_above.
     double mse = 0;              ///< mean (X − R)²; may be negative with two references
     double rmse = 0;             ///< √max(mse, 0)
     double rel_mse = 0;          ///< mean (X − R)² / (R² + 0.01 m²)
@@ -33,10 +34,12 @@ struct ImageErrors {
     double mean_ratio = 0;       ///< mean X / m
 };
 /// Both images of the same size; throws std::invalid_argument otherwise or where no pixel is left.
-ImageErrors image_errors(std::span<const Rgb> image, std::span<const Rgb> reference, const ErrorOptions& options = {});
+ImageErrors image_errors(std::span<const Rgb> image, std::span<const Rgb> reference,
+                         const ErrorOptions& options = {});
 
 /// Per pixel the summand of rel_mse; not-a-number where the image or the reference is not finite.
-std::vector<float> relative_squared_errors(std::span<const Rgb> image, std::span<const Rgb> reference,
+std::vector<float> relative_squared_errors(std::span<const Rgb> image,
+                                           std::span<const Rgb> reference,
                                            std::span<const Rgb> reference2 = {});
 
 }  // namespace etendue

@@ -10,7 +10,8 @@ namespace etendue {
 namespace {
 
 // (a x² + b x) / (c x² + d x + e) of [Narkowicz 2016]; its input is the exposed colour times kAcesScale.
-constexpr double kAcesScale = 0.6, kAcesA = 2.51, kAcesB = 0.03, kAcesC = 2.43, kAcesD = 0.59, kAcesE = 0.14;
+constexpr double kAcesScale = 0.6, kAcesA = 2.51, kAcesB = 0.03, kAcesC = 2.43, kAcesD = 0.59,
+                 kAcesE = 0.14;
 
 Rgb clamp01(Rgb c) {
     return {std::clamp(c.r, 0.0f, 1.0f), std::clamp(c.g, 0.0f, 1.0f), std::clamp(c.b, 0.0f, 1.0f)};
@@ -35,7 +36,8 @@ std::optional<ToneOperator> tone_operator(std::string_view name) {
 float aces_curve(float exposed) {
     const double x = kAcesScale * std::max(exposed, 0.0f);
     if (std::isinf(x)) return 1;
-    return float(std::clamp((kAcesA * x + kAcesB) * x / ((kAcesC * x + kAcesD) * x + kAcesE), 0.0, 1.0));
+    return float(
+        std::clamp((kAcesA * x + kAcesB) * x / ((kAcesC * x + kAcesD) * x + kAcesE), 0.0, 1.0));
 }
 
 double inverse_aces_curve(double y) {
@@ -56,7 +58,8 @@ std::vector<Rgb> tone_map(std::span<const Rgb> pixels, const ToneMapping& mappin
     for (Rgb& c : mapped) {
         c *= scale;
         if (mapping.op == ToneOperator::Reinhard) c = reinhard(c, white);
-        if (mapping.op == ToneOperator::Aces) c = {aces_curve(c.r), aces_curve(c.g), aces_curve(c.b)};
+        if (mapping.op == ToneOperator::Aces)
+            c = {aces_curve(c.r), aces_curve(c.g), aces_curve(c.b)};
         c = clamp01(c);
     }
     return mapped;
@@ -71,7 +74,8 @@ Rgb magma(float v) {
     const float x = std::clamp(v, 0.0f, 1.0f) * kLast;
     const int i = std::min(int(x), kLast - 1);
     const auto channel = [&](int shift) {
-        const float lo = float(kStops[i] >> shift & 255u), hi = float(kStops[i + 1] >> shift & 255u);
+        const float lo = float(kStops[i] >> shift & 255u),
+                    hi = float(kStops[i + 1] >> shift & 255u);
         return srgb_to_linear((lo + (x - float(i)) * (hi - lo)) / 255);
     };
     return {channel(16), channel(8), channel(0)};

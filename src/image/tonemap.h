@@ -20,7 +20,8 @@ std::optional<ToneOperator> tone_operator(std::string_view name);  ///< "srgb", 
 struct ToneMapping {
     ToneOperator op = ToneOperator::Srgb;
     float exposure = 0;  ///< Stops: colours are multiplied by 2^exposure first.
-    float white = 0;     ///< Luminance, after exposure, that becomes white under Reinhard; 0: the image's largest.
+    float white =
+        0;  ///< Luminance, after exposure, that becomes white under Reinhard; 0: the image's largest.
 };
 /// In [0, 1], linear; not-a-number stays as it is.
 std::vector<Rgb> tone_map(std::span<const Rgb> pixels, const ToneMapping& mapping);

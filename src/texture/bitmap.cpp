@@ -29,7 +29,8 @@ std::array<float, 256> decoding_table(bool srgb) {
 }
 
 const float* decoding(bool srgb) {
-    static const std::array<float, 256> kLinear = decoding_table(false), kSrgb = decoding_table(true);
+    static const std::array<float, 256> kLinear = decoding_table(false),
+                                        kSrgb = decoding_table(true);
     return srgb ? kSrgb.data() : kLinear.data();
 }
 
@@ -41,12 +42,12 @@ struct Wrapped {
 Wrapped wrap(float u, TextureWrap mode) {
     Wrapped w = {u, 1};
     switch (mode) {
-        case TextureWrap::Repeat: w.t = u - std::floor(u); break;
-        case TextureWrap::Mirror:
-            w.t = u - 2 * std::floor(u * 0.5f);
-            if (w.t > 1) w = {2 - w.t, -1};
-            break;
-        case TextureWrap::Clamp: break;
+    case TextureWrap::Repeat: w.t = u - std::floor(u); break;
+    case TextureWrap::Mirror:
+        w.t = u - 2 * std::floor(u * 0.5f);
+        if (w.t > 1) w = {2 - w.t, -1};
+        break;
+    case TextureWrap::Clamp: break;
     }
     // Not a number becomes zero: indices must be good whatever the mesh holds.
     return {w.t > 0 ? std::min(w.t, 1.0f) : 0.0f, w.slope};
@@ -91,12 +92,15 @@ BitmapTexture::Footprint BitmapTexture::footprint(Vec2 uv) const {
         return {{x, x, 0}, {y, y, 0}, {}};
     }
     const bool repeat = options_.wrap == TextureWrap::Repeat;
-    return {neighbours(u.t, image_->width, repeat), neighbours(v.t, image_->height, repeat), {u.slope, v.slope}};
+    return {neighbours(u.t, image_->width, repeat),
+            neighbours(v.t, image_->height, repeat),
+            {u.slope, v.slope}};
 }
 
 template <class Texels>
 inline Rgb BitmapTexture::texel(const Texels& texels, int x, int y) const {
-    const auto* p = texels.data() + (size_t(y) * image_->width + x) * image_->channels + first_channel_;
+    const auto* p =
+        texels.data() + (size_t(y) * image_->width + x) * image_->channels + first_channel_;
     const auto value = [&](int c) {
         if constexpr (std::is_same_v<Texels, std::vector<uint8_t>>)
             return decode_[p[c]];
@@ -117,7 +121,8 @@ inline Rgb BitmapTexture::filtered(const Texels& texels, const Footprint& f) con
 }
 
 Rgb BitmapTexture::eval(Vec2 uv) const {
-    return std::visit([&](const auto& texels) { return filtered(texels, footprint(uv)); }, image_->data);
+    return std::visit([&](const auto& texels) { return filtered(texels, footprint(uv)); },
+                      image_->data);
 }
 
 float BitmapTexture::eval_scalar(Vec2 uv) const {
@@ -153,13 +158,15 @@ Rgb BitmapTexture::image_mean(const Texels& texels) const {
     const auto add = [&](Rgb c) {
         for (int i = 0; i < 3; ++i) sum[i] += c[i];
     };
-    constexpr int kGrid = 256;  // look-ups along each axis where `to_uv` selects another part of the plane
+    constexpr int kGrid =
+        256;  // look-ups along each axis where `to_uv` selects another part of the plane
     const bool whole = options_.to_uv.is_identity();
     const int width = whole ? image_->width : kGrid, height = whole ? image_->height : kGrid;
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x)
             add(whole ? texel(texels, x, y)
-                      : filtered(texels, footprint({(float(x) + 0.5f) / kGrid, (float(y) + 0.5f) / kGrid})));
+                      : filtered(texels, footprint({(float(x) + 0.5f) / kGrid,
+                                                    (float(y) + 0.5f) / kGrid})));
     const double n = double(width) * height;
     return {float(sum[0] / n), float(sum[1] / n), float(sum[2] / n)};
 }
@@ -193,16 +200,18 @@ std::unique_ptr<Texture> make_bitmap(const Params& params, TextureContext& conte
 }  // namespace
 
 TextureEntry bitmap_entry() {
-    return {{"texture",
-             "bitmap",
-             "An image; (0, 0) is its upper left corner.",
-             {{"filename", ParamKind::String, "", "File of any format that OpenImageIO reads."},
-              {"filter_type", ParamKind::String, "bilinear", "bilinear or nearest."},
-              {"wrap_mode", ParamKind::String, "repeat", "repeat, mirror or clamp."},
-              {"raw", ParamKind::Bool, "false", "Integer formats hold linear data instead of sRGB."},
-              {"channel", ParamKind::String, "all", "all (the colours), or r, g, b or a alone as grey."},
-              {"to_uv", ParamKind::Transform, "identity", "Affine map of (u, v) before the look-up."}}},
-            make_bitmap};
+    return {
+        {"texture",
+         "bitmap",
+         "An image; (0, 0) is its upper left corner.",
+         {{"filename", ParamKind::String, "", "File of any format that OpenImageIO reads."},
+          {"filter_type", ParamKind::String, "bilinear", "bilinear or nearest."},
+          {"wrap_mode", ParamKind::String, "repeat", "repeat, mirror or clamp."},
+          {"raw", ParamKind::Bool, "false", "Integer formats hold linear data instead of sRGB."},
+          {"channel", ParamKind::String, "all",
+           "all (the colours), or r, g, b or a alone as grey."},
+          {"to_uv", ParamKind::Transform, "identity", "Affine map of (u, v) before the look-up."}}},
+        make_bitmap};
 }
 
 }  // namespace etendue

@@ -18,11 +18,13 @@ public:
         TextureFilter filter = TextureFilter::Bilinear;
         TextureWrap wrap = TextureWrap::Repeat;
         bool raw = false;  ///< 8-bit codes are linear values, not sRGB.
-        int channel = -1;  ///< The only channel to use, or -1 for colours (the sole one of grey images).
+        int channel =
+            -1;  ///< The only channel to use, or -1 for colours (the sole one of grey images).
         UvTransform to_uv = {};
     };
 
-    BitmapTexture(const PixelBuffer& image, const Options& options);  ///< The image must outlive the texture.
+    BitmapTexture(const PixelBuffer& image,
+                  const Options& options);  ///< The image must outlive the texture.
 
     Rgb eval(Vec2 uv) const override;
     float eval_scalar(Vec2 uv) const override;

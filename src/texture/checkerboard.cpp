@@ -15,8 +15,9 @@ namespace {
 class Checkerboard final : public Texture {
 public:
     Checkerboard(const Params& params, TextureContext& context)
-        : color0_(context.texture(params, "color0", Rgb(0.4f))), color1_(context.texture(params, "color1", Rgb(0.2f))),
-          to_uv_(params.transform("to_uv")) {}
+        : color0_(context.texture(params, "color0", Rgb(0.4f))),
+          color1_(context.texture(params, "color1", Rgb(0.2f))), to_uv_(params.transform("to_uv")) {
+    }
 
     Rgb eval(Vec2 uv) const override { return square(uv).eval(uv); }
     float eval_scalar(Vec2 uv) const override { return square(uv).eval_scalar(uv); }

@@ -15,7 +15,8 @@ Vec2 Texture::gradient(Vec2 uv) const {
 }
 
 const std::vector<TextureEntry>& texture_registry() {
-    static const std::vector<TextureEntry> entries = {bitmap_entry(), checkerboard_entry(), scale_entry()};
+    static const std::vector<TextureEntry> entries = {bitmap_entry(), checkerboard_entry(),
+                                                      scale_entry()};
     return entries;
 }
 

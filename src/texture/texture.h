@@ -58,7 +58,8 @@ class TextureContext {
 public:
     virtual ~TextureContext() = default;
     /// Colour or nested texture; checks that constants lie in [0, hi].
-    virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback, float hi = kInf) = 0;
+    virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback,
+                               float hi = kInf) = 0;
     /// The scene's images; they outlive its textures.
     virtual TextureCache& images() = 0;
 };

@@ -43,7 +43,8 @@ const PixelBuffer& TextureCache::load(const std::string& path, bool raw) {
     auto& image = images_[{std::filesystem::weakly_canonical(path).string(), raw}];
     if (!image) {
         auto loaded = std::make_unique<PixelBuffer>(read_pixels(path, raw));
-        const size_t bad = std::visit([&](auto& data) { return sanitize(data, raw); }, loaded->data);
+        const size_t bad =
+            std::visit([&](auto& data) { return sanitize(data, raw); }, loaded->data);
         if (bad > 0)
             throw std::runtime_error("image \"" + path + "\" has " + std::to_string(bad) +
                                      " values that are infinite or not a number");

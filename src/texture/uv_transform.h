@@ -21,7 +21,8 @@ public:
     }
 
     Vec2 point(Vec2 uv) const {
-        return {m_[0][0] * uv.x + m_[0][1] * uv.y + m_[0][2], m_[1][0] * uv.x + m_[1][1] * uv.y + m_[1][2]};
+        return {m_[0][0] * uv.x + m_[0][1] * uv.y + m_[0][2],
+                m_[1][0] * uv.x + m_[1][1] * uv.y + m_[1][2]};
     }
     /// Gradient with respect to uv from the one with respect to point(uv).
     Vec2 gradient(Vec2 g) const {
@@ -38,7 +39,8 @@ public:
         height = v;
     }
     bool is_identity() const {
-        return m_[0][0] == 1 && m_[0][1] == 0 && m_[0][2] == 0 && m_[1][0] == 0 && m_[1][1] == 1 && m_[1][2] == 0;
+        return m_[0][0] == 1 && m_[0][1] == 0 && m_[0][2] == 0 && m_[1][0] == 0 && m_[1][1] == 1 &&
+               m_[1][2] == 0;
     }
 
 private:

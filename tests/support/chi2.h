@@ -1,6 +1,6 @@
 #pragma once
-// Pearson's χ² test of samples against a density, on cells of a two-dimensional domain, and what it needs: adaptive
-// quadrature, the incomplete gamma function, Šidák's correction.
+// Pearson's χ² test of samples against a density, on cells of a two-dimensional domain, and what it
+// needs: adaptive quadrature, the incomplete gamma function, Šidák's correction.
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,8 @@
 
 namespace etendue::testing {
 
-/// Regularised upper incomplete gamma function Q(a, x) by series or continued fraction [Press et al. 2007, §6.2].
+/// Regularised upper incomplete gamma function Q(a, x) by series or continued fraction [Press et
+/// al. 2007, §6.2].
 inline double gamma_q(double a, double x) {
     if (!(x > 0)) return 1;
     const double scale = std::exp(-x + a * std::log(x) - std::lgamma(a));
@@ -30,31 +31,37 @@ inline double gamma_q(double a, double x) {
     return h * scale;
 }
 
-/// Significance level of each of `tests` independent tests such that all together raise a false alarm with `family`.
+/// Significance level of each of `tests` independent tests such that all together raise a false
+/// alarm with `family`.
 inline double sidak(double family, int tests) {
     return 1 - std::pow(1 - family, 1.0 / tests);
 }
 
-/// ∫∫ f over [x0, x1] × [y0, y1] to about the absolute error `tolerance`: 2×2 against 4 × (2×2) Gauss points,
-/// subdivided where they differ. `min_depth` levels are always taken, so that narrow peaks are not stepped over; what
-/// has no integral ends the subdivision by its cost.
+/// ∫∫ f over [x0, x1] × [y0, y1] to about the absolute error `tolerance`: 2×2 against 4 × (2×2)
+/// Gauss points, subdivided where they differ. `min_depth` levels are always taken, so that narrow
+/// peaks are not stepped over; what has no integral ends the subdivision by its cost.
 template <class F>
-double integrate_2d(const F& f, double x0, double x1, double y0, double y1, double tolerance, int min_depth = 1) {
+double integrate_2d(const F& f, double x0, double x1, double y0, double y1, double tolerance,
+                    int min_depth = 1) {
     constexpr int kMaxDepth = 12, kMaxCells = 2000;
     int cells = 0;
     const auto gauss = [&](double ax, double bx, double ay, double by) {
         constexpr double g = 0.57735026918962576451;
-        const double cx = 0.5 * (ax + bx), hx = 0.5 * (bx - ax), cy = 0.5 * (ay + by), hy = 0.5 * (by - ay);
-        return hx * hy * (f(cx - g * hx, cy - g * hy) + f(cx + g * hx, cy - g * hy) + f(cx - g * hx, cy + g * hy) +
-                          f(cx + g * hx, cy + g * hy));
+        const double cx = 0.5 * (ax + bx), hx = 0.5 * (bx - ax), cy = 0.5 * (ay + by),
+                     hy = 0.5 * (by - ay);
+        return hx * hy *
+               (f(cx - g * hx, cy - g * hy) + f(cx + g * hx, cy - g * hy) +
+                f(cx - g * hx, cy + g * hy) + f(cx + g * hx, cy + g * hy));
     };
-    const auto recurse = [&](const auto& self, double ax, double bx, double ay, double by, double whole, double tol,
-                             int depth) -> double {
+    const auto recurse = [&](const auto& self, double ax, double bx, double ay, double by,
+                             double whole, double tol, int depth) -> double {
         const double mx = 0.5 * (ax + bx), my = 0.5 * (ay + by);
         const double q[4] = {gauss(ax, mx, ay, my), gauss(mx, bx, ay, my), gauss(ax, mx, my, by),
                              gauss(mx, bx, my, by)};
         const double sum = q[0] + q[1] + q[2] + q[3];
-        if (depth >= min_depth && (std::fabs(sum - whole) < tol || depth >= kMaxDepth || ++cells > kMaxCells)) return sum;
+        if (depth >= min_depth &&
+            (std::fabs(sum - whole) < tol || depth >= kMaxDepth || ++cells > kMaxCells))
+            return sum;
         return self(self, ax, mx, ay, my, q[0], tol / 2, depth + 1) +
                self(self, mx, bx, ay, my, q[1], tol / 2, depth + 1) +
                self(self, ax, mx, my, by, q[2], tol / 2, depth + 1) +
@@ -70,10 +77,11 @@ struct Chi2Result {
     double total_probability = 0;  ///< Σ of the cells' probabilities.
 };
 
-/// Pearson's test of `counts` out of `samples` draws against cell probabilities; what fell in no cell forms one more.
-/// Cells expecting fewer than five are pooled; a pool that is still that small passes unless it holds too many.
-inline Chi2Result chi2_test(const std::vector<int64_t>& counts, const std::vector<double>& probabilities,
-                            int64_t samples) {
+/// Pearson's test of `counts` out of `samples` draws against cell probabilities; what fell in no
+/// cell forms one more. Cells expecting fewer than five are pooled; a pool that is still that small
+/// passes unless it holds too many.
+inline Chi2Result chi2_test(const std::vector<int64_t>& counts,
+                            const std::vector<double>& probabilities, int64_t samples) {
     struct Cell {
         double expected;
         double observed;
@@ -110,9 +118,11 @@ inline Chi2Result chi2_test(const std::vector<int64_t>& counts, const std::vecto
     }
     // A remnant that expects next to nothing: Poisson tail instead of a term of the sum.
     double pool_p = 1;
-    if (pool.observed > 0) pool_p = pool.expected > 0 ? 1 - gamma_q(pool.observed, pool.expected) : 0;
+    if (pool.observed > 0)
+        pool_p = pool.expected > 0 ? 1 - gamma_q(pool.observed, pool.expected) : 0;
     result.degrees = std::max(1, used - 1);
-    result.p_value = std::min(gamma_q(0.5 * result.degrees, 0.5 * result.statistic), std::min(1.0, 2 * pool_p));
+    result.p_value =
+        std::min(gamma_q(0.5 * result.degrees, 0.5 * result.statistic), std::min(1.0, 2 * pool_p));
     return result;
 }
 
@@ -139,8 +149,9 @@ public:
         const double tolerance = 0.02 / std::sqrt(double(samples_) * double(counts_.size()));
         for (int j = 0; j < ny_; ++j)
             for (int i = 0; i < nx_; ++i)
-                probabilities.push_back(integrate_2d(density, x0_ + i * dx, x0_ + (i + 1) * dx, y0_ + j * dy,
-                                                     y0_ + (j + 1) * dy, tolerance, min_depth));
+                probabilities.push_back(integrate_2d(density, x0_ + i * dx, x0_ + (i + 1) * dx,
+                                                     y0_ + j * dy, y0_ + (j + 1) * dy, tolerance,
+                                                     min_depth));
         return chi2_test(counts_, probabilities, samples_);
     }
 

@@ -1,6 +1,7 @@
 #pragma once
-// Checks that hold for every scattering lobe (bsdf/lobe.h), generic over its type. Each draws from a fixed seed; the
-// statistical ones take the significance level of one test, which the caller corrects for their number (sidak()).
+// Checks that hold for every scattering lobe (bsdf/lobe.h), generic over its type. Each draws from
+// a fixed seed; the statistical ones take the significance level of one test, which the caller
+// corrects for their number (sidak()).
 
 #include <gtest/gtest.h>
 
@@ -29,7 +30,8 @@ private:
 
 inline Vec3 direction(double theta_degrees, double phi_degrees) {
     const double t = theta_degrees * M_PI / 180, p = phi_degrees * M_PI / 180;
-    return normalize({float(std::sin(t) * std::cos(p)), float(std::sin(t) * std::sin(p)), float(std::cos(t))});
+    return normalize(
+        {float(std::sin(t) * std::cos(p)), float(std::sin(t) * std::sin(p)), float(std::cos(t))});
 }
 
 /// Normal, 45°, oblique and grazing incidence from above.
@@ -44,25 +46,30 @@ inline std::vector<Vec3> test_directions_both_sides() {
 }
 
 inline std::string describe(Vec3 w) {
-    return "(" + std::to_string(w.x) + ", " + std::to_string(w.y) + ", " + std::to_string(w.z) + ")";
+    return "(" + std::to_string(w.x) + ", " + std::to_string(w.y) + ", " + std::to_string(w.z) +
+           ")";
 }
 
-/// Polar coordinates (t, φ) about an axis with θ = π t^p: p > 1 puts the cells where a sharp lobe is.
+/// Polar coordinates (t, φ) about an axis with θ = π t^p: p > 1 puts the cells where a sharp lobe
+/// is.
 struct PolarMap {
     Frame frame;
     double power = 1;
 
     double t(Vec3 w) const {
         // From the chord, because acos has no digits left near the axis.
-        return std::pow(2 * std::asin(std::min(1.0, 0.5 * double(length(w - frame.n)))) / M_PI, 1 / power);
+        return std::pow(2 * std::asin(std::min(1.0, 0.5 * double(length(w - frame.n)))) / M_PI,
+                        1 / power);
     }
-    double phi(Vec3 w) const { return std::atan2(double(dot(w, frame.t)), double(dot(w, frame.s))); }
+    double phi(Vec3 w) const {
+        return std::atan2(double(dot(w, frame.t)), double(dot(w, frame.s)));
+    }
     /// Direction at (t, φ) and dω / (dt dφ).
     Vec3 direction(double t, double phi, double& jacobian) const {
         const double theta = M_PI * std::pow(t, power), s = std::sin(theta);
         jacobian = s * M_PI * power * std::pow(t, power - 1);
-        return normalize(
-            frame.to_world({float(s * std::cos(phi)), float(s * std::sin(phi)), float(std::cos(theta))}));
+        return normalize(frame.to_world(
+            {float(s * std::cos(phi)), float(s * std::sin(phi)), float(std::cos(theta))}));
     }
 };
 
@@ -87,7 +94,8 @@ PolarMap fit_polar_map(const L& lobe, Vec3 wo, bool upper) {
     std::vector<double> distance;
     for (Vec3 w : draws) distance.push_back(map.t(w));
     if (distance.size() < 8) return {Frame::from_normal({0, 0, upper ? 1.0f : -1.0f}), 1};
-    std::nth_element(distance.begin(), distance.begin() + long(distance.size() / 2), distance.end());
+    std::nth_element(distance.begin(), distance.begin() + long(distance.size() / 2),
+                     distance.end());
     const double median = distance[distance.size() / 2];
     // A wide lobe fits (θ, φ) of the surface, where the horizon is a line of the grid.
     if (median > 0.1) return {Frame::from_normal({0, 0, upper ? 1.0f : -1.0f}), 1};
@@ -95,8 +103,9 @@ PolarMap fit_polar_map(const L& lobe, Vec3 wo, bool upper) {
     return map;
 }
 
-/// χ² of sample() against the density of eval(), in each hemisphere; delta events and failures count as outside. That
-/// ∫pdf is the probability of a smooth sample, and so at most one, is part of the test.
+/// χ² of sample() against the density of eval(), in each hemisphere; delta events and failures
+/// count as outside. That ∫pdf is the probability of a smooth sample, and so at most one, is part
+/// of the test.
 template <class L>
 void expect_samples_match_pdf(const L& lobe, Vec3 wo, double significance, int samples = 60000) {
     for (const bool upper : {true, false}) {
@@ -106,8 +115,10 @@ void expect_samples_match_pdf(const L& lobe, Vec3 wo, double significance, int s
         for (int i = 0; i < samples; ++i) {
             const float u_lobe = random.next();
             const auto s = lobe.sample(wo, u_lobe, random.next_2d());
-            if (s && !s->is_delta && (s->wi.z > 0) == upper) grid.add(map.t(s->wi), map.phi(s->wi));
-            else grid.add_outside();
+            if (s && !s->is_delta && (s->wi.z > 0) == upper)
+                grid.add(map.t(s->wi), map.phi(s->wi));
+            else
+                grid.add_outside();
         }
         const auto density = [&](double t, double phi) {
             double jacobian;
@@ -117,8 +128,9 @@ void expect_samples_match_pdf(const L& lobe, Vec3 wo, double significance, int s
         const Chi2Result r = grid.test(density, 1);
         EXPECT_LE(r.total_probability, 1.001) << "wo " << describe(wo);
         EXPECT_GE(r.p_value, significance)
-            << "wo " << describe(wo) << (upper ? " up" : " down") << ": chi2 " << r.statistic << " with "
-            << r.degrees << " degrees of freedom, integral of pdf " << r.total_probability;
+            << "wo " << describe(wo) << (upper ? " up" : " down") << ": chi2 " << r.statistic
+            << " with " << r.degrees << " degrees of freedom, integral of pdf "
+            << r.total_probability;
     }
 }
 
@@ -131,10 +143,11 @@ inline bool nearly(Rgb a, Rgb b, double relative, double absolute) {
            nearly(a.b, b.b, relative, absolute);
 }
 
-/// What sample() says of itself: a unit direction, weight = f/pdf, and the densities and η of eval(). `relative` allows
-/// for what one rounding of a direction does to a sharp lobe.
+/// What sample() says of itself: a unit direction, weight = f/pdf, and the densities and η of
+/// eval(). `relative` allows for what one rounding of a direction does to a sharp lobe.
 template <class L>
-void expect_sample_agrees_with_eval(const L& lobe, Vec3 wo, double relative = 1e-3, int samples = 2000) {
+void expect_sample_agrees_with_eval(const L& lobe, Vec3 wo, double relative = 1e-3,
+                                    int samples = 2000) {
     LobeRandom random(3);
     for (int i = 0; i < samples; ++i) {
         const float u_lobe = random.next();
@@ -151,16 +164,19 @@ void expect_sample_agrees_with_eval(const L& lobe, Vec3 wo, double relative = 1e
         }
         const BsdfEval e = lobe.eval(wo, s->wi);
         const std::string where = "wo " + describe(wo) + " wi " + describe(s->wi);
-        ASSERT_TRUE(nearly(e.pdf, s->pdf, relative, 1e-6)) << where << ": pdf " << e.pdf << " " << s->pdf;
-        ASSERT_TRUE(nearly(e.pdf_rev, s->pdf_rev, relative, 1e-6)) << where << ": " << e.pdf_rev << " " << s->pdf_rev;
+        ASSERT_TRUE(nearly(e.pdf, s->pdf, relative, 1e-6))
+            << where << ": pdf " << e.pdf << " " << s->pdf;
+        ASSERT_TRUE(nearly(e.pdf_rev, s->pdf_rev, relative, 1e-6))
+            << where << ": " << e.pdf_rev << " " << s->pdf_rev;
         ASSERT_TRUE(nearly(e.f, s->weight * s->pdf, relative, 1e-6))
             << where << ": f " << e.f.g << " weight·pdf " << s->weight.g * s->pdf;
         ASSERT_FLOAT_EQ(e.eta, s->eta) << where;
     }
 }
 
-/// pdf_rev(wo, wi) = pdf(wi, wo), and f(wo, wi)/|cos θ_i| = η² f(wi, wo)/|cos θ_o| (reciprocity where η = 1), for pairs
-/// that the lobe samples and for uniform ones; delta events against the event sampled from the other end.
+/// pdf_rev(wo, wi) = pdf(wi, wo), and f(wo, wi)/|cos θ_i| = η² f(wi, wo)/|cos θ_o| (reciprocity
+/// where η = 1), for pairs that the lobe samples and for uniform ones; delta events against the
+/// event sampled from the other end.
 template <class L>
 void expect_adjoint_symmetry(const L& lobe, Vec3 wo, double relative = 1e-3, int samples = 2000) {
     LobeRandom random(4);
@@ -175,18 +191,23 @@ void expect_adjoint_symmetry(const L& lobe, Vec3 wo, double relative = 1e-3, int
         }
         const BsdfEval a = lobe.eval(wo, wi), b = lobe.eval(wi, wo);
         const std::string where = "wo " + describe(wo) + " wi " + describe(wi);
-        ASSERT_TRUE(nearly(a.pdf_rev, b.pdf, relative, 1e-6)) << where << ": " << a.pdf_rev << " " << b.pdf;
-        ASSERT_TRUE(nearly(a.pdf, b.pdf_rev, relative, 1e-6)) << where << ": " << a.pdf << " " << b.pdf_rev;
-        ASSERT_TRUE(nearly(a.f * std::fabs(wo.z), b.f * (sqr(a.eta) * std::fabs(wi.z)), relative, 1e-6))
-            << where << ": " << a.f.g * std::fabs(wo.z) << " " << b.f.g * (sqr(a.eta) * std::fabs(wi.z));
+        ASSERT_TRUE(nearly(a.pdf_rev, b.pdf, relative, 1e-6))
+            << where << ": " << a.pdf_rev << " " << b.pdf;
+        ASSERT_TRUE(nearly(a.pdf, b.pdf_rev, relative, 1e-6))
+            << where << ": " << a.pdf << " " << b.pdf_rev;
+        ASSERT_TRUE(
+            nearly(a.f * std::fabs(wo.z), b.f * (sqr(a.eta) * std::fabs(wi.z)), relative, 1e-6))
+            << where << ": " << a.f.g * std::fabs(wo.z) << " "
+            << b.f.g * (sqr(a.eta) * std::fabs(wi.z));
         if (!a.f.is_zero()) {
             ASSERT_NEAR(a.eta * b.eta, 1, 1e-5) << where;
         }
     }
 }
 
-/// Each delta event has its reverse: sampled from wi, some event returns to wo with pmf and pmf_rev exchanged and the
-/// same f = weight · pmf (times η² of refraction, which the convention of BsdfSample::weight leaves out).
+/// Each delta event has its reverse: sampled from wi, some event returns to wo with pmf and pmf_rev
+/// exchanged and the same f = weight · pmf (times η² of refraction, which the convention of
+/// BsdfSample::weight leaves out).
 template <class L>
 void expect_delta_events_reverse(const L& lobe, Vec3 wo, int samples = 200) {
     LobeRandom random(5);
@@ -201,7 +222,8 @@ void expect_delta_events_reverse(const L& lobe, Vec3 wo, int samples = 200) {
             found = true;
             ASSERT_TRUE(nearly(back->pdf, s->pdf_rev, 1e-3, 1e-6)) << describe(wo);
             ASSERT_TRUE(nearly(back->pdf_rev, s->pdf, 1e-3, 1e-6)) << describe(wo);
-            ASSERT_TRUE(nearly(back->weight * back->pdf, s->weight * s->pdf, 1e-3, 1e-6)) << describe(wo);
+            ASSERT_TRUE(nearly(back->weight * back->pdf, s->weight * s->pdf, 1e-3, 1e-6))
+                << describe(wo);
             ASSERT_NEAR(s->eta * back->eta, 1, 1e-5);
         }
         // An event of tiny probability may be missed by a thousand strata.
@@ -221,8 +243,10 @@ Albedo sampled_albedo(const L& lobe, Vec3 wo, int strata = 64) {
     const int n = strata * strata;
     for (int i = 0; i < n; ++i) {
         const Vec2 jitter = random.next_2d();
-        const Vec2 u{(float(i % strata) + jitter.x) / float(strata), (float(i / strata) + jitter.y) / float(strata)};
-        const auto s = lobe.sample(wo, random.next(), {std::min(u.x, kOneMinusEpsilon), std::min(u.y, kOneMinusEpsilon)});
+        const Vec2 u{(float(i % strata) + jitter.x) / float(strata),
+                     (float(i / strata) + jitter.y) / float(strata)};
+        const auto s = lobe.sample(
+            wo, random.next(), {std::min(u.x, kOneMinusEpsilon), std::min(u.y, kOneMinusEpsilon)});
         for (int c = 0; s && c < 3; ++c) {
             sum[c] += s->weight[c];
             sum2[c] += sqr(double(s->weight[c]));
@@ -236,8 +260,8 @@ Albedo sampled_albedo(const L& lobe, Vec3 wo, int strata = 64) {
     return a;
 }
 
-/// ∫ f of one colour channel over all directions, by quadrature of eval() in coordinates fitted to the lobe: the albedo of
-/// the smooth part.
+/// ∫ f of one colour channel over all directions, by quadrature of eval() in coordinates fitted to
+/// the lobe: the albedo of the smooth part.
 template <class L>
 double integrated_albedo(const L& lobe, Vec3 wo, int channel, double tolerance = 5e-5) {
     double total = 0;
@@ -262,7 +286,8 @@ void expect_energy_conserved(const L& lobe, Vec3 wo) {
     }
 }
 
-/// Finite, non-negative numbers for every pair of directions, with grazing and degenerate ones, and for extreme u.
+/// Finite, non-negative numbers for every pair of directions, with grazing and degenerate ones, and
+/// for extreme u.
 template <class L>
 void expect_finite(const L& lobe) {
     std::vector<Vec3> directions;
@@ -277,18 +302,20 @@ void expect_finite(const L& lobe) {
     for (Vec3 wo : directions) {
         for (Vec3 wi : directions) {
             const BsdfEval e = lobe.eval(wo, wi);
-            ASSERT_TRUE(ok(e.f) && std::isfinite(e.pdf) && e.pdf >= 0 && std::isfinite(e.pdf_rev) && e.pdf_rev >= 0)
-                << describe(wo) << describe(wi) << " f " << e.f.g << " pdf " << e.pdf << " rev " << e.pdf_rev;
+            ASSERT_TRUE(ok(e.f) && std::isfinite(e.pdf) && e.pdf >= 0 && std::isfinite(e.pdf_rev) &&
+                        e.pdf_rev >= 0)
+                << describe(wo) << describe(wi) << " f " << e.f.g << " pdf " << e.pdf << " rev "
+                << e.pdf_rev;
         }
         for (float a : {0.0f, 0x1p-24f, 0.5f, kOneMinusEpsilon})
             for (float b : {0.0f, 0x1p-24f, 0.5f, kOneMinusEpsilon})
                 for (float l : {0.0f, 0.5f, kOneMinusEpsilon}) {
                     const auto s = lobe.sample(wo, l, {a, b});
                     if (!s) continue;
-                    ASSERT_TRUE(ok(s->weight) && is_finite(s->wi) && std::isfinite(s->pdf) && s->pdf > 0 &&
-                                std::isfinite(s->pdf_rev) && s->pdf_rev >= 0)
-                        << describe(wo) << " u " << l << " " << a << " " << b << " weight " << s->weight.g << " pdf "
-                        << s->pdf << " rev " << s->pdf_rev;
+                    ASSERT_TRUE(ok(s->weight) && is_finite(s->wi) && std::isfinite(s->pdf) &&
+                                s->pdf > 0 && std::isfinite(s->pdf_rev) && s->pdf_rev >= 0)
+                        << describe(wo) << " u " << l << " " << a << " " << b << " weight "
+                        << s->weight.g << " pdf " << s->pdf << " rev " << s->pdf_rev;
                 }
     }
     const float roughness = lobe.roughness();

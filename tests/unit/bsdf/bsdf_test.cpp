@@ -1,4 +1,5 @@
-// Lobes in world space: transport modes, shading normals, mixtures. False-alarm rate of the χ² tests: 0.1 %.
+// Lobes in world space: transport modes, shading normals, mixtures. False-alarm rate of the χ²
+// tests: 0.1 %.
 
 #include "bsdf/bsdf.h"
 
@@ -40,18 +41,21 @@ std::vector<Mixture> random_mixtures(Vec3 ng, LobeRandom& random) {
 }
 
 TEST(Bsdf, RadianceAndImportanceAreAdjoint) {
-    // f̃ is one function of the two directions, whichever end the walk comes from [Veach 1997, §5.3].
+    // f̃ is one function of the two directions, whichever end the walk comes from [Veach 1997,
+    // §5.3].
     LobeRandom random(21);
     int values = 0, refractions = 0;
     for (int i = 0; i < 2000; ++i) {
         const Vec3 ng = sample_uniform_sphere(random.next_2d());
         for (Mixture& mixture : random_mixtures(ng, random)) {
             const Bsdf bsdf = mixture.bsdf(ng);
-            const Vec3 wo = sample_uniform_sphere(random.next_2d()), wi = sample_uniform_sphere(random.next_2d());
+            const Vec3 wo = sample_uniform_sphere(random.next_2d()),
+                       wi = sample_uniform_sphere(random.next_2d());
             const BsdfEval radiance = bsdf.eval(wo, wi, TransportMode::Radiance);
             const BsdfEval importance = bsdf.eval(wi, wo, TransportMode::Importance);
             const double a = radiance.f.g / abs_dot(wi, ng), b = importance.f.g / abs_dot(wo, ng);
-            ASSERT_TRUE(nearly(a, b, 2e-3, 1e-5)) << a << " " << b << " " << describe(wo) << describe(wi);
+            ASSERT_TRUE(nearly(a, b, 2e-3, 1e-5))
+                << a << " " << b << " " << describe(wo) << describe(wi);
             ASSERT_TRUE(nearly(radiance.pdf, importance.pdf_rev, 2e-3, 1e-5));
             ASSERT_TRUE(nearly(radiance.pdf_rev, importance.pdf, 2e-3, 1e-5));
             values += a > 0;
@@ -69,7 +73,8 @@ TEST(Bsdf, RadianceOfAnUntiltedRefractionLosesEtaSquared) {
     const Rgb f = kGlass.eval(wo, wi).f;
     EXPECT_TRUE(nearly(bsdf.eval(wo, wi, TransportMode::Importance).f, f, 1e-6, 0));
     EXPECT_TRUE(nearly(bsdf.eval(wo, wi, TransportMode::Radiance).f, f / 2.25f, 1e-6, 0));
-    EXPECT_TRUE(nearly(bsdf.eval(wi, wo, TransportMode::Radiance).f, kGlass.eval(wi, wo).f * 2.25f, 1e-6, 0));
+    EXPECT_TRUE(nearly(bsdf.eval(wi, wo, TransportMode::Radiance).f, kGlass.eval(wi, wo).f * 2.25f,
+                       1e-6, 0));
 }
 
 TEST(Bsdf, NothingCrossesBetweenTheSidesOfTheTwoNormals) {
@@ -106,7 +111,8 @@ TEST(Bsdf, DeltaSamplesAreCorrectedLikeValues) {
             const Vec3 wi = radiance->wi;
             EXPECT_FLOAT_EQ(radiance->weight.g, 1 / sqr(radiance->eta));
             EXPECT_NEAR(importance->weight.g,
-                        abs_dot(wo, ns) * abs_dot(wi, ng) / (abs_dot(wo, ng) * abs_dot(wi, ns)), 1e-5);
+                        abs_dot(wo, ns) * abs_dot(wi, ng) / (abs_dot(wo, ng) * abs_dot(wi, ns)),
+                        1e-5);
         }
     }
 }
@@ -117,7 +123,9 @@ struct AsLobe {
     TransportMode mode;
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const { return bsdf.eval(wo, wi, mode); }
-    std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const { return bsdf.sample(wo, u_lobe, u, mode); }
+    std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const {
+        return bsdf.sample(wo, u_lobe, u, mode);
+    }
     float roughness() const { return bsdf.roughness(); }
     Rgb albedo_estimate() const { return bsdf.albedo_estimate(); }
 };
@@ -128,9 +136,11 @@ TEST(Bsdf, MixturesSampleTheirDensity) {
     const double significance = sidak(1e-3, int(2 * 4 * directions.size()));
     for (Mixture& mixture : random_mixtures({0, 0, 1}, random)) {
         for (Vec3 wo : directions) {
-            expect_samples_match_pdf(AsLobe{mixture.bsdf({0, 0, 1}), TransportMode::Radiance}, wo, significance, 30000);
+            expect_samples_match_pdf(AsLobe{mixture.bsdf({0, 0, 1}), TransportMode::Radiance}, wo,
+                                     significance, 30000);
             for (TransportMode mode : {TransportMode::Radiance, TransportMode::Importance})
-                expect_sample_agrees_with_eval(AsLobe{mixture.bsdf({0, 0, 1}), mode}, wo, 3e-3, 500);
+                expect_sample_agrees_with_eval(AsLobe{mixture.bsdf({0, 0, 1}), mode}, wo, 3e-3,
+                                               500);
         }
         expect_finite(AsLobe{mixture.bsdf({0, 0, 1}), TransportMode::Radiance});
     }
@@ -138,7 +148,8 @@ TEST(Bsdf, MixturesSampleTheirDensity) {
 
 TEST(Bsdf, MixtureWithDeltaLobeSharesItsProbability) {
     const ConductorLobe mirror{Rgb(0), Rgb(1), Rgb(0.8f)};
-    Mixture mixture{{{Frame{}, kDiffuse, 0.25f}, {Frame{}, mirror, 0.5f}, {Frame{}, kMetal, 0.25f}}};
+    Mixture mixture{
+        {{Frame{}, kDiffuse, 0.25f}, {Frame{}, mirror, 0.5f}, {Frame{}, kMetal, 0.25f}}};
     const Bsdf bsdf = mixture.bsdf({0, 0, 1});
     const Vec3 wo = direction(40, 10);
     EXPECT_TRUE(bsdf.has_smooth() && bsdf.has_delta());
@@ -148,7 +159,8 @@ TEST(Bsdf, MixtureWithDeltaLobeSharesItsProbability) {
     Rgb sum;
     const int n = 40000;
     for (int i = 0; i < n; ++i) {
-        const auto s = bsdf.sample(wo, (float(i) + 0.5f) / n, random.next_2d(), TransportMode::Radiance);
+        const auto s =
+            bsdf.sample(wo, (float(i) + 0.5f) / n, random.next_2d(), TransportMode::Radiance);
         if (!s) continue;
         sum += s->weight;
         if (!s->is_delta) continue;
@@ -163,9 +175,10 @@ TEST(Bsdf, MixtureWithDeltaLobeSharesItsProbability) {
     double integral = integrate_2d(
         [&](double z, double phi) {
             const float r = float(std::sqrt(1 - z * z));
-            return double(
-                bsdf.eval(wo, {r * float(std::cos(phi)), r * float(std::sin(phi)), float(z)}, TransportMode::Radiance)
-                    .pdf);
+            return double(bsdf.eval(wo,
+                                    {r * float(std::cos(phi)), r * float(std::sin(phi)), float(z)},
+                                    TransportMode::Radiance)
+                              .pdf);
         },
         0, 1, 0, 2 * M_PI, 1e-5, 4);
     EXPECT_LE(integral, 0.5 + 1e-4);

@@ -28,18 +28,23 @@ TEST(Chi2, QuadratureFindsPeaksAndSteps) {
         return std::exp(-(dx * dx + dy * dy) / (2 * s * s)) / (2 * M_PI * s * s);
     };
     EXPECT_NEAR(integrate_2d(peak, 0, 1, 0, 1, 1e-6, 4), 1, 1e-5);
-    EXPECT_NEAR(integrate_2d([](double x, double y) { return x + y < 0.7 ? 1.0 : 0.0; }, 0, 1, 0, 1, 1e-5), 0.245, 2e-3);
+    EXPECT_NEAR(
+        integrate_2d([](double x, double y) { return x + y < 0.7 ? 1.0 : 0.0; }, 0, 1, 0, 1, 1e-5),
+        0.245, 2e-3);
 }
 
-/// p-value for draws of density 2x on [0, 1]², with a tenth of them lost, against (2 + tilt·(y − ½)) x of the rest.
+/// p-value for draws of density 2x on [0, 1]², with a tenth of them lost, against (2 + tilt·(y −
+/// ½)) x of the rest.
 double p_value(uint64_t seed, double tilt) {
     std::mt19937_64 engine(seed);
     std::uniform_real_distribution<double> uniform;
     Chi2Grid grid(0, 1, 10, 0, 1, 10);
     for (int i = 0; i < 20000; ++i) {
         const double x = std::sqrt(uniform(engine)), y = uniform(engine);
-        if (uniform(engine) < 0.1) grid.add_outside();
-        else grid.add(x, y);
+        if (uniform(engine) < 0.1)
+            grid.add_outside();
+        else
+            grid.add(x, y);
     }
     return grid.test([&](double x, double y) { return 0.9 * (2 + tilt * (y - 0.5)) * x; }).p_value;
 }
@@ -51,7 +56,8 @@ TEST(Chi2, PValuesOfTheRightDensityAreUniform) {
     std::sort(p.begin(), p.end());
     double distance = 0;
     for (size_t i = 0; i < p.size(); ++i)
-        distance = std::max({distance, std::fabs(p[i] - double(i) / 200), std::fabs(p[i] - double(i + 1) / 200)});
+        distance = std::max(
+            {distance, std::fabs(p[i] - double(i) / 200), std::fabs(p[i] - double(i + 1) / 200)});
     EXPECT_LT(distance, 1.95 / std::sqrt(200.0));
 }
 

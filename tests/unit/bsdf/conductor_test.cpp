@@ -16,7 +16,8 @@ const Rgb kGoldEta{0.143f, 0.375f, 1.44f}, kGoldK{3.98f, 2.39f, 1.60f};
 struct Roughness {
     float x, y;
 };
-constexpr Roughness kRoughness[] = {{1, 1}, {0.3f, 0.3f}, {0.05f, 0.05f}, {0.001f, 0.001f}, {0.4f, 0.1f}};
+constexpr Roughness kRoughness[] = {
+    {1, 1}, {0.3f, 0.3f}, {0.05f, 0.05f}, {0.001f, 0.001f}, {0.4f, 0.1f}};
 
 RoughConductorLobe mirror(Kind kind, Roughness a) {
     return {Microfacet(kind, a.x, a.y), Rgb(0), Rgb(1), Rgb(1)};
@@ -48,7 +49,9 @@ TEST(Conductor, PerfectMirrorLosesNothing) {
 
 class RoughConductorOf : public ::testing::TestWithParam<Kind> {};
 INSTANTIATE_TEST_SUITE_P(Both, RoughConductorOf, ::testing::Values(Kind::Beckmann, Kind::Ggx),
-                         [](const auto& kind) { return kind.param == Kind::Ggx ? "Ggx" : "Beckmann"; });
+                         [](const auto& kind) {
+                             return kind.param == Kind::Ggx ? "Ggx" : "Beckmann";
+                         });
 
 TEST_P(RoughConductorOf, SamplesMatchPdf) {
     const auto directions = test_directions();
@@ -78,7 +81,8 @@ TEST_P(RoughConductorOf, AlbedoAgreesWithQuadratureAndLosesOnlyMultipleScatterin
             const RoughConductorLobe lobe = gold(GetParam(), a);
             expect_energy_conserved(lobe, wo);
             const Albedo sampled = sampled_albedo(lobe, wo);
-            EXPECT_NEAR(sampled.value.g, integrated_albedo(lobe, wo, 1), 4 * sampled.standard_error.g + 1e-3f)
+            EXPECT_NEAR(sampled.value.g, integrated_albedo(lobe, wo, 1),
+                        4 * sampled.standard_error.g + 1e-3f)
                 << describe(wo);
             expect_energy_conserved(mirror(GetParam(), a), wo);
             if (a.x <= 0.05f && wo.z > 0.4f) {

@@ -17,9 +17,11 @@ constexpr float kEta[] = {1.5f, 1 / 1.5f, 1.1f, 2.4f};
 struct Roughness {
     float x, y;
 };
-constexpr Roughness kRoughness[] = {{1, 1}, {0.3f, 0.3f}, {0.05f, 0.05f}, {0.001f, 0.001f}, {0.4f, 0.1f}};
+constexpr Roughness kRoughness[] = {
+    {1, 1}, {0.3f, 0.3f}, {0.05f, 0.05f}, {0.001f, 0.001f}, {0.4f, 0.1f}};
 
-RoughDielectricLobe glass(Kind kind, Roughness a, float eta, Rgb reflectance = Rgb(1), Rgb transmittance = Rgb(1)) {
+RoughDielectricLobe glass(Kind kind, Roughness a, float eta, Rgb reflectance = Rgb(1),
+                          Rgb transmittance = Rgb(1)) {
     return {Microfacet(kind, a.x, a.y), eta, reflectance, transmittance};
 }
 
@@ -79,11 +81,14 @@ TEST(ThinDielectric, SumsInternalReflections) {
 
 class RoughDielectricOf : public ::testing::TestWithParam<Kind> {};
 INSTANTIATE_TEST_SUITE_P(Both, RoughDielectricOf, ::testing::Values(Kind::Beckmann, Kind::Ggx),
-                         [](const auto& kind) { return kind.param == Kind::Ggx ? "Ggx" : "Beckmann"; });
+                         [](const auto& kind) {
+                             return kind.param == Kind::Ggx ? "Ggx" : "Beckmann";
+                         });
 
 TEST_P(RoughDielectricOf, SamplesMatchPdf) {
     const auto directions = test_directions_both_sides();
-    const double significance = sidak(1e-3, int(2 * (std::size(kRoughness) + 2) * directions.size()));
+    const double significance =
+        sidak(1e-3, int(2 * (std::size(kRoughness) + 2) * directions.size()));
     for (Vec3 wo : directions) {
         for (const Roughness a : kRoughness) {
             SCOPED_TRACE(a.x);
@@ -102,8 +107,10 @@ TEST_P(RoughDielectricOf, ValueDensityAndWeightAgree) {
             for (Vec3 wo : test_directions_both_sides()) {
                 SCOPED_TRACE(a.x);
                 SCOPED_TRACE(eta);
-                const RoughDielectricLobe lobe = glass(GetParam(), a, eta, Rgb(0.5f, 1, 0), Rgb(1, 0.5f, 1));
-                // One rounding of wi moves the facet by 1e-7 / |η − 1|, which is to be held against α.
+                const RoughDielectricLobe lobe =
+                    glass(GetParam(), a, eta, Rgb(0.5f, 1, 0), Rgb(1, 0.5f, 1));
+                // One rounding of wi moves the facet by 1e-7 / |η − 1|, which is to be held against
+                // α.
                 expect_sample_agrees_with_eval(lobe, wo, a.x < 0.01f ? 1e-1 : 3e-3, 500);
                 expect_adjoint_symmetry(lobe, wo, a.x < 0.01f ? 1e-1 : 3e-3, 500);
             }
@@ -118,7 +125,8 @@ TEST_P(RoughDielectricOf, AlbedoAgreesWithQuadratureAndLosesOnlyMultipleScatteri
             expect_energy_conserved(lobe, wo);
             const Albedo sampled = sampled_albedo(lobe, wo);
             for (int c : {0, 1})
-                EXPECT_NEAR(sampled.value[c], integrated_albedo(lobe, wo, c), 4 * sampled.standard_error[c] + 1e-3f)
+                EXPECT_NEAR(sampled.value[c], integrated_albedo(lobe, wo, c),
+                            4 * sampled.standard_error[c] + 1e-3f)
                     << describe(wo) << " channel " << c;
             if (a.x <= 0.05f && std::fabs(wo.z) > 0.4f) {
                 EXPECT_GT(sampled.value.r, 0.99f) << describe(wo);
@@ -135,7 +143,8 @@ TEST_P(RoughDielectricOf, IsFinite) {
 }
 
 TEST_P(RoughDielectricOf, SharpLobeTendsToTheSmoothDielectric) {
-    const RoughDielectricLobe lobe = glass(GetParam(), {1e-4f, 1e-4f}, 1.5f, Rgb(1, 0, 0), Rgb(0, 1, 0));
+    const RoughDielectricLobe lobe =
+        glass(GetParam(), {1e-4f, 1e-4f}, 1.5f, Rgb(1, 0, 0), Rgb(0, 1, 0));
     for (Vec3 wo : {direction(0, 0), direction(30, 0), direction(35, 130), direction(150, 40)}) {
         const float F = fresnel_dielectric(wo.z, 1.5f).R;
         const Albedo a = sampled_albedo(lobe, wo, 64);

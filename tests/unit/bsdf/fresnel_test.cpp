@@ -4,7 +4,6 @@
 
 #include <complex>
 
-
 namespace etendue {
 namespace {
 
@@ -16,7 +15,8 @@ TEST(Fresnel, DielectricAtNormalIncidence) {
 TEST(Fresnel, DielectricVanishesAtBrewstersAngleForOnePolarisation) {
     // At tan θ = η only the s part is left: R = ½ ((η² − 1) / (η² + 1))².
     const double eta = 1.5, cos = 1 / std::sqrt(1 + eta * eta);
-    EXPECT_NEAR(fresnel_dielectric(float(cos), 1.5f).R, 0.5 * std::pow((eta * eta - 1) / (eta * eta + 1), 2), 1e-6);
+    EXPECT_NEAR(fresnel_dielectric(float(cos), 1.5f).R,
+                0.5 * std::pow((eta * eta - 1) / (eta * eta + 1), 2), 1e-6);
 }
 
 TEST(Fresnel, RefractionObeysSnellAndReversesWithTheSameReflectance) {
@@ -62,23 +62,27 @@ TEST(Fresnel, ConductorMatchesComplexArithmetic) {
                 const std::complex<double> root = std::sqrt(n2 - (1 - cos * cos));
                 const double rs = std::norm((cos - root) / (cos + root));
                 const double rp = std::norm((n2 * cos - root) / (n2 * cos + root));
-                EXPECT_NEAR(fresnel_conductor(float(cos), Rgb(float(eta)), Rgb(float(k))).g, 0.5 * (rs + rp), 2e-5)
+                EXPECT_NEAR(fresnel_conductor(float(cos), Rgb(float(eta)), Rgb(float(k))).g,
+                            0.5 * (rs + rp), 2e-5)
                     << eta << " " << k << " " << cos;
             }
 }
 
 TEST(Fresnel, ConductorWithoutAbsorptionIsADielectric) {
     for (float cos : {1.0f, 0.6f, 0.1f})
-        EXPECT_NEAR(fresnel_conductor(cos, Rgb(1.5f), Rgb(0)).r, fresnel_dielectric(cos, 1.5f).R, 1e-5);
+        EXPECT_NEAR(fresnel_conductor(cos, Rgb(1.5f), Rgb(0)).r, fresnel_dielectric(cos, 1.5f).R,
+                    1e-5);
 }
 
 TEST(Fresnel, PerfectMirrorIndexReflectsEverything) {
-    for (float cos : {1.0f, 0.5f, 0.1f, 1e-3f, 0.0f}) EXPECT_EQ(fresnel_conductor(cos, Rgb(0), Rgb(1)), Rgb(1));
+    for (float cos : {1.0f, 0.5f, 0.1f, 1e-3f, 0.0f})
+        EXPECT_EQ(fresnel_conductor(cos, Rgb(0), Rgb(1)), Rgb(1));
     EXPECT_TRUE(is_finite(fresnel_conductor(0, Rgb(1), Rgb(0))));
 }
 
 TEST(Fresnel, DiffuseReflectanceMatchesQuadrature) {
-    for (float eta : {1.00001f, 1.0003f, 1.01f, 1.33f, 1.5f, 2.4f, 4.0f, 1 / 1.0003f, 1 / 1.33f, 1 / 1.5f, 0.25f}) {
+    for (float eta : {1.00001f, 1.0003f, 1.01f, 1.33f, 1.5f, 2.4f, 4.0f, 1 / 1.0003f, 1 / 1.33f,
+                      1 / 1.5f, 0.25f}) {
         double sum = 0;
         const int n = 200000;
         for (int i = 0; i < n; ++i) {

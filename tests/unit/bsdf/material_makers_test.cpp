@@ -50,25 +50,32 @@ TEST(MaterialMakers, ConductorsTakeNamesOrIndices) {
     const auto gold = only_lobe<ConductorLobe>("conductor", {{"material", std::string("Au")}});
     EXPECT_EQ(gold.eta, named_metal("Au")->eta);
     EXPECT_EQ(gold.k, named_metal("Au")->k);
-    const auto given = only_lobe<ConductorLobe>("conductor", {{"eta", Rgb(0.2f, 0.9f, 1.1f)}, {"k", 3.0}, {"specular_reflectance", 0.5}});
+    const auto given = only_lobe<ConductorLobe>(
+        "conductor", {{"eta", Rgb(0.2f, 0.9f, 1.1f)}, {"k", 3.0}, {"specular_reflectance", 0.5}});
     EXPECT_EQ(given.eta, Rgb(0.2f, 0.9f, 1.1f));
     EXPECT_EQ(given.k, Rgb(3));
     EXPECT_EQ(given.reflectance, Rgb(0.5f));
-    EXPECT_NE(refusal("conductor", {{"material", std::string("Unobtainium")}}).find("Unobtainium"), std::string::npos);
-    EXPECT_NE(refusal("conductor", {{"material", std::string("Au")}, {"eta", 1.0}}).find("not both"),
+    EXPECT_NE(refusal("conductor", {{"material", std::string("Unobtainium")}}).find("Unobtainium"),
               std::string::npos);
+    EXPECT_NE(
+        refusal("conductor", {{"material", std::string("Au")}, {"eta", 1.0}}).find("not both"),
+        std::string::npos);
 }
 
 TEST(MaterialMakers, RoughnessIsIsotropicOrGivenTwice) {
-    const auto lobe = only_lobe<RoughConductorLobe>("roughconductor", {{"distribution", std::string("ggx")}, {"alpha_u", 0.2}, {"alpha_v", 0.4}});
+    const auto lobe = only_lobe<RoughConductorLobe>(
+        "roughconductor",
+        {{"distribution", std::string("ggx")}, {"alpha_u", 0.2}, {"alpha_v", 0.4}});
     EXPECT_EQ(lobe.distribution.kind(), Microfacet::Kind::Ggx);
     EXPECT_EQ(lobe.distribution.alpha_x(), 0.2f);
     EXPECT_EQ(lobe.distribution.alpha_y(), 0.4f);
-    EXPECT_NE(refusal("roughconductor", {{"alpha", 0.2}, {"alpha_u", 0.2}, {"alpha_v", 0.2}}).find("not both"),
+    EXPECT_NE(refusal("roughconductor", {{"alpha", 0.2}, {"alpha_u", 0.2}, {"alpha_v", 0.2}})
+                  .find("not both"),
               std::string::npos);
     EXPECT_NE(refusal("roughdielectric", {{"alpha_u", 0.2}}).find("together"), std::string::npos);
-    EXPECT_NE(refusal("roughconductor", {{"distribution", std::string("phong")}}).find("beckmann, ggx"),
-              std::string::npos);
+    EXPECT_NE(
+        refusal("roughconductor", {{"distribution", std::string("phong")}}).find("beckmann, ggx"),
+        std::string::npos);
 }
 
 TEST(MaterialMakers, DielectricsAreGlassInAirByDefault) {
@@ -86,14 +93,19 @@ TEST(MaterialMakers, DielectricsAreGlassInAirByDefault) {
 }
 
 TEST(MaterialMakers, IndicesAreNumbersOrNames) {
-    const auto lobe = only_lobe<DielectricLobe>("dielectric", {{"int_ior", std::string("diamond")}, {"ext_ior", 1.333}, {"specular_transmittance", Rgb(1, 0, 0)}});
+    const auto lobe =
+        only_lobe<DielectricLobe>("dielectric", {{"int_ior", std::string("diamond")},
+                                                 {"ext_ior", 1.333},
+                                                 {"specular_transmittance", Rgb(1, 0, 0)}});
     EXPECT_EQ(lobe.eta, 2.419f / 1.333f);
     EXPECT_EQ(lobe.transmittance, Rgb(1, 0, 0));
     EXPECT_EQ(lobe.reflectance, Rgb(1));
-    EXPECT_NE(refusal("dielectric", {{"int_ior", std::string("treacle")}}).find("treacle"), std::string::npos);
+    EXPECT_NE(refusal("dielectric", {{"int_ior", std::string("treacle")}}).find("treacle"),
+              std::string::npos);
     EXPECT_NE(refusal("dielectric", {{"int_ior", 0.0}}).find("above zero"), std::string::npos);
     EXPECT_NE(refusal("dielectric", {{"int_ior", true}}).find("number or name"), std::string::npos);
-    EXPECT_NE(refusal("roughdielectric", {{"int_ior", 1.5}, {"ext_ior", 1.5}}).find("different"), std::string::npos);
+    EXPECT_NE(refusal("roughdielectric", {{"int_ior", 1.5}, {"ext_ior", 1.5}}).find("different"),
+              std::string::npos);
 }
 
 }  // namespace

@@ -12,14 +12,19 @@ using testing::direction;
 struct Roughness {
     float x, y;
 };
-constexpr Roughness kRoughness[] = {{1, 1}, {0.5f, 0.5f}, {0.1f, 0.1f}, {0.001f, 0.001f}, {0.4f, 0.08f}, {0.05f, 0.8f}};
+constexpr Roughness kRoughness[] = {{1, 1},           {0.5f, 0.5f},  {0.1f, 0.1f},
+                                    {0.001f, 0.001f}, {0.4f, 0.08f}, {0.05f, 0.8f}};
 constexpr double kAngles[] = {0, 30, 60, 85, 89.5};
 
 class MicrofacetOf : public ::testing::TestWithParam<Microfacet::Kind> {};
-INSTANTIATE_TEST_SUITE_P(Both, MicrofacetOf, ::testing::Values(Microfacet::Kind::Beckmann, Microfacet::Kind::Ggx),
-                         [](const auto& kind) { return kind.param == Microfacet::Kind::Ggx ? "Ggx" : "Beckmann"; });
+INSTANTIATE_TEST_SUITE_P(Both, MicrofacetOf,
+                         ::testing::Values(Microfacet::Kind::Beckmann, Microfacet::Kind::Ggx),
+                         [](const auto& kind) {
+                             return kind.param == Microfacet::Kind::Ggx ? "Ggx" : "Beckmann";
+                         });
 
-/// ∫ f(m) dω over normals, in the slopes' own scale so that the peak is as wide for every roughness.
+/// ∫ f(m) dω over normals, in the slopes' own scale so that the peak is as wide for every
+/// roughness.
 template <class F>
 double integrate_normals(const Microfacet& d, const F& f) {
     const auto g = [&](double a, double phi) {
@@ -37,7 +42,8 @@ double integrate_normals(const Microfacet& d, const F& f) {
 TEST_P(MicrofacetOf, ProjectedAreaOfNormalsIsOne) {
     for (const Roughness a : kRoughness) {
         const Microfacet d(GetParam(), a.x, a.y);
-        EXPECT_NEAR(integrate_normals(d, [&](Vec3 m) { return d.D(m) * m.z; }), 1, 1e-3) << a.x << " " << a.y;
+        EXPECT_NEAR(integrate_normals(d, [&](Vec3 m) { return d.D(m) * m.z; }), 1, 1e-3)
+            << a.x << " " << a.y;
     }
 }
 
@@ -46,14 +52,16 @@ TEST_P(MicrofacetOf, SigmaIsTheProjectedAreaOfFacingNormals) {
         for (const double theta : kAngles) {
             const Microfacet d(GetParam(), a.x, a.y);
             const Vec3 w = direction(theta, 35);
-            const double area = integrate_normals(d, [&](Vec3 m) { return std::max(dot(w, m), 0.0f) * d.D(m); });
+            const double area =
+                integrate_normals(d, [&](Vec3 m) { return std::max(dot(w, m), 0.0f) * d.D(m); });
             EXPECT_NEAR(d.sigma(w) / area, 1, 2e-3) << a.x << " " << a.y << " at " << theta;
             EXPECT_FLOAT_EQ(d.sigma(w), d.sigma(-w));
         }
 }
 
 TEST_P(MicrofacetOf, VisibleNormalsFollowTheirDensity) {
-    const double significance = testing::sidak(1e-3, 2 * int(std::size(kRoughness) * std::size(kAngles)));
+    const double significance =
+        testing::sidak(1e-3, 2 * int(std::size(kRoughness) * std::size(kAngles)));
     for (const Roughness a : kRoughness)
         for (const double theta : kAngles) {
             const Microfacet d(GetParam(), a.x, a.y);
@@ -69,15 +77,17 @@ TEST_P(MicrofacetOf, VisibleNormalsFollowTheirDensity) {
                 grid.add(squeeze(m.x / m.z / d.alpha_x()), squeeze(m.y / m.z / d.alpha_y()));
             }
             const auto density = [&](double a_x, double a_y) {
-                const double sx = a_x / (1 - std::fabs(a_x)) * d.alpha_x(), sy = a_y / (1 - std::fabs(a_y)) * d.alpha_y();
+                const double sx = a_x / (1 - std::fabs(a_x)) * d.alpha_x(),
+                             sy = a_y / (1 - std::fabs(a_y)) * d.alpha_y();
                 const double len2 = 1 + sx * sx + sy * sy, len = std::sqrt(len2);
                 const Vec3 m{float(sx / len), float(sy / len), float(1 / len)};
                 return double(d.pdf_visible(w, m)) / (len2 * len) * d.alpha_x() * d.alpha_y() /
-                       ((1 - std::fabs(a_x)) * (1 - std::fabs(a_x)) * (1 - std::fabs(a_y)) * (1 - std::fabs(a_y)));
+                       ((1 - std::fabs(a_x)) * (1 - std::fabs(a_x)) * (1 - std::fabs(a_y)) *
+                        (1 - std::fabs(a_y)));
             };
             const testing::Chi2Result r = grid.test(density, 1);
-            EXPECT_GE(r.p_value, significance)
-                << a.x << " " << a.y << " at " << theta << ": chi2 " << r.statistic << " / " << r.degrees;
+            EXPECT_GE(r.p_value, significance) << a.x << " " << a.y << " at " << theta << ": chi2 "
+                                               << r.statistic << " / " << r.degrees;
             EXPECT_NEAR(r.total_probability, 1, 2e-3) << a.x << " " << a.y << " at " << theta;
         }
 }

@@ -83,13 +83,23 @@ TEST(Params, ChecksAgainstTheTable) {
                            {"flat", ParamKind::Transform, "", ""},
                            {"map", ParamKind::Texture, "", ""}}};
     std::vector<std::string> reports;
-    check_params(scene, 0, info, [&](const SourceLocation& where, const std::string& message) {
+    const auto report = [&](const SourceLocation& where, const std::string& message) {
         reports.push_back(SceneError(where, message).what());
-    });
+    };
+    check_params(scene, 0, info, report);
     ASSERT_EQ(reports.size(), 2u);
     EXPECT_EQ(reports[0],
               "f:4: parameter \"size\" of bsdf \"x\" must be a integer, but is a float");
     EXPECT_EQ(reports[1], "f:7: bsdf \"x\" has no parameter \"colour\" (did you mean \"color\"?)");
+
+    // A texture where a number must stand.
+    scene.objects[0].params.clear();
+    scene.objects[0].children[0].name = "count";
+    reports.clear();
+    check_params(scene, 0, info, report);
+    ASSERT_EQ(reports.size(), 1u);
+    EXPECT_EQ(reports[0],
+              "f:9: parameter \"count\" of bsdf \"x\" must be a float, but is a texture");
 }
 
 }  // namespace

@@ -65,7 +65,9 @@ TEST_F(ImageIo, ExrKeepsChannelsAttributesAndEveryBit) {
     image.at(2, 2, 0) = std::numeric_limits<float>::infinity();
     image.at(3, 2, 1) = 1e-42f;
     image.at(4, 2, 1) = 3e38f;
-    image.attributes = {{"integrator", std::string("bdpt, \"quoted\"\nline")}, {"samples", 1e15 + 1}, {"seconds", 0.1}};
+    image.attributes = {{"integrator", std::string("bdpt, \"quoted\"\nline")},
+                        {"samples", 1e15 + 1},
+                        {"seconds", 0.1}};
     write_image(file("a.exr"), image);
     const Image read = read_image(file("a.exr"));
     ASSERT_EQ(read.width, 5);
@@ -76,7 +78,8 @@ TEST_F(ImageIo, ExrKeepsChannelsAttributesAndEveryBit) {
         ASSERT_GE(k, 0) << image.channels[c];
         for (int y = 0; y < 3; ++y)
             for (int x = 0; x < 5; ++x)
-                EXPECT_EQ(std::bit_cast<uint32_t>(read.at(x, y, k)), std::bit_cast<uint32_t>(image.at(x, y, int(c))));
+                EXPECT_EQ(std::bit_cast<uint32_t>(read.at(x, y, k)),
+                          std::bit_cast<uint32_t>(image.at(x, y, int(c))));
     }
     EXPECT_EQ(read.attributes, image.attributes);
     EXPECT_EQ(file_count(), 1u);
@@ -111,7 +114,8 @@ TEST_F(ImageIo, HalfExrRoundsAndClamps) {
 }
 
 TEST_F(ImageIo, PfmRoundTrip) {
-    for (const auto& channels : {std::vector<std::string>{"R", "G", "B"}, std::vector<std::string>{"Y"}}) {
+    for (const auto& channels :
+         {std::vector<std::string>{"R", "G", "B"}, std::vector<std::string>{"Y"}}) {
         const Image image = sample_image(channels);
         write_image(file("a.pfm"), image);
         const Image read = read_image(file("a.pfm"));
@@ -132,7 +136,8 @@ TEST_F(ImageIo, PfmOfKnownBytes) {
     image.data = {2, 1};
     write_image(file("out.pfm"), image);
     std::ifstream in(file("out.pfm"), std::ios::binary);
-    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "Pf\n1 2\n-1.0\n" + one_le + two_le);
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}),
+              "Pf\n1 2\n-1.0\n" + one_le + two_le);
 }
 
 TEST_F(ImageIo, HdrHoldsEightBitsOfMantissa) {
@@ -156,16 +161,18 @@ TEST_F(ImageIo, PngIsSrgbAndClamped) {
 
 // 2 × 1 pixels of RGBA: (190, 193, 150, 42), (255, 0, 128, 0).
 const unsigned char kRgbaPng[] = {
-    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00, 0x00,
-    0x02, 0x00, 0x00, 0x00, 0x01, 0x08, 0x06, 0x00, 0x00, 0x00, 0xf4, 0x22, 0x7f, 0x8a, 0x00, 0x00, 0x00, 0x11, 0x49,
-    0x44, 0x41, 0x54, 0x78, 0xda, 0x63, 0xd8, 0x77, 0x70, 0x9a, 0xd6, 0x7f, 0x86, 0x06, 0x06, 0x00, 0x14, 0x92, 0x03,
-    0xbf, 0x83, 0xc7, 0x7f, 0x51, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
+    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44,
+    0x52, 0x00, 0x00, 0x00, 0x02, 0x00, 0x00, 0x00, 0x01, 0x08, 0x06, 0x00, 0x00, 0x00, 0xf4,
+    0x22, 0x7f, 0x8a, 0x00, 0x00, 0x00, 0x11, 0x49, 0x44, 0x41, 0x54, 0x78, 0xda, 0x63, 0xd8,
+    0x77, 0x70, 0x9a, 0xd6, 0x7f, 0x86, 0x06, 0x06, 0x00, 0x14, 0x92, 0x03, 0xbf, 0x83, 0xc7,
+    0x7f, 0x51, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
 // 2 × 1 pixels of 16-bit grey: 0x8000, 0xffff.
 const unsigned char kGrey16Png[] = {
-    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00,
-    0x00, 0x02, 0x00, 0x00, 0x00, 0x01, 0x10, 0x00, 0x00, 0x00, 0x00, 0x81, 0xd9, 0xfc, 0x15, 0x00, 0x00, 0x00,
-    0x0d, 0x49, 0x44, 0x41, 0x54, 0x78, 0xda, 0x63, 0x68, 0x60, 0xf8, 0xff, 0x1f, 0x00, 0x05, 0x02, 0x02, 0x7f,
-    0xc9, 0x00, 0xd6, 0x75, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
+    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48,
+    0x44, 0x52, 0x00, 0x00, 0x00, 0x02, 0x00, 0x00, 0x00, 0x01, 0x10, 0x00, 0x00, 0x00,
+    0x00, 0x81, 0xd9, 0xfc, 0x15, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x44, 0x41, 0x54, 0x78,
+    0xda, 0x63, 0x68, 0x60, 0xf8, 0xff, 0x1f, 0x00, 0x05, 0x02, 0x02, 0x7f, 0xc9, 0x00,
+    0xd6, 0x75, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82};
 
 template <size_t N>
 std::string bytes(const unsigned char (&data)[N]) {
@@ -176,7 +183,8 @@ TEST_F(ImageIo, AlphaIsNeitherMultipliedInNorDecoded) {
     const std::string path = write_bytes("rgba.png", bytes(kRgbaPng));
     const PixelBuffer codes = read_pixels(path, false);
     EXPECT_EQ(codes.alpha_channel, 3);
-    EXPECT_EQ(std::get<std::vector<uint8_t>>(codes.data), (std::vector<uint8_t>{190, 193, 150, 42, 255, 0, 128, 0}));
+    EXPECT_EQ(std::get<std::vector<uint8_t>>(codes.data),
+              (std::vector<uint8_t>{190, 193, 150, 42, 255, 0, 128, 0}));
     const Image image = read_image(path);
     EXPECT_NEAR(image.at(0, 0, 0), 0.51491784f, 1e-6);
     EXPECT_NEAR(image.at(0, 0, 3), 42 / 255.0f, 1e-6);
@@ -194,19 +202,25 @@ TEST_F(ImageIo, SixteenBitsBecomeFloats) {
 
 TEST_F(ImageIo, ReadErrorsNameTheFile) {
     const std::string missing = file("missing.exr");
-    EXPECT_EQ(error([&] { read_image(missing); }), "cannot read \"" + missing + "\": there is no such file");
-    EXPECT_NE(error([&] { read_image(folder_.string()); }).find("it is not a file"), std::string::npos);
+    EXPECT_EQ(error([&] { read_image(missing); }),
+              "cannot read \"" + missing + "\": there is no such file");
+    EXPECT_NE(error([&] { read_image(folder_.string()); }).find("it is not a file"),
+              std::string::npos);
     const std::string text = write_bytes("text.exr", "not an image");
     EXPECT_NE(error([&] { read_pixels(text, false); }).find(text), std::string::npos);
-    EXPECT_NE(error([&] { read_image(write_bytes("empty.png", "")); }).find("empty.png"), std::string::npos);
+    EXPECT_NE(error([&] { read_image(write_bytes("empty.png", "")); }).find("empty.png"),
+              std::string::npos);
     // A header that claims far more pixels than the file can hold.
-    EXPECT_NE(error([&] { read_image(write_bytes("huge.pfm", "PF\n60000 60000\n-1.0\nxxxx")); }).find("60000"),
+    EXPECT_NE(error([&] {
+                  read_image(write_bytes("huge.pfm", "PF\n60000 60000\n-1.0\nxxxx"));
+              }).find("60000"),
               std::string::npos);
 }
 
 TEST_F(ImageIo, TruncatedFilesAreErrors) {
     Image image(64, 64, {"R", "G", "B"});
-    for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = to_unit_float(uint32_t(mix64(i)));
+    for (size_t i = 0; i < image.data.size(); ++i)
+        image.data[i] = to_unit_float(uint32_t(mix64(i)));
     for (const char* name : {"a.exr", "a.pfm", "a.hdr", "a.png"}) {
         write_image(file(name), image);
         fs::resize_file(file(name), fs::file_size(file(name)) / 2);
@@ -221,15 +235,22 @@ TEST_F(ImageIo, WritingMakesFolders) {
 
 TEST_F(ImageIo, WriteErrorsNameTheFileAndLeaveNothing) {
     const Image image = sample_image({"R", "G", "B"});
-    EXPECT_NE(error([&] { write_image(file("a.jpg"), image); }).find("must end in .exr"), std::string::npos);
-    EXPECT_NE(error([&] { check_image_extension("noextension"); }).find("noextension"), std::string::npos);
+    EXPECT_NE(error([&] { write_image(file("a.jpg"), image); }).find("must end in .exr"),
+              std::string::npos);
+    EXPECT_NE(error([&] { check_image_extension("noextension"); }).find("noextension"),
+              std::string::npos);
     EXPECT_NO_THROW(check_image_extension("UPPER.EXR"));
     EXPECT_NE(error([&] { write_image(file("a.exr"), Image()); }).find("empty"), std::string::npos);
-    EXPECT_NE(error([&] { write_image(file("a.png"), sample_image({"u", "v"})); }).find("a.png"), std::string::npos);
+    EXPECT_NE(error([&] {
+                  write_image(file("a.png"), sample_image({"u", "v"}));
+              }).find("a.png"),
+              std::string::npos);
     fs::create_directory(file("folder.exr"));
-    EXPECT_NE(error([&] { write_image(file("folder.exr"), image); }).find("there is a folder"), std::string::npos);
+    EXPECT_NE(error([&] { write_image(file("folder.exr"), image); }).find("there is a folder"),
+              std::string::npos);
     write_bytes("plain", "");
-    EXPECT_NE(error([&] { write_image(file("plain/a.exr"), image); }).find("plain/a.exr"), std::string::npos);
+    EXPECT_NE(error([&] { write_image(file("plain/a.exr"), image); }).find("plain/a.exr"),
+              std::string::npos);
     EXPECT_EQ(file_count(), 2u);
 }
 
@@ -259,7 +280,8 @@ TEST(Images, LayersAndColours) {
     Image image;
     add_rgb_layer(image, 2, 1, "", std::vector<Rgb>{Rgb(1, 2, 3), Rgb(4, 5, 6)});
     add_rgb_layer(image, 2, 1, "direct", std::vector<Rgb>{Rgb(7, 8, 9), Rgb(10, 11, 12)});
-    EXPECT_EQ(image.channels, (std::vector<std::string>{"R", "G", "B", "direct.R", "direct.G", "direct.B"}));
+    EXPECT_EQ(image.channels,
+              (std::vector<std::string>{"R", "G", "B", "direct.R", "direct.G", "direct.B"}));
     EXPECT_EQ(image.layers(), (std::vector<std::string>{"", "direct"}));
     EXPECT_EQ(rgb_pixels(image)[1], Rgb(4, 5, 6));
     EXPECT_EQ(rgb_pixels(image, "direct")[0], Rgb(7, 8, 9));

@@ -18,7 +18,8 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 std::vector<Rgb> random_image(size_t n, uint64_t seed) {
     std::vector<Rgb> v(n);
     for (size_t i = 0; i < n; ++i)
-        for (int c = 0; c < 3; ++c) v[i][c] = to_unit_float(uint32_t(mix64(hash_combine(seed, 3 * i + size_t(c)))));
+        for (int c = 0; c < 3; ++c)
+            v[i][c] = to_unit_float(uint32_t(mix64(hash_combine(seed, 3 * i + size_t(c)))));
     return v;
 }
 
@@ -39,7 +40,8 @@ TEST(Metrics, ClosedForm) {
 TEST(Metrics, IdenticalImagesHaveNoError) {
     std::vector<Rgb> r = random_image(100, 1);
     r[5] = {};
-    for (const ImageErrors& e : {image_errors(r, r), image_errors(std::vector<Rgb>(4), std::vector<Rgb>(4))}) {
+    for (const ImageErrors& e :
+         {image_errors(r, r), image_errors(std::vector<Rgb>(4), std::vector<Rgb>(4))}) {
         EXPECT_EQ(e.mse, 0);
         EXPECT_EQ(e.rel_mse, 0);
         EXPECT_EQ(e.rel_mse_trimmed, 0);
@@ -115,7 +117,8 @@ TEST(Metrics, PixelsThatAreNotFiniteAreCounted) {
     const auto map = relative_squared_errors(x, r);
     EXPECT_TRUE(std::isnan(map[3]) && std::isnan(map[4]) && std::isnan(map[5]));
     EXPECT_NEAR(map[0], 1 / 1.01, 1e-6);
-    EXPECT_THROW(image_errors(std::vector<Rgb>(1, Rgb(kNaN)), std::vector<Rgb>(1)), std::invalid_argument);
+    EXPECT_THROW(image_errors(std::vector<Rgb>(1, Rgb(kNaN)), std::vector<Rgb>(1)),
+                 std::invalid_argument);
 }
 
 TEST(Metrics, SizesMustAgree) {
@@ -136,9 +139,11 @@ struct TestPair {
         for (int y = 0; y < kHeight; ++y)
             for (int x = 0; x < kWidth; ++x) {
                 const double u = x, v = y;
-                const double r[3] = {0.5 + 0.5 * std::sin(u / 7 + v / 11), 0.5 + 0.4 * std::cos(u / 17),
+                const double r[3] = {0.5 + 0.5 * std::sin(u / 7 + v / 11),
+                                     0.5 + 0.4 * std::cos(u / 17),
                                      (x / 13 + y / 9) % 2 * 0.8 + 0.1};
-                const double d[3] = {std::sin(u * v), std::cos(u * u + v), std::sin(3 * u + 5 * v * v)};
+                const double d[3] = {std::sin(u * v), std::cos(u * u + v),
+                                     std::sin(3 * u + 5 * v * v)};
                 Rgb a, b, c, e;
                 for (int k = 0; k < 3; ++k) {
                     a[k] = float(r[k]);
@@ -157,14 +162,18 @@ struct TestPair {
 void expect_flip(const FlipResult& flip, double mean, const std::array<float, 5>& pixels) {
     EXPECT_NEAR(flip.mean, mean, 2e-5);
     const int at[5][2] = {{0, 0}, {30, 20}, {59, 39}, {13, 27}, {45, 3}};
-    for (int i = 0; i < 5; ++i) EXPECT_NEAR(flip.map[at[i][1] * kWidth + at[i][0]], pixels[i], 3e-4) << i;
+    for (int i = 0; i < 5; ++i)
+        EXPECT_NEAR(flip.map[at[i][1] * kWidth + at[i][0]], pixels[i], 3e-4) << i;
 }
 
 TEST(Flip, AgreesWithTheAuthorsPackage) {
     const TestPair p;
-    expect_flip(ldr_flip(p.ldr, p.ldr_reference, kWidth, kHeight), 0.2014645, {0.27549f, 0.16353f, 0.30361f, 0.08031f, 0.08876f});
-    expect_flip(ldr_flip(p.ldr, p.ldr_reference, kWidth, kHeight, 30), 0.4044485, {0.34513f, 0.42891f, 0.44427f, 0.19517f, 0.16541f});
-    expect_flip(hdr_flip(p.hdr, p.hdr_reference, kWidth, kHeight), 0.2720372, {0.29764f, 0.29473f, 0.06635f, 0.32879f, 0.26027f});
+    expect_flip(ldr_flip(p.ldr, p.ldr_reference, kWidth, kHeight), 0.2014645,
+                {0.27549f, 0.16353f, 0.30361f, 0.08031f, 0.08876f});
+    expect_flip(ldr_flip(p.ldr, p.ldr_reference, kWidth, kHeight, 30), 0.4044485,
+                {0.34513f, 0.42891f, 0.44427f, 0.19517f, 0.16541f});
+    expect_flip(hdr_flip(p.hdr, p.hdr_reference, kWidth, kHeight), 0.2720372,
+                {0.29764f, 0.29473f, 0.06635f, 0.32879f, 0.26027f});
     const auto exposures = flip_exposures(p.hdr_reference);
     ASSERT_EQ(exposures.size(), 3u);
     EXPECT_NEAR(exposures.front(), -2.782971, 1e-3);

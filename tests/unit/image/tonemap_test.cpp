@@ -36,7 +36,8 @@ TEST(ToneMap, ReinhardMapsWhiteToOneAndKeepsHues) {
     EXPECT_NEAR(c.r / c.g, 2, 1e-5);
     EXPECT_NEAR(c.g / c.b, 2, 1e-5);
     // Without a white point the brightest pixel becomes white.
-    const auto pair = tone_map(std::vector<Rgb>{Rgb(1), Rgb(10)}, {.op = ToneOperator::Reinhard, .exposure = 1});
+    const auto pair =
+        tone_map(std::vector<Rgb>{Rgb(1), Rgb(10)}, {.op = ToneOperator::Reinhard, .exposure = 1});
     EXPECT_NEAR(pair[1].g, 1, 1e-6);
     EXPECT_NEAR(pair[0].g, 2 * (1 + 2 / 400.0) / 3, 1e-6);
     EXPECT_EQ(mapped(Rgb(0), {.op = ToneOperator::Reinhard}), Rgb(0));
@@ -47,7 +48,8 @@ TEST(ToneMap, AcesCurve) {
     // x = 0.6: (2.51 · 0.36 + 0.03 · 0.6) / (2.43 · 0.36 + 0.59 · 0.6 + 0.14)
     EXPECT_NEAR(aces_curve(1), 0.9216 / 1.3688, 1e-6);
     EXPECT_EQ(aces_curve(1e6f), 1);
-    for (const double y : {0.1, 0.5, 0.85}) EXPECT_NEAR(aces_curve(float(inverse_aces_curve(y))), y, 1e-6);
+    for (const double y : {0.1, 0.5, 0.85})
+        EXPECT_NEAR(aces_curve(float(inverse_aces_curve(y))), y, 1e-6);
     for (float x = 0; x < 10; x += 0.1f) EXPECT_LE(aces_curve(x), aces_curve(x + 0.1f));
 }
 
@@ -60,7 +62,8 @@ TEST(ToneMap, InfinityIsWhiteAndNotANumberStays) {
 
 TEST(Magma, IsNearMatplotlibs) {
     // matplotlib.colormaps["magma"] at 0, 1/4, 1/2, 3/4, 1
-    const int codes[5][3] = {{0, 0, 4}, {81, 18, 124}, {183, 55, 121}, {252, 137, 97}, {252, 253, 191}};
+    const int codes[5][3] = {
+        {0, 0, 4}, {81, 18, 124}, {183, 55, 121}, {252, 137, 97}, {252, 253, 191}};
     float before = -1;
     for (int i = 0; i < 5; ++i) {
         const Rgb c = magma(float(i) / 4);

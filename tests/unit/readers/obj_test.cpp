@@ -46,6 +46,21 @@ TEST(Obj, CornersAreUnifiedByAllThreeIndices) {
     EXPECT_EQ(m.normals[3], (Vec3{0, 1, 0}));
 }
 
+TEST(Obj, ManyCornersAtTheSamePositionsStayApart) {
+    constexpr int kCount = 1000;
+    std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    for (int i = 1; i <= kCount; ++i) {
+        const std::string n = std::to_string(i);
+        text += "vt " + n + " 0\nf 1/" + n + " 2/" + n + " 3/" + n + "\n";
+    }
+    const MeshData m = parse(text);
+    ASSERT_EQ(m.positions.size(), size_t(3 * kCount));
+    for (size_t i = 0; i < m.uvs.size(); ++i) {
+        EXPECT_EQ(m.uvs[i].x, float(i / 3 + 1));
+        EXPECT_EQ(m.positions[i].x, i % 3 == 1 ? 1 : 0);
+    }
+}
+
 TEST(Obj, NegativeIndicesCountBackFromHere) {
     const MeshData m = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf -3//-1 -2//-1 -1//-1\n"
                              "v 5 0 0\nv 6 0 0\nv 5 1 0\nf -3//1 -2//1 -1//1\n");

@@ -20,7 +20,8 @@ PixelBuffer test_image() {
     std::vector<float> data;
     for (int y = 0; y < 3; ++y)
         for (int x = 0; x < 4; ++x)
-            for (int v : {(x * x * 5 + y * 3) % 7, 10 * y + x % 3, x * y % 5}) data.push_back(float(v));
+            for (int v : {(x * x * 5 + y * 3) % 7, 10 * y + x % 3, x * y % 5})
+                data.push_back(float(v));
     return float_pixels(4, 3, 3, data);
 }
 
@@ -98,8 +99,8 @@ TEST(Bitmap, AgreesWithMitsuba3) {
         if (l.to_uv) options.to_uv = UvTransform(test_to_uv());
         const BitmapTexture texture(image, options);
         const Rgb c = texture.eval(l.uv);
-        SCOPED_TRACE(std::string(l.filter) + " " + std::string(l.wrap) + " at " + std::to_string(l.uv.x) + ", " +
-                     std::to_string(l.uv.y));
+        SCOPED_TRACE(std::string(l.filter) + " " + std::string(l.wrap) + " at " +
+                     std::to_string(l.uv.x) + ", " + std::to_string(l.uv.y));
         for (int i = 0; i < 3; ++i) EXPECT_NEAR(c[i], l.expected[i], 1e-4);
         EXPECT_NEAR(texture.eval_scalar(l.uv), luminance(l.expected), 1e-4);
     }
@@ -117,10 +118,12 @@ TEST(Bitmap, GradientIsTheSlopeOfTheBilinearSurface) {
             const Vec2 uv = {std::fmod(0.754877666f * float(i), 3.0f) - 1.2f,
                              std::fmod(0.569840291f * float(i), 3.0f) - 1.3f};
             const float h = 1e-3f;
-            const auto slope = [&](Vec2 d) {  // one-sided ones agree where no edge of a texel is near
-                const float here = texture.eval_scalar(uv);
-                return Vec2{(texture.eval_scalar(uv + d) - here) / h, (here - texture.eval_scalar(uv - d)) / h};
-            };
+            const auto slope =
+                [&](Vec2 d) {  // one-sided ones agree where no edge of a texel is near
+                    const float here = texture.eval_scalar(uv);
+                    return Vec2{(texture.eval_scalar(uv + d) - here) / h,
+                                (here - texture.eval_scalar(uv - d)) / h};
+                };
             const Vec2 u = slope({h, 0}), v = slope({0, h}), g = texture.gradient(uv);
             if (std::fabs(u.x - u.y) + std::fabs(v.x - v.y) > 0.2f) continue;
             ++checked;
@@ -145,14 +148,18 @@ TEST(Bitmap, MeanIsTheAverageOfLookups) {
                 const Rgb c = texture.eval({(float(i % n) + 0.5f) / n, (float(i / n) + 0.5f) / n});
                 for (int k = 0; k < 3; ++k) sum[k] += c[k];
             }
-            for (int k = 0; k < 3; ++k) EXPECT_NEAR(texture.mean()[k], sum[k] / (n * n), moved ? 2e-2 : 1e-3);
+            for (int k = 0; k < 3; ++k)
+                EXPECT_NEAR(texture.mean()[k], sum[k] / (n * n), moved ? 2e-2 : 1e-3);
         }
     }
 }
 
 TEST(Bitmap, DecodesByKindOfPixels) {
     // sRGB code 188 is 0.50289 linear; alpha and raw data are not decoded.
-    const PixelBuffer codes = {.width = 1, .height = 1, .channels = 4, .data = std::vector<uint8_t>{188, 0, 255, 51},
+    const PixelBuffer codes = {.width = 1,
+                               .height = 1,
+                               .channels = 4,
+                               .data = std::vector<uint8_t>{188, 0, 255, 51},
                                .alpha_channel = 3};
     const Rgb c = BitmapTexture(codes, {}).eval({0.5f, 0.5f});
     EXPECT_NEAR(c.r, 0.502886f, 1e-5);
@@ -164,7 +171,8 @@ TEST(Bitmap, DecodesByKindOfPixels) {
     EXPECT_EQ(blue.eval({0.5f, 0.5f}), Rgb(1));
     EXPECT_EQ(blue.eval_scalar({0.5f, 0.5f}), 1);
 
-    const PixelBuffer half = {.width = 1, .height = 1, .channels = 1, .data = std::vector<Half>{{0x3555}}};
+    const PixelBuffer half = {
+        .width = 1, .height = 1, .channels = 1, .data = std::vector<Half>{{0x3555}}};
     EXPECT_NEAR(BitmapTexture(half, {}).eval_scalar({0, 0}), 0.333251953f, 1e-8);
     const PixelBuffer grey_alpha = float_pixels(1, 1, 2, {0.25f, 0.5f});
     EXPECT_EQ(BitmapTexture(grey_alpha, {}).eval({0, 0}), Rgb(0.25f));
@@ -172,7 +180,8 @@ TEST(Bitmap, DecodesByKindOfPixels) {
 
 TEST(Bitmap, SurvivesCoordinatesThatAreNotFinite) {
     const PixelBuffer image = test_image();
-    for (const float u : {kInf, -kInf, std::numeric_limits<float>::quiet_NaN(), 1e30f, -1e-30f, -1e30f})
+    for (const float u :
+         {kInf, -kInf, std::numeric_limits<float>::quiet_NaN(), 1e30f, -1e-30f, -1e30f})
         for (TextureWrap wrap : kWraps)
             for (TextureFilter filter : {TextureFilter::Bilinear, TextureFilter::Nearest}) {
                 const BitmapTexture texture(image, {.filter = filter, .wrap = wrap});
@@ -187,7 +196,8 @@ TEST(Bitmap, ResolutionFollowsToUv) {
     BitmapTexture(image, {}).resolution(width, height);
     EXPECT_EQ(width, 4);
     EXPECT_EQ(height, 3);
-    const Transform quarter_turn_and_scale = Transform::rotate({0, 0, 1}, 90) * Transform::scale({20, 10, 1});
+    const Transform quarter_turn_and_scale =
+        Transform::rotate({0, 0, 1}, 90) * Transform::scale({20, 10, 1});
     BitmapTexture(image, {.to_uv = UvTransform(quarter_turn_and_scale)}).resolution(width, height);
     EXPECT_EQ(width, 60);
     EXPECT_EQ(height, 40);

@@ -28,9 +28,10 @@ public:
         const Params params(scene_, object);
         for (const TextureEntry& e : texture_registry())
             if (params.object().type == e.info.name) {
-                check_params(scene_, object, e.info, [](const SourceLocation& where, const std::string& message) {
-                    throw SceneError(where, message);
-                });
+                check_params(scene_, object, e.info,
+                             [](const SourceLocation& where, const std::string& message) {
+                                 throw SceneError(where, message);
+                             });
                 made_.push_back(e.make(params, *this));
                 return made_.back().get();
             }
@@ -43,7 +44,8 @@ private:
     std::vector<std::unique_ptr<Texture>> made_;
 };
 
-SceneObject object(const std::string& type, std::vector<std::pair<std::string, ParamValue>> params) {
+SceneObject object(const std::string& type,
+                   std::vector<std::pair<std::string, ParamValue>> params) {
     SceneObject o;
     o.category = "texture";
     o.type = type;
@@ -55,7 +57,8 @@ class TextureRegistry : public testing::Test {
 protected:
     void SetUp() override {
         const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-        folder_ = std::filesystem::path(testing::TempDir()) / (std::string("etendue-texture-") + test->name());
+        folder_ = std::filesystem::path(testing::TempDir()) /
+                  (std::string("etendue-texture-") + test->name());
         std::filesystem::create_directories(folder_);
         scene_.search_paths = {(folder_ / "elsewhere").string(), folder_.string()};
     }
@@ -75,7 +78,8 @@ protected:
         return "";
     }
     void write(const std::string& name, std::initializer_list<Rgb> row) {
-        write_image((folder_ / name).string(), rgb_image(int(row.size()), 1, std::vector<Rgb>(row)));
+        write_image((folder_ / name).string(),
+                    rgb_image(int(row.size()), 1, std::vector<Rgb>(row)));
     }
 
     std::filesystem::path folder_;
@@ -84,8 +88,10 @@ protected:
 };
 
 TEST_F(TextureRegistry, CheckerboardHasMitsubasSquares) {
-    const Texture& t = build(object("checkerboard", {{"color0", Rgb(1, 0, 0)}, {"color1", Rgb(0, 0, 1)}}));
-    const Vec2 first[] = {{0.2f, 0.2f}, {0.7f, 0.7f}, {1.2f, 0.2f}, {-0.2f, -0.2f}, {2.2f, -0.7f}, {0.5f, 0.2f}, {}};
+    const Texture& t =
+        build(object("checkerboard", {{"color0", Rgb(1, 0, 0)}, {"color1", Rgb(0, 0, 1)}}));
+    const Vec2 first[] = {
+        {0.2f, 0.2f}, {0.7f, 0.7f}, {1.2f, 0.2f}, {-0.2f, -0.2f}, {2.2f, -0.7f}, {0.5f, 0.2f}, {}};
     const Vec2 second[] = {{0.7f, 0.2f}, {0.2f, 0.7f}, {-0.2f, 0.2f}};
     for (const Vec2 uv : first) EXPECT_EQ(t.eval(uv), Rgb(1, 0, 0)) << uv.x << ", " << uv.y;
     for (const Vec2 uv : second) EXPECT_EQ(t.eval(uv), Rgb(0, 0, 1)) << uv.x << ", " << uv.y;
@@ -140,17 +146,20 @@ TEST_F(TextureRegistry, BitmapTakesItsParameters) {
                                                   {"filter_type", std::string("nearest")},
                                                   {"wrap_mode", std::string("clamp")}}));
     EXPECT_NEAR(srgb.eval_scalar({7, 0}), 0.5f, 3e-3);
-    const Texture& raw = build(object("bitmap", {{"filename", (folder_ / "ramp.png").string()}, {"raw", true}}));
+    const Texture& raw =
+        build(object("bitmap", {{"filename", (folder_ / "ramp.png").string()}, {"raw", true}}));
     EXPECT_NEAR(raw.eval_scalar({0.75f, 0}), 188 / 255.0f, 1e-6);
 }
 
 TEST_F(TextureRegistry, MissingFilesAreExplained) {
     write("leaves.png", {Rgb(0)});
     const std::string message = error(object("bitmap", {{"filename", std::string("leafs.png")}}));
-    EXPECT_NE(message.find("scene.xml:7: there is no file \"leafs.png\""), std::string::npos) << message;
+    EXPECT_NE(message.find("scene.xml:7: there is no file \"leafs.png\""), std::string::npos)
+        << message;
     EXPECT_NE(message.find((folder_ / "elsewhere").string()), std::string::npos) << message;
     EXPECT_NE(message.find("did you mean \"leaves.png\""), std::string::npos) << message;
-    EXPECT_NE(error(object("bitmap", {})).find("needs the parameter \"filename\""), std::string::npos);
+    EXPECT_NE(error(object("bitmap", {})).find("needs the parameter \"filename\""),
+              std::string::npos);
 }
 
 TEST_F(TextureRegistry, BadImagesAreExplained) {
@@ -160,16 +169,20 @@ TEST_F(TextureRegistry, BadImagesAreExplained) {
     EXPECT_NE(message.find("broken.png"), std::string::npos) << message;
     write("nan.exr", {Rgb(std::numeric_limits<float>::quiet_NaN()), Rgb(1)});
     message = error(object("bitmap", {{"filename", std::string("nan.exr")}}));
-    EXPECT_NE(message.find("3 values that are infinite or not a number"), std::string::npos) << message;
+    EXPECT_NE(message.find("3 values that are infinite or not a number"), std::string::npos)
+        << message;
     write("opaque.png", {Rgb(1)});
-    message = error(object("bitmap", {{"filename", std::string("opaque.png")}, {"channel", std::string("a")}}));
+    message = error(
+        object("bitmap", {{"filename", std::string("opaque.png")}, {"channel", std::string("a")}}));
     EXPECT_NE(message.find("has no alpha"), std::string::npos) << message;
 }
 
 TEST_F(TextureRegistry, NegativeColoursCountAsZeroUnlessRaw) {
     write("negative.exr", {Rgb(-1, 2, -3)});
-    EXPECT_EQ(build(object("bitmap", {{"filename", std::string("negative.exr")}})).eval({0, 0}), Rgb(0, 2, 0));
-    EXPECT_EQ(build(object("bitmap", {{"filename", std::string("negative.exr")}, {"raw", true}})).eval({0, 0}),
+    EXPECT_EQ(build(object("bitmap", {{"filename", std::string("negative.exr")}})).eval({0, 0}),
+              Rgb(0, 2, 0));
+    EXPECT_EQ(build(object("bitmap", {{"filename", std::string("negative.exr")}, {"raw", true}}))
+                  .eval({0, 0}),
               Rgb(-1, 2, -3));
 }
 

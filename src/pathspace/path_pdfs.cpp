@@ -1,0 +1,93 @@
+#include "pathspace/path_pdfs.h"
+
+namespace etendue {
+namespace {
+
+/// Unit direction from a to b; at infinity their own.
+Vec3 direction(const Vertex& a, const Vertex& b) {
+    if (b.is_infinite) return b.p;
+    if (a.is_infinite) return -a.p;
+    return normalize(b.p - a.p);
+}
+
+double inverse_square(const Vertex& a, const Vertex& b) {
+    return a.is_infinite || b.is_infinite ? 1.0 : 1.0 / double(length2(b.p - a.p));
+}
+
+}  // namespace
+
+double PathPdfs::density(const Technique& q) const {
+    const int n = vertices();
+    if (q.vertices() != n) return 0;
+    if (q.s > 0 && is_delta[q.s - 1] && q.t > 0) return 0;
+    if (q.s < n && is_delta[q.s] && q.s > 0) return 0;
+    if (q.strategy == Strategy::Hit && !can_hit_emitter) return 0;
+    double p = 1;
+    for (int i = 0; i < q.s; ++i) p *= q.strategy == Strategy::NextEvent && i == 0 ? next_event : light[i];
+    for (int i = q.s; i < n; ++i) p *= eye[i];
+    return p;
+}
+
+double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {
+    double sum = 0, own = 0;
+    for (int s = 0; s <= pdfs.vertices(); ++s) {
+        const Technique q = connection_technique(s, pdfs.vertices() - s);
+        const double np = counts.of(q.strategy) > 0 ? sqr(counts.of(q.strategy) * pdfs.density(q)) : 0.0;
+        sum += np;
+        if (q == technique) own = np;
+    }
+    return own / sum;
+}
+
+std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t, const Vertex* emitter_point, const Vertex* lens_point) {
+    std::vector<const Vertex*> x;
+    for (int i = 0; i < s; ++i) x.push_back(i == 0 && emitter_point ? emitter_point : &y[i]);
+    for (int i = t - 1; i >= 0; --i) x.push_back(i == 0 && lens_point ? lens_point : &z[i]);
+    return x;
+}
+
+PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x, const std::vector<bool>& delta) {
+    const int n = int(x.size()), k = n - 1;
+    PathValue v;
+    PathPdfs& p = v.pdfs;
+    p.light.assign(size_t(n), 1);
+    p.eye.assign(size_t(n), 1);
+    p.is_delta = delta;
+
+    // Emission: x_0 and the direction to x_1.
+    const Emitter& emitter = *x[0]->emitter;
+    const Vec3 w0 = direction(*x[0], *x[1]);
+    const Emitter::Emission emission = emitter.eval_emission(x[0]->ng, x[0]->uv, w0);
+    const EmitterHit hit = emitter.is_infinite() ? emitter.eval_infinite(x[0]->p) : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->prim, w0);
+    p.can_hit_emitter = !emitter.is_delta();
+    p.light[0] = p.next_event = emitter.selection_pmf;
+    if (p.can_hit_emitter) {
+        p.light[0] *= hit.pdf_y0;
+        p.next_event *= hit.pdf;
+    }
+    p.light[1] = to_area(emission.pdf_d, *x[0], *x[1]);
+    v.f = emission.Le_cos;
+
+    // Sensor: x_k and the direction to x_{k-1}.
+    const Sensor& sensor = scene.sensor();
+    const Vec3 wk = direction(*x[k], *x[k - 1]);
+    const float pdf_dir = sensor.pdf_direction(x[k]->p, wk);
+    p.eye[k] = x[k]->pdf_fwd;
+    p.eye[k - 1] = to_area(pdf_dir, *x[k], *x[k - 1]);
+    v.f *= pdf_dir * x[k]->pdf_fwd;  // W_e |cos θ|
+
+    for (int i = 1; i < k; ++i) {
+        const Vec3 to_light = direction(*x[i], *x[i - 1]), to_eye = direction(*x[i], *x[i + 1]);
+        if (delta[i]) continue;
+        const BsdfEval from_light = x[i]->bsdf.eval(to_light, to_eye, TransportMode::Importance);
+        const BsdfEval from_eye = x[i]->bsdf.eval(to_eye, to_light, TransportMode::Radiance);
+        p.light[i + 1] = to_area(from_light.pdf, *x[i], *x[i + 1]);
+        p.eye[i - 1] = to_area(from_eye.pdf, *x[i], *x[i - 1]);
+        // f̃·|cos| toward the eye; the other cosines follow as the loop goes on: each edge is G = |cos||cos| / d².
+        v.f *= from_light.f * float(inverse_square(*x[i - 1], *x[i]) * abs_dot(x[i]->ng, to_light));
+    }
+    v.f *= float(inverse_square(*x[k - 1], *x[k]));
+    return v;
+}
+
+}  // namespace etendue

@@ -1,0 +1,41 @@
+#pragma once
+// The slow definitions: contribution, densities and weight of a finished path, from its vertices alone. What joins and
+// mis.h compute incrementally must equal these; tests hold them together, and so can whoever adds a technique.
+
+#include <span>
+#include <vector>
+
+#include "pathspace/vertex.h"
+#include "pathspace/technique.h"
+
+namespace etendue {
+
+/// Densities of every vertex of a full path x_0 (emitter) … x_k (lens), from either side, in the conventions of Vertex.
+struct PathPdfs {
+    std::vector<double> light, eye;
+    std::vector<bool> is_delta;  ///< Events.
+    double next_event = 0;       ///< p_NE(x_0) as chosen for x_1.
+    bool can_hit_emitter = true;
+
+    int vertices() const { return int(light.size()); }
+    /// Density of the path as the technique makes it; 0 where it cannot.
+    double density(const Technique& technique) const;
+};
+
+/// Power heuristic with β = 2 by the explicit sum over all techniques.
+double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts);
+
+/// The vertices of the path that joins s light to t eye vertices, from x_0 to x_k. A technique that samples its own end
+/// point (next event, splat) brings it as `emitter_point` or `lens_point`.
+std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t, const Vertex* emitter_point = nullptr,
+                                         const Vertex* lens_point = nullptr);
+
+/// Measurement contribution f(x̄), without visibility and attenuation, and the densities. Events at the vertices of
+/// `delta` (one flag a vertex) are delta events: their BSDF and densities are taken as 1, as both cancel.
+struct PathValue {
+    Rgb f;
+    PathPdfs pdfs;
+};
+PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x, const std::vector<bool>& delta);
+
+}  // namespace etendue

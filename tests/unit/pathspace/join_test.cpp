@@ -1,0 +1,174 @@
+// Joins and weights against the slow definitions, on random paths of scenes with all kinds of events.
+
+#include <gtest/gtest.h>
+
+#include "pathspace/join.h"
+#include "pathspace/path_pdfs.h"
+#include "test_scenes.h"
+
+namespace etendue {
+namespace {
+
+constexpr int kPixels = 8;
+
+struct Case {
+    const char* name;
+    std::string xml;
+};
+
+std::vector<Case> cases() {
+    using namespace test;
+    const std::string spheres = sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) + sphere("0.4,-0.65,0.3", "0.3", kRoughGlass);
+    return {
+        {"mixed", mixed_room(front_camera(kPixels))},
+        {"thinlens", mixed_room(lens_camera(kPixels))},
+        {"orthographic", mixed_room(sensor("0,0,3.4", "0,0,0", kPixels, "", "", "orthographic"))},
+        {"point", front_camera(kPixels) + room() + spheres + "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0\"/></emitter>"},
+        {"spot", front_camera(kPixels) + room() + spheres +
+                     "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"60\"/><transform name=\"to_world\"><lookat origin=\"0,0.9,0\" target=\"0,0,0.01\" up=\"1,0,0\"/></transform></emitter>"},
+        {"constant", front_camera(kPixels) + room() + spheres + "<emitter type=\"constant\"/>"},
+        {"directional", front_camera(kPixels) + room() + spheres + "<emitter type=\"directional\"><vector name=\"direction\" value=\"0.2,-0.4,-1\"/></emitter>"},
+        {"several", mixed_room(front_camera(kPixels)) + "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>" +
+                        "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>"},
+    };
+}
+
+class Joins : public testing::TestWithParam<Case> {
+protected:
+    Joins() : scene(test::build(GetParam().xml)), film(scene.film(), scene.filter()), sampler(SamplerKind::Independent, 7) {
+        const float N = kPixels * kPixels;
+        counts = {.hit = 1, .next_event = 1, .connect = 1, .splat = N, .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
+    }
+
+    /// Both sub-paths of sample `index`, without roulette.
+    void trace(uint32_t index) {
+        sampler.start(index, index % (kPixels * kPixels));
+        const WalkOptions walk{6, 1000};
+        start_light_path(scene, sampler, y, stats);
+        while (y.size() >= 2 && extend<TransportMode::Importance>(scene, sampler, walk, counts, y, stats)) {}
+        start_eye_path(scene, film, index % (kPixels * kPixels), sampler, z, stats);
+        while (z.size() >= 2 && extend<TransportMode::Radiance>(scene, sampler, walk, counts, z, stats)) {}
+    }
+
+    /// Compares a join with the path's own definition. End points of the join are connectible by any other event too.
+    void check(const Join& join, const std::vector<const Vertex*>& x, double p_sampled) {
+        const int n = int(x.size());
+        std::vector<bool> delta(x.size(), false);
+        for (int i = 0; i < n; ++i) {
+            const bool is_end = i == join.technique.s - 1 || i == join.technique.s;
+            delta[size_t(i)] = !is_end && x[size_t(i)]->is_delta;
+        }
+        for (bool d : delta) if (d) return;  // densities of delta events are checked by the weights' agreement below
+        const PathValue value = evaluate_path(scene, x, delta);
+        const double p = value.pdfs.density(join.technique);
+        ASSERT_GT(p, 0);
+        EXPECT_NEAR(p_sampled / p, 1, 2e-3) << "density s=" << join.technique.s << " t=" << join.technique.t;
+        for (int c = 0; c < 3; ++c) {
+            const double expected = value.f[c] / p;
+            EXPECT_NEAR(join.contribution[c], expected, 2e-3 * expected + 1e-12) << "C s=" << join.technique.s << " t=" << join.technique.t;
+        }
+        EXPECT_NEAR(join.mis_weight, mis_weight(value.pdfs, join.technique, counts), 2e-3)
+            << "weight s=" << join.technique.s << " t=" << join.technique.t;
+        ++checked;
+    }
+
+    static double density_of(const SubPath& path, int count) {
+        double p = 1;
+        for (int i = 0; i < count; ++i) p *= path[i].pdf_fwd;
+        return p;
+    }
+
+    Scene scene;
+    Film film;
+    Sampler sampler;
+    TechniqueCounts counts;
+    SubPath y, z;
+    RenderStats stats;
+    int checked = 0;
+};
+
+TEST_P(Joins, EqualTheDefinition) {
+    for (uint32_t index = 0; index < 400 && !HasFatalFailure(); ++index) {
+        trace(index);
+        for (int s = 2; s <= y.size(); ++s)
+            for (int t = 2; t <= z.size(); ++t)
+                if (const auto j = join_connect(scene, y, s, z, t, counts))
+                    check(*j, path_vertices(y, s, z, t), density_of(y, s) * density_of(z, t));
+        for (int t = 2; t <= z.size(); ++t)
+            for_each_hit(scene, z, t, counts, [&](const Join& j) {
+                Vertex x0 = z[t - 1];
+                if (z[t - 1].is_infinite) x0.emitter = scene.infinite_emitters().front();
+                if (z[t - 1].is_infinite && scene.infinite_emitters().size() > 1) return;
+                auto x = path_vertices(y, 0, z, t);
+                x[0] = &x0;
+                check(j, x, density_of(z, t));
+            });
+        for (int t = 2; t <= z.size(); ++t) {
+            if (z[t - 1].kind != Vertex::Kind::Surface) continue;
+            if (const auto j = join_next_event(scene, z, t, sampler, counts)) {
+                Vertex x0;
+                x0.kind = Vertex::Kind::Emitter;
+                x0.p = j->b;
+                x0.ng = j->ng_b;
+                x0.is_infinite = j->to_infinity;
+                for (const auto& e : scene.emitters())
+                    if (e->is_infinite() == x0.is_infinite && e->is_area() == (length2(x0.ng) > 0)) x0.emitter = e.get();
+                if (!x0.emitter->is_area()) x0.ng = x0.is_infinite ? -x0.p : normalize(z[t - 1].p - x0.p);
+                x0.has_cosine = x0.emitter->is_area();
+                const auto x = path_vertices(y, 1, z, t, &x0);
+                const PathValue v = evaluate_path(scene, x, std::vector<bool>(x.size(), false));
+                check(*j, x, v.pdfs.next_event * density_of(z, t));
+            }
+        }
+        for (int s = 1; s <= y.size(); ++s)
+            if (const auto j = join_splat(scene, y, s, sampler, counts)) {
+                Vertex lens;
+                lens.kind = Vertex::Kind::Sensor;
+                lens.is_infinite = scene.sensor().is_orthographic();
+                const auto again = scene.sensor().sample_connection(y[s - 1].p, y[s - 1].is_infinite, {0.5f, 0.5f});
+                lens.ng = again->ng;
+                lens.p = lens.is_infinite ? -again->ng : j->a;
+                lens.pdf_fwd = again->pdf_pos;
+                check(*j, path_vertices(y, s, z, 1, nullptr, &lens), density_of(y, s) * lens.pdf_fwd);
+            }
+    }
+    EXPECT_GT(checked, 500);
+}
+
+/// With delta events the stored discrete probabilities enter; then the weights of all techniques that can make a path,
+/// each as computed by the technique itself from its own split of the same vertices, must sum to one.
+TEST_P(Joins, StoredSumsEqualTheExplicitSum) {
+    int compared = 0;
+    for (uint32_t index = 0; index < 300; ++index) {
+        trace(index);
+        for (int t = 2; t <= z.size(); ++t) {
+            if (z[t - 1].kind != Vertex::Kind::Surface || !z[t - 1].may_connect) continue;
+            for (int s = 2; s <= y.size(); ++s) {
+                const auto j = join_connect(scene, y, s, z, t, counts);
+                if (!j) continue;
+                // Explicit densities: those the walks stored, and the four that the connection defines.
+                const auto x = path_vertices(y, s, z, t);
+                const int n = s + t;
+                std::vector<bool> delta(x.size());
+                for (int i = 0; i < n; ++i) delta[i] = i != s - 1 && i != s && x[i]->is_delta;
+                PathPdfs p = evaluate_path(scene, x, delta).pdfs;
+                for (int i = 0; i < s; ++i) {
+                    p.light[i] = y[i].pdf_fwd;
+                    if (i < s - 2) p.eye[i] = y[i].pdf_rev;
+                }
+                for (int i = 0; i < t; ++i) {
+                    p.eye[n - 1 - i] = z[i].pdf_fwd;
+                    if (i < t - 2) p.light[n - 1 - i] = z[i].pdf_rev;
+                }
+                EXPECT_NEAR(j->mis_weight, mis_weight(p, j->technique, counts), 1e-4);
+                ++compared;
+            }
+        }
+    }
+    EXPECT_GT(compared, 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Joins, testing::ValuesIn(cases()), [](const auto& p) { return std::string(p.param.name); });
+
+}  // namespace
+}  // namespace etendue
