@@ -59,6 +59,16 @@ BsdfEval eval_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, Vec3 wi, Trans
     return e;
 }
 
+/// eval_component() of a diffuse lobe, which needs the normals alone: most evaluations are of this kind.
+BsdfEval eval_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe, Vec3 wo, Vec3 wi, TransportMode mode) {
+    const Vec3 ns = c.frame.n;
+    const float side = std::copysign(1.0f, dot(ng, ns));
+    const float cos_o = dot(wo, ns), cos_i = dot(wi, ns), cos_og = dot(wo, ng) * side, cos_ig = dot(wi, ng) * side;
+    if (!(cos_o > 0 && cos_i > 0 && cos_og > 0 && cos_ig > 0)) return {};
+    const float factor = mode == TransportMode::Radiance ? cos_i : cos_o * cos_ig / cos_og;
+    return {lobe.reflectance * (factor * c.weight * kInvPi), cos_i * c.weight * kInvPi, cos_o * c.weight * kInvPi};
+}
+
 /// As if `c` were chosen for certain.
 std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, float u_lobe,
                                            Vec2 u, TransportMode mode) {
@@ -87,6 +97,8 @@ void add(BsdfEval& sum, const BsdfEval& e) {
 }  // namespace
 
 BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
+    if (!first_.next)
+        if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe)) return eval_diffuse(ng_, first_, *diffuse, wo, wi, mode);
     BsdfEval sum = eval_component(ng_, first_, wo, wi, mode);
     for (const BsdfComponent* c = first_.next; c; c = c->next)
         add(sum, eval_component(ng_, *c, wo, wi, mode));
@@ -113,12 +125,6 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     s->pdf = sum.pdf;
     s->pdf_rev = sum.pdf_rev;
     return s;
-}
-
-bool Bsdf::has_smooth() const {
-    for (const BsdfComponent* c = &first_; c; c = c->next)
-        if (std::visit([](const auto& l) { return l.has_smooth(); }, c->lobe)) return true;
-    return false;
 }
 
 bool Bsdf::has_delta() const {

@@ -34,7 +34,6 @@ struct BsdfComponent {
 class Bsdf {
 public:
     Bsdf() = default;
-    Bsdf(Vec3 ng, const BsdfComponent& first) : ng_(ng), first_(first) {}
 
     /// Path-space scattering value for the edge pair: f̃(…)·|wi·ng|, where f̃ is the radiance BSDF for light arriving
     /// from the light's side and leaving to the eye's, corrected for shading normals; with pdfs in solid angle.
@@ -44,7 +43,8 @@ public:
     /// A direction with weight f̃·|wi·ng| / pdf; nothing where the walk ends.
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const;
 
-    bool has_smooth() const;
+    /// Whether some lobe is smooth, so that connections can be made here.
+    bool has_smooth() const { return has_smooth_; }
     bool has_delta() const;
     /// α of the sharpest smooth lobe, 0 where there is only a delta one.
     float roughness() const;
@@ -52,7 +52,10 @@ public:
     Vec3 shading_normal() const { return first_.frame.n; }
 
 private:
+    friend class ComponentList;
+
     Vec3 ng_;
+    bool has_smooth_ = false;
     BsdfComponent first_;
 };
 

@@ -55,21 +55,43 @@ public:
     /// Average reflectance for `info` and for heuristics.
     virtual Rgb mean_albedo() const = 0;
 
-    Bsdf bsdf(const SurfacePoint& point, ComponentArena& arena) const;
+    /// Makes the BSDF at `point` in place; further components go to the arena.
+    void make_bsdf(const SurfacePoint& point, ComponentArena& arena, Bsdf& out) const;
+    Bsdf bsdf(const SurfacePoint& point, ComponentArena& arena) const {
+        Bsdf out;
+        make_bsdf(point, arena, out);
+        return out;
+    }
 };
 
-/// Gathers components while a material tree is walked, first one inline and the rest in the arena.
+/// Gathers components while a material tree is walked: the first in the Bsdf itself, the rest in the arena.
 class ComponentList {
 public:
-    explicit ComponentList(ComponentArena& arena) : arena_(&arena) {}
-    void add(const Frame& frame, const Lobe& lobe, float weight);
-    bool empty() const { return count_ == 0; }
-    const BsdfComponent& first() const { return first_; }
+    ComponentList(Vec3 ng, ComponentArena& arena, Bsdf& out) : arena_(&arena), out_(&out) {
+        out.ng_ = ng;
+        out.has_smooth_ = false;
+        out.first_.weight = 0;
+        out.first_.next = nullptr;
+    }
+    template <class L>
+    void add(const Frame& frame, const L& lobe, float weight) {
+        if (!(weight > 0)) return;
+        out_->has_smooth_ |= lobe.has_smooth();
+        BsdfComponent& first = out_->first_;
+        if (is_empty_) {
+            first.frame = frame;
+            first.lobe.template emplace<L>(lobe);
+            first.weight = weight;
+            is_empty_ = false;
+        } else {
+            first.next = arena_->keep({.frame = frame, .lobe = lobe, .weight = weight, .next = first.next});
+        }
+    }
 
 private:
     ComponentArena* arena_;
-    BsdfComponent first_;
-    int count_ = 0;
+    Bsdf* out_;
+    bool is_empty_ = true;
 };
 
 /// What a material's maker may ask of the scene builder.

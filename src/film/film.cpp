@@ -60,6 +60,7 @@ Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter)
       filter_(filter),
       eye_(geometry.pixel_count()),
       moments_(geometry.pixel_count()),
+      expected_(geometry.pixel_count()),
       previous_(geometry.pixel_count()) {}
 
 void Film::add_splat(Vec2 point, Rgb value) {
@@ -98,7 +99,8 @@ void Film::end_pass() {
             }
             const float y = luminance(v);
             luminance_sum[chunk] += y;
-            total[chunk] += luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2])));
+            expected_[i] = luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / float(passes_);
+            total[chunk] += expected_[i];
             if (!second) previous_[i] = y;
             else previous_[i] = sqr(previous_[i] - y);
         }
@@ -106,16 +108,15 @@ void Film::end_pass() {
     double sum = 0, mean = 0;
     for (uint64_t c = 0; c < chunks; ++c) sum += luminance_sum[c], mean += total[c];
     pass_means_.push_back(sum / double(n));
-    mean /= double(n) * double(passes_);
-    if (!second) return;
-    // Half the squared difference of two passes estimates the variance of one, whatever the passes share within.
+    mean /= double(n);
     for_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
-            const Moments& m = moments_[i];
-            const double y = luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / double(passes_);
-            pair_sum[chunk] += 0.5 * previous_[i] / (y * y + 0.01 * mean * mean + 1e-30);
+            // Half the squared difference of two passes estimates the variance of one, whatever they share within.
+            if (second) pair_sum[chunk] += 0.5 * previous_[i] / (sqr(double(expected_[i])) + 0.01 * mean * mean + 1e-30);
+            expected_[i] = std::max(expected_[i], float(0.1 * mean));
         }
     });
+    if (!second) return;
     double pair = 0;
     for (double p : pair_sum) pair += p;
     pair_errors_.push_back(pair / double(n));

@@ -104,6 +104,16 @@ public:
     void end_pass();
     uint64_t passes() const { return passes_; }
 
+    /// Luminance that earlier passes lead to expect of a pixel, at least a tenth of the image's mean; 0 in the first pass.
+    /// It does not depend on the pass in flight.
+    float expected_luminance(uint64_t pixel) const { return expected_[pixel]; }
+    /// The same at a film point (clamped to the crop).
+    float expected_luminance(Vec2 point) const {
+        const int x = std::clamp(int(point.x) - geometry_.crop_x, 0, geometry_.crop_width - 1);
+        const int y = std::clamp(int(point.y) - geometry_.crop_y, 0, geometry_.crop_height - 1);
+        return expected_[uint64_t(y) * geometry_.crop_width + x];
+    }
+
     /// Mean of all passes.
     std::vector<Rgb> image() const;
     /// Variance of that mean, per pixel and channel; zero with fewer than two passes.
@@ -128,6 +138,7 @@ private:
     std::unique_ptr<SplatBuffer> splats_;  ///< Made by the first pass that has light paths.
     float splat_scale_ = 0;
     std::vector<Moments> moments_;
+    std::vector<float> expected_;
     std::vector<float> previous_;  ///< Luminance of the last even pass, for the spread between neighbours.
     std::vector<double> pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.
     std::vector<double> pass_means_;

@@ -1,14 +1,16 @@
 // Bidirectional path tracing [Veach & Guibas 1994; Lafortune & Willems 1993]: all techniques C(s,t), combined by the power
-// heuristic. Unbiased.
+// heuristic. Unbiased. Joins that will add little are thinned by roulette before their shadow ray.
 
 #include "integrator/bdpt.h"
+
+#include <stdexcept>
 
 namespace etendue {
 namespace {
 
 class BdptIntegrator final : public Integrator {
 public:
-    explicit BdptIntegrator(const DepthOptions& depth) : depth_(depth) {}
+    BdptIntegrator(const DepthOptions& depth, float roulette) : depth_(depth), roulette_(roulette) {}
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const float N = float(c.light_paths);
@@ -49,25 +51,47 @@ private:
         }
     }
 
-    static void add_if_visible(const SampleContext& c, const std::optional<Join>& j, Workspace& work) {
+    void add_if_visible(const SampleContext& c, const std::optional<Join>& j, Workspace& work) const {
         if (!j) return;
+        const bool is_splat = j->technique.t <= 1;
+        Rgb contribution = j->contribution;
+        if (roulette_ > 0) {
+            const float expected = is_splat ? c.film.expected_luminance(j->film) : c.film.expected_luminance(c.pixel);
+            const float share = j->mis_weight * (is_splat ? c.splat_scale : std::fabs(work.z.film_weight));
+            const float q = join_survival(luminance(contribution) * share, roulette_ * expected);
+            if (q < 1) {
+                c.sampler.seek(Stream::Roulette, uint32_t(j->technique.s) << 16 | uint32_t(j->technique.t));
+                if (!(c.sampler.next_1d_unstructured() < q)) {
+                    ++work.stats.joins_skipped;
+                    return;
+                }
+                contribution *= 1 / q;
+            }
+        }
         const float Tr = visibility(c.scene, *j, work.stats);
         if (!(Tr > 0)) return;
-        if (j->technique.t <= 1)
-            c.sink.add_splat(j->film, j->technique, j->contribution * Tr, j->mis_weight);
+        if (is_splat)
+            c.sink.add_splat(j->film, j->technique, contribution * Tr, j->mis_weight);
         else
-            c.sink.add_eye(j->technique, j->contribution * Tr, j->mis_weight);
+            c.sink.add_eye(j->technique, contribution * Tr, j->mis_weight);
     }
 
     DepthOptions depth_;
+    float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
 };
 
 }  // namespace
 
 IntegratorEntry bdpt_entry() {
-    return {{"integrator", "bdpt", "Bidirectional path tracing with all connections and MIS. Unbiased.", depth_params()},
+    std::vector<ParamInfo> params = depth_params();
+    params.push_back({"roulette", ParamKind::Float, "0.05",
+                      "Joins that would add less than this share of the pixel's luminance (as earlier passes have it) are tested "
+                      "with a probability proportional to what they add; 0: all are tested."});
+    return {{"integrator", "bdpt", "Bidirectional path tracing with all connections and MIS. Unbiased.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-                return std::make_unique<BdptIntegrator>(DepthOptions::from(p));
+                const float roulette = p.number("roulette");
+                if (!(roulette >= 0 && roulette <= 1)) throw std::runtime_error("bdpt: roulette must lie in [0, 1]");
+                return std::make_unique<BdptIntegrator>(DepthOptions::from(p), roulette);
             }};
 }
 

@@ -33,7 +33,7 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter, co
     double others = 0;
     if (last >= 2 && !z[last - 1].is_delta) others += sqr(counts.next_event * p_NE);
     if (counts.uses_light_paths()) {
-        const double rev_prev = to_area(e.pdf_d, v, z[last - 1]);
+        const double rev_prev = v.is_infinite ? to_area(e.pdf_d, v, z[last - 1]) : e.pdf_d * v.to_predecessor;
         double inner = sqr(split_count<Side::Eye>(z, last - 1, z[last - 1].is_delta, counts)) + v.weight_sum;
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
         if (last == 1) inner += sqr(double(counts.splat));
@@ -71,7 +71,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     double others = emitter.is_delta() ? 0.0 : sqr(double(counts.hit) * f.pdf * to_x0 / p_NE);
     if (counts.uses_light_paths()) {
         const double rev_last = double(d.pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
-        const double rev_prev = to_area(f.pdf_rev, v, z[last - 1]);
+        const double rev_prev = f.pdf_rev * v.to_predecessor;
         const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
         others += sqr(p_L / p_NE) * outward_sum<Side::Eye>(z, last, false, rev_last, rev_prev, counts);
     }
@@ -101,11 +101,12 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
     const BsdfEval fa = a.bsdf.eval(a.wo, w, TransportMode::Importance);
     if (fa.f.is_zero()) return {};
     const float inv_dist2 = sqr(inv_dist);
-    const Rgb C = a.beta * fa.f * fb.f * b.beta * inv_dist2 * edge_attenuation(scene, a, b, w, dist2 * inv_dist);
+    Rgb C = a.beta * fa.f * fb.f * b.beta * inv_dist2;
+    if (scene.has_media()) C *= edge_attenuation(scene, a, b, w, dist2 * inv_dist);
 
     const double others =
-        outward_sum<Side::Light>(y, s - 1, false, fb.pdf * abs_dot(a.ng, w) * inv_dist2, to_area(fa.pdf_rev, a, y[s - 2]), counts) +
-        outward_sum<Side::Eye>(z, t - 1, false, fa.pdf * abs_dot(b.ng, w) * inv_dist2, to_area(fb.pdf_rev, b, z[t - 2]), counts);
+        outward_sum<Side::Light>(y, s - 1, false, fb.pdf * abs_dot(a.ng, w) * inv_dist2, fa.pdf_rev * a.to_predecessor, counts) +
+        outward_sum<Side::Eye>(z, t - 1, false, fa.pdf * abs_dot(b.ng, w) * inv_dist2, fb.pdf_rev * b.to_predecessor, counts);
     return Join{.technique = {Strategy::Connect, s, t},
                 .contribution = C,
                 .mis_weight = power_heuristic(counts.connect, others),
@@ -145,7 +146,7 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
     if (medium != kVacuum) C *= scene.attenuation(medium, length(edge));
 
     const double rev_last = a.is_infinite ? lens->pdf_dir : lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, w) : 1.0f) * inv_dist2;
-    const double rev_prev = s >= 2 ? to_area(f.pdf_rev, a, y[s - 2]) : 0.0f;
+    const double rev_prev = s >= 2 ? f.pdf_rev * a.to_predecessor : 0.0f;
     double others = outward_sum<Side::Light>(y, s - 1, false, rev_last, rev_prev, counts);
     if (counts.hit_lens > 0) others += sqr(double(counts.hit_lens) * f.pdf * abs_dot(lens->ng, w) * inv_dist2 / lens->pdf_pos);
     Join join{.technique = {Strategy::Splat, s, 1},

@@ -18,6 +18,12 @@ struct Join {
     bool needs_test = true;
 };
 
+/// Russian roulette before the shadow ray [Veach 1997, §10.4.1]: the probability with which a join that will add
+/// `contribution` (luminance, weighted) to a pixel is evaluated. `threshold` must not depend on the sample.
+inline float join_survival(float contribution, float threshold) {
+    return contribution < threshold ? contribution / threshold : 1.0f;
+}
+
 /// Transmittance of the join's edge: 0 where it is blocked.
 float visibility(const Scene& scene, const Join& join, RenderStats& stats);
 

@@ -21,7 +21,7 @@ void fill_surface(Vertex& v, const SurfaceHit& hit, Vec3 d, ComponentArena& aren
     v.prim = hit.prim;
     v.uv = hit.geometry.uv;
     const SurfaceGeometry& g = hit.geometry;
-    v.bsdf = hit.shape->material->bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, -d}, arena);
+    hit.shape->material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, -d}, arena, v.bsdf);
     v.may_connect = v.bsdf.has_smooth();
 }
 
@@ -36,17 +36,21 @@ bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const R
     if (!scene.intersect(ray, u, hit)) return false;
     path.flight.length = hit.t;
     ++stats.vertices;
-    Vertex& v = path.vertices.emplace_back();
+    Vertex& v = path.append();
     fill_surface(v, hit, ray.d, path.arena);
     v.medium = medium;
-    v.beta = beta * scene.attenuation(medium, hit.t);
-    v.pdf_fwd = is_delta ? pdf_sa : to_area(pdf_sa, path[path.size() - 2], v);
+    v.beta = medium == kVacuum ? beta : beta * scene.attenuation(medium, hit.t);
+    // hit.t is short of the distance by the offset of the ray's origin; densities are of the points themselves.
+    const Vertex& previous = path[path.size() - 2];
+    const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
+    v.pdf_fwd = is_delta ? pdf_sa : pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
+    v.to_predecessor = previous.has_cosine && !previous.is_infinite ? abs_dot(previous.ng, ray.d) * inv_dist2 : inv_dist2;
     return v.pdf_fwd > 0;
 }
 
 /// The end of an eye path that left the scene: a vertex at infinity, on all emitters there at once.
 void append_escape(SubPath& path, Vec3 d, Rgb beta, float pdf) {
-    Vertex& v = path.vertices.emplace_back();
+    Vertex& v = path.append();
     v.kind = Vertex::Kind::Emitter;
     v.is_infinite = true;
     v.p = d;
@@ -73,7 +77,6 @@ RenderStats& RenderStats::operator+=(const RenderStats& o) {
     walk_rays += o.walk_rays;
     shadow_rays += o.shadow_rays;
     visible += o.visible;
-    joins += o.joins;
     joins_skipped += o.joins_skipped;
     rejected += o.rejected;
     return *this;
@@ -88,7 +91,7 @@ void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sample
     z.film_weight = pixel_sample.weight;
     const SensorRay ray = scene.sensor().sample_ray(z.film, sampler.next_2d());
 
-    Vertex& lens = z.vertices.emplace_back();
+    Vertex& lens = z.append();
     lens.kind = Vertex::Kind::Sensor;
     lens.ng = ray.ng;
     lens.pdf_fwd = ray.pdf_pos;
@@ -99,7 +102,7 @@ void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sample
 
     const Ray start{ray.p, ray.d, kInf};
     if (append_surface(scene, sampler, z, start, Rgb(1), ray.pdf_dir, false, kVacuum, stats)) return;
-    z.vertices.resize(1);
+    z.truncate(1);
     if (!scene.infinite_emitters().empty()) append_escape(z, ray.d, Rgb(1), ray.pdf_dir);
 }
 
@@ -114,7 +117,7 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
     const EmissionSample e = emitter.sample_emission(u_y0, sampler.next_2d());
     if (!(e.pdf_y0 > 0)) return false;
 
-    Vertex& y0 = y.vertices.emplace_back();
+    Vertex& y0 = y.append();
     y0.kind = Vertex::Kind::Emitter;
     y0.emitter = &emitter;
     y0.is_infinite = emitter.is_infinite();
@@ -132,7 +135,7 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
     const Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
     if (!append_surface(scene, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, false, kVacuum, stats)) {
-        y.vertices.resize(1);
+        y.truncate(1);
         return true;
     }
     Vertex& y1 = y[1];
@@ -163,7 +166,7 @@ bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options, co
     if (!s) return false;
     v.is_delta = s->is_delta;
     Vertex& previous = path[last - 1];
-    previous.pdf_rev = s->is_delta ? s->pdf_rev : to_area(s->pdf_rev, v, previous);
+    previous.pdf_rev = s->is_delta ? s->pdf_rev : s->pdf_rev * v.to_predecessor;
     if (eye) path.eta2 *= sqr(s->eta);
 
     const Rgb beta = v.beta * s->weight * (1 / q);
@@ -171,7 +174,7 @@ bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options, co
     const Ray ray{offset_origin(v.p, v.ng, s->wi), s->wi, kInf};
     const bool found = append_surface(scene, sampler, path, ray, beta, s->pdf, s->is_delta, medium, stats);
     if (!found) {
-        if (path.size() > last + 1) path.vertices.pop_back();
+        path.truncate(last + 1);
         if (!eye || scene.infinite_emitters().empty()) return false;
         append_escape(path, s->wi, beta, s->pdf);
     }

@@ -11,7 +11,7 @@ namespace etendue {
 struct RenderStats {
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
     uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
-    uint64_t joins = 0, joins_skipped = 0;
+    uint64_t joins_skipped = 0;  ///< By roulette, before their shadow ray.
     uint64_t rejected = 0;  ///< Contributions that were not finite or negative.
 
     RenderStats& operator+=(const RenderStats& o);

@@ -19,6 +19,8 @@ struct Vertex {
     Vec3 wo;              ///< Toward the predecessor; unused at the first vertex.
     Rgb beta;             ///< Throughput up to, not including, scattering here.
     float pdf_fwd = 0;    ///< Area density as sampled from the predecessor; discrete after a delta event.
+    /// Solid angle at this vertex over area at the predecessor: |cos θ|/d² there, 1 where it is at infinity.
+    float to_predecessor = 0;
     float pdf_rev = 0;    ///< Area density as it would be sampled from the successor; known two vertices later.
     /// Σ over the techniques whose split lies before vertex i-2, relative to the density of the split there; see mis.h.
     double weight_sum = 0;
@@ -54,22 +56,40 @@ struct Flight {
 
 /// A walk from one end of the path space: y_0 … or z_0 …
 struct SubPath {
-    std::vector<Vertex> vertices;
     ComponentArena arena;
     Vec2 film;                ///< Film point of an eye sub-path.
     float film_weight = 1;    ///< Factor of the reconstruction filter, for contributions to the own pixel.
     Flight flight;
     float eta2 = 1;           ///< Product of η² over the refractions of an eye sub-path.
 
-    int size() const { return int(vertices.size()); }
-    const Vertex& operator[](int i) const { return vertices[size_t(i)]; }
-    Vertex& operator[](int i) { return vertices[size_t(i)]; }
+    int size() const { return size_; }
+    const Vertex& operator[](int i) const { return store_[size_t(i)]; }
+    Vertex& operator[](int i) { return store_[size_t(i)]; }
+    /// A new last vertex. What it held before stays but for the fields that not every kind of vertex sets.
+    Vertex& append() {
+        if (size_t(size_) == store_.size()) store_.resize(2 * store_.size() + 16);
+        Vertex& v = store_[size_t(size_++)];
+        v.pdf_rev = 0;
+        v.weight_sum = 0;
+        v.next_event_ratio = 1;
+        v.is_delta = v.is_infinite = v.may_connect = false;
+        v.has_cosine = true;
+        v.medium = kVacuum;
+        v.shape = nullptr;
+        v.emitter = nullptr;
+        return v;
+    }
+    void truncate(int size) { size_ = size; }
     void clear() {
-        vertices.clear();
+        size_ = 0;
         arena.reset();
         eta2 = 1;
         flight.pdf_sa = 0;
     }
+
+private:
+    std::vector<Vertex> store_;  ///< Grown and kept: walks do not allocate.
+    int size_ = 0;
 };
 
 /// Solid-angle density at `from` to area density at `to`: p_A = p_σ |cos θ_to| / d². At infinity it stays as it is.

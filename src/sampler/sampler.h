@@ -13,7 +13,8 @@ namespace etendue {
 enum class Stream : uint8_t {
     Eye,         ///< Film point, lens point and the eye sub-path's vertices.
     Light,       ///< Emission and the light sub-path's vertices.
-    Connection,  ///< Next event, lens points of splats, roulette of connections; vertex = that of the sub-path.
+    Connection,  ///< Next event and lens points of splats; vertex = that of the sub-path.
+    Roulette,    ///< Whether a join is evaluated; vertex = 2^16·s + t.
     Auxiliary,   ///< Loops of unbounded length.
 };
 
@@ -59,6 +60,11 @@ public:
             return {to_unit_float(uint32_t(b >> 32)), to_unit_float(uint32_t(b))};
         }
         return next_2d_structured();
+    }
+    /// As next_1d(), for decisions that gain nothing from structured points: pseudo-random unless a Markov chain drives.
+    float next_1d_unstructured() {
+        if (kind_ == SamplerKind::Sobol) return to_unit_float(uint32_t(hash_combine(bits(), pass_) >> 32));
+        return next_1d();
     }
     SamplerKind kind() const { return kind_; }
 

@@ -89,6 +89,7 @@ public:
     const Bounds3& bounds() const { return bounds_; }
     const std::string& file() const { return file_; }
     bool has_masks() const { return has_masks_; }
+    bool has_media() const { return !media_.empty(); }
 
     struct Statistics {
         size_t triangles = 0, quadrics = 0, instances = 0, materials = 0, textures = 0;

@@ -19,10 +19,12 @@ namespace {
 class PerspectiveSensor final : public Sensor {
 public:
     PerspectiveSensor(const PerspectiveCamera& camera, const Transform& to_world, float filter_radius)
-        : camera_(camera), to_world_(to_world), to_local_(to_world.inverse()) {
+        : camera_(camera),
+          origin_(to_world.point({0, 0, 0})),
+          left_(normalize(to_world.vector({1, 0, 0}))),
+          up_(normalize(to_world.vector({0, 1, 0}))),
+          forward_(normalize(to_world.vector({0, 0, 1}))) {
         pixel_area_ = (2 * camera.half_width / float(camera.film.width)) * (2 * camera.half_height / float(camera.film.height));
-        origin_ = to_world.point({0, 0, 0});
-        forward_ = normalize(to_world.vector({0, 0, 1}));
         const FilmGeometry& f = camera.film;
         lo_ = {float(f.crop_x) - filter_radius + 0.5f, float(f.crop_y) - filter_radius + 0.5f};
         hi_ = {float(f.crop_x + f.crop_width) + filter_radius - 0.5f,
@@ -32,28 +34,27 @@ public:
 
     SensorRay sample_ray(Vec2 film, Vec2 u_lens) const override {
         const Vec2 on_plane = film_to_plane(film);
-        Vec3 target{on_plane.x, on_plane.y, 1}, origin;
+        Vec3 target{on_plane.x, on_plane.y, 1}, lens = origin_;
         if (has_finite_lens()) {
-            const Vec2 lens = sample_uniform_disk(u_lens);
-            origin = {lens.x * camera_.lens_radius, lens.y * camera_.lens_radius, 0};
-            target = target * camera_.focus_distance - origin;
+            const Vec2 u = sample_lens(u_lens);
+            lens = to_world({u.x, u.y, 0}) + origin_;
+            target = target * camera_.focus_distance - Vec3{u.x, u.y, 0};
         }
         const Vec3 d = normalize(target);
-        return {has_finite_lens() ? to_world_.point(origin) : origin_, forward_, normalize(to_world_.vector(d)), pdf_pos_,
-                pdf_of_cosine(d.z)};
+        return {lens, forward_, to_world(d), pdf_pos_, pdf_of_cosine(d.z)};
     }
 
     std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity, Vec2 u_lens) const override {
         Vec3 lens = origin_;
         if (has_finite_lens()) {
-            const Vec2 u = sample_uniform_disk(u_lens);
-            lens = to_world_.point({u.x * camera_.lens_radius, u.y * camera_.lens_radius, 0});
+            const Vec2 u = sample_lens(u_lens);
+            lens = to_world({u.x, u.y, 0}) + origin_;
         }
         return measure(lens, from_infinity ? from : from - lens);
     }
 
     std::optional<SensorSample> hit_lens(Vec3 o, Vec3 d, float tmax) const override {
-        const Vec3 lo = to_local_.point(o), ld = to_local_.vector(d);
+        const Vec3 lo = to_local(o - origin_), ld = to_local(d);
         if (!(ld.z < 0)) return {};  // from behind
         const float t = -lo.z / ld.z;
         if (!(t > 0 && t < tmax)) return {};
@@ -66,6 +67,10 @@ public:
     float pdf_direction(Vec3, Vec3 d) const override { return pdf_of_cosine(dot(forward_, d)); }
 
 private:
+    Vec3 to_world(Vec3 v) const { return left_ * v.x + up_ * v.y + forward_ * v.z; }
+    Vec3 to_local(Vec3 v) const { return {dot(v, left_), dot(v, up_), dot(v, forward_)}; }
+    Vec2 sample_lens(Vec2 u) const { return sample_uniform_disk(u) * camera_.lens_radius; }
+
     float pdf_of_cosine(float c) const { return c > 0 ? 1 / (pixel_area_ * c * c * c) : 0.0f; }
 
     Vec2 film_to_plane(Vec2 film) const {
@@ -80,10 +85,10 @@ private:
         const Vec3 d = v * (1 / std::sqrt(dist2));
         const float cos = dot(forward_, d);
         if (!(cos > 0)) return {};
-        Vec3 local = to_local_.vector(v);
+        const Vec3 local = to_local(v);
         Vec2 plane;
         if (has_finite_lens()) {
-            const Vec3 origin = to_local_.point(lens);
+            const Vec3 origin = to_local(lens - origin_);
             const float k = camera_.focus_distance / local.z;
             plane = {(origin.x + local.x * k) / camera_.focus_distance, (origin.y + local.y * k) / camera_.focus_distance};
         } else {
@@ -97,8 +102,7 @@ private:
     }
 
     PerspectiveCamera camera_;
-    Transform to_world_, to_local_;
-    Vec3 origin_, forward_;
+    Vec3 origin_, left_, up_, forward_;  ///< Camera space in the world.
     Vec2 lo_, hi_;  ///< Film points that reach some pixel of the crop.
     float pixel_area_, pdf_pos_;
 };
