@@ -26,13 +26,19 @@ double TriangleMesh::area() const {
     return sum;
 }
 
+void TriangleMesh::compute_face_normals() {
+    face_normals.clear();
+    for (const auto& [a, b, c] : triangles)
+        face_normals.push_back(normalize(cross(positions[b] - positions[a], positions[c] - positions[a])));
+}
+
 SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tangents) const {
     const auto [ia, ib, ic] = triangles[prim];
     const Vec3 a = positions[ia], e1 = positions[ib] - a, e2 = positions[ic] - a;
     const float w = 1 - u - v;
     SurfaceGeometry g;
     g.p = a + e1 * u + e2 * v;
-    g.ng = normalize(cross(e1, e2));
+    g.ng = face_normals[prim];
     g.ns = g.ng;
     if (!normals.empty()) {
         const Vec3 n = normals[ia] * w + normals[ib] * u + normals[ic] * v;
@@ -69,7 +75,7 @@ ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
 
 size_t TriangleMesh::memory_bytes() const {
     return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) + uvs.size() * sizeof(Vec2) +
-           triangles.size() * sizeof(triangles[0]);
+           triangles.size() * (sizeof(triangles[0]) + sizeof(face_normals[0]));
 }
 
 // ---- Sphere

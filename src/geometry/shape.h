@@ -48,6 +48,10 @@ public:
     std::vector<Vec3> normals;  ///< Empty, or unit and one per vertex.
     std::vector<Vec2> uvs;      ///< Empty, or one per vertex.
     std::vector<std::array<uint32_t, 3>> triangles;
+    std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see compute_face_normals().
+
+    /// To be called once positions and triangles are final.
+    void compute_face_normals();
 
     Bounds3 bounds() const override;
     double area() const override;

@@ -7,21 +7,23 @@
 
 namespace etendue {
 
+/// sin and cos of (π/4)·t for t in [-1, 1], by their series; errors below 1e-7.
+inline void sincos_quarter_pi(float t, float& s, float& c) {
+    const float x = (kPi / 4) * t, x2 = x * x;
+    s = x * (1 + x2 * (-1.0f / 6 + x2 * (1.0f / 120 + x2 * (-1.0f / 5040 + x2 * (1.0f / 362880)))));
+    c = 1 + x2 * (-0.5f + x2 * (1.0f / 24 + x2 * (-1.0f / 720 + x2 * (1.0f / 40320))));
+}
+
 /// Uniform on the unit disc, concentric map [Shirley & Chiu 1997].
 inline Vec2 sample_uniform_disk(Vec2 u) {
     const float a = 2 * u.x - 1, b = 2 * u.y - 1;
     if (a == 0 && b == 0) return {0, 0};
-    float r, phi;
-    if (a * a > b * b) {
-        r = a;
-        phi = (kPi / 4) * (b / a);
-    } else {
-        r = b;
-        phi = (kPi / 2) - (kPi / 4) * (a / b);
-    }
+    // The angle is (π/4) b/a in the left and right quadrants, π/2 - (π/4) a/b above and below.
+    const bool upright = b * b >= a * a;
+    const float r = upright ? b : a;
     float s, c;
-    sincosf(phi, &s, &c);
-    return {r * c, r * s};
+    sincos_quarter_pi((upright ? a : b) / r, s, c);
+    return upright ? Vec2{r * s, r * c} : Vec2{r * c, r * s};
 }
 inline constexpr float kUniformDiskPdf = kInvPi;
 

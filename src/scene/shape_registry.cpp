@@ -39,7 +39,7 @@ std::vector<ParamInfo> mesh_params(const char* flip) {
 /// Turns file data into a world-space mesh.
 std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& warn) {
     if (data.dropped_degenerate > 0)
-        warn(fmt::format("{}: {} triangle{} without area left out", data.name, data.dropped_degenerate,
+        warn(fmt::format("{}: {} triangle{} without area left out", params.text("filename", data.name), data.dropped_degenerate,
                          data.dropped_degenerate == 1 ? "" : "s"));
     const Transform t = params.transform("to_world");
     const bool flat = params.flag("face_normals", false) || data.face_normals;
@@ -63,6 +63,7 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     mesh->triangles = std::move(data.triangles);
     for (Vec3 p : mesh->positions)
         if (!is_finite(p)) params.fail("to_world", "the transform takes a vertex of the mesh out of the range of floats");
+    mesh->compute_face_normals();
     return mesh;
 }
 
@@ -94,6 +95,7 @@ std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quad
         }
     }
     if (!(mesh->area() > 0)) params.fail("to_world", "the transform leaves the shape without area");
+    mesh->compute_face_normals();
     return mesh;
 }
 
