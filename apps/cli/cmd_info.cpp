@@ -43,15 +43,24 @@ void info(const SceneOptions& options, bool as_json) {
     fmt::print("{}\n", s.file());
     fmt::print("  image       {} x {}", s.film().width, s.film().height);
     if (s.film().pixel_count() != uint64_t(s.film().width) * s.film().height)
-        fmt::print(", crop {} x {} at ({}, {})", s.film().crop_width, s.film().crop_height, s.film().crop_x, s.film().crop_y);
+        fmt::print(", crop {} x {} at ({}, {})", s.film().crop_width, s.film().crop_height,
+                   s.film().crop_x, s.film().crop_y);
     fmt::print(", {} filter\n", s.filter().name());
-    fmt::print("  rendering   {}, sampler {}, {} spp\n", s.defaults().integrator.empty() ? "path" : s.defaults().integrator, s.defaults().sampler, s.defaults().spp);
-    fmt::print("  shapes      {}: {} triangles, {} quadrics, {} instances\n", s.shapes().size(), st.triangles, st.quadrics, st.instances);
+    fmt::print("  rendering   {}, sampler {}, {} spp\n",
+               s.defaults().integrator.empty() ? "path" : s.defaults().integrator,
+               s.defaults().sampler, s.defaults().spp);
+    fmt::print("  shapes      {}: {} triangles, {} quadrics, {} instances\n", s.shapes().size(),
+               st.triangles, st.quadrics, st.instances);
     fmt::print("  materials   {}\n", st.materials);
     fmt::print("  textures    {}\n", st.textures);
-    fmt::print("  emitters    {}, of them {} at infinity; {:.6g} W (luminance)\n", s.emitters().size(), s.infinite_emitters().size(), power);
-    if (!b.is_empty()) fmt::print("  bounds      ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g})\n", b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z);
-    fmt::print("  memory      geometry {}, hierarchy {}, textures {}\n", mebibytes(st.geometry_bytes), mebibytes(st.accelerator_bytes), mebibytes(st.texture_bytes));
+    fmt::print("  emitters    {}, of them {} at infinity; {:.6g} W (luminance)\n",
+               s.emitters().size(), s.infinite_emitters().size(), power);
+    if (!b.is_empty())
+        fmt::print("  bounds      ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g})\n", b.lo.x,
+                   b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z);
+    fmt::print("  memory      geometry {}, hierarchy {}, textures {}\n",
+               mebibytes(st.geometry_bytes), mebibytes(st.accelerator_bytes),
+               mebibytes(st.texture_bytes));
     for (const std::string& w : s.warnings()) fmt::print("  warning     {}\n", w);
 }
 

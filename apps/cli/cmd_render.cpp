@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
-#include "image/image_io.h"
 #include "image/atomic_file.h"
+#include "image/image_io.h"
 #include "preview.h"
 #include "render/aov.h"
 #include "render/renderer.h"
@@ -42,7 +42,8 @@ struct RenderCommand {
 std::string format_seconds(double s) {
     if (s < 100) return fmt::format("{:.1f} s", s);
     const long t = std::lround(s);
-    return t < 3600 ? fmt::format("{}:{:02}", t / 60, t % 60) : fmt::format("{}:{:02}:{:02}", t / 3600, t / 60 % 60, t % 60);
+    return t < 3600 ? fmt::format("{}:{:02}", t / 60, t % 60)
+                    : fmt::format("{}:{:02}:{:02}", t / 3600, t / 60 % 60, t % 60);
 }
 
 /// One line that is rewritten on a terminal; in a log a line now and then.
@@ -59,11 +60,15 @@ public:
         last_ = p.seconds;
         written_ = true;
         std::string line = fmt::format("{} spp, {}", p.passes, format_seconds(p.seconds));
-        if (p.fraction && *p.fraction > 0) line += fmt::format(", {:.0f} %, {} left", 100 * *p.fraction, format_seconds(p.seconds * (1 / *p.fraction - 1)));
+        if (p.fraction && *p.fraction > 0)
+            line += fmt::format(", {:.0f} %, {} left", 100 * *p.fraction,
+                                format_seconds(p.seconds * (1 / *p.fraction - 1)));
         line += fmt::format(", {:.2f} Mrays/s", p.rays_per_second * 1e-6);
         if (p.error.valid) line += fmt::format(", relative error {:.4f}", p.error.relative_rms);
-        if (terminal_) std::fprintf(stderr, "\r%s\033[K", line.c_str());
-        else std::fprintf(stderr, "%s\n", line.c_str());
+        if (terminal_)
+            std::fprintf(stderr, "\r%s\033[K", line.c_str());
+        else
+            std::fprintf(stderr, "%s\n", line.c_str());
         std::fflush(stderr);
     }
 
@@ -76,7 +81,10 @@ private:
 /// same ones.
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
     const RenderDefaults& defaults = scene.defaults();
-    IntegratorSpec spec = IntegratorSpec::parse(!text.empty() ? text : defaults.integrator.empty() ? "path" : defaults.integrator);
+    IntegratorSpec spec =
+        IntegratorSpec::parse(!text.empty()                 ? text
+                              : defaults.integrator.empty() ? "path"
+                                                            : defaults.integrator);
     for (const auto& [name, value] : defaults.integrator_params) spec.params.emplace(name, value);
     return spec;
 }
@@ -85,10 +93,12 @@ SamplerKind choose_sampler(const Scene& scene, const std::string& text) {
     const std::string& name = text.empty() ? scene.defaults().sampler : text;
     if (name == "independent") return SamplerKind::Independent;
     if (name == "sobol") return SamplerKind::Sobol;
-    throw std::runtime_error(fmt::format("--sampler is \"{}\", but must be independent or sobol", name));
+    throw std::runtime_error(
+        fmt::format("--sampler is \"{}\", but must be independent or sobol", name));
 }
 
-nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings, StopReason reason) {
+nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
+                       StopReason reason) {
     const RenderStats& s = r.stats();
     const ErrorEstimate e = r.film().error();
     const Film::MeanEstimate mean = r.film().mean_luminance();
@@ -102,7 +112,8 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"spp", r.film().passes()},
         {"seconds", r.seconds()},
         {"stopped_by", to_string(reason)},
-        {"samples_per_second", double(r.film().passes()) * double(scene.film().pixel_count()) / r.seconds()},
+        {"samples_per_second",
+         double(r.film().passes()) * double(scene.film().pixel_count()) / r.seconds()},
         {"rays_per_second", double(s.rays()) / r.seconds()},
         {"walk_rays", s.walk_rays},
         {"shadow_rays", s.shadow_rays},
@@ -114,7 +125,9 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"mean_luminance", mean.mean},
         {"mean_luminance_standard_error", mean.standard_error},
     };
-    if (e.valid) j["relative_error"] = {{"estimate", e.relative_rms}, {"low_95", e.low}, {"high_95", e.high}};
+    if (e.valid)
+        j["relative_error"] = {
+            {"estimate", e.relative_rms}, {"low_95", e.low}, {"high_95", e.high}};
     return j;
 }
 
@@ -123,12 +136,15 @@ void check_aovs(const std::vector<std::string>& names) {
     for (const AovInfo& a : aov_registry()) known.push_back(a.name);
     for (const std::string& n : names)
         if (std::find(known.begin(), known.end(), n) == known.end())
-            throw std::runtime_error(fmt::format("--aov: there is no \"{}\" (there are: {})", n, fmt::join(known, ", ")));
+            throw std::runtime_error(fmt::format("--aov: there is no \"{}\" (there are: {})", n,
+                                                 fmt::join(known, ", ")));
 }
 
 void write_techniques(const Renderer& r, const Scene& scene, const std::string& folder) {
     for (const auto& t : r.techniques()->images()) {
-        const std::string stem = fmt::format("{}/length{:02}_s{:02}_t{:02}", folder, t.technique.vertices() - 1, t.technique.s, t.technique.t);
+        const std::string stem =
+            fmt::format("{}/length{:02}_s{:02}_t{:02}", folder, t.technique.vertices() - 1,
+                        t.technique.s, t.technique.t);
         const auto [w, h] = std::pair{scene.film().crop_width, scene.film().crop_height};
         write_image(stem + "_weighted.exr", rgb_image(w, h, t.weighted));
         write_image(stem + "_unweighted.exr", rgb_image(w, h, t.unweighted));
@@ -139,7 +155,8 @@ void RenderCommand::run() const {
     check_image_extension(output);
     check_aovs(aovs);
     const auto folder = std::filesystem::path(output).parent_path();
-    if (!folder.empty() && std::filesystem::exists(folder) && !std::filesystem::is_directory(folder))
+    if (!folder.empty() && std::filesystem::exists(folder) &&
+        !std::filesystem::is_directory(folder))
         throw std::runtime_error(fmt::format("{}: {} is not a folder", output, folder.string()));
 
     const Scene s = load_scene(scene);
@@ -153,19 +170,24 @@ void RenderCommand::run() const {
     if (spp > 0) settings.spp = spp;
     if (seconds > 0) settings.seconds = seconds;
     if (error > 0) settings.error = error;
-    if (!settings.spp && !settings.seconds && !settings.error) settings.spp = s.defaults().spp > 0 ? uint64_t(s.defaults().spp) : 64;
+    if (!settings.spp && !settings.seconds && !settings.error)
+        settings.spp = s.defaults().spp > 0 ? uint64_t(s.defaults().spp) : 64;
     if (!techniques.empty()) {
         settings.technique_depth = technique_depth;
         if (!quiet)
-            fmt::print(stderr, "technique images of paths up to {} edges: {:.0f} MiB\n", technique_depth,
-                       double(TechniqueImages::memory_bytes(s.film().pixel_count(), technique_depth)) / (1 << 20));
+            fmt::print(
+                stderr, "technique images of paths up to {} edges: {:.0f} MiB\n", technique_depth,
+                double(TechniqueImages::memory_bytes(s.film().pixel_count(), technique_depth)) /
+                    (1 << 20));
     }
 
     Renderer renderer(s, settings);
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
     std::unique_ptr<Preview> viewer;
-    if (!preview.empty()) viewer = std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
+    if (!preview.empty())
+        viewer =
+            std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
 
     StopReason reason;
     {
@@ -181,8 +203,10 @@ void RenderCommand::run() const {
     const nlohmann::json report = to_json(renderer, s, settings, reason);
     Image image = rgb_image(s.film().crop_width, s.film().crop_height, renderer.film().image());
     for (const auto& [key, value] : report.items())
-        if (value.is_string()) image.attributes["etendue." + key] = value.get<std::string>();
-        else if (value.is_number()) image.attributes["etendue." + key] = value.get<double>();
+        if (value.is_string())
+            image.attributes["etendue." + key] = value.get<std::string>();
+        else if (value.is_number())
+            image.attributes["etendue." + key] = value.get<double>();
     image.attributes["etendue.version"] = std::string(ETENDUE_VERSION);
     for (const AovImage& a : render_aovs(s, aovs, 16, seed, threads))
         add_rgb_layer(image, image.width, image.height, a.name, a.pixels);
@@ -194,11 +218,16 @@ void RenderCommand::run() const {
 
     if (!quiet) {
         const ErrorEstimate e = renderer.film().error();
-        fmt::print(stderr, "{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output, renderer.film().passes(), format_seconds(renderer.seconds()),
-                   report["samples_per_second"].get<double>() * 1e-6, report["rays_per_second"].get<double>() * 1e-6,
-                   e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})", e.relative_rms, e.low, e.high) : "");
+        fmt::print(stderr, "{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output,
+                   renderer.film().passes(), format_seconds(renderer.seconds()),
+                   report["samples_per_second"].get<double>() * 1e-6,
+                   report["rays_per_second"].get<double>() * 1e-6,
+                   e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})",
+                                         e.relative_rms, e.low, e.high)
+                           : "");
         if (const auto bad = report["rejected_contributions"].get<uint64_t>(); bad > 0)
-            fmt::print(stderr, "warning: {} contributions were not finite and were left out\n", bad);
+            fmt::print(stderr, "warning: {} contributions were not finite and were left out\n",
+                       bad);
     }
 }
 
@@ -208,18 +237,32 @@ void add_render_command(CLI::App& app) {
     auto command = std::make_shared<RenderCommand>();
     CLI::App& c = *app.add_subcommand("render", "Render a scene to an image");
     command->scene.add_to(c);
-    c.add_option("-o,--output", command->output, "Image to write: .exr, .pfm, .hdr or .png")->capture_default_str();
-    c.add_option("-i,--integrator", command->integrator, "Integrator with parameters: bdpt or bdpt:max_depth=12,rr_depth=5 (default: the scene's)");
+    c.add_option("-o,--output", command->output, "Image to write: .exr, .pfm, .hdr or .png")
+        ->capture_default_str();
+    c.add_option(
+        "-i,--integrator", command->integrator,
+        "Integrator with parameters: bdpt or bdpt:max_depth=12,rr_depth=5 (default: the scene's)");
     c.add_option("--spp", command->spp, "Samples per pixel")->check(CLI::PositiveNumber);
-    c.add_option("--time", command->seconds, "Seconds to render, within one pass")->check(CLI::PositiveNumber);
-    c.add_option("--error", command->error, "Stop at this relative RMS error of the image")->check(CLI::PositiveNumber);
+    c.add_option("--time", command->seconds, "Seconds to render, within one pass")
+        ->check(CLI::PositiveNumber);
+    c.add_option("--error", command->error, "Stop at this relative RMS error of the image")
+        ->check(CLI::PositiveNumber);
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
     c.add_option("--sampler", command->sampler, "independent or sobol (default: the scene's)");
-    c.add_option("--threads", command->threads, "Number of threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
-    c.add_option("--aov", command->aovs, "Layers to add: albedo, normal, depth, position, uv, variance")->delimiter(',');
-    c.add_option("--techniques", command->techniques, "Folder for an image per technique (s,t), weighted and unweighted");
-    c.add_option("--techniques-max-depth", command->technique_depth, "Longest path with technique images, edges")->capture_default_str()->check(CLI::Range(1, 64));
-    c.add_option("--preview", command->preview, "Show the image while it renders: tev or tev://host:port");
+    c.add_option("--threads", command->threads, "Number of threads; 0: all")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 4096));
+    c.add_option("--aov", command->aovs,
+                 "Layers to add: albedo, normal, depth, position, uv, variance")
+        ->delimiter(',');
+    c.add_option("--techniques", command->techniques,
+                 "Folder for an image per technique (s,t), weighted and unweighted");
+    c.add_option("--techniques-max-depth", command->technique_depth,
+                 "Longest path with technique images, edges")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 64));
+    c.add_option("--preview", command->preview,
+                 "Show the image while it renders: tev or tev://host:port");
     c.add_option("--stats", command->stats, "Write statistics to this JSON file");
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
     c.callback([command] { command->run(); });

@@ -51,13 +51,15 @@ Preview::Preview(const std::string& address, const std::string& image_name, int 
         host = rest.substr(0, colon);
         if (colon != std::string::npos) port = rest.substr(colon + 1);
     } else if (address != "tev") {
-        throw std::runtime_error(fmt::format("--preview must be tev or tev://host:port, but is \"{}\"", address));
+        throw std::runtime_error(
+            fmt::format("--preview must be tev or tev://host:port, but is \"{}\"", address));
     }
     addrinfo hints{}, *found = nullptr;
     hints.ai_family = AF_UNSPEC;
     hints.ai_socktype = SOCK_STREAM;
     if (const int error = getaddrinfo(host.c_str(), port.c_str(), &hints, &found))
-        throw std::runtime_error(fmt::format("--preview: {}:{}: {}", host, port, gai_strerror(error)));
+        throw std::runtime_error(
+            fmt::format("--preview: {}:{}: {}", host, port, gai_strerror(error)));
     for (const addrinfo* a = found; a && socket_ < 0; a = a->ai_next) {
         socket_ = ::socket(a->ai_family, a->ai_socktype, a->ai_protocol);
         if (socket_ >= 0 && ::connect(socket_, a->ai_addr, a->ai_addrlen) != 0) {
@@ -66,9 +68,15 @@ Preview::Preview(const std::string& address, const std::string& image_name, int 
         }
     }
     freeaddrinfo(found);
-    if (socket_ < 0) throw std::runtime_error(fmt::format("--preview: no viewer listens at {}:{} (is tev running?)", host, port));
+    if (socket_ < 0)
+        throw std::runtime_error(
+            fmt::format("--preview: no viewer listens at {}:{} (is tev running?)", host, port));
     Packet packet(kCreateImage);
-    packet.number<uint8_t>(1).text(name_).number<int32_t>(width_).number<int32_t>(height_).number<int32_t>(3);
+    packet.number<uint8_t>(1)
+        .text(name_)
+        .number<int32_t>(width_)
+        .number<int32_t>(height_)
+        .number<int32_t>(3);
     for (const char* c : kChannels) packet.text(c);
     send(packet.finished());
 }
@@ -79,7 +87,8 @@ Preview::~Preview() {
 
 void Preview::send(const std::string& payload) {
     for (size_t sent = 0; sent < payload.size() && socket_ >= 0;) {
-        const ssize_t n = ::send(socket_, payload.data() + sent, payload.size() - sent, MSG_NOSIGNAL);
+        const ssize_t n =
+            ::send(socket_, payload.data() + sent, payload.size() - sent, MSG_NOSIGNAL);
         if (n <= 0) {
             ::close(socket_);
             socket_ = -1;

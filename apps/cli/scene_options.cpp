@@ -13,7 +13,8 @@ namespace etendue {
 namespace {
 
 /// Integers between separators, all of them or an error that names the option.
-std::vector<int> parse_integers(const std::string& text, char separator, size_t count, const char* option, const char* form) {
+std::vector<int> parse_integers(const std::string& text, char separator, size_t count,
+                                const char* option, const char* form) {
     std::vector<int> numbers;
     const char* at = text.data();
     const char* end = at + text.size();
@@ -27,7 +28,8 @@ std::vector<int> parse_integers(const std::string& text, char separator, size_t 
         ++at;
     }
     if (at != end || numbers.size() != count)
-        throw std::runtime_error(fmt::format("{} must have the form {}, but is \"{}\"", option, form, text));
+        throw std::runtime_error(
+            fmt::format("{} must have the form {}, but is \"{}\"", option, form, text));
     return numbers;
 }
 
@@ -35,27 +37,34 @@ std::vector<int> parse_integers(const std::string& text, char separator, size_t 
 
 void SceneOptions::add_to(CLI::App& command) {
     command.add_option("SCENE", file, "Scene file (.xml)")->required();
-    command.add_option("-D,--define", defines, "Value of a scene parameter, name=value; repeatable")->allow_extra_args(false);
+    command
+        .add_option("-D,--define", defines, "Value of a scene parameter, name=value; repeatable")
+        ->allow_extra_args(false);
     command.add_flag("--lenient", lenient, "Turn unknown plug-ins and parameters into warnings");
     command.add_option("--resolution", resolution, "Image size WxH instead of the file's");
     command.add_option("--crop", crop, "Part of the image to render: x,y,w,h in pixels");
 }
 
 Scene load_scene(const SceneOptions& options) {
-    if (!std::filesystem::exists(options.file)) throw std::runtime_error(fmt::format("{}: there is no such file", options.file));
-    if (std::filesystem::is_directory(options.file)) throw std::runtime_error(fmt::format("{}: is a folder, not a scene file", options.file));
+    if (!std::filesystem::exists(options.file))
+        throw std::runtime_error(fmt::format("{}: there is no such file", options.file));
+    if (std::filesystem::is_directory(options.file))
+        throw std::runtime_error(fmt::format("{}: is a folder, not a scene file", options.file));
     ReadOptions read;
     read.lenient = options.lenient;
     for (const std::string& d : options.defines) {
         const size_t equals = d.find('=');
-        if (equals == std::string::npos || equals == 0) throw std::runtime_error(fmt::format("-D must have the form name=value, but is \"{}\"", d));
+        if (equals == std::string::npos || equals == 0)
+            throw std::runtime_error(
+                fmt::format("-D must have the form name=value, but is \"{}\"", d));
         read.defines[d.substr(0, equals)] = d.substr(equals + 1);
     }
     BuildOptions build;
     build.lenient = options.lenient;
     if (!options.resolution.empty()) {
         const auto v = parse_integers(options.resolution, 'x', 2, "--resolution", "WxH");
-        if (v[0] < 1 || v[1] < 1 || v[0] > 65536 || v[1] > 65536) throw std::runtime_error("--resolution must lie between 1x1 and 65536x65536");
+        if (v[0] < 1 || v[1] < 1 || v[0] > 65536 || v[1] > 65536)
+            throw std::runtime_error("--resolution must lie between 1x1 and 65536x65536");
         build.resolution = {v[0], v[1]};
     }
     if (!options.crop.empty()) {
@@ -64,7 +73,9 @@ Scene load_scene(const SceneOptions& options) {
     }
     const std::string extension = std::filesystem::path(options.file).extension().string();
     if (extension != ".xml")
-        throw std::runtime_error(fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3)", options.file, extension));
+        throw std::runtime_error(
+            fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3)",
+                        options.file, extension));
     return build_scene(read_mitsuba_xml(options.file, read), build);
 }
 

@@ -60,17 +60,21 @@ BsdfEval eval_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, Vec3 wi, Trans
 }
 
 /// eval_component() of a diffuse lobe, which needs the normals alone: most evaluations are of this kind.
-BsdfEval eval_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe, Vec3 wo, Vec3 wi, TransportMode mode) {
+BsdfEval eval_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe, Vec3 wo, Vec3 wi,
+                      TransportMode mode) {
     const Vec3 ns = c.frame.n;
     const float side = std::copysign(1.0f, dot(ng, ns));
-    const float cos_o = dot(wo, ns), cos_i = dot(wi, ns), cos_og = dot(wo, ng) * side, cos_ig = dot(wi, ng) * side;
+    const float cos_o = dot(wo, ns), cos_i = dot(wi, ns), cos_og = dot(wo, ng) * side,
+                cos_ig = dot(wi, ng) * side;
     if (!(cos_o > 0 && cos_i > 0 && cos_og > 0 && cos_ig > 0)) return {};
     const float factor = mode == TransportMode::Radiance ? cos_i : cos_o * cos_ig / cos_og;
-    return {lobe.reflectance * (factor * c.weight * kInvPi), cos_i * c.weight * kInvPi, cos_o * c.weight * kInvPi};
+    return {lobe.reflectance * (factor * c.weight * kInvPi), cos_i * c.weight * kInvPi,
+            cos_o * c.weight * kInvPi};
 }
 
 /// Sampling's counterpart of eval_diffuse().
-std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe, Vec3 wo, Vec2 u, TransportMode mode) {
+std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe,
+                                         Vec3 wo, Vec2 u, TransportMode mode) {
     const float side = std::copysign(1.0f, dot(ng, c.frame.n));
     const float cos_o = dot(wo, c.frame.n), cos_og = dot(wo, ng) * side;
     if (!(cos_o > 0 && cos_og > 0)) return {};
@@ -78,8 +82,12 @@ std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const 
     const Vec3 wi = c.frame.to_world(local);
     const float cos_ig = dot(wi, ng) * side;
     if (!(local.z > 0 && cos_ig > 0)) return {};
-    const float correction = mode == TransportMode::Radiance ? 1.0f : cos_o * cos_ig / (cos_og * local.z);
-    return BsdfSample{.wi = wi, .weight = lobe.reflectance * correction, .pdf = local.z * kInvPi, .pdf_rev = cos_o * kInvPi};
+    const float correction =
+        mode == TransportMode::Radiance ? 1.0f : cos_o * cos_ig / (cos_og * local.z);
+    return BsdfSample{.wi = wi,
+                      .weight = lobe.reflectance * correction,
+                      .pdf = local.z * kInvPi,
+                      .pdf_rev = cos_o * kInvPi};
 }
 
 /// As if `c` were chosen for certain.
@@ -111,7 +119,8 @@ void add(BsdfEval& sum, const BsdfEval& e) {
 
 BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
     if (!first_.next)
-        if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe)) return eval_diffuse(ng_, first_, *diffuse, wo, wi, mode);
+        if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe))
+            return eval_diffuse(ng_, first_, *diffuse, wo, wi, mode);
     BsdfEval sum = eval_component(ng_, first_, wo, wi, mode);
     for (const BsdfComponent* c = first_.next; c; c = c->next)
         add(sum, eval_component(ng_, *c, wo, wi, mode));
@@ -120,7 +129,8 @@ BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
 
 std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const {
     if (!first_.next && first_.weight == 1)
-        if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe)) return sample_diffuse(ng_, first_, *diffuse, wo, u, mode);
+        if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe))
+            return sample_diffuse(ng_, first_, *diffuse, wo, u, mode);
     const BsdfComponent* chosen = &first_;
     while (chosen && u_lobe >= chosen->weight) {
         u_lobe -= chosen->weight;

@@ -19,15 +19,17 @@
 namespace etendue {
 
 /// The closed set of lobes; trivially copyable, at most 64 bytes each.
-using Lobe = std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, DielectricLobe, ThinDielectricLobe,
-                          RoughDielectricLobe, PlasticLobe, RoughPlasticLobe, PhongLobe, PrincipledLobe>;
+using Lobe =
+    std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, DielectricLobe, ThinDielectricLobe,
+                 RoughDielectricLobe, PlasticLobe, RoughPlasticLobe, PhongLobe, PrincipledLobe>;
 
 /// One lobe in its shading frame; a mixture is a list of them whose weights sum to one.
 struct BsdfComponent {
     Frame frame;
     Lobe lobe;
     float weight = 1;
-    const BsdfComponent* next = nullptr;  ///< In the arena of the walk that made it; nullptr for the last.
+    const BsdfComponent* next =
+        nullptr;  ///< In the arena of the walk that made it; nullptr for the last.
 };
 
 /// Everything that scatters at one surface point.

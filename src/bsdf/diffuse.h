@@ -17,7 +17,8 @@ struct DiffuseLobe {
         if (!(wo.z > 0)) return {};
         const Vec3 wi = sample_cosine_hemisphere(u);
         if (!(wi.z > 0)) return {};
-        return BsdfSample{.wi = wi, .weight = reflectance, .pdf = wi.z * kInvPi, .pdf_rev = wo.z * kInvPi};
+        return BsdfSample{
+            .wi = wi, .weight = reflectance, .pdf = wi.z * kInvPi, .pdf_rev = wo.z * kInvPi};
     }
     Rgb albedo_estimate() const { return reflectance; }
     float roughness() const { return 1; }

@@ -15,8 +15,9 @@ enum class TransportMode : uint8_t { Radiance, Importance };
 
 /// Value of the smooth part of a lobe for a pair of directions. Delta components contribute nothing here.
 struct BsdfEval {
-    Rgb f;              ///< f(wo, wi)·|cos θ_i|, in the convention of importance transport (no η² of radiance).
-    float pdf = 0;      ///< Solid-angle density of sampling wi from wo, lobe choice included, not renormalised.
+    Rgb f;  ///< f(wo, wi)·|cos θ_i|, in the convention of importance transport (no η² of radiance).
+    float pdf =
+        0;  ///< Solid-angle density of sampling wi from wo, lobe choice included, not renormalised.
     float pdf_rev = 0;  ///< The same for sampling wo from wi.
     /// η on wi's side over η on wo's side; 1 for reflection.
     float eta = 1;
@@ -24,17 +25,19 @@ struct BsdfEval {
 
 struct BsdfSample {
     Vec3 wi;
-    Rgb weight;         ///< f·|cos θ_i| / pdf in the convention of BsdfEval::f; for a delta event f / pmf.
-    float pdf = 0;      ///< As BsdfEval; for a delta event its discrete probability.
-    float pdf_rev = 0;  ///< As BsdfEval; for a delta event the discrete probability of the reverse event.
-    float eta = 1;      ///< As BsdfEval.
+    Rgb weight;  ///< f·|cos θ_i| / pdf in the convention of BsdfEval::f; for a delta event f / pmf.
+    float pdf = 0;  ///< As BsdfEval; for a delta event its discrete probability.
+    float pdf_rev =
+        0;  ///< As BsdfEval; for a delta event the discrete probability of the reverse event.
+    float eta = 1;  ///< As BsdfEval.
     bool is_delta = false;
 };
 
 /// The sample of a smooth lobe from its value and densities; nothing where it cannot have been sampled.
 inline std::optional<BsdfSample> make_sample(Vec3 wi, const BsdfEval& e) {
     if (!(e.pdf > 0)) return {};
-    return BsdfSample{.wi = wi, .weight = e.f / e.pdf, .pdf = e.pdf, .pdf_rev = e.pdf_rev, .eta = e.eta};
+    return BsdfSample{
+        .wi = wi, .weight = e.f / e.pdf, .pdf = e.pdf, .pdf_rev = e.pdf_rev, .eta = e.eta};
 }
 
 // ---- Lobes: each has

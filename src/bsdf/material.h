@@ -18,7 +18,7 @@ struct SurfacePoint {
     Vec3 ns;          ///< Interpolated normal, on ng's side.
     Vec3 dpdu, dpdv;  ///< Tangents; may be zero where there is no parametrisation.
     Vec2 uv;
-    Vec3 wo;          ///< Toward the predecessor.
+    Vec3 wo;  ///< Toward the predecessor.
 };
 
 /// Where mixtures keep their second and further components until the walk is over; reset() keeps the memory.
@@ -41,7 +41,8 @@ public:
     virtual ~Material() = default;
     /// Adds this material's lobes at `point`, scaled by `weight`, in `frame` (whose n is the shading normal to use;
     /// a two-sided material turns it toward wo). Components are appended to `list`.
-    virtual void append(const SurfacePoint& point, const Frame& frame, float weight, class ComponentList& list) const = 0;
+    virtual void append(const SurfacePoint& point, const Frame& frame, float weight,
+                        class ComponentList& list) const = 0;
     /// Probability that a ray meets the surface at all; 1 unless masked. 0 everywhere for `null`.
     virtual float opacity(Vec2) const { return 1; }
     virtual bool is_opaque() const { return true; }  ///< opacity is 1 everywhere
@@ -84,7 +85,8 @@ public:
             first.weight = weight;
             is_empty_ = false;
         } else {
-            first.next = arena_->keep({.frame = frame, .lobe = lobe, .weight = weight, .next = first.next});
+            first.next =
+                arena_->keep({.frame = frame, .lobe = lobe, .weight = weight, .next = first.next});
         }
     }
 
@@ -99,7 +101,8 @@ class MaterialContext {
 public:
     virtual ~MaterialContext() = default;
     /// Colour or texture parameter; checks that constants lie in [0, hi]. An empty name is the unnamed texture child.
-    virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback, float hi = kInf) = 0;
+    virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback,
+                               float hi = kInf) = 0;
     /// The nested materials in file order.
     virtual std::vector<const Material*> nested(const Params& params) = 0;
 };

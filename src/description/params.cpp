@@ -17,18 +17,18 @@ const char* type_name(const Param& p) {
 
 bool accepts(ParamKind kind, ParamType type) {
     switch (kind) {
-        case ParamKind::Bool: return type == ParamType::Bool;
-        case ParamKind::Int: return type == ParamType::Int;
-        case ParamKind::Float: return type == ParamType::Float || type == ParamType::Int;
-        case ParamKind::String: return type == ParamType::String;
-        case ParamKind::Vector: return type == ParamType::Vector;
-        case ParamKind::Rgb:
-        case ParamKind::Texture:
-            return type == ParamType::Rgb || type == ParamType::Float || type == ParamType::Int;
-        case ParamKind::Transform: return type == ParamType::Transform;
-        case ParamKind::Object: return false;
-        case ParamKind::FloatOrName:
-            return type == ParamType::Float || type == ParamType::Int || type == ParamType::String;
+    case ParamKind::Bool: return type == ParamType::Bool;
+    case ParamKind::Int: return type == ParamType::Int;
+    case ParamKind::Float: return type == ParamType::Float || type == ParamType::Int;
+    case ParamKind::String: return type == ParamType::String;
+    case ParamKind::Vector: return type == ParamType::Vector;
+    case ParamKind::Rgb:
+    case ParamKind::Texture:
+        return type == ParamType::Rgb || type == ParamType::Float || type == ParamType::Int;
+    case ParamKind::Transform: return type == ParamType::Transform;
+    case ParamKind::Object: return false;
+    case ParamKind::FloatOrName:
+        return type == ParamType::Float || type == ParamType::Int || type == ParamType::String;
     }
     return false;
 }
@@ -57,8 +57,9 @@ const T* Params::get(std::string_view name, const char* expected) const {
     if (!p) return nullptr;
     const T* v = std::get_if<T>(&p->value);
     if (!v)
-        throw SceneError(p->where, fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", name,
-                                               object().category, object().type, expected, type_name(*p)));
+        throw SceneError(
+            p->where, fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", name,
+                                  object().category, object().type, expected, type_name(*p)));
     return v;
 }
 
@@ -70,7 +71,8 @@ bool Params::flag(std::string_view name, bool fallback) const {
 int64_t Params::integer(std::string_view name, int64_t fallback, int64_t lo, int64_t hi) const {
     const int64_t* v = get<int64_t>(name, "integer");
     if (v && (*v < lo || *v > hi))
-        fail(name, fmt::format("parameter \"{}\" is {}, but must lie in [{}, {}]", name, *v, lo, hi));
+        fail(name,
+             fmt::format("parameter \"{}\" is {}, but must lie in [{}, {}]", name, *v, lo, hi));
     return v ? *v : fallback;
 }
 
@@ -86,7 +88,8 @@ float Params::number(std::string_view name, float fallback, float lo, float hi) 
                        ? fmt::format("parameter \"{}\" is {}, but must be finite", name, v)
                    : std::isinf(hi)
                        ? fmt::format("parameter \"{}\" is {}, but must be at least {}", name, v, lo)
-                       : fmt::format("parameter \"{}\" is {}, but must lie in [{}, {}]", name, v, lo, hi));
+                       : fmt::format("parameter \"{}\" is {}, but must lie in [{}, {}]", name, v,
+                                     lo, hi));
     return float(v);
 }
 
@@ -95,10 +98,12 @@ std::string Params::text(std::string_view name, std::string_view fallback) const
     return v ? *v : std::string(fallback);
 }
 
-int Params::choice(std::string_view name, std::initializer_list<const char*> options, int fallback) const {
+int Params::choice(std::string_view name, std::initializer_list<const char*> options,
+                   int fallback) const {
     const std::string* v = get<std::string>(name, "string");
     if (!v) return fallback;
-    const auto it = std::find_if(options.begin(), options.end(), [&](const char* o) { return *v == o; });
+    const auto it =
+        std::find_if(options.begin(), options.end(), [&](const char* o) { return *v == o; });
     if (it == options.end())
         fail(name, fmt::format("parameter \"{}\" is \"{}\", but must be one of: {}", name, *v,
                                fmt::join(options.begin(), options.end(), ", ")));
@@ -122,7 +127,8 @@ Rgb Params::rgb(std::string_view name, Rgb fallback, float lo) const {
     else
         c = *get<Rgb>(name, "colour");
     if (!is_finite(c) || std::min({c.r, c.g, c.b}) < lo)
-        fail(name, fmt::format("parameter \"{}\" is ({}, {}, {}), but its components must be finite and at least {}",
+        fail(name, fmt::format("parameter \"{}\" is ({}, {}, {}), but its components must be "
+                               "finite and at least {}",
                                name, c.r, c.g, c.b, lo));
     return c;
 }
@@ -157,18 +163,20 @@ void check_params(const SceneDescription& scene, int index, const PluginInfo& in
     };
     auto unknown = [&](const SourceLocation& where, const std::string& name) {
         const std::string near = nearest_name(name, known);
-        report(where, fmt::format("{} \"{}\" has no parameter \"{}\"{}", info.category, info.name, name,
-                                  !near.empty()    ? fmt::format(" (did you mean \"{}\"?)", near)
-                                  : known.empty() ? std::string(" (it has none)")
-                                                  : fmt::format(" (it has: {})", fmt::join(known, ", "))));
+        report(where,
+               fmt::format("{} \"{}\" has no parameter \"{}\"{}", info.category, info.name, name,
+                           !near.empty()   ? fmt::format(" (did you mean \"{}\"?)", near)
+                           : known.empty() ? std::string(" (it has none)")
+                                           : fmt::format(" (it has: {})", fmt::join(known, ", "))));
     };
     for (const Param& p : object.params) {
         const auto it = find(p.name);
         if (it == info.params.end())
             unknown(p.where, p.name);
         else if (!accepts(it->kind, p.type()))
-            report(p.where, fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", p.name,
-                                        info.category, info.name, kind_name(it->kind), type_name(p)));
+            report(p.where,
+                   fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", p.name,
+                               info.category, info.name, kind_name(it->kind), type_name(p)));
     }
     for (const auto& c : object.children) {
         if (c.name.empty()) continue;
@@ -177,9 +185,11 @@ void check_params(const SceneDescription& scene, int index, const PluginInfo& in
         const auto it = find(c.name);
         if (it == info.params.end()) {
             if (is_texture) unknown(c.where, c.name);
-        } else if (it->kind != ParamKind::Object && !(is_texture && it->kind == ParamKind::Texture)) {
-            report(c.where, fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", c.name,
-                                        info.category, info.name, kind_name(it->kind), category));
+        } else if (it->kind != ParamKind::Object &&
+                   !(is_texture && it->kind == ParamKind::Texture)) {
+            report(c.where,
+                   fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", c.name,
+                               info.category, info.name, kind_name(it->kind), category));
         }
     }
 }

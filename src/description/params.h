@@ -19,19 +19,20 @@ enum class ParamKind {
     Int,
     Float,
     String,
-    Vector,     ///< point or vector
-    Rgb,        ///< colour or spectrum; a float is taken as grey
+    Vector,  ///< point or vector
+    Rgb,     ///< colour or spectrum; a float is taken as grey
     Transform,
-    Texture,    ///< colour, spectrum, float or nested texture
-    Object,     ///< nested bsdf, medium, film, ...
+    Texture,      ///< colour, spectrum, float or nested texture
+    Object,       ///< nested bsdf, medium, film, ...
     FloatOrName,  ///< number, or the name of one in a table
 };
 
 struct ParamInfo {
     const char* name;
     ParamKind kind;
-    const char* fallback;  ///< Default as printed; "" where the parameter is required or has no single default.
-    const char* doc;       ///< One sentence with unit and range.
+    const char*
+        fallback;  ///< Default as printed; "" where the parameter is required or has no single default.
+    const char* doc;  ///< One sentence with unit and range.
 };
 
 /// One plug-in of one category: what `list` prints and what the parser checks.
@@ -61,11 +62,13 @@ public:
     float number(std::string_view name, float fallback, float lo = -kInf, float hi = kInf) const;
     std::string text(std::string_view name, std::string_view fallback) const;
     /// Index of the parameter's text in `options`; an error that names them all where it is none of them.
-    int choice(std::string_view name, std::initializer_list<const char*> options, int fallback) const;
+    int choice(std::string_view name, std::initializer_list<const char*> options,
+               int fallback) const;
     Vec3 vector(std::string_view name, Vec3 fallback) const;
     /// A colour whose components are finite and at least `lo`.
     Rgb rgb(std::string_view name, Rgb fallback, float lo = 0) const;
-    Transform transform(std::string_view name) const;  ///< Identity where absent; must be invertible.
+    Transform
+    transform(std::string_view name) const;  ///< Identity where absent; must be invertible.
 
     /// Child given under this parameter name, if any.
     const SceneObject::Child* child(std::string_view name) const;

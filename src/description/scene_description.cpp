@@ -7,14 +7,14 @@ namespace etendue {
 SceneError::SceneError(const SourceLocation& where, const std::string& message)
     : std::runtime_error(where.file.empty()
                              ? message
-                             : where.file + (where.line > 0 ? ":" + std::to_string(where.line) : "") +
-                                   ": " + message),
-      where_(where),
-      message_(message) {}
+                             : where.file +
+                                   (where.line > 0 ? ":" + std::to_string(where.line) : "") + ": " +
+                                   message),
+      where_(where), message_(message) {}
 
 const Param* SceneObject::find(std::string_view param_name) const {
-    const auto it =
-        std::find_if(params.begin(), params.end(), [&](const Param& p) { return p.name == param_name; });
+    const auto it = std::find_if(params.begin(), params.end(),
+                                 [&](const Param& p) { return p.name == param_name; });
     return it == params.end() ? nullptr : &*it;
 }
 

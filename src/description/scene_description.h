@@ -55,8 +55,9 @@ struct SceneObject {
     SourceLocation where;
     std::vector<Param> params;
     struct Child {
-        std::string name;  ///< Parameter name of the child ("reflectance", "interior", ...); empty where unnamed.
-        int object;        ///< Index into SceneDescription::objects; shared where the file used a reference.
+        std::string
+            name;  ///< Parameter name of the child ("reflectance", "interior", ...); empty where unnamed.
+        int object;  ///< Index into SceneDescription::objects; shared where the file used a reference.
         SourceLocation where;
     };
     std::vector<Child> children;

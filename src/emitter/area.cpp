@@ -25,8 +25,11 @@ public:
                 constexpr int kGrid = 4;
                 double sum = 0;
                 for (int k = 0; k < kGrid * kGrid; ++k)
-                    sum += luminance(radiance.eval(
-                        shape.sample(i, {(float(k % kGrid) + 0.5f) / kGrid, (float(k / kGrid) + 0.5f) / kGrid}).uv));
+                    sum +=
+                        luminance(radiance.eval(shape
+                                                    .sample(i, {(float(k % kGrid) + 0.5f) / kGrid,
+                                                                (float(k / kGrid) + 0.5f) / kGrid})
+                                                    .uv));
                 L = sum / (kGrid * kGrid);
                 flux += areas[i] * L;
                 L += 0.05 * mean;
@@ -38,14 +41,16 @@ public:
         power_ = double(kPi) * flux;
         choice_ = AliasTable(weights);
         pdf_.resize(n);
-        for (size_t i = 0; i < n && !choice_.empty(); ++i) pdf_[i] = areas[i] > 0 ? float(choice_.pmf(uint32_t(i)) / areas[i]) : 0.0f;
+        for (size_t i = 0; i < n && !choice_.empty(); ++i)
+            pdf_[i] = areas[i] > 0 ? float(choice_.pmf(uint32_t(i)) / areas[i]) : 0.0f;
     }
 
     EmissionSample sample_emission(Vec2 u_y0, Vec2 u_d) const override {
         const ShapeSample s = sample_point(u_y0);
         const Vec3 local = sample_cosine_hemisphere(u_d);
         const Vec3 d = Frame::from_normal(s.ng).to_world(local);
-        return {s.p, s.ng, d, radiance_.eval(s.uv), pdf_[s.prim], pdf_cosine_hemisphere(local.z), s.uv, s.prim};
+        return {s.p,  s.ng,  d, radiance_.eval(s.uv), pdf_[s.prim], pdf_cosine_hemisphere(local.z),
+                s.uv, s.prim};
     }
 
     bool sample_direct(Vec3 from, Vec2 u, DirectSample& out) const override {
@@ -97,7 +102,9 @@ std::unique_ptr<Emitter> make_area_emitter(const Shape& shape, TextureRef radian
 }
 
 EmitterEntry area_entry() {
-    return {{"emitter", "area", "Radiance from the front of a shape.",
+    return {{"emitter",
+             "area",
+             "Radiance from the front of a shape.",
              {{"radiance", ParamKind::Texture, "1", "Radiance in W/(m² sr)."}}},
             [](const Params& p, EmitterContext& c) {
                 if (!c.shape()) p.fail("emitter \"area\" must be nested in a shape");

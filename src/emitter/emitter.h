@@ -16,28 +16,29 @@ namespace etendue {
 
 /// The start of a light sub-path: y_0 and the direction to y_1.
 struct EmissionSample {
-    Vec3 p;         ///< Finite: y_0. Infinite: a point on the bounding disc, outside the scene.
-    Vec3 ng;        ///< Normal at y_0; for emitters without a surface the direction d.
-    Vec3 d;         ///< Direction in which light leaves, unit length.
-    Rgb Le;         ///< Radiance (intensity of point-like emitters, irradiance of directional ones) along d.
+    Vec3 p;   ///< Finite: y_0. Infinite: a point on the bounding disc, outside the scene.
+    Vec3 ng;  ///< Normal at y_0; for emitters without a surface the direction d.
+    Vec3 d;   ///< Direction in which light leaves, unit length.
+    Rgb Le;  ///< Radiance (intensity of point-like emitters, irradiance of directional ones) along d.
     /// Density of y_0: area measure; 1 for a point; for infinite emitters solid angle of d (1 for a delta direction).
     float pdf_y0;
     /// Density of d at y_0: solid angle; for infinite emitters density of p on the bounding disc.
     float pdf_d;
-    Vec2 uv;        ///< Of y_0 on a textured emitter.
+    Vec2 uv;  ///< Of y_0 on a textured emitter.
     uint32_t prim = 0;
 };
 
 /// y_0 as next event estimation chooses it for a given point of the scene.
 struct DirectSample {
-    Vec3 p;         ///< y_0; for infinite emitters the point's direction wi.
+    Vec3 p;  ///< y_0; for infinite emitters the point's direction wi.
     Vec3 ng;
-    Vec3 wi;        ///< From the scene point toward y_0, unit length.
-    float dist;     ///< kInf for infinite emitters.
-    Rgb Le;         ///< Toward the scene point.
-    float pdf;      ///< p_NE: of y_0 in the measure of EmissionSample::pdf_y0.
-    float pdf_y0;   ///< p_L(y_0): density with which emission sampling would make it.
-    float pdf_d;    ///< Density with which it would leave toward the scene point, as EmissionSample::pdf_d.
+    Vec3 wi;       ///< From the scene point toward y_0, unit length.
+    float dist;    ///< kInf for infinite emitters.
+    Rgb Le;        ///< Toward the scene point.
+    float pdf;     ///< p_NE: of y_0 in the measure of EmissionSample::pdf_y0.
+    float pdf_y0;  ///< p_L(y_0): density with which emission sampling would make it.
+    float
+        pdf_d;  ///< Density with which it would leave toward the scene point, as EmissionSample::pdf_d.
     Vec2 uv;
     uint32_t prim = 0;
 };
@@ -45,7 +46,7 @@ struct DirectSample {
 /// What an eye path that arrives at the emitter finds.
 struct EmitterHit {
     Rgb Le;
-    float pdf;      ///< As DirectSample::pdf, for the point the eye path came from.
+    float pdf;  ///< As DirectSample::pdf, for the point the eye path came from.
     float pdf_y0;
     float pdf_d;
 };
@@ -86,7 +87,8 @@ public:
 class EmitterContext {
 public:
     virtual ~EmitterContext() = default;
-    virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback, float hi = kInf) = 0;
+    virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback,
+                               float hi = kInf) = 0;
     /// The shape an area emitter sits on; nullptr for others.
     virtual const Shape* shape() const = 0;
 };

@@ -14,15 +14,19 @@ namespace {
 class EnvironmentEmitter final : public InfiniteEmitter {
 public:
     EnvironmentEmitter(int width, int height, std::vector<Rgb> pixels, const Transform& to_world)
-        : width_(width), height_(height), pixels_(std::move(pixels)), to_world_(to_world), to_local_(to_world.inverse()) {
+        : width_(width), height_(height), pixels_(std::move(pixels)), to_world_(to_world),
+          to_local_(to_world.inverse()) {
         // Rows of cells: one above the first row of centres, one between each two, one below the last.
         std::vector<float> weights(size_t(width) * (height + 1));
         for (int y = 0; y <= height; ++y) {
-            const double top = std::max(0.0, (y - 0.5) / height), bottom = std::min(1.0, (y + 0.5) / height);
+            const double top = std::max(0.0, (y - 0.5) / height),
+                         bottom = std::min(1.0, (y + 0.5) / height);
             // Solid angle of the row over that of its share of the (u, v) square, up to a constant.
-            const double area = (std::cos(double(kPi) * top) - std::cos(double(kPi) * bottom)) / (bottom - top);
+            const double area =
+                (std::cos(double(kPi) * top) - std::cos(double(kPi) * bottom)) / (bottom - top);
             for (int x = 0; x < width; ++x) {
-                const Rgb sum = texel(x, y - 1) + texel(x + 1, y - 1) + texel(x, y) + texel(x + 1, y);
+                const Rgb sum =
+                    texel(x, y - 1) + texel(x + 1, y - 1) + texel(x, y) + texel(x + 1, y);
                 weights[size_t(y) * width + x] = float(0.25 * luminance(sum) * area);
                 mean_ += 0.25 * luminance(sum) * area * (bottom - top) / width / 2;
             }
@@ -30,7 +34,9 @@ public:
         distribution_ = PiecewiseConstant2D(weights, width, height + 1);
     }
 
-    double power() const override { return 4 * double(kPi) * double(kPi) * sqr(double(scene_radius())) * mean_; }
+    double power() const override {
+        return 4 * double(kPi) * double(kPi) * sqr(double(scene_radius())) * mean_;
+    }
 
 private:
     // The square of the density: u runs over the cells' columns, v over height + 1 rows, of which the first and the last
@@ -48,7 +54,8 @@ private:
         if (!(sin_theta > 0)) return 0;
         float x = uv.x - 0.5f / float(width_);
         if (x < 0) x += 1;
-        return distribution_.pdf({x, to_cell_v(uv.y)}) * cell_v_derivative(uv.y) / (2 * kPi * kPi * sin_theta);
+        return distribution_.pdf({x, to_cell_v(uv.y)}) * cell_v_derivative(uv.y) /
+               (2 * kPi * kPi * sin_theta);
     }
 
     Rgb radiance(Vec3 d) const override {
@@ -56,7 +63,8 @@ private:
         const float x = uv.x * float(width_) - 0.5f, y = uv.y * float(height_) - 0.5f;
         const int x0 = int(std::floor(x)), y0 = int(std::floor(y));
         const float fx = x - float(x0), fy = y - float(y0);
-        return lerp(fy, lerp(fx, texel(x0, y0), texel(x0 + 1, y0)), lerp(fx, texel(x0, y0 + 1), texel(x0 + 1, y0 + 1)));
+        return lerp(fy, lerp(fx, texel(x0, y0), texel(x0 + 1, y0)),
+                    lerp(fx, texel(x0, y0 + 1), texel(x0 + 1, y0 + 1)));
     }
 
     /// Position among the rows of cells, in [0, 1), of an image coordinate v, piecewise linear.
@@ -64,13 +72,16 @@ private:
         const float y = v * float(height_);
         const float rows = float(height_ + 1);
         if (y < 0.5f) return 2 * y / rows;
-        if (y >= float(height_) - 0.5f) return std::min((float(height_) + 2 * (y - float(height_) + 0.5f)) / rows, kOneMinusEpsilon);
+        if (y >= float(height_) - 0.5f)
+            return std::min((float(height_) + 2 * (y - float(height_) + 0.5f)) / rows,
+                            kOneMinusEpsilon);
         return (y + 0.5f) / rows;
     }
     float to_image_v(float cell_v) const {
         const float c = cell_v * float(height_ + 1);
         if (c < 1) return 0.5f * c / float(height_);
-        if (c >= float(height_)) return (float(height_) - 0.5f + 0.5f * (c - float(height_))) / float(height_);
+        if (c >= float(height_))
+            return (float(height_) - 0.5f + 0.5f * (c - float(height_))) / float(height_);
         return (c - 0.5f) / float(height_);
     }
     /// d to_cell_v / dv
@@ -84,7 +95,8 @@ private:
         const Vec3 w = normalize(to_local_.vector(d));
         float u = std::atan2(w.x, -w.z) / (2 * kPi);
         if (u < 0) u += 1;
-        return {std::min(u, kOneMinusEpsilon), std::min(std::acos(clamp(w.y, -1, 1)) / kPi, kOneMinusEpsilon)};
+        return {std::min(u, kOneMinusEpsilon),
+                std::min(std::acos(clamp(w.y, -1, 1)) / kPi, kOneMinusEpsilon)};
     }
     Vec3 to_direction(Vec2 uv) const {
         float sp, cp, st, ct;
@@ -108,15 +120,19 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb> pixels, const Transform& to_world) {
+std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb> pixels,
+                                          const Transform& to_world) {
     return std::make_unique<EnvironmentEmitter>(width, height, std::move(pixels), to_world);
 }
 
 EmitterEntry envmap_entry() {
-    return {{"emitter", "envmap", "Environment as a latitude-longitude image, importance-sampled.",
+    return {{"emitter",
+             "envmap",
+             "Environment as a latitude-longitude image, importance-sampled.",
              {{"filename", ParamKind::String, "", "Image, any format; up is its upper edge."},
               {"scale", ParamKind::Float, "1", "Factor of the radiance."},
-              {"to_world", ParamKind::Transform, "identity", "Rotation of the environment; its own up is +y."},
+              {"to_world", ParamKind::Transform, "identity",
+               "Rotation of the environment; its own up is +y."},
               {"mis_compensation", ParamKind::Bool, "false", "Accepted; without effect."}}},
             [](const Params& p, EmitterContext&) {
                 const std::string path = resolve_file(p);
@@ -131,10 +147,12 @@ EmitterEntry envmap_entry() {
                 for (Rgb& c : pixels) {
                     c *= scale;
                     if (!is_finite(c) || std::min({c.r, c.g, c.b}) < 0)
-                        p.fail("filename", path + ": the image has a pixel that is not finite or is negative");
+                        p.fail("filename",
+                               path + ": the image has a pixel that is not finite or is negative");
                 }
                 std::vector<std::unique_ptr<Emitter>> made;
-                made.push_back(make_environment(image.width, image.height, std::move(pixels), p.transform("to_world")));
+                made.push_back(make_environment(image.width, image.height, std::move(pixels),
+                                                p.transform("to_world")));
                 return made;
             }};
 }

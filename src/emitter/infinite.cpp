@@ -41,10 +41,14 @@ namespace {
 class ConstantEmitter final : public InfiniteEmitter {
 public:
     explicit ConstantEmitter(Rgb L) : L_(L) {}
-    double power() const override { return 4 * double(kPi) * double(kPi) * sqr(double(scene_radius())) * luminance(L_); }
+    double power() const override {
+        return 4 * double(kPi) * double(kPi) * sqr(double(scene_radius())) * luminance(L_);
+    }
 
 private:
-    Sample sample_direction(Vec2 u) const override { return {sample_uniform_sphere(u), L_, kUniformSpherePdf}; }
+    Sample sample_direction(Vec2 u) const override {
+        return {sample_uniform_sphere(u), L_, kUniformSpherePdf};
+    }
     Rgb radiance(Vec3) const override { return L_; }
     float pdf_direction(Vec3) const override { return kUniformSpherePdf; }
 
@@ -54,7 +58,9 @@ private:
 class DirectionalEmitter final : public InfiniteEmitter {
 public:
     DirectionalEmitter(Vec3 travel, Rgb irradiance) : d_(-travel), E_(irradiance) {}
-    double power() const override { return double(kPi) * sqr(double(scene_radius())) * luminance(E_); }
+    double power() const override {
+        return double(kPi) * sqr(double(scene_radius())) * luminance(E_);
+    }
     bool is_delta() const override { return true; }
 
 private:
@@ -75,7 +81,9 @@ std::vector<std::unique_ptr<Emitter>> one(std::unique_ptr<Emitter> e) {
 }  // namespace
 
 EmitterEntry constant_entry() {
-    return {{"emitter", "constant", "The same radiance from every direction.",
+    return {{"emitter",
+             "constant",
+             "The same radiance from every direction.",
              {{"radiance", ParamKind::Rgb, "1", "Radiance in W/(m² sr)."}}},
             [](const Params& p, EmitterContext&) {
                 return one(std::make_unique<ConstantEmitter>(p.rgb("radiance", Rgb(1))));
@@ -83,16 +91,23 @@ EmitterEntry constant_entry() {
 }
 
 EmitterEntry directional_entry() {
-    return {{"emitter", "directional", "Parallel light from infinity.",
-             {{"irradiance", ParamKind::Rgb, "1", "Irradiance on a plane normal to the light, W/m²."},
-              {"direction", ParamKind::Vector, "0, 0, 1", "Direction in which the light travels, instead of to_world."},
-              {"to_world", ParamKind::Transform, "identity", "The light travels along its +z."}}},
-            [](const Params& p, EmitterContext&) {
-                if (p.has("direction") && p.has("to_world")) p.fail("to_world", "give either direction or to_world, not both");
-                const Vec3 d = p.has("direction") ? p.vector("direction", {}) : p.transform("to_world").vector({0, 0, 1});
-                if (!(length2(d) > 0)) p.fail("direction", "the direction must not be zero");
-                return one(std::make_unique<DirectionalEmitter>(normalize(d), p.rgb("irradiance", Rgb(1))));
-            }};
+    return {
+        {"emitter",
+         "directional",
+         "Parallel light from infinity.",
+         {{"irradiance", ParamKind::Rgb, "1", "Irradiance on a plane normal to the light, W/m²."},
+          {"direction", ParamKind::Vector, "0, 0, 1",
+           "Direction in which the light travels, instead of to_world."},
+          {"to_world", ParamKind::Transform, "identity", "The light travels along its +z."}}},
+        [](const Params& p, EmitterContext&) {
+            if (p.has("direction") && p.has("to_world"))
+                p.fail("to_world", "give either direction or to_world, not both");
+            const Vec3 d = p.has("direction") ? p.vector("direction", {})
+                                              : p.transform("to_world").vector({0, 0, 1});
+            if (!(length2(d) > 0)) p.fail("direction", "the direction must not be zero");
+            return one(
+                std::make_unique<DirectionalEmitter>(normalize(d), p.rgb("irradiance", Rgb(1))));
+        }};
 }
 
 }  // namespace etendue

@@ -30,7 +30,9 @@ public:
         return true;
     }
 
-    Emission eval_emission(Vec3, Vec2, Vec3 w) const override { return {intensity(w), pdf_direction(w)}; }
+    Emission eval_emission(Vec3, Vec2, Vec3 w) const override {
+        return {intensity(w), pdf_direction(w)};
+    }
     double power() const override { return 4 * double(kPi) * luminance(intensity_); }
     bool is_delta() const override { return true; }
 
@@ -46,15 +48,13 @@ protected:
 class SpotEmitter final : public PointEmitter {
 public:
     SpotEmitter(Vec3 p, Vec3 axis, Rgb intensity, float cutoff_degrees, float beam_degrees)
-        : PointEmitter(p, intensity),
-          frame_(Frame::from_normal(axis)),
-          cutoff_(cutoff_degrees * kPi / 180),
-          beam_(beam_degrees * kPi / 180),
-          cos_cutoff_(std::cos(cutoff_)),
-          cos_beam_(std::cos(beam_)) {}
+        : PointEmitter(p, intensity), frame_(Frame::from_normal(axis)),
+          cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
+          cos_cutoff_(std::cos(cutoff_)), cos_beam_(std::cos(beam_)) {}
 
     double power() const override {
-        return 2 * double(kPi) * luminance(intensity_) * (1 - 0.5 * (double(cos_cutoff_) + cos_beam_));
+        return 2 * double(kPi) * luminance(intensity_) *
+               (1 - 0.5 * (double(cos_cutoff_) + cos_beam_));
     }
 
 private:
@@ -64,7 +64,9 @@ private:
         if (c >= cos_beam_) return intensity_;
         return intensity_ * ((cutoff_ - std::acos(c)) / (cutoff_ - beam_));
     }
-    Vec3 sample_direction(Vec2 u) const override { return frame_.to_world(sample_uniform_cone(u, cos_cutoff_)); }
+    Vec3 sample_direction(Vec2 u) const override {
+        return frame_.to_world(sample_uniform_cone(u, cos_cutoff_));
+    }
     float pdf_direction(Vec3 d) const override {
         return dot(d, frame_.n) > cos_cutoff_ ? pdf_uniform_cone(cos_cutoff_) : 0.0f;
     }
@@ -82,29 +84,39 @@ std::vector<std::unique_ptr<Emitter>> one(std::unique_ptr<Emitter> e) {
 }  // namespace
 
 EmitterEntry point_entry() {
-    return {{"emitter", "point", "Isotropic point light.",
-             {{"intensity", ParamKind::Rgb, "1", "Radiant intensity in W/sr."},
-              {"position", ParamKind::Vector, "0, 0, 0", "Instead of to_world."},
-              {"to_world", ParamKind::Transform, "identity", "Its origin is the light's position."}}},
-            [](const Params& p, EmitterContext&) {
-                if (p.has("position") && p.has("to_world")) p.fail("to_world", "give either position or to_world, not both");
-                const Vec3 at = p.has("position") ? p.vector("position", {}) : p.transform("to_world").point({0, 0, 0});
-                return one(std::make_unique<PointEmitter>(at, p.rgb("intensity", Rgb(1))));
-            }};
+    return {
+        {"emitter",
+         "point",
+         "Isotropic point light.",
+         {{"intensity", ParamKind::Rgb, "1", "Radiant intensity in W/sr."},
+          {"position", ParamKind::Vector, "0, 0, 0", "Instead of to_world."},
+          {"to_world", ParamKind::Transform, "identity", "Its origin is the light's position."}}},
+        [](const Params& p, EmitterContext&) {
+            if (p.has("position") && p.has("to_world"))
+                p.fail("to_world", "give either position or to_world, not both");
+            const Vec3 at = p.has("position") ? p.vector("position", {})
+                                              : p.transform("to_world").point({0, 0, 0});
+            return one(std::make_unique<PointEmitter>(at, p.rgb("intensity", Rgb(1))));
+        }};
 }
 
 EmitterEntry spot_entry() {
-    return {{"emitter", "spot", "Spot light along +z.",
+    return {{"emitter",
+             "spot",
+             "Spot light along +z.",
              {{"intensity", ParamKind::Rgb, "1", "Radiant intensity in the beam, W/sr."},
-              {"cutoff_angle", ParamKind::Float, "20", "Half-angle in degrees beyond which nothing is emitted."},
-              {"beam_width", ParamKind::Float, "3/4 of cutoff_angle", "Half-angle in degrees of full intensity."},
+              {"cutoff_angle", ParamKind::Float, "20",
+               "Half-angle in degrees beyond which nothing is emitted."},
+              {"beam_width", ParamKind::Float, "3/4 of cutoff_angle",
+               "Half-angle in degrees of full intensity."},
               {"to_world", ParamKind::Transform, "identity", "Position, and +z as axis."}}},
             [](const Params& p, EmitterContext&) {
                 const Transform t = p.transform("to_world");
                 const float cutoff = p.number("cutoff_angle", 20, 0.01f, 179.9f);
                 const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
                 if (beam > cutoff) p.fail("beam_width", "beam_width must not exceed cutoff_angle");
-                return one(std::make_unique<SpotEmitter>(t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})),
+                return one(std::make_unique<SpotEmitter>(t.point({0, 0, 0}),
+                                                         normalize(t.vector({0, 0, 1})),
                                                          p.rgb("intensity", Rgb(1)), cutoff, beam));
             }};
 }

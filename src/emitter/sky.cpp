@@ -15,10 +15,12 @@ namespace {
 class SunEmitter final : public InfiniteEmitter {
 public:
     SunEmitter(Vec3 toward, float angular_radius, Rgb radiance)
-        : frame_(Frame::from_normal(toward)), cos_max_(std::cos(angular_radius)), radiance_(radiance) {}
+        : frame_(Frame::from_normal(toward)), cos_max_(std::cos(angular_radius)),
+          radiance_(radiance) {}
 
     double power() const override {
-        return double(kPi) * sqr(double(scene_radius())) * luminance(radiance_) / pdf_uniform_cone(cos_max_);
+        return double(kPi) * sqr(double(scene_radius())) * luminance(radiance_) /
+               pdf_uniform_cone(cos_max_);
     }
 
 private:
@@ -27,7 +29,9 @@ private:
         return {frame_.to_world(local), radiance_, pdf_uniform_cone(cos_max_)};
     }
     Rgb radiance(Vec3 d) const override { return is_inside(d) ? radiance_ : Rgb(); }
-    float pdf_direction(Vec3 d) const override { return is_inside(d) ? pdf_uniform_cone(cos_max_) : 0.0f; }
+    float pdf_direction(Vec3 d) const override {
+        return is_inside(d) ? pdf_uniform_cone(cos_max_) : 0.0f;
+    }
     /// By the distance to the axis: the cosine alone has too few digits for half a degree.
     bool is_inside(Vec3 d) const {
         return dot(d, frame_.n) > 0 && length2(cross(d, frame_.n)) <= 1 - sqr(cos_max_);
@@ -41,7 +45,8 @@ private:
 std::vector<ParamInfo> params() {
     return {
         {"turbidity", ParamKind::Float, "3", "Haze: 1 (clear, taken as 2 for the sky) to 10."},
-        {"sun_direction", ParamKind::Vector, "", "Toward the sun, before to_world; instead of time and place."},
+        {"sun_direction", ParamKind::Vector, "",
+         "Toward the sun, before to_world; instead of time and place."},
         {"year", ParamKind::Int, "2010", "Date of the sun's position."},
         {"month", ParamKind::Int, "7", "1 to 12."},
         {"day", ParamKind::Int, "10", "1 to 31."},
@@ -54,7 +59,8 @@ std::vector<ParamInfo> params() {
         {"scale", ParamKind::Float, "1", "Factor of all radiance."},
         {"sky_scale", ParamKind::Float, "1", "Factor of the sky's radiance."},
         {"sun_scale", ParamKind::Float, "1", "Factor of the sun's radiance."},
-        {"sun_radius_scale", ParamKind::Float, "1", "Factor of the sun's angular radius; its power stays."},
+        {"sun_radius_scale", ParamKind::Float, "1",
+         "Factor of the sun's angular radius; its power stays."},
         {"resolution", ParamKind::Int, "512", "Rows of the table of the sky."},
         {"albedo", ParamKind::Rgb, "", "Accepted; the model has no ground."},
         {"to_world", ParamKind::Transform, "identity", "Rotation; up is +y, east +x, north -z."},
@@ -87,8 +93,10 @@ std::unique_ptr<Emitter> make_sky(const Params& p, const SkyModel& model) {
     std::vector<Rgb> pixels(size_t(width) * height);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
-            const float theta = kPi * (float(y) + 0.5f) / float(height), phi = 2 * kPi * (float(x) + 0.5f) / float(width);
-            const Vec3 d{std::sin(phi) * std::sin(theta), std::cos(theta), -std::cos(phi) * std::sin(theta)};
+            const float theta = kPi * (float(y) + 0.5f) / float(height),
+                        phi = 2 * kPi * (float(x) + 0.5f) / float(width);
+            const Vec3 d{std::sin(phi) * std::sin(theta), std::cos(theta),
+                         -std::cos(phi) * std::sin(theta)};
             pixels[size_t(y) * width + x] = model.sky_radiance(d) * scale;
         }
     return make_environment(width, height, std::move(pixels), p.transform("to_world"));
@@ -98,13 +106,15 @@ std::unique_ptr<Emitter> make_sun(const Params& p, const SkyModel& model) {
     const float radius_scale = p.number("sun_radius_scale", 1, 0.01f, 100);
     const float scale = p.number("scale", 1, 0) * p.number("sun_scale", 1, 0) / sqr(radius_scale);
     const Vec3 toward = normalize(p.transform("to_world").vector(model.sun_direction()));
-    return std::make_unique<SunEmitter>(toward, kSunAngularRadius * radius_scale, model.sun_radiance() * scale);
+    return std::make_unique<SunEmitter>(toward, kSunAngularRadius * radius_scale,
+                                        model.sun_radiance() * scale);
 }
 
 }  // namespace
 
 EmitterEntry sky_entry() {
-    return {{"emitter", "sky", "Clear sky without the sun [Preetham et al. 1999].", params()}, [](const Params& p, EmitterContext&) {
+    return {{"emitter", "sky", "Clear sky without the sun [Preetham et al. 1999].", params()},
+            [](const Params& p, EmitterContext&) {
                 std::vector<std::unique_ptr<Emitter>> made;
                 made.push_back(make_sky(p, read_model(p)));
                 return made;
@@ -112,7 +122,8 @@ EmitterEntry sky_entry() {
 }
 
 EmitterEntry sun_entry() {
-    return {{"emitter", "sun", "The sun's disc through a clear atmosphere [Preetham et al. 1999].", params()},
+    return {{"emitter", "sun", "The sun's disc through a clear atmosphere [Preetham et al. 1999].",
+             params()},
             [](const Params& p, EmitterContext&) {
                 std::vector<std::unique_ptr<Emitter>> made;
                 made.push_back(make_sun(p, read_model(p)));
@@ -121,7 +132,8 @@ EmitterEntry sun_entry() {
 }
 
 EmitterEntry sunsky_entry() {
-    return {{"emitter", "sunsky", "sun and sky together.", params()}, [](const Params& p, EmitterContext&) {
+    return {{"emitter", "sunsky", "sun and sky together.", params()},
+            [](const Params& p, EmitterContext&) {
                 const SkyModel model = read_model(p);
                 std::vector<std::unique_ptr<Emitter>> made;
                 made.push_back(make_sky(p, model));

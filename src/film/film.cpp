@@ -49,18 +49,16 @@ void SplatBuffer::fold_into(std::span<Rgb> sums) {
             }
     });
     std::sort(large_.begin(), large_.end(), [](const Large& a, const Large& b) {
-        return std::tie(a.pixel, a.value.r, a.value.g, a.value.b) < std::tie(b.pixel, b.value.r, b.value.g, b.value.b);
+        return std::tie(a.pixel, a.value.r, a.value.g, a.value.b) <
+               std::tie(b.pixel, b.value.r, b.value.g, b.value.b);
     });
     for (const Large& l : large_) sums[l.pixel] += l.value;
     large_.clear();
 }
 
 Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter)
-    : geometry_(geometry),
-      filter_(filter),
-      eye_(geometry.pixel_count()),
-      moments_(geometry.pixel_count()),
-      expected_(geometry.pixel_count()),
+    : geometry_(geometry), filter_(filter), eye_(geometry.pixel_count()),
+      moments_(geometry.pixel_count()), expected_(geometry.pixel_count()),
       previous_(geometry.pixel_count()) {}
 
 void Film::add_splat(Vec2 point, Rgb value) {
@@ -69,11 +67,13 @@ void Film::add_splat(Vec2 point, Rgb value) {
         return;
     }
     value *= splat_scale_;
-    for_each_pixel(geometry_, filter_, point, [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); });
+    for_each_pixel(geometry_, filter_, point,
+                   [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); });
 }
 
 void Film::begin_pass(uint64_t light_paths) {
-    if (light_paths > 0 && !splats_) splats_ = std::make_unique<SplatBuffer>(geometry_.pixel_count());
+    if (light_paths > 0 && !splats_)
+        splats_ = std::make_unique<SplatBuffer>(geometry_.pixel_count());
     splat_scale_ = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
 }
 
@@ -99,10 +99,13 @@ void Film::end_pass() {
             }
             const float y = luminance(v);
             luminance_sum[chunk] += y;
-            expected_[i] = luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / float(passes_);
+            expected_[i] =
+                luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / float(passes_);
             total[chunk] += expected_[i];
-            if (!second) previous_[i] = y;
-            else previous_[i] = sqr(previous_[i] - y);
+            if (!second)
+                previous_[i] = y;
+            else
+                previous_[i] = sqr(previous_[i] - y);
         }
     });
     double sum = 0, mean = 0;
@@ -112,7 +115,9 @@ void Film::end_pass() {
     for_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
             // Half the squared difference of two passes estimates the variance of one, whatever they share within.
-            if (second) pair_sum[chunk] += 0.5 * previous_[i] / (sqr(double(expected_[i])) + 0.01 * mean * mean + 1e-30);
+            if (second)
+                pair_sum[chunk] +=
+                    0.5 * previous_[i] / (sqr(double(expected_[i])) + 0.01 * mean * mean + 1e-30);
             expected_[i] = std::max(expected_[i], float(0.1 * mean));
         }
     });
@@ -154,7 +159,8 @@ ErrorEstimate Film::error() const {
         square += sqr(pair_errors_[i]);
     }
     mean /= double(count);
-    const double spread = std::sqrt(std::max(0.0, square / double(count) - mean * mean) / double(count - 1));
+    const double spread =
+        std::sqrt(std::max(0.0, square / double(count) - mean * mean) / double(count - 1));
     const double half = t_quantile_95(double(count - 1)) * spread;
     const double n = double(passes_);
     e.relative_rms = std::sqrt(mean / n);

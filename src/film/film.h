@@ -19,19 +19,21 @@ namespace etendue {
 
 /// Size of the image and the part of it that is rendered. Film points are in pixels, (0, 0) at the top left corner.
 struct FilmGeometry {
-    int width = 0, height = 0;                            ///< Of the whole image.
+    int width = 0, height = 0;  ///< Of the whole image.
     int crop_x = 0, crop_y = 0, crop_width = 0, crop_height = 0;
 
     uint64_t pixel_count() const { return uint64_t(crop_width) * uint64_t(crop_height); }
     /// Centre of the crop's pixel `index` (row by row).
     Vec2 pixel_center(uint64_t index) const {
-        return {float(crop_x + int(index % crop_width)) + 0.5f, float(crop_y + int(index / crop_width)) + 0.5f};
+        return {float(crop_x + int(index % crop_width)) + 0.5f,
+                float(crop_y + int(index / crop_width)) + 0.5f};
     }
 };
 
 /// Calls `use(pixel index, h)` for every pixel of the crop whose filter reaches the film point.
 template <class Use>
-void for_each_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point, const Use& use) {
+void for_each_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point,
+                    const Use& use) {
     const float r = filter.radius();
     const int x0 = std::max(int(std::ceil(point.x - r - 0.5f)), g.crop_x);
     const int y0 = std::max(int(std::ceil(point.y - r - 0.5f)), g.crop_y);
@@ -69,9 +71,10 @@ private:
 
 /// Statistics of the passes' spread.
 struct ErrorEstimate {
-    double relative_rms = 0;    ///< sqrt(mean over pixels of variance / (I² + 0.01·mean(I)²)), of the mean of all passes.
-    double low = 0, high = 0;   ///< 95 % confidence interval.
-    bool valid = false;         ///< False until there are enough passes.
+    double relative_rms =
+        0;  ///< sqrt(mean over pixels of variance / (I² + 0.01·mean(I)²)), of the mean of all passes.
+    double low = 0, high = 0;  ///< 95 % confidence interval.
+    bool valid = false;        ///< False until there are enough passes.
 };
 
 /// Accumulates passes. Within a pass, eye contributions of a pixel come from one thread at a time; splats from any.
@@ -139,8 +142,10 @@ private:
     float splat_scale_ = 0;
     std::vector<Moments> moments_;
     std::vector<float> expected_;
-    std::vector<float> previous_;  ///< Luminance of the last even pass, for the spread between neighbours.
-    std::vector<double> pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.
+    std::vector<float>
+        previous_;  ///< Luminance of the last even pass, for the spread between neighbours.
+    std::vector<double>
+        pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.
     std::vector<double> pass_means_;
     uint64_t passes_ = 0;
     std::atomic<uint64_t> rejected_{0};

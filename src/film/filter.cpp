@@ -24,7 +24,10 @@ double mitchell_shape(double x, double b, double c) {
     x = std::fabs(x);
     const double x2 = x * x, x3 = x2 * x;
     if (x < 1) return ((12 - 9 * b - 6 * c) * x3 + (-18 + 12 * b + 6 * c) * x2 + (6 - 2 * b)) / 6;
-    if (x < 2) return ((-b - 6 * c) * x3 + (6 * b + 30 * c) * x2 + (-12 * b - 48 * c) * x + (8 * b + 24 * c)) / 6;
+    if (x < 2)
+        return ((-b - 6 * c) * x3 + (6 * b + 30 * c) * x2 + (-12 * b - 48 * c) * x +
+                (8 * b + 24 * c)) /
+               6;
     return 0;
 }
 double lanczos_shape(double x, double lobes, double) {
@@ -37,8 +40,9 @@ double lanczos_shape(double x, double lobes, double) {
 
 }  // namespace
 
-ReconstructionFilter::ReconstructionFilter(const char* name, float radius, double (*shape)(double, double, double),
-                                           double a, double b)
+ReconstructionFilter::ReconstructionFilter(const char* name, float radius,
+                                           double (*shape)(double, double, double), double a,
+                                           double b)
     : name_(name), radius_(radius), shape_(shape), a_(a), b_(b), cdf_(kSteps + 1, 0.0) {
     // Midpoint rule; the shapes are smooth between the steps.
     double signed_sum = 0;
@@ -89,30 +93,44 @@ ReconstructionFilter::Sample ReconstructionFilter::sample(Vec2 u) const {
 
 const std::vector<FilterEntry>& filter_registry() {
     static const std::vector<FilterEntry> entries = {
-        {{"rfilter", "box", "Box of one pixel.", {}}, [](const Params&) { return ReconstructionFilter::box(); }},
-        {{"rfilter", "tent", "Linear ramp from the pixel's centre.",
+        {{"rfilter", "box", "Box of one pixel.", {}},
+         [](const Params&) { return ReconstructionFilter::box(); }},
+        {{"rfilter",
+          "tent",
+          "Linear ramp from the pixel's centre.",
           {{"radius", ParamKind::Float, "1", "Half width in pixels, above 0 and at most 16."}}},
          [](const Params& p) {
              const float r = p.number("radius", 1, 0.01f, 16);
              return ReconstructionFilter("tent", r, tent_shape, r);
          }},
-        {{"rfilter", "gaussian", "Gaussian cut off, and lowered to zero, at four standard deviations.",
+        {{"rfilter",
+          "gaussian",
+          "Gaussian cut off, and lowered to zero, at four standard deviations.",
           {{"stddev", ParamKind::Float, "0.5", "Standard deviation in pixels."}}},
          [](const Params& p) {
              const float sigma = p.number("stddev", 0.5f, 0.01f, 4);
              return ReconstructionFilter("gaussian", 4 * sigma, gaussian_shape, sigma, 4.0 * sigma);
          }},
-        {{"rfilter", "mitchell", "Mitchell and Netravali's cubic; has negative lobes.",
-          {{"b", ParamKind::Float, "0.333333", "Blur."}, {"c", ParamKind::Float, "0.333333", "Ringing."},
-           {"B", ParamKind::Float, "0.333333", "As b."}, {"C", ParamKind::Float, "0.333333", "As c."}}},
+        {{"rfilter",
+          "mitchell",
+          "Mitchell and Netravali's cubic; has negative lobes.",
+          {{"b", ParamKind::Float, "0.333333", "Blur."},
+           {"c", ParamKind::Float, "0.333333", "Ringing."},
+           {"B", ParamKind::Float, "0.333333", "As b."},
+           {"C", ParamKind::Float, "0.333333", "As c."}}},
          [](const Params& p) {
              const float third = 1.0f / 3;
-             return ReconstructionFilter("mitchell", 2, mitchell_shape, p.number("b", p.number("B", third, 0, 1), 0, 1),
+             return ReconstructionFilter("mitchell", 2, mitchell_shape,
+                                         p.number("b", p.number("B", third, 0, 1), 0, 1),
                                          p.number("c", p.number("C", third, 0, 1), 0, 1));
          }},
         {{"rfilter", "catmullrom", "Catmull–Rom spline; has negative lobes.", {}},
-         [](const Params&) { return ReconstructionFilter("catmullrom", 2, mitchell_shape, 0, 0.5); }},
-        {{"rfilter", "lanczos", "Windowed sinc; has negative lobes.",
+         [](const Params&) {
+             return ReconstructionFilter("catmullrom", 2, mitchell_shape, 0, 0.5);
+         }},
+        {{"rfilter",
+          "lanczos",
+          "Windowed sinc; has negative lobes.",
           {{"lobes", ParamKind::Int, "3", "Number of lobes, 1 to 8."}}},
          [](const Params& p) {
              const int n = int(p.integer("lobes", 3, 1, 8));

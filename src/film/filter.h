@@ -15,8 +15,8 @@ namespace etendue {
 class ReconstructionFilter {
 public:
     /// Tabulates `shape` (unnormalised, even, zero beyond `radius`).
-    ReconstructionFilter(const char* name, float radius, double (*shape)(double x, double a, double b), double a = 0,
-                         double b = 0);
+    ReconstructionFilter(const char* name, float radius,
+                         double (*shape)(double x, double a, double b), double a = 0, double b = 0);
     static ReconstructionFilter box();
 
     float radius() const { return radius_; }
@@ -41,7 +41,7 @@ private:
     bool box_ = false;
     double (*shape_)(double, double, double);
     double a_, b_, scale_ = 1;
-    std::vector<double> cdf_;      ///< Of |h| over [-radius, radius], at equal steps.
+    std::vector<double> cdf_;  ///< Of |h| over [-radius, radius], at equal steps.
 };
 
 struct FilterEntry {

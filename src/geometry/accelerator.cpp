@@ -26,8 +26,8 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
 }
 
 bool intersect_analytic(const AnalyticShape& shape, const RTCRay& ray, AnalyticShape::Hit& hit) {
-    return shape.intersect({ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z}, ray.tnear,
-                           ray.tfar, hit);
+    return shape.intersect({ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z},
+                           ray.tnear, ray.tfar, hit);
 }
 
 // Only single rays are ever traced, so the packets that Embree hands over have one element.
@@ -35,7 +35,9 @@ void intersect_callback(const RTCIntersectFunctionNArguments* args) {
     if (!args->valid[0]) return;
     auto* rayhit = reinterpret_cast<RTCRayHit*>(args->rayhit);
     AnalyticShape::Hit hit;
-    if (!intersect_analytic(*static_cast<const AnalyticShape*>(args->geometryUserPtr), rayhit->ray, hit)) return;
+    if (!intersect_analytic(*static_cast<const AnalyticShape*>(args->geometryUserPtr), rayhit->ray,
+                            hit))
+        return;
     rayhit->ray.tfar = float(hit.t);
     rayhit->hit.u = hit.u;
     rayhit->hit.v = hit.v;
@@ -68,8 +70,9 @@ struct Accelerator::Impl {
         Transform to_world;
         uint32_t first_shape;
     };
-    std::vector<uint32_t> group_first;   ///< Index of each group's first shape.
-    std::vector<uint32_t> shape_of_geom; ///< By geometry id of the top scene; instances hold their index instead.
+    std::vector<uint32_t> group_first;  ///< Index of each group's first shape.
+    std::vector<uint32_t>
+        shape_of_geom;  ///< By geometry id of the top scene; instances hold their index instead.
     std::vector<Instance> instances;
     uint32_t shape_count = 0;
 
@@ -104,8 +107,8 @@ struct Accelerator::Impl {
         if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape)) {
             geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
             // Copied, not shared: Embree reads 16 bytes a vertex, beyond the end of a packed array.
-            auto* p = static_cast<Vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
-                                                                 RTC_FORMAT_FLOAT3, sizeof(Vec3),
+            auto* p = static_cast<Vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX,
+                                                                 0, RTC_FORMAT_FLOAT3, sizeof(Vec3),
                                                                  mesh->positions.size()));
             auto* t = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                               3 * sizeof(uint32_t), mesh->triangles.size());
@@ -116,7 +119,8 @@ struct Accelerator::Impl {
         } else {
             geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
             rtcSetGeometryUserPrimitiveCount(geometry, 1);
-            rtcSetGeometryUserData(geometry, const_cast<AnalyticShape*>(dynamic_cast<const AnalyticShape*>(&shape)));
+            rtcSetGeometryUserData(
+                geometry, const_cast<AnalyticShape*>(dynamic_cast<const AnalyticShape*>(&shape)));
             rtcSetGeometryBoundsFunction(geometry, bounds_callback, nullptr);
             rtcSetGeometryIntersectFunction(geometry, intersect_callback);
             rtcSetGeometryOccludedFunction(geometry, occluded_callback);
@@ -175,7 +179,8 @@ void Accelerator::commit() {
 
 bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
     RTCRayHit rh;
-    rh.ray = {ray.o.x, ray.o.y, ray.o.z, 0, ray.d.x, ray.d.y, ray.d.z, 0, ray.tmax, 0xffffffffu, 0, 0};
+    rh.ray = {ray.o.x, ray.o.y, ray.o.z,  0,           ray.d.x, ray.d.y,
+              ray.d.z, 0,       ray.tmax, 0xffffffffu, 0,       0};
     rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 #if RTC_VERSION_MAJOR >= 4
@@ -201,7 +206,8 @@ bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
 }
 
 bool Accelerator::occluded(const Ray& ray) const {
-    RTCRay r{ray.o.x, ray.o.y, ray.o.z, 0, ray.d.x, ray.d.y, ray.d.z, 0, ray.tmax, 0xffffffffu, 0, 0};
+    RTCRay r{ray.o.x, ray.o.y, ray.o.z,  0,           ray.d.x, ray.d.y,
+             ray.d.z, 0,       ray.tmax, 0xffffffffu, 0,       0};
 #if RTC_VERSION_MAJOR >= 4
     rtcOccluded1(impl_->top, &r, nullptr);
 #else

@@ -12,7 +12,7 @@ namespace etendue {
 /// What a ray met.
 struct RayHit {
     float t;
-    uint32_t shape;     ///< Index of the shape in the order of add_shape / add_group.
+    uint32_t shape;  ///< Index of the shape in the order of add_shape / add_group.
     uint32_t prim;
     uint32_t instance;  ///< Index of the instance, or kNoInstance.
     float u, v;

@@ -29,7 +29,8 @@ double TriangleMesh::area() const {
 void TriangleMesh::compute_face_normals() {
     face_normals.clear();
     for (const auto& [a, b, c] : triangles)
-        face_normals.push_back(normalize(cross(positions[b] - positions[a], positions[c] - positions[a])));
+        face_normals.push_back(
+            normalize(cross(positions[b] - positions[a], positions[c] - positions[a])));
 }
 
 SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tangents) const {
@@ -74,7 +75,8 @@ ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
 }
 
 size_t TriangleMesh::memory_bytes() const {
-    return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) + uvs.size() * sizeof(Vec2) +
+    return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) +
+           uvs.size() * sizeof(Vec2) +
            triangles.size() * (sizeof(triangles[0]) + sizeof(face_normals[0]));
 }
 
@@ -130,7 +132,8 @@ ShapeSample Sphere::sample(uint32_t, Vec2 u) const {
 }
 
 bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
-    const double ox = double(o.x) - center_.x, oy = double(o.y) - center_.y, oz = double(o.z) - center_.z;
+    const double ox = double(o.x) - center_.x, oy = double(o.y) - center_.y,
+                 oz = double(o.z) - center_.z;
     const double dx = d.x, dy = d.y, dz = d.z;
     const double a = dx * dx + dy * dy + dz * dz;
     const double b = ox * dx + oy * dy + oz * dz;
@@ -144,7 +147,8 @@ bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
     if (t0 > t1) std::swap(t0, t1);
     const double t = t0 > tmin ? t0 : t1;
     if (!(t > tmin && t < tmax)) return false;
-    const Vec3 world{float((ox + t * dx) / radius_), float((oy + t * dy) / radius_), float((oz + t * dz) / radius_)};
+    const Vec3 world{float((ox + t * dx) / radius_), float((oy + t * dy) / radius_),
+                     float((oz + t * dz) / radius_)};
     const Vec3 n = orientation_.inverse().vector(world);
     float phi = std::atan2(n.y, n.x);
     if (phi < 0) phi += 2 * kPi;
@@ -154,14 +158,16 @@ bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
 
 // ---- Disk
 
-Disk::Disk(const Transform& to_world, bool flip_normals) : to_world_(to_world), to_local_(to_world.inverse()) {
+Disk::Disk(const Transform& to_world, bool flip_normals)
+    : to_world_(to_world), to_local_(to_world.inverse()) {
     ng_ = normalize(to_world.normal({0, 0, 1}));
     if (flip_normals) ng_ = -ng_;
 }
 
 Bounds3 Disk::bounds() const {
     // The ellipse's extent along an axis is the length of that row of the linear part.
-    const Vec3 c = to_world_.point({0, 0, 0}), x = to_world_.vector({1, 0, 0}), y = to_world_.vector({0, 1, 0});
+    const Vec3 c = to_world_.point({0, 0, 0}), x = to_world_.vector({1, 0, 0}),
+               y = to_world_.vector({0, 1, 0});
     const Vec3 e{std::hypot(x.x, y.x), std::hypot(x.y, y.y), std::hypot(x.z, y.z)};
     return {c - e, c + e};
 }

@@ -77,7 +77,8 @@ public:
 /// Sphere of a centre and radius; u is the azimuth over 2π about +z, v the polar angle over π.
 class Sphere final : public AnalyticShape {
 public:
-    Sphere(Vec3 center, float radius, bool flip_normals) : center_(center), radius_(radius), flip_(flip_normals) {}
+    Sphere(Vec3 center, float radius, bool flip_normals)
+        : center_(center), radius_(radius), flip_(flip_normals) {}
     /// The unit sphere under a transform of uniform scale.
     Sphere(const Transform& to_world, bool flip_normals);
 

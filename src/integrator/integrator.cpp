@@ -22,13 +22,17 @@ IntegratorSpec IntegratorSpec::parse(const std::string& text) {
     spec.name = text.substr(0, colon);
     for (size_t begin = colon; begin != std::string::npos && begin + 1 < text.size();) {
         const size_t end = text.find(',', begin + 1);
-        const std::string item = text.substr(begin + 1, end == std::string::npos ? end : end - begin - 1);
+        const std::string item =
+            text.substr(begin + 1, end == std::string::npos ? end : end - begin - 1);
         const size_t equals = item.find('=');
         if (equals == std::string::npos || equals == 0 || equals + 1 == item.size())
-            throw std::runtime_error(
-                fmt::format("integrator \"{}\": expected name=value after ':' or ',', but found \"{}\"", spec.name, item));
+            throw std::runtime_error(fmt::format(
+                "integrator \"{}\": expected name=value after ':' or ',', but found \"{}\"",
+                spec.name, item));
         if (!spec.params.emplace(item.substr(0, equals), item.substr(equals + 1)).second)
-            throw std::runtime_error(fmt::format("integrator \"{}\": parameter \"{}\" is given twice", spec.name, item.substr(0, equals)));
+            throw std::runtime_error(
+                fmt::format("integrator \"{}\": parameter \"{}\" is given twice", spec.name,
+                            item.substr(0, equals)));
         begin = end;
     }
     return spec;
@@ -44,7 +48,8 @@ std::string IntegratorSpec::to_string() const {
     return text;
 }
 
-IntegratorParams::IntegratorParams(const IntegratorSpec& spec, const PluginInfo& info) : integrator_(spec.name) {
+IntegratorParams::IntegratorParams(const IntegratorSpec& spec, const PluginInfo& info)
+    : integrator_(spec.name) {
     std::vector<std::string> known;
     for (const ParamInfo& p : info.params) {
         values_[p.name] = p.fallback;
@@ -53,9 +58,10 @@ IntegratorParams::IntegratorParams(const IntegratorSpec& spec, const PluginInfo&
     for (const auto& [key, value] : spec.params) {
         if (!values_.count(key)) {
             const std::string near = nearest_name(key, known);
-            throw std::runtime_error(fmt::format("integrator \"{}\" has no parameter \"{}\" ({})", spec.name, key,
-                                                 near.empty() ? fmt::format("it has: {}", fmt::join(known, ", "))
-                                                              : fmt::format("did you mean \"{}\"?", near)));
+            throw std::runtime_error(
+                fmt::format("integrator \"{}\" has no parameter \"{}\" ({})", spec.name, key,
+                            near.empty() ? fmt::format("it has: {}", fmt::join(known, ", "))
+                                         : fmt::format("did you mean \"{}\"?", near)));
         }
         values_[key] = value;
     }
@@ -68,12 +74,14 @@ const std::string& IntegratorParams::text(const char* name) const {
 namespace {
 
 template <class T>
-T parse_number(const std::string& integrator, const char* name, const std::string& text, const char* kind) {
+T parse_number(const std::string& integrator, const char* name, const std::string& text,
+               const char* kind) {
     T value{};
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size())
         throw std::runtime_error(
-            fmt::format("integrator \"{}\": parameter \"{}\" must be {}, but is \"{}\"", integrator, name, kind, text));
+            fmt::format("integrator \"{}\": parameter \"{}\" must be {}, but is \"{}\"", integrator,
+                        name, kind, text));
     return value;
 }
 
@@ -91,7 +99,8 @@ bool IntegratorParams::flag(const char* name) const {
     const std::string& t = text(name);
     if (t != "true" && t != "false")
         throw std::runtime_error(
-            fmt::format("integrator \"{}\": parameter \"{}\" must be true or false, but is \"{}\"", integrator_, name, t));
+            fmt::format("integrator \"{}\": parameter \"{}\" must be true or false, but is \"{}\"",
+                        integrator_, name, t));
     return t == "true";
 }
 
@@ -102,20 +111,24 @@ std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec) {
         known.push_back(e.info.name);
     }
     const std::string near = nearest_name(spec.name, known);
-    throw std::runtime_error(fmt::format("there is no integrator \"{}\"; {}there are: {}", spec.name,
-                                         near.empty() ? "" : fmt::format("did you mean \"{}\"? ", near), fmt::join(known, ", ")));
+    throw std::runtime_error(fmt::format(
+        "there is no integrator \"{}\"; {}there are: {}", spec.name,
+        near.empty() ? "" : fmt::format("did you mean \"{}\"? ", near), fmt::join(known, ", ")));
 }
 
 DepthOptions DepthOptions::from(const IntegratorParams& params) {
     const int max_depth = params.integer("max_depth"), rr_depth = params.integer("rr_depth");
-    if (max_depth < -1 || max_depth == 0) throw std::runtime_error("max_depth must be -1 (unlimited) or at least 1");
+    if (max_depth < -1 || max_depth == 0)
+        throw std::runtime_error("max_depth must be -1 (unlimited) or at least 1");
     if (rr_depth < 1) throw std::runtime_error("rr_depth must be at least 1");
     return {max_depth < 0 ? kUnlimited : std::min(max_depth, kUnlimited), rr_depth};
 }
 
 std::vector<ParamInfo> depth_params() {
-    return {{"max_depth", ParamKind::Int, "-1", "Edges of the longest path (1: directly visible light); -1 for no limit."},
-            {"rr_depth", ParamKind::Int, "5", "Russian roulette begins at the sub-path's vertex with this index."}};
+    return {{"max_depth", ParamKind::Int, "-1",
+             "Edges of the longest path (1: directly visible light); -1 for no limit."},
+            {"rr_depth", ParamKind::Int, "5",
+             "Russian roulette begins at the sub-path's vertex with this index."}};
 }
 
 }  // namespace etendue

@@ -25,9 +25,9 @@ struct Workspace {
 struct SampleContext {
     const Scene& scene;
     const Film& film;
-    uint64_t pixel;           ///< Index within the crop; also that of the light path.
-    uint64_t light_paths;     ///< N_L of the pass.
-    float splat_scale;        ///< 1 / N_L: what a splat is worth on the film.
+    uint64_t pixel;        ///< Index within the crop; also that of the light path.
+    uint64_t light_paths;  ///< N_L of the pass.
+    float splat_scale;     ///< 1 / N_L: what a splat is worth on the film.
     Sampler& sampler;
     ContributionSink& sink;
 };
@@ -80,7 +80,9 @@ struct DepthOptions {
 
     static DepthOptions from(const IntegratorParams& params);
     /// Vertices of a sub-path that can still be joined.
-    WalkOptions walk() const { return {max_depth == kUnlimited ? kUnlimited : max_depth + 1, rr_depth}; }
+    WalkOptions walk() const {
+        return {max_depth == kUnlimited ? kUnlimited : max_depth + 1, rr_depth};
+    }
     static constexpr int kUnlimited = 1 << 20;
 };
 std::vector<ParamInfo> depth_params();

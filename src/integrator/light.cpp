@@ -14,9 +14,11 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const float N = float(c.light_paths);
-        const TechniqueCounts counts{.splat = N, .hit_lens = c.scene.sensor().has_finite_lens() ? N : 0.0f};
+        const TechniqueCounts counts{.splat = N,
+                                     .hit_lens = c.scene.sensor().has_finite_lens() ? N : 0.0f};
         // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
-        const WalkOptions walk{depth_.max_depth + c.scene.sensor().has_finite_lens(), depth_.rr_depth};
+        const WalkOptions walk{depth_.max_depth + c.scene.sensor().has_finite_lens(),
+                               depth_.rr_depth};
         SubPath& y = work.y;
         if (!start_light_path(c.scene, c.sampler, y, work.stats)) return;
         for (int s = 1; s <= y.size(); ++s) {
@@ -24,7 +26,8 @@ public:
             if (const auto j = join_splat(c.scene, y, s, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add_splat(j->film, j->technique, j->contribution * Tr, j->mis_weight);
-            if (s >= 2) extend<TransportMode::Importance>(c.scene, c.sampler, walk, counts, y, work.stats);
+            if (s >= 2)
+                extend<TransportMode::Importance>(c.scene, c.sampler, walk, counts, y, work.stats);
             if (const auto j = join_hit_lens(c.scene, y, s, counts))
                 c.sink.add_splat(j->film, j->technique, j->contribution, j->mis_weight);
         }
@@ -40,10 +43,13 @@ private:
 }  // namespace
 
 IntegratorEntry light_entry() {
-    return {{"integrator", "light", "Light tracing: light paths connected to the lens. Unbiased for the paths it can make.", depth_params()},
-            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-                return std::make_unique<LightIntegrator>(DepthOptions::from(p));
-            }};
+    return {
+        {"integrator", "light",
+         "Light tracing: light paths connected to the lens. Unbiased for the paths it can make.",
+         depth_params()},
+        [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+            return std::make_unique<LightIntegrator>(DepthOptions::from(p));
+        }};
 }
 
 }  // namespace etendue

@@ -19,8 +19,9 @@ public:
         SubPath& z = work.z;
         start_eye_path(c.scene, c.film, c.pixel, c.sampler, z, work.stats);
         for (int t = 2; t <= z.size(); ++t) {
-            for_each_hit(c.scene, z, t, counts,
-                         [&](const Join& j) { c.sink.add_eye(j.technique, j.contribution, j.mis_weight); });
+            for_each_hit(c.scene, z, t, counts, [&](const Join& j) {
+                c.sink.add_eye(j.technique, j.contribution, j.mis_weight);
+            });
             if (t > depth_.max_depth) break;
             if (const auto j = join_next_event(c.scene, z, t, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
@@ -39,7 +40,9 @@ private:
 }  // namespace
 
 IntegratorEntry path_entry() {
-    return {{"integrator", "path", "Path tracing with next event estimation and MIS; the reference. Unbiased.", depth_params()},
+    return {{"integrator", "path",
+             "Path tracing with next event estimation and MIS; the reference. Unbiased.",
+             depth_params()},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PathIntegrator>(DepthOptions::from(p));
             }};

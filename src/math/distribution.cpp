@@ -33,7 +33,8 @@ AliasTable::AliasTable(std::span<const double> weights) {
         cells_[i].keep = 1, cells_[i].alias = i;
         if (cells_[i].pmf == 0) {
             cells_[i].keep = 0;
-            cells_[i].alias = uint32_t(std::max_element(weights.begin(), weights.end()) - weights.begin());
+            cells_[i].alias =
+                uint32_t(std::max_element(weights.begin(), weights.end()) - weights.begin());
         }
     }
 }

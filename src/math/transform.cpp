@@ -5,8 +5,7 @@
 namespace etendue {
 namespace {
 
-constexpr Transform::Matrix kIdentity = {
-    {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+constexpr Transform::Matrix kIdentity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
 
 Transform::Matrix multiply(const Transform::Matrix& a, const Transform::Matrix& b) {
     Transform::Matrix r{};
@@ -62,7 +61,8 @@ Transform Transform::scale(Vec3 s) {
 }
 
 Transform Transform::rotate(Vec3 axis, double degrees) {
-    const double len = std::sqrt(double(axis.x) * axis.x + double(axis.y) * axis.y + double(axis.z) * axis.z);
+    const double len =
+        std::sqrt(double(axis.x) * axis.x + double(axis.y) * axis.y + double(axis.z) * axis.z);
     const double x = axis.x / len, y = axis.y / len, z = axis.z / len;
     const double a = degrees * (3.14159265358979323846 / 180.0);
     const double c = std::cos(a), s = std::sin(a), k = 1 - c;

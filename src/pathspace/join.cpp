@@ -5,7 +5,8 @@ namespace {
 
 /// Attenuation of the edge between two surface points by the media they say lie on it. Where they differ (a scene whose
 /// surfaces contradict each other) the choice does not depend on the side it is seen from.
-Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b, float distance) {
+Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b,
+                     float distance) {
     return scene.attenuation(std::min(a.medium_toward(a_to_b), b.medium_toward(-a_to_b)), distance);
 }
 
@@ -20,11 +21,13 @@ float visibility(const Scene& scene, const Join& join, RenderStats& stats) {
     return Tr;
 }
 
-std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter, const TechniqueCounts& counts) {
+std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
+                             const TechniqueCounts& counts) {
     const int last = t - 1;
     const Vertex& v = z[last];
     if (!(counts.hit > 0)) return {};
-    const EmitterHit e = v.is_infinite ? emitter.eval_infinite(v.p) : emitter.eval_surface(v.ng, v.uv, v.prim, v.wo);
+    const EmitterHit e =
+        v.is_infinite ? emitter.eval_infinite(v.p) : emitter.eval_surface(v.ng, v.uv, v.prim, v.wo);
     if (e.Le.is_zero()) return {};
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
@@ -33,8 +36,10 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter, co
     double others = 0;
     if (last >= 2 && !z[last - 1].is_delta) others += sqr(counts.next_event * p_NE);
     if (counts.uses_light_paths()) {
-        const double rev_prev = v.is_infinite ? to_area(e.pdf_d, v, z[last - 1]) : e.pdf_d * v.to_predecessor;
-        double inner = sqr(split_count<Side::Eye>(z, last - 1, z[last - 1].is_delta, counts)) + v.weight_sum;
+        const double rev_prev =
+            v.is_infinite ? to_area(e.pdf_d, v, z[last - 1]) : e.pdf_d * v.to_predecessor;
+        double inner =
+            sqr(split_count<Side::Eye>(z, last - 1, z[last - 1].is_delta, counts)) + v.weight_sum;
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
         if (last == 1) inner += sqr(double(counts.splat));
         others += sqr(p_L) * inner;
@@ -73,7 +78,8 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const double rev_last = double(d.pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
         const double rev_prev = f.pdf_rev * v.to_predecessor;
         const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
-        others += sqr(p_L / p_NE) * outward_sum<Side::Eye>(z, last, false, rev_last, rev_prev, counts);
+        others +=
+            sqr(p_L / p_NE) * outward_sum<Side::Eye>(z, last, false, rev_last, rev_prev, counts);
     }
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .contribution = C,
@@ -86,8 +92,8 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                 .to_infinity = infinite};
 }
 
-std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z, int t,
-                                 const TechniqueCounts& counts) {
+std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
+                                 int t, const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
     const Vertex& b = z[t - 1];
     if (!a.may_connect || !b.may_connect) return {};
@@ -105,8 +111,10 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
     if (scene.has_media()) C *= edge_attenuation(scene, a, b, w, dist2 * inv_dist);
 
     const double others =
-        outward_sum<Side::Light>(y, s - 1, false, fb.pdf * abs_dot(a.ng, w) * inv_dist2, fa.pdf_rev * a.to_predecessor, counts) +
-        outward_sum<Side::Eye>(z, t - 1, false, fa.pdf * abs_dot(b.ng, w) * inv_dist2, fb.pdf_rev * b.to_predecessor, counts);
+        outward_sum<Side::Light>(y, s - 1, false, fb.pdf * abs_dot(a.ng, w) * inv_dist2,
+                                 fa.pdf_rev * a.to_predecessor, counts) +
+        outward_sum<Side::Eye>(z, t - 1, false, fa.pdf * abs_dot(b.ng, w) * inv_dist2,
+                               fb.pdf_rev * b.to_predecessor, counts);
     return Join{.technique = {Strategy::Connect, s, t},
                 .contribution = C,
                 .mis_weight = power_heuristic(counts.connect, others),
@@ -117,7 +125,8 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
                 .ng_b = b.ng};
 }
 
-std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler, const TechniqueCounts& counts) {
+std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler,
+                               const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
     if (!a.may_connect) return {};
     sampler.seek(Stream::Connection, uint32_t(s) + 0x8000u);
@@ -145,10 +154,14 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
     const MediumId medium = a.medium_toward(w);
     if (medium != kVacuum) C *= scene.attenuation(medium, length(edge));
 
-    const double rev_last = a.is_infinite ? lens->pdf_dir : lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, w) : 1.0f) * inv_dist2;
+    const double rev_last =
+        a.is_infinite ? lens->pdf_dir
+                      : lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, w) : 1.0f) * inv_dist2;
     const double rev_prev = s >= 2 ? f.pdf_rev * a.to_predecessor : 0.0f;
     double others = outward_sum<Side::Light>(y, s - 1, false, rev_last, rev_prev, counts);
-    if (counts.hit_lens > 0) others += sqr(double(counts.hit_lens) * f.pdf * abs_dot(lens->ng, w) * inv_dist2 / lens->pdf_pos);
+    if (counts.hit_lens > 0)
+        others +=
+            sqr(double(counts.hit_lens) * f.pdf * abs_dot(lens->ng, w) * inv_dist2 / lens->pdf_pos);
     Join join{.technique = {Strategy::Splat, s, 1},
               .contribution = C,
               .mis_weight = power_heuristic(counts.splat, others),
@@ -161,7 +174,8 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
     return join;
 }
 
-std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s, const TechniqueCounts& counts) {
+std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
+                                  const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
     const Flight& flight = y.flight;
     if (!(counts.hit_lens > 0) || !(flight.pdf_sa > 0) || a.is_infinite) return {};
@@ -169,12 +183,15 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s, c
     if (!lens) return {};
     const float dist2 = length2(lens->p - a.p);
     const float cos_lens = abs_dot(lens->ng, flight.d);
-    const Rgb C = flight.beta * (lens->We_cos / cos_lens) * scene.attenuation(flight.medium, std::sqrt(dist2));
+    const Rgb C = flight.beta * (lens->We_cos / cos_lens) *
+                  scene.attenuation(flight.medium, std::sqrt(dist2));
 
     const double p_fwd = a.is_delta ? flight.pdf_sa : flight.pdf_sa * cos_lens / dist2;
     const double p_lens = lens->pdf_pos / p_fwd;
     const double rev_last = lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, flight.d) : 1.0f) / dist2;
-    double others = sqr(p_lens) * outward_sum<Side::Light>(y, s - 1, a.is_delta, rev_last, s >= 2 ? y[s - 2].pdf_rev : 0.0f, counts);
+    double others =
+        sqr(p_lens) * outward_sum<Side::Light>(y, s - 1, a.is_delta, rev_last,
+                                               s >= 2 ? y[s - 2].pdf_rev : 0.0f, counts);
     if (!a.is_delta) others += sqr(counts.splat * p_lens);
     return Join{.technique = {Strategy::HitLens, s + 1, 0},
                 .contribution = C,

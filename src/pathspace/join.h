@@ -10,9 +10,9 @@ namespace etendue {
 
 struct Join {
     Technique technique;
-    Rgb contribution;      ///< C_{s,t}, visibility left out; of splats for one light path (the film divides by N_L).
+    Rgb contribution;  ///< C_{s,t}, visibility left out; of splats for one light path (the film divides by N_L).
     float mis_weight;
-    Vec2 film{};           ///< Film point; that of the eye sub-path unless t ≤ 1.
+    Vec2 film{};                    ///< Film point; that of the eye sub-path unless t ≤ 1.
     Vec3 a{}, ng_a{}, b{}, ng_b{};  ///< The edge to test; b is a direction where `to_infinity`.
     bool to_infinity = false;
     bool needs_test = true;
@@ -28,19 +28,25 @@ inline float join_survival(float contribution, float threshold) {
 float visibility(const Scene& scene, const Join& join, RenderStats& stats);
 
 /// C(0,t): z_{t-1} lies on `emitter`.
-std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter, const TechniqueCounts& counts);
+std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
+                             const TechniqueCounts& counts);
 /// C(1,t): a point on an emitter drawn for z_{t-1}.
-std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler, const TechniqueCounts& counts);
+std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,
+                                    const TechniqueCounts& counts);
 /// C(s,t), s ≥ 2, t ≥ 2.
-std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z, int t, const TechniqueCounts& counts);
+std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
+                                 int t, const TechniqueCounts& counts);
 /// C(s,1): y_{s-1} is connected to a point on the lens.
-std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler, const TechniqueCounts& counts);
+std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler,
+                               const TechniqueCounts& counts);
 /// C(s+1,0): the ray that left y_{s-1} (the path's last flight) crosses a finite lens, which becomes y_s.
-std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s, const TechniqueCounts& counts);
+std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
+                                  const TechniqueCounts& counts);
 
 /// Calls `use(join)` for C(0,t) of every emitter that z_{t-1} lies on: one on a surface, all of them at infinity.
 template <class Use>
-void for_each_hit(const Scene& scene, const SubPath& z, int t, const TechniqueCounts& counts, const Use& use) {
+void for_each_hit(const Scene& scene, const SubPath& z, int t, const TechniqueCounts& counts,
+                  const Use& use) {
     const Vertex& v = z[t - 1];
     if (v.is_infinite) {
         for (const Emitter* e : scene.infinite_emitters())

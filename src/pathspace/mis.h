@@ -37,11 +37,12 @@ inline double split_count(const SubPath& v, int i, bool delta, const TechniqueCo
 /// Sum over the techniques that move the split past v[last], relative to the present one. `rev_last`, `rev_prev`:
 /// densities of v[last] and v[last-1] as sampled from the other side.
 template <Side side>
-inline double outward_sum(const SubPath& v, int last, bool last_is_delta, double rev_last, double rev_prev,
-                          const TechniqueCounts& n) {
+inline double outward_sum(const SubPath& v, int last, bool last_is_delta, double rev_last,
+                          double rev_prev, const TechniqueCounts& n) {
     double inner = sqr(split_count<side>(v, last, last_is_delta, n));
     if (last >= 1) {
-        const double prev = sqr(split_count<side>(v, last - 1, v[last - 1].is_delta, n)) + v[last].weight_sum;
+        const double prev =
+            sqr(split_count<side>(v, last - 1, v[last - 1].is_delta, n)) + v[last].weight_sum;
         inner += sqr(rev_prev / v[last - 1].pdf_fwd) * prev;
     }
     return sqr(rev_last / v[last].pdf_fwd) * inner;
@@ -50,7 +51,8 @@ inline double outward_sum(const SubPath& v, int last, bool last_is_delta, double
 /// The sum from level i on, stored at v[i+2] once v[i].pdf_rev is known; `below` is that of level i-1.
 template <Side side>
 inline double level_sum(const SubPath& v, int i, double below, const TechniqueCounts& n) {
-    return sqr(double(v[i].pdf_rev) / v[i].pdf_fwd) * (sqr(split_count<side>(v, i, v[i].is_delta, n)) + below);
+    return sqr(double(v[i].pdf_rev) / v[i].pdf_fwd) *
+           (sqr(split_count<side>(v, i, v[i].is_delta, n)) + below);
 }
 
 /// Power heuristic of a technique with `count` samples against the sum of the others' (n·p)², relative to its p.

@@ -23,7 +23,8 @@ double PathPdfs::density(const Technique& q) const {
     if (q.s < n && is_delta[q.s] && q.s > 0) return 0;
     if (q.strategy == Strategy::Hit && !can_hit_emitter) return 0;
     double p = 1;
-    for (int i = 0; i < q.s; ++i) p *= q.strategy == Strategy::NextEvent && i == 0 ? next_event : light[i];
+    for (int i = 0; i < q.s; ++i)
+        p *= q.strategy == Strategy::NextEvent && i == 0 ? next_event : light[i];
     for (int i = q.s; i < n; ++i) p *= eye[i];
     return p;
 }
@@ -32,21 +33,24 @@ double mis_weight(const PathPdfs& pdfs, const Technique& technique, const Techni
     double sum = 0, own = 0;
     for (int s = 0; s <= pdfs.vertices(); ++s) {
         const Technique q = connection_technique(s, pdfs.vertices() - s);
-        const double np = counts.of(q.strategy) > 0 ? sqr(counts.of(q.strategy) * pdfs.density(q)) : 0.0;
+        const double np =
+            counts.of(q.strategy) > 0 ? sqr(counts.of(q.strategy) * pdfs.density(q)) : 0.0;
         sum += np;
         if (q == technique) own = np;
     }
     return own / sum;
 }
 
-std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t, const Vertex* emitter_point, const Vertex* lens_point) {
+std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t,
+                                         const Vertex* emitter_point, const Vertex* lens_point) {
     std::vector<const Vertex*> x;
     for (int i = 0; i < s; ++i) x.push_back(i == 0 && emitter_point ? emitter_point : &y[i]);
     for (int i = t - 1; i >= 0; --i) x.push_back(i == 0 && lens_point ? lens_point : &z[i]);
     return x;
 }
 
-PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x, const std::vector<bool>& delta) {
+PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
+                        const std::vector<bool>& delta) {
     const int n = int(x.size()), k = n - 1;
     PathValue v;
     PathPdfs& p = v.pdfs;
@@ -58,7 +62,9 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x, co
     const Emitter& emitter = *x[0]->emitter;
     const Vec3 w0 = direction(*x[0], *x[1]);
     const Emitter::Emission emission = emitter.eval_emission(x[0]->ng, x[0]->uv, w0);
-    const EmitterHit hit = emitter.is_infinite() ? emitter.eval_infinite(x[0]->p) : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->prim, w0);
+    const EmitterHit hit = emitter.is_infinite()
+                               ? emitter.eval_infinite(x[0]->p)
+                               : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->prim, w0);
     p.can_hit_emitter = !emitter.is_delta();
     p.light[0] = p.next_event = emitter.selection_pmf;
     if (p.can_hit_emitter) {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "pathspace/vertex.h"
 #include "pathspace/technique.h"
+#include "pathspace/vertex.h"
 
 namespace etendue {
 
@@ -27,7 +27,8 @@ double mis_weight(const PathPdfs& pdfs, const Technique& technique, const Techni
 
 /// The vertices of the path that joins s light to t eye vertices, from x_0 to x_k. A technique that samples its own end
 /// point (next event, splat) brings it as `emitter_point` or `lens_point`.
-std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t, const Vertex* emitter_point = nullptr,
+std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t,
+                                         const Vertex* emitter_point = nullptr,
                                          const Vertex* lens_point = nullptr);
 
 /// Measurement contribution f(x̄), without visibility and attenuation, and the densities. Events at the vertices of
@@ -36,6 +37,7 @@ struct PathValue {
     Rgb f;
     PathPdfs pdfs;
 };
-PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x, const std::vector<bool>& delta);
+PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
+                        const std::vector<bool>& delta);
 
 }  // namespace etendue

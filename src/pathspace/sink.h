@@ -1,8 +1,8 @@
 #pragma once
 
-#include "pathspace/technique.h"
 #include "color/rgb.h"
 #include "math/vec.h"
+#include "pathspace/technique.h"
 
 namespace etendue {
 
@@ -14,7 +14,8 @@ public:
     /// Unweighted contribution of a path of the current eye sub-path's own pixel (t ≥ 2), and its weight.
     virtual void add_eye(const Technique& technique, Rgb contribution, float mis_weight) = 0;
     /// The same for a path that may land anywhere on the film (t ≤ 1), for one light path.
-    virtual void add_splat(Vec2 film, const Technique& technique, Rgb contribution, float mis_weight) = 0;
+    virtual void add_splat(Vec2 film, const Technique& technique, Rgb contribution,
+                           float mis_weight) = 0;
 };
 
 }  // namespace etendue

@@ -27,8 +27,8 @@ void fill_surface(Vertex& v, const SurfaceHit& hit, Vec3 d, ComponentArena& aren
 
 /// Traces from the last vertex along `d` and appends what is found, with throughput `beta` and density `pdf_sa` of the
 /// direction (discrete for a delta event). False where the ray leaves the scene.
-bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const Ray& ray, Rgb beta, float pdf_sa,
-                    bool is_delta, MediumId medium, RenderStats& stats) {
+bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const Ray& ray, Rgb beta,
+                    float pdf_sa, bool is_delta, MediumId medium, RenderStats& stats) {
     ++stats.walk_rays;
     SurfaceHit hit;
     const float u = scene.has_masks() ? sampler.next_1d() : 0.0f;
@@ -44,7 +44,9 @@ bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const R
     const Vertex& previous = path[path.size() - 2];
     const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
     v.pdf_fwd = is_delta ? pdf_sa : pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
-    v.to_predecessor = previous.has_cosine && !previous.is_infinite ? abs_dot(previous.ng, ray.d) * inv_dist2 : inv_dist2;
+    v.to_predecessor = previous.has_cosine && !previous.is_infinite
+                           ? abs_dot(previous.ng, ray.d) * inv_dist2
+                           : inv_dist2;
     return v.pdf_fwd > 0;
 }
 
@@ -82,7 +84,8 @@ RenderStats& RenderStats::operator+=(const RenderStats& o) {
     return *this;
 }
 
-void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sampler& sampler, SubPath& z, RenderStats& stats) {
+void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sampler& sampler,
+                    SubPath& z, RenderStats& stats) {
     ++stats.eye_paths;
     z.clear();
     sampler.seek(Stream::Eye, 0);
@@ -101,7 +104,8 @@ void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sample
     lens.p = lens.is_infinite ? -ray.d : ray.p;
 
     const Ray start{ray.p, ray.d, kInf};
-    if (append_surface(scene, sampler, z, start, Rgb(1), ray.pdf_dir, false, kVacuum, stats)) return;
+    if (append_surface(scene, sampler, z, start, Rgb(1), ray.pdf_dir, false, kVacuum, stats))
+        return;
     z.truncate(1);
     if (!scene.infinite_emitters().empty()) append_escape(z, ray.d, Rgb(1), ray.pdf_dir);
 }
@@ -134,19 +138,21 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
     const Vec3 origin = y0.has_cosine ? offset_origin(e.p, e.ng, e.d) : e.p;
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
     const Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
-    if (!append_surface(scene, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, false, kVacuum, stats)) {
+    if (!append_surface(scene, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, false, kVacuum,
+                        stats)) {
         y.truncate(1);
         return true;
     }
     Vertex& y1 = y[1];
-    const EmitterHit reverse = y0.is_infinite ? emitter.eval_infinite(y0.p) : emitter.eval_surface(y0.ng, y0.uv, y0.prim, e.d);
+    const EmitterHit reverse = y0.is_infinite ? emitter.eval_infinite(y0.p)
+                                              : emitter.eval_surface(y0.ng, y0.uv, y0.prim, e.d);
     y1.next_event_ratio = reverse.pdf_y0 > 0 ? reverse.pdf / reverse.pdf_y0 : 1.0f;
     return true;
 }
 
 template <TransportMode mode>
-bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options, const TechniqueCounts& counts, SubPath& path,
-            RenderStats& stats) {
+bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options,
+            const TechniqueCounts& counts, SubPath& path, RenderStats& stats) {
     constexpr bool eye = mode == TransportMode::Radiance;
     const int last = path.size() - 1;
     path.flight.pdf_sa = 0;
@@ -172,7 +178,8 @@ bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options, co
     const Rgb beta = v.beta * s->weight * (1 / q);
     const MediumId medium = v.medium_toward(s->wi);
     const Ray ray{offset_origin(v.p, v.ng, s->wi), s->wi, kInf};
-    const bool found = append_surface(scene, sampler, path, ray, beta, s->pdf, s->is_delta, medium, stats);
+    const bool found =
+        append_surface(scene, sampler, path, ray, beta, s->pdf, s->is_delta, medium, stats);
     if (!found) {
         path.truncate(last + 1);
         if (!eye || scene.infinite_emitters().empty()) return false;
@@ -182,7 +189,9 @@ bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options, co
     return true;
 }
 
-template bool extend<TransportMode::Radiance>(const Scene&, Sampler&, const WalkOptions&, const TechniqueCounts&, SubPath&, RenderStats&);
-template bool extend<TransportMode::Importance>(const Scene&, Sampler&, const WalkOptions&, const TechniqueCounts&, SubPath&, RenderStats&);
+template bool extend<TransportMode::Radiance>(const Scene&, Sampler&, const WalkOptions&,
+                                              const TechniqueCounts&, SubPath&, RenderStats&);
+template bool extend<TransportMode::Importance>(const Scene&, Sampler&, const WalkOptions&,
+                                                const TechniqueCounts&, SubPath&, RenderStats&);
 
 }  // namespace etendue

@@ -12,7 +12,7 @@ struct RenderStats {
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
     uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
     uint64_t joins_skipped = 0;  ///< By roulette, before their shadow ray.
-    uint64_t rejected = 0;  ///< Contributions that were not finite or negative.
+    uint64_t rejected = 0;       ///< Contributions that were not finite or negative.
 
     RenderStats& operator+=(const RenderStats& o);
     uint64_t rays() const { return walk_rays + shadow_rays; }
@@ -26,14 +26,15 @@ struct WalkOptions {
 
 /// z_0 on the lens and, if the scene is met, z_1. The film point is drawn from the pixel's filter.
 /// Where the ray leaves the scene, z_1 is a vertex at infinity if there are emitters there, else z_0 stays alone.
-void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sampler& sampler, SubPath& z, RenderStats& stats);
+void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sampler& sampler,
+                    SubPath& z, RenderStats& stats);
 /// y_0 on an emitter and, if the scene is met, y_1. False where there is no emitter to choose.
 bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderStats& stats);
 
 /// Samples scattering at the last vertex and appends the next one. False where the walk ends: absorbed, roulette, or
 /// out of the scene; in the last case an eye walk over a scene with emitters at infinity has appended a vertex there.
 template <TransportMode mode>
-bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options, const TechniqueCounts& counts, SubPath& path,
-            RenderStats& stats);
+bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options,
+            const TechniqueCounts& counts, SubPath& path, RenderStats& stats);
 
 }  // namespace etendue

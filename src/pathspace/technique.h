@@ -40,11 +40,11 @@ struct TechniqueCounts {
     bool uses_light_paths() const { return connect > 0 || splat > 0 || hit_lens > 0; }
     float of(Strategy strategy) const {
         switch (strategy) {
-            case Strategy::Hit: return hit;
-            case Strategy::NextEvent: return next_event;
-            case Strategy::Connect: return connect;
-            case Strategy::Splat: return splat;
-            case Strategy::HitLens: return hit_lens;
+        case Strategy::Hit: return hit;
+        case Strategy::NextEvent: return next_event;
+        case Strategy::Connect: return connect;
+        case Strategy::Splat: return splat;
+        case Strategy::HitLens: return hit_lens;
         }
         return 0;
     }

@@ -14,14 +14,17 @@ namespace etendue {
 struct Vertex {
     enum class Kind : uint8_t { Sensor, Emitter, Surface };
 
-    Vec3 p;               ///< Position; for an emitter at infinity the unit direction toward it.
-    Vec3 ng;              ///< Unit geometric normal; zero-cosine points (point lights) have the direction of the walk.
-    Vec3 wo;              ///< Toward the predecessor; unused at the first vertex.
-    Rgb beta;             ///< Throughput up to, not including, scattering here.
-    float pdf_fwd = 0;    ///< Area density as sampled from the predecessor; discrete after a delta event.
+    Vec3 p;  ///< Position; for an emitter at infinity the unit direction toward it.
+    Vec3
+        ng;  ///< Unit geometric normal; zero-cosine points (point lights) have the direction of the walk.
+    Vec3 wo;   ///< Toward the predecessor; unused at the first vertex.
+    Rgb beta;  ///< Throughput up to, not including, scattering here.
+    float pdf_fwd =
+        0;  ///< Area density as sampled from the predecessor; discrete after a delta event.
     /// Solid angle at this vertex over area at the predecessor: |cos θ|/d² there, 1 where it is at infinity.
     float to_predecessor = 0;
-    float pdf_rev = 0;    ///< Area density as it would be sampled from the successor; known two vertices later.
+    float pdf_rev =
+        0;  ///< Area density as it would be sampled from the successor; known two vertices later.
     /// Σ over the techniques whose split lies before vertex i-2, relative to the density of the split there; see mis.h.
     double weight_sum = 0;
     /// p_NE / p_L of an emitter vertex y_0 seen from here (stored at y_1); see mis.h.
@@ -48,19 +51,21 @@ struct Vertex {
 /// The last ray of a walk, whether or not it met a surface: a finite lens may lie on it.
 struct Flight {
     Vec3 d;
-    float length = kInf;     ///< Distance to what it met.
-    Rgb beta;                ///< Throughput along it: that of the vertex it left, times scattering over density.
-    float pdf_sa = 0;        ///< Density of d; discrete for a delta event; 0: the last step traced no ray.
+    float length = kInf;  ///< Distance to what it met.
+    Rgb beta;  ///< Throughput along it: that of the vertex it left, times scattering over density.
+    float pdf_sa =
+        0;  ///< Density of d; discrete for a delta event; 0: the last step traced no ray.
     MediumId medium = kVacuum;
 };
 
 /// A walk from one end of the path space: y_0 … or z_0 …
 struct SubPath {
     ComponentArena arena;
-    Vec2 film;                ///< Film point of an eye sub-path.
-    float film_weight = 1;    ///< Factor of the reconstruction filter, for contributions to the own pixel.
+    Vec2 film;  ///< Film point of an eye sub-path.
+    float film_weight =
+        1;  ///< Factor of the reconstruction filter, for contributions to the own pixel.
     Flight flight;
-    float eta2 = 1;           ///< Product of η² over the refractions of an eye sub-path.
+    float eta2 = 1;  ///< Product of η² over the refractions of an eye sub-path.
 
     int size() const { return size_; }
     const Vertex& operator[](int i) const { return store_[size_t(i)]; }

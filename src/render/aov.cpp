@@ -1,6 +1,5 @@
 #include "render/aov.h"
 
-
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -36,7 +35,8 @@ const std::vector<AovInfo>& aov_registry() {
     return entries;
 }
 
-std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names, int samples, uint64_t seed, int threads) {
+std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names,
+                                  int samples, uint64_t seed, int threads) {
     std::vector<AovImage> images;
     const uint64_t pixels = scene.film().pixel_count();
     for (const std::string& n : names)
@@ -55,7 +55,9 @@ std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::str
                     sampler.start(uint32_t(i), pixel);
                     start_eye_path(scene, film, pixel, sampler, z, stats);
                     if (z.size() < 2 || z[1].kind != Vertex::Kind::Surface) continue;
-                    for (AovImage& image : images) image.pixels[pixel] += value(image.name, z[1], z) * (z.film_weight / float(samples));
+                    for (AovImage& image : images)
+                        image.pixels[pixel] +=
+                            value(image.name, z[1], z) * (z.film_weight / float(samples));
                 }
             }
         });

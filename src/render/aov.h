@@ -20,6 +20,7 @@ struct AovImage {
     std::vector<Rgb> pixels;
 };
 /// Averages of `samples` eye rays a pixel for each name (but `variance`).
-std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names, int samples, uint64_t seed, int threads);
+std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names,
+                                  int samples, uint64_t seed, int threads);
 
 }  // namespace etendue

@@ -39,14 +39,16 @@ public:
         if (techniques_) techniques_->add_eye(pixel_, technique, contribution, mis_weight);
     }
 
-    void add_splat(Vec2 film, const Technique& technique, Rgb contribution, float mis_weight) override {
+    void add_splat(Vec2 film, const Technique& technique, Rgb contribution,
+                   float mis_weight) override {
         const Rgb value = contribution * mis_weight;
         if (!is_finite(value)) {
             ++stats_.rejected;
             return;
         }
         film_.add_splat(film, value);
-        if (techniques_) techniques_->add_splat(film, technique, contribution, mis_weight, splat_scale_);
+        if (techniques_)
+            techniques_->add_splat(film, technique, contribution, mis_weight, splat_scale_);
     }
 
 private:
@@ -63,26 +65,27 @@ private:
 
 const char* to_string(StopReason reason) {
     switch (reason) {
-        case StopReason::Samples: return "samples";
-        case StopReason::Time: return "time";
-        case StopReason::Error: return "error";
-        case StopReason::Interrupted: return "interrupted";
+    case StopReason::Samples: return "samples";
+    case StopReason::Time: return "time";
+    case StopReason::Error: return "error";
+    case StopReason::Interrupted: return "interrupted";
     }
     return "";
 }
 
 const char* to_string(Estimator estimator) {
     switch (estimator) {
-        case Estimator::Unbiased: return "unbiased";
-        case Estimator::Consistent: return "consistent";
-        case Estimator::Biased: return "biased";
+    case Estimator::Unbiased: return "unbiased";
+    case Estimator::Consistent: return "consistent";
+    case Estimator::Biased: return "biased";
     }
     return "";
 }
 
 struct Renderer::Workers {
     explicit Workers(int threads)
-        : limit(tbb::global_control::max_allowed_parallelism, size_t(threads > 0 ? threads : tbb::this_task_arena::max_concurrency())),
+        : limit(tbb::global_control::max_allowed_parallelism,
+                size_t(threads > 0 ? threads : tbb::this_task_arena::max_concurrency())),
           arena(threads > 0 ? threads : tbb::task_arena::automatic) {}
 
     tbb::global_control limit;
@@ -91,13 +94,11 @@ struct Renderer::Workers {
 };
 
 Renderer::Renderer(const Scene& scene, const RenderSettings& settings)
-    : scene_(scene),
-      settings_(settings),
-      integrator_(make_integrator(settings.integrator)),
-      film_(scene.film(), scene.filter()),
-      workers_(std::make_unique<Workers>(settings.threads)) {
+    : scene_(scene), settings_(settings), integrator_(make_integrator(settings.integrator)),
+      film_(scene.film(), scene.filter()), workers_(std::make_unique<Workers>(settings.threads)) {
     if (settings.technique_depth > 0)
-        techniques_ = std::make_unique<TechniqueImages>(scene.film(), scene.filter(), settings.technique_depth);
+        techniques_ = std::make_unique<TechniqueImages>(scene.film(), scene.filter(),
+                                                        settings.technique_depth);
 }
 
 Renderer::~Renderer() = default;
@@ -116,7 +117,8 @@ void Renderer::pass(uint32_t index) {
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
                 sampler.start(index, pixel);
                 sink.begin(pixel, work.z.film_weight);
-                integrator_->sample({scene_, film_, pixel, light_paths, splat_scale, sampler, sink}, work);
+                integrator_->sample({scene_, film_, pixel, light_paths, splat_scale, sampler, sink},
+                                    work);
                 sink.end();
             }
         });
@@ -125,7 +127,8 @@ void Renderer::pass(uint32_t index) {
     });
 }
 
-StopReason Renderer::run(const std::function<void(const Progress&)>& progress, const std::atomic<bool>& interrupted) {
+StopReason Renderer::run(const std::function<void(const Progress&)>& progress,
+                         const std::atomic<bool>& interrupted) {
     using Clock = std::chrono::steady_clock;
     const auto begin = Clock::now();
     for (uint32_t index = 0;; ++index) {
@@ -137,18 +140,22 @@ StopReason Renderer::run(const std::function<void(const Progress&)>& progress, c
 
         Progress now{film_.passes(), seconds_, {}, double(stats_.rays()) / seconds_, film_.error()};
         if (settings_.spp) now.fraction = double(now.passes) / double(*settings_.spp);
-        if (settings_.seconds) now.fraction = std::max(now.fraction.value_or(0), seconds_ / *settings_.seconds);
+        if (settings_.seconds)
+            now.fraction = std::max(now.fraction.value_or(0), seconds_ / *settings_.seconds);
         // The error falls with the square root of the number of passes.
         if (settings_.error && now.error.valid)
-            now.fraction = std::max(now.fraction.value_or(0), sqr(*settings_.error / now.error.relative_rms));
+            now.fraction =
+                std::max(now.fraction.value_or(0), sqr(*settings_.error / now.error.relative_rms));
         if (now.fraction) now.fraction = std::min(*now.fraction, 1.0);
         progress(now);
 
         if (interrupted.load(std::memory_order_relaxed)) return StopReason::Interrupted;
         if (settings_.spp && film_.passes() >= *settings_.spp) return StopReason::Samples;
         // The next pass is begun only if its larger part fits.
-        if (settings_.seconds && seconds_ + 0.5 * one_pass > *settings_.seconds) return StopReason::Time;
-        if (settings_.error && now.error.valid && now.error.relative_rms <= *settings_.error) return StopReason::Error;
+        if (settings_.seconds && seconds_ + 0.5 * one_pass > *settings_.seconds)
+            return StopReason::Time;
+        if (settings_.error && now.error.valid && now.error.relative_rms <= *settings_.error)
+            return StopReason::Error;
     }
 }
 

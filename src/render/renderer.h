@@ -47,7 +47,8 @@ public:
 
     /// Renders until a limit is reached or `interrupted` is set; the pass in flight is always finished. `progress` is
     /// called after every pass, from the calling thread.
-    StopReason run(const std::function<void(const Progress&)>& progress, const std::atomic<bool>& interrupted);
+    StopReason run(const std::function<void(const Progress&)>& progress,
+                   const std::atomic<bool>& interrupted);
 
     const Film& film() const { return film_; }
     const Integrator& integrator() const { return *integrator_; }

@@ -13,7 +13,8 @@ size_t triangle_index(const Technique& q) {
 
 struct TechniqueImages::Layer {
     Layer(const Technique& q, uint64_t pixels)
-        : technique(q), pass_weighted(pixels), pass_unweighted(pixels), weighted(pixels), unweighted(pixels) {}
+        : technique(q), pass_weighted(pixels), pass_unweighted(pixels), weighted(pixels),
+          unweighted(pixels) {}
 
     Technique technique;
     SplatBuffer pass_weighted, pass_unweighted;
@@ -21,11 +22,13 @@ struct TechniqueImages::Layer {
     std::atomic<bool> is_used{false};
 };
 
-TechniqueImages::TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter, int max_edges)
+TechniqueImages::TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter,
+                                 int max_edges)
     : geometry_(geometry), filter_(filter), max_edges_(max_edges) {
     for (int n = 2; n <= max_edges + 1; ++n)
         for (int s = 0; s <= n; ++s)
-            layers_.push_back(std::make_unique<Layer>(connection_technique(s, n - s), geometry.pixel_count()));
+            layers_.push_back(
+                std::make_unique<Layer>(connection_technique(s, n - s), geometry.pixel_count()));
 }
 
 TechniqueImages::~TechniqueImages() = default;
@@ -39,7 +42,8 @@ TechniqueImages::Layer* TechniqueImages::layer(const Technique& q) const {
     return q.vertices() - 1 <= max_edges_ ? layers_[triangle_index(q)].get() : nullptr;
 }
 
-void TechniqueImages::add_eye(uint64_t pixel, const Technique& q, Rgb contribution, float mis_weight) {
+void TechniqueImages::add_eye(uint64_t pixel, const Technique& q, Rgb contribution,
+                              float mis_weight) {
     Layer* l = layer(q);
     if (!l) return;
     l->is_used.store(true, std::memory_order_relaxed);
@@ -47,7 +51,8 @@ void TechniqueImages::add_eye(uint64_t pixel, const Technique& q, Rgb contributi
     l->pass_unweighted.add(pixel, contribution);
 }
 
-void TechniqueImages::add_splat(Vec2 film, const Technique& q, Rgb contribution, float mis_weight, float scale) {
+void TechniqueImages::add_splat(Vec2 film, const Technique& q, Rgb contribution, float mis_weight,
+                                float scale) {
     Layer* l = layer(q);
     if (!l) return;
     l->is_used.store(true, std::memory_order_relaxed);

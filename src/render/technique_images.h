@@ -12,11 +12,13 @@ namespace etendue {
 class TechniqueImages {
 public:
     /// For paths of at most `max_edges` edges.
-    TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter, int max_edges);
+    TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter,
+                    int max_edges);
     ~TechniqueImages();
 
     void add_eye(uint64_t pixel, const Technique& technique, Rgb contribution, float mis_weight);
-    void add_splat(Vec2 film, const Technique& technique, Rgb contribution, float mis_weight, float scale);
+    void add_splat(Vec2 film, const Technique& technique, Rgb contribution, float mis_weight,
+                   float scale);
     void end_pass();
 
     struct Entry {

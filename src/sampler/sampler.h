@@ -19,9 +19,9 @@ enum class Stream : uint8_t {
 };
 
 enum class SamplerKind : uint8_t {
-    Independent,      ///< Counter-based pseudo-random numbers.
-    Sobol,            ///< Owen-scrambled Sobol' points over the passes, padded by dimension pairs [Burley 2020].
-    PrimarySample,    ///< Numbers from a PrimarySource.
+    Independent,  ///< Counter-based pseudo-random numbers.
+    Sobol,  ///< Owen-scrambled Sobol' points over the passes, padded by dimension pairs [Burley 2020].
+    PrimarySample,  ///< Numbers from a PrimarySource.
 };
 
 /// Where a Markov chain keeps its point of primary sample space. Values lie in [0, 1).
@@ -33,7 +33,8 @@ public:
 
 class Sampler {
 public:
-    Sampler(SamplerKind kind, uint64_t seed) : seed_(mix64(seed + 0x5851f42d4c957f2dull)), kind_(kind) {}
+    Sampler(SamplerKind kind, uint64_t seed)
+        : seed_(mix64(seed + 0x5851f42d4c957f2dull)), kind_(kind) {}
     explicit Sampler(PrimarySource& source) : source_(&source), kind_(SamplerKind::PrimarySample) {}
 
     /// Begins the sample `path` of pass `pass`.
@@ -63,7 +64,8 @@ public:
     }
     /// As next_1d(), for decisions that gain nothing from structured points: pseudo-random unless a Markov chain drives.
     float next_1d_unstructured() {
-        if (kind_ == SamplerKind::Sobol) return to_unit_float(uint32_t(hash_combine(bits(), pass_) >> 32));
+        if (kind_ == SamplerKind::Sobol)
+            return to_unit_float(uint32_t(hash_combine(bits(), pass_) >> 32));
         return next_1d();
     }
     SamplerKind kind() const { return kind_; }

@@ -16,7 +16,8 @@ namespace etendue {
 /// Walks the description from its roots and fills a Scene. Objects that are referred to several times are made once.
 class SceneBuilder final : public MaterialContext, public EmitterContext, public TextureContext {
 public:
-    SceneBuilder(const SceneDescription& description, const BuildOptions& options) : description_(description), options_(options) {}
+    SceneBuilder(const SceneDescription& description, const BuildOptions& options)
+        : description_(description), options_(options) {}
 
     Scene build() {
         scene_.file_ = description_.file;
@@ -27,16 +28,24 @@ public:
         for (int root : description_.roots) {
             const SceneObject& object = description_.objects[root];
             const std::string& c = object.category;
-            if (c == "shape") add_shape(root);
-            else if (c == "emitter") add_emitter(root);
+            if (c == "shape")
+                add_shape(root);
+            else if (c == "emitter")
+                add_emitter(root);
             else if (c == "sensor") {
-                if (!sensor) sensor = &object, sensor_index = root;
-                else warn(object.where, "only the first sensor is rendered; this one is left out");
-            } else if (c == "integrator") read_integrator(params(root));
-            else if (c == "bsdf" || c == "texture" || c == "medium") check_unused(root);
-            else problem(object.where, fmt::format("a {} has no place at the top of a scene", c));
+                if (!sensor)
+                    sensor = &object, sensor_index = root;
+                else
+                    warn(object.where, "only the first sensor is rendered; this one is left out");
+            } else if (c == "integrator")
+                read_integrator(params(root));
+            else if (c == "bsdf" || c == "texture" || c == "medium")
+                check_unused(root);
+            else
+                problem(object.where, fmt::format("a {} has no place at the top of a scene", c));
         }
-        if (scene_.shapes_.empty() && scene_.emitters_.empty()) throw SceneError({description_.file, 0}, "the scene has no shapes and no emitters");
+        if (scene_.shapes_.empty() && scene_.emitters_.empty())
+            throw SceneError({description_.file, 0}, "the scene has no shapes and no emitters");
         if (!sensor) throw SceneError({description_.file, 0}, "the scene has no sensor");
         finish_geometry();
         make_sensor(sensor_index);
@@ -55,7 +64,10 @@ public:
         if (name.empty()) return TextureRef(fallback);
         const Rgb c = p.rgb(name, fallback);
         if (c.max() > hi)
-            p.fail(name, fmt::format("parameter \"{}\" is ({}, {}, {}), but its components must be at most {}", name, c.r, c.g, c.b, hi));
+            p.fail(name,
+                   fmt::format(
+                       "parameter \"{}\" is ({}, {}, {}), but its components must be at most {}",
+                       name, c.r, c.g, c.b, hi));
         return TextureRef(c);
     }
 
@@ -73,7 +85,9 @@ private:
 
     Params params(int index) const { return {description_, index}; }
 
-    void warn(const Location& where, const std::string& message) { scene_.warnings_.push_back(SceneError(where, message).what()); }
+    void warn(const Location& where, const std::string& message) {
+        scene_.warnings_.push_back(SceneError(where, message).what());
+    }
     /// An error, or under `lenient` a warning.
     void problem(const Location& where, const std::string& message) {
         if (!options_.lenient) throw SceneError(where, message);
@@ -81,7 +95,8 @@ private:
     }
 
     void check(int index, const PluginInfo& info) {
-        check_params(description_, index, info, [&](const Location& where, const std::string& m) { problem(where, m); });
+        check_params(description_, index, info,
+                     [&](const Location& where, const std::string& m) { problem(where, m); });
     }
 
     /// The entry of the object's plug-in, its parameters checked; nullptr (under `lenient`) where there is none.
@@ -99,8 +114,11 @@ private:
         if (object.category == "shape")
             for (const PluginInfo& g : group_infos()) known.push_back(g.name);
         const std::string near = nearest_name(object.type, known);
-        problem(object.where, near.empty() ? fmt::format("unknown {} \"{}\" (known: {})", object.category, object.type, fmt::join(known, ", "))
-                                           : fmt::format("unknown {} \"{}\" (did you mean \"{}\"?)", object.category, object.type, near));
+        problem(object.where, near.empty()
+                                  ? fmt::format("unknown {} \"{}\" (known: {})", object.category,
+                                                object.type, fmt::join(known, ", "))
+                                  : fmt::format("unknown {} \"{}\" (did you mean \"{}\"?)",
+                                                object.category, object.type, near));
         return nullptr;
     }
 
@@ -120,7 +138,8 @@ private:
         if (const auto it = textures_.find(index); it != textures_.end()) return it->second;
         const TextureEntry* entry = find(index, texture_registry());
         if (!entry) return textures_[index] = nullptr;
-        scene_.textures_.push_back(guarded(index, [&] { return entry->make(params(index), *this); }));
+        scene_.textures_.push_back(
+            guarded(index, [&] { return entry->make(params(index), *this); }));
         return textures_[index] = scene_.textures_.back().get();
     }
 
@@ -128,16 +147,20 @@ private:
         if (const auto it = materials_.find(index); it != materials_.end()) return it->second;
         const MaterialEntry* entry = find(index, material_registry());
         if (!entry) return materials_[index] = default_material(Rgb(0.5f));
-        scene_.materials_.push_back(guarded(index, [&] { return entry->make(params(index), *this); }));
+        scene_.materials_.push_back(
+            guarded(index, [&] { return entry->make(params(index), *this); }));
         return materials_[index] = scene_.materials_.back().get();
     }
 
     /// A material or texture at the top that no shape uses is still checked.
     void check_unused(int index) {
         const std::string& c = description_.objects[index].category;
-        if (c == "bsdf") make_material(index);
-        else if (c == "texture") make_texture(index);
-        else make_medium(index);
+        if (c == "bsdf")
+            make_material(index);
+        else if (c == "texture")
+            make_texture(index);
+        else
+            make_medium(index);
     }
 
     const Material* default_material(Rgb reflectance) {
@@ -146,7 +169,10 @@ private:
             SceneDescription diffuse;
             diffuse.objects = {{"bsdf", "diffuse", "", {}, {{"reflectance", reflectance, {}}}, {}}};
             const auto& registry = material_registry();
-            const auto entry = std::find_if(registry.begin(), registry.end(), [](const MaterialEntry& e) { return std::string_view(e.info.name) == "diffuse"; });
+            const auto entry =
+                std::find_if(registry.begin(), registry.end(), [](const MaterialEntry& e) {
+                    return std::string_view(e.info.name) == "diffuse";
+                });
             scene_.materials_.push_back(entry->make({diffuse, 0}, *this));
             m = scene_.materials_.back().get();
         }
@@ -157,8 +183,10 @@ private:
         if (const auto it = media_.find(index); it != media_.end()) return it->second;
         const SceneObject& object = description_.objects[index];
         if (object.type != "homogeneous")
-            throw SceneError(object.where, fmt::format("medium \"{}\" is not supported: media other than \"homogeneous\" with albedo 0 "
-                                                       "(absorption alone) need volume transport", object.type));
+            throw SceneError(object.where, fmt::format("medium \"{}\" is not supported: media "
+                                                       "other than \"homogeneous\" with albedo 0 "
+                                                       "(absorption alone) need volume transport",
+                                                       object.type));
         check(index, medium_info());
         scene_.media_.push_back(read_absorption(params(index)));
         return media_[index] = MediumId(scene_.media_.size() - 1);
@@ -166,8 +194,10 @@ private:
 
     void read_media(const Params& p, SceneShape& s) {
         for (const auto& c : p.children("medium")) {
-            if (c.name == "interior") s.interior = make_medium(c.object);
-            else if (c.name == "exterior") s.exterior = make_medium(c.object);
+            if (c.name == "interior")
+                s.interior = make_medium(c.object);
+            else if (c.name == "exterior")
+                s.exterior = make_medium(c.object);
             else {
                 problem(c.where, "a shape's medium must be named \"interior\" or \"exterior\"");
                 continue;
@@ -182,20 +212,27 @@ private:
         if (!entry) return {};
         const Params p = params(index);
         SceneShape s;
-        scene_.owned_shapes_.push_back(guarded(index, [&] { return entry->make(p, [&](const std::string& m) { warn(p.where(), m); }); }));
+        scene_.owned_shapes_.push_back(guarded(index, [&] {
+            return entry->make(p, [&](const std::string& m) { warn(p.where(), m); });
+        }));
         s.shape = scene_.owned_shapes_.back().get();
         s.is_mesh = dynamic_cast<const TriangleMesh*>(s.shape) != nullptr;
         s.name = p.object().id.empty() ? p.object().type : p.object().id;
         const auto materials = p.children("bsdf");
-        if (materials.size() > 1) problem(materials[1].where, "a shape has one bsdf, this is a second");
+        if (materials.size() > 1)
+            problem(materials[1].where, "a shape has one bsdf, this is a second");
         const auto emitters = p.children("emitter");
-        if (emitters.size() > 1) problem(emitters[1].where, "a shape has one emitter, this is a second");
-        s.material = materials.empty() ? default_material(emitters.empty() ? Rgb(0.5f) : Rgb(0)) : make_material(materials[0].object);
+        if (emitters.size() > 1)
+            problem(emitters[1].where, "a shape has one emitter, this is a second");
+        s.material = materials.empty() ? default_material(emitters.empty() ? Rgb(0.5f) : Rgb(0))
+                                       : make_material(materials[0].object);
         s.needs_tangents = !materials.empty() && s.material->needs_tangents();
         read_media(p, s);
         if (!s.material->is_opaque()) {
             scene_.has_masks_ = true;
-            if (!emitters.empty()) throw SceneError(emitters[0].where, "an emitter on a masked shape is not supported");
+            if (!emitters.empty())
+                throw SceneError(emitters[0].where,
+                                 "an emitter on a masked shape is not supported");
         }
         if (!emitters.empty()) {
             emitting_shape_ = s.shape;
@@ -215,7 +252,8 @@ private:
             const auto groups = params(index).children("shape");
             if (groups.size() != 1 || description_.objects[groups[0].object].type != "shapegroup")
                 throw SceneError(object.where, "an instance needs one reference to a shapegroup");
-            instances_.push_back({make_group(groups[0].object), params(index).transform("to_world")});
+            instances_.push_back(
+                {make_group(groups[0].object), params(index).transform("to_world")});
         } else if (auto s = make_shape(index)) {
             top_.push_back(*s);
             scene_.shapes_.push_back(*s);  // its place in the order is set by finish_geometry()
@@ -227,13 +265,17 @@ private:
         std::vector<SceneShape> members;
         for (const auto& c : params(index).children("shape")) {
             const SceneObject& member = description_.objects[c.object];
-            if (member.type == "shapegroup" || member.type == "instance") throw SceneError(member.where, "shapegroups cannot be nested");
+            if (member.type == "shapegroup" || member.type == "instance")
+                throw SceneError(member.where, "shapegroups cannot be nested");
             if (auto s = make_shape(c.object)) {
-                if (s->emitter) throw SceneError(member.where, "an emitter in a shapegroup is not supported; place the shape itself instead");
+                if (s->emitter)
+                    throw SceneError(member.where, "an emitter in a shapegroup is not supported; "
+                                                   "place the shape itself instead");
                 members.push_back(*s);
             }
         }
-        if (members.empty()) throw SceneError(description_.objects[index].where, "the shapegroup has no shapes");
+        if (members.empty())
+            throw SceneError(description_.objects[index].where, "the shapegroup has no shapes");
         groups_.push_back(std::move(members));
         return group_of_[index] = groups_.size() - 1;
     }
@@ -257,7 +299,9 @@ private:
             for (const SceneShape& s : groups_[group]) {
                 const Bounds3 b = s.shape->bounds();
                 for (int corner = 0; corner < 8; ++corner)
-                    scene_.bounds_.extend(to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y, corner & 4 ? b.hi.z : b.lo.z}));
+                    scene_.bounds_.extend(
+                        to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
+                                        corner & 4 ? b.hi.z : b.lo.z}));
             }
         }
         guarded(0, [&] { a.commit(); });
@@ -267,7 +311,8 @@ private:
         const EmitterEntry* entry = find(index, emitter_registry());
         if (!entry) return nullptr;
         if (emitting_shape_ && std::string_view(entry->info.name) != "area")
-            throw SceneError(description_.objects[index].where, fmt::format("emitter \"{}\" cannot sit on a shape", entry->info.name));
+            throw SceneError(description_.objects[index].where,
+                             fmt::format("emitter \"{}\" cannot sit on a shape", entry->info.name));
         auto made = guarded(index, [&] { return entry->make(params(index), *this); });
         const Emitter* first = made.empty() ? nullptr : made.front().get();
         for (auto& e : made) scene_.emitters_.push_back(std::move(e));
@@ -280,37 +325,49 @@ private:
         std::vector<double> powers;
         for (auto& e : scene_.emitters_) {
             // A margin, so that the bounding disc lies outside everything.
-            e->set_scene_bounds(scene_.bounds_.is_empty() ? Vec3{} : scene_.bounds_.center(), radius * 1.001f);
+            e->set_scene_bounds(scene_.bounds_.is_empty() ? Vec3{} : scene_.bounds_.center(),
+                                radius * 1.001f);
             powers.push_back(e->power());
             if (e->is_infinite() && !e->is_delta()) scene_.infinite_.push_back(e.get());
         }
         scene_.selection_ = AliasTable(powers);
-        for (size_t i = 0; i < powers.size() && !scene_.selection_.empty(); ++i) scene_.emitters_[i]->selection_pmf = scene_.selection_.pmf(uint32_t(i));
-        if (scene_.selection_.empty()) scene_.warnings_.push_back("the scene has no emitter with any power: the image will be black");
+        for (size_t i = 0; i < powers.size() && !scene_.selection_.empty(); ++i)
+            scene_.emitters_[i]->selection_pmf = scene_.selection_.pmf(uint32_t(i));
+        if (scene_.selection_.empty())
+            scene_.warnings_.push_back(
+                "the scene has no emitter with any power: the image will be black");
     }
 
     void read_integrator(const Params& p) {
-        if (!scene_.defaults_.integrator.empty()) return problem(p.where(), "a scene has one integrator, this is a second");
+        if (!scene_.defaults_.integrator.empty())
+            return problem(p.where(), "a scene has one integrator, this is a second");
         scene_.defaults_.integrator = "path";
         const IntegratorAlias* alias = find(p.index(), integrator_aliases());
         if (!alias) return;
         scene_.defaults_.integrator = alias->integrator;
         for (const char* name : {"max_depth", "rr_depth"})
-            if (p.has(name)) scene_.defaults_.integrator_params.emplace_back(name, fmt::format("{}", p.integer(name, 0, -1, 1 << 20)));
+            if (p.has(name))
+                scene_.defaults_.integrator_params.emplace_back(
+                    name, fmt::format("{}", p.integer(name, 0, -1, 1 << 20)));
     }
 
     void make_sensor(int index) {
         const SensorEntry* entry = find(index, sensor_registry());
-        if (!entry) throw SceneError(description_.objects[index].where, "without a known sensor there is no image");
+        if (!entry)
+            throw SceneError(description_.objects[index].where,
+                             "without a known sensor there is no image");
         const Params p = params(index);
         FilmGeometry film{.width = 768, .height = 576, .crop_width = 768, .crop_height = 576};
         const auto films = p.children("film");
         if (films.size() > 1) problem(films[1].where, "a sensor has one film, this is a second");
         if (!films.empty()) {
-            if (const FilmEntry* f = find(films[0].object, film_registry())) film = f->make(params(films[0].object));
+            if (const FilmEntry* f = find(films[0].object, film_registry()))
+                film = f->make(params(films[0].object));
             for (const auto& c : params(films[0].object).children("rfilter"))
-                if (const FilterEntry* r = find(c.object, filter_registry())) scene_.filter_ = r->make(params(c.object));
-            if (params(films[0].object).children("rfilter").empty()) scene_.filter_ = default_filter();
+                if (const FilterEntry* r = find(c.object, filter_registry()))
+                    scene_.filter_ = r->make(params(c.object));
+            if (params(films[0].object).children("rfilter").empty())
+                scene_.filter_ = default_filter();
         }
         apply_overrides(film, p);
         for (const auto& c : p.children("sampler"))
@@ -318,10 +375,12 @@ private:
                 scene_.defaults_.sampler = s->kind;
                 scene_.defaults_.spp = int(params(c.object).integer("sample_count", 4, 1, 1 << 30));
             }
-        if (!p.children("medium").empty()) problem(p.children("medium")[0].where, "a medium around the sensor is not supported");
+        if (!p.children("medium").empty())
+            problem(p.children("medium")[0].where, "a medium around the sensor is not supported");
         scene_.film_ = film;
         scene_.sensor_ = guarded(index, [&] {
-            return entry->make(p, {film, scene_.filter_.radius(), scene_.bounds_.radius(), scene_.bounds_.center()});
+            return entry->make(p, {film, scene_.filter_.radius(), scene_.bounds_.radius(),
+                                   scene_.bounds_.center()});
         });
     }
 
@@ -333,7 +392,10 @@ private:
         if (options_.crop) {
             const auto [x, y, w, h] = *options_.crop;
             if (x < 0 || y < 0 || w < 1 || h < 1 || x + w > film.width || y + h > film.height)
-                throw SceneError(sensor.where(), fmt::format("the crop {},{},{},{} does not lie within the image of {}x{}", x, y, w, h, film.width, film.height));
+                throw SceneError(
+                    sensor.where(),
+                    fmt::format("the crop {},{},{},{} does not lie within the image of {}x{}", x, y,
+                                w, h, film.width, film.height));
             film.crop_x = x, film.crop_y = y, film.crop_width = w, film.crop_height = h;
         }
     }

@@ -9,7 +9,8 @@
 namespace etendue {
 
 struct BuildOptions {
-    bool lenient = false;  ///< Unknown plug-ins and parameters become warnings that name what was dropped.
+    bool lenient =
+        false;  ///< Unknown plug-ins and parameters become warnings that name what was dropped.
     /// Image size and crop instead of the file's. A new size scales the file's crop away.
     std::optional<std::pair<int, int>> resolution;
     std::optional<std::array<int, 4>> crop;  ///< x, y, width, height

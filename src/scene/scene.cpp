@@ -30,7 +30,8 @@ void Scene::surface(const RayHit& raw, SurfaceHit& hit) const {
         hit.geometry = mesh->TriangleMesh::surface(raw.prim, raw.u, raw.v, s.needs_tangents);
     else
         hit.geometry = s.shape->surface(raw.prim, raw.u, raw.v, s.needs_tangents);
-    if (raw.instance != kNoInstance) transform_geometry(accelerator_.instance_transform(raw.instance), hit.geometry);
+    if (raw.instance != kNoInstance)
+        transform_geometry(accelerator_.instance_transform(raw.instance), hit.geometry);
     hit.t = raw.t;
 }
 

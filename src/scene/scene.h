@@ -24,7 +24,8 @@ struct SceneShape {
     const Material* material = nullptr;
     const Emitter* emitter = nullptr;
     MediumId interior = kVacuum, exterior = kVacuum;
-    bool is_interface = false;    ///< interior and exterior are told; else the medium is that of the walk.
+    bool is_interface =
+        false;  ///< interior and exterior are told; else the medium is that of the walk.
     bool is_mesh = false;
     bool needs_tangents = false;  ///< The material asks for dpdu.
     std::string name;
@@ -40,8 +41,9 @@ struct SurfaceHit {
 
 /// Settings that the file gives for the integrator and the sampler, before the command line.
 struct RenderDefaults {
-    std::string integrator;                                         ///< Empty where the file names none.
-    std::vector<std::pair<std::string, std::string>> integrator_params;  ///< Those this project knows.
+    std::string integrator;  ///< Empty where the file names none.
+    std::vector<std::pair<std::string, std::string>>
+        integrator_params;  ///< Those this project knows.
     std::string sampler = "independent";
     int spp = 0;
 };

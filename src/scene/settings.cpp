@@ -18,7 +18,8 @@ const std::vector<FilmEntry>& film_registry() {
             {"pixel_format", ParamKind::String, "", "Accepted; colours are written."},
             {"component_format", ParamKind::String, "", "Accepted; floats are written."},
             {"banner", ParamKind::Bool, "", "Accepted; without effect."},
-            {"high_quality_edges", ParamKind::Bool, "", "Accepted; edges are always as with this on."},
+            {"high_quality_edges", ParamKind::Bool, "",
+             "Accepted; edges are always as with this on."},
             {"sample_border", ParamKind::Bool, "", "Accepted; borders are always sampled."},
             {"compensate", ParamKind::Bool, "", "Accepted; sums are in double."},
             {"attach_log", ParamKind::Bool, "", "Accepted; without effect."},
@@ -36,12 +37,14 @@ const std::vector<FilmEntry>& film_registry() {
             f.crop_width = int(p.integer("crop_width", f.width, 1, kMost));
             f.crop_height = int(p.integer("crop_height", f.height, 1, kMost));
             if (f.crop_x + f.crop_width > f.width || f.crop_y + f.crop_height > f.height)
-                p.fail(fmt::format("the crop of {}x{} at ({}, {}) does not lie within the image of {}x{}", f.crop_width, f.crop_height,
-                                   f.crop_x, f.crop_y, f.width, f.height));
+                p.fail(fmt::format(
+                    "the crop of {}x{} at ({}, {}) does not lie within the image of {}x{}",
+                    f.crop_width, f.crop_height, f.crop_x, f.crop_y, f.width, f.height));
             return f;
         };
         std::vector<FilmEntry> all;
-        for (const char* name : {"hdrfilm", "ldrfilm", "mfilm"}) all.push_back({{"film", name, "Image of linear colours.", params}, make});
+        for (const char* name : {"hdrfilm", "ldrfilm", "mfilm"})
+            all.push_back({{"film", name, "Image of linear colours.", params}, make});
         return all;
     }();
     return entries;
@@ -58,14 +61,20 @@ ReconstructionFilter default_filter() {
 const std::vector<SamplerEntry>& sampler_registry() {
     static const std::vector<SamplerEntry> entries = [] {
         std::vector<SamplerEntry> all;
-        const std::vector<ParamInfo> params = {{"sample_count", ParamKind::Int, "4", "Samples per pixel, unless the command line says."},
-                                               {"seed", ParamKind::Int, "", "Accepted; the command line's seed counts."},
-                                               {"dimension", ParamKind::Int, "", "Accepted; there is no limit."},
-                                               {"scramble", ParamKind::Int, "", "Accepted; points are always scrambled."},
-                                               {"jitter", ParamKind::Bool, "", "Accepted; points are always jittered."}};
-        all.push_back({{"sampler", "independent", "Counter-based pseudo-random numbers.", params}, "independent"});
-        all.push_back({{"sampler", "sobol", "Owen-scrambled Sobol' points over the passes.", params}, "sobol"});
-        for (const char* name : {"ldsampler", "stratified", "multijitter", "orthogonal", "halton", "hammersley"})
+        const std::vector<ParamInfo> params = {
+            {"sample_count", ParamKind::Int, "4",
+             "Samples per pixel, unless the command line says."},
+            {"seed", ParamKind::Int, "", "Accepted; the command line's seed counts."},
+            {"dimension", ParamKind::Int, "", "Accepted; there is no limit."},
+            {"scramble", ParamKind::Int, "", "Accepted; points are always scrambled."},
+            {"jitter", ParamKind::Bool, "", "Accepted; points are always jittered."}};
+        all.push_back({{"sampler", "independent", "Counter-based pseudo-random numbers.", params},
+                       "independent"});
+        all.push_back(
+            {{"sampler", "sobol", "Owen-scrambled Sobol' points over the passes.", params},
+             "sobol"});
+        for (const char* name :
+             {"ldsampler", "stratified", "multijitter", "orthogonal", "halton", "hammersley"})
             all.push_back({{"sampler", name, "Taken as sobol.", params}, "sobol"});
         return all;
     }();
@@ -74,15 +83,18 @@ const std::vector<SamplerEntry>& sampler_registry() {
 
 const std::vector<IntegratorAlias>& integrator_aliases() {
     static const std::vector<IntegratorAlias> entries = [] {
-        const std::vector<ParamInfo> params = {{"max_depth", ParamKind::Int, "-1", "Edges of the longest path; -1: no limit."},
-                                               {"rr_depth", ParamKind::Int, "5", "Where Russian roulette begins."},
-                                               {"hide_emitters", ParamKind::Bool, "", "Accepted; emitters are never hidden."},
-                                               {"strict_normals", ParamKind::Bool, "", "Accepted; normals are always strict."},
-                                               {"light_image", ParamKind::Bool, "", "Accepted; splats are always made."},
-                                               {"sample_direct", ParamKind::Bool, "", "Accepted; direct light is always sampled."}};
+        const std::vector<ParamInfo> params = {
+            {"max_depth", ParamKind::Int, "-1", "Edges of the longest path; -1: no limit."},
+            {"rr_depth", ParamKind::Int, "5", "Where Russian roulette begins."},
+            {"hide_emitters", ParamKind::Bool, "", "Accepted; emitters are never hidden."},
+            {"strict_normals", ParamKind::Bool, "", "Accepted; normals are always strict."},
+            {"light_image", ParamKind::Bool, "", "Accepted; splats are always made."},
+            {"sample_direct", ParamKind::Bool, "", "Accepted; direct light is always sampled."}};
         std::vector<IntegratorAlias> all;
-        for (const char* name : {"path", "volpath", "volpathmis", "volpath_simple", "direct"}) all.push_back({{"integrator", name, "Path tracing.", params}, "path"});
-        for (const char* name : {"ptracer", "light"}) all.push_back({{"integrator", name, "Light tracing.", params}, "light"});
+        for (const char* name : {"path", "volpath", "volpathmis", "volpath_simple", "direct"})
+            all.push_back({{"integrator", name, "Path tracing.", params}, "path"});
+        for (const char* name : {"ptracer", "light"})
+            all.push_back({{"integrator", name, "Light tracing.", params}, "light"});
         all.push_back({{"integrator", "bdpt", "Bidirectional path tracing.", params}, "bdpt"});
         return all;
     }();
@@ -90,26 +102,29 @@ const std::vector<IntegratorAlias>& integrator_aliases() {
 }
 
 const PluginInfo& medium_info() {
-    static const PluginInfo info = {"medium",
-                                    "homogeneous",
-                                    "Absorbing medium: attenuation along the segment. Its albedo must be 0.",
-                                    {{"sigma_t", ParamKind::Rgb, "1", "Extinction, 1/length."},
-                                     {"sigma_a", ParamKind::Rgb, "", "Absorption, instead of sigma_t."},
-                                     {"sigma_s", ParamKind::Rgb, "0", "Scattering; must be 0."},
-                                     {"albedo", ParamKind::Rgb, "0.75", "Must be given as 0."},
-                                     {"scale", ParamKind::Float, "1", "Factor of sigma_t."},
-                                     {"sample_emitters", ParamKind::Bool, "", "Accepted; without effect."}}};
+    static const PluginInfo info = {
+        "medium",
+        "homogeneous",
+        "Absorbing medium: attenuation along the segment. Its albedo must be 0.",
+        {{"sigma_t", ParamKind::Rgb, "1", "Extinction, 1/length."},
+         {"sigma_a", ParamKind::Rgb, "", "Absorption, instead of sigma_t."},
+         {"sigma_s", ParamKind::Rgb, "0", "Scattering; must be 0."},
+         {"albedo", ParamKind::Rgb, "0.75", "Must be given as 0."},
+         {"scale", ParamKind::Float, "1", "Factor of sigma_t."},
+         {"sample_emitters", ParamKind::Bool, "", "Accepted; without effect."}}};
     return info;
 }
 
 Rgb read_absorption(const Params& p) {
     const float scale = p.number("scale", 1, 0);
     const bool by_absorption = p.has("sigma_a");
-    if (by_absorption && p.has("sigma_t")) p.fail("sigma_t", "give either sigma_a and sigma_s, or sigma_t and albedo");
+    if (by_absorption && p.has("sigma_t"))
+        p.fail("sigma_t", "give either sigma_a and sigma_s, or sigma_t and albedo");
     const Rgb scattering = by_absorption ? p.rgb("sigma_s", Rgb(0)) : p.rgb("albedo", Rgb(0.75f));
     if (!scattering.is_zero())
         p.fail(by_absorption ? "sigma_s" : "albedo",
-               "scattering media are not supported: a homogeneous medium must have albedo 0 (absorption alone)");
+               "scattering media are not supported: a homogeneous medium must have albedo 0 "
+               "(absorption alone)");
     return (by_absorption ? p.rgb("sigma_a", Rgb(0)) : p.rgb("sigma_t", Rgb(1))) * scale;
 }
 

@@ -19,7 +19,8 @@ using Warn = std::function<void(const std::string&)>;
 std::vector<ParamInfo> with_common(std::vector<ParamInfo> params) {
     params.push_back({"to_world", ParamKind::Transform, "identity", "Object to world."});
     params.push_back({"flip_normals", ParamKind::Bool, "false", "Turns the shape inside out."});
-    params.push_back({"bsdf", ParamKind::Object, "diffuse", "Material; black where the shape emits and names none."});
+    params.push_back({"bsdf", ParamKind::Object, "diffuse",
+                      "Material; black where the shape emits and names none."});
     params.push_back({"emitter", ParamKind::Object, "", "An area emitter."});
     params.push_back({"interior", ParamKind::Object, "", "Medium behind the surface."});
     params.push_back({"exterior", ParamKind::Object, "", "Medium before the surface."});
@@ -27,19 +28,21 @@ std::vector<ParamInfo> with_common(std::vector<ParamInfo> params) {
 }
 
 std::vector<ParamInfo> mesh_params(const char* flip) {
-    return with_common({{"filename", ParamKind::String, "", "Mesh file."},
-                        {"face_normals", ParamKind::Bool, "false", "Flat shading: vertex normals are dropped."},
-                        {"flip_tex_coords", ParamKind::Bool, flip, "v becomes 1 - v."},
-                        {"collapse", ParamKind::Bool, "false", "Accepted; a file is always one shape."},
-                        {"shape_index", ParamKind::Int, "0", "Which mesh of a .serialized file."},
-                        {"max_smooth_angle", ParamKind::Float, "", "Accepted; without effect."},
-                        {"srgb", ParamKind::Bool, "false", "Accepted; vertex colours are not used."}});
+    return with_common(
+        {{"filename", ParamKind::String, "", "Mesh file."},
+         {"face_normals", ParamKind::Bool, "false", "Flat shading: vertex normals are dropped."},
+         {"flip_tex_coords", ParamKind::Bool, flip, "v becomes 1 - v."},
+         {"collapse", ParamKind::Bool, "false", "Accepted; a file is always one shape."},
+         {"shape_index", ParamKind::Int, "0", "Which mesh of a .serialized file."},
+         {"max_smooth_angle", ParamKind::Float, "", "Accepted; without effect."},
+         {"srgb", ParamKind::Bool, "false", "Accepted; vertex colours are not used."}});
 }
 
 /// Turns file data into a world-space mesh.
 std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& warn) {
     if (data.dropped_degenerate > 0)
-        warn(fmt::format("{}: {} triangle{} without area left out", params.text("filename", data.name), data.dropped_degenerate,
+        warn(fmt::format("{}: {} triangle{} without area left out",
+                         params.text("filename", data.name), data.dropped_degenerate,
                          data.dropped_degenerate == 1 ? "" : "s"));
     const Transform t = params.transform("to_world");
     const bool flat = params.flag("face_normals", false) || data.face_normals;
@@ -62,14 +65,19 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     mesh->uvs = std::move(data.uvs);
     mesh->triangles = std::move(data.triangles);
     for (Vec3 p : mesh->positions)
-        if (!is_finite(p)) params.fail("to_world", "the transform takes a vertex of the mesh out of the range of floats");
+        if (!is_finite(p))
+            params.fail("to_world",
+                        "the transform takes a vertex of the mesh out of the range of floats");
     mesh->compute_face_normals();
     return mesh;
 }
 
 template <MeshData (*read)(const std::string&, const MeshOptions&)>
-std::unique_ptr<Shape> make_file_mesh(const Params& params, const Warn& warn, bool flip_by_default) {
-    return finish(read(resolve_file(params), {.flip_tex_coords = params.flag("flip_tex_coords", flip_by_default)}), params, warn);
+std::unique_ptr<Shape> make_file_mesh(const Params& params, const Warn& warn,
+                                      bool flip_by_default) {
+    return finish(read(resolve_file(params),
+                       {.flip_tex_coords = params.flag("flip_tex_coords", flip_by_default)}),
+                  params, warn);
 }
 
 struct Corner {
@@ -78,7 +86,8 @@ struct Corner {
 };
 
 /// Quads given by their corners, counter-clockwise seen from the front; flat, oriented by the transformed normal.
-std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quads, const Params& params) {
+std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quads,
+                                  const Params& params) {
     const Transform t = params.transform("to_world");
     // A mirroring transform would turn the winding, but not the normal that the shape is documented to have.
     const bool turn = (t.determinant3() < 0) != params.flag("flip_normals", false);
@@ -100,7 +109,11 @@ std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quad
 }
 
 std::unique_ptr<Shape> make_rectangle(const Params& params, const Warn&) {
-    return make_quads({{Corner{{-1, -1, 0}, {0, 0}}, {{1, -1, 0}, {1, 0}}, {{1, 1, 0}, {1, 1}}, {{-1, 1, 0}, {0, 1}}}}, params);
+    return make_quads({{Corner{{-1, -1, 0}, {0, 0}},
+                        {{1, -1, 0}, {1, 0}},
+                        {{1, 1, 0}, {1, 1}},
+                        {{-1, 1, 0}, {0, 1}}}},
+                      params);
 }
 
 /// The cube [-1, 1]³; the texture coordinates of each face as Mitsuba's cube has them.
@@ -109,12 +122,15 @@ std::unique_ptr<Shape> make_cube(const Params& params, const Warn&) {
     struct Face {
         Vec3 n, u, v;
     };
-    const Face faces[] = {{{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},  {{0, 0, -1}, {0, -1, 0}, {1, 0, 0}},
-                          {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}, {{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+    const Face faces[] = {{{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},   {{0, 0, -1}, {0, -1, 0}, {1, 0, 0}},
+                          {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}},  {{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
                           {{0, 1, 0}, {-1, 0, 0}, {0, 0, -1}}, {{0, -1, 0}, {0, 0, 1}, {1, 0, 0}}};
     std::vector<std::array<Corner, 4>> quads;
     for (const Face& f : faces) {
-        std::array<Corner, 4> q = {Corner{f.n - f.u - f.v, {0, 0}}, {f.n + f.u - f.v, {1, 0}}, {f.n + f.u + f.v, {1, 1}}, {f.n - f.u + f.v, {0, 1}}};
+        std::array<Corner, 4> q = {Corner{f.n - f.u - f.v, {0, 0}},
+                                   {f.n + f.u - f.v, {1, 0}},
+                                   {f.n + f.u + f.v, {1, 1}},
+                                   {f.n - f.u + f.v, {0, 1}}};
         if (dot(cross(f.u, f.v), f.n) < 0) std::swap(q[1], q[3]);
         quads.push_back(q);
     }
@@ -125,19 +141,23 @@ std::unique_ptr<Shape> make_cube(const Params& params, const Warn&) {
 void check_similarity(const Transform& t, const Params& params, bool uniform) {
     const Vec3 x = t.vector({1, 0, 0}), y = t.vector({0, 1, 0}), z = t.vector({0, 0, 1});
     const float lx = length(x), ly = length(y), lz = length(z);
-    const bool orthogonal = std::fabs(dot(x, y)) < 1e-3f * lx * ly && std::fabs(dot(y, z)) < 1e-3f * ly * lz &&
+    const bool orthogonal = std::fabs(dot(x, y)) < 1e-3f * lx * ly &&
+                            std::fabs(dot(y, z)) < 1e-3f * ly * lz &&
                             std::fabs(dot(z, x)) < 1e-3f * lz * lx;
-    const bool round = std::fabs(lx - ly) < 1e-3f * lx && (!uniform || std::fabs(lx - lz) < 1e-3f * lx);
+    const bool round =
+        std::fabs(lx - ly) < 1e-3f * lx && (!uniform || std::fabs(lx - lz) < 1e-3f * lx);
     if (!orthogonal || !round)
-        params.fail("to_world", fmt::format("a {} needs a transform without shear and with {} scale", params.object().type,
-                                            uniform ? "a uniform" : "the same x and y"));
+        params.fail("to_world",
+                    fmt::format("a {} needs a transform without shear and with {} scale",
+                                params.object().type, uniform ? "a uniform" : "the same x and y"));
 }
 
 std::unique_ptr<Shape> make_sphere(const Params& params, const Warn&) {
     const Transform t = params.transform("to_world");
     check_similarity(t, params, true);
     const float radius = params.number("radius", 1, 1e-20f);
-    const Transform local = Transform::translate(params.vector("center", {0, 0, 0})) * Transform::scale({radius, radius, radius});
+    const Transform local = Transform::translate(params.vector("center", {0, 0, 0})) *
+                            Transform::scale({radius, radius, radius});
     return std::make_unique<Sphere>(t * local, params.flag("flip_normals", false));
 }
 
@@ -174,16 +194,20 @@ const std::vector<ShapeEntry>& shape_registry() {
          [](const Params& p, const Warn& w) { return make_file_mesh<read_ply>(p, w, false); }},
         {{"shape", "serialized", "Mitsuba 0.6's compressed meshes.", mesh_params("false")},
          [](const Params& p, const Warn& w) {
-             return finish(read_serialized(resolve_file(p), int(p.integer("shape_index", 0, 0, 1 << 24)),
+             return finish(read_serialized(resolve_file(p),
+                                           int(p.integer("shape_index", 0, 0, 1 << 24)),
                                            {.flip_tex_coords = p.flag("flip_tex_coords", false)}),
                            p, w);
          }},
-        {{"shape", "rectangle", "The square [-1, 1]² in the xy plane, normal +z.", with_common({})}, make_rectangle},
+        {{"shape", "rectangle", "The square [-1, 1]² in the xy plane, normal +z.", with_common({})},
+         make_rectangle},
         {{"shape", "cube", "The cube [-1, 1]³, normals outward.", with_common({})}, make_cube},
         {{"shape", "sphere", "Sphere, normals outward.",
-          with_common({{"center", ParamKind::Vector, "0, 0, 0", "Centre."}, {"radius", ParamKind::Float, "1", "Radius."}})},
+          with_common({{"center", ParamKind::Vector, "0, 0, 0", "Centre."},
+                       {"radius", ParamKind::Float, "1", "Radius."}})},
          make_sphere},
-        {{"shape", "disk", "The unit disc in the xy plane, normal +z.", with_common({})}, make_disk},
+        {{"shape", "disk", "The unit disc in the xy plane, normal +z.", with_common({})},
+         make_disk},
         {{"shape", "cylinder", "Open cylinder, normals outward.",
           with_common({{"p0", ParamKind::Vector, "0, 0, 0", "Start of the axis."},
                        {"p1", ParamKind::Vector, "0, 0, 1", "End of the axis."},
@@ -195,9 +219,15 @@ const std::vector<ShapeEntry>& shape_registry() {
 
 const std::vector<PluginInfo>& group_infos() {
     static const std::vector<PluginInfo> infos = {
-        {"shape", "shapegroup", "Shapes that appear only through instances.", {{"shape", ParamKind::Object, "", "Nested shapes."}}},
-        {"shape", "instance", "A copy of a shapegroup.",
-         {{"to_world", ParamKind::Transform, "identity", "Group to world."}, {"shapegroup", ParamKind::Object, "", "Reference to the group."}}}};
+        {"shape",
+         "shapegroup",
+         "Shapes that appear only through instances.",
+         {{"shape", ParamKind::Object, "", "Nested shapes."}}},
+        {"shape",
+         "instance",
+         "A copy of a shapegroup.",
+         {{"to_world", ParamKind::Transform, "identity", "Group to world."},
+          {"shapegroup", ParamKind::Object, "", "Reference to the group."}}}};
     return infos;
 }
 

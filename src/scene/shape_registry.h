@@ -12,7 +12,8 @@ namespace etendue {
 struct ShapeEntry {
     PluginInfo info;
     /// `warn` takes remarks on data that was mended.
-    std::unique_ptr<Shape> (*make)(const Params& params, const std::function<void(const std::string&)>& warn);
+    std::unique_ptr<Shape> (*make)(const Params& params,
+                                   const std::function<void(const std::string&)>& warn);
 };
 /// All but `shapegroup` and `instance`, which the builder resolves itself; their tables are `group_info()`.
 const std::vector<ShapeEntry>& shape_registry();

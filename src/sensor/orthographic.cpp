@@ -17,20 +17,28 @@ public:
         pixel_area_ = abs_dot(cross(x, y), forward_);
         const float r = context.filter_radius - 0.5f;
         lo_ = {float(film_.crop_x) - r, float(film_.crop_y) - r};
-        hi_ = {float(film_.crop_x + film_.crop_width) + r, float(film_.crop_y + film_.crop_height) + r};
+        hi_ = {float(film_.crop_x + film_.crop_width) + r,
+               float(film_.crop_y + film_.crop_height) + r};
     }
 
     SensorRay sample_ray(Vec2 film, Vec2) const override {
-        const Vec3 local{1 - 2 * film.x / float(film_.width), (1 - 2 * film.y / float(film_.height)) / aspect_, 0};
+        const Vec3 local{1 - 2 * film.x / float(film_.width),
+                         (1 - 2 * film.y / float(film_.height)) / aspect_, 0};
         return {to_world_.point(local), forward_, forward_, 1, 1 / pixel_area_};
     }
 
     std::optional<SensorSample> sample_connection(Vec3 from, bool, Vec2) const override {
         const Vec3 local = to_local_.point(from);
         if (!(local.z > 0)) return {};
-        const Vec2 film{(1 - local.x) * 0.5f * float(film_.width), (1 - local.y * aspect_) * 0.5f * float(film_.height)};
+        const Vec2 film{(1 - local.x) * 0.5f * float(film_.width),
+                        (1 - local.y * aspect_) * 0.5f * float(film_.height)};
         if (!(film.x >= lo_.x && film.x < hi_.x && film.y >= lo_.y && film.y < hi_.y)) return {};
-        return SensorSample{to_world_.point({local.x, local.y, 0}), forward_, film, 1 / pixel_area_, 1, 1 / pixel_area_};
+        return SensorSample{to_world_.point({local.x, local.y, 0}),
+                            forward_,
+                            film,
+                            1 / pixel_area_,
+                            1,
+                            1 / pixel_area_};
     }
 
     bool is_orthographic() const override { return true; }
@@ -47,8 +55,11 @@ private:
 }  // namespace
 
 SensorEntry orthographic_entry() {
-    return {{"sensor", "orthographic", "Parallel projection; the image spans [-1, 1] in x of camera space.",
-             {{"to_world", ParamKind::Transform, "identity", "Camera to world; its scale sets the size of the view."},
+    return {{"sensor",
+             "orthographic",
+             "Parallel projection; the image spans [-1, 1] in x of camera space.",
+             {{"to_world", ParamKind::Transform, "identity",
+               "Camera to world; its scale sets the size of the view."},
               {"near_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
               {"far_clip", ParamKind::Float, "", "Accepted; rays are not clipped."}}},
             [](const Params& p, const SensorContext& c) -> std::unique_ptr<Sensor> {

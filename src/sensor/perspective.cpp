@@ -18,13 +18,13 @@ namespace {
 
 class PerspectiveSensor final : public Sensor {
 public:
-    PerspectiveSensor(const PerspectiveCamera& camera, const Transform& to_world, float filter_radius)
-        : camera_(camera),
-          origin_(to_world.point({0, 0, 0})),
-          left_(normalize(to_world.vector({1, 0, 0}))),
-          up_(normalize(to_world.vector({0, 1, 0}))),
+    PerspectiveSensor(const PerspectiveCamera& camera, const Transform& to_world,
+                      float filter_radius)
+        : camera_(camera), origin_(to_world.point({0, 0, 0})),
+          left_(normalize(to_world.vector({1, 0, 0}))), up_(normalize(to_world.vector({0, 1, 0}))),
           forward_(normalize(to_world.vector({0, 0, 1}))) {
-        pixel_area_ = (2 * camera.half_width / float(camera.film.width)) * (2 * camera.half_height / float(camera.film.height));
+        pixel_area_ = (2 * camera.half_width / float(camera.film.width)) *
+                      (2 * camera.half_height / float(camera.film.height));
         const FilmGeometry& f = camera.film;
         lo_ = {float(f.crop_x) - filter_radius + 0.5f, float(f.crop_y) - filter_radius + 0.5f};
         hi_ = {float(f.crop_x + f.crop_width) + filter_radius - 0.5f,
@@ -44,7 +44,8 @@ public:
         return {lens, forward_, to_world(d), pdf_pos_, pdf_of_cosine(d.z)};
     }
 
-    std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity, Vec2 u_lens) const override {
+    std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity,
+                                                  Vec2 u_lens) const override {
         Vec3 lens = origin_;
         if (has_finite_lens()) {
             const Vec2 u = sample_lens(u_lens);
@@ -74,8 +75,10 @@ private:
     float pdf_of_cosine(float c) const { return c > 0 ? 1 / (pixel_area_ * c * c * c) : 0.0f; }
 
     Vec2 film_to_plane(Vec2 film) const {
-        return {camera_.half_width * (1 - 2 * (film.x / float(camera_.film.width) + camera_.offset.x)),
-                camera_.half_height * (1 - 2 * (film.y / float(camera_.film.height) + camera_.offset.y))};
+        return {camera_.half_width *
+                    (1 - 2 * (film.x / float(camera_.film.width) + camera_.offset.x)),
+                camera_.half_height *
+                    (1 - 2 * (film.y / float(camera_.film.height) + camera_.offset.y))};
     }
 
     /// What light leaving the scene along -v (v: from the lens point to the scene) measures.
@@ -90,12 +93,15 @@ private:
         if (has_finite_lens()) {
             const Vec3 origin = to_local(lens - origin_);
             const float k = camera_.focus_distance / local.z;
-            plane = {(origin.x + local.x * k) / camera_.focus_distance, (origin.y + local.y * k) / camera_.focus_distance};
+            plane = {(origin.x + local.x * k) / camera_.focus_distance,
+                     (origin.y + local.y * k) / camera_.focus_distance};
         } else {
             plane = {local.x / local.z, local.y / local.z};
         }
-        const Vec2 film{((1 - plane.x / camera_.half_width) * 0.5f - camera_.offset.x) * float(camera_.film.width),
-                        ((1 - plane.y / camera_.half_height) * 0.5f - camera_.offset.y) * float(camera_.film.height)};
+        const Vec2 film{((1 - plane.x / camera_.half_width) * 0.5f - camera_.offset.x) *
+                            float(camera_.film.width),
+                        ((1 - plane.y / camera_.half_height) * 0.5f - camera_.offset.y) *
+                            float(camera_.film.height)};
         if (!(film.x >= lo_.x && film.x < hi_.x && film.y >= lo_.y && film.y < hi_.y)) return {};
         const float pdf = pdf_of_cosine(cos);
         return SensorSample{lens, forward_, film, pdf_pos_ * pdf, pdf_pos_, pdf};
@@ -103,7 +109,7 @@ private:
 
     PerspectiveCamera camera_;
     Vec3 origin_, left_, up_, forward_;  ///< Camera space in the world.
-    Vec2 lo_, hi_;  ///< Film points that reach some pixel of the crop.
+    Vec2 lo_, hi_;                       ///< Film points that reach some pixel of the crop.
     float pixel_area_, pdf_pos_;
 };
 
@@ -130,19 +136,24 @@ void set_field_of_view(const Params& params, PerspectiveCamera& camera) {
         const std::string text = focal.empty() ? "50mm" : focal;
         char* end = nullptr;
         const double mm = std::strtod(text.c_str(), &end);
-        if (end == text.c_str() || (std::string(end) != "mm" && std::string(end) != "") || !(mm > 0) || !std::isfinite(mm))
-            params.fail("focal_length", fmt::format("focal_length is \"{}\", but must be a length in mm, like \"50mm\"", focal));
+        if (end == text.c_str() || (std::string(end) != "mm" && std::string(end) != "") ||
+            !(mm > 0) || !std::isfinite(mm))
+            params.fail(
+                "focal_length",
+                fmt::format("focal_length is \"{}\", but must be a length in mm, like \"50mm\"",
+                            focal));
         const double half_diagonal = std::hypot(36.0, 24.0) / 2 / mm;
         half_width = half_diagonal * aspect / std::hypot(aspect, 1.0);
     } else {
-        if (!focal.empty()) params.fail("focal_length", "give either fov or focal_length, not both");
+        if (!focal.empty())
+            params.fail("focal_length", "give either fov or focal_length, not both");
         const double tangent = std::tan(params.number("fov", 0, 1e-3f, 179.9f) * double(kPi) / 360);
         switch (params.choice("fov_axis", {"x", "y", "diagonal", "smaller", "larger"}, 0)) {
-            case 0: half_width = tangent; break;
-            case 1: half_width = tangent * aspect; break;
-            case 2: half_width = tangent * aspect / std::hypot(aspect, 1.0); break;
-            case 3: half_width = aspect > 1 ? tangent * aspect : tangent; break;
-            default: half_width = aspect > 1 ? tangent : tangent * aspect; break;
+        case 0: half_width = tangent; break;
+        case 1: half_width = tangent * aspect; break;
+        case 2: half_width = tangent * aspect / std::hypot(aspect, 1.0); break;
+        case 3: half_width = aspect > 1 ? tangent * aspect : tangent; break;
+        default: half_width = aspect > 1 ? tangent : tangent * aspect; break;
         }
     }
     camera.half_width = float(half_width);
@@ -157,21 +168,27 @@ std::unique_ptr<Sensor> make(const Params& params, const SensorContext& context,
                      params.number("principal_point_offset_y", 0, -10, 10)};
     if (lens) {
         camera.lens_radius = params.number("aperture_radius", 0, 0);
-        if (!params.has("aperture_radius")) params.fail("thinlens needs an aperture_radius (world units)");
+        if (!params.has("aperture_radius"))
+            params.fail("thinlens needs an aperture_radius (world units)");
         camera.focus_distance = params.number("focus_distance", 0, 1e-6f);
-        if (!params.has("focus_distance")) params.fail("thinlens needs a focus_distance (world units)");
+        if (!params.has("focus_distance"))
+            params.fail("thinlens needs a focus_distance (world units)");
     }
     return make_perspective(camera, rigid(params), context.filter_radius);
 }
 
 std::vector<ParamInfo> shared_params(std::vector<ParamInfo> more) {
     std::vector<ParamInfo> all = {
-        {"to_world", ParamKind::Transform, "identity", "Camera to world; looks along +z, x to the left, y up."},
+        {"to_world", ParamKind::Transform, "identity",
+         "Camera to world; looks along +z, x to the left, y up."},
         {"fov", ParamKind::Float, "", "Field of view in degrees along fov_axis."},
         {"fov_axis", ParamKind::String, "x", "x, y, diagonal, smaller or larger."},
-        {"focal_length", ParamKind::String, "50mm", "Instead of fov: focal length for a 35 mm film."},
-        {"principal_point_offset_x", ParamKind::Float, "0", "Shift of the image centre, as a fraction of the width."},
-        {"principal_point_offset_y", ParamKind::Float, "0", "Shift of the image centre, as a fraction of the height."},
+        {"focal_length", ParamKind::String, "50mm",
+         "Instead of fov: focal length for a 35 mm film."},
+        {"principal_point_offset_x", ParamKind::Float, "0",
+         "Shift of the image centre, as a fraction of the width."},
+        {"principal_point_offset_y", ParamKind::Float, "0",
+         "Shift of the image centre, as a fraction of the height."},
         {"near_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
         {"far_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
         {"shutter_open", ParamKind::Float, "0", "Accepted; nothing moves."},
@@ -183,7 +200,8 @@ std::vector<ParamInfo> shared_params(std::vector<ParamInfo> more) {
 
 }  // namespace
 
-std::unique_ptr<Sensor> make_perspective(const PerspectiveCamera& camera, const Transform& to_world, float filter_radius) {
+std::unique_ptr<Sensor> make_perspective(const PerspectiveCamera& camera, const Transform& to_world,
+                                         float filter_radius) {
     return std::make_unique<PerspectiveSensor>(camera, to_world, filter_radius);
 }
 
@@ -194,8 +212,10 @@ SensorEntry perspective_entry() {
 
 SensorEntry thinlens_entry() {
     return {{"sensor", "thinlens", "Perspective camera with a finite round lens.",
-             shared_params({{"aperture_radius", ParamKind::Float, "", "Radius of the lens, world units."},
-                            {"focus_distance", ParamKind::Float, "", "Distance of the plane in focus along +z, world units."}})},
+             shared_params(
+                 {{"aperture_radius", ParamKind::Float, "", "Radius of the lens, world units."},
+                  {"focus_distance", ParamKind::Float, "",
+                   "Distance of the plane in focus along +z, world units."}})},
             [](const Params& p, const SensorContext& c) { return make(p, c, true); }};
 }
 

@@ -13,7 +13,8 @@ struct PerspectiveCamera {
 };
 
 /// `to_world` must be rigid.
-std::unique_ptr<Sensor> make_perspective(const PerspectiveCamera& camera, const Transform& to_world, float filter_radius);
+std::unique_ptr<Sensor> make_perspective(const PerspectiveCamera& camera, const Transform& to_world,
+                                         float filter_radius);
 
 SensorEntry perspective_entry();
 SensorEntry thinlens_entry();

@@ -10,7 +10,8 @@ std::optional<SensorSample> Sensor::hit_lens(Vec3, Vec3, float) const {
 }
 
 const std::vector<SensorEntry>& sensor_registry() {
-    static const std::vector<SensorEntry> entries = {perspective_entry(), thinlens_entry(), orthographic_entry()};
+    static const std::vector<SensorEntry> entries = {perspective_entry(), thinlens_entry(),
+                                                     orthographic_entry()};
     return entries;
 }
 

@@ -25,7 +25,7 @@ struct SensorRay {
 
 /// z_0 as seen from a point of the scene.
 struct SensorSample {
-    Vec3 p;         ///< z_0; for orthographic sensors the direction toward the sensor.
+    Vec3 p;  ///< z_0; for orthographic sensors the direction toward the sensor.
     Vec3 ng;
     Vec2 film;      ///< Film point at which the measurement lands.
     float We_cos;   ///< W_e·|cos θ at z_0| (orthographic: W_e), over nothing: divide by pdf_pos.
@@ -41,7 +41,8 @@ public:
     virtual SensorRay sample_ray(Vec2 film, Vec2 u_lens) const = 0;
     /// A connection from `from` (a point, or a direction to it) to the lens; nothing outside the film (grown by the
     /// filter's radius).
-    virtual std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity, Vec2 u_lens) const = 0;
+    virtual std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity,
+                                                          Vec2 u_lens) const = 0;
     /// Where a light ray o + t·d, t in (0, tmax), crosses a finite lens from its front, and what it measures there.
     virtual std::optional<SensorSample> hit_lens(Vec3 o, Vec3 d, float tmax) const;
 
