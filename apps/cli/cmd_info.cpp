@@ -46,9 +46,9 @@ void info(const SceneOptions& options, bool as_json) {
         fmt::print(", crop {} x {} at ({}, {})", s.film().crop_width, s.film().crop_height,
                    s.film().crop_x, s.film().crop_y);
     fmt::print(", {} filter\n", s.filter().name());
-    fmt::print("  rendering   {}, sampler {}, {} spp\n",
+    fmt::print("  rendering   {}, {} spp\n",
                s.defaults().integrator.empty() ? "path" : s.defaults().integrator,
-               s.defaults().sampler, s.defaults().spp);
+               s.defaults().spp);
     fmt::print("  shapes      {}: {} triangles, {} quadrics, {} instances\n", s.shapes().size(),
                st.triangles, st.quadrics, st.instances);
     fmt::print("  materials   {}\n", st.materials);

@@ -29,7 +29,7 @@ extern "C" void on_interrupt(int) {
 
 struct RenderCommand {
     SceneOptions scene;
-    std::string output = "out.exr", integrator, sampler, techniques, preview, stats;
+    std::string output = "out.exr", integrator, sampler = "sobol", techniques, preview, stats;
     std::vector<std::string> aovs;
     uint64_t seed = 0, spp = 0;
     double seconds = 0, error = 0;
@@ -89,8 +89,7 @@ IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
     return spec;
 }
 
-SamplerKind choose_sampler(const Scene& scene, const std::string& text) {
-    const std::string& name = text.empty() ? scene.defaults().sampler : text;
+SamplerKind parse_sampler(const std::string& name) {
     if (name == "independent") return SamplerKind::Independent;
     if (name == "sobol") return SamplerKind::Sobol;
     throw std::runtime_error(
@@ -164,7 +163,7 @@ void RenderCommand::run() const {
 
     RenderSettings settings;
     settings.integrator = choose_integrator(s, integrator);
-    settings.sampler = choose_sampler(s, sampler);
+    settings.sampler = parse_sampler(sampler);
     settings.seed = seed;
     settings.threads = threads;
     if (spp > 0) settings.spp = spp;
@@ -248,7 +247,9 @@ void add_render_command(CLI::App& app) {
     c.add_option("--error", command->error, "Stop at this relative RMS error of the image")
         ->check(CLI::PositiveNumber);
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
-    c.add_option("--sampler", command->sampler, "independent or sobol (default: the scene's)");
+    c.add_option("--sampler", command->sampler,
+                 "independent or sobol; with sobol the error estimate is an upper one")
+        ->capture_default_str();
     c.add_option("--threads", command->threads, "Number of threads; 0: all")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));

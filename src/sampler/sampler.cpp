@@ -60,7 +60,7 @@ Vec2 Sampler::next_2d_structured() {
     }
     // Each pair of dimensions is the same two-dimensional sequence over the passes, with an order
     // and a scrambling of its own.
-    const uint64_t seed = bits(), scramble = mix64(seed);
+    const uint64_t seed = bits(path_key_), scramble = mix64(seed);
     const uint32_t index = reverse_bits(scramble_reversed(reverse_bits(pass_), uint32_t(seed)));
     const uint32_t x = scramble_reversed(index, uint32_t(scramble));
     const uint32_t y = scramble_reversed(second_reversed(index), uint32_t(scramble >> 32));

@@ -33,6 +33,8 @@ public:
 
 class Sampler {
 public:
+    static constexpr uint32_t kStructuredVertices = 4;
+
     Sampler(SamplerKind kind, uint64_t seed)
         : seed_(mix64(seed + 0x5851f42d4c957f2dull)), kind_(kind) {}
     explicit Sampler(PrimarySource& source) : source_(&source), kind_(SamplerKind::PrimarySample) {}
@@ -40,50 +42,49 @@ public:
     /// Begins the sample `path` of pass `pass`.
     void start(uint32_t pass, uint64_t path) {
         pass_ = pass;
-        key_ = hash_combine(seed_, path);
-        if (kind_ == SamplerKind::Independent) key_ = hash_combine(key_, pass);
+        path_key_ = hash_combine(seed_, path);
+        key_ = hash_combine(path_key_, pass);
     }
     /// Moves to the block of numbers of one vertex, at its first slot.
     void seek(Stream stream, uint32_t vertex) {
         stream_ = stream;
         vertex_ = vertex;
         slot_ = 0;
+        is_structured_ = kind_ != SamplerKind::Independent &&
+                         (kind_ == SamplerKind::PrimarySample || vertex < kStructuredVertices);
     }
 
     float next_1d() {
-        if (kind_ == SamplerKind::Independent) [[likely]]
-            return to_unit_float(uint32_t(bits() >> 32));
-        return next_1d_structured();
+        return is_structured_ ? next_1d_structured() : to_unit_float(uint32_t(bits(key_) >> 32));
     }
     Vec2 next_2d() {
-        if (kind_ == SamplerKind::Independent) [[likely]] {
-            const uint64_t b = bits();
-            return {to_unit_float(uint32_t(b >> 32)), to_unit_float(uint32_t(b))};
-        }
-        return next_2d_structured();
+        if (is_structured_) return next_2d_structured();
+        const uint64_t b = bits(key_);
+        return {to_unit_float(uint32_t(b >> 32)), to_unit_float(uint32_t(b))};
     }
     /// As next_1d(), for decisions that gain nothing from structured points: pseudo-random unless a Markov chain drives.
     float next_1d_unstructured() {
-        if (kind_ == SamplerKind::Sobol)
-            return to_unit_float(uint32_t(hash_combine(bits(), pass_) >> 32));
-        return next_1d();
+        if (kind_ == SamplerKind::PrimarySample) return next_1d_structured();
+        return to_unit_float(uint32_t(bits(key_) >> 32));
     }
     SamplerKind kind() const { return kind_; }
 
 private:
     /// 64 bits of the present address; moves on by one slot.
-    uint64_t bits() {
+    uint64_t bits(uint64_t key) {
         const uint64_t address = uint64_t(stream_) << 56 ^ uint64_t(vertex_) << 32 ^ slot_++;
-        return mix64(key_ + 0x9e3779b97f4a7c15ull * (address + 1));
+        return mix64(key + 0x9e3779b97f4a7c15ull * (address + 1));
     }
     float next_1d_structured();
     Vec2 next_2d_structured();
 
-    uint64_t seed_ = 0, key_ = 0;
+    uint64_t seed_ = 0;
+    uint64_t path_key_ = 0, key_ = 0;  ///< Of the path; of the path in this pass.
     PrimarySource* source_ = nullptr;
     uint32_t pass_ = 0, vertex_ = 0, slot_ = 0;
     Stream stream_ = Stream::Eye;
     SamplerKind kind_;
+    bool is_structured_ = false;
 };
 
 }  // namespace etendue

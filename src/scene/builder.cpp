@@ -371,10 +371,8 @@ private:
         }
         apply_overrides(film, p);
         for (const auto& c : p.children("sampler"))
-            if (const SamplerEntry* s = find(c.object, sampler_registry())) {
-                scene_.defaults_.sampler = s->kind;
+            if (find(c.object, sampler_registry()))
                 scene_.defaults_.spp = int(params(c.object).integer("sample_count", 4, 1, 1 << 30));
-            }
         if (!p.children("medium").empty())
             problem(p.children("medium")[0].where, "a medium around the sensor is not supported");
         scene_.film_ = film;

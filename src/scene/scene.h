@@ -44,7 +44,6 @@ struct RenderDefaults {
     std::string integrator;  ///< Empty where the file names none.
     std::vector<std::pair<std::string, std::string>>
         integrator_params;  ///< Those this project knows.
-    std::string sampler = "independent";
     int spp = 0;
 };
 

@@ -68,14 +68,10 @@ const std::vector<SamplerEntry>& sampler_registry() {
             {"dimension", ParamKind::Int, "", "Accepted; there is no limit."},
             {"scramble", ParamKind::Int, "", "Accepted; points are always scrambled."},
             {"jitter", ParamKind::Bool, "", "Accepted; points are always jittered."}};
-        all.push_back({{"sampler", "independent", "Counter-based pseudo-random numbers.", params},
-                       "independent"});
-        all.push_back(
-            {{"sampler", "sobol", "Owen-scrambled Sobol' points over the passes.", params},
-             "sobol"});
-        for (const char* name :
-             {"ldsampler", "stratified", "multijitter", "orthogonal", "halton", "hammersley"})
-            all.push_back({{"sampler", name, "Taken as sobol.", params}, "sobol"});
+        for (const char* name : {"independent", "sobol", "ldsampler", "stratified", "multijitter",
+                                 "orthogonal", "halton", "hammersley"})
+            all.push_back(
+                {{"sampler", name, "Taken for its sample count; see --sampler.", params}});
         return all;
     }();
     return entries;

@@ -14,10 +14,10 @@ const std::vector<FilmEntry>& film_registry();
 /// What a film without a filter has.
 ReconstructionFilter default_filter();
 
-/// Sampler plug-ins of scene files and what they become here.
+/// Sampler plug-ins that scene files may name. Only their sample count is taken: which random numbers to use is the
+/// command line's choice.
 struct SamplerEntry {
     PluginInfo info;
-    const char* kind;  ///< "independent" or "sobol"
 };
 const std::vector<SamplerEntry>& sampler_registry();
 

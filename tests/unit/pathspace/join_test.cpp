@@ -20,26 +20,41 @@ struct Case {
 
 std::vector<Case> cases() {
     using namespace test;
-    const std::string spheres = sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) + sphere("0.4,-0.65,0.3", "0.3", kRoughGlass);
+    const std::string spheres =
+        sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) + sphere("0.4,-0.65,0.3", "0.3", kRoughGlass);
     return {
         {"mixed", mixed_room(front_camera(kPixels))},
         {"thinlens", mixed_room(lens_camera(kPixels))},
         {"orthographic", mixed_room(sensor("0,0,3.4", "0,0,0", kPixels, "", "", "orthographic"))},
-        {"point", front_camera(kPixels) + room() + spheres + "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0\"/></emitter>"},
+        {"point",
+         front_camera(kPixels) + room() + spheres +
+             "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0\"/></emitter>"},
         {"spot", front_camera(kPixels) + room() + spheres +
-                     "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"60\"/><transform name=\"to_world\"><lookat origin=\"0,0.9,0\" target=\"0,0,0.01\" up=\"1,0,0\"/></transform></emitter>"},
+                     "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"60\"/><transform "
+                     "name=\"to_world\"><lookat origin=\"0,0.9,0\" target=\"0,0,0.01\" "
+                     "up=\"1,0,0\"/></transform></emitter>"},
         {"constant", front_camera(kPixels) + room() + spheres + "<emitter type=\"constant\"/>"},
-        {"directional", front_camera(kPixels) + room() + spheres + "<emitter type=\"directional\"><vector name=\"direction\" value=\"0.2,-0.4,-1\"/></emitter>"},
-        {"several", mixed_room(front_camera(kPixels)) + "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>" +
-                        "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>"},
+        {"directional", front_camera(kPixels) + room() + spheres +
+                            "<emitter type=\"directional\"><vector name=\"direction\" "
+                            "value=\"0.2,-0.4,-1\"/></emitter>"},
+        {"several",
+         mixed_room(front_camera(kPixels)) +
+             "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>" +
+             "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>"},
     };
 }
 
 class Joins : public testing::TestWithParam<Case> {
 protected:
-    Joins() : scene(test::build(GetParam().xml)), film(scene.film(), scene.filter()), sampler(SamplerKind::Independent, 7) {
+    Joins()
+        : scene(test::build(GetParam().xml)), film(scene.film(), scene.filter()),
+          sampler(SamplerKind::Independent, 7) {
         const float N = kPixels * kPixels;
-        counts = {.hit = 1, .next_event = 1, .connect = 1, .splat = N, .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
+        counts = {.hit = 1,
+                  .next_event = 1,
+                  .connect = 1,
+                  .splat = N,
+                  .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
     }
 
     /// Both sub-paths of sample `index`, without roulette.
@@ -47,9 +62,13 @@ protected:
         sampler.start(index, index % (kPixels * kPixels));
         const WalkOptions walk{6, 1000};
         start_light_path(scene, sampler, y, stats);
-        while (y.size() >= 2 && extend<TransportMode::Importance>(scene, sampler, walk, counts, y, stats)) {}
+        while (y.size() >= 2 &&
+               extend<TransportMode::Importance>(scene, sampler, walk, counts, y, stats)) {
+        }
         start_eye_path(scene, film, index % (kPixels * kPixels), sampler, z, stats);
-        while (z.size() >= 2 && extend<TransportMode::Radiance>(scene, sampler, walk, counts, z, stats)) {}
+        while (z.size() >= 2 &&
+               extend<TransportMode::Radiance>(scene, sampler, walk, counts, z, stats)) {
+        }
     }
 
     /// Compares a join with the path's own definition. End points of the join are connectible by any other event too.
@@ -60,7 +79,8 @@ protected:
             const bool is_end = i == join.technique.s - 1 || i == join.technique.s;
             delta[size_t(i)] = !is_end && x[size_t(i)]->is_delta;
         }
-        for (bool d : delta) if (d) return;  // densities of delta events are checked by the weights' agreement below
+        for (bool d : delta)
+            if (d) return;  // densities of delta events are checked by the weights' agreement below
         const PathValue value = evaluate_path(scene, x, delta);
         const double p = value.pdfs.density(join.technique);
         ASSERT_GT(p, 0);
@@ -123,8 +143,10 @@ TEST_P(Joins, EqualTheDefinition) {
                 x0.ng = j->ng_b;
                 x0.is_infinite = j->to_infinity;
                 for (const auto& e : scene.emitters())
-                    if (e->is_infinite() == x0.is_infinite && e->is_area() == (length2(x0.ng) > 0)) x0.emitter = e.get();
-                if (!x0.emitter->is_area()) x0.ng = x0.is_infinite ? -x0.p : normalize(z[t - 1].p - x0.p);
+                    if (e->is_infinite() == x0.is_infinite && e->is_area() == (length2(x0.ng) > 0))
+                        x0.emitter = e.get();
+                if (!x0.emitter->is_area())
+                    x0.ng = x0.is_infinite ? -x0.p : normalize(z[t - 1].p - x0.p);
                 x0.has_cosine = x0.emitter->is_area();
                 const auto x = path_vertices(y, 1, z, t, &x0);
                 const PathValue v = evaluate_path(scene, x, std::vector<bool>(x.size(), false));
@@ -136,17 +158,20 @@ TEST_P(Joins, EqualTheDefinition) {
                 Vertex lens;
                 lens.kind = Vertex::Kind::Sensor;
                 lens.is_infinite = scene.sensor().is_orthographic();
-                const auto again = scene.sensor().sample_connection(y[s - 1].p, y[s - 1].is_infinite, {0.5f, 0.5f});
+                const auto again = scene.sensor().sample_connection(
+                    y[s - 1].p, y[s - 1].is_infinite, {0.5f, 0.5f});
                 lens.ng = again->ng;
                 lens.p = lens.is_infinite ? -again->ng : j->a;
                 lens.pdf_fwd = again->pdf_pos;
-                check(*j, path_vertices(y, s, z, 1, nullptr, &lens), density_of(y, s) * lens.pdf_fwd);
+                check(*j, path_vertices(y, s, z, 1, nullptr, &lens),
+                      density_of(y, s) * lens.pdf_fwd);
             }
     }
     EXPECT_GT(checked, 500);
     EXPECT_GE(tallies.size(), 3u);
     for (const auto& [strategy, tally] : tallies)
-        EXPECT_LT(tally.deviating, 0.02 * tally.compared) << "strategy " << int(strategy) << ", " << tally.compared << " comparisons";
+        EXPECT_LT(tally.deviating, 0.02 * tally.compared)
+            << "strategy " << int(strategy) << ", " << tally.compared << " comparisons";
 }
 
 /// With delta events the stored discrete probabilities enter; then the weights of all techniques that can make a path,
@@ -183,7 +208,8 @@ TEST_P(Joins, StoredSumsEqualTheExplicitSum) {
     EXPECT_LT(tallies[Strategy::Connect].deviating, 0.001 * compared + 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Joins, testing::ValuesIn(cases()), [](const auto& p) { return std::string(p.param.name); });
+INSTANTIATE_TEST_SUITE_P(Scenes, Joins, testing::ValuesIn(cases()),
+                         [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace
 }  // namespace etendue

@@ -182,7 +182,7 @@ bool is_net(const std::vector<Vec2>& points, int m) {
 TEST(Sobol, PowersOfTwoOfPassesAreNets) {
     const Address addresses[] = {{},
                                  {.path = 12345, .vertex = 3, .slot = 2, .seed = 99},
-                                 {.path = 1, .stream = Stream::Connection, .vertex = 8}};
+                                 {.path = 1, .stream = Stream::Connection, .vertex = 2}};
     for (const Address& a : addresses)
         for (int m = 0; m <= 10; ++m) {
             const uint32_t n = 1u << m;
