@@ -52,6 +52,8 @@ public:
     float roughness() const;
     Rgb albedo_estimate() const;
     Vec3 shading_normal() const { return first_.frame.n; }
+    /// First of the linked components.
+    const BsdfComponent& front() const { return first_; }
 
 private:
     friend class ComponentList;

@@ -41,7 +41,8 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
         double inner =
             sqr(split_count<Side::Eye>(z, last - 1, z[last - 1].is_delta, counts)) + v.weight_sum;
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
-        if (last == 1) inner += sqr(double(counts.splat));
+        // Two ends at infinity cannot be connected.
+        if (last == 1 && !(v.is_infinite && z[0].is_infinite)) inner += sqr(double(counts.splat));
         others += sqr(p_L) * inner;
     }
     return Join{.technique = connection_technique(0, t),
@@ -178,13 +179,14 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
                                   const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
     const Flight& flight = y.flight;
-    if (!(counts.hit_lens > 0) || !(flight.pdf_sa > 0) || a.is_infinite) return {};
-    const auto lens = scene.sensor().hit_lens(a.p, flight.d, flight.length);
+    if (!(counts.hit_lens > 0) || !(flight.pdf_sa > 0)) return {};
+    const Vec3 origin = a.is_infinite ? flight.o : a.p;
+    const auto lens = scene.sensor().hit_lens(origin, flight.d, flight.length);
     if (!lens) return {};
-    const float dist2 = length2(lens->p - a.p);
+    const float dist2 = a.is_infinite ? 1.0f : length2(lens->p - origin);
     const float cos_lens = abs_dot(lens->ng, flight.d);
     const Rgb C = flight.beta * (lens->We_cos / cos_lens) *
-                  scene.attenuation(flight.medium, std::sqrt(dist2));
+                  scene.attenuation(flight.medium, length(lens->p - origin));
 
     const double p_fwd = a.is_delta ? flight.pdf_sa : flight.pdf_sa * cos_lens / dist2;
     const double p_lens = lens->pdf_pos / p_fwd;

@@ -22,6 +22,7 @@ double PathPdfs::density(const Technique& q) const {
     if (q.s > 0 && is_delta[q.s - 1] && q.t > 0) return 0;
     if (q.s < n && is_delta[q.s] && q.s > 0) return 0;
     if (q.strategy == Strategy::Hit && !can_hit_emitter) return 0;
+    if (q.s == 1 && q.t == 1 && !can_connect_ends) return 0;
     double p = 1;
     for (int i = 0; i < q.s; ++i)
         p *= q.strategy == Strategy::NextEvent && i == 0 ? next_event : light[i];
@@ -66,6 +67,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
                                ? emitter.eval_infinite(x[0]->p)
                                : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->prim, w0);
     p.can_hit_emitter = !emitter.is_delta();
+    p.can_connect_ends = !(x[0]->is_infinite && x[k]->is_infinite);
     p.light[0] = p.next_event = emitter.selection_pmf;
     if (p.can_hit_emitter) {
         p.light[0] *= hit.pdf_y0;

@@ -16,6 +16,7 @@ struct PathPdfs {
     std::vector<bool> is_delta;  ///< Events.
     double next_event = 0;       ///< p_NE(x_0) as chosen for x_1.
     bool can_hit_emitter = true;
+    bool can_connect_ends = true;  ///< Not both are at infinity.
 
     int vertices() const { return int(light.size()); }
     /// Density of the path as the technique makes it; 0 where it cannot.

@@ -32,7 +32,7 @@ bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const R
     ++stats.walk_rays;
     SurfaceHit hit;
     const float u = scene.has_masks() ? sampler.next_1d() : 0.0f;
-    path.flight = {ray.d, kInf, beta, pdf_sa, medium};
+    path.flight = {ray.o, ray.d, kInf, beta, pdf_sa, medium};
     if (!scene.intersect(ray, u, hit)) return false;
     path.flight.length = hit.t;
     ++stats.vertices;

@@ -50,7 +50,7 @@ struct Vertex {
 
 /// The last ray of a walk, whether or not it met a surface: a finite lens may lie on it.
 struct Flight {
-    Vec3 d;
+    Vec3 o, d;
     float length = kInf;  ///< Distance to what it met.
     Rgb beta;  ///< Throughput along it: that of the vertex it left, times scattering over density.
     float pdf_sa =

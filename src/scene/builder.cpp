@@ -321,12 +321,13 @@ private:
     void add_emitter(int index) { make_emitters(index); }
 
     void finish_emitters() {
-        const float radius = std::max(scene_.bounds_.radius(), 1e-6f);
+        Bounds3 bounds = scene_.bounds_;
+        bounds.extend(scene_.sensor_->lens_bounds());
+        const float radius = std::max(bounds.radius(), 1e-6f);
         std::vector<double> powers;
         for (auto& e : scene_.emitters_) {
             // A margin, so that the bounding disc lies outside everything.
-            e->set_scene_bounds(scene_.bounds_.is_empty() ? Vec3{} : scene_.bounds_.center(),
-                                radius * 1.001f);
+            e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);
             powers.push_back(e->power());
             if (e->is_infinite() && !e->is_delta()) scene_.infinite_.push_back(e.get());
         }

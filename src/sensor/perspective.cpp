@@ -65,6 +65,15 @@ public:
     }
 
     bool has_finite_lens() const override { return camera_.lens_radius > 0; }
+    Bounds3 lens_bounds() const override {
+        Bounds3 b;
+        if (has_finite_lens())
+            for (const float side : {-1.0f, 1.0f}) {
+                b.extend(origin_ + (left_ + up_) * (side * camera_.lens_radius));
+                b.extend(origin_ + (left_ - up_) * (side * camera_.lens_radius));
+            }
+        return b;
+    }
     float pdf_direction(Vec3, Vec3 d) const override { return pdf_of_cosine(dot(forward_, d)); }
 
 private:

@@ -8,6 +8,7 @@
 #include "color/rgb.h"
 #include "description/params.h"
 #include "film/film.h"
+#include "math/bounds.h"
 #include "math/transform.h"
 #include "math/vec.h"
 
@@ -50,6 +51,8 @@ public:
     virtual bool is_orthographic() const { return false; }
     /// True where light paths can hit the lens.
     virtual bool has_finite_lens() const { return false; }
+    /// Of a finite lens, empty for others: light paths from infinity must be able to reach it.
+    virtual Bounds3 lens_bounds() const { return {}; }
     /// Direction and density of a film point, as sample_ray() would give it for `d` from `p`.
     virtual float pdf_direction(Vec3 p, Vec3 d) const = 0;
 };

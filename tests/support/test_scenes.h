@@ -9,55 +9,72 @@
 namespace etendue::test {
 
 /// Sensor at `origin` looking at `target`, box filter, `size` pixels square.
-inline std::string sensor(const std::string& origin, const std::string& target, int size, const std::string& fov = "45",
-                          const std::string& extra = "", const std::string& type = "perspective") {
+inline std::string sensor(const std::string& origin, const std::string& target, int size,
+                          const std::string& fov = "45", const std::string& extra = "",
+                          const std::string& type = "perspective") {
     const std::string s = std::to_string(size);
-    return "<sensor type=\"" + type + "\">" + (type == "orthographic" ? "" : "<float name=\"fov\" value=\"" + fov + "\"/>") +
-           extra + "<transform name=\"to_world\">" + (type == "orthographic" ? "<scale value=\"0.8\"/>" : "") + "<lookat origin=\"" + origin + "\" target=\"" +
-           target + "\" up=\"0,1,0\"/></transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"" + s +
-           "\"/><integer name=\"height\" value=\"" + s + "\"/><rfilter type=\"box\"/></film></sensor>";
+    return "<sensor type=\"" + type + "\">" +
+           (type == "orthographic" ? "" : "<float name=\"fov\" value=\"" + fov + "\"/>") + extra +
+           "<transform name=\"to_world\">" +
+           (type == "orthographic" ? "<scale value=\"0.8\"/>" : "") + "<lookat origin=\"" + origin +
+           "\" target=\"" + target +
+           "\" up=\"0,1,0\"/></transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"" +
+           s + "\"/><integer name=\"height\" value=\"" + s +
+           "\"/><rfilter type=\"box\"/></film></sensor>";
 }
 
 inline std::string diffuse(const std::string& rgb) {
-    return "<bsdf type=\"twosided\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"" + rgb + "\"/></bsdf></bsdf>";
+    return "<bsdf type=\"twosided\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"" +
+           rgb + "\"/></bsdf></bsdf>";
 }
 
 inline std::string rectangle(const std::string& transform, const std::string& inside) {
-    return "<shape type=\"rectangle\"><transform name=\"to_world\">" + transform + "</transform>" + inside + "</shape>";
+    return "<shape type=\"rectangle\"><transform name=\"to_world\">" + transform + "</transform>" +
+           inside + "</shape>";
 }
 
 inline Scene build(const std::string& body) {
-    return build_scene(parse_mitsuba_xml("<scene version=\"3.0.0\">" + body + "</scene>", "test.xml"));
+    return build_scene(
+        parse_mitsuba_xml("<scene version=\"3.0.0\">" + body + "</scene>", "test.xml"));
 }
 
 /// The room [-1, 1]³, closed but for the front where the camera stands, its walls coloured.
 inline std::string room() {
-    return rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>", diffuse("0.7,0.7,0.7")) +
+    return rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>",
+                     diffuse("0.7,0.7,0.7")) +
            rectangle("<rotate x=\"1\" angle=\"90\"/><translate y=\"1\"/>", diffuse("0.7,0.7,0.7")) +
            rectangle("<translate z=\"-1\"/>", diffuse("0.7,0.7,0.7")) +
-           rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"-1\"/>", diffuse("0.6,0.1,0.1")) +
+           rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"-1\"/>",
+                     diffuse("0.6,0.1,0.1")) +
            rectangle("<rotate y=\"1\" angle=\"-90\"/><translate x=\"1\"/>", diffuse("0.1,0.5,0.1"));
 }
 
 inline std::string area_lamp(const std::string& radiance = "12,11,9") {
     return rectangle("<scale value=\"0.25\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.98\"/>",
-                     diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" value=\"" + radiance + "\"/></emitter>");
+                     diffuse("0.5,0.5,0.5") +
+                         "<emitter type=\"area\"><rgb name=\"radiance\" value=\"" + radiance +
+                         "\"/></emitter>");
 }
 
-inline std::string sphere(const std::string& center, const std::string& radius, const std::string& bsdf) {
-    return "<shape type=\"sphere\"><point name=\"center\" value=\"" + center + "\"/><float name=\"radius\" value=\"" + radius + "\"/>" + bsdf + "</shape>";
+inline std::string sphere(const std::string& center, const std::string& radius,
+                          const std::string& bsdf) {
+    return "<shape type=\"sphere\"><point name=\"center\" value=\"" + center +
+           "\"/><float name=\"radius\" value=\"" + radius + "\"/>" + bsdf + "</shape>";
 }
 
 inline const std::string kRoughMetal =
-    "<bsdf type=\"twosided\"><bsdf type=\"roughconductor\"><float name=\"alpha\" value=\"0.2\"/><string name=\"material\" value=\"Al\"/></bsdf></bsdf>";
-inline const std::string kRoughGlass = "<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\"0.3\"/></bsdf>";
+    "<bsdf type=\"twosided\"><bsdf type=\"roughconductor\"><float name=\"alpha\" "
+    "value=\"0.2\"/><string name=\"material\" value=\"Al\"/></bsdf></bsdf>";
+inline const std::string kRoughGlass =
+    "<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\"0.3\"/></bsdf>";
 inline const std::string kGlass = "<bsdf type=\"dielectric\"/>";
 inline const std::string kPlastic = "<bsdf type=\"plastic\"/>";
 
 /// Room with lamp, and spheres of rough metal, rough glass, plastic and glass.
 inline std::string mixed_room(const std::string& the_sensor) {
-    return the_sensor + room() + area_lamp() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) + sphere("0.4,-0.65,0.3", "0.3", kRoughGlass) +
-           sphere("0,-0.7,-0.5", "0.3", kPlastic) + sphere("0.1,0.2,-0.1", "0.2", kGlass);
+    return the_sensor + room() + area_lamp() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
+           sphere("0.4,-0.65,0.3", "0.3", kRoughGlass) + sphere("0,-0.7,-0.5", "0.3", kPlastic) +
+           sphere("0.1,0.2,-0.1", "0.2", kGlass);
 }
 
 inline std::string front_camera(int size) {
@@ -65,7 +82,9 @@ inline std::string front_camera(int size) {
 }
 inline std::string lens_camera(int size) {
     return sensor("0,0,3.4", "0,0,0", size, "45",
-                  "<float name=\"aperture_radius\" value=\"0.3\"/><float name=\"focus_distance\" value=\"3\"/>", "thinlens");
+                  "<float name=\"aperture_radius\" value=\"0.3\"/><float name=\"focus_distance\" "
+                  "value=\"3\"/>",
+                  "thinlens");
 }
 
 }  // namespace etendue::test

@@ -17,13 +17,17 @@ const RoughConductorLobe kMetal{Microfacet(Kind::Ggx, 0.3f, 0.15f), Rgb(0.2f), R
 const RoughDielectricLobe kGlass{Microfacet(Kind::Beckmann, 0.3f, 0.3f), 1.5f, Rgb(1), Rgb(0.9f)};
 const DielectricLobe kSmoothGlass{1.5f, Rgb(1), Rgb(1)};
 
-/// A Bsdf that owns its components.
+/// A Bsdf whose components it owns.
 struct Mixture {
     std::vector<BsdfComponent> components;
+    ComponentArena arena = {};
 
     Bsdf bsdf(Vec3 ng) {
-        for (size_t i = 1; i < components.size(); ++i) components[i - 1].next = &components[i];
-        return {ng, components.front()};
+        Bsdf made;
+        ComponentList list(ng, arena, made);
+        for (const BsdfComponent& c : components)
+            std::visit([&](const auto& lobe) { list.add(c.frame, lobe, c.weight); }, c.lobe);
+        return made;
     }
 };
 

@@ -18,9 +18,7 @@ L only_lobe(const char* type, const Values& values = {}) {
     TestMaterials materials;
     const Material& material = materials.make(type, values);
     ComponentArena arena;
-    ComponentList list(arena);
-    material.append(plane_point({0, 0, 1}), Frame{}, 1, list);
-    return std::get<L>(list.first().lobe);
+    return std::get<L>(material.bsdf(plane_point({0, 0, 1}), arena).front().lobe);
 }
 
 /// Message of the SceneError that making the material raises.

@@ -18,10 +18,7 @@ const Rgb kWood(0.7f, 0.4f, 0.2f);
 template <class L>
 L lobe_of(const Material& material) {
     ComponentArena arena;
-    ComponentList list(arena);
-    const SurfacePoint point = plane_point({0, 0, 1});
-    material.append(point, Frame{}, 1, list);
-    return std::get<L>(list.first().lobe);
+    return std::get<L>(material.bsdf(plane_point({0, 0, 1}), arena).front().lobe);
 }
 
 class PlasticTest : public ::testing::Test {

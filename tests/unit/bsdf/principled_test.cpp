@@ -218,9 +218,7 @@ TEST(Principled, MaterialReadsItsParameters) {
 
     const auto lobe = [&](const Material& material) {
         ComponentArena arena;
-        ComponentList list(arena);
-        material.append(plane_point({0, 0, 1}), Frame{}, 1, list);
-        return std::get<PrincipledLobe>(list.first().lobe);
+        return std::get<PrincipledLobe>(material.bsdf(plane_point({0, 0, 1}), arena).front().lobe);
     };
     EXPECT_NEAR(lobe(m.make("principled")).eta, 1.5f, 1e-6f);  // F0 = 0.04
     EXPECT_EQ(lobe(m.make("principled", {{"eta", 1.8}})).eta, 1.8f);

@@ -1,0 +1,125 @@
+#pragma once
+// What all benchmarks share: options, scenes, a timed rendering, two sides measured in turn, and
+// the result lines.
+//
+// A benchmark prints one JSON object a line and case:
+//     {"bench": "scaling", "case": "bdpt yard-ring", "figures": {"scaling": {"unit": …, "better": "higher" | "lower",
+//      "aim": …, "median": …, "min": …, "max": …, "runs": […]}}, "notes": {…}}
+// or {"bench": …, "case": …, "skipped": reason}. bench/compare reads these lines.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "image/image.h"
+#include "render/renderer.h"
+#include "scene/scene.h"
+
+namespace etendue::bench {
+
+struct Options {
+    int repeats = 5;     ///< Runs of each side.
+    double seconds = 1;  ///< Least length of one run.
+    bool quick = false;  ///< Short runs, to see that all works; the figures mean nothing.
+    std::string only;    ///< Cases whose name contains this text; all where empty.
+
+    /// `--repeats N --seconds S --quick --only TEXT`; ends the program where it knows better than
+    /// to go on.
+    static Options parse(int argc, char** argv);
+};
+
+/// One measured quantity: its value in every run.
+struct Figure {
+    std::string name;
+    std::string unit;
+    bool higher_is_better;
+    std::vector<double> runs;
+    std::optional<double> aim = {};
+};
+double median(std::vector<double> values);
+
+/// The result lines of one program.
+class Report {
+public:
+    Report(std::string bench, const Options& options)
+        : bench_(std::move(bench)), only_(options.only) {}
+
+    /// Whether this case was asked for.
+    bool wants(const std::string& name) const { return name.find(only_) != std::string::npos; }
+    void add(const std::string& name, const std::vector<Figure>& figures,
+             const nlohmann::ordered_json& notes = {}) const;
+    void skip(const std::string& name, const std::string& reason) const;
+
+private:
+    void print(const nlohmann::ordered_json& line) const;
+    std::string bench_, only_;
+};
+
+/// Calls `a` and `b` in turn, A B A B …, after one unmeasured call of each; what they return, run
+/// by run.
+template <class A, class B>
+auto alternate(int repeats, const A& a, const B& b) {
+    a(), b();
+    std::pair<std::vector<decltype(a())>, std::vector<decltype(b())>> runs;
+    for (int i = 0; i < repeats; ++i) {
+        runs.first.push_back(a());
+        runs.second.push_back(b());
+    }
+    return runs;
+}
+
+/// Run by run f(a_i, b_i).
+template <class A, class B, class F>
+std::vector<double> each(const std::vector<A>& a, const std::vector<B>& b, const F& f) {
+    std::vector<double> values;
+    for (size_t i = 0; i < a.size(); ++i) values.push_back(f(a[i], b[i]));
+    return values;
+}
+template <class A, class F>
+std::vector<double> each(const std::vector<A>& a, const F& f) {
+    return each(a, a, [&](const A& x, const A&) { return f(x); });
+}
+
+/// A scene file that may be missing on this machine.
+struct SceneFile {
+    std::string name;
+    std::filesystem::path path;
+
+    std::filesystem::path sibling(const char* file) const { return path.parent_path() / file; }
+};
+/// `name`/scene.xml in $ETENDUE_SCENES, or in shared/scenes beside the project.
+SceneFile shared_scene(const std::string& folder, const std::string& name);
+/// scenes/`name`.xml of the project.
+SceneFile own_scene(const std::string& name);
+/// The scene, or a line that says the file is missing. A file that cannot be read is an error.
+std::optional<Scene> load_or_skip(const Report& report, const SceneFile& file,
+                                  std::optional<std::pair<int, int>> resolution = {});
+
+/// The integrator with the scene file's own parameters, such as the longest path.
+IntegratorSpec integrator_for(const Scene& scene, const std::string& name);
+
+struct Rendering {
+    double seconds = 0;
+    double samples = 0;  ///< Passes times pixels.
+    RenderStats stats;
+    std::vector<Rgb> image;
+
+    double samples_per_second() const { return samples / seconds; }
+    double rays_per_second() const { return double(stats.rays()) / seconds; }
+};
+/// What ends a rendering: passes, or seconds.
+struct Length {
+    std::optional<uint64_t> passes;
+    std::optional<double> seconds;
+};
+Rendering render(const Scene& scene, const IntegratorSpec& integrator, int threads,
+                 const Length& length, uint64_t seed = 0);
+/// Passes that take about `seconds`, at least one.
+uint64_t passes_for(const Scene& scene, const IntegratorSpec& integrator, int threads,
+                    double seconds);
+
+}  // namespace etendue::bench

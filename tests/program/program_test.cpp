@@ -1,0 +1,307 @@
+// The program from its command line: what it refuses and how it says so, what it leaves alone, what it writes.
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "image/image_io.h"
+#include "run_program.h"
+
+namespace etendue::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kBroken = fs::path(ETENDUE_SOURCE_DIR) / "tests/scenes/broken";
+
+/// A small scene with a lamp, of `more` and film parameters.
+std::string scene_text(const std::string& more = "") {
+    return "<scene version=\"3.0.0\"><default name=\"size\" value=\"16\"/><integrator "
+           "type=\"path\"/><sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/>"
+           "<film type=\"hdrfilm\"><integer name=\"width\" value=\"$size\"/><integer "
+           "name=\"height\" value=\"$size\"/></film></sensor>"
+           "<shape type=\"sphere\"><point name=\"center\" value=\"0,0,4\"/></shape><emitter "
+           "type=\"constant\"/>" +
+           more + "</scene>";
+}
+
+class ProgramTest : public ::testing::Test {
+protected:
+    ProgramTest() { write(scene, scene_text()); }
+
+    static void write(const fs::path& file, const std::string& text) {
+        std::ofstream(file) << text;
+    }
+    ProgramResult run(const std::vector<std::string>& arguments) const {
+        return Program(ETENDUE_PROGRAM, arguments, folder.path()).wait();
+    }
+
+    /// The program must fail with one line that contains `message`, and leave the image of an earlier run as it is.
+    void expect_refusal(std::vector<std::string> arguments, const std::string& message) const {
+        SCOPED_TRACE(fmt::format("etendue {}", fmt::join(arguments, " ")));
+        write(image, "an earlier picture");
+        if (std::find(arguments.begin(), arguments.end(), "-o") == arguments.end())
+            arguments.insert(arguments.end(), {"-o", image.string()});
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.signal, 0);
+        EXPECT_TRUE(r.status == 1 || r.status == 2) << "status " << r.status;
+        EXPECT_NE(r.errors.find(message), std::string::npos)
+            << "it says: " << r.errors << "expected: " << message;
+        EXPECT_TRUE(r.errors.starts_with("etendue: ")) << r.errors;
+        EXPECT_EQ(r.errors.find("\netendue: "), std::string::npos)
+            << "more than one message: " << r.errors;
+        EXPECT_EQ(r.output, "");
+        EXPECT_EQ(read_text(image), "an earlier picture");
+    }
+
+    TemporaryFolder folder;
+    fs::path scene = folder.path() / "scene.xml", image = folder.path() / "image.exr";
+};
+
+/// What the file's `<!-- expect: ... -->` says; empty without one.
+std::string expected_message(const fs::path& file) {
+    const std::string text = read_text(file), mark = "<!-- expect: ";
+    const size_t begin = text.find(mark);
+    if (begin == std::string::npos) return "";
+    return text.substr(begin + mark.size(), text.find(" -->", begin) - begin - mark.size());
+}
+
+std::vector<fs::path> files_in(const fs::path& folder) {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(folder))
+        if (entry.is_regular_file()) files.push_back(entry.path());
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+/// Every `step`-th broken input.
+class BrokenInputs : public ProgramTest {
+protected:
+    void expect_refusals(size_t step) const {
+        const std::vector<fs::path> scenes = files_in(kBroken),
+                                    unbuildable = files_in(kBroken / "builder"),
+                                    meshes = files_in(kBroken / "meshes");
+        EXPECT_GE(scenes.size(), 40u);
+        EXPECT_GE(unbuildable.size(), 40u);
+        for (size_t i = 0; i < scenes.size(); i += step)
+            if (scenes[i].extension() == ".xml")
+                expect_refusal({"render", scenes[i].string(), "--spp", "1"},
+                               expected_message(scenes[i]));
+        for (size_t i = 0; i < unbuildable.size(); i += step) {
+            ASSERT_NE(expected_message(unbuildable[i]), "") << unbuildable[i];
+            expect_refusal({"render", unbuildable[i].string(), "--spp", "1"},
+                           expected_message(unbuildable[i]));
+        }
+        for (size_t i = 0; i < meshes.size(); i += step) {
+            const std::string type = meshes[i].extension().string().substr(1);
+            if (type != "obj" && type != "ply") continue;
+            write(scene,
+                  scene_text("<shape type=\"" + type + "\"><string name=\"filename\" value=\"" +
+                             meshes[i].string() + "\"/></shape>"));
+            expect_refusal({"render", scene.string(), "--spp", "1"}, meshes[i].filename().string());
+        }
+    }
+};
+class LongBrokenInputs : public BrokenInputs {};
+
+TEST_F(BrokenInputs, SomeAreRefused) {
+    expect_refusals(8);
+}
+TEST_F(LongBrokenInputs, AllAreRefused) {
+    expect_refusals(1);
+}
+
+TEST_F(ProgramTest, RefusesBadCommandLines) {
+    const std::string s = scene.string();
+    expect_refusal({"render", s, "-i", "bdtp"}, "did you mean \"bdpt\"?");
+    expect_refusal({"render", s, "-i", "bdpt:max_dept=3"}, "did you mean \"max_depth\"?");
+    expect_refusal({"render", s, "-i", "bdpt:max_depth=three"}, "\"three\"");
+    expect_refusal({"render", s, "-i", "bdpt:max_depth=0"}, "max_depth");
+    expect_refusal({"render", s, "-i", "bdpt:max_depth=3,max_depth=4"}, "twice");
+    expect_refusal({"render", s, "-i", "bdpt:rr_depth"}, "rr_depth");
+    expect_refusal({"render", s, "-D", "size"}, "size");
+    expect_refusal({"render", s, "-D", "sise=8"}, "sise");
+    expect_refusal({"render", s, "-D", "size=eight"}, "eight");
+    expect_refusal({"render", s, "--crop", "0,0,99,4"}, "crop");
+    expect_refusal({"render", s, "--crop", "0,0,4"}, "crop");
+    expect_refusal({"render", s, "--crop", "-1,0,4,4"}, "crop");
+    expect_refusal({"render", s, "--resolution", "0x8"}, "resolution");
+    expect_refusal({"render", s, "--resolution", "8"}, "resolution");
+    expect_refusal({"render", s, "--spp", "0"}, "spp");
+    expect_refusal({"render", s, "--spp", "many"}, "spp");
+    expect_refusal({"render", s, "--time", "-1"}, "time");
+    expect_refusal({"render", s, "--error", "0"}, "error");
+    expect_refusal({"render", s, "--threads", "-2"}, "threads");
+    expect_refusal({"render", s, "--sampler", "sobl"}, "sampler");
+    expect_refusal({"render", s, "--aov", "albdo"}, "albdo");
+    expect_refusal({"render", s, "--preview", "tef"}, "preview");
+    expect_refusal({"render", s, "--colour"}, "--colour");
+    expect_refusal({"render", (folder.path() / "no_such.xml").string()}, "no_such.xml");
+    expect_refusal({"render", folder.path().string()}, folder.path().string());
+    expect_refusal({"render"}, "SCENE");
+    expect_refusal({"paint", s}, "subcommand");
+    expect_refusal({}, "subcommand");
+}
+
+TEST_F(ProgramTest, RefusesOutputsThatCannotBeWritten) {
+    const std::string s = scene.string();
+    expect_refusal({"render", s, "--spp", "1", "-o", (folder.path() / "a.jpg").string()}, "jpg");
+    expect_refusal({"render", s, "--spp", "1", "-o", (folder.path() / "a").string()},
+                   "must end in");
+    expect_refusal({"render", s, "--spp", "1", "-o", (scene / "a.exr").string()}, "not a folder");
+    expect_refusal({"render", s, "--quiet", "--spp", "1", "-o", "/proc/a.exr"}, "/proc/a.exr");
+    fs::create_directory(folder.path() / "folder.exr");
+    expect_refusal(
+        {"render", s, "--quiet", "--spp", "1", "-o", (folder.path() / "folder.exr").string()},
+        "folder.exr");
+}
+
+TEST_F(ProgramTest, ReadsImagesOnlyIfTheyAre) {
+    const std::string s = scene.string(), none = (folder.path() / "none.exr").string();
+    for (const auto& arguments : {std::vector<std::string>{"diff", s, s},
+                                  {"diff", none, none},
+                                  {"tonemap", s, image.string()},
+                                  {"tonemap", none, image.string()}}) {
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.status, 1) << fmt::format("{}", fmt::join(arguments, " "));
+        EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
+    }
+}
+
+TEST_F(ProgramTest, WritesImageWithLayersAndMetadataAndStatistics) {
+    const fs::path stats = folder.path() / "stats.json";
+    const ProgramResult r =
+        run({"render", scene.string(), "-o", image.string(), "-i", "bdpt:max_depth=4", "--spp", "8",
+             "--seed", "7", "-D", "size=12", "--aov", "albedo,normal,depth,variance", "--stats",
+             stats.string(), "--quiet"});
+    ASSERT_EQ(r.status, 0) << r.errors;
+    EXPECT_EQ(r.output + r.errors, "");
+    const Image out = read_image(image.string());
+    EXPECT_EQ(out.width, 12);
+    EXPECT_EQ(out.height, 12);
+    const std::vector<std::string> layers = out.layers();
+    for (const char* layer : {"", "albedo", "normal", "depth", "variance"})
+        EXPECT_NE(std::find(layers.begin(), layers.end(), layer), layers.end())
+            << "layer \"" << layer << "\"";
+    // The sphere fills the middle: grey, turned to the camera, three units away.
+    const size_t middle = 12 * 6 + 6;
+    EXPECT_NEAR(rgb_pixels(out, "albedo")[middle].r, 0.5f, 0.01f);
+    EXPECT_NEAR(rgb_pixels(out, "depth")[middle].r, 3, 0.1f);
+    EXPECT_NEAR(rgb_pixels(out, "")[middle].r, 0.5f, 0.3f);
+    for (const char* key : {"scene", "integrator", "estimator", "version"})
+        EXPECT_TRUE(out.attributes.count(std::string("etendue.") + key)) << key;
+    for (const char* key : {"seed", "spp", "seconds"})
+        EXPECT_TRUE(out.attributes.count(std::string("etendue.") + key)) << key;
+
+    const nlohmann::json j = nlohmann::json::parse(read_text(stats));
+    EXPECT_EQ(j["spp"], 8);
+    EXPECT_EQ(j["seed"], 7);
+    EXPECT_EQ(j["width"], 12);
+    EXPECT_EQ(j["estimator"], "unbiased");
+    EXPECT_EQ(j["stopped_by"], "samples");
+    EXPECT_EQ(j["rejected_contributions"], 0);
+    EXPECT_EQ(j["eye_paths"], 8 * 12 * 12);
+    EXPECT_EQ(j["light_paths"], 8 * 12 * 12);
+}
+
+TEST_F(ProgramTest, WritesEveryFormat) {
+    for (const char* name : {"a.exr", "a.pfm", "a.hdr", "a.png", "new/folder/a.exr"}) {
+        const fs::path out = folder.path() / name;
+        const ProgramResult r = run({"render", scene.string(), "-o", out.string(), "--spp", "1",
+                                     "--resolution", "10x6", "--crop", "2,1,5,4"});
+        ASSERT_EQ(r.status, 0) << r.errors;
+        const Image written = read_image(out.string());
+        EXPECT_EQ(written.width, 5) << name;
+        EXPECT_EQ(written.height, 4) << name;
+    }
+}
+
+TEST_F(ProgramTest, WritesTechniqueImages) {
+    const fs::path techniques = folder.path() / "techniques";
+    const ProgramResult r =
+        run({"render", scene.string(), "-o", image.string(), "-i", "bdpt", "--spp", "4",
+             "--techniques", techniques.string(), "--techniques-max-depth", "3"});
+    ASSERT_EQ(r.status, 0) << r.errors;
+    // A pinhole has no t = 0.
+    for (int length = 2; length <= 3; ++length)
+        for (int s = 0; s <= length; ++s)
+            for (const char* kind : {"weighted", "unweighted"}) {
+                if (s == 3 || length == 3) continue;  // the sphere is convex: no third edge
+                const fs::path file = techniques / fmt::format("length{:02}_s{:02}_t{:02}_{}.exr",
+                                                               length, s, length + 1 - s, kind);
+                EXPECT_TRUE(fs::exists(file)) << file;
+                EXPECT_NO_THROW(read_image(file.string()));
+            }
+}
+
+TEST_F(ProgramTest, EndsWithAnImageWhenInterrupted) {
+    const fs::path stats = folder.path() / "stats.json";
+    const Program program(
+        ETENDUE_PROGRAM,
+        {"render", scene.string(), "-o", image.string(), "--time", "60", "--stats", stats.string()},
+        folder.path());
+    // The first line of progress says that a pass is made.
+    for (int i = 0; i < 1000 && program.errors().find("spp") == std::string::npos; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    program.interrupt();
+    const auto begin = std::chrono::steady_clock::now();
+    const ProgramResult r = program.wait();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+    EXPECT_EQ(r.status, 0) << r.errors;
+    EXPECT_EQ(read_image(image.string()).width, 16);
+    EXPECT_EQ(nlohmann::json::parse(read_text(stats))["stopped_by"], "interrupted");
+}
+
+TEST_F(ProgramTest, HoldsItsLimits) {
+    const fs::path stats = folder.path() / "stats.json";
+    const auto report = [&](const std::vector<std::string>& limit) {
+        std::vector<std::string> arguments{"render",       scene.string(), "-o",
+                                           image.string(), "--stats",      stats.string()};
+        arguments.insert(arguments.end(), limit.begin(), limit.end());
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.status, 0) << r.errors;
+        return nlohmann::json::parse(read_text(stats));
+    };
+    EXPECT_EQ(report({"--spp", "3"})["spp"], 3);
+    const nlohmann::json timed = report({"--time", "0.3"});
+    EXPECT_EQ(timed["stopped_by"], "time");
+    EXPECT_NEAR(timed["seconds"].get<double>(), 0.3, 0.2);
+    const nlohmann::json accurate = report({"--error", "0.1"});
+    EXPECT_EQ(accurate["stopped_by"], "error");
+    EXPECT_LE(accurate["relative_error"]["estimate"].get<double>(), 0.1);
+}
+
+TEST_F(ProgramTest, RendersTheSameBitsWithAnyNumberOfThreads) {
+    std::vector<std::vector<float>> pixels;
+    for (const char* threads : {"1", "2", "5"}) {
+        ASSERT_EQ(run({"render", scene.string(), "-o", image.string(), "-i", "bdpt", "--spp", "4",
+                       "--threads", threads})
+                      .status,
+                  0);
+        pixels.push_back(read_image(image.string()).data);
+    }
+    EXPECT_EQ(pixels[0], pixels[1]);
+    EXPECT_EQ(pixels[0], pixels[2]);
+}
+
+TEST_F(ProgramTest, TellsAboutItselfAndItsScenes) {
+    for (const auto& arguments : {std::vector<std::string>{"--help"},
+                                  {"--version"},
+                                  {"list"},
+                                  {"list", "bsdf"},
+                                  {"info", scene.string()},
+                                  {"render", "--help"}}) {
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.status, 0) << r.errors;
+        EXPECT_NE(r.output, "");
+        EXPECT_EQ(r.errors, "");
+    }
+    EXPECT_EQ(nlohmann::json::parse(run({"info", scene.string(), "--json"}).output)["quadrics"], 1);
+}
+
+}  // namespace
+}  // namespace etendue::test

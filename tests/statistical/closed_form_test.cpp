@@ -1,0 +1,322 @@
+// Scenes whose image is known in closed form, by every integrator that can render them.
+
+#include <functional>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "bsdf/fresnel.h"
+#include "render_tiles.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+constexpr int kSize = 8;
+constexpr float kGlassEta = 1.5f;
+const std::string kPlainGlass =
+    "<float name=\"int_ior\" value=\"1.5\"/><float name=\"ext_ior\" value=\"1\"/></bsdf>";
+
+std::string rgb(const char* name, Rgb v) {
+    return fmt::format("<rgb name=\"{}\" value=\"{},{},{}\"/>", name, v.r, v.g, v.b);
+}
+std::string lambert(Rgb reflectance) {
+    return "<bsdf type=\"diffuse\">" + rgb("reflectance", reflectance) + "</bsdf>";
+}
+/// Looks down on z = 0 from z = 2; a film of kSize² pixels shows [-half, half]² of it. x runs to the left.
+std::string camera_above(const std::string& type, float half) {
+    const std::string size = std::to_string(kSize);
+    const bool is_orthographic = type == "orthographic";
+    std::string s = "<sensor type=\"" + type + "\">";
+    if (!is_orthographic)
+        s += fmt::format("<float name=\"fov\" value=\"{}\"/>",
+                         2 * std::atan(double(half) / 2) * 180 / M_PI);
+    if (type == "thinlens")
+        s += "<float name=\"aperture_radius\" value=\"0.2\"/><float name=\"focus_distance\" "
+             "value=\"2\"/>";
+    s += "<transform name=\"to_world\">";
+    if (is_orthographic) s += fmt::format("<scale value=\"{}\"/>", half);
+    return s +
+           "<lookat origin=\"0,0,2\" target=\"0,0,0\" up=\"0,1,0\"/></transform><film "
+           "type=\"hdrfilm\"><integer name=\"width\" value=\"" +
+           size + "\"/><integer name=\"height\" value=\"" + size +
+           "\"/><rfilter type=\"box\"/></film></sensor>";
+}
+/// Point of z = 0 that the film point shows. Looking down -z with y up, x of the world grows to the right of the film.
+Vec3 on_plane(float half, float x, float y) {
+    return {half * (2 * x / kSize - 1), half * (1 - 2 * y / kSize), 0};
+}
+std::string floor_of(Rgb reflectance, float half = 4) {
+    return rectangle(fmt::format("<scale value=\"{}\"/>", half), lambert(reflectance));
+}
+
+void expect_image(const Scene& scene, const std::vector<std::string>& integrators, uint64_t passes,
+                  const std::function<Rgb(float, float)>& radiance, double resolution = 0.02) {
+    const Tiles exact = exact_tiles(scene.film(), 4, radiance);
+    for (const std::string& i : integrators)
+        expect_same_image(render_tiles(scene, i, {i.starts_with("light") ? 4 * passes : passes}),
+                          exact, resolution, i);
+}
+
+// ---- Furnaces: inside a closed surface of albedo ρ that emits L_e, L = L_e / (1 - ρ) everywhere.
+
+constexpr Rgb kAlbedo{0.7f, 0.5f, 0.2f}, kEmitted{1, 2, 3};
+
+const std::string kFurnaceWall = "<boolean name=\"flip_normals\" value=\"true\"/>" +
+                                 lambert(kAlbedo) + "<emitter type=\"area\">" +
+                                 rgb("radiance", kEmitted) + "</emitter>";
+
+/// Camera inside, off the centre.
+std::string furnace(const std::string& shape, const std::string& sensor_type = "perspective",
+                    const std::string& extra = "") {
+    return sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kSize, "70", extra, sensor_type) +
+           "<shape type=\"" + shape + "\">" + kFurnaceWall + "</shape>";
+}
+
+/// Σ_{i<depth} ρ^i L_e: paths of at most `depth` edges.
+Rgb furnace_radiance(int depth) {
+    Rgb sum, term = kEmitted;
+    for (int i = 0; i < depth; ++i, term *= kAlbedo) sum += term;
+    return sum;
+}
+
+struct FurnaceCase {
+    const char* name;
+    std::string xml;
+    bool light = true;  ///< Whether light paths see all of it.
+};
+
+class Furnace : public ::testing::TestWithParam<FurnaceCase> {
+protected:
+    Furnace() : scene(build(GetParam().xml)) {}
+    std::vector<std::string> integrators() const {
+        return GetParam().light ? std::vector<std::string>{"path", "light", "bdpt"}
+                                : std::vector<std::string>{"path", "bdpt"};
+    }
+    Scene scene;
+};
+
+TEST_P(Furnace, IsEmissionOverOneMinusAlbedo) {
+    expect_image(
+        scene, integrators(), 768, [](float, float) { return furnace_radiance(60); }, 0.03);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Closed, Furnace,
+    ::testing::Values(
+        FurnaceCase{"sphere", furnace("sphere")}, FurnaceCase{"cube", furnace("cube")},
+        FurnaceCase{"thinlens", furnace("sphere", "thinlens",
+                                        "<float name=\"aperture_radius\" value=\"0.2\"/><float "
+                                        "name=\"focus_distance\" value=\"0.7\"/>")},
+        // What neither absorbs nor emits cannot be seen in a furnace.
+        FurnaceCase{"glass", furnace("sphere") + sphere("-0.4,0,0.2", "0.3", kGlass), false},
+        FurnaceCase{
+            "mirror",
+            furnace("sphere") +
+                sphere(
+                    "-0.4,0,0.2", "0.3",
+                    "<bsdf type=\"conductor\"><string name=\"material\" value=\"none\"/></bsdf>"),
+            false},
+        FurnaceCase{"thin_glass",
+                    furnace("cube") +
+                        rectangle("<translate z=\"0.3\"/>", "<bsdf type=\"thindielectric\"/>"),
+                    false},
+        FurnaceCase{"white", furnace("sphere") + sphere("-0.4,0,0.2", "0.3", lambert(Rgb(1)))},
+        FurnaceCase{
+            "masked_white",
+            furnace("sphere") +
+                sphere("-0.4,0,0.2", "0.3",
+                       "<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.4\"/>" +
+                           ("<bsdf type=\"twosided\">" + lambert(Rgb(1)) + "</bsdf></bsdf>"))}),
+    [](const auto& p) { return std::string(p.param.name); });
+
+TEST(ClosedForm, FurnaceByPathLength) {
+    const Scene scene = build(furnace("sphere"));
+    for (const int depth : {1, 2, 3, 5})
+        for (const char* integrator : {"path", "light", "bdpt"}) {
+            const std::string spec = fmt::format("{}:max_depth={},rr_depth=2", integrator, depth);
+            expect_image(
+                scene, {spec}, 512, [&](float, float) { return furnace_radiance(depth); }, 0.03);
+        }
+}
+
+// ---- Emitters over a Lambertian floor.
+
+constexpr Rgb kFloor{0.8f, 0.5f, 0.3f};
+
+class OverFloor : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(OverFloor, PointLight) {
+    const Vec3 light{0.3f, -0.2f, 2.3f};
+    const Scene scene =
+        build(camera_above(GetParam(), 1) + floor_of(kFloor) +
+              "<emitter type=\"point\"><point name=\"position\" value=\"0.3,-0.2,2.3\"/><rgb "
+              "name=\"intensity\" value=\"3,2,1\"/></emitter>");
+    expect_image(
+        scene, {"path", "light", "bdpt"}, 2048,
+        [&](float x, float y) {
+            const Vec3 v = light - on_plane(1, x, y);
+            return kFloor * Rgb(3, 2, 1) * (v.z / std::pow(length(v), 3.0f) / kPi);
+        },
+        0.04);
+}
+
+TEST_P(OverFloor, DirectionalLight) {
+    const Scene scene =
+        build(camera_above(GetParam(), 1) + floor_of(kFloor) +
+              "<emitter type=\"directional\"><vector name=\"direction\" value=\"0.3,0.4,-1\"/><rgb "
+              "name=\"irradiance\" value=\"3,2,1\"/></emitter>");
+    const float cosine = 1 / std::sqrt(1.25f);
+    expect_image(scene, {"path", "light", "bdpt"}, 8192,
+                 [&](float, float) { return kFloor * Rgb(3, 2, 1) * (cosine / kPi); });
+}
+
+/// A disc of radius a at height h, parallel to the floor and facing it [Howell, Catalogue of radiation heat transfer
+/// configuration factors, B-12]. It hangs above the camera.
+TEST_P(OverFloor, DiscLamp) {
+    const double a = 0.8, h = 2.5;
+    const Scene scene =
+        build(camera_above(GetParam(), 1) + floor_of(kFloor) +
+              "<shape type=\"disk\"><transform name=\"to_world\"><scale value=\"0.8\"/><rotate "
+              "x=\"1\" angle=\"180\"/>"
+              "<translate x=\"0.4\" z=\"2.5\"/></transform>" +
+              lambert(Rgb(0)) +
+              "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter></shape>");
+    expect_image(
+        scene, {"path", "light", "bdpt"}, 2000,
+        [&](float x, float y) {
+            const double r2 = double(length2(on_plane(1, x, y) - Vec3{0.4f, 0, 0})),
+                         sum = r2 + h * h + a * a;
+            const double factor =
+                0.5 * (1 - (r2 + h * h - a * a) / std::sqrt(sum * sum - 4 * r2 * a * a));
+            return kFloor * Rgb(3, 2, 1) * float(factor);
+        },
+        0.03);
+}
+
+/// A sphere of radius r at distance d, wholly above the horizon: E = π L (r/d)² cos θ.
+TEST_P(OverFloor, SphereLamp) {
+    const Scene scene = build(
+        camera_above(GetParam(), 1) + floor_of(kFloor) +
+        sphere("0.5,0.3,3", "0.5",
+               lambert(Rgb(0)) +
+                   "<emitter type=\"area\"><rgb name=\"radiance\" value=\"30,20,10\"/></emitter>"));
+    expect_image(
+        scene, {"path", "light", "bdpt"}, 8192,
+        [&](float x, float y) {
+            const Vec3 v = Vec3{0.5f, 0.3f, 3} - on_plane(1, x, y);
+            return kFloor * Rgb(30, 20, 10) * (0.25f * v.z / std::pow(length(v), 3.0f));
+        },
+        0.03);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, OverFloor,
+                         ::testing::Values("perspective", "orthographic", "thinlens"),
+                         [](const auto& p) { return std::string(p.param); });
+
+// ---- Environments.
+
+TEST(ClosedForm, EnvironmentOnDiffuseSphere) {
+    const Scene scene =
+        build(sensor("0,0,5", "0,0,0", kSize, "8") + sphere("0,0,0", "1", lambert(kFloor)) +
+              "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter>");
+    expect_image(
+        scene, {"path", "light", "bdpt"}, 2048, [](float, float) { return kFloor * Rgb(3, 2, 1); },
+        0.07);
+}
+
+/// Nothing but the environment, from behind a small sphere: every technique that a sensor has not must not be weighed.
+TEST(ClosedForm, EnvironmentSeenDirectly) {
+    for (const char* type : {"perspective", "orthographic", "thinlens"}) {
+        const Scene scene =
+            build(camera_above(type, 0.5f) + sphere("0,0,4", "1", lambert(kFloor)) +
+                  "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter>");
+        expect_image(scene, {"path", "bdpt"}, 2000, [](float, float) { return Rgb(3, 2, 1); });
+    }
+}
+
+TEST(ClosedForm, EnvironmentOnMirror) {
+    const Scene scene =
+        build(sensor("0,0,5", "0,0,0", kSize, "8") +
+              sphere("0,0,0", "1",
+                     "<bsdf type=\"conductor\"><string name=\"material\" value=\"none\"/><rgb "
+                     "name=\"specular_reflectance\" value=\"0.9,0.5,0.2\"/></bsdf>") +
+              "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter>");
+    expect_image(scene, {"path", "bdpt"}, 64,
+                 [](float, float) { return Rgb(0.9f, 0.5f, 0.2f) * Rgb(3, 2, 1); });
+}
+
+// ---- Transmission.
+
+/// exp(-σ d) through matter without surfaces, (1-F)² e^{-σd} / (1 - F² e^{-2σd}) through a slab of glass.
+TEST(ClosedForm, AbsorbingSlab) {
+    const Vec3 sigma{0.2f, 1.0f, 3.0f};
+    const Rgb Tr{std::exp(-0.5f * sigma.x), std::exp(-0.5f * sigma.y), std::exp(-0.5f * sigma.z)};
+    for (const bool is_glass : {false, true}) {
+        const Scene scene =
+            build(camera_above("orthographic", 0.5f) +
+                  "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"10\" y=\"10\" "
+                  "z=\"0.25\"/></transform>" +
+                  "<bsdf type=\"dielectric\">" +
+                  (is_glass ? kPlainGlass
+                            : "<float name=\"int_ior\" value=\"1\"/><float name=\"ext_ior\" "
+                              "value=\"1\"/></bsdf>") +
+                  "<medium type=\"homogeneous\" name=\"interior\"><rgb name=\"sigma_t\" "
+                  "value=\"0.2,1,3\"/><float name=\"albedo\" value=\"0\"/></medium></shape>"
+                  "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter>");
+        // Glass also shows the environment by reflection: at the first surface, and, attenuated, at the second.
+        const float F = is_glass ? sqr((kGlassEta - 1) / (kGlassEta + 1)) : 0.0f;
+        Rgb L;
+        for (int c = 0; c < 3; ++c) {
+            const float t = Tr[c], pass = sqr(1 - F) / (1 - sqr(F * t));
+            L[c] = Rgb(3, 2, 1)[c] * (pass * t + F + pass * F * sqr(t));
+        }
+        expect_image(scene, {"path", "bdpt"}, 4096, [&](float, float) { return L; });
+    }
+}
+
+TEST(ClosedForm, MaskBeforeEmitter) {
+    const Scene scene = build(
+        camera_above("perspective", 0.5f) +
+        rectangle("<scale value=\"3\"/>",
+                  lambert(Rgb(0)) +
+                      "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter>") +
+        rectangle("<scale value=\"2\"/><translate z=\"1\"/>",
+                  "<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.3\"/>" +
+                      (lambert(Rgb(0)) + "</bsdf>")));
+    expect_image(
+        scene, {"path", "light", "bdpt"}, 2048, [](float, float) { return Rgb(3, 2, 1) * 0.7f; },
+        0.045);
+}
+
+/// Directional light through a glass plate onto the floor, seen from between them: only light paths find it. Paths of the
+/// fewest edges, so that nothing is reflected to and fro.
+TEST(ClosedForm, DirectionalLightThroughGlass) {
+    const std::string light =
+        "<emitter type=\"directional\"><vector name=\"direction\" value=\"0.6,0,-0.8\"/><rgb "
+        "name=\"irradiance\" value=\"3,2,1\"/></emitter>";
+    const float F = fresnel_dielectric(0.8f, kGlassEta).R;
+    const struct {
+        std::string plate;
+        const char* depth;
+        float transmittance;
+    } cases[] = {{"<shape type=\"rectangle\"><transform name=\"to_world\"><scale "
+                  "value=\"6\"/><translate z=\"3\"/></transform><bsdf type=\"thindielectric\">" +
+                      kPlainGlass + "</shape>",
+                  ":max_depth=3", 1 - 2 * F / (1 + F)},
+                 {"<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"6\" y=\"6\" "
+                  "z=\"0.25\"/><translate z=\"3\"/></transform><bsdf type=\"dielectric\">" +
+                      kPlainGlass + "</shape>",
+                  ":max_depth=4", sqr(1 - F)}};
+    for (const auto& c : cases) {
+        const Scene scene =
+            build(camera_above("perspective", 1) + floor_of(kFloor) + c.plate + light);
+        expect_image(
+            scene, {std::string("light") + c.depth, std::string("bdpt") + c.depth}, 3000,
+            [&](float, float) { return kFloor * Rgb(3, 2, 1) * (0.8f * c.transmittance / kPi); },
+            0.09);
+    }
+}
+
+}  // namespace
+}  // namespace etendue::test

@@ -1,0 +1,72 @@
+// The same seed gives the same bits, whatever the number of threads.
+
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include "render_tiles.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+/// Two tent pixels' reach, so that splats of many light paths meet in each pixel; several chunks of work.
+Scene scene_with_tent() {
+    std::string camera = lens_camera(40);
+    const std::string box = "<rfilter type=\"box\"/>";
+    camera.replace(camera.find(box), box.size(), "<rfilter type=\"tent\"/>");
+    return build(
+        mixed_room(camera) +
+        "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>");
+}
+
+struct Rendering {
+    std::vector<Rgb> image, variance;
+    uint64_t rays;
+};
+
+Rendering render(const Scene& scene, const std::string& integrator, SamplerKind sampler,
+                 uint64_t seed, int threads) {
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(integrator);
+    settings.sampler = sampler;
+    settings.seed = seed;
+    settings.threads = threads;
+    settings.spp = 3;
+    Renderer renderer(scene, settings);
+    const std::atomic<bool> interrupted{false};
+    EXPECT_EQ(renderer.run([](const Progress&) {}, interrupted), StopReason::Samples);
+    return {renderer.film().image(), renderer.film().variance(), renderer.stats().rays()};
+}
+
+bool same_bits(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Rgb)) == 0;
+}
+
+class Determinism : public ::testing::TestWithParam<std::tuple<const char*, SamplerKind>> {};
+
+TEST_P(Determinism, OfThreadsAndSeeds) {
+    const auto& [integrator, sampler] = GetParam();
+    const Scene scene = scene_with_tent();
+    const Rendering one = render(scene, integrator, sampler, 5, 1);
+    for (const int threads : {1, 2, 3, 7}) {
+        const Rendering more = render(scene, integrator, sampler, 5, threads);
+        EXPECT_TRUE(same_bits(one.image, more.image)) << threads << " threads";
+        EXPECT_TRUE(same_bits(one.variance, more.variance)) << threads << " threads";
+        EXPECT_EQ(one.rays, more.rays) << threads << " threads";
+    }
+    EXPECT_FALSE(same_bits(one.image, render(scene, integrator, sampler, 6, 1).image));
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, Determinism,
+                         ::testing::Combine(::testing::Values("path", "light", "bdpt"),
+                                            ::testing::Values(SamplerKind::Independent,
+                                                              SamplerKind::Sobol)),
+                         [](const auto& p) {
+                             return std::string(std::get<0>(p.param)) +
+                                    (std::get<1>(p.param) == SamplerKind::Sobol ? "_sobol"
+                                                                                : "_independent");
+                         });
+
+}  // namespace
+}  // namespace etendue::test

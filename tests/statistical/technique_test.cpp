@@ -1,0 +1,97 @@
+// Every technique alone. In a closed diffuse sphere that emits L_e the paths of k edges bring L_e ρ^(k-1) to every pixel,
+// whichever technique makes them; G is constant there, so that no connection has infinite variance.
+
+#include <map>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "render_tiles.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+constexpr int kSize = 8, kLongest = 6;
+
+class Techniques : public ::testing::TestWithParam<const char*> {
+protected:
+    /// Camera in an emitting sphere of albedo ½.
+    static Scene furnace(const std::string& type) {
+        const std::string lens = type == "thinlens"
+                                     ? "<float name=\"aperture_radius\" value=\"0.3\"/><float "
+                                       "name=\"focus_distance\" value=\"0.7\"/>"
+                                     : "";
+        return build(
+            sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kSize, "70", lens, type) +
+            "<shape type=\"sphere\"><boolean name=\"flip_normals\" value=\"true\"/><bsdf "
+            "type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.5,0.5,0.5\"/></bsdf>"
+            "<emitter type=\"area\"><rgb name=\"radiance\" value=\"1,1,1\"/></emitter></shape>");
+    }
+    static double mean(const std::vector<Rgb>& pixels) {
+        double sum = 0;
+        for (Rgb c : pixels) sum += c.g;
+        return sum / double(pixels.size());
+    }
+};
+
+TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
+    const Scene scene = furnace(GetParam());
+    constexpr int kRuns = 24;
+    std::map<std::pair<int, int>, Moments> alone;  // by (s, t)
+    std::map<int, Moments> together;               // by length
+    for (int run = 0; run < kRuns; ++run) {
+        RenderSettings settings;
+        settings.integrator =
+            IntegratorSpec::parse(fmt::format("bdpt:max_depth={},rr_depth=3,roulette=0", kLongest));
+        settings.seed = uint64_t(run);
+        settings.threads = 1;
+        settings.spp = scene.sensor().has_finite_lens() ? 64 : 24;
+        settings.technique_depth = kLongest;
+        Renderer renderer(scene, settings);
+        const std::atomic<bool> interrupted{false};
+        renderer.run([](const Progress&) {}, interrupted);
+        std::map<int, double> length_sum;
+        std::vector<Rgb> sum(scene.film().pixel_count());
+        for (const TechniqueImages::Entry& e : renderer.techniques()->images()) {
+            Moments& m = alone[{e.technique.s, e.technique.t}];
+            while (m.count() < run) m.add(0);  // runs in which it made nothing
+            m.add(mean(e.unweighted));
+            length_sum[e.technique.vertices() - 1] += mean(e.weighted);
+            for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
+        }
+        for (const auto& [length, value] : length_sum) together[length].add(value);
+        // The weighted images are the picture's parts.
+        const std::vector<Rgb> image = renderer.film().image();
+        for (size_t i = 0; i < sum.size(); ++i)
+            ASSERT_NEAR(sum[i].g, image[i].g, 1e-4f * image[i].g) << "pixel " << i;
+    }
+    for (auto& [q, m] : alone)
+        while (m.count() < kRuns) m.add(0);
+    const bool lens = scene.sensor().has_finite_lens();
+    size_t expected_count = 0;
+    for (int k = 1; k <= kLongest; ++k) expected_count += size_t(k + 1 + lens);
+    EXPECT_EQ(alone.size(), expected_count) << "a technique made nothing";
+    const double level = testing::sidak(0.01, int(alone.size() + together.size()));
+    // Few light paths meet the lens.
+    const auto expect_mean = [&](const Moments& m, int length, bool is_rare,
+                                 const std::string& what) {
+        const double exact = std::pow(0.5, length - 1);
+        EXPECT_GE(welch_p(m, Moments::exact(exact), kRounding * exact), level)
+            << what << ": " << m.mean() << " against " << exact << ", ratio " << m.mean() / exact
+            << " ± " << std::sqrt(m.squared_error()) / exact;
+        EXPECT_LT(4 * std::sqrt(m.squared_error()), (is_rare ? 0.9 : 0.2) * exact)
+            << what << ": too few samples";
+    };
+    for (const auto& [q, m] : alone)
+        expect_mean(m, q.first + q.second - 1, q.second == 0,
+                    fmt::format("s = {}, t = {}", q.first, q.second));
+    for (const auto& [length, m] : together)
+        expect_mean(m, length, false, fmt::format("length {}, weighted", length));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, Techniques, ::testing::Values("perspective", "thinlens"),
+                         [](const auto& p) { return std::string(p.param); });
+
+}  // namespace
+}  // namespace etendue::test

@@ -1,0 +1,89 @@
+#pragma once
+// Runs a program and catches what it says.
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace etendue::test {
+
+struct ProgramResult {
+    int status = -1;  ///< Exit status; -1 if it did not exit by itself.
+    int signal = 0;   ///< The signal that ended it.
+    std::string output, errors;
+};
+
+inline std::string read_text(const std::filesystem::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A process with its output in files of `folder`.
+class Program {
+public:
+    Program(const std::string& program, const std::vector<std::string>& arguments,
+            const std::filesystem::path& folder)
+        : out_(folder / "stdout.txt"), err_(folder / "stderr.txt") {
+        std::vector<std::string> words{program};
+        words.insert(words.end(), arguments.begin(), arguments.end());
+        std::vector<char*> argv;
+        for (std::string& w : words) argv.push_back(w.data());
+        argv.push_back(nullptr);
+        pid_ = fork();
+        if (pid_ != 0) return;
+        constexpr int kFlags = O_WRONLY | O_CREAT | O_TRUNC;
+        dup2(open(out_.c_str(), kFlags, 0600), STDOUT_FILENO);
+        dup2(open(err_.c_str(), kFlags, 0600), STDERR_FILENO);
+        execv(argv[0], argv.data());
+        _exit(127);
+    }
+    void interrupt() const { kill(pid_, SIGINT); }
+    /// What it has said so far on its standard error.
+    std::string errors() const { return read_text(err_); }
+
+    ProgramResult wait() const {
+        int status = 0;
+        waitpid(pid_, &status, 0);
+        ProgramResult r;
+        if (WIFEXITED(status)) r.status = WEXITSTATUS(status);
+        if (WIFSIGNALED(status)) r.signal = WTERMSIG(status);
+        r.output = read_text(out_);
+        r.errors = read_text(err_);
+        return r;
+    }
+
+private:
+    pid_t pid_;
+    std::filesystem::path out_, err_;
+};
+
+/// A folder that is deleted with the object.
+class TemporaryFolder {
+public:
+    TemporaryFolder() {
+        std::string name =
+            (std::filesystem::temp_directory_path() / "etendue-test-XXXXXX").string();
+        path_ = mkdtemp(name.data());
+    }
+    ~TemporaryFolder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+    const std::filesystem::path& path() const { return path_; }
+
+private:
+    std::filesystem::path path_;
+};
+
+}  // namespace etendue::test
