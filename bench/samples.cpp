@@ -44,7 +44,9 @@ void measure_samples(const Report& report, const Options& options, const Yardsti
     const std::string name = aim.integrator + " " + scene_name;
     if (!report.wants(name)) return;
     const IntegratorSpec integrator = integrator_for(scene, aim.integrator);
-    const uint64_t passes = passes_for(scene, integrator, kPeerThreads, options.seconds);
+    // Enough that the first pass, which knows nothing of the image yet, weighs little.
+    const uint64_t passes =
+        std::max(passes_for(scene, integrator, kPeerThreads, options.seconds), uint64_t{8});
     const auto [rendered, bare] = alternate(
         options.repeats,
         [&] { return render(scene, integrator, kPeerThreads, {.passes = passes, .seconds = {}}); },

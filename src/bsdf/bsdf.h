@@ -48,6 +48,8 @@ public:
     /// Whether some lobe is smooth, so that connections can be made here.
     bool has_smooth() const { return has_smooth_; }
     bool has_delta() const;
+    /// Whether sample() reads u_lobe.
+    bool uses_lobe_choice() const { return uses_lobe_choice_; }
     /// α of the sharpest smooth lobe, 0 where there is only a delta one.
     float roughness() const;
     Rgb albedo_estimate() const;
@@ -60,6 +62,7 @@ private:
 
     Vec3 ng_;
     bool has_smooth_ = false;
+    bool uses_lobe_choice_ = false;
     BsdfComponent first_;
 };
 

@@ -21,6 +21,7 @@ struct ConductorLobe {
     Rgb albedo_estimate() const { return reflectance * fresnel_conductor(1, eta, k); }
     float roughness() const { return 0; }
     bool has_smooth() const { return false; }
+    static constexpr bool kUsesLobeChoice = false;
     bool has_delta() const { return true; }
 };
 

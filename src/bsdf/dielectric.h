@@ -33,6 +33,7 @@ struct DielectricLobe {
     }
     float roughness() const { return 0; }
     bool has_smooth() const { return false; }
+    static constexpr bool kUsesLobeChoice = true;
     bool has_delta() const { return true; }
 };
 

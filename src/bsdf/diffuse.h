@@ -23,6 +23,7 @@ struct DiffuseLobe {
     Rgb albedo_estimate() const { return reflectance; }
     float roughness() const { return 1; }
     bool has_smooth() const { return true; }
+    static constexpr bool kUsesLobeChoice = false;
     bool has_delta() const { return false; }
 };
 

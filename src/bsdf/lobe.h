@@ -46,6 +46,7 @@ inline std::optional<BsdfSample> make_sample(Vec3 wi, const BsdfEval& e) {
 //   Rgb albedo_estimate() const       rough hemispherical reflectance, for AOVs and heuristics
 //   float roughness() const           GGX-like α of the *sharpest smooth* lobe: 0 delta only … 1 diffuse
 //   bool has_smooth() const, has_delta() const
+//   bool kUsesLobeChoice              whether sample() reads u_lobe
 // `wo` and `wi` are unit vectors in local coordinates, away from the surface. A reflecting-only lobe is black for
 // wo.z <= 0 (Material's two-sided wrapper turns the frame). A smooth lobe may share its model with a delta one.
 

@@ -71,6 +71,7 @@ public:
     ComponentList(Vec3 ng, ComponentArena& arena, Bsdf& out) : arena_(&arena), out_(&out) {
         out.ng_ = ng;
         out.has_smooth_ = false;
+        out.uses_lobe_choice_ = false;
         out.first_.weight = 0;
         out.first_.next = nullptr;
     }
@@ -83,8 +84,10 @@ public:
             first.frame = frame;
             first.lobe.template emplace<L>(lobe);
             first.weight = weight;
+            out_->uses_lobe_choice_ = L::kUsesLobeChoice;
             is_empty_ = false;
         } else {
+            out_->uses_lobe_choice_ = true;
             first.next =
                 arena_->keep({.frame = frame, .lobe = lobe, .weight = weight, .next = first.next});
         }

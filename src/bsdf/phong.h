@@ -18,6 +18,7 @@ struct PhongLobe {
     /// The GGX or Beckmann α of about the same highlight.
     float roughness() const { return specular_probability > 0 ? std::sqrt(2 / (exponent + 2)) : 1; }
     bool has_smooth() const { return true; }
+    static constexpr bool kUsesLobeChoice = true;
     bool has_delta() const { return false; }
 };
 

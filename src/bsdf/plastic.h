@@ -45,6 +45,7 @@ struct PlasticLobe {
     }
     float roughness() const { return 1; }
     bool has_smooth() const { return true; }
+    static constexpr bool kUsesLobeChoice = true;
     bool has_delta() const { return true; }
 };
 

@@ -23,6 +23,7 @@ struct PrincipledLobe {
     Rgb albedo_estimate() const { return base_color; }
     float roughness() const;
     bool has_smooth() const { return true; }
+    static constexpr bool kUsesLobeChoice = true;
     bool has_delta() const { return false; }
 
 private:

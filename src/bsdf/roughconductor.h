@@ -17,6 +17,7 @@ struct RoughConductorLobe {
     Rgb albedo_estimate() const { return reflectance * fresnel_conductor(1, eta, k); }
     float roughness() const { return distribution.min_alpha(); }
     bool has_smooth() const { return true; }
+    static constexpr bool kUsesLobeChoice = false;
     bool has_delta() const { return false; }
 };
 

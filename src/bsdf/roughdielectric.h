@@ -20,6 +20,7 @@ struct RoughDielectricLobe {
     }
     float roughness() const { return distribution.min_alpha(); }
     bool has_smooth() const { return true; }
+    static constexpr bool kUsesLobeChoice = true;
     bool has_delta() const { return false; }
 };
 

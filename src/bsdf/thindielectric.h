@@ -23,6 +23,7 @@ struct ThinDielectricLobe {
     Rgb albedo_estimate() const { return lerp(pane_reflectance(1), transmittance, reflectance); }
     float roughness() const { return 0; }
     bool has_smooth() const { return false; }
+    static constexpr bool kUsesLobeChoice = true;
     bool has_delta() const { return true; }
 
 private:

@@ -58,8 +58,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     const Vertex& v = z[last];
     if (!v.may_connect || !scene.has_emitters()) return {};
     sampler.seek(Stream::Connection, uint32_t(last));
-    const Scene::EmitterChoice choice = scene.sample_emitter(sampler.next_1d());
-    const Emitter& emitter = *choice.emitter;
+    const Emitter& emitter = scene.sample_emitter(sampler.next_1d_if(scene.has_emitter_choice()));
     DirectSample d;
     if (!emitter.sample_direct(v.p, sampler.next_2d(), d)) return {};
     const BsdfEval f = v.bsdf.eval(v.wo, d.wi, TransportMode::Radiance);

@@ -115,8 +115,7 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
     if (!scene.has_emitters()) return false;
     ++stats.light_paths;
     sampler.seek(Stream::Light, 0);
-    const Scene::EmitterChoice choice = scene.sample_emitter(sampler.next_1d());
-    const Emitter& emitter = *choice.emitter;
+    const Emitter& emitter = scene.sample_emitter(sampler.next_1d_if(scene.has_emitter_choice()));
     const Vec2 u_y0 = sampler.next_2d();
     const EmissionSample e = emitter.sample_emission(u_y0, sampler.next_2d());
     if (!(e.pdf_y0 > 0)) return false;
@@ -158,11 +157,10 @@ bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options,
     path.flight.pdf_sa = 0;
     if (last + 1 >= options.max_vertices) return false;
     sampler.seek(eye ? Stream::Eye : Stream::Light, uint32_t(last));
-    const float u_lobe = sampler.next_1d();
-    const Vec2 u_direction = sampler.next_2d();
-
     Vertex& v = path[last];
     if (v.kind != Vertex::Kind::Surface) return false;
+    const float u_lobe = sampler.next_1d_if(v.bsdf.uses_lobe_choice());
+    const Vec2 u_direction = sampler.next_2d();
     float q = 1;
     if (last >= options.rr_depth) {
         q = survival(path);

@@ -5,13 +5,6 @@
 namespace etendue {
 namespace {
 
-constexpr uint32_t reverse_bits(uint32_t x) {
-    x = __builtin_bswap32(x);
-    x = (x & 0x0f0f0f0fu) << 4 | (x & 0xf0f0f0f0u) >> 4;
-    x = (x & 0x33333333u) << 2 | (x & 0xccccccccu) >> 2;
-    return (x & 0x55555555u) << 1 | (x & 0xaaaaaaaau) >> 1;
-}
-
 /// Owen scrambling of an integer whose bits stand in reverse: a hash in which bits influence higher
 /// bits only [Laine & Karras 2011; constants of Vegdahl 2021].
 constexpr uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
@@ -49,7 +42,9 @@ constexpr uint32_t second_reversed(uint32_t i) {
 
 float Sampler::next_1d_structured() {
     if (kind_ == SamplerKind::PrimarySample) return source_->value(stream_, vertex_, slot_++);
-    return next_2d_structured().x;
+    const uint64_t seed = bits(path_key_);
+    const uint32_t index = reverse_bits(scramble_reversed(pass_reversed_, uint32_t(seed)));
+    return to_unit_float(reverse_bits(scramble_reversed(index, uint32_t(mix64(seed)))));
 }
 
 Vec2 Sampler::next_2d_structured() {
@@ -61,10 +56,11 @@ Vec2 Sampler::next_2d_structured() {
     // Each pair of dimensions is the same two-dimensional sequence over the passes, with an order
     // and a scrambling of its own.
     const uint64_t seed = bits(path_key_), scramble = mix64(seed);
-    const uint32_t index = reverse_bits(scramble_reversed(reverse_bits(pass_), uint32_t(seed)));
+    const uint32_t index = reverse_bits(scramble_reversed(pass_reversed_, uint32_t(seed)));
     const uint32_t x = scramble_reversed(index, uint32_t(scramble));
     const uint32_t y = scramble_reversed(second_reversed(index), uint32_t(scramble >> 32));
-    return {to_unit_float(reverse_bits(x)), to_unit_float(reverse_bits(y))};
+    const uint64_t both = reverse_bits(uint64_t{y} << 32 | x);
+    return {to_unit_float(uint32_t(both >> 32)), to_unit_float(uint32_t(both))};
 }
 
 }  // namespace etendue

@@ -41,7 +41,7 @@ public:
 
     /// Begins the sample `path` of pass `pass`.
     void start(uint32_t pass, uint64_t path) {
-        pass_ = pass;
+        pass_reversed_ = reverse_bits(pass);
         path_key_ = hash_combine(seed_, path);
         key_ = hash_combine(path_key_, pass);
     }
@@ -62,6 +62,12 @@ public:
         const uint64_t b = bits(key_);
         return {to_unit_float(uint32_t(b >> 32)), to_unit_float(uint32_t(b))};
     }
+    /// As next_1d() where the number matters; otherwise its slot is passed over.
+    float next_1d_if(bool is_needed) {
+        if (is_needed) return next_1d();
+        ++slot_;
+        return 0;
+    }
     /// As next_1d(), for decisions that gain nothing from structured points: pseudo-random unless a Markov chain drives.
     float next_1d_unstructured() {
         if (kind_ == SamplerKind::PrimarySample) return next_1d_structured();
@@ -81,7 +87,7 @@ private:
     uint64_t seed_ = 0;
     uint64_t path_key_ = 0, key_ = 0;  ///< Of the path; of the path in this pass.
     PrimarySource* source_ = nullptr;
-    uint32_t pass_ = 0, vertex_ = 0, slot_ = 0;
+    uint32_t pass_reversed_ = 0, vertex_ = 0, slot_ = 0;
     Stream stream_ = Stream::Eye;
     SamplerKind kind_;
     bool is_structured_ = false;

@@ -88,10 +88,4 @@ float Scene::transmittance_to_infinity(Vec3 a, Vec3 ng_a, Vec3 d) const {
     return masked_transmittance(ray);
 }
 
-Scene::EmitterChoice Scene::sample_emitter(float u) const {
-    if (emitters_.size() == 1) return {emitters_[0].get(), u};
-    const AliasTable::Draw draw = selection_.sample(u);
-    return {emitters_[draw.index].get(), draw.u};
-}
-
 }  // namespace etendue

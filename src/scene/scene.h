@@ -68,13 +68,12 @@ public:
         return medium == kVacuum ? Rgb(1) : exp(media_[medium] * -distance);
     }
 
-    /// Emitter drawn by power, and what is left of `u`.
-    struct EmitterChoice {
-        const Emitter* emitter;
-        float u;
-    };
-    EmitterChoice sample_emitter(float u) const;
+    /// Emitter drawn by power. `u` is not read where there is but one.
+    const Emitter& sample_emitter(float u) const {
+        return *emitters_[emitters_.size() == 1 ? 0u : selection_.sample(u).index];
+    }
     bool has_emitters() const { return !selection_.empty(); }
+    bool has_emitter_choice() const { return emitters_.size() > 1; }
 
     const Sensor& sensor() const { return *sensor_; }
     const FilmGeometry& film() const { return film_; }
