@@ -9,15 +9,20 @@
 
 namespace etendue {
 
-/// What a ray met.
-struct RayHit {
-    float t;
-    uint32_t shape;  ///< Index of the shape in the order of add_shape / add_group.
-    uint32_t prim;
-    uint32_t instance;  ///< Index of the instance, or kNoInstance.
-    float u, v;
-};
 inline constexpr uint32_t kNoInstance = 0xffffffffu;
+
+/// A surface point by name: all that is needed to find its geometry again.
+struct SurfaceLocation {
+    uint32_t shape = 0;  ///< Index of the shape in the order of add_shape / add_group.
+    uint32_t prim = 0;
+    uint32_t instance = kNoInstance;
+    float u = 0, v = 0;  ///< Parameters within the primitive.
+};
+
+/// What a ray met.
+struct RayHit : SurfaceLocation {
+    float t;
+};
 
 /// Shapes are added, then committed once; queries are thread-safe after that.
 class Accelerator {

@@ -8,11 +8,13 @@
 #include "integrator/bdpt.h"
 #include "integrator/light.h"
 #include "integrator/path.h"
+#include "integrator/vcm.h"
 
 namespace etendue {
 
 const std::vector<IntegratorEntry>& integrator_registry() {
-    static const std::vector<IntegratorEntry> entries = {path_entry(), light_entry(), bdpt_entry()};
+    static const std::vector<IntegratorEntry> entries = {path_entry(), light_entry(), bdpt_entry(),
+                                                         vcm_entry()};
     return entries;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // Integrators: which sub-paths are traced, which techniques join them, how many samples each takes. Nothing else.
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -18,6 +19,7 @@ enum class Estimator { Unbiased, Consistent, Biased };
 /// Buffers of one worker, reused from sample to sample.
 struct Workspace {
     SubPath y, z;
+    SubPath pair;  ///< The other path of a pair of vertices.
     RenderStats stats;
 };
 
@@ -32,9 +34,23 @@ struct SampleContext {
     ContributionSink& sink;
 };
 
+/// What an integrator may do before the samples of a pass.
+struct PassContext {
+    const Scene& scene;
+    uint32_t index;        ///< Of the pass, from 0.
+    uint64_t light_paths;  ///< N_L.
+    uint64_t chunks;
+    /// Calls `use(chunk, context, work)` for every light path in parallel; those of one chunk in order by one thread.
+    /// Only splats may be added.
+    using Use = std::function<void(uint64_t, const SampleContext&, Workspace&)>;
+    std::function<void(const Use& use)> for_each_light_path;
+};
+
 class Integrator {
 public:
     virtual ~Integrator() = default;
+    /// Called by one thread before the samples of each pass.
+    virtual void begin_pass(const PassContext&) {}
     /// Traces sample `context.pixel` and reports its contributions.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
     /// Light paths per pixel in one pass: 0 or 1.
@@ -59,6 +75,7 @@ public:
     int integer(const char* name) const;
     float number(const char* name) const;
     bool flag(const char* name) const;
+    const std::string& integrator() const { return integrator_; }
 
 private:
     const std::string& text(const char* name) const;

@@ -27,7 +27,7 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     const Vertex& v = z[last];
     if (!(counts.hit > 0)) return {};
     const EmitterHit e =
-        v.is_infinite ? emitter.eval_infinite(v.p) : emitter.eval_surface(v.ng, v.uv, v.prim, v.wo);
+        v.is_infinite ? emitter.eval_infinite(v.p) : emitter.eval_surface(v.ng, v.uv, v.location.prim, v.wo);
     if (e.Le.is_zero()) return {};
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
@@ -38,8 +38,9 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     if (counts.uses_light_paths()) {
         const double rev_prev =
             v.is_infinite ? to_area(e.pdf_d, v, z[last - 1]) : e.pdf_d * v.to_predecessor;
-        double inner =
-            sqr(split_count<Side::Eye>(z, last - 1, z[last - 1].is_delta, counts)) + v.weight_sum;
+        double inner = bracket<Side::Eye>(z, last - 1, z[last - 1].is_delta, rev_prev,
+                                          emitter_gloss(emitter.is_area()), last, counts) +
+                       v.weight_sum;
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
         // Two ends at infinity cannot be connected.
         if (last == 1 && !(v.is_infinite && z[0].is_infinite)) inner += sqr(double(counts.splat));
@@ -79,7 +80,9 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const double rev_prev = f.pdf_rev * v.to_predecessor;
         const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
         others +=
-            sqr(p_L / p_NE) * outward_sum<Side::Eye>(z, last, false, rev_last, rev_prev, counts);
+            sqr(p_L / p_NE) *
+            outward_sum<Side::Eye>(
+                z, last, false, {rev_last, rev_prev, emitter_gloss(emitter.is_area()), t}, counts);
     }
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .contribution = C,
@@ -92,37 +95,125 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                 .to_infinity = infinite};
 }
 
-std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
-                                 int t, const TechniqueCounts& counts) {
+namespace {
+
+/// The edge between y_{s-1} and z_{t-1}.
+struct Edge {
+    Vec3 w;            ///< From y_{s-1} to z_{t-1}.
+    Rgb contribution;  ///< Of the connection, visibility left out.
+    double rev_a, rev_b;  ///< Densities of y_{s-1} as sampled from z_{t-1}, and the other way round.
+    double total;         ///< Σ (n·p)² over all techniques, relative to p of the split here.
+};
+
+/// y_{s-1} (which may be y_0, as the emission sampled it) connected to z_{t-1}, t ≥ 2.
+std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const SubPath& z, int t,
+                            const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
     const Vertex& b = z[t - 1];
     if (!a.may_connect || !b.may_connect) return {};
-    const Vec3 edge = b.p - a.p;
-    const float dist2 = length2(edge);
+    const Vec3 d = a.is_infinite ? -a.p : b.p - a.p;
+    const float dist2 = length2(d);
     if (!(dist2 > 0)) return {};
-    const float inv_dist = 1 / std::sqrt(dist2);
-    const Vec3 w = edge * inv_dist;
-    const BsdfEval fb = b.bsdf.eval(b.wo, -w, TransportMode::Radiance);
+    const float inv_dist = 1 / std::sqrt(dist2), inv_dist2 = a.is_infinite ? 1.0f : sqr(inv_dist);
+    Edge edge;
+    edge.w = d * inv_dist;
+    const BsdfEval fb = b.bsdf.eval(b.wo, -edge.w, TransportMode::Radiance);
     if (fb.f.is_zero()) return {};
-    const BsdfEval fa = a.bsdf.eval(a.wo, w, TransportMode::Importance);
+    BsdfEval fa;
+    double count = counts.connect;
+    if (s == 1) {
+        const Emitter::Emission e = a.emitter->eval_emission(a.ng, a.uv, edge.w);
+        fa.f = e.Le_cos;
+        fa.pdf = e.pdf_d;
+        count = double(counts.next_event) * next_event_ratio(a, edge.w);
+    } else {
+        fa = a.bsdf.eval(a.wo, edge.w, TransportMode::Importance);
+    }
     if (fa.f.is_zero()) return {};
-    const float inv_dist2 = sqr(inv_dist);
-    Rgb C = a.beta * fa.f * fb.f * b.beta * inv_dist2;
-    if (scene.has_media()) C *= edge_attenuation(scene, a, b, w, dist2 * inv_dist);
+    edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
+    if (scene.has_media() && !a.is_infinite)
+        edge.contribution *= edge_attenuation(scene, a, b, edge.w, dist2 * inv_dist);
 
-    const double others =
-        outward_sum<Side::Light>(y, s - 1, false, fb.pdf * abs_dot(a.ng, w) * inv_dist2,
-                                 fa.pdf_rev * a.to_predecessor, counts) +
-        outward_sum<Side::Eye>(z, t - 1, false, fa.pdf * abs_dot(b.ng, w) * inv_dist2,
-                               fb.pdf_rev * b.to_predecessor, counts);
+    edge.rev_a = double(fb.pdf) * (a.has_cosine ? abs_dot(a.ng, edge.w) : 1.0f) * inv_dist2;
+    edge.rev_b = double(fa.pdf) * abs_dot(b.ng, edge.w) * inv_dist2;
+    if (a.is_infinite) edge.rev_a = fb.pdf;
+    const bool gathers = counts.gather > 0;
+    edge.total =
+        sqr(count) +
+        outward_sum<Side::Light>(y, s - 1, false,
+                                 {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f,
+                                  gathers ? gloss(b, false) : 0, s + t - 1},
+                                 counts) +
+        outward_sum<Side::Eye>(z, t - 1, false,
+                               {edge.rev_b, fb.pdf_rev * b.to_predecessor,
+                                gathers ? gloss(a, false) : 0, s + t - 1},
+                               counts);
+    return edge;
+}
+
+}  // namespace
+
+std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
+                                 int t, const TechniqueCounts& counts) {
+    const auto edge = connect(scene, y, s, z, t, counts);
+    if (!edge) return {};
+    const Vertex &a = y[s - 1], &b = z[t - 1];
     return Join{.technique = {Strategy::Connect, s, t},
-                .contribution = C,
-                .mis_weight = power_heuristic(counts.connect, others),
+                .contribution = edge->contribution,
+                .mis_weight = float(sqr(double(counts.connect)) / edge->total),
                 .film = z.film,
                 .a = a.p,
                 .ng_a = a.ng,
                 .b = b.p,
                 .ng_b = b.ng};
+}
+
+std::optional<bool> drops_eye_vertex_of_pair(const SubPath& y, int s, const SubPath& z, int t) {
+    const float before = gloss(y[s - 2], y[s - 2].is_delta), after = gloss(z[t - 2], z[t - 2].is_delta);
+    if (before >= kDeltaGloss && after >= kDeltaGloss) return {};
+    return drops_eye_vertex(before, after);
+}
+
+std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
+                                int t, const TechniqueCounts& counts, bool drops_eye) {
+    if (s + t - 2 < counts.min_pair_edges) return {};
+    const auto edge = connect(scene, y, drops_eye ? s : s - 1, z, drops_eye ? t - 1 : t, counts);
+    if (!edge) return {};
+    const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
+    const double kept = drops_eye ? edge->rev_a : edge->rev_b;
+    const double np = counts.gather * std::fmin(1, counts.disc * kept);
+    return Join{.technique = {Strategy::Gather, s, t},
+                .contribution = edge->contribution,
+                .mis_weight = float(sqr(np) / edge->total),
+                .film = z.film,
+                .a = b.p,
+                .ng_a = b.ng,
+                .b = a.p,
+                .ng_b = a.has_cosine ? a.ng : Vec3{},
+                .to_infinity = a.is_infinite};
+}
+
+std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
+                               const TechniqueCounts& counts) {
+    const Vertex &a = y[s - 1], &b = z[t - 1];
+    const int edges = s + t - 2;
+    if (edges < counts.min_pair_edges) return {};
+    const BsdfEval f = b.bsdf.eval(b.wo, a.wo, TransportMode::Radiance);
+    if (f.f.is_zero()) return {};
+    // Relative to the split after x_m, which has p_L(x_m) but not p_E(x_m).
+    const double total =
+        sqr(split_count<Side::Eye>(z, t - 1, false, counts)) +
+        outward_sum<Side::Light>(y, s - 1, false,
+                                 {b.pdf_fwd, f.pdf * a.to_predecessor, 0, edges}, counts) +
+        sqr(f.pdf_rev * b.to_predecessor / z[t - 2].pdf_fwd) *
+            (bracket<Side::Eye>(z, t - 2, z[t - 2].is_delta, 0, 0, edges, counts) + b.weight_sum);
+    const double np = double(counts.merge) * counts.disc * b.pdf_fwd;
+    return Join{.technique = {Strategy::Merge, s, t},
+                .contribution =
+                    a.beta * f.f * b.beta * (1 / (abs_dot(a.wo, b.ng) * counts.disc)),
+                .mis_weight = float(sqr(np) / total),
+                .film = z.film,
+                .needs_test = false};
 }
 
 std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler,
@@ -158,7 +249,8 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
         a.is_infinite ? lens->pdf_dir
                       : lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, w) : 1.0f) * inv_dist2;
     const double rev_prev = s >= 2 ? f.pdf_rev * a.to_predecessor : 0.0f;
-    double others = outward_sum<Side::Light>(y, s - 1, false, rev_last, rev_prev, counts);
+    double others =
+        outward_sum<Side::Light>(y, s - 1, false, {rev_last, rev_prev, kLensGloss, s}, counts);
     if (counts.hit_lens > 0)
         others +=
             sqr(double(counts.hit_lens) * f.pdf * abs_dot(lens->ng, w) * inv_dist2 / lens->pdf_pos);
@@ -191,8 +283,9 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
     const double p_lens = lens->pdf_pos / p_fwd;
     const double rev_last = lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, flight.d) : 1.0f) / dist2;
     double others =
-        sqr(p_lens) * outward_sum<Side::Light>(y, s - 1, a.is_delta, rev_last,
-                                               s >= 2 ? y[s - 2].pdf_rev : 0.0f, counts);
+        sqr(p_lens) * outward_sum<Side::Light>(
+                          y, s - 1, a.is_delta,
+                          {rev_last, s >= 2 ? y[s - 2].pdf_rev : 0.0f, kLensGloss, s}, counts);
     if (!a.is_delta) others += sqr(counts.splat * p_lens);
     return Join{.technique = {Strategy::HitLens, s + 1, 0},
                 .contribution = C,

@@ -5,10 +5,12 @@
 // With the light and eye densities p_L(x_i), p_E(x_i) of every vertex, the density of the technique whose split lies
 // before x_i (i light vertices) is  p_i = Π_{j<i} p_L(x_j) · Π_{j≥i} p_E(x_j).  Moving the split past a vertex multiplies by
 // a ratio, so relative to the present split the sum over all others is, on each side, a nested product
-//     S_L = ρ_L² (c_L² + ρ_{L-1}² (c_{L-1}² + … )),     ρ_i = pdf_rev_i / pdf_fwd_i,
+//     S_L = ρ_L² (b_L + ρ_{L-1}² (b_{L-1} + … )),     ρ_i = pdf_rev_i / pdf_fwd_i,
+//     b_i = c_i² + m_i²,
 // where c_i is the number of samples of the technique whose split lies between v_{i-1} and v_i, 0 where an event there
-// is a delta event. Everything but the last two levels is known while the sub-path is walked: v[L].weight_sum holds
-// the sum inside from level L-2 on. `path_pdfs.h` has the same weight as an explicit sum; a test holds them together.
+// is a delta event, and m_i that of pairs at v_i, relative to the density of this split. Everything but the last two
+// levels is known while the sub-path is walked: v[L].weight_sum holds the sum inside from level L-2 on. `path_pdfs.h`
+// has the same weight as an explicit sum; a test holds them together.
 
 #include "math/vec.h"
 #include "pathspace/technique.h"
@@ -17,6 +19,24 @@
 namespace etendue {
 
 enum class Side : uint8_t { Light, Eye };
+
+/// Order in which the end points of a gathered pair are kept [Qin et al. 2015, appendix B]: the one that was sampled
+/// from the glossier vertex. A delta event cannot be sampled again.
+inline constexpr float kDeltaGloss = 3, kLensGloss = 4;
+inline float emitter_gloss(bool is_area) {
+    return is_area ? 0.0f : 2.0f;
+}
+/// `is_delta`: whether the path's event at the vertex is a delta event.
+inline float gloss(const Vertex& v, bool is_delta) {
+    if (v.kind == Vertex::Kind::Sensor) return kLensGloss;
+    if (is_delta) return kDeltaGloss;
+    if (v.kind == Vertex::Kind::Emitter) return emitter_gloss(v.has_cosine);
+    return 1 - v.bsdf.roughness();
+}
+/// Which end point of the pair at x_m is dropped: z_{t-1} (else y_{s-1}), from the gloss of x_{m-1} and x_{m+1}.
+inline bool drops_eye_vertex(float gloss_before, float gloss_after) {
+    return gloss_after <= gloss_before;
+}
 
 /// c_i of a sub-path: samples of the technique split between v[i-1] and v[i], times the ratio of its own density to the
 /// walk's where it samples y_0 in another way. `delta` tells whether the event at v[i] is one.
@@ -34,25 +54,66 @@ inline double split_count(const SubPath& v, int i, bool delta, const TechniqueCo
     return v[i - 1].is_delta ? 0.0 : n.connect;
 }
 
-/// Sum over the techniques that move the split past v[last], relative to the present one. `rev_last`, `rev_prev`:
-/// densities of v[last] and v[last-1] as sampled from the other side.
+/// m_i of a sub-path, for the inner vertex v[i] of a path: n·p of a merge is N_L π d² p_L(x_m) p_E(x_m) times the
+/// densities of all others. A gather leaves the dropped vertex's density out and has the probability of its disc
+/// instead, at most 1 [Qin et al. 2015, eq. 24]. `rev`: density of v[i] from the other side; `inward`: gloss of the
+/// vertex beyond v[i].
 template <Side side>
-inline double outward_sum(const SubPath& v, int last, bool last_is_delta, double rev_last,
-                          double rev_prev, const TechniqueCounts& n) {
-    double inner = sqr(split_count<side>(v, last, last_is_delta, n));
-    if (last >= 1) {
-        const double prev =
-            sqr(split_count<side>(v, last - 1, v[last - 1].is_delta, n)) + v[last].weight_sum;
-        inner += sqr(rev_prev / v[last - 1].pdf_fwd) * prev;
-    }
-    return sqr(rev_last / v[last].pdf_fwd) * inner;
+inline double pair_count(const SubPath& v, int i, double rev, float inward,
+                         const TechniqueCounts& n) {
+    if (i == 0 || !v[i].may_connect) return 0;
+    const double fwd = v[i].pdf_fwd;
+    if (n.merge > 0) return double(n.merge) * n.disc * fwd;
+    const float outward = gloss(v[i - 1], v[i - 1].is_delta);
+    if (outward >= kDeltaGloss && inward >= kDeltaGloss) return 0;
+    const bool drops_eye = side == Side::Light ? drops_eye_vertex(outward, inward)
+                                               : drops_eye_vertex(inward, outward);
+    const bool drops_own = drops_eye == (side == Side::Eye);
+    if (drops_own) return n.gather * std::fmin(1, n.disc * fwd);
+    return rev > 0 ? n.gather * std::fmin(1, n.disc * rev) * (fwd / rev) : 0.0;
 }
 
-/// The sum from level i on, stored at v[i+2] once v[i].pdf_rev is known; `below` is that of level i-1.
+/// b_i of a sub-path. `delta`, `rev`, `inward` as above; `edges`: length of the path, or any larger number.
+template <Side side>
+inline double bracket(const SubPath& v, int i, bool delta, double rev, float inward, int edges,
+                      const TechniqueCounts& n) {
+    double b = sqr(split_count<side>(v, i, delta, n));
+    if (n.disc > 0 && !delta && edges >= n.min_pair_edges)
+        b += sqr(pair_count<side>(v, i, rev, inward, n));
+    return b;
+}
+
+/// What lies beyond the last vertex of one side of a join.
+struct Across {
+    double rev_last, rev_prev;  ///< Densities of v[last], v[last-1] as sampled from there.
+    float gloss = 0;            ///< Of the next vertex; read only where there are gathers.
+    int edges = 0;              ///< Length of the whole path.
+};
+
+/// Sum over the techniques that move the split past v[last], relative to the present one.
+template <Side side>
+inline double outward_sum(const SubPath& v, int last, bool last_is_delta, const Across& a,
+                          const TechniqueCounts& n) {
+    double inner = bracket<side>(v, last, last_is_delta, a.rev_last, a.gloss, a.edges, n);
+    if (last >= 1) {
+        const float inward = n.gather > 0 ? gloss(v[last], last_is_delta) : 0;
+        const double prev = bracket<side>(v, last - 1, v[last - 1].is_delta, a.rev_prev, inward,
+                                          a.edges, n) +
+                            v[last].weight_sum;
+        inner += sqr(a.rev_prev / v[last - 1].pdf_fwd) * prev;
+    }
+    return sqr(a.rev_last / v[last].pdf_fwd) * inner;
+}
+
+/// The sum from level i on, stored at v[i+2] once v[i].pdf_rev is known; `below` is that of level i-1. Where pairs are
+/// possible (i ≥ 1) the path has three edges at least.
 template <Side side>
 inline double level_sum(const SubPath& v, int i, double below, const TechniqueCounts& n) {
-    return sqr(double(v[i].pdf_rev) / v[i].pdf_fwd) *
-           (sqr(split_count<side>(v, i, v[i].is_delta, n)) + below);
+    constexpr int kManyEdges = 1 << 30;
+    const double rev = v[i].pdf_rev;
+    const float inward = n.gather > 0 ? gloss(v[i + 1], v[i + 1].is_delta) : 0;
+    return sqr(rev / v[i].pdf_fwd) *
+           (bracket<side>(v, i, v[i].is_delta, rev, inward, kManyEdges, n) + below);
 }
 
 /// Power heuristic of a technique with `count` samples against the sum of the others' (n·p)², relative to its p.

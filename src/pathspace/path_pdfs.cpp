@@ -1,5 +1,9 @@
 #include "pathspace/path_pdfs.h"
 
+#include <cmath>
+
+#include "pathspace/mis.h"
+
 namespace etendue {
 namespace {
 
@@ -30,16 +34,31 @@ double PathPdfs::density(const Technique& q) const {
     return p;
 }
 
+double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) const {
+    const double n = counts.of(q.strategy);
+    if (!(n > 0)) return 0;
+    if (!is_pair(q.strategy)) return n * density(q);
+    const int k = vertices() - 1, m = q.s - 1;
+    if (m < 1 || m >= k || k < counts.min_pair_edges || is_delta[m]) return 0;
+    double others = 1;  // of all vertices but x_m
+    for (int i = 0; i < m; ++i) others *= light[i];
+    for (int i = m + 1; i <= k; ++i) others *= eye[i];
+    if (q.strategy == Strategy::Merge) return n * others * light[m] * eye[m] * counts.disc;
+    if (gloss[m - 1] >= kDeltaGloss && gloss[m + 1] >= kDeltaGloss) return 0;
+    const bool drops_eye = drops_eye_vertex(gloss[m - 1], gloss[m + 1]);
+    const double kept = drops_eye ? light[m] : eye[m], dropped = drops_eye ? eye[m] : light[m];
+    return n * others * kept * std::fmin(1, counts.disc * dropped);
+}
+
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {
-    double sum = 0, own = 0;
-    for (int s = 0; s <= pdfs.vertices(); ++s) {
-        const Technique q = connection_technique(s, pdfs.vertices() - s);
-        const double np =
-            counts.of(q.strategy) > 0 ? sqr(counts.of(q.strategy) * pdfs.density(q)) : 0.0;
-        sum += np;
-        if (q == technique) own = np;
+    double sum = 0;
+    const auto add = [&](const Technique& q) { sum += sqr(pdfs.sampled(q, counts)); };
+    const int n = pdfs.vertices();
+    for (int s = 0; s <= n; ++s) {
+        add(connection_technique(s, n - s));
+        if (s > 0) add({Strategy::Merge, s, n + 1 - s}), add({Strategy::Gather, s, n + 1 - s});
     }
-    return own / sum;
+    return sqr(pdfs.sampled(technique, counts)) / sum;
 }
 
 std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t,
@@ -58,6 +77,9 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.light.assign(size_t(n), 1);
     p.eye.assign(size_t(n), 1);
     p.is_delta = delta;
+    for (int i = 0; i < n; ++i)
+        p.gloss.push_back(i == 0 ? emitter_gloss(x[0]->emitter->is_area())
+                                 : gloss(*x[i], delta[size_t(i)]));
 
     // Emission: x_0 and the direction to x_1.
     const Emitter& emitter = *x[0]->emitter;
@@ -65,7 +87,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     const Emitter::Emission emission = emitter.eval_emission(x[0]->ng, x[0]->uv, w0);
     const EmitterHit hit = emitter.is_infinite()
                                ? emitter.eval_infinite(x[0]->p)
-                               : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->prim, w0);
+                               : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->location.prim, w0);
     p.can_hit_emitter = !emitter.is_delta();
     p.can_connect_ends = !(x[0]->is_infinite && x[k]->is_infinite);
     p.light[0] = p.next_event = emitter.selection_pmf;

@@ -14,6 +14,7 @@ namespace etendue {
 struct PathPdfs {
     std::vector<double> light, eye;
     std::vector<bool> is_delta;  ///< Events.
+    std::vector<float> gloss;    ///< See drops_eye_vertex().
     double next_event = 0;       ///< p_NE(x_0) as chosen for x_1.
     bool can_hit_emitter = true;
     bool can_connect_ends = true;  ///< Not both are at infinity.
@@ -21,6 +22,8 @@ struct PathPdfs {
     int vertices() const { return int(light.size()); }
     /// Density of the path as the technique makes it; 0 where it cannot.
     double density(const Technique& technique) const;
+    /// n·p of the technique.
+    double sampled(const Technique& technique, const TechniqueCounts& counts) const;
 };
 
 /// Power heuristic with β = 2 by the explicit sum over all techniques.

@@ -11,19 +11,6 @@ float survival(const SubPath& path) {
     return std::min(0.95f, path[path.size() - 1].beta.max() * path.eta2 / path[1].beta.max());
 }
 
-void fill_surface(Vertex& v, const SurfaceHit& hit, Vec3 d, ComponentArena& arena) {
-    v.kind = Vertex::Kind::Surface;
-    v.p = hit.geometry.p;
-    v.ng = hit.geometry.ng;
-    v.wo = -d;
-    v.shape = hit.shape;
-    v.emitter = hit.shape->emitter;
-    v.prim = hit.prim;
-    v.uv = hit.geometry.uv;
-    const SurfaceGeometry& g = hit.geometry;
-    hit.shape->material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, -d}, arena, v.bsdf);
-    v.may_connect = v.bsdf.has_smooth();
-}
 
 /// Traces from the last vertex along `d` and appends what is found, with throughput `beta` and density `pdf_sa` of the
 /// direction (discrete for a delta event). False where the ray leaves the scene.
@@ -37,7 +24,7 @@ bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const R
     path.flight.length = hit.t;
     ++stats.vertices;
     Vertex& v = path.append();
-    fill_surface(v, hit, ray.d, path.arena);
+    v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
     v.medium = medium;
     v.beta = medium == kVacuum ? beta : beta * scene.attenuation(medium, hit.t);
     // hit.t is short of the distance by the offset of the ray's origin; densities are of the points themselves.
@@ -71,6 +58,13 @@ void store_weight_sum(SubPath& path, const TechniqueCounts& counts) {
 }
 
 }  // namespace
+
+float next_event_ratio(const Vertex& y0, Vec3 w) {
+    const EmitterHit e = y0.is_infinite
+                             ? y0.emitter->eval_infinite(y0.p)
+                             : y0.emitter->eval_surface(y0.ng, y0.uv, y0.location.prim, w);
+    return e.pdf_y0 > 0 ? e.pdf / e.pdf_y0 : 1.0f;
+}
 
 RenderStats& RenderStats::operator+=(const RenderStats& o) {
     eye_paths += o.eye_paths;
@@ -128,7 +122,7 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
     y0.p = y0.is_infinite ? -e.d : e.p;
     y0.ng = e.ng;
     y0.uv = e.uv;
-    y0.prim = e.prim;
+    y0.location.prim = e.prim;
     y0.may_connect = true;
     y0.pdf_fwd = emitter.selection_pmf * e.pdf_y0;
     y0.beta = Rgb(1 / y0.pdf_fwd);
@@ -143,9 +137,7 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
         return true;
     }
     Vertex& y1 = y[1];
-    const EmitterHit reverse = y0.is_infinite ? emitter.eval_infinite(y0.p)
-                                              : emitter.eval_surface(y0.ng, y0.uv, y0.prim, e.d);
-    y1.next_event_ratio = reverse.pdf_y0 > 0 ? reverse.pdf / reverse.pdf_y0 : 1.0f;
+    y1.next_event_ratio = next_event_ratio(y0, e.d);
     return true;
 }
 

@@ -31,6 +31,9 @@ void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sample
 /// y_0 on an emitter and, if the scene is met, y_1. False where there is no emitter to choose.
 bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderStats& stats);
 
+/// p_NE / p_L of y_0 for a next vertex along `w`.
+float next_event_ratio(const Vertex& y0, Vec3 w);
+
 /// Samples scattering at the last vertex and appends the next one. False where the walk ends: absorbed, roulette, or
 /// out of the scene; in the last case an eye walk over a scene with emitters at infinity has appended a vertex there.
 template <TransportMode mode>

@@ -12,13 +12,21 @@ enum class Strategy : uint8_t {
     Connect,    ///< C(s,t), s ≥ 2, t ≥ 2.
     Splat,      ///< C(s,1): the light path is connected to the lens.
     HitLens,    ///< C(s,0): the light path lands on a finite lens.
+    Merge,      ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are taken for one vertex.
+    Gather,     ///< U(s,t): such a pair, one of the two dropped, the rest joined by a shadow ray.
 };
+
+/// Whether y_{s-1} and z_{t-1} stand for one vertex of the full path.
+constexpr bool is_pair(Strategy strategy) {
+    return strategy == Strategy::Merge || strategy == Strategy::Gather;
+}
 
 struct Technique {
     Strategy strategy;
     int s, t;
 
-    int vertices() const { return s + t; }
+    /// Of the full path.
+    int vertices() const { return s + t - is_pair(strategy); }
     friend bool operator==(const Technique&, const Technique&) = default;
 };
 
@@ -36,8 +44,13 @@ constexpr Technique connection_technique(int s, int t) {
 /// per pixel, so one eye path a pixel counts 1 and whatever reaches any pixel counts N_L, the number of light paths.
 struct TechniqueCounts {
     float hit = 0, next_event = 0, connect = 0, splat = 0, hit_lens = 0;
+    float merge = 0, gather = 0;  ///< Of each inner vertex of the path; one of the two is 0.
+    float disc = 0;               ///< π d², the area in which a pair's partner is sought.
+    int min_pair_edges = 2;       ///< Shorter paths are not made from pairs.
 
-    bool uses_light_paths() const { return connect > 0 || splat > 0 || hit_lens > 0; }
+    bool uses_light_paths() const {
+        return connect > 0 || splat > 0 || hit_lens > 0 || merge > 0 || gather > 0;
+    }
     float of(Strategy strategy) const {
         switch (strategy) {
         case Strategy::Hit: return hit;
@@ -45,6 +58,8 @@ struct TechniqueCounts {
         case Strategy::Connect: return connect;
         case Strategy::Splat: return splat;
         case Strategy::HitLens: return hit_lens;
+        case Strategy::Merge: return merge;
+        case Strategy::Gather: return gather;
         }
         return 0;
     }

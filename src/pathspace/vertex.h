@@ -37,9 +37,24 @@ struct Vertex {
     MediumId medium = kVacuum;  ///< On the edge to the predecessor.
     const SceneShape* shape = nullptr;
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or on the surface.
-    uint32_t prim = 0;
+    SurfaceLocation location;  ///< Of a surface; of an emitter's y_0 only `prim`.
     Vec2 uv;
     Bsdf bsdf;
+
+    /// Makes this a point of a surface, seen from `wo`.
+    void set_surface(const SceneShape& on, const SurfaceLocation& at, const SurfaceGeometry& g,
+                     Vec3 toward_predecessor, ComponentArena& arena) {
+        kind = Kind::Surface;
+        p = g.p;
+        ng = g.ng;
+        wo = toward_predecessor;
+        shape = &on;
+        emitter = on.emitter;
+        location = at;
+        uv = g.uv;
+        on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo}, arena, bsdf);
+        may_connect = bsdf.has_smooth();
+    }
 
     /// Medium on the edge that leaves along `w`.
     MediumId medium_toward(Vec3 w) const {

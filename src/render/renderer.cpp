@@ -107,20 +107,34 @@ void Renderer::pass(uint32_t index) {
     const uint64_t pixels = scene_.film().pixel_count();
     const uint64_t light_paths = integrator_->traces_light_paths() ? pixels : 0;
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
+    const uint64_t chunks = (pixels + kChunk - 1) / kChunk;
     film_.begin_pass(light_paths);
-    workers_->arena.execute([&] {
-        tbb::parallel_for(uint64_t(0), (pixels + kChunk - 1) / kChunk, [&](uint64_t chunk) {
+    // Calls use(chunk, context, work, sink) for every sample of the pass.
+    const auto for_each_sample = [&](const auto& use) {
+        tbb::parallel_for(uint64_t(0), chunks, [&](uint64_t chunk) {
             Workspace& work = workers_->spaces.local();
             Sampler sampler(settings_.sampler, settings_.seed);
             FilmSink sink(film_, techniques_.get(), splat_scale, work.stats);
             const uint64_t end = std::min(pixels, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
                 sampler.start(index, pixel);
-                sink.begin(pixel, work.z.film_weight);
-                integrator_->sample({scene_, film_, pixel, light_paths, splat_scale, sampler, sink},
-                                    work);
-                sink.end();
+                use(chunk,
+                    SampleContext{scene_, film_, pixel, light_paths, splat_scale, sampler, sink},
+                    work, sink);
             }
+        });
+    };
+    workers_->arena.execute([&] {
+        integrator_->begin_pass({scene_, index, light_paths, chunks, [&](const auto& use) {
+                                     for_each_sample([&](uint64_t chunk, const SampleContext& c,
+                                                         Workspace& work, FilmSink&) {
+                                         use(chunk, c, work);
+                                     });
+                                 }});
+        for_each_sample([&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {
+            sink.begin(c.pixel, work.z.film_weight);
+            integrator_->sample(c, work);
+            sink.end();
         });
         film_.end_pass();
         if (techniques_) techniques_->end_pass();

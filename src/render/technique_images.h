@@ -1,7 +1,8 @@
 #pragma once
 // One image per technique, weighted and unweighted: Veach's pyramid.
 
-#include <memory>
+#include <atomic>
+#include <mutex>
 #include <vector>
 
 #include "film/film.h"
@@ -27,17 +28,20 @@ public:
     };
     /// Those that received anything, by length, then s.
     std::vector<Entry> images() const;
+    /// At most, without pairs.
     static size_t memory_bytes(uint64_t pixels, int max_edges);
 
 private:
     struct Layer;
-    Layer* layer(const Technique& technique) const;
+    /// Made when it is first asked for.
+    Layer* layer(const Technique& technique);
 
     FilmGeometry geometry_;
     const ReconstructionFilter& filter_;
     int max_edges_;
     uint64_t passes_ = 0;
-    std::vector<std::unique_ptr<Layer>> layers_;  ///< By number of vertices, then s.
+    std::vector<std::atomic<Layer*>> layers_;  ///< By number of vertices, then s, then pairs.
+    std::mutex creation_;
 };
 
 }  // namespace etendue

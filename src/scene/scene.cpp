@@ -22,16 +22,22 @@ Scene::Scene() = default;
 Scene::~Scene() = default;
 Scene::Scene(Scene&&) noexcept = default;
 
-void Scene::surface(const RayHit& raw, SurfaceHit& hit) const {
-    const SceneShape& s = shapes_[raw.shape];
-    hit.shape = &s;
-    hit.prim = raw.prim;
+SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
+    const SceneShape& s = shapes_[at.shape];
+    SurfaceGeometry g;
     if (const auto* mesh = s.is_mesh ? static_cast<const TriangleMesh*>(s.shape) : nullptr)
-        hit.geometry = mesh->TriangleMesh::surface(raw.prim, raw.u, raw.v, s.needs_tangents);
+        g = mesh->TriangleMesh::surface(at.prim, at.u, at.v, s.needs_tangents);
     else
-        hit.geometry = s.shape->surface(raw.prim, raw.u, raw.v, s.needs_tangents);
-    if (raw.instance != kNoInstance)
-        transform_geometry(accelerator_.instance_transform(raw.instance), hit.geometry);
+        g = s.shape->surface(at.prim, at.u, at.v, s.needs_tangents);
+    if (at.instance != kNoInstance)
+        transform_geometry(accelerator_.instance_transform(at.instance), g);
+    return g;
+}
+
+void Scene::fill_hit(const RayHit& raw, SurfaceHit& hit) const {
+    hit.geometry = surface(raw);
+    hit.shape = &shapes_[raw.shape];
+    hit.location = raw;
     hit.t = raw.t;
 }
 
@@ -40,7 +46,7 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit) const {
     float travelled = 0;
     RayHit raw;
     while (accelerator_.intersect(r, raw)) {
-        surface(raw, hit);
+        fill_hit(raw, hit);
         hit.t += travelled;
         if (!has_masks_ || hit.shape->material->is_opaque()) return true;
         const float opacity = hit.shape->material->opacity(hit.geometry.uv);
@@ -59,7 +65,7 @@ float Scene::masked_transmittance(Ray r) const {
     SurfaceHit hit;
     const float length_d = length(r.d);
     while (accelerator_.intersect(r, raw)) {
-        surface(raw, hit);
+        fill_hit(raw, hit);
         if (hit.shape->material->is_opaque()) return 0;
         Tr *= 1 - hit.shape->material->opacity(hit.geometry.uv);
         if (Tr == 0) return 0;

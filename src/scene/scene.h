@@ -35,7 +35,7 @@ struct SceneShape {
 struct SurfaceHit {
     SurfaceGeometry geometry;
     const SceneShape* shape;
-    uint32_t prim;
+    SurfaceLocation location;
     float t;
 };
 
@@ -58,6 +58,9 @@ public:
     /// Nearest surface. Masked surfaces let the ray pass with probability 1 - opacity, decided by `u`, which is
     /// rescaled by each decision.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit) const;
+    /// Geometry of a surface point that a ray met before.
+    SurfaceGeometry surface(const SurfaceLocation& location) const;
+    const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
     /// Transmittance of masks along the open segment between two points, their surfaces left out by offsets along
     /// `ng`; 0 where something is in the way. For a point at infinity use `transmittance_to_infinity`.
     float transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
@@ -99,7 +102,7 @@ public:
 
 private:
     friend class SceneBuilder;
-    void surface(const RayHit& raw, SurfaceHit& hit) const;
+    void fill_hit(const RayHit& raw, SurfaceHit& hit) const;
     float masked_transmittance(Ray ray) const;
 
     std::string file_;

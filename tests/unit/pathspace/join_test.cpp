@@ -48,10 +48,12 @@ std::vector<Case> cases() {
     };
 }
 
-class Joins : public testing::TestWithParam<Case> {
+enum class Pairs { None, Merges, Gathers };
+
+class Joins : public testing::TestWithParam<std::tuple<Case, Pairs>> {
 protected:
     Joins()
-        : scene(test::build(GetParam().xml)), film(scene.film(), scene.filter()),
+        : scene(test::build(std::get<Case>(GetParam()).xml)), film(scene.film(), scene.filter()),
           sampler(SamplerKind::Independent, 7) {
         const float N = kPixels * kPixels;
         counts = {.hit = 1,
@@ -59,7 +61,15 @@ protected:
                   .connect = 1,
                   .splat = N,
                   .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
+        if (pairs() != Pairs::None) {
+            (pairs() == Pairs::Merges ? counts.merge : counts.gather) = N;
+            // Large enough for the clamp of gathers to matter now and then.
+            counts.disc = 0.3f;
+            counts.min_pair_edges = pairs() == Pairs::Merges ? 2 : 3;
+        }
     }
+
+    static Pairs pairs() { return std::get<Pairs>(GetParam()); }
 
     /// Both sub-paths of sample `index`, without roulette.
     void trace(uint32_t index) {
@@ -116,6 +126,27 @@ protected:
         check(*j, x, density_of(y, s) * to_area(y.flight.pdf_sa, a, lens));
     }
 
+    /// Any two vertices taken for a pair: contribution and weight are those of the path without the dropped one.
+    void check_gather(int s, int t) {
+        if (!y[s - 1].may_connect || !z[t - 1].may_connect) return;
+        const auto drops_eye = drops_eye_vertex_of_pair(y, s, z, t);
+        if (!drops_eye) return;
+        const auto j = join_gather(scene, y, s, z, t, counts, *drops_eye);
+        if (!j) return;
+        const auto x = path_vertices(y, *drops_eye ? s : s - 1, z, *drops_eye ? t - 1 : t);
+        const int n = int(x.size()), m = s - 1;
+        for (int i = 0; i < n; ++i) {
+            const bool is_end = *drops_eye ? i == m || i == m + 1 : i == m || i == m - 1;
+            if (!is_end && x[size_t(i)]->is_delta) return;
+        }
+        const PathValue value = evaluate_path(scene, x, std::vector<bool>(x.size(), false));
+        const double p = density_of(y, *drops_eye ? s : s - 1) * density_of(z, *drops_eye ? t - 1 : t);
+        Tally& tally = tallies[Strategy::Gather];
+        for (int c = 0; c < 3; ++c)
+            if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);
+        tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
+    }
+
     /// Rays start a little off their surface, so on short edges the walk's directions differ from those between the stored
     /// points: a few comparisons deviate by more than rounding. A wrong factor makes all of its strategy deviate.
     struct Tally {
@@ -149,6 +180,8 @@ TEST_P(Joins, EqualTheDefinition) {
             for (int t = 2; t <= z.size(); ++t)
                 if (const auto j = join_connect(scene, y, s, z, t, counts))
                     check(*j, path_vertices(y, s, z, t), density_of(y, s) * density_of(z, t));
+        for (int s = 2; s <= y.size() && counts.gather > 0; ++s)
+            for (int t = 2; t <= z.size(); ++t) check_gather(s, t);
         for (int t = 2; t <= z.size(); ++t)
             for_each_hit(scene, z, t, counts, [&](const Join& j) {
                 Vertex x0 = z[t - 1];
@@ -231,8 +264,15 @@ TEST_P(Joins, StoredSumsEqualTheExplicitSum) {
     EXPECT_LT(tallies[Strategy::Connect].deviating, 0.002 * compared + 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Joins, testing::ValuesIn(cases()),
-                         [](const auto& p) { return std::string(p.param.name); });
+const auto kName = [](const testing::TestParamInfo<std::tuple<Case, Pairs>>& p) {
+    const char* suffix[] = {"", "_merges", "_gathers"};
+    return std::get<Case>(p.param).name + std::string(suffix[int(std::get<Pairs>(p.param))]);
+};
+INSTANTIATE_TEST_SUITE_P(Scenes, Joins,
+                         testing::Combine(testing::ValuesIn(cases()),
+                                          testing::Values(Pairs::None, Pairs::Merges,
+                                                          Pairs::Gathers)),
+                         kName);
 
 }  // namespace
 }  // namespace etendue

@@ -1,0 +1,68 @@
+#include "integrator/bidirectional.h"
+
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace etendue {
+
+std::vector<ParamInfo> Bidirectional::params() {
+    std::vector<ParamInfo> params = depth_params();
+    params.push_back({"roulette", ParamKind::Float, "0.05",
+                      "Joins that would add less than this share of the pixel's luminance (as "
+                      "earlier passes have it) are tested "
+                      "with a probability proportional to what they add; 0: all are tested."});
+    return params;
+}
+
+Bidirectional::Bidirectional(const IntegratorParams& p)
+    : depth_(DepthOptions::from(p)), roulette_(p.number("roulette")) {
+    if (!(roulette_ >= 0 && roulette_ <= 1))
+        throw std::runtime_error(fmt::format("{}: roulette must lie in [0, 1]", p.integrator()));
+}
+
+void Bidirectional::light_path(const SampleContext& c, const TechniqueCounts& counts,
+                               Workspace& work) const {
+    SubPath& y = work.y;
+    // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
+    const WalkOptions walk{depth_.max_depth + c.scene.sensor().has_finite_lens(), depth_.rr_depth};
+    if (!start_light_path(c.scene, c.sampler, y, work.stats)) return;
+    for (int s = 1; s <= y.size() && s <= depth_.max_depth; ++s) {
+        if (counts.splat > 0)
+            add_if_visible(c, join_splat(c.scene, y, s, c.sampler, counts), work);
+        if (s >= 2)
+            extend<TransportMode::Importance>(c.scene, c.sampler, walk, counts, y, work.stats);
+        add_if_visible(c, join_hit_lens(c.scene, y, s, counts), work);
+    }
+}
+
+void Bidirectional::add_if_visible(const SampleContext& c, const std::optional<Join>& j,
+                                   Workspace& work) const {
+    if (!j) return;
+    const bool is_splat = j->technique.t <= 1;
+    Rgb contribution = j->contribution;
+    if (roulette_ > 0) {
+        const float expected =
+            is_splat ? c.film.expected_luminance(j->film) : c.film.expected_luminance(c.pixel);
+        const float share =
+            j->mis_weight * (is_splat ? c.splat_scale : std::fabs(work.z.film_weight));
+        const float q = join_survival(luminance(contribution) * share, roulette_ * expected);
+        if (q < 1) {
+            c.sampler.seek(Stream::Roulette,
+                           uint32_t(j->technique.s) << 16 | uint32_t(j->technique.t));
+            if (!(c.sampler.next_1d_unstructured() < q)) {
+                ++work.stats.joins_skipped;
+                return;
+            }
+            contribution *= 1 / q;
+        }
+    }
+    const float Tr = visibility(c.scene, *j, work.stats);
+    if (!(Tr > 0)) return;
+    if (is_splat)
+        c.sink.add_splat(j->film, j->technique, contribution * Tr, j->mis_weight);
+    else
+        c.sink.add_eye(j->technique, contribution * Tr, j->mis_weight);
+}
+
+}  // namespace etendue

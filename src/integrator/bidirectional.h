@@ -1,0 +1,64 @@
+#pragma once
+// What the bidirectional integrators share: both sub-paths with their joins, and the roulette before shadow rays.
+
+#include <cmath>
+#include <optional>
+
+#include "integrator/integrator.h"
+
+namespace etendue {
+
+class Bidirectional {
+public:
+    static std::vector<ParamInfo> params();
+    explicit Bidirectional(const IntegratorParams& params);
+
+    /// Counts of bidirectional path tracing, without pairs.
+    static TechniqueCounts counts(const SampleContext& c) {
+        const float N = float(c.light_paths);
+        return {.hit = 1,
+                .next_event = 1,
+                .connect = 1,
+                .splat = N,
+                .hit_lens = c.scene.sensor().has_finite_lens() ? N : 0.0f};
+    }
+
+    /// The light sub-path work.y, with its techniques t ≤ 1.
+    void light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
+
+    /// The eye sub-path work.z with its techniques t ≥ 2, connected to work.y. `at_vertex(t)` is called for every
+    /// z_{t-1} that may be joined, while it is the last.
+    template <class AtVertex>
+    void eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
+                  const AtVertex& at_vertex) const {
+        SubPath &y = work.y, &z = work.z;
+        start_eye_path(c.scene, c.film, c.pixel, c.sampler, z, work.stats);
+        const WalkOptions walk = depth_.walk();
+        for (int t = 2; t <= z.size(); ++t) {
+            if (counts.hit > 0)
+                for_each_hit(c.scene, z, t, counts, [&](const Join& j) {
+                    c.sink.add_eye(j.technique, j.contribution, j.mis_weight);
+                });
+            if (z[t - 1].may_connect) at_vertex(t);
+            if (t > depth_.max_depth) break;
+            if (z[t - 1].may_connect && counts.connect > 0) {
+                add_if_visible(c, join_next_event(c.scene, z, t, c.sampler, counts), work);
+                const int longest = std::min(y.size(), depth_.max_depth + 1 - t);
+                for (int s = 2; s <= longest; ++s)
+                    add_if_visible(c, join_connect(c.scene, y, s, z, t, counts), work);
+            }
+            extend<TransportMode::Radiance>(c.scene, c.sampler, walk, counts, z, work.stats);
+        }
+    }
+
+    int max_depth() const { return depth_.max_depth; }
+
+private:
+    void add_if_visible(const SampleContext& c, const std::optional<Join>& j,
+                        Workspace& work) const;
+
+    DepthOptions depth_;
+    float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
+};
+
+}  // namespace etendue

@@ -1,0 +1,36 @@
+#pragma once
+// The light vertices of a pass from which eye vertices choose partners.
+
+#include "integrator/bidirectional.h"
+#include "pathspace/light_paths.h"
+#include "pathspace/point_grid.h"
+
+namespace etendue {
+
+class Photons {
+public:
+    /// Traces all light paths of the pass, with the techniques t ≤ 1, and keeps them. Connectible vertices y_i, i ≥ 1,
+    /// can be found within `radius`.
+    void trace(const PassContext& pass, const Bidirectional& paths, const TechniqueCounts& counts,
+               float radius);
+
+    const LightPaths& paths() const { return paths_; }
+    /// Calls use(vertex) for the numbers of the light vertices nearer to `p` than the radius.
+    template <class Use>
+    void for_each_near(Vec3 p, const Use& use) const {
+        grid_.for_each_near(p, radius_, use);
+    }
+    float radius() const { return radius_; }
+
+private:
+    LightPaths paths_;
+    PointGrid grid_;
+    float radius_ = 0;
+    std::vector<LightPaths::Chunk> chunks_;
+};
+
+/// The parameter `radius`, or where it is 0 a default from the size of the scene: 0.3 % of the bounding radius.
+float gather_radius(float given, const Scene& scene);
+ParamInfo radius_param();
+
+}  // namespace etendue

@@ -1,0 +1,131 @@
+#include "pathspace/light_paths.h"
+
+#include <stdexcept>
+
+namespace etendue {
+
+void LightPaths::Chunk::clear() {
+    heads_.clear();
+    vertices_.clear();
+}
+
+void LightPaths::Chunk::add(const SubPath& y) {
+    Head& head = heads_.emplace_back();
+    head.begin = head.end = uint32_t(vertices_.size());
+    if (y.size() == 0) return;
+    const Vertex& y0 = y[0];
+    head.emitter = y0.emitter;
+    head.p = y0.p;
+    head.ng = y0.ng;
+    head.uv = y0.uv;
+    head.prim = y0.location.prim;
+    head.pdf_fwd = y0.pdf_fwd;
+    head.beta = y0.beta;
+    if (y.size() >= 2) head.next_event_ratio = y[1].next_event_ratio;
+    for (int i = 1; i < y.size(); ++i) {
+        const Vertex& v = y[i];
+        vertices_.push_back({.p = v.p,
+                             .beta = v.beta,
+                             .location = v.location,
+                             .pdf_fwd = v.pdf_fwd,
+                             .to_predecessor = v.to_predecessor,
+                             .weight_sum = float(v.weight_sum),
+                             .path = 0,
+                             .medium = v.medium,
+                             .is_delta = v.is_delta,
+                             .may_connect = v.may_connect});
+    }
+    head.end = uint32_t(vertices_.size());
+}
+
+void LightPaths::assemble(std::span<const Chunk> chunks) {
+    heads_.clear();
+    vertices_.clear();
+    size_t paths = 0, total = 0;
+    for (const Chunk& c : chunks) paths += c.heads_.size(), total += c.vertices_.size();
+    if (total >= UINT32_MAX)
+        throw std::runtime_error("a pass has more light vertices than can be kept; limit "
+                                 "max_depth, or render in crops");
+    heads_.reserve(paths);
+    vertices_.reserve(total);
+    for (const Chunk& c : chunks) {
+        const uint32_t offset = uint32_t(vertices_.size());
+        vertices_.insert(vertices_.end(), c.vertices_.begin(), c.vertices_.end());
+        for (Chunk::Head head : c.heads_) {
+            head.begin += offset, head.end += offset;
+            for (uint32_t i = head.begin; i < head.end; ++i)
+                vertices_[i].path = uint32_t(heads_.size());
+            heads_.push_back(head);
+        }
+    }
+}
+
+size_t LightPaths::memory_bytes() const {
+    return heads_.capacity() * sizeof(Chunk::Head) + vertices_.capacity() * sizeof(LightVertex);
+}
+
+void LightPaths::restore_head(uint64_t index, Vertex& y0) const {
+    const Chunk::Head& head = heads_[index];
+    y0.kind = Vertex::Kind::Emitter;
+    y0.emitter = head.emitter;
+    y0.is_infinite = head.emitter->is_infinite();
+    y0.has_cosine = head.emitter->is_area();
+    y0.p = head.p;
+    y0.ng = head.ng;
+    y0.uv = head.uv;
+    y0.location.prim = head.prim;
+    y0.may_connect = true;
+    y0.pdf_fwd = head.pdf_fwd;
+    y0.beta = head.beta;
+}
+
+void LightPaths::restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, SubPath& y,
+                                int i) const {
+    const LightVertex& stored = vertices_[vertex];
+    Vertex& v = y[i];
+    if (bsdf) {
+        const Vertex& previous = y[i - 1];
+        const Vec3 wo = previous.is_infinite ? previous.p : normalize(previous.p - stored.p);
+        v.set_surface(scene.shape(stored.location.shape), stored.location,
+                      scene.surface(stored.location), wo, y.arena);
+    } else {
+        v.kind = Vertex::Kind::Surface;
+        v.p = stored.p;
+        v.may_connect = stored.may_connect;
+    }
+    v.medium = stored.medium;
+    v.beta = stored.beta;
+    v.pdf_fwd = stored.pdf_fwd;
+    v.to_predecessor = stored.to_predecessor;
+    v.weight_sum = double(stored.weight_sum);
+    v.is_delta = stored.is_delta;
+    if (i == 1) v.next_event_ratio = heads_[stored.path].next_event_ratio;
+}
+
+void LightPaths::restore(const Scene& scene, uint64_t index, SubPath& y) const {
+    y.clear();
+    const Chunk::Head& head = heads_[index];
+    if (!head.emitter) return;
+    restore_head(index, y.append());
+    for (uint32_t vertex = head.begin; vertex < head.end; ++vertex) {
+        y.append();
+        restore_vertex(scene, vertex, true, y, y.size() - 1);
+    }
+}
+
+int LightPaths::restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, SubPath& y) const {
+    const uint64_t path = vertices_[vertex].path;
+    const uint32_t begin = heads_[path].begin;
+    const int last = int(vertex - begin) + 1;
+    y.clear();
+    restore_head(path, y.append());
+    for (int i = 1; i <= last; ++i) {
+        y.append();
+        // A BSDF looks toward its predecessor, whose place must be known.
+        if (i >= last - 2)
+            restore_vertex(scene, begin + uint32_t(i) - 1, i > last - bsdfs, y, i);
+    }
+    return last + 1;
+}
+
+}  // namespace etendue

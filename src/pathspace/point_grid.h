@@ -1,0 +1,71 @@
+#pragma once
+// Points within a distance of another: a hashed grid, built by counting.
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "math/hash.h"
+#include "math/vec.h"
+
+namespace etendue {
+
+class PointGrid {
+public:
+    /// A point and the caller's number for it.
+    struct Entry {
+        Vec3 p;
+        uint32_t index;
+    };
+
+    /// For queries of up to `radius`. The order of the entries decides that of the answers.
+    void build(std::span<const Entry> entries, float radius);
+
+    /// Calls use(index) for every point nearer to `p` than `radius`, at most that of build().
+    template <class Use>
+    void for_each_near(Vec3 p, float radius, const Use& use) const {
+        if (entries_.empty()) return;
+        // Cells are twice the radius wide, so that a ball meets at most eight.
+        const Vec3 scaled = p * inv_cell_;
+        const int x0 = low(scaled.x), y0 = low(scaled.y), z0 = low(scaled.z);
+        const float radius2 = radius * radius;
+        for (int corner = 0; corner < 8; ++corner) {
+            const Cell cell{x0 + (corner & 1), y0 + (corner >> 1 & 1), z0 + (corner >> 2)};
+            const uint32_t bucket = bucket_of(cell);
+            for (uint32_t i = begins_[bucket]; i < begins_[bucket + 1]; ++i) {
+                const Entry& e = entries_[i];
+                // Other cells may share the bucket.
+                if (length2(e.p - p) < radius2 && cell_of(e.p) == cell) use(e.index);
+            }
+        }
+    }
+    size_t memory_bytes() const {
+        return entries_.capacity() * sizeof(Entry) + begins_.capacity() * sizeof(uint32_t);
+    }
+
+private:
+    struct Cell {
+        int x, y, z;
+        friend bool operator==(const Cell&, const Cell&) = default;
+    };
+    /// The lower of the two cells that a ball meets along one axis.
+    static int low(float scaled) { return int(std::floor(scaled - 0.5f)); }
+    Cell cell_of(Vec3 p) const {
+        const Vec3 s = p * inv_cell_;
+        return {int(std::floor(s.x)), int(std::floor(s.y)), int(std::floor(s.z))};
+    }
+    uint32_t bucket_of(const Cell& c) const {
+        const uint64_t key = uint64_t(uint32_t(c.x)) * 0x9e3779b97f4a7c15ull ^
+                             uint64_t(uint32_t(c.y)) * 0xc2b2ae3d27d4eb4full ^
+                             uint64_t(uint32_t(c.z)) * 0x165667b19e3779f9ull;
+        return uint32_t(mix64(key)) & mask_;
+    }
+
+    float inv_cell_ = 1;
+    uint32_t mask_ = 0;
+    std::vector<uint32_t> begins_;  ///< Of each bucket; one more than there are.
+    std::vector<Entry> entries_;    ///< Sorted by bucket.
+};
+
+}  // namespace etendue
