@@ -152,6 +152,23 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     return s;
 }
 
+float Bsdf::max_pdf(Vec3 wo, const DirectionCone& cone) const {
+    float sum = 0;
+    for (const BsdfComponent* c = &first_; c; c = c->next) {
+        const Vec3 local_wo = c->frame.to_local(wo);
+        const DirectionCone local{c->frame.to_local(cone.axis), cone.angle};
+        sum += c->weight *
+               std::visit([&](const auto& l) { return l.max_pdf(local_wo, local); }, c->lobe);
+    }
+    return sum;
+}
+
+std::optional<Vec3> Bsdf::diffuse_normal() const {
+    if (first_.next || first_.weight != 1 || !std::holds_alternative<DiffuseLobe>(first_.lobe))
+        return {};
+    return first_.frame.n;
+}
+
 bool Bsdf::has_delta() const {
     for (const BsdfComponent* c = &first_; c; c = c->next)
         if (std::visit([](const auto& l) { return l.has_delta(); }, c->lobe)) return true;

@@ -45,6 +45,11 @@ public:
     /// A direction with weight f̃·|wi·ng| / pdf; nothing where the walk ends.
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const;
 
+    /// Bound of eval(wo, w).pdf over the directions w of a cone; kInf where none is known.
+    float max_pdf(Vec3 wo, const DirectionCone& cone) const;
+    /// Shading normal of a surface that is diffuse alone; its density is that of the cosine about it.
+    std::optional<Vec3> diffuse_normal() const;
+
     /// Whether some lobe is smooth, so that connections can be made here.
     bool has_smooth() const { return has_smooth_; }
     bool has_delta() const;

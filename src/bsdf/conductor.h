@@ -18,6 +18,7 @@ struct ConductorLobe {
                           .pdf_rev = 1,
                           .is_delta = true};
     }
+    float max_pdf(Vec3 /*wo*/, const DirectionCone& /*c*/) const { return 0; }
     Rgb albedo_estimate() const { return reflectance * fresnel_conductor(1, eta, k); }
     float roughness() const { return 0; }
     bool has_smooth() const { return false; }

@@ -28,6 +28,7 @@ struct DielectricLobe {
                           .eta = fresnel.eta,
                           .is_delta = true};
     }
+    float max_pdf(Vec3 /*wo*/, const DirectionCone& /*c*/) const { return 0; }
     Rgb albedo_estimate() const {
         return lerp(fresnel_dielectric(1, eta).R, transmittance, reflectance);
     }

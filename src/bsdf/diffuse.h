@@ -20,6 +20,9 @@ struct DiffuseLobe {
         return BsdfSample{
             .wi = wi, .weight = reflectance, .pdf = wi.z * kInvPi, .pdf_rev = wo.z * kInvPi};
     }
+    float max_pdf(Vec3 /*wo*/, const DirectionCone& c) const {
+        return std::fmax(c.max_cos({0, 0, 1}), 0.0f) * kInvPi;
+    }
     Rgb albedo_estimate() const { return reflectance; }
     float roughness() const { return 1; }
     bool has_smooth() const { return true; }

@@ -2,6 +2,7 @@
 // A lobe is one closed-form scattering model with its parameters looked up. It works in local coordinates (z = shading
 // normal) and knows nothing of the direction of transport; `Bsdf` (bsdf.h) adds that.
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -33,6 +34,19 @@ struct BsdfSample {
     bool is_delta = false;
 };
 
+/// All directions within `angle` (radians, at most π) of `axis`.
+struct DirectionCone {
+    Vec3 axis;
+    float angle;
+
+    /// Bound of dot(w, n) over the cone. The slack covers the rounding of acos near 0 and π.
+    float max_cos(Vec3 n) const {
+        constexpr float kSlack = 1e-3f;
+        const float a = std::acos(clamp(dot(axis, n), -1.0f, 1.0f)) - angle - kSlack;
+        return a > 0 ? std::cos(a) : 1.0f;
+    }
+};
+
 /// The sample of a smooth lobe from its value and densities; nothing where it cannot have been sampled.
 inline std::optional<BsdfSample> make_sample(Vec3 wi, const BsdfEval& e) {
     if (!(e.pdf > 0)) return {};
@@ -47,6 +61,7 @@ inline std::optional<BsdfSample> make_sample(Vec3 wi, const BsdfEval& e) {
 //   float roughness() const           GGX-like α of the *sharpest smooth* lobe: 0 delta only … 1 diffuse
 //   bool has_smooth() const, has_delta() const
 //   bool kUsesLobeChoice              whether sample() reads u_lobe
+//   float max_pdf(Vec3 wo, const DirectionCone& c) const   bound of eval(wo, wi).pdf for wi in c; kInf if unknown
 // `wo` and `wi` are unit vectors in local coordinates, away from the surface. A reflecting-only lobe is black for
 // wo.z <= 0 (Material's two-sided wrapper turns the frame). A smooth lobe may share its model with a delta one.
 

@@ -80,6 +80,29 @@ Vec3 sample_visible_ggx(Vec3 w_std, Vec2 u) {
 
 }  // namespace
 
+float Microfacet::max_D_of_halfway(Vec3 wo, const DirectionCone& c) const {
+    constexpr float kSlack = 1e-3f;  // for acos
+    const Vec3 h = wo + c.axis;
+    const float length_h = length(h);
+    float theta = 0;
+    if (length_h > 1e-3f) {
+        const float cos_d = std::cos(
+            std::acos(clamp(0.5f * length_h, 0.0f, 1.0f)) + 0.5f * c.angle + kSlack);
+        if (cos_d > 0)
+            theta = std::acos(clamp(h.z / length_h, -1.0f, 1.0f)) - c.angle / (2 * cos_d) - kSlack;
+    }
+    if (theta >= 0.5f * kPi) return 0;
+    const float cos2 = theta > 0 ? sqr(std::cos(theta)) : 1.0f, sin2 = 1 - cos2;
+    const float max_alpha2 = sqr(std::fmax(alpha_x_, alpha_y_)), norm = kPi * alpha_x_ * alpha_y_;
+    if (kind_ == Kind::Ggx) {
+        // Monotone for α ≤ 1 only; beyond that the peak lies at the horizon.
+        return max_alpha2 > 1 ? kInf : 1 / (norm * sqr(cos2 + sin2 / max_alpha2));
+    }
+    // exp(-tan²θ/α²)/cos⁴θ has its maximum at tan²θ = 2α² - 1.
+    const float tan2 = std::fmax(sin2 / cos2, 2 * max_alpha2 - 1);
+    return std::exp(-tan2 / max_alpha2) * sqr(1 + tan2) / norm;
+}
+
 Vec3 Microfacet::sample_visible(Vec3 w, Vec2 u) const {
     // Stretched so that the roughness is one; normals stretch back with the inverse transpose.
     const Vec3 w_std = normalize({alpha_x_ * w.x, alpha_y_ * w.y, w.z});

@@ -34,6 +34,10 @@ public:
         return density > 0 ? density / (norm * sqr(cos2)) : 0;
     }
 
+    /// Bound of D over the halfway vectors of `wo` and all directions of a cone. As wi turns by dα the halfway vector
+    /// turns by at most dα / (2 cos θ_d), θ_d = ∠(wo, m) = ∠(wo, wi)/2; D falls with θ_m.
+    float max_D_of_halfway(Vec3 wo, const DirectionCone& c) const;
+
     /// Projected area σ(w), for `w` on either side.
     float sigma(Vec3 w) const {
         const float cos = std::fabs(w.z), s2 = sqr(alpha_x_ * w.x) + sqr(alpha_y_ * w.y);

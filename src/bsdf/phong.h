@@ -14,6 +14,11 @@ struct PhongLobe {
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const;
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const;
+    float max_pdf(Vec3 wo, const DirectionCone& c) const {
+        const float lobe = std::pow(std::fmax(c.max_cos(reflect(wo)), 0.0f), exponent);
+        return specular_probability * (exponent + 1) * lobe * (0.5f * kInvPi) +
+               (1 - specular_probability) * std::fmax(c.max_cos({0, 0, 1}), 0.0f) * kInvPi;
+    }
     Rgb albedo_estimate() const { return diffuse + specular; }
     /// The GGX or Beckmann α of about the same highlight.
     float roughness() const { return specular_probability > 0 ? std::sqrt(2 / (exponent + 2)) : 1; }

@@ -15,6 +15,7 @@ struct RoughDielectricLobe {
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const;
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const;
+    float max_pdf(Vec3 /*wo*/, const DirectionCone& /*c*/) const { return kInf; }
     Rgb albedo_estimate() const {
         return lerp(fresnel_dielectric(1, eta).R, transmittance, reflectance);
     }

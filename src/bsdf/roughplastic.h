@@ -45,6 +45,12 @@ struct RoughPlasticLobe {
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const;
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const;
+    float max_pdf(Vec3 wo, const DirectionCone& c) const {
+        const float To = RoughTransmittance::lookup(transmittance, wo.z);
+        const float q = coat_probability(1 - To, specular_share);
+        return q * 0.25f * distribution.max_D_of_halfway(wo, c) / distribution.sigma(wo) +
+               (1 - q) * std::fmax(c.max_cos({0, 0, 1}), 0.0f) * kInvPi;
+    }
     Rgb albedo_estimate() const {
         const float T = RoughTransmittance::lookup(transmittance, 1);
         return specular * (1 - T) + diffuse * sqr(T);

@@ -20,6 +20,7 @@ struct ThinDielectricLobe {
         return BsdfSample{
             .wi = -wo, .weight = transmittance, .pdf = 1 - R, .pdf_rev = 1 - R, .is_delta = true};
     }
+    float max_pdf(Vec3 /*wo*/, const DirectionCone& /*c*/) const { return 0; }
     Rgb albedo_estimate() const { return lerp(pane_reflectance(1), transmittance, reflectance); }
     float roughness() const { return 0; }
     bool has_smooth() const { return false; }

@@ -81,6 +81,7 @@ public:
 
     double power() const override { return power_; }
     bool is_area() const override { return true; }
+    float max_pdf_d() const override { return kInvPi; }
 
 private:
     ShapeSample sample_point(Vec2 u) const {

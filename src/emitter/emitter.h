@@ -72,6 +72,16 @@ public:
     };
     virtual Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const = 0;
 
+    /// Bound of the density of directions from a point of a finite emitter; kInf where none is known.
+    virtual float max_pdf_d() const { return kInf; }
+    /// The disc from which an emitter at infinity lights the scene; for light that travels along -d it lies around
+    /// center + d·radius, normal to d.
+    struct Disc {
+        Vec3 center;
+        float radius;
+    };
+    virtual Disc disc() const { return {}; }
+
     virtual bool is_infinite() const { return false; }
     /// True where an eye path can never hit it.
     virtual bool is_delta() const { return false; }

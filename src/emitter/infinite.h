@@ -13,6 +13,7 @@ public:
     EmitterHit eval_infinite(Vec3 d) const final;
     Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const final;
     bool is_infinite() const final { return true; }
+    Disc disc() const final { return {center_, radius_}; }
     void set_scene_bounds(Vec3 center, float radius) final;
 
 protected:

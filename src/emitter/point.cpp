@@ -33,6 +33,7 @@ public:
     Emission eval_emission(Vec3, Vec2, Vec3 w) const override {
         return {intensity(w), pdf_direction(w)};
     }
+    float max_pdf_d() const override { return kUniformSpherePdf; }
     double power() const override { return 4 * double(kPi) * luminance(intensity_); }
     bool is_delta() const override { return true; }
 
@@ -52,6 +53,7 @@ public:
           cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
           cos_cutoff_(std::cos(cutoff_)), cos_beam_(std::cos(beam_)) {}
 
+    float max_pdf_d() const override { return pdf_uniform_cone(cos_cutoff_); }
     double power() const override {
         return 2 * double(kPi) * luminance(intensity_) *
                (1 - 0.5 * (double(cos_cutoff_) + cos_beam_));

@@ -36,33 +36,39 @@ void Bidirectional::light_path(const SampleContext& c, const TechniqueCounts& co
     }
 }
 
-void Bidirectional::add_if_visible(const SampleContext& c, const std::optional<Join>& j,
-                                   Workspace& work) const {
-    if (!j) return;
-    const bool is_splat = j->technique.t <= 1;
-    Rgb contribution = j->contribution;
+std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, float scale,
+                                       uint32_t number, Workspace& work) const {
+    Rgb contribution = j.contribution;
     if (roulette_ > 0) {
-        const float expected =
-            is_splat ? c.film.expected_luminance(j->film) : c.film.expected_luminance(c.pixel);
-        const float share =
-            j->mis_weight * (is_splat ? c.splat_scale : std::fabs(work.z.film_weight));
-        const float q = join_survival(luminance(contribution) * share, roulette_ * expected);
+        const float expected = j.technique.t <= 1 ? c.film.expected_luminance(j.film)
+                                                  : c.film.expected_luminance(c.pixel);
+        const float q = join_survival(luminance(contribution) * j.mis_weight * scale,
+                                      roulette_ * expected);
         if (q < 1) {
-            c.sampler.seek(Stream::Roulette,
-                           uint32_t(j->technique.s) << 16 | uint32_t(j->technique.t));
+            c.sampler.seek(Stream::Roulette, number);
             if (!(c.sampler.next_1d_unstructured() < q)) {
                 ++work.stats.joins_skipped;
-                return;
+                return {};
             }
             contribution *= 1 / q;
         }
     }
-    const float Tr = visibility(c.scene, *j, work.stats);
-    if (!(Tr > 0)) return;
-    if (is_splat)
-        c.sink.add_splat(j->film, j->technique, contribution * Tr, j->mis_weight);
-    else
-        c.sink.add_eye(j->technique, contribution * Tr, j->mis_weight);
+    const float Tr = visibility(c.scene, j, work.stats);
+    if (!(Tr > 0)) return {};
+    return contribution * Tr;
+}
+
+void Bidirectional::add_if_visible(const SampleContext& c, const std::optional<Join>& j,
+                                   Workspace& work) const {
+    if (!j) return;
+    const Technique& q = j->technique;
+    const uint32_t number = uint32_t(q.s) << 16 | uint32_t(q.t);
+    if (q.t <= 1) {
+        if (const auto value = test(c, *j, c.splat_scale, number, work))
+            c.sink.add_splat(j->film, q, *value, j->mis_weight);
+    } else if (const auto value = test(c, *j, std::fabs(work.z.film_weight), number, work)) {
+        c.sink.add_eye(q, *value, j->mis_weight);
+    }
 }
 
 }  // namespace etendue

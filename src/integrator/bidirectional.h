@@ -51,6 +51,11 @@ public:
         }
     }
 
+    /// What is left of a join's contribution after the roulette and the shadow ray; nothing where they end it. A unit of
+    /// contribution adds `scale` to its pixel; `number` tells joins of one sample apart.
+    std::optional<Rgb> test(const SampleContext& c, const Join& join, float scale, uint32_t number,
+                            Workspace& work) const;
+
     int max_depth() const { return depth_.max_depth; }
 
 private:

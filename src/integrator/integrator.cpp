@@ -8,13 +8,14 @@
 #include "integrator/bdpt.h"
 #include "integrator/light.h"
 #include "integrator/path.h"
+#include "integrator/upg.h"
 #include "integrator/vcm.h"
 
 namespace etendue {
 
 const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {path_entry(), light_entry(), bdpt_entry(),
-                                                         vcm_entry()};
+                                                         vcm_entry(),  upg_entry(),   upg_bdpt_entry()};
     return entries;
 }
 

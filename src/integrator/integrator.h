@@ -20,6 +20,7 @@ enum class Estimator { Unbiased, Consistent, Biased };
 struct Workspace {
     SubPath y, z;
     SubPath pair;  ///< The other path of a pair of vertices.
+    Vertex scratch;
     RenderStats stats;
 };
 

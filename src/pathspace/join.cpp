@@ -181,16 +181,17 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
     const double kept = drops_eye ? edge->rev_a : edge->rev_b;
-    const double np = counts.gather * std::fmin(1, counts.disc * kept);
+    const double found = std::fmin(1, counts.disc * kept);
     return Join{.technique = {Strategy::Gather, s, t},
                 .contribution = edge->contribution,
-                .mis_weight = float(sqr(np) / edge->total),
+                .mis_weight = float(sqr(counts.gather * found) / edge->total),
                 .film = z.film,
                 .a = b.p,
                 .ng_a = b.ng,
                 .b = a.p,
                 .ng_b = a.has_cosine ? a.ng : Vec3{},
-                .to_infinity = a.is_infinite};
+                .to_infinity = a.is_infinite,
+                .found = float(found)};
 }
 
 std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,

@@ -15,6 +15,7 @@ struct Join {
     Vec2 film{};                    ///< Film point; that of the eye sub-path unless t ≤ 1.
     Vec3 a{}, ng_a{}, b{}, ng_b{};  ///< The edge to test; b is a direction where `to_infinity`.
     bool to_infinity = false;
+    float found = 1;  ///< Of a gather: approximate probability that the pair was found, eq. 24.
     bool needs_test = true;
 };
 

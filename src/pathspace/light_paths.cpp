@@ -19,6 +19,7 @@ void LightPaths::Chunk::add(const SubPath& y) {
     head.ng = y0.ng;
     head.uv = y0.uv;
     head.prim = y0.location.prim;
+    head.u_emission = y.u_emission;
     head.pdf_fwd = y0.pdf_fwd;
     head.beta = y0.beta;
     if (y.size() >= 2) head.next_event_ratio = y[1].next_event_ratio;
@@ -33,7 +34,8 @@ void LightPaths::Chunk::add(const SubPath& y) {
                              .path = 0,
                              .medium = v.medium,
                              .is_delta = v.is_delta,
-                             .may_connect = v.may_connect});
+                             .may_connect = v.may_connect,
+                             .survival = v.survival});
     }
     head.end = uint32_t(vertices_.size());
 }
@@ -64,8 +66,10 @@ size_t LightPaths::memory_bytes() const {
     return heads_.capacity() * sizeof(Chunk::Head) + vertices_.capacity() * sizeof(LightVertex);
 }
 
-void LightPaths::restore_head(uint64_t index, Vertex& y0) const {
+void LightPaths::restore_head(uint64_t index, SubPath& y) const {
     const Chunk::Head& head = heads_[index];
+    y.u_emission = head.u_emission;
+    Vertex& y0 = y.append();
     y0.kind = Vertex::Kind::Emitter;
     y0.emitter = head.emitter;
     y0.is_infinite = head.emitter->is_infinite();
@@ -99,6 +103,7 @@ void LightPaths::restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, 
     v.to_predecessor = stored.to_predecessor;
     v.weight_sum = double(stored.weight_sum);
     v.is_delta = stored.is_delta;
+    v.survival = stored.survival;
     if (i == 1) v.next_event_ratio = heads_[stored.path].next_event_ratio;
 }
 
@@ -106,7 +111,7 @@ void LightPaths::restore(const Scene& scene, uint64_t index, SubPath& y) const {
     y.clear();
     const Chunk::Head& head = heads_[index];
     if (!head.emitter) return;
-    restore_head(index, y.append());
+    restore_head(index, y);
     for (uint32_t vertex = head.begin; vertex < head.end; ++vertex) {
         y.append();
         restore_vertex(scene, vertex, true, y, y.size() - 1);
@@ -118,7 +123,7 @@ int LightPaths::restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, Su
     const uint32_t begin = heads_[path].begin;
     const int last = int(vertex - begin) + 1;
     y.clear();
-    restore_head(path, y.append());
+    restore_head(path, y);
     for (int i = 1; i <= last; ++i) {
         y.append();
         // A BSDF looks toward its predecessor, whose place must be known.

@@ -15,8 +15,9 @@ struct LightVertex {
     SurfaceLocation location;
     float pdf_fwd, to_predecessor, weight_sum;  ///< As in Vertex.
     uint32_t path;
-    MediumId medium;
-    bool is_delta, may_connect;
+    MediumId medium : 14;
+    bool is_delta : 1, may_connect : 1;
+    Survival survival;
 };
 static_assert(sizeof(LightVertex) == 64);
 
@@ -34,11 +35,10 @@ public:
         struct Head {
             const Emitter* emitter = nullptr;  ///< nullptr: the path has no vertex at all.
             Vec3 p, ng;
-            Vec2 uv;
+            Vec2 uv, u_emission;
             uint32_t prim = 0;
             float pdf_fwd = 0, next_event_ratio = 1;
             Rgb beta;
-            bool is_delta = false;
             uint32_t begin = 0, end = 0;
         };
         std::vector<Head> heads_;
@@ -59,7 +59,7 @@ public:
     int restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, SubPath& y) const;
 
 private:
-    void restore_head(uint64_t index, Vertex& y0) const;
+    void restore_head(uint64_t index, SubPath& y) const;
     void restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, SubPath& y, int i) const;
 
     std::vector<Chunk::Head> heads_;

@@ -5,10 +5,11 @@
 namespace etendue {
 namespace {
 
-/// Survival probability of Russian roulette at the last vertex: how much throughput is left of what it was at the
-/// first scattering vertex. η² of refractions is taken out, since it comes back when the path leaves the glass.
-float survival(const SubPath& path) {
-    return std::min(0.95f, path[path.size() - 1].beta.max() * path.eta2 / path[1].beta.max());
+/// Survival of Russian roulette at the last vertex: how much throughput is left of what it was at the first scattering
+/// vertex. η² of refractions is taken out, since it comes back when the path leaves the glass.
+Survival survival(const SubPath& path) {
+    const float left = path[path.size() - 1].beta.max() * path.eta2 / path[1].beta.max();
+    return Survival(left > 0 ? std::min(0.95f, left) : 0x1p-16f);
 }
 
 
@@ -74,6 +75,12 @@ RenderStats& RenderStats::operator+=(const RenderStats& o) {
     shadow_rays += o.shadow_rays;
     visible += o.visible;
     joins_skipped += o.joins_skipped;
+    pairs += o.pairs;
+    visible_pairs += o.visible_pairs;
+    trials += o.trials;
+    trial_rays += o.trial_rays;
+    bounds_exceeded += o.bounds_exceeded;
+    runaways += o.runaways;
     rejected += o.rejected;
     return *this;
 }
@@ -112,6 +119,7 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
     const Emitter& emitter = scene.sample_emitter(sampler.next_1d_if(scene.has_emitter_choice()));
     const Vec2 u_y0 = sampler.next_2d();
     const EmissionSample e = emitter.sample_emission(u_y0, sampler.next_2d());
+    y.u_emission = u_y0;
     if (!(e.pdf_y0 > 0)) return false;
 
     Vertex& y0 = y.append();
@@ -155,7 +163,8 @@ bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options,
     const Vec2 u_direction = sampler.next_2d();
     float q = 1;
     if (last >= options.rr_depth) {
-        q = survival(path);
+        v.survival = survival(path);
+        q = v.survival.value();
         if (!(sampler.next_1d() < q)) return false;
     }
     const auto s = v.bsdf.sample(v.wo, u_lobe, u_direction, mode);

@@ -1,6 +1,7 @@
 #pragma once
 // Vertices and sub-paths. A sub-path is walked once and then only read: joins and weights never change it.
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -9,6 +10,18 @@
 #include "scene/scene.h"
 
 namespace etendue {
+
+/// A probability in steps of 2^-16, so that what is kept of it compactly is what was decided by.
+class Survival {
+public:
+    Survival() = default;
+    /// Rounded up.
+    explicit Survival(float q) : steps_(uint16_t(std::ceil(q * 0x1p16f) - 1)) {}
+    float value() const { return float(steps_ + 1) * 0x1p-16f; }
+
+private:
+    uint16_t steps_ = 0xffff;
+};
 
 /// One end or scattering point with everything that connections and weights need.
 struct Vertex {
@@ -35,6 +48,7 @@ struct Vertex {
     bool has_cosine = true;     ///< A surface: |cos θ| belongs to G here.
     bool may_connect = false;   ///< Has a smooth lobe, or is an end point.
     MediumId medium = kVacuum;  ///< On the edge to the predecessor.
+    Survival survival;          ///< Of the roulette before the walk left this vertex.
     const SceneShape* shape = nullptr;
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or on the surface.
     SurfaceLocation location;  ///< Of a surface; of an emitter's y_0 only `prim`.
@@ -80,6 +94,7 @@ struct SubPath {
     float film_weight =
         1;  ///< Factor of the reconstruction filter, for contributions to the own pixel.
     Flight flight;
+    Vec2 u_emission;  ///< The numbers from which y_0 was made.
     float eta2 = 1;  ///< Product of η² over the refractions of an eye sub-path.
 
     int size() const { return size_; }
@@ -95,6 +110,7 @@ struct SubPath {
         v.is_delta = v.is_infinite = v.may_connect = false;
         v.has_cosine = true;
         v.medium = kVacuum;
+        v.survival = {};
         v.shape = nullptr;
         v.emitter = nullptr;
         return v;

@@ -123,6 +123,8 @@ protected:
         const Tiles path = render_tiles(scene, "path", {2 * factor * c.passes, 4, 1});
         expect_same_image(render_tiles(scene, "bdpt", {factor * c.passes, 4, 2}), path, resolution,
                           "bdpt against path");
+        expect_same_image(render_tiles(scene, "upg+bdpt:radius=0.12", {factor * c.passes, 4, 4}),
+                          path, resolution, "upg+bdpt against path");
         if (c.light)
             expect_same_image(render_tiles(scene, "light", {2 * factor * c.passes, 4, 3}), path,
                               2 * resolution, "light against path");

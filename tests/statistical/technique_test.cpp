@@ -2,6 +2,7 @@
 // whichever technique makes them; G is constant there, so that no connection has infinite variance.
 
 #include <map>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -14,7 +15,11 @@ namespace {
 
 constexpr int kSize = 8, kLongest = 6;
 
-class Techniques : public ::testing::TestWithParam<const char*> {
+struct TechniqueCase {
+    const char *name, *sensor, *integrator;
+};
+
+class Techniques : public ::testing::TestWithParam<TechniqueCase> {
 protected:
     /// Camera in an emitting sphere of albedo ½.
     static Scene furnace(const std::string& type) {
@@ -36,14 +41,15 @@ protected:
 };
 
 TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
-    const Scene scene = furnace(GetParam());
+    const Scene scene = furnace(GetParam().sensor);
     constexpr int kRuns = 24;
-    std::map<std::pair<int, int>, Moments> alone;  // by (s, t)
-    std::map<int, Moments> together;               // by length
+    std::map<std::tuple<bool, int, int>, Moments> alone;  // by (is it a pair, s, t)
+    std::map<int, Moments> together;                      // by length
     for (int run = 0; run < kRuns; ++run) {
         RenderSettings settings;
         settings.integrator =
-            IntegratorSpec::parse(fmt::format("bdpt:max_depth={},rr_depth=3,roulette=0", kLongest));
+            IntegratorSpec::parse(fmt::format("{}max_depth={},rr_depth=3,roulette=0",
+                                              GetParam().integrator, kLongest));
         settings.seed = uint64_t(run);
         settings.threads = 1;
         settings.spp = scene.sensor().has_finite_lens() ? 64 : 24;
@@ -54,10 +60,11 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         std::map<int, double> length_sum;
         std::vector<Rgb> sum(scene.film().pixel_count());
         for (const TechniqueImages::Entry& e : renderer.techniques()->images()) {
-            Moments& m = alone[{e.technique.s, e.technique.t}];
+            const Technique& q = e.technique;
+            Moments& m = alone[{is_pair(q.strategy), q.s, q.t}];
             while (m.count() < run) m.add(0);  // runs in which it made nothing
             m.add(mean(e.unweighted));
-            length_sum[e.technique.vertices() - 1] += mean(e.weighted);
+            length_sum[q.vertices() - 1] += mean(e.weighted);
             for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
         }
         for (const auto& [length, value] : length_sum) together[length].add(value);
@@ -70,7 +77,9 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         while (m.count() < kRuns) m.add(0);
     const bool lens = scene.sensor().has_finite_lens();
     size_t expected_count = 0;
-    for (int k = 1; k <= kLongest; ++k) expected_count += size_t(k + 1 + lens);
+    const bool gathers = GetParam().integrator[0] == 'u';
+    for (int k = 1; k <= kLongest; ++k)
+        expected_count += size_t(k + 1 + lens) + (gathers && k >= 3 ? size_t(k - 1) : 0);
     EXPECT_EQ(alone.size(), expected_count) << "a technique made nothing";
     const double level = testing::sidak(0.01, int(alone.size() + together.size()));
     // Few light paths meet the lens.
@@ -83,15 +92,21 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         EXPECT_LT(4 * std::sqrt(m.squared_error()), (is_rare ? 0.9 : 0.2) * exact)
             << what << ": too few samples";
     };
-    for (const auto& [q, m] : alone)
-        expect_mean(m, q.first + q.second - 1, q.second == 0,
-                    fmt::format("s = {}, t = {}", q.first, q.second));
+    for (const auto& [q, m] : alone) {
+        const auto [pair, s, t] = q;
+        expect_mean(m, s + t - 1 - pair, t == 0,
+                    fmt::format("{}s = {}, t = {}", pair ? "pair, " : "", s, t));
+    }
     for (const auto& [length, m] : together)
         expect_mean(m, length, false, fmt::format("length {}, weighted", length));
 }
 
-INSTANTIATE_TEST_SUITE_P(Sensors, Techniques, ::testing::Values("perspective", "thinlens"),
-                         [](const auto& p) { return std::string(p.param); });
+INSTANTIATE_TEST_SUITE_P(
+    Sensors, Techniques,
+    ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
+                      TechniqueCase{"thinlens", "thinlens", "bdpt:"},
+                      TechniqueCase{"gathers", "perspective", "upg+bdpt:radius=0.2,"}),
+    [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace
 }  // namespace etendue::test
