@@ -86,8 +86,8 @@ float Microfacet::max_D_of_halfway(Vec3 wo, const DirectionCone& c) const {
     const float length_h = length(h);
     float theta = 0;
     if (length_h > 1e-3f) {
-        const float cos_d = std::cos(
-            std::acos(clamp(0.5f * length_h, 0.0f, 1.0f)) + 0.5f * c.angle + kSlack);
+        const float cos_d =
+            std::cos(std::acos(clamp(0.5f * length_h, 0.0f, 1.0f)) + 0.5f * c.angle + kSlack);
         if (cos_d > 0)
             theta = std::acos(clamp(h.z / length_h, -1.0f, 1.0f)) - c.angle / (2 * cos_d) - kSlack;
     }

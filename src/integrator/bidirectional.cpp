@@ -28,8 +28,7 @@ void Bidirectional::light_path(const SampleContext& c, const TechniqueCounts& co
     const WalkOptions walk{depth_.max_depth + c.scene.sensor().has_finite_lens(), depth_.rr_depth};
     if (!start_light_path(c.scene, c.sampler, y, work.stats)) return;
     for (int s = 1; s <= y.size() && s <= depth_.max_depth; ++s) {
-        if (counts.splat > 0)
-            add_if_visible(c, join_splat(c.scene, y, s, c.sampler, counts), work);
+        if (counts.splat > 0) add_if_visible(c, join_splat(c.scene, y, s, c.sampler, counts), work);
         if (s >= 2)
             extend<TransportMode::Importance>(c.scene, c.sampler, walk, counts, y, work.stats);
         add_if_visible(c, join_hit_lens(c.scene, y, s, counts), work);
@@ -42,8 +41,8 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
     if (roulette_ > 0) {
         const float expected = j.technique.t <= 1 ? c.film.expected_luminance(j.film)
                                                   : c.film.expected_luminance(c.pixel);
-        const float q = join_survival(luminance(contribution) * j.mis_weight * scale,
-                                      roulette_ * expected);
+        const float q =
+            join_survival(luminance(contribution) * j.mis_weight * scale, roulette_ * expected);
         if (q < 1) {
             c.sampler.seek(Stream::Roulette, number);
             if (!(c.sampler.next_1d_unstructured() < q)) {

@@ -14,8 +14,8 @@
 namespace etendue {
 
 const std::vector<IntegratorEntry>& integrator_registry() {
-    static const std::vector<IntegratorEntry> entries = {path_entry(), light_entry(), bdpt_entry(),
-                                                         vcm_entry(),  upg_entry(),   upg_bdpt_entry()};
+    static const std::vector<IntegratorEntry> entries = {
+        path_entry(), light_entry(), bdpt_entry(), vcm_entry(), upg_entry(), upg_bdpt_entry()};
     return entries;
 }
 

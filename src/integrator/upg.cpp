@@ -22,7 +22,8 @@ public:
     UpgIntegrator(const IntegratorParams& p, bool connects)
         : paths_(p), radius_(p.number("radius")), connects_(connects) {
         if (!(radius_ >= 0))
-            throw std::runtime_error(fmt::format("{}: radius must not be negative", p.integrator()));
+            throw std::runtime_error(
+                fmt::format("{}: radius must not be negative", p.integrator()));
     }
 
     void begin_pass(const PassContext& pass) override {
@@ -75,8 +76,8 @@ private:
         ++work.stats.visible_pairs;
         c.sampler.seek(Stream::Auxiliary, number);
         const PairEvent event{.from = *drops_eye ? z[t - 2] : y[s - 2],
-                              .mode = *drops_eye ? TransportMode::Radiance
-                                                 : TransportMode::Importance,
+                              .mode =
+                                  *drops_eye ? TransportMode::Radiance : TransportMode::Importance,
                               .u_emission = y.u_emission,
                               .center = *drops_eye ? y[s - 1].p : z[t - 1].p,
                               .radius = photons_.radius()};

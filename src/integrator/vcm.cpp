@@ -25,8 +25,8 @@ public:
     }
 
     void begin_pass(const PassContext& pass) override {
-        const float radius = gather_radius(radius_, pass.scene) *
-                             std::pow(float(pass.index + 1), (alpha_ - 1) / 2);
+        const float radius =
+            gather_radius(radius_, pass.scene) * std::pow(float(pass.index + 1), (alpha_ - 1) / 2);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius);
     }
 
@@ -47,7 +47,9 @@ public:
 
     bool traces_light_paths() const override { return true; }
     Estimator estimator() const override {
-        return !merges_ ? Estimator::Unbiased : alpha_ < 1 ? Estimator::Consistent : Estimator::Biased;
+        return !merges_     ? Estimator::Unbiased
+               : alpha_ < 1 ? Estimator::Consistent
+                            : Estimator::Biased;
     }
 
 private:

@@ -26,8 +26,8 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     const int last = t - 1;
     const Vertex& v = z[last];
     if (!(counts.hit > 0)) return {};
-    const EmitterHit e =
-        v.is_infinite ? emitter.eval_infinite(v.p) : emitter.eval_surface(v.ng, v.uv, v.location.prim, v.wo);
+    const EmitterHit e = v.is_infinite ? emitter.eval_infinite(v.p)
+                                       : emitter.eval_surface(v.ng, v.uv, v.location.prim, v.wo);
     if (e.Le.is_zero()) return {};
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
@@ -79,10 +79,10 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const double rev_last = double(d.pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
         const double rev_prev = f.pdf_rev * v.to_predecessor;
         const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
-        others +=
-            sqr(p_L / p_NE) *
-            outward_sum<Side::Eye>(
-                z, last, false, {rev_last, rev_prev, emitter_gloss(emitter.is_area()), t}, counts);
+        others += sqr(p_L / p_NE) *
+                  outward_sum<Side::Eye>(z, last, false,
+                                         {rev_last, rev_prev, emitter_gloss(emitter.is_area()), t},
+                                         counts);
     }
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .contribution = C,
@@ -101,8 +101,9 @@ namespace {
 struct Edge {
     Vec3 w;            ///< From y_{s-1} to z_{t-1}.
     Rgb contribution;  ///< Of the connection, visibility left out.
-    double rev_a, rev_b;  ///< Densities of y_{s-1} as sampled from z_{t-1}, and the other way round.
-    double total;         ///< Σ (n·p)² over all techniques, relative to p of the split here.
+    double rev_a,
+        rev_b;     ///< Densities of y_{s-1} as sampled from z_{t-1}, and the other way round.
+    double total;  ///< Σ (n·p)² over all techniques, relative to p of the split here.
 };
 
 /// y_{s-1} (which may be y_0, as the emission sampled it) connected to z_{t-1}, t ≥ 2.
@@ -144,10 +145,10 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
                                  {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f,
                                   gathers ? gloss(b, false) : 0, s + t - 1},
                                  counts) +
-        outward_sum<Side::Eye>(z, t - 1, false,
-                               {edge.rev_b, fb.pdf_rev * b.to_predecessor,
-                                gathers ? gloss(a, false) : 0, s + t - 1},
-                               counts);
+        outward_sum<Side::Eye>(
+            z, t - 1, false,
+            {edge.rev_b, fb.pdf_rev * b.to_predecessor, gathers ? gloss(a, false) : 0, s + t - 1},
+            counts);
     return edge;
 }
 
@@ -169,7 +170,8 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
 }
 
 std::optional<bool> drops_eye_vertex_of_pair(const SubPath& y, int s, const SubPath& z, int t) {
-    const float before = gloss(y[s - 2], y[s - 2].is_delta), after = gloss(z[t - 2], z[t - 2].is_delta);
+    const float before = gloss(y[s - 2], y[s - 2].is_delta),
+                after = gloss(z[t - 2], z[t - 2].is_delta);
     if (before >= kDeltaGloss && after >= kDeltaGloss) return {};
     return drops_eye_vertex(before, after);
 }
@@ -204,14 +206,13 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
     // Relative to the split after x_m, which has p_L(x_m) but not p_E(x_m).
     const double total =
         sqr(split_count<Side::Eye>(z, t - 1, false, counts)) +
-        outward_sum<Side::Light>(y, s - 1, false,
-                                 {b.pdf_fwd, f.pdf * a.to_predecessor, 0, edges}, counts) +
+        outward_sum<Side::Light>(y, s - 1, false, {b.pdf_fwd, f.pdf * a.to_predecessor, 0, edges},
+                                 counts) +
         sqr(f.pdf_rev * b.to_predecessor / z[t - 2].pdf_fwd) *
             (bracket<Side::Eye>(z, t - 2, z[t - 2].is_delta, 0, 0, edges, counts) + b.weight_sum);
     const double np = double(counts.merge) * counts.disc * b.pdf_fwd;
     return Join{.technique = {Strategy::Merge, s, t},
-                .contribution =
-                    a.beta * f.f * b.beta * (1 / (abs_dot(a.wo, b.ng) * counts.disc)),
+                .contribution = a.beta * f.f * b.beta * (1 / (abs_dot(a.wo, b.ng) * counts.disc)),
                 .mis_weight = float(sqr(np) / total),
                 .film = z.film,
                 .needs_test = false};

@@ -127,8 +127,7 @@ int LightPaths::restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, Su
     for (int i = 1; i <= last; ++i) {
         y.append();
         // A BSDF looks toward its predecessor, whose place must be known.
-        if (i >= last - 2)
-            restore_vertex(scene, begin + uint32_t(i) - 1, i > last - bsdfs, y, i);
+        if (i >= last - 2) restore_vertex(scene, begin + uint32_t(i) - 1, i > last - bsdfs, y, i);
     }
     return last + 1;
 }

@@ -66,8 +66,8 @@ inline double pair_count(const SubPath& v, int i, double rev, float inward,
     if (n.merge > 0) return double(n.merge) * n.disc * fwd;
     const float outward = gloss(v[i - 1], v[i - 1].is_delta);
     if (outward >= kDeltaGloss && inward >= kDeltaGloss) return 0;
-    const bool drops_eye = side == Side::Light ? drops_eye_vertex(outward, inward)
-                                               : drops_eye_vertex(inward, outward);
+    const bool drops_eye =
+        side == Side::Light ? drops_eye_vertex(outward, inward) : drops_eye_vertex(inward, outward);
     const bool drops_own = drops_eye == (side == Side::Eye);
     if (drops_own) return n.gather * std::fmin(1, n.disc * fwd);
     return rev > 0 ? n.gather * std::fmin(1, n.disc * rev) * (fwd / rev) : 0.0;
@@ -97,9 +97,9 @@ inline double outward_sum(const SubPath& v, int last, bool last_is_delta, const 
     double inner = bracket<side>(v, last, last_is_delta, a.rev_last, a.gloss, a.edges, n);
     if (last >= 1) {
         const float inward = n.gather > 0 ? gloss(v[last], last_is_delta) : 0;
-        const double prev = bracket<side>(v, last - 1, v[last - 1].is_delta, a.rev_prev, inward,
-                                          a.edges, n) +
-                            v[last].weight_sum;
+        const double prev =
+            bracket<side>(v, last - 1, v[last - 1].is_delta, a.rev_prev, inward, a.edges, n) +
+            v[last].weight_sum;
         inner += sqr(a.rev_prev / v[last - 1].pdf_fwd) * prev;
     }
     return sqr(a.rev_last / v[last].pdf_fwd) * inner;

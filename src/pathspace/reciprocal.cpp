@@ -85,8 +85,8 @@ private:
             return;
         }
         const DirectionCone cone{frame_.n, float(std::asin(sin))};
-        max_pdf_ = from_emitter() ? e_.from.emitter->max_pdf_d()
-                                  : e_.from.bsdf.max_pdf(e_.from.wo, cone);
+        max_pdf_ =
+            from_emitter() ? e_.from.emitter->max_pdf_d() : e_.from.bsdf.max_pdf(e_.from.wo, cone);
         const double mass = 2 * double(kPi) * one_minus_cos_ * max_pdf_;
         if (!(mass < 1)) return;
         proposal_ = Proposal::Cone;

@@ -13,10 +13,11 @@ inline bool is_near(Vec3 a, Vec3 b, float radius2) {
 
 /// What the pair's dropped vertex was sampled from, and where its partner may lie.
 struct PairEvent {
-    const Vertex& from;     ///< z_{t-2} in mode Radiance, or y_{s-2} in mode Importance, which may be y_0.
+    const Vertex&
+        from;  ///< z_{t-2} in mode Radiance, or y_{s-2} in mode Importance, which may be y_0.
     TransportMode mode;
-    Vec2 u_emission;        ///< That y_0 was made from; read only if `from` is y_0.
-    Vec3 center;            ///< The vertex that stays.
+    Vec2 u_emission;  ///< That y_0 was made from; read only if `from` is y_0.
+    Vec3 center;      ///< The vertex that stays.
     float radius;
 };
 

@@ -12,7 +12,6 @@ Survival survival(const SubPath& path) {
     return Survival(left > 0 ? std::min(0.95f, left) : 0x1p-16f);
 }
 
-
 /// Traces from the last vertex along `d` and appends what is found, with throughput `beta` and density `pdf_sa` of the
 /// direction (discrete for a delta event). False where the ray leaves the scene.
 bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const Ray& ray, Rgb beta,

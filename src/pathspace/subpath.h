@@ -11,12 +11,12 @@ namespace etendue {
 struct RenderStats {
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
     uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
-    uint64_t joins_skipped = 0;  ///< By roulette, before their shadow ray.
+    uint64_t joins_skipped = 0;             ///< By roulette, before their shadow ray.
     uint64_t pairs = 0, visible_pairs = 0;  ///< Gathered; of these, joined without obstacle.
     uint64_t trials = 0, trial_rays = 0;    ///< Of all visible pairs.
     uint64_t bounds_exceeded = 0;           ///< Densities above their bound: must stay 0.
     uint64_t runaways = 0;                  ///< Pairs given up after too many trials: must stay 0.
-    uint64_t rejected = 0;       ///< Contributions that were not finite or negative.
+    uint64_t rejected = 0;                  ///< Contributions that were not finite or negative.
 
     RenderStats& operator+=(const RenderStats& o);
     uint64_t rays() const { return walk_rays + shadow_rays + trial_rays; }

@@ -51,7 +51,7 @@ struct Vertex {
     Survival survival;          ///< Of the roulette before the walk left this vertex.
     const SceneShape* shape = nullptr;
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or on the surface.
-    SurfaceLocation location;  ///< Of a surface; of an emitter's y_0 only `prim`.
+    SurfaceLocation location;          ///< Of a surface; of an emitter's y_0 only `prim`.
     Vec2 uv;
     Bsdf bsdf;
 
@@ -95,7 +95,7 @@ struct SubPath {
         1;  ///< Factor of the reconstruction filter, for contributions to the own pixel.
     Flight flight;
     Vec2 u_emission;  ///< The numbers from which y_0 was made.
-    float eta2 = 1;  ///< Product of η² over the refractions of an eye sub-path.
+    float eta2 = 1;   ///< Product of η² over the refractions of an eye sub-path.
 
     int size() const { return size_; }
     const Vertex& operator[](int i) const { return store_[size_t(i)]; }

@@ -127,9 +127,8 @@ void Renderer::pass(uint32_t index) {
     workers_->arena.execute([&] {
         integrator_->begin_pass({scene_, index, light_paths, chunks, [&](const auto& use) {
                                      for_each_sample([&](uint64_t chunk, const SampleContext& c,
-                                                         Workspace& work, FilmSink&) {
-                                         use(chunk, c, work);
-                                     });
+                                                         Workspace& work,
+                                                         FilmSink&) { use(chunk, c, work); });
                                  }});
         for_each_sample([&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {
             sink.begin(c.pixel, work.z.film_weight);

@@ -42,7 +42,8 @@ TechniqueImages::Layer* TechniqueImages::layer(const Technique& q) {
     Layer* found = place.load(std::memory_order_acquire);
     if (found) return found;
     const std::lock_guard lock(creation_);
-    if (!place.load()) place.store(new Layer(q, geometry_.pixel_count()), std::memory_order_release);
+    if (!place.load())
+        place.store(new Layer(q, geometry_.pixel_count()), std::memory_order_release);
     return place.load();
 }
 

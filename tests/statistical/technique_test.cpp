@@ -47,9 +47,8 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
     std::map<int, Moments> together;                      // by length
     for (int run = 0; run < kRuns; ++run) {
         RenderSettings settings;
-        settings.integrator =
-            IntegratorSpec::parse(fmt::format("{}max_depth={},rr_depth=3,roulette=0",
-                                              GetParam().integrator, kLongest));
+        settings.integrator = IntegratorSpec::parse(
+            fmt::format("{}max_depth={},rr_depth=3,roulette=0", GetParam().integrator, kLongest));
         settings.seed = uint64_t(run);
         settings.threads = 1;
         settings.spp = scene.sensor().has_finite_lens() ? 64 : 24;
@@ -101,12 +100,12 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         expect_mean(m, length, false, fmt::format("length {}, weighted", length));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Sensors, Techniques,
-    ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
-                      TechniqueCase{"thinlens", "thinlens", "bdpt:"},
-                      TechniqueCase{"gathers", "perspective", "upg+bdpt:radius=0.2,"}),
-    [](const auto& p) { return std::string(p.param.name); });
+INSTANTIATE_TEST_SUITE_P(Sensors, Techniques,
+                         ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
+                                           TechniqueCase{"thinlens", "thinlens", "bdpt:"},
+                                           TechniqueCase{"gathers", "perspective",
+                                                         "upg+bdpt:radius=0.2,"}),
+                         [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace
 }  // namespace etendue::test

@@ -140,7 +140,8 @@ protected:
             if (!is_end && x[size_t(i)]->is_delta) return;
         }
         const PathValue value = evaluate_path(scene, x, std::vector<bool>(x.size(), false));
-        const double p = density_of(y, *drops_eye ? s : s - 1) * density_of(z, *drops_eye ? t - 1 : t);
+        const double p =
+            density_of(y, *drops_eye ? s : s - 1) * density_of(z, *drops_eye ? t - 1 : t);
         Tally& tally = tallies[Strategy::Gather];
         for (int c = 0; c < 3; ++c)
             if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);

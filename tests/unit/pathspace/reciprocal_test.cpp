@@ -1,0 +1,178 @@
+// Trials of unbiased photon gathering against the walk itself: the frequency with which a walk finds a partner, times the
+// mean of r, is one. False-alarm rate: 0.1 % for all configurations of a case together.
+
+#include "pathspace/reciprocal.h"
+
+#include <gtest/gtest.h>
+
+#include "statistics.h"
+#include "test_scenes.h"
+
+namespace etendue {
+namespace {
+
+struct Case {
+    const char* name;
+    std::string bsdf, light;
+};
+
+const std::string kLamp = test::area_lamp();
+
+std::vector<Case> cases() {
+    const auto alpha = [](const char* type, const char* a, const char* more = "") {
+        return std::string("<bsdf type=\"") + type + "\"><float name=\"alpha\" value=\"" + a +
+               "\"/>" + more + "</bsdf>";
+    };
+    const std::string ggx = "<string name=\"distribution\" value=\"ggx\"/>";
+    const auto two_sided = [](const std::string& b) {
+        return "<bsdf type=\"twosided\">" + b + "</bsdf>";
+    };
+    return {
+        {"diffuse", test::diffuse("0.7,0.6,0.5"), kLamp},
+        {"beckmann", two_sided(alpha("roughconductor", "0.3")), kLamp},
+        {"ggx", two_sided(alpha("roughconductor", "0.15", ggx.c_str())), kLamp},
+        {"anisotropic",
+         two_sided("<bsdf type=\"roughconductor\"><float name=\"alpha_u\" value=\"0.1\"/><float "
+                   "name=\"alpha_v\" value=\"0.4\"/>" +
+                   ggx + "</bsdf>"),
+         kLamp},
+        {"roughplastic", two_sided(alpha("roughplastic", "0.2")), kLamp},
+        {"phong", two_sided("<bsdf type=\"phong\"><float name=\"exponent\" value=\"20\"/></bsdf>"),
+         kLamp},
+        {"plastic", two_sided("<bsdf type=\"plastic\"/>"), kLamp},
+        {"principled",
+         two_sided("<bsdf type=\"principled\"><float name=\"roughness\" value=\"0.5\"/></bsdf>"),
+         kLamp},
+        {"roughdielectric", alpha("roughdielectric", "0.3"), kLamp},
+        {"mirror_and_diffuse",
+         two_sided("<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.4\"/><bsdf "
+                   "type=\"diffuse\"/><bsdf type=\"conductor\"/></bsdf>"),
+         kLamp},
+        {"point", test::diffuse("0.5,0.5,0.5"),
+         "<emitter type=\"point\"><point name=\"position\" value=\"0,0.6,0.3\"/></emitter>"},
+        {"spot", test::diffuse("0.5,0.5,0.5"),
+         "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"50\"/><transform "
+         "name=\"to_world\"><lookat origin=\"0,0.6,0.9\" target=\"0,-0.6,0\" "
+         "up=\"0,0,1\"/></transform></emitter>"},
+        {"directional", test::diffuse("0.5,0.5,0.5"),
+         "<emitter type=\"directional\"><vector name=\"direction\" "
+         "value=\"0.1,-0.4,-1\"/></emitter>"},
+        {"constant", test::diffuse("0.5,0.5,0.5"), "<emitter type=\"constant\"/>"},
+    };
+}
+
+class Reciprocal : public testing::TestWithParam<Case> {
+protected:
+    Reciprocal()
+        : scene(test::build(test::front_camera(8) + test::room() + GetParam().light +
+                            test::sphere("-0.3,-0.5,0.3", "0.4", GetParam().bsdf) +
+                            test::sphere("0.5,0.3,-0.2", "0.45", GetParam().bsdf))),
+          film(scene.film(), scene.filter()), sampler(SamplerKind::Independent, 5) {}
+
+    template <TransportMode mode>
+    void trace(SubPath& path, uint32_t index) {
+        const TechniqueCounts counts{
+            .hit = 1, .next_event = 1, .connect = 1, .splat = 64, .gather = 64};
+        sampler.start(0, index);
+        if (mode == TransportMode::Radiance)
+            start_eye_path(scene, film, index % 64, sampler, path, stats);
+        else
+            start_light_path(scene, sampler, path, stats);
+        // Roulette early, so that survival enters.
+        while (path.size() >= 2 && extend<mode>(scene, sampler, {5, 2}, counts, path, stats)) {
+        }
+    }
+
+    /// Whether one walk from `e.from` finds a partner.
+    bool walk_finds(const PairEvent& e) {
+        Ray ray;
+        if (e.from.kind == Vertex::Kind::Emitter) {
+            const EmissionSample s =
+                e.from.emitter->sample_emission(e.u_emission, sampler.next_2d());
+            ray = {e.from.has_cosine ? offset_origin(s.p, s.ng, s.d) : s.p, s.d, kInf};
+        } else {
+            if (!(sampler.next_1d() < e.from.survival.value())) return false;
+            const float u = sampler.next_1d();
+            const auto s = e.from.bsdf.sample(e.from.wo, u, sampler.next_2d(), e.mode);
+            if (!s || s->is_delta) return false;
+            ray = {offset_origin(e.from.p, e.from.ng, s->wi), s->wi, kInf};
+        }
+        SurfaceHit hit;
+        if (!scene.intersect(ray, 0, hit) || !is_near(hit.geometry.p, e.center, sqr(e.radius)))
+            return false;
+        ComponentArena arena;
+        scratch.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, arena);
+        return scratch.may_connect;
+    }
+
+    template <TransportMode mode>
+    void check(uint32_t paths, float radius) {
+        SubPath path;
+        for (uint32_t index = 0; index < paths; ++index) {
+            trace<mode>(path, index);
+            for (int i = mode == TransportMode::Radiance ? 1 : 0; i + 1 < path.size(); ++i) {
+                const Vertex &from = path[i], &next = path[i + 1];
+                if (from.is_delta || next.kind != Vertex::Kind::Surface || !next.may_connect)
+                    continue;
+                // Off the surface, as other vertices near it are.
+                const Vec3 center = next.p + (next.p - path[0].p) * 0.01f;
+                compare({from, mode, path.u_emission, center, radius});
+            }
+        }
+    }
+
+    void compare(const PairEvent& event) {
+        sampler.seek(Stream::Auxiliary, ++number);
+        test::Moments found, r;
+        for (int i = 0; i < kWalks / 20; ++i) found.add(walk_finds(event));
+        if (found.mean() < 0.04) return;
+        found = {};
+        for (int i = 0; i < kWalks; ++i) found.add(walk_finds(event));
+        for (int i = 0; i < kWalks / 8; ++i)
+            r.add(reciprocal_probability(scene, event, sampler, scratch, stats));
+        const double product = found.mean() * r.mean();
+        const double spread = std::sqrt(found.squared_error() / sqr(found.mean()) +
+                                        r.squared_error() / sqr(r.mean()));
+        deviations.push_back((product - 1) / spread);
+        weighted += (product - 1) / sqr(spread);
+        weights += 1 / sqr(spread);
+    }
+
+    static constexpr int kWalks = 20000;
+    Scene scene;
+    Film film;
+    Sampler sampler;
+    RenderStats stats;
+    Vertex scratch;
+    uint32_t number = 0;
+    std::vector<double> deviations;
+    double weighted = 0, weights = 0;  ///< Inverse-variance mean of product - 1.
+};
+
+TEST_P(Reciprocal, IsThatOfTheWalk) {
+    for (const float radius : {0.1f, 0.3f, 0.9f}) {
+        check<TransportMode::Radiance>(5, radius);
+        check<TransportMode::Importance>(7, radius);
+    }
+    ASSERT_GT(deviations.size(), 10u);
+    double squares = 0;
+    for (double d : deviations) {
+        squares += sqr(d);
+        EXPECT_LT(std::fabs(d), 5);
+    }
+    // About χ² with as many degrees of freedom; normal for so many.
+    const double n = double(deviations.size());
+    EXPECT_LT((squares - n) / std::sqrt(2 * n), 4);
+    const double spread = 1 / std::sqrt(weights);
+    EXPECT_NEAR(weighted / weights, 0, 3.9 * spread);
+    EXPECT_LT(spread, 0.007) << "too few samples";
+    EXPECT_EQ(stats.bounds_exceeded, 0u);
+    EXPECT_EQ(stats.runaways, 0u);
+    RecordProperty("trials_per_pair", std::to_string(double(stats.trials) / (kWalks / 8 * n)));
+}
+
+INSTANTIATE_TEST_SUITE_P(Starts, Reciprocal, testing::ValuesIn(cases()),
+                         [](const auto& p) { return std::string(p.param.name); });
+
+}  // namespace
+}  // namespace etendue
