@@ -1,0 +1,173 @@
+"""Renders one scene with etendue and with Mitsuba 3 and tests whether the images agree.
+
+Shared by compare_mitsuba.py (whole scenes) and compare_conventions.py (one plug-in at a time).
+Needs the PyPI packages mitsuba, numpy and scipy; ensure_packages() makes them available.
+"""
+
+import ctypes.util
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FALSE_ALARM = 0.01
+TILES = (8, 6)
+
+
+def ensure_packages():
+    """Restart the running script in a virtual environment that has the packages."""
+    try:
+        import mitsuba  # noqa: F401
+        import numpy  # noqa: F401
+        import scipy  # noqa: F401
+    except ImportError:
+        venv = ROOT / "build" / "mitsuba-venv"
+        python = venv / "bin" / "python"
+        if os.environ.get("ETENDUE_MITSUBA_VENV") == "1":
+            sys.exit(f"{sys.argv[0]}: mitsuba, numpy and scipy cannot be imported")
+        if not python.exists():
+            subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
+        subprocess.run(
+            [python, "-m", "pip", "install", "-q", "mitsuba", "numpy", "scipy"], check=True
+        )
+        os.environ["ETENDUE_MITSUBA_VENV"] = "1"
+        os.execv(python, [str(python), *sys.argv])
+
+
+def add_arguments(parser):
+    parser.add_argument("--etendue", default=str(ROOT / "build/release/etendue"))
+    parser.add_argument("--variant", help="of Mitsuba; llvm_ad_rgb where LLVM 16 or later is found")
+    parser.add_argument("--threads", type=int, default=os.cpu_count())
+
+
+def default_variant():
+    """The compiled variant is several times faster, but its code generator needs a recent LLVM."""
+    for version in range(22, 15, -1):
+        if ctypes.util.find_library(f"LLVM-{version}"):
+            os.environ.setdefault("DRJIT_LIBLLVM_PATH", f"libLLVM-{version}.so")
+            return "llvm_ad_rgb"
+    return "llvm_ad_rgb" if "DRJIT_LIBLLVM_PATH" in os.environ else "scalar_rgb"
+
+
+class Mitsuba:
+    def __init__(self, args):
+        self.name = "mitsuba"
+        variant = args.variant or default_variant()
+        import drjit
+        import mitsuba
+
+        mitsuba.set_variant(variant)
+        mitsuba.set_log_level(mitsuba.LogLevel.Error)
+        drjit.set_thread_count(args.threads)
+        self.mitsuba = mitsuba
+        self.version = f"Mitsuba {mitsuba.__version__} {variant}"
+
+    def open(self, file):
+        self.scene = self.mitsuba.load_file(str(file))
+
+    def render(self, spp, seed):
+        import numpy as np
+
+        image = self.mitsuba.render(self.scene, spp=spp, seed=seed)
+        return np.array(image)[:, :, :3].astype(float)
+
+
+class Etendue:
+    def __init__(self, integrator, args, folder):
+        self.name = integrator
+        self.args = args
+        self.output = folder / "etendue.exr"
+        self.options = []
+
+    def open(self, file, *options):
+        """options: parameters of the integrator, as 'max_depth=5'."""
+        self.file = file
+        self.integrator = ":".join(filter(None, [self.name, ",".join(options)]))
+
+    def render(self, spp, seed):
+        command = [self.args.etendue, "render", str(self.file), "-o", str(self.output), "--quiet"]
+        command += ["-i", self.integrator, "--spp", str(spp), "--seed", str(seed)]
+        command += ["--threads", str(self.args.threads)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        return read_image(self.output)
+
+
+def read_image(file):
+    import mitsuba
+    import numpy as np
+
+    bitmap = mitsuba.Bitmap(str(file)).convert(
+        mitsuba.Bitmap.PixelFormat.RGB, mitsuba.Struct.Type.Float32, srgb_gamma=False
+    )
+    return np.array(bitmap).astype(float)
+
+
+def write_image(file, image):
+    import mitsuba
+
+    mitsuba.Bitmap(image.astype("float32")).write(str(file))
+
+
+def independent_runs(renderer, runs, seconds):
+    """Images that differ in their seed and take about `seconds` together, and the spp of each."""
+    import numpy as np
+
+    wanted = seconds / runs
+    spp = 2
+    while True:
+        start = time.monotonic()
+        renderer.render(spp, 999)
+        elapsed = time.monotonic() - start
+        if elapsed > wanted / 4 or spp >= 4096:
+            break
+        spp *= 2
+    spp = max(2, int(spp * wanted / elapsed))
+    return np.array([renderer.render(spp, 1 + i) for i in range(runs)]), spp
+
+
+def tile_means(images):
+    """Mean over the channels of each tile of each image: an array (images, tiles)."""
+    import numpy as np
+
+    _, height, width, _ = images.shape
+    y = np.linspace(0, height, TILES[1] + 1).round().astype(int)
+    x = np.linspace(0, width, TILES[0] + 1).round().astype(int)
+    grey = images.mean(axis=3)
+    rows = np.add.reduceat(grey, y[:-1], axis=1) / np.diff(y)[:, None]
+    return (np.add.reduceat(rows, x[:-1], axis=2) / np.diff(x)).reshape(len(images), -1)
+
+
+def mean_and_error(images):
+    """Mean of all pixels and its standard error, from the spread of the runs."""
+    from scipy import stats
+
+    means = images.mean(axis=(1, 2, 3))
+    return means.mean(), stats.sem(means)
+
+
+def compare(a, b):
+    """Runs a against runs b. Welch's t-test of the image mean; the same of the tiles, at a level for
+    which one tile or more fails by chance in 1 % of all comparisons (Sidak)."""
+    import numpy as np
+    from scipy import stats
+
+    (mean_a, error_a), (mean_b, error_b) = mean_and_error(a), mean_and_error(b)
+    means = [x.mean(axis=(1, 2, 3)) for x in (a, b)]
+    test = stats.ttest_ind(*means, equal_var=False)
+    interval = test.confidence_interval(1 - FALSE_ALARM)
+    tiles = stats.ttest_ind(tile_means(a), tile_means(b), equal_var=False).pvalue
+    tiles = np.nan_to_num(tiles, nan=1.0)  # both constant: a tile that is black in all runs
+    level = 1 - (1 - FALSE_ALARM) ** (1 / tiles.size)
+    return {
+        "ratio": mean_a / mean_b,
+        "ratio_99": [1 + interval.low / mean_b, 1 + interval.high / mean_b],
+        "ratio_error": math.hypot(error_a, error_b) / mean_b,
+        "p": float(test.pvalue),
+        "ratio_rgb": (a.mean(axis=(0, 1, 2)) / b.mean(axis=(0, 1, 2))).tolist(),
+        "tiles": int(tiles.size),
+        "tiles_failed": int((tiles < level).sum()),
+        "smallest_tile_p": float(tiles.min()),
+    }
