@@ -7,6 +7,7 @@
 
 #include "description/mesh_data.h"
 #include "description/resolve_file.h"
+#include "math/frame.h"
 #include "readers/obj.h"
 #include "readers/ply.h"
 #include "readers/serialized.h"
@@ -172,14 +173,12 @@ std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn&) {
     const float height = length(axis);
     if (!(height > 0)) params.fail("p1", "a cylinder's p0 and p1 must differ");
     const Transform t = params.transform("to_world");
-    // Columns: two unit vectors normal to the axis times the radius, the axis, p0.
-    const Vec3 n = axis / height;
-    const Vec3 s = std::fabs(n.z) > 0.999999f ? Vec3{1, 0, 0} : normalize(cross({0, 0, 1}, n));
-    const Vec3 r = cross(n, s);
-    const Transform local(Transform::Matrix{{{s.x * radius, r.x * radius, axis.x, p0.x},
-                                             {s.y * radius, r.y * radius, axis.y, p0.y},
-                                             {s.z * radius, r.z * radius, axis.z, p0.z},
-                                             {0, 0, 0, 1}}});
+    // Columns: two unit vectors normal to the axis times the radius, the axis, p0. Which two decides where u = 0; these
+    // are Mitsuba 3's.
+    const Frame frame = Frame::from_normal(axis / height);
+    const Vec3 s = frame.s * radius, r = frame.t * radius;
+    const Transform local(Transform::Matrix{
+        {{s.x, r.x, axis.x, p0.x}, {s.y, r.y, axis.y, p0.y}, {s.z, r.z, axis.z, p0.z}, {0, 0, 0, 1}}});
     check_similarity(t * local, params, false);
     return std::make_unique<Cylinder>(t * local, params.flag("flip_normals", false));
 }

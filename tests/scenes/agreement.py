@@ -80,7 +80,6 @@ class Etendue:
         self.name = integrator
         self.args = args
         self.output = folder / "etendue.exr"
-        self.options = []
 
     def open(self, file, *options):
         """options: parameters of the integrator, as 'max_depth=5'."""
@@ -112,18 +111,22 @@ def write_image(file, image):
 
 
 def independent_runs(renderer, runs, seconds):
-    """Images that differ in their seed and take about `seconds` together, and the spp of each."""
+    """Images that differ in their seed and take about `seconds` together, beyond reading the scene each
+    time, and the spp of each."""
     import numpy as np
 
-    wanted = seconds / runs
-    spp = 2
-    while True:
-        start = time.monotonic()
+    def seconds_of(spp):
+        begin = time.monotonic()
         renderer.render(spp, 999)
-        elapsed = time.monotonic() - start
-        if elapsed > wanted / 4 or spp >= 4096:
-            break
-        spp *= 2
+        return time.monotonic() - begin
+
+    wanted = seconds / runs
+    seconds_of(1)  # compiles
+    start_up = seconds_of(1)
+    spp = elapsed = 0
+    while elapsed < wanted / 4 and spp < 4096:
+        spp = max(4, 2 * spp)
+        elapsed = seconds_of(spp) - start_up
     spp = max(2, int(spp * wanted / elapsed))
     return np.array([renderer.render(spp, 1 + i) for i in range(runs)]), spp
 
@@ -148,18 +151,23 @@ def mean_and_error(images):
     return means.mean(), stats.sem(means)
 
 
-def compare(a, b):
+def compare(a, b, tolerance=0.0):
     """Runs a against runs b. Welch's t-test of the image mean; the same of the tiles, at a level for
-    which one tile or more fails by chance in 1 % of all comparisons (Sidak)."""
+    which one tile or more fails by chance in 1 % of all comparisons (Sidak). Differences up to
+    `tolerance` times the image's mean are taken for none."""
     import numpy as np
     from scipy import stats
 
+    def welch(x, y):
+        forgiven = np.clip(x.mean(axis=0) - y.mean(axis=0), -allowed, allowed)
+        return stats.ttest_ind(x, y + forgiven, equal_var=False)
+
     (mean_a, error_a), (mean_b, error_b) = mean_and_error(a), mean_and_error(b)
-    means = [x.mean(axis=(1, 2, 3)) for x in (a, b)]
-    test = stats.ttest_ind(*means, equal_var=False)
+    allowed = tolerance * mean_b
+    test = welch(a.mean(axis=(1, 2, 3)), b.mean(axis=(1, 2, 3)))
     interval = test.confidence_interval(1 - FALSE_ALARM)
-    tiles = stats.ttest_ind(tile_means(a), tile_means(b), equal_var=False).pvalue
-    tiles = np.nan_to_num(tiles, nan=1.0)  # both constant: a tile that is black in all runs
+    tiles_a, tiles_b = tile_means(a), tile_means(b)
+    tiles = np.nan_to_num(welch(tiles_a, tiles_b).pvalue, nan=1.0)  # 0/0: black in all runs
     level = 1 - (1 - FALSE_ALARM) ** (1 / tiles.size)
     return {
         "ratio": mean_a / mean_b,
@@ -170,4 +178,7 @@ def compare(a, b):
         "tiles": int(tiles.size),
         "tiles_failed": int((tiles < level).sum()),
         "smallest_tile_p": float(tiles.min()),
+        "largest_tile_difference": float(
+            np.abs(tiles_a.mean(axis=0) - tiles_b.mean(axis=0)).max() / mean_b
+        ),
     }
