@@ -51,6 +51,7 @@ MaterialEntry bumpmap_entry() {
              "Shades a material with the normals of a displaced surface [Blinn 1978].",
              {{"displacement", ParamKind::Texture, "",
                "Heights in units of the scene; an unnamed texture will do."},
+              {"arbitrary", ParamKind::Texture, "", "As displacement: the name in Mitsuba's manual."},
               {"scale", ParamKind::Float, "1", "Factor of the heights."},
               {"flip_invalid_normals", ParamKind::Bool, "false", kFlipInvalidNormalsDoc},
               {"use_shadowing_function", ParamKind::Bool, "false", kShadowingFunctionDoc},

@@ -110,6 +110,21 @@ def write_image(file, image):
     mitsuba.Bitmap(image.astype("float32")).write(str(file))
 
 
+def write_stretched_environment(file, source):
+    """Rows of `source` as seen here, at the latitudes at which Mitsuba 3 expects its rows: from pole to
+    pole, r / (rows - 1), where the centres of the source's rows are at (r + 1/2) / rows."""
+    import numpy as np
+
+    image = read_image(source)
+    rows = len(image)
+    finer = 4  # so that both interpolate the same, nearly
+    y = np.linspace(0, rows, finer * rows) - 0.5
+    above = np.floor(y).astype(int)
+    below_share = (y - above)[:, None, None]
+    row = [image[np.clip(above + i, 0, rows - 1)] for i in (0, 1)]
+    write_image(file, (1 - below_share) * row[0] + below_share * row[1])
+
+
 def independent_runs(renderer, runs, seconds):
     """Images that differ in their seed and take about `seconds` together, beyond reading the scene each
     time, and the spp of each."""

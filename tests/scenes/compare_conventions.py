@@ -303,13 +303,17 @@ def main():
     agreement.add_arguments(parser)
     parser.add_argument("--runs", type=int, default=8)
     parser.add_argument("--spp", type=int, default=128, help="of each run")
-    parser.add_argument("--json", default="compare-conventions.json")
+    parser.add_argument(
+        "--json", default="compare-conventions.json", help="report; cases of earlier runs stay in it"
+    )
     parser.add_argument("--pictures", help="existing folder for the mean image of each renderer")
     args = parser.parse_args()
     agreement.ensure_packages()
 
     mitsuba = agreement.Mitsuba(args)
-    report = {"mitsuba": mitsuba.version, "cases": {}}
+    output = pathlib.Path(args.json)
+    report = json.loads(output.read_text()) if output.exists() else {"cases": {}}
+    report["mitsuba"] = mitsuba.version
     surprises = 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
@@ -337,7 +341,7 @@ def main():
                 flush=True,
             )
             report["cases"][name] = result
-    pathlib.Path(args.json).write_text(json.dumps(report, indent=1) + "\n")
+    output.write_text(json.dumps(report, indent=1) + "\n")
     sys.exit(1 if surprises else 0)
 
 

@@ -84,7 +84,7 @@ class Case:
             (folder / entry.name).symlink_to(entry)
         self.ours = folder / "compare-etendue.xml"
         tree.write(self.ours)
-        self.adapt_to_mitsuba(scene, integrator)
+        self.adapt_to_mitsuba(scene, integrator, folder)
         self.theirs = folder / "compare-mitsuba.xml"
         tree.write(self.theirs)
 
@@ -98,7 +98,7 @@ class Case:
                 radiance.set("value", str(float(radiance.get("value")) / factor**2))
 
     @staticmethod
-    def adapt_to_mitsuba(scene, integrator):
+    def adapt_to_mitsuba(scene, integrator, folder):
         """What the file means here, said in the words of Mitsuba 3.9; see docs/agreement.md."""
         if any(scene.iter("medium")):
             integrator.set("type", "volpath")
@@ -107,6 +107,12 @@ class Case:
             if bsdf.get("type") in ("normalmap", "bumpmap"):
                 for option in ("flip_invalid_normals", "use_shadowing_function"):
                     ElementTree.SubElement(bsdf, "boolean", name=option, value="false")
+        # Newer versions stretch an environment by half a row at each pole.
+        for file in scene.findall("emitter[@type='envmap']/string[@name='filename']"):
+            agreement.write_stretched_environment(
+                folder / "compare-environment.exr", folder / file.get("value")
+            )
+            file.set("value", "compare-environment.exr")
         # Newer versions give a constant spectrum of an emitter the colour of a flat spectrum, not white.
         for emitter in scene.iter("emitter"):
             for child in emitter.findall("spectrum"):
@@ -130,6 +136,36 @@ def comparison_line(other, c):
         f"{'':8}against {other:9} ratio {c['ratio']:.4f} [{low:.4f}, {high:.4f}] p {c['p']:.3f}"
         f"  tiles failed {c['tiles_failed']}/{c['tiles']} (p {c['smallest_tile_p']:.1e})  RGB {rgb}"
     )
+
+
+def markdown_tables(report):
+    """The figures of a report for docs/agreement.md."""
+
+    def row(*cells):
+        return "| " + " | ".join(cells) + " |"
+
+    def mean(r):
+        return f"{r['mean']:.4f} ± {100 * r['error'] / r['mean']:.2f} % ({r['spp']})"
+
+    def verdict(c):
+        low, high = c["ratio_99"]
+        return f"{c['ratio']:.4f} ({low:.3f} – {high:.3f}), {c['tiles_failed']}"
+
+    names = ("mitsuba", "path", "bdpt", "light")
+    pairs = [("path", "mitsuba"), ("bdpt", "mitsuba"), ("bdpt", "path"), ("light", "path")]
+    scenes = {
+        name: {r["renderer"]: r for r in scene["renderers"]}
+        for name, scene in report["scenes"].items()
+    }
+    lines = [row("scene", "size", *names), row(*["---"] * (2 + len(names)))]
+    for name, r in scenes.items():
+        size = "{}×{}".format(*report["scenes"][name]["size"])
+        lines.append(row(name, size, *(mean(r[k]) if k in r else "" for k in names)))
+    lines += ["", row("scene", *(f"{a} / {b}" for a, b in pairs)), row(*["---"] * (1 + len(pairs)))]
+    for name, r in scenes.items():
+        cells = (verdict(r[a]["against"][b]) if a in r and b in r else "" for a, b in pairs)
+        lines.append(row(name, *cells))
+    return "\n".join(lines)
 
 
 def run_scene(case, renderers, seconds, args):
@@ -166,12 +202,16 @@ def main():
     parser.add_argument("--integrators", help="of etendue, as path,bdpt; default: by scene")
     parser.add_argument("--no-mitsuba", action="store_true", help="only etendue")
     parser.add_argument("--width", type=int, default=160)
-    parser.add_argument("--runs", type=int, default=8)
+    parser.add_argument("--runs", type=int, default=16)
     parser.add_argument("--seconds", type=float, default=60, help="for all runs of a renderer")
     parser.add_argument("--max-depth", type=int, help="instead of the file's")
     parser.add_argument("--json", default="compare-mitsuba.json")
     parser.add_argument("--pictures", help="folder for the mean image of each renderer")
+    parser.add_argument("--table", action="store_true", help="only print the JSON file as tables")
     args = parser.parse_args()
+    if args.table:
+        print(markdown_tables(json.loads(pathlib.Path(args.json).read_text())))
+        return
     agreement.ensure_packages()
 
     root = os.environ.get("ETENDUE_SCENES", agreement.ROOT.parent / "shared" / "scenes")

@@ -283,6 +283,14 @@ TEST(BumpMap, HasTheNormalOfTheDisplacedSurface) {
     point.ns = direction(20, 70);
     expect_near(bumped(m, {0, 0}, diffuse).bsdf(point, arena).shading_normal(), point.ns);
 
+    // The texture has two names and may have none.
+    FunctionTexture slope;
+    slope.slope = [](Vec2) { return Vec2{0.6f, -0.2f}; };
+    for (const char* name : {"displacement", "arbitrary"}) {
+        const MaterialLobe named{&m.make("bumpmap", {}, {{"", diffuse}, {name, m.texture(slope)}})};
+        expect_near(named.shading_normal({0, 0, 1}), normalize({-0.6f, 0.2f, 1}));
+    }
+
     // Without a parametrisation nothing changes.
     point.ns = {0, 0, 1};
     point.dpdu = point.dpdv = {};
