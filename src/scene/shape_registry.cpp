@@ -177,8 +177,10 @@ std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn&) {
     // are Mitsuba 3's.
     const Frame frame = Frame::from_normal(axis / height);
     const Vec3 s = frame.s * radius, r = frame.t * radius;
-    const Transform local(Transform::Matrix{
-        {{s.x, r.x, axis.x, p0.x}, {s.y, r.y, axis.y, p0.y}, {s.z, r.z, axis.z, p0.z}, {0, 0, 0, 1}}});
+    const Transform local(Transform::Matrix{{{s.x, r.x, axis.x, p0.x},
+                                             {s.y, r.y, axis.y, p0.y},
+                                             {s.z, r.z, axis.z, p0.z},
+                                             {0, 0, 0, 1}}});
     check_similarity(t * local, params, false);
     return std::make_unique<Cylinder>(t * local, params.flag("flip_normals", false));
 }

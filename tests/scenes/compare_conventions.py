@@ -134,6 +134,12 @@ CASES = {
     "directional to_world": (None, FLOOR + """<emitter type="directional"><transform name="to_world">
 <lookat origin="1, 1, 2" target="0, 0, 0" up="0, 1, 0"/></transform></emitter>"""),
     "constant": (None, FLOOR + '<emitter type="constant"><rgb name="radiance" value="3, 2, 1"/></emitter>'),
+    "constant, grey spectrum": (
+        None, '<emitter type="constant"><spectrum name="radiance" value="1"/></emitter>'),
+    "constant, spectrum": (None, """<emitter type="constant"><spectrum name="radiance"
+value="400:0, 500:0.8, 600:1.5, 700:1.9"/></emitter>"""),
+    "diffuse, spectrum": (None, bsdf("""<spectrum name="reflectance"
+value="400:0.1, 500:0.3, 550:0.7, 600:0.5, 700:0.2"/>""", "diffuse")),
     "envmap": (None, '<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter>'),
     "envmap to_world, scale": (None, f"""<emitter type="envmap"><string name="filename" value="sky.exr"/>
 <float name="scale" value="2"/>{TURN}</emitter>"""),
@@ -237,6 +243,7 @@ CASES = {
 
 # Cases that must differ, and why; docs/agreement.md says more.
 DIFFERENT = {
+    "constant, grey spectrum": "Mitsuba gives it the colour of a flat spectrum, (1.205, 0.948, 0.909)",
     "envmap of few rows": "Mitsuba puts the centres of the first and last rows on the poles",
     "blendbsdf, smooth and mirror": "Mitsuba loses light; here it has the closed form",
 }
