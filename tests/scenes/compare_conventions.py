@@ -284,6 +284,18 @@ def write_files(folder):
     )
 
 
+def markdown_table(report):
+    """The figures of a report for docs/agreement.md."""
+    lines = ["| case | ratio of means ± standard error | largest tile difference, % | |"]
+    lines.append("| --- | --- | --- | --- |")
+    for name, c in report["cases"].items():
+        lines.append(
+            f"| {name} | {c['ratio']:.4f} ± {c['ratio_error']:.4f} "
+            f"| {100 * c['largest_tile_difference']:.2f} | {'' if c['agrees'] else 'differs'} |"
+        )
+    return "\n".join(lines)
+
+
 def run_case(name, mitsuba, ours, folder, args):
     import numpy as np
 
@@ -314,7 +326,11 @@ def main():
         "--json", default="compare-conventions.json", help="report; cases of earlier runs stay in it"
     )
     parser.add_argument("--pictures", help="existing folder for the mean image of each renderer")
+    parser.add_argument("--table", action="store_true", help="only print the JSON file as a table")
     args = parser.parse_args()
+    if args.table:
+        print(markdown_table(json.loads(pathlib.Path(args.json).read_text())))
+        return
     agreement.ensure_packages()
 
     mitsuba = agreement.Mitsuba(args)
@@ -338,7 +354,7 @@ def main():
                 surprises += 1
                 continue
             agrees = result["tiles_failed"] == 0 and result["p"] >= agreement.FALSE_ALARM
-            result["agrees"] = agrees
+            result |= {"agrees": agrees, "spp": args.spp * args.runs}
             surprises += agrees == (name in DIFFERENT)
             verdict = "agrees" if agrees else "DIFFERS"
             print(

@@ -231,7 +231,7 @@ def main():
             name = name if base in SCENES else file.stem
             if args.integrators:
                 integrators = args.integrators.split(",")
-            factor = LAMP_FACTOR[base] if name != base else 1
+            factor = LAMP_FACTOR[base] if name.endswith(LARGE) else 1
             case = Case(name, file, temporary / name, args, factor)
             renderers = [] if args.no_mitsuba else [mitsuba]
             renderers += [agreement.Etendue(i, args, temporary) for i in integrators]
