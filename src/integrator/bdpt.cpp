@@ -13,11 +13,14 @@ public:
     explicit BdptIntegrator(const IntegratorParams& params) : paths_(params) {}
 
     void sample(const SampleContext& c, Workspace& work) const override {
-        const TechniqueCounts counts = Bidirectional::counts(c);
+        const TechniqueCounts counts = this->counts(c.scene, c.light_paths);
         paths_.light_path(c, counts, work);
         paths_.eye_path(c, counts, work, [](int) {});
     }
 
+    TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
+        return Bidirectional::counts(scene, light_paths);
+    }
     bool traces_light_paths() const override { return true; }
     Estimator estimator() const override { return Estimator::Unbiased; }
 

@@ -64,9 +64,9 @@ void Bidirectional::add_if_visible(const SampleContext& c, const std::optional<J
     const uint32_t number = uint32_t(q.s) << 16 | uint32_t(q.t);
     if (q.t <= 1) {
         if (const auto value = test(c, *j, c.splat_scale, number, work))
-            c.sink.add_splat(j->film, q, *value, j->mis_weight);
+            c.sink.add(*j, *value);
     } else if (const auto value = test(c, *j, std::fabs(work.z.film_weight), number, work)) {
-        c.sink.add_eye(q, *value, j->mis_weight);
+        c.sink.add(*j, *value);
     }
 }
 

@@ -14,13 +14,13 @@ public:
     explicit Bidirectional(const IntegratorParams& params);
 
     /// Counts of bidirectional path tracing, without pairs.
-    static TechniqueCounts counts(const SampleContext& c) {
-        const float N = float(c.light_paths);
+    static TechniqueCounts counts(const Scene& scene, uint64_t light_paths) {
+        const float N = float(light_paths);
         return {.hit = 1,
                 .next_event = 1,
                 .connect = 1,
                 .splat = N,
-                .hit_lens = c.scene.sensor().has_finite_lens() ? N : 0.0f};
+                .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
     }
 
     /// The light sub-path work.y, with its techniques t ≤ 1.
@@ -37,7 +37,7 @@ public:
         for (int t = 2; t <= z.size(); ++t) {
             if (counts.hit > 0)
                 for_each_hit(c.scene, z, t, counts, [&](const Join& j) {
-                    c.sink.add_eye(j.technique, j.contribution, j.mis_weight);
+                    c.sink.add(j, j.contribution);
                 });
             if (z[t - 1].may_connect) at_vertex(t);
             if (t > depth_.max_depth) break;

@@ -21,6 +21,7 @@ struct Workspace {
     SubPath y, z;
     SubPath pair;  ///< The other path of a pair of vertices.
     Vertex scratch;
+    bool is_observed = false;  ///< Somebody reads whole sub-paths, not only what joins need of them.
     RenderStats stats;
 };
 
@@ -54,6 +55,8 @@ public:
     virtual void begin_pass(const PassContext&) {}
     /// Traces sample `context.pixel` and reports its contributions.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
+    /// Samples of each strategy per eye sub-path, as the weights have it, where a pass traces `light_paths`.
+    virtual TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const = 0;
     /// Light paths per pixel in one pass: 0 or 1.
     virtual bool traces_light_paths() const = 0;
     virtual Estimator estimator() const = 0;

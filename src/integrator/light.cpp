@@ -13,9 +13,7 @@ public:
     explicit LightIntegrator(const DepthOptions& depth) : depth_(depth) {}
 
     void sample(const SampleContext& c, Workspace& work) const override {
-        const float N = float(c.light_paths);
-        const TechniqueCounts counts{.splat = N,
-                                     .hit_lens = c.scene.sensor().has_finite_lens() ? N : 0.0f};
+        const TechniqueCounts counts = this->counts(c.scene, c.light_paths);
         // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
         const WalkOptions walk{depth_.max_depth + c.scene.sensor().has_finite_lens(),
                                depth_.rr_depth};
@@ -25,14 +23,18 @@ public:
             if (s > depth_.max_depth) break;
             if (const auto j = join_splat(c.scene, y, s, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
-                    c.sink.add_splat(j->film, j->technique, j->contribution * Tr, j->mis_weight);
+                    c.sink.add(*j, j->contribution * Tr);
             if (s >= 2)
                 extend<TransportMode::Importance>(c.scene, c.sampler, walk, counts, y, work.stats);
             if (const auto j = join_hit_lens(c.scene, y, s, counts))
-                c.sink.add_splat(j->film, j->technique, j->contribution, j->mis_weight);
+                c.sink.add(*j, j->contribution);
         }
     }
 
+    TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
+        const float N = float(light_paths);
+        return {.splat = N, .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
+    }
     bool traces_light_paths() const override { return true; }
     Estimator estimator() const override { return Estimator::Unbiased; }
 

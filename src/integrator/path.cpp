@@ -14,22 +14,24 @@ public:
     explicit PathIntegrator(const DepthOptions& depth) : depth_(depth) {}
 
     void sample(const SampleContext& c, Workspace& work) const override {
-        constexpr TechniqueCounts counts{.hit = 1, .next_event = 1};
+        const TechniqueCounts counts = this->counts(c.scene, 0);
         const WalkOptions walk = depth_.walk();
         SubPath& z = work.z;
         start_eye_path(c.scene, c.film, c.pixel, c.sampler, z, work.stats);
         for (int t = 2; t <= z.size(); ++t) {
-            for_each_hit(c.scene, z, t, counts, [&](const Join& j) {
-                c.sink.add_eye(j.technique, j.contribution, j.mis_weight);
-            });
+            for_each_hit(c.scene, z, t, counts,
+                         [&](const Join& j) { c.sink.add(j, j.contribution); });
             if (t > depth_.max_depth) break;
             if (const auto j = join_next_event(c.scene, z, t, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
-                    c.sink.add_eye(j->technique, j->contribution * Tr, j->mis_weight);
+                    c.sink.add(*j, j->contribution * Tr);
             extend<TransportMode::Radiance>(c.scene, c.sampler, walk, counts, z, work.stats);
         }
     }
 
+    TechniqueCounts counts(const Scene&, uint64_t /*light_paths*/) const override {
+        return {.hit = 1, .next_event = 1};
+    }
     bool traces_light_paths() const override { return false; }
     Estimator estimator() const override { return Estimator::Unbiased; }
 

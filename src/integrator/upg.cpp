@@ -40,6 +40,9 @@ public:
         });
     }
 
+    TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
+        return counts(scene, light_paths, photons_.radius());
+    }
     bool traces_light_paths() const override { return true; }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
@@ -62,7 +65,7 @@ private:
                 Workspace& work) const {
         const SubPath& z = work.z;
         SubPath& y = work.pair;
-        const int s = photons_.paths().restore_up_to(c.scene, vertex, 2, y);
+        const int s = photons_.paths().restore_up_to(c.scene, vertex, 2, work.is_observed, y);
         if (s + t - 2 > paths_.max_depth()) return;
         const auto drops_eye = drops_eye_vertex_of_pair(y, s, z, t);
         if (!drops_eye) return;
@@ -83,7 +86,7 @@ private:
                               .radius = photons_.radius()};
         const double r =
             reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
-        c.sink.add_eye(j->technique, *value * float(r * c.splat_scale), j->mis_weight);
+        c.sink.add(*j, *value * float(r * c.splat_scale));
     }
 
     Bidirectional paths_;

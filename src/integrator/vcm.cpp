@@ -36,15 +36,19 @@ public:
         const auto merge = [&](int t) {
             if (!merges_) return;
             photons_.for_each_near(work.z[t - 1].p, [&](uint32_t vertex) {
-                const int s = photons_.paths().restore_up_to(c.scene, vertex, 1, work.pair);
+                const int s = photons_.paths().restore_up_to(
+                    c.scene, vertex, 1, work.is_observed, work.pair);
                 if (s + t - 2 > paths_.max_depth()) return;
                 if (const auto j = join_merge(work.pair, s, work.z, t, n))
-                    c.sink.add_eye(j->technique, j->contribution * c.splat_scale, j->mis_weight);
+                    c.sink.add(*j, j->contribution * c.splat_scale);
             });
         };
         paths_.eye_path(c, n, work, merge);
     }
 
+    TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
+        return counts(scene, light_paths, photons_.radius());
+    }
     bool traces_light_paths() const override { return true; }
     Estimator estimator() const override {
         return !merges_     ? Estimator::Unbiased

@@ -47,6 +47,7 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
         others += sqr(p_L) * inner;
     }
     return Join{.technique = connection_technique(0, t),
+                .emitter = &emitter,
                 .contribution = v.beta * e.Le,
                 .mis_weight = power_heuristic(counts.hit, others),
                 .film = z.film,
@@ -85,6 +86,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                                          counts);
     }
     return Join{.technique = {Strategy::NextEvent, 1, t},
+                .emitter = &emitter,
                 .contribution = C,
                 .mis_weight = power_heuristic(counts.next_event, others),
                 .film = z.film,
@@ -160,6 +162,7 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
     if (!edge) return {};
     const Vertex &a = y[s - 1], &b = z[t - 1];
     return Join{.technique = {Strategy::Connect, s, t},
+                .emitter = y[0].emitter,
                 .contribution = edge->contribution,
                 .mis_weight = float(sqr(double(counts.connect)) / edge->total),
                 .film = z.film,
@@ -185,6 +188,7 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     const double kept = drops_eye ? edge->rev_a : edge->rev_b;
     const double found = std::fmin(1, counts.disc * kept);
     return Join{.technique = {Strategy::Gather, s, t},
+                .emitter = y[0].emitter,
                 .contribution = edge->contribution,
                 .mis_weight = float(sqr(counts.gather * found) / edge->total),
                 .film = z.film,
@@ -212,6 +216,7 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
             (bracket<Side::Eye>(z, t - 2, z[t - 2].is_delta, 0, 0, edges, counts) + b.weight_sum);
     const double np = double(counts.merge) * counts.disc * b.pdf_fwd;
     return Join{.technique = {Strategy::Merge, s, t},
+                .emitter = y[0].emitter,
                 .contribution = a.beta * f.f * b.beta * (1 / (abs_dot(a.wo, b.ng) * counts.disc)),
                 .mis_weight = float(sqr(np) / total),
                 .film = z.film,
@@ -257,6 +262,7 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
         others +=
             sqr(double(counts.hit_lens) * f.pdf * abs_dot(lens->ng, w) * inv_dist2 / lens->pdf_pos);
     Join join{.technique = {Strategy::Splat, s, 1},
+              .emitter = y[0].emitter,
               .contribution = C,
               .mis_weight = power_heuristic(counts.splat, others),
               .film = lens->film,
@@ -290,9 +296,13 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
                           {rev_last, s >= 2 ? y[s - 2].pdf_rev : 0.0f, kLensGloss, s}, counts);
     if (!a.is_delta) others += sqr(counts.splat * p_lens);
     return Join{.technique = {Strategy::HitLens, s + 1, 0},
+                .emitter = y[0].emitter,
                 .contribution = C,
                 .mis_weight = power_heuristic(counts.hit_lens, others),
                 .film = lens->film,
+                .a = origin,
+                .b = lens->p,
+                .to_infinity = a.is_infinite,
                 .needs_test = false};
 }
 

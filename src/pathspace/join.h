@@ -10,10 +10,12 @@ namespace etendue {
 
 struct Join {
     Technique technique;
+    const Emitter* emitter;  ///< That x_0 lies on.
     Rgb contribution;  ///< C_{s,t}, visibility left out; of splats for one light path (the film divides by N_L).
     float mis_weight;
-    Vec2 film{};                    ///< Film point; that of the eye sub-path unless t ≤ 1.
-    Vec3 a{}, ng_a{}, b{}, ng_b{};  ///< The edge to test; b is a direction where `to_infinity`.
+    Vec2 film{};  ///< Film point; that of the eye sub-path unless t ≤ 1.
+    /// The edge that the join adds; b is a direction where `to_infinity`. A hit adds none.
+    Vec3 a{}, ng_a{}, b{}, ng_b{};
     bool to_infinity = false;
     float found = 1;  ///< Of a gather: approximate probability that the pair was found, eq. 24.
     bool needs_test = true;

@@ -118,7 +118,8 @@ void LightPaths::restore(const Scene& scene, uint64_t index, SubPath& y) const {
     }
 }
 
-int LightPaths::restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, SubPath& y) const {
+int LightPaths::restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, bool whole,
+                              SubPath& y) const {
     const uint64_t path = vertices_[vertex].path;
     const uint32_t begin = heads_[path].begin;
     const int last = int(vertex - begin) + 1;
@@ -127,7 +128,8 @@ int LightPaths::restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, Su
     for (int i = 1; i <= last; ++i) {
         y.append();
         // A BSDF looks toward its predecessor, whose place must be known.
-        if (i >= last - 2) restore_vertex(scene, begin + uint32_t(i) - 1, i > last - bsdfs, y, i);
+        if (whole || i >= last - 2)
+            restore_vertex(scene, begin + uint32_t(i) - 1, i > last - bsdfs, y, i);
     }
     return last + 1;
 }

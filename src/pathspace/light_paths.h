@@ -55,8 +55,8 @@ public:
     /// The whole path `index` as it was walked.
     void restore(const Scene& scene, uint64_t index, SubPath& y) const;
     /// The path up to `vertex`; of its vertices only what joins with the last one (`bsdfs` = 1), or the last two, read:
-    /// y_0 and the last three. Returns s.
-    int restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, SubPath& y) const;
+    /// y_0 and the last three; all of them, without the earlier BSDFs, if `whole`. Returns s.
+    int restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, bool whole, SubPath& y) const;
 
 private:
     void restore_head(uint64_t index, SubPath& y) const;

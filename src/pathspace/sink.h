@@ -1,8 +1,6 @@
 #pragma once
 
-#include "color/rgb.h"
-#include "math/vec.h"
-#include "pathspace/technique.h"
+#include "pathspace/join.h"
 
 namespace etendue {
 
@@ -11,11 +9,9 @@ namespace etendue {
 class ContributionSink {
 public:
     virtual ~ContributionSink() = default;
-    /// Unweighted contribution of a path of the current eye sub-path's own pixel (t ≥ 2), and its weight.
-    virtual void add_eye(const Technique& technique, Rgb contribution, float mis_weight) = 0;
-    /// The same for a path that may land anywhere on the film (t ≤ 1), for one light path.
-    virtual void add_splat(Vec2 film, const Technique& technique, Rgb contribution,
-                           float mis_weight) = 0;
+    /// What the join brings, unweighted, with visibility. Where t ≥ 2 it belongs to the current eye sub-path's pixel;
+    /// where t ≤ 1 it may land anywhere on the film, and is for one light path.
+    virtual void add(const Join& join, Rgb contribution) = 0;
 };
 
 }  // namespace etendue

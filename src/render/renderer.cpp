@@ -15,49 +15,53 @@ namespace {
 /// Samples in a chunk of parallel work; fixed, whatever the number of threads.
 constexpr uint64_t kChunk = 256;
 
-/// The sink of a rendering: the film, and the technique images where they are asked for.
+/// The sink of a rendering: the film, and who else wants to know.
 class FilmSink final : public ContributionSink {
 public:
-    FilmSink(Film& film, TechniqueImages* techniques, float splat_scale, RenderStats& stats)
-        : film_(film), techniques_(techniques), splat_scale_(splat_scale), stats_(stats) {}
+    FilmSink(Film& film, TechniqueImages* techniques, ContributionObserver* observer,
+             float splat_scale, Workspace& work)
+        : film_(film), techniques_(techniques), observer_(observer), splat_scale_(splat_scale),
+          work_(work) {}
 
-    void begin(uint64_t pixel, const float& film_weight) {
+    void begin(uint64_t pixel) {
         pixel_ = pixel;
-        film_weight_ = &film_weight;
         sum_ = Rgb();
     }
     void end() { film_.add_eye(pixel_, sum_); }
 
-    void add_eye(const Technique& technique, Rgb contribution, float mis_weight) override {
-        contribution *= *film_weight_;
-        const Rgb value = contribution * mis_weight;
+    void add(const Join& join, Rgb contribution) override {
+        const bool is_splat = join.technique.t <= 1;
+        const Rgb value = contribution * join.mis_weight;
         if (!is_finite(value)) {
-            ++stats_.rejected;
+            ++work_.stats.rejected;
             return;
         }
-        sum_ += value;
-        if (techniques_) techniques_->add_eye(pixel_, technique, contribution, mis_weight);
-    }
-
-    void add_splat(Vec2 film, const Technique& technique, Rgb contribution,
-                   float mis_weight) override {
-        const Rgb value = contribution * mis_weight;
-        if (!is_finite(value)) {
-            ++stats_.rejected;
-            return;
-        }
-        film_.add_splat(film, value);
-        if (techniques_)
-            techniques_->add_splat(film, technique, contribution, mis_weight, splat_scale_);
+        if (is_splat)
+            film_.add_splat(join.film, value);
+        else
+            sum_ += value * work_.z.film_weight;
+        if (techniques_) add_to_techniques(join, contribution);
+        if (observer_)
+            observer_->observe(join, contribution, is_splat ? splat_scale_ : work_.z.film_weight,
+                               pixel_, work_);
     }
 
 private:
+    void add_to_techniques(const Join& join, Rgb contribution) {
+        if (join.technique.t <= 1)
+            techniques_->add_splat(join.film, join.technique, contribution, join.mis_weight,
+                                   splat_scale_);
+        else
+            techniques_->add_eye(pixel_, join.technique, contribution * work_.z.film_weight,
+                                 join.mis_weight);
+    }
+
     Film& film_;
     TechniqueImages* techniques_;
+    ContributionObserver* observer_;
     float splat_scale_;
-    RenderStats& stats_;
+    Workspace& work_;
     uint64_t pixel_ = 0;
-    const float* film_weight_ = nullptr;
     Rgb sum_;
 };
 
@@ -113,8 +117,9 @@ void Renderer::pass(uint32_t index) {
     const auto for_each_sample = [&](const auto& use) {
         tbb::parallel_for(uint64_t(0), chunks, [&](uint64_t chunk) {
             Workspace& work = workers_->spaces.local();
+            work.is_observed = settings_.observer != nullptr;
             Sampler sampler(settings_.sampler, settings_.seed);
-            FilmSink sink(film_, techniques_.get(), splat_scale, work.stats);
+            FilmSink sink(film_, techniques_.get(), settings_.observer, splat_scale, work);
             const uint64_t end = std::min(pixels, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
                 sampler.start(index, pixel);
@@ -131,7 +136,7 @@ void Renderer::pass(uint32_t index) {
                                                          FilmSink&) { use(chunk, c, work); });
                                  }});
         for_each_sample([&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {
-            sink.begin(c.pixel, work.z.film_weight);
+            sink.begin(c.pixel);
             integrator_->sample(c, work);
             sink.end();
         });

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "integrator/integrator.h"
+#include "render/contribution_observer.h"
 #include "render/technique_images.h"
 
 namespace etendue {
@@ -24,6 +25,7 @@ struct RenderSettings {
     std::optional<double> error;  ///< Relative RMS error of the image, see ErrorEstimate.
     /// Technique images up to this many edges; 0 for none.
     int technique_depth = 0;
+    ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
 };
 
 struct Progress {

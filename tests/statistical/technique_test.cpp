@@ -80,7 +80,7 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
     for (int k = 1; k <= kLongest; ++k)
         expected_count += size_t(k + 1 + lens) + (gathers && k >= 3 ? size_t(k - 1) : 0);
     EXPECT_EQ(alone.size(), expected_count) << "a technique made nothing";
-    const double level = testing::sidak(0.01, int(alone.size() + together.size()));
+    const double level = sidak(0.01, int(alone.size() + together.size()));
     // Few light paths meet the lens.
     const auto expect_mean = [&](const Moments& m, int length, bool is_rare,
                                  const std::string& what) {

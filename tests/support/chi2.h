@@ -1,11 +1,13 @@
 #pragma once
 // Pearson's χ² test of samples against a density, on cells of a two-dimensional domain, and what it
-// needs: adaptive quadrature, the incomplete gamma function, Šidák's correction.
+// needs: adaptive quadrature and the incomplete gamma function.
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
+
+#include "math/statistics.h"
 
 namespace etendue::testing {
 
@@ -29,12 +31,6 @@ inline double gamma_q(double a, double x) {
         if (std::fabs(c * d - 1) < 1e-15) break;
     }
     return h * scale;
-}
-
-/// Significance level of each of `tests` independent tests such that all together raise a false
-/// alarm with `family`.
-inline double sidak(double family, int tests) {
-    return 1 - std::pow(1 - family, 1.0 / tests);
 }
 
 /// ∫∫ f over [x0, x1] × [y0, y1] to about the absolute error `tolerance`: 2×2 against 4 × (2×2)

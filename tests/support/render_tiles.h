@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "chi2.h"
+#include "math/statistics.h"
 #include "render/renderer.h"
-#include "statistics.h"
 
 namespace etendue::test {
 
@@ -101,7 +100,7 @@ inline constexpr double kRounding = 1e-4;
 inline void expect_same_image(const Tiles& a, const Tiles& b, double resolution,
                               const std::string& what) {
     ASSERT_EQ(a.across, b.across);
-    const double level = testing::sidak(0.01, int(a.values.size()));
+    const double level = sidak(0.01, int(a.values.size()));
     const size_t whole = size_t(a.parts() - 1) * 3;
     size_t different = 0, worst = 0;
     double lowest = 2, seen = 0;

@@ -60,8 +60,7 @@ TEST_P(MicrofacetOf, SigmaIsTheProjectedAreaOfFacingNormals) {
 }
 
 TEST_P(MicrofacetOf, VisibleNormalsFollowTheirDensity) {
-    const double significance =
-        testing::sidak(1e-3, 2 * int(std::size(kRoughness) * std::size(kAngles)));
+    const double significance = sidak(1e-3, 2 * int(std::size(kRoughness) * std::size(kAngles)));
     for (const Roughness a : kRoughness)
         for (const double theta : kAngles) {
             const Microfacet d(GetParam(), a.x, a.y);

@@ -20,7 +20,7 @@ using testing::Random;
 /// fixed).
 constexpr double kFalseAlarm = 1e-3;
 constexpr int kTests = 16;
-const double kSignificance = testing::sidak(kFalseAlarm, kTests);
+const double kSignificance = sidak(kFalseAlarm, kTests);
 constexpr int kDraws = 200000;
 
 const std::vector<std::vector<double>> kWeights = {

@@ -22,7 +22,7 @@ constexpr int kDraws = 200000;
 constexpr double kTau = 2 * M_PI;
 
 void expect_passes(const Chi2Result& result) {
-    EXPECT_GT(result.p_value, testing::sidak(kFalseAlarm, kTests))
+    EXPECT_GT(result.p_value, sidak(kFalseAlarm, kTests))
         << "chi2 " << result.statistic << " at " << result.degrees << " degrees of freedom";
     EXPECT_NEAR(result.total_probability, 1, 1e-4);
 }

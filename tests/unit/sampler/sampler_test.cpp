@@ -25,7 +25,7 @@ void expect_uniform(const std::vector<int64_t>& counts) {
     for (const int64_t c : counts) samples += c;
     const std::vector<double> probabilities(counts.size(), 1.0 / double(counts.size()));
     const auto result = chi2_test(counts, probabilities, samples);
-    EXPECT_GT(result.p_value, testing::sidak(kFalseAlarm, kTests))
+    EXPECT_GT(result.p_value, sidak(kFalseAlarm, kTests))
         << "chi2 " << result.statistic << " at " << result.degrees << " degrees of freedom";
 }
 

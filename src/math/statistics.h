@@ -1,0 +1,54 @@
+#pragma once
+// Estimates with their spread, and the tests that compare them.
+
+#include <cmath>
+#include <cstdint>
+
+namespace etendue {
+
+/// Mean and spread of independent samples of one quantity [Welford 1962].
+class Moments {
+public:
+    /// A quantity that is known.
+    static Moments exact(double value) { return estimate(value, 0, 0); }
+    /// The mean of `count` samples, and the variance of that mean.
+    static Moments estimate(double mean, double squared_error, int64_t count) {
+        Moments m;
+        m.count_ = count;
+        m.mean_ = mean;
+        m.sum2_ = squared_error * double(count) * double(count - 1);
+        return m;
+    }
+    void add(double x) {
+        const double d = x - mean_;
+        mean_ += d / double(++count_);
+        sum2_ += d * (x - mean_);
+    }
+    int64_t count() const { return count_; }
+    double mean() const { return mean_; }
+    /// Of one sample.
+    double variance() const { return count_ > 1 ? sum2_ / double(count_ - 1) : 0.0; }
+    /// Of the mean.
+    double squared_error() const { return count_ > 1 ? variance() / double(count_) : 0.0; }
+
+private:
+    int64_t count_ = 0;
+    double mean_ = 0, sum2_ = 0;
+};
+
+/// Probability that |T| exceeds t for Student's distribution.
+double student_tail(double t, double dof);
+/// The t whose student_tail() is `p`.
+double student_quantile(double p, double dof);
+
+/// Degrees of freedom of the difference of two means [Welch 1947]; infinite where both are known.
+double welch_dof(const Moments& a, const Moments& b);
+/// Welch's test: the probability of means at least this different, where the expectations differ by at most
+/// `tolerance` (for what single precision does to a render, which no number of samples averages out).
+double welch_p(const Moments& a, const Moments& b, double tolerance);
+
+/// Significance level of each of `tests` independent tests such that all together raise a false alarm with probability
+/// `family` [Šidák 1967].
+double sidak(double family, int tests);
+
+}  // namespace etendue
