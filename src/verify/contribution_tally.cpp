@@ -1,0 +1,50 @@
+#include "verify/contribution_tally.h"
+
+#include <algorithm>
+
+namespace etendue {
+
+void ContributionTally::observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
+                                const Workspace& paths) {
+    const int edges = join.technique.vertices() - 1;
+    if (edges > max_edges_) return;
+    PathClass c = classify(scene_, join, paths.y, paths.z, cut_off_);
+    Sums& sums = sums_[uint64_t(join.technique.s) << 32 | c.key()];
+    c.has_short_edge = false;
+    std::vector<TileSum>& tiles = tiles_[c];
+    tiles.resize(grid_.tiles());
+
+    const auto add_to_tile = [&](uint64_t at, Rgb value) {
+        TileSum& t = tiles[grid_.tile(at)];
+        for (int i = 0; i < 3; ++i) t.rgb[size_t(i)] += double(value[i]);
+        t.luminance.add(double(luminance(value)));
+    };
+    double reach = double(share);  // what the pixels of the crop get of a contribution of 1
+    if (join.technique.t >= 2) {
+        add_to_tile(pixel, contribution * (join.mis_weight * share));
+    } else {
+        reach = 0;
+        for_each_pixel(grid_.film, scene_.filter(), join.film, [&](uint64_t at, float h) {
+            reach += double(share * h);
+            add_to_tile(at, contribution * (join.mis_weight * share * h));
+        });
+    }
+    const double alone = double(luminance(contribution)) * reach;
+    sums.alone.add(alone);
+    sums.weighted.add(alone * double(join.mis_weight));
+}
+
+std::vector<ContributionTally::Entry> ContributionTally::entries() const {
+    std::vector<Entry> out;
+    for (const auto& [key, sums] : sums_) {
+        const PathClass c = PathClass::from_key(uint32_t(key));
+        const int s = int(key >> 32);
+        out.push_back({c, connection_technique(s, c.edges + 1 - s), sums.weighted, sums.alone});
+    }
+    std::sort(out.begin(), out.end(), [](const Entry& a, const Entry& b) {
+        return std::pair(a.path_class, a.technique.s) < std::pair(b.path_class, b.technique.s);
+    });
+    return out;
+}
+
+}  // namespace etendue

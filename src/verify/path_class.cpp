@@ -1,0 +1,66 @@
+#include "verify/path_class.h"
+
+#include <algorithm>
+
+namespace etendue {
+namespace {
+
+/// Edges between the first `count` vertices of a walk.
+float shortest_edge(const SubPath& path, int count) {
+    float shortest = kInf;
+    for (int i = 1; i < count; ++i)
+        if (!path[i - 1].is_infinite && !path[i].is_infinite)
+            shortest = std::min(shortest, length2(path[i].p - path[i - 1].p));
+    return std::sqrt(shortest);
+}
+
+/// Light vertices that the walk made; the lens of C(s,0) is none of them.
+int walked(const Technique& q) {
+    return q.t == 0 ? q.s - 1 : q.s;
+}
+
+}  // namespace
+
+float shortest_edge(const Scene& scene, const Join& join, const SubPath& y, const SubPath& z) {
+    const Technique& q = join.technique;
+    float shortest = std::min(q.s >= 2 ? shortest_edge(y, walked(q)) : kInf,
+                              q.t >= 2 ? shortest_edge(z, q.t) : kInf);
+    const bool to_lens_at_infinity = q.t <= 1 && scene.sensor().is_orthographic();
+    if (q.strategy != Strategy::Hit && !join.to_infinity && !to_lens_at_infinity)
+        shortest = std::min(shortest, length(join.b - join.a));
+    return shortest;
+}
+
+PathClass classify(const Scene& scene, const Join& join, const SubPath& y, const SubPath& z,
+                   float cut_off) {
+    const Technique& q = join.technique;
+    const int last = q.vertices() - 1;
+    PathClass c{.edges = uint8_t(last),
+                .has_short_edge = shortest_edge(scene, join, y, z) < cut_off,
+                .delta_emitter = join.emitter->is_delta(),
+                .infinite_ends = join.emitter->is_infinite() && scene.sensor().is_orthographic()};
+    // The event at an end point of a join is a smooth one, whatever the walk did there; C(s,0) has no such end point.
+    for (int i = 1; i < (q.t == 0 ? last : q.s - 1); ++i)
+        if (y[i].is_delta) c.delta_events |= 1u << i;
+    for (int i = 1; i < q.t - 1; ++i)
+        if (z[i].is_delta) c.delta_events |= 1u << (last - i);
+    return c;
+}
+
+bool can_make(const Technique& q, const PathClass& c) {
+    if (q.vertices() != c.edges + 1) return false;
+    if (q.strategy == Strategy::Hit) return !c.delta_emitter;
+    if (q.strategy == Strategy::HitLens) return true;
+    if (q.s == 1 && q.t == 1) return !c.infinite_ends;
+    return (c.delta_events & (3u << (q.s - 1))) == 0;  // x_{s-1} and x_s are joined
+}
+
+bool can_make(const TechniqueCounts& counts, const PathClass& c) {
+    for (int s = 0; s <= c.edges + 1; ++s) {
+        const Technique q = connection_technique(s, c.edges + 1 - s);
+        if (counts.of(q.strategy) > 0 && can_make(q, c)) return true;
+    }
+    return false;
+}
+
+}  // namespace etendue
