@@ -163,9 +163,6 @@ void print_report(const VerifyReport& report, const Scene& scene, const VerifyOp
     fmt::print("{} comparisons, together a false alarm with probability {}: each is tested at "
                "{:.3g}\n",
                report.tests, options.alpha, report.level);
-    if (report.cut_off > 0)
-        fmt::print("techniques alone: of paths whose every edge has at least {:.4g}\n",
-                   report.cut_off);
     fmt::print("\n");
     for (const MethodReport& m : report.methods) {
         fmt::print("{}, {} spp a run\n", m.method, m.spp);
@@ -209,6 +206,7 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m
     for (const LengthReport& l : m.lengths) {
         j["lengths"].push_back(to_json(report, l.comparison));
         j["lengths"].back().update(nlohmann::ordered_json{{"edges", l.edges},
+                                                          {"cut_off", l.cut_off},
                                                           {"share", l.share},
                                                           {"out_of_reach", l.out_of_reach},
                                                           {"too_rare", l.too_rare}});
@@ -234,8 +232,7 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
                              {"seed", options.seed},
                              {"alpha", options.alpha},
                              {"tests", report.tests},
-                             {"level", report.level},
-                             {"cut_off", report.cut_off}};
+                             {"level", report.level}};
     for (const MethodReport& m : report.methods) j["methods"].push_back(to_json(report, m));
     return j;
 }

@@ -6,9 +6,9 @@ namespace etendue {
 
 void ContributionTally::observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
                                 const Workspace& paths) {
-    const int edges = join.technique.vertices() - 1;
-    if (edges > max_edges_) return;
-    PathClass c = classify(scene_, join, paths.y, paths.z, cut_off_);
+    const size_t edges = size_t(join.technique.vertices() - 1);
+    if (edges >= cut_offs_.size()) return;
+    PathClass c = classify(scene_, join, paths.y, paths.z, cut_offs_[edges]);
     Sums& sums = sums_[uint64_t(join.technique.s) << 32 | c.key()];
     c.has_short_edge = false;
     std::vector<TileSum>& tiles = tiles_[c];

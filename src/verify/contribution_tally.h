@@ -55,9 +55,9 @@ public:
         Tally luminance;
     };
 
-    /// Edges shorter than `cut_off` mark their path. Longer paths than `max_edges` are passed over.
-    ContributionTally(const Scene& scene, TileGrid grid, float cut_off, int max_edges)
-        : scene_(scene), grid_(grid), cut_off_(cut_off), max_edges_(max_edges) {}
+    /// An edge shorter than cut_offs[edges of the path] marks the path. Paths with more edges are passed over.
+    ContributionTally(const Scene& scene, TileGrid grid, std::vector<float> cut_offs)
+        : scene_(scene), grid_(grid), cut_offs_(std::move(cut_offs)) {}
 
     void observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
                  const Workspace& paths) override;
@@ -69,8 +69,7 @@ public:
 private:
     const Scene& scene_;
     TileGrid grid_;
-    float cut_off_;
-    int max_edges_;
+    std::vector<float> cut_offs_;
     struct Sums {
         Tally weighted, alone;
     };

@@ -15,7 +15,7 @@ namespace {
 
 /// Samples of the first, short rendering that tells times and edge lengths.
 constexpr uint64_t kPilotSamples = 20000;
-/// δ is the length that the shortest edges of this share of the light do not reach.
+/// δ is the length that the shortest edge of this share of the light does not reach.
 constexpr double kShortShare = 0.2;
 
 using TileMeans = std::vector<std::array<double, 3>>;  ///< Of every tile, then of the image.
@@ -42,13 +42,15 @@ public:
     Runner(const Scene& scene, const VerifyOptions& options,
            const std::function<void(const std::string&)>& progress)
         : scene_(scene), options_(options), progress_(progress),
-          grid_{scene.film(), std::min({options.tiles, scene.film().crop_width,
-                                        scene.film().crop_height})} {}
+          grid_{scene.film(),
+                std::min({options.tiles, scene.film().crop_width, scene.film().crop_height})},
+          cut_offs_(size_t(options.longest) + 1) {}
 
     const TileGrid& grid() const { return grid_; }
-    float cut_off() const { return cut_off_; }
-    /// Finds δ from a short rendering by the method.
-    void choose_cut_off(const IntegratorSpec& spec);
+    /// δ by path length.
+    const std::vector<float>& cut_offs() const { return cut_offs_; }
+    /// Finds them from a short rendering by the method.
+    void choose_cut_offs(const IntegratorSpec& spec);
     /// Every run of the method; `stream` tells its random numbers from those of the others.
     Series render(const IntegratorSpec& spec, uint64_t stream) const;
 
@@ -67,7 +69,7 @@ private:
     const VerifyOptions& options_;
     const std::function<void(const std::string&)>& progress_;
     TileGrid grid_;
-    float cut_off_ = 0;
+    std::vector<float> cut_offs_;
 };
 
 void render_all(Renderer& renderer) {
@@ -86,36 +88,42 @@ Renderer Runner::renderer(const IntegratorSpec& spec, uint64_t stream, uint64_t 
     return Renderer(scene_, settings);
 }
 
-void Runner::choose_cut_off(const IntegratorSpec& spec) {
+void Runner::choose_cut_offs(const IntegratorSpec& spec) {
+    struct Edges {
+        std::vector<std::pair<float, double>> shortest;  // and the light it brings
+        double total = 0;
+    };
     struct EdgeObserver final : ContributionObserver {
-        explicit EdgeObserver(const Scene& s) : scene(s) {}
+        EdgeObserver(const Scene& s, int longest) : scene(s), lengths(size_t(longest) + 1) {}
         void observe(const Join& join, Rgb contribution, float share, uint64_t,
                      const Workspace& paths) override {
             const double light = double(luminance(contribution) * join.mis_weight * share);
-            edges.emplace_back(shortest_edge(scene, join, paths.y, paths.z), light);
-            total += light;
+            Edges& edges = lengths[size_t(join.technique.vertices() - 1)];
+            edges.shortest.emplace_back(shortest_edge(scene, join, paths.y, paths.z), light);
+            edges.total += light;
         }
         const Scene& scene;
-        std::vector<std::pair<float, double>> edges;
-        double total = 0;
-    } observer(scene_);
+        std::vector<Edges> lengths;
+    } observer(scene_, options_.longest);
     Renderer pilot = renderer(spec, 0, 0, pilot_spp(), &observer);
     render_all(pilot);
-    std::sort(observer.edges.begin(), observer.edges.end());
-    double sum = 0;
-    for (const auto& [edge, light] : observer.edges) {
-        sum += light;
-        if (sum > kShortShare * observer.total) {
-            cut_off_ = std::isfinite(edge) ? edge : 0;
-            return;
-        }
+    for (size_t i = 0; i < observer.lengths.size(); ++i) {
+        Edges& edges = observer.lengths[i];
+        std::sort(edges.shortest.begin(), edges.shortest.end());
+        double sum = 0;
+        const auto delta = std::find_if(
+            edges.shortest.begin(), edges.shortest.end(), [&](const auto& edge) {
+                return (sum += edge.second) > kShortShare * edges.total;
+            });
+        if (delta != edges.shortest.end() && std::isfinite(delta->first))
+            cut_offs_[i] = delta->first;
     }
 }
 
 /// From the time of a rendering that is thrown away: the number must not depend on the values that are compared.
 uint64_t Runner::choose_spp(const IntegratorSpec& spec, uint64_t stream) const {
     if (options_.spp) return *options_.spp;
-    ContributionTally tally(scene_, grid_, cut_off_, options_.longest);
+    ContributionTally tally(scene_, grid_, cut_offs_);
     Renderer pilot = renderer(spec, stream, uint64_t(options_.runs), pilot_spp(), &tally);
     render_all(pilot);
     const double pass = pilot.seconds() / double(pilot_spp());
@@ -125,7 +133,7 @@ uint64_t Runner::choose_spp(const IntegratorSpec& spec, uint64_t stream) const {
 
 Run Runner::render_run(const IntegratorSpec& spec, uint64_t stream, uint64_t run,
                        uint64_t spp) const {
-    ContributionTally tally(scene_, grid_, cut_off_, options_.longest);
+    ContributionTally tally(scene_, grid_, cut_offs_);
     Renderer r = renderer(spec, stream, run, spp, &tally);
     render_all(r);
     const double scale = 1 / (double(spp) * double(scene_.film().pixel_count()));
@@ -313,7 +321,8 @@ void compare_images(const TileSeries& method, const TileSeries& reference, Metho
 }
 
 void compare_lengths(const Series& method, const Series& reference, const CommonClasses& common,
-                     const VerifyOptions& options, MethodReport& report) {
+                     const VerifyOptions& options, const std::vector<float>& cut_offs,
+                     MethodReport& report) {
     const auto light = [](const Run& run, const auto& belongs) {
         double sum = 0;
         for (const ContributionTally::Entry& e : run.entries)
@@ -332,7 +341,7 @@ void compare_lengths(const Series& method, const Series& reference, const Common
         };
         const auto left = common.left_out(edges);
         report.lengths.push_back(
-            {edges, of_length(reference, false).mean() / everything.mean(), left.out_of_reach,
+            {edges, cut_offs[size_t(edges)], of_length(reference, false).mean() / everything.mean(), left.out_of_reach,
              left.too_rare,
              compare(of_length(method, true), of_length(reference, true),
                      common.effective_count(edges))});
@@ -499,8 +508,7 @@ VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& metho
         spec.params.emplace("rr_depth", std::to_string(options.longest + 1));
         report.reference = spec.to_string();
         for (const IntegratorSpec& m : methods) make_integrator(limited(m, options.longest));
-        runner.choose_cut_off(spec);
-        report.cut_off = runner.cut_off();
+        runner.choose_cut_offs(spec);
         against = runner.render(spec, 1);
     }
     const ErrorReference error_reference =
@@ -524,7 +532,7 @@ VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& metho
             m.too_rare = left.too_rare;
             compare_images(tile_series(series, runner.grid(), &common),
                            tile_series(*against, runner.grid(), &common), m);
-            compare_lengths(series, *against, common, options, m);
+            compare_lengths(series, *against, common, options, runner.cut_offs(), m);
             for (int edges = options.shortest; edges <= options.longest; ++edges)
                 for (int s = 0; s <= edges + 1; ++s)
                     if (const Technique q = connection_technique(s, edges + 1 - s);

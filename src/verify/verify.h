@@ -7,7 +7,7 @@
 // enough for a t-test to hold. What is left out is reported.
 //
 // Techniques alone: an unweighted connection has infinite variance where surfaces meet, its second moment being
-// ∝ 1/(shortest edge). So both sides are multiplied by [every edge ≥ δ].
+// ∝ 1/(shortest edge). So both sides are multiplied by [every edge ≥ δ], with a δ for each path length.
 
 #include <atomic>
 #include <functional>
@@ -59,6 +59,7 @@ inline constexpr double kRounding = 1e-4;
 
 struct LengthReport {
     int edges = 0;
+    float cut_off = 0;  ///< δ
     double share = 0;  ///< Of the reference's image.
     /// Shares of what either side found of this length that only one can make, or that one finds too rarely.
     double out_of_reach = 0, too_rare = 0;
@@ -110,7 +111,6 @@ const char* to_string(Verdict verdict);
 
 struct VerifyReport {
     std::string reference;
-    float cut_off = 0;  ///< δ
     int tests = 0;
     double level = 0;  ///< Of each test.
     std::vector<MethodReport> methods;

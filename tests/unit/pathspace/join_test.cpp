@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pathspace/join.h"
+#include "path_ends.h"
 #include "pathspace/path_pdfs.h"
 #include "test_scenes.h"
 
@@ -195,17 +195,7 @@ TEST_P(Joins, EqualTheDefinition) {
         for (int t = 2; t <= z.size(); ++t) {
             if (z[t - 1].kind != Vertex::Kind::Surface) continue;
             if (const auto j = join_next_event(scene, z, t, sampler, counts)) {
-                Vertex x0;
-                x0.kind = Vertex::Kind::Emitter;
-                x0.p = j->b;
-                x0.ng = j->ng_b;
-                x0.is_infinite = j->to_infinity;
-                for (const auto& e : scene.emitters())
-                    if (e->is_infinite() == x0.is_infinite && e->is_area() == (length2(x0.ng) > 0))
-                        x0.emitter = e.get();
-                if (!x0.emitter->is_area())
-                    x0.ng = x0.is_infinite ? -x0.p : normalize(z[t - 1].p - x0.p);
-                x0.has_cosine = x0.emitter->is_area();
+                const Vertex x0 = test::emitter_end(*j, z[t - 1]);
                 const auto x = path_vertices(y, 1, z, t, &x0);
                 const PathValue v = evaluate_path(scene, x, std::vector<bool>(x.size(), false));
                 check(*j, x, v.pdfs.next_event * density_of(z, t));
@@ -213,13 +203,7 @@ TEST_P(Joins, EqualTheDefinition) {
         }
         for (int s = 1; s <= y.size(); ++s)
             if (const auto j = join_splat(scene, y, s, sampler, counts)) {
-                Vertex lens;
-                lens.kind = Vertex::Kind::Sensor;
-                lens.is_infinite = scene.sensor().is_orthographic();
-                const SensorRay ray = scene.sensor().sample_ray(j->film, {0.5f, 0.5f});
-                lens.ng = ray.ng;
-                lens.p = lens.is_infinite ? -ray.ng : j->a;
-                lens.pdf_fwd = ray.pdf_pos;
+                const Vertex lens = test::lens_end(scene, *j);
                 check(*j, path_vertices(y, s, z, 1, nullptr, &lens),
                       density_of(y, s) * lens.pdf_fwd);
             }

@@ -1,0 +1,144 @@
+// What verify() says of code with a planted error, and of the same scenes without one. Which error is in the program
+// that runs is decided by CMakeLists.txt.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "sample_densities.h"
+#include "test_scenes.h"
+#include "verify/verify.h"
+
+namespace etendue::test {
+namespace {
+
+constexpr int kSize = 16;
+
+/// Where an error shows.
+enum Part : unsigned { Image = 1, Lengths = 2, Techniques = 4, Densities = 8 };
+
+struct Planted {
+    const char* name;
+    std::string xml;
+    std::string method;
+    unsigned shows;  ///< Parts that must find it.
+    unsigned clear;  ///< Parts that must not: the error is none to them.
+    uint64_t spp = 64;
+};
+void PrintTo(const Planted& p, std::ostream* out) {
+    *out << p.name;
+}
+
+/// A lamp as large as the ceiling: hits and next events share its light.
+std::string large_lamp() {
+    return rectangle("<scale value=\"0.9\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.9\"/>",
+                     diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                              "value=\"2,2,2\"/></emitter>");
+}
+
+/// Light that begins in glass: elsewhere the η² of two refractions cancel.
+std::string lamp_in_glass() {
+    return sphere("0,0,0", "0.6", kRoughGlass) +
+           sphere("0,0,0", "0.3",
+                  diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                           "value=\"9,8,7\"/></emitter>");
+}
+
+std::string cropped_camera() {
+    return "<sensor type=\"perspective\"><float name=\"fov\" value=\"45\"/><transform "
+           "name=\"to_world\"><lookat origin=\"0,0,3.4\" target=\"0,0,0\" up=\"0,1,0\"/>"
+           "</transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"20\"/><integer "
+           "name=\"height\" value=\"20\"/><integer name=\"crop_offset_x\" value=\"2\"/><integer "
+           "name=\"crop_offset_y\" value=\"2\"/><integer name=\"crop_width\" value=\"16\"/><integer "
+           "name=\"crop_height\" value=\"16\"/><rfilter type=\"box\"/></film></sensor>";
+}
+
+std::string smooth_mesh() {
+    return "<shape type=\"obj\"><string name=\"filename\" value=\"" ETENDUE_SOURCE_DIR
+           "/tests/scenes/icosahedron.obj\"/><transform name=\"to_world\"><scale value=\"0.5\"/>"
+           "<translate x=\"-0.1\" y=\"-0.4\" z=\"0.2\"/></transform>" +
+           diffuse("0.8,0.6,0.4") + "</shape>";
+}
+
+std::vector<Planted> planted() {
+    const std::string lit_room = front_camera(kSize) + room() + area_lamp();
+    const std::string softly_lit = front_camera(kSize) + room() + large_lamp();
+    return {
+        {"EtaSquared", front_camera(kSize) + room() + lamp_in_glass(), "light",
+         Image | Lengths | Techniques, 0},
+        {"ShadingNormal", lit_room + smooth_mesh(), "light", Image | Lengths | Techniques, 0},
+        {"SplatCount", cropped_camera() + room() + area_lamp(), "light", Image,
+         Lengths | Techniques},
+        {"Roulette", lit_room, "path:rr_depth=2", Image | Lengths | Techniques, 0},
+        {"RouletteOfJoins", lit_room, "bdpt", Image | Lengths, 0},
+        {"OwnCount", lit_room, "bdpt:roulette=0", Image | Lengths, Techniques},
+        {"CountEverywhere", lit_room, "bdpt:roulette=0", Densities, Image | Lengths | Techniques},
+        {"PdfOfEvaluation", softly_lit, "path", Lengths, Techniques, 256},
+        {"PdfOfSampling", softly_lit, "path", Techniques, Densities, 256},
+        {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques, 256},
+        {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
+    };
+}
+
+/// What was found, with a text that says what.
+struct Findings {
+    unsigned parts = 0;
+    std::string text;
+
+    void add(Part part, bool found, const std::string& what) {
+        if (!found) return;
+        parts |= part;
+        text += what + "\n";
+    }
+};
+
+Findings findings(const Planted& planted) {
+    const Scene scene = build(planted.xml);
+    VerifyOptions options;
+    options.longest = 5;
+    options.spp = planted.spp;
+    options.threads = 1;
+    const VerifyReport report = verify(scene, {IntegratorSpec::parse(planted.method)}, options);
+    const MethodReport& m = report.methods.front();
+    Findings found;
+    for (const auto* parts : {&m.image, &m.tiles})
+        for (const Comparison& c : *parts)
+            found.add(Image, report.deviates(c), fmt::format("image or tile: {:.4f}", c.ratio()));
+    for (const LengthReport& l : m.lengths)
+        found.add(Lengths, report.deviates(l.comparison),
+                  fmt::format("length {}: {:.4f} ± {:.4f}, would be found {:.4f}", l.edges,
+                              l.comparison.ratio(), l.comparison.ratio_error(),
+                              l.comparison.detectable(report.level)));
+    for (const TechniqueReport& t : m.techniques)
+        found.add(Techniques, report.deviates(t.comparison),
+                  fmt::format("s = {}, t = {}: {:.4f} ± {:.4f}", t.technique.s, t.technique.t,
+                              t.comparison.ratio(), t.comparison.ratio_error()));
+    EXPECT_GE(report.tests, 40) << "hardly anything was tested";
+    if ((planted.shows | planted.clear) & Densities)
+        for (const DensityTest& d : test_sample_densities(scene, planted.method))
+            found.add(Densities, d.deviates,
+                      fmt::format("density of s = {}, t = {}: {:.4f}", d.technique.s,
+                                  d.technique.t, d.ratio));
+    return found;
+}
+
+class Control : public ::testing::TestWithParam<Planted> {};
+class NoError : public ::testing::TestWithParam<Planted> {};
+
+TEST_P(Control, IsFound) {
+    const Findings found = findings(GetParam());
+    EXPECT_EQ(found.parts & GetParam().shows, GetParam().shows) << found.text;
+    EXPECT_EQ(found.parts & GetParam().clear, 0u) << found.text;
+    RecordProperty("found", found.text);
+}
+
+TEST_P(NoError, IsFound) {
+    const Findings found = findings(GetParam());
+    EXPECT_EQ(found.parts, 0u) << found.text;
+}
+
+const auto kName = [](const auto& p) { return std::string(p.param.name); };
+INSTANTIATE_TEST_SUITE_P(Planted, Control, ::testing::ValuesIn(planted()), kName);
+INSTANTIATE_TEST_SUITE_P(Clean, NoError, ::testing::ValuesIn(planted()), kName);
+
+}  // namespace
+}  // namespace etendue::test
