@@ -32,8 +32,8 @@ struct VerifyCommand {
 void parse_lengths(const std::string& text, VerifyOptions& options) {
     int read = 0;
     if (std::sscanf(text.c_str(), "%d..%d%n", &options.shortest, &options.longest, &read) != 2 ||
-        size_t(read) != text.size() || options.shortest < 1 ||
-        options.longest < options.shortest || options.longest > PathClass::kMostEdges)
+        size_t(read) != text.size() || options.shortest < 1 || options.longest < options.shortest ||
+        options.longest > PathClass::kMostEdges)
         throw std::runtime_error(
             fmt::format("--lengths must have the form 2..8, within 1..{}, but is \"{}\"",
                         PathClass::kMostEdges, text));
@@ -111,8 +111,7 @@ void print_techniques(const VerifyReport& report, const MethodReport& m) {
     fmt::print("  techniques alone, ratio to the reference (standard error of the last digits; "
                "share compared), by s\n");
     std::map<int, std::vector<const TechniqueReport*>> rows;
-    for (const TechniqueReport& t : m.techniques)
-        rows[t.technique.vertices() - 1].push_back(&t);
+    for (const TechniqueReport& t : m.techniques) rows[t.technique.vertices() - 1].push_back(&t);
     for (const auto& [edges, row] : rows) {
         std::string line = fmt::format("  {:>6} ", edges);
         int column = 0;
@@ -120,11 +119,11 @@ void print_techniques(const VerifyReport& report, const MethodReport& m) {
             for (; column < t->technique.s; ++column) line += fmt::format(" {:>18}", "");
             const Comparison& c = t->comparison;
             line += fmt::format(
-                " {:>18}", !c.is_tested()
-                               ? "-"
-                               : fmt::format("{}{:.3f}({:.0f}; {:.0f} %)",
-                                             report.deviates(c) ? "!" : "", c.ratio(),
-                                             std::ceil(1000 * c.ratio_error()), 100 * t->coverage));
+                " {:>18}",
+                !c.is_tested()
+                    ? "-"
+                    : fmt::format("{}{:.3f}({:.0f}; {:.0f} %)", report.deviates(c) ? "!" : "",
+                                  c.ratio(), std::ceil(1000 * c.ratio_error()), 100 * t->coverage));
             ++column;
         }
         fmt::print("{}\n", line);
@@ -151,8 +150,7 @@ void print_verdict(const VerifyReport& report, const MethodReport& m) {
     if (m.out_of_reach > 0)
         fmt::print("; {} of the light is out of its reach, or the reference's",
                    percent(m.out_of_reach));
-    if (m.too_rare > 0)
-        fmt::print("; {} comes by paths too rare for a test", percent(m.too_rare));
+    if (m.too_rare > 0) fmt::print("; {} comes by paths too rare for a test", percent(m.too_rare));
     if (m.rejected > 0) fmt::print("; {} contributions were not finite", m.rejected);
     fmt::print("\n\n");
 }
@@ -256,15 +254,14 @@ void VerifyCommand::run() {
     if (!quiet && is_terminal) fmt::print(stderr, "\r\033[K");
 
     if (!quiet) print_report(report, s, options);
-    if (!json.empty())
-        write_file_atomically(json, to_json(report, s, options).dump(2) + "\n");
+    if (!json.empty()) write_file_atomically(json, to_json(report, s, options).dump(2) + "\n");
     std::vector<std::string> rejected;
     for (const MethodReport& m : report.methods)
         if (m.estimator == Estimator::Unbiased && report.verdict(m) == Verdict::Deviates)
             rejected.push_back(m.method);
     if (!rejected.empty())
-        throw std::runtime_error(fmt::format("claimed to be unbiased, but rejected: {}",
-                                             fmt::join(rejected, ", ")));
+        throw std::runtime_error(
+            fmt::format("claimed to be unbiased, but rejected: {}", fmt::join(rejected, ", ")));
 }
 
 }  // namespace

@@ -41,9 +41,9 @@ class Runner {
 public:
     Runner(const Scene& scene, const VerifyOptions& options,
            const std::function<void(const std::string&)>& progress)
-        : scene_(scene), options_(options), progress_(progress),
-          grid_{scene.film(),
-                std::min({options.tiles, scene.film().crop_width, scene.film().crop_height})},
+        : scene_(scene), options_(options),
+          progress_(progress), grid_{scene.film(), std::min({options.tiles, scene.film().crop_width,
+                                                             scene.film().crop_height})},
           cut_offs_(size_t(options.longest) + 1) {}
 
     const TileGrid& grid() const { return grid_; }
@@ -111,8 +111,8 @@ void Runner::choose_cut_offs(const IntegratorSpec& spec) {
         Edges& edges = observer.lengths[i];
         std::sort(edges.shortest.begin(), edges.shortest.end());
         double sum = 0;
-        const auto delta = std::find_if(
-            edges.shortest.begin(), edges.shortest.end(), [&](const auto& edge) {
+        const auto delta =
+            std::find_if(edges.shortest.begin(), edges.shortest.end(), [&](const auto& edge) {
                 return (sum += edge.second) > kShortShare * edges.total;
             });
         if (delta != edges.shortest.end() && std::isfinite(delta->first))
@@ -312,8 +312,8 @@ TileSeries tile_series(const ReferenceImage& image, const TileGrid& grid) {
 
 void compare_images(const TileSeries& method, const TileSeries& reference, MethodReport& report) {
     for (size_t i = 0; i < method.means.size(); ++i) {
-        const double effective = std::min(method.tallies[i].effective_count(),
-                                          reference.tallies[i].effective_count());
+        const double effective =
+            std::min(method.tallies[i].effective_count(), reference.tallies[i].effective_count());
         for (size_t k = 0; k < 3; ++k)
             (i + 1 < method.means.size() ? report.tiles : report.image)
                 .push_back(compare(method.means[i][k], reference.means[i][k], effective));
@@ -340,11 +340,11 @@ void compare_lengths(const Series& method, const Series& reference, const Common
             });
         };
         const auto left = common.left_out(edges);
-        report.lengths.push_back(
-            {edges, cut_offs[size_t(edges)], of_length(reference, false).mean() / everything.mean(), left.out_of_reach,
-             left.too_rare,
-             compare(of_length(method, true), of_length(reference, true),
-                     common.effective_count(edges))});
+        report.lengths.push_back({edges, cut_offs[size_t(edges)],
+                                  of_length(reference, false).mean() / everything.mean(),
+                                  left.out_of_reach, left.too_rare,
+                                  compare(of_length(method, true), of_length(reference, true),
+                                          common.effective_count(edges))});
     }
 }
 
@@ -384,11 +384,11 @@ TechniqueReport compare_technique(const Technique& q, const Series& method,
             return sum;
         });
     };
-    return {q, length_total > 0 ? all.expected.sum / length_total : 0.0,
-            compare(mean(method,
-                         [&](const auto& e) { return e.technique == q ? e.alone.sum : 0.0; }),
-                    mean(reference, [](const auto& e) { return e.weighted.sum; }),
-                    std::min(all.alone.effective_count(), all.expected.effective_count()))};
+    return {
+        q, length_total > 0 ? all.expected.sum / length_total : 0.0,
+        compare(mean(method, [&](const auto& e) { return e.technique == q ? e.alone.sum : 0.0; }),
+                mean(reference, [](const auto& e) { return e.weighted.sum; }),
+                std::min(all.alone.effective_count(), all.expected.effective_count()))};
 }
 
 /// The picture that errors are measured from, and the variance of it; both by channel.
@@ -448,9 +448,9 @@ std::optional<double> slope_of(const std::vector<ErrorOfRuns>& errors) {
 
 IntegratorSpec limited(IntegratorSpec spec, int longest) {
     if (!spec.params.emplace("max_depth", std::to_string(longest)).second)
-        throw std::runtime_error(
-            fmt::format("{}: max_depth must not be given: the path lengths that are compared set it",
-                        spec.to_string()));
+        throw std::runtime_error(fmt::format(
+            "{}: max_depth must not be given: the path lengths that are compared set it",
+            spec.to_string()));
     return spec;
 }
 
@@ -466,8 +466,7 @@ const char* to_string(Verdict verdict) {
 }
 
 bool Comparison::is_tested() const {
-    return effective_count >= kEnoughContributions &&
-           (method.mean() != 0 || reference.mean() != 0);
+    return effective_count >= kEnoughContributions && (method.mean() != 0 || reference.mean() != 0);
 }
 
 double Comparison::ratio_error() const {

@@ -60,7 +60,7 @@ inline constexpr double kRounding = 1e-4;
 struct LengthReport {
     int edges = 0;
     float cut_off = 0;  ///< δ
-    double share = 0;  ///< Of the reference's image.
+    double share = 0;   ///< Of the reference's image.
     /// Shares of what either side found of this length that only one can make, or that one finds too rarely.
     double out_of_reach = 0, too_rare = 0;
     Comparison comparison;

@@ -48,7 +48,8 @@ std::string cropped_camera() {
            "name=\"to_world\"><lookat origin=\"0,0,3.4\" target=\"0,0,0\" up=\"0,1,0\"/>"
            "</transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"20\"/><integer "
            "name=\"height\" value=\"20\"/><integer name=\"crop_offset_x\" value=\"2\"/><integer "
-           "name=\"crop_offset_y\" value=\"2\"/><integer name=\"crop_width\" value=\"16\"/><integer "
+           "name=\"crop_offset_y\" value=\"2\"/><integer name=\"crop_width\" "
+           "value=\"16\"/><integer "
            "name=\"crop_height\" value=\"16\"/><rfilter type=\"box\"/></film></sensor>";
 }
 
@@ -72,8 +73,8 @@ std::vector<Planted> planted() {
         {"RouletteOfJoins", lit_room, "bdpt", Image | Lengths, 0},
         {"OwnCount", lit_room, "bdpt:roulette=0", Image | Lengths, Techniques},
         {"CountEverywhere", lit_room, "bdpt:roulette=0", Densities, Image | Lengths | Techniques},
-        {"PdfOfEvaluation", softly_lit, "path", Lengths, Techniques, 256},
-        {"PdfOfSampling", softly_lit, "path", Techniques, Densities, 256},
+        {"PdfOfEvaluation", softly_lit, "path", Techniques, 0, 256},
+        {"PdfOfSampling", softly_lit, "path", Techniques, 0},
         {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques, 256},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
     };
@@ -116,8 +117,8 @@ Findings findings(const Planted& planted) {
     if ((planted.shows | planted.clear) & Densities)
         for (const DensityTest& d : test_sample_densities(scene, planted.method))
             found.add(Densities, d.deviates,
-                      fmt::format("density of s = {}, t = {}: {:.4f}", d.technique.s,
-                                  d.technique.t, d.ratio));
+                      fmt::format("density of s = {}, t = {}: {:.4f}", d.technique.s, d.technique.t,
+                                  d.ratio));
     return found;
 }
 

@@ -18,10 +18,6 @@ TEST(Chi2, GammaQMatchesClosedForms) {
     EXPECT_NEAR(gamma_q(50, 50), 0.4811916844, 1e-9);
 }
 
-TEST(Chi2, SidakKeepsTheFamilysRate) {
-    EXPECT_NEAR(1 - std::pow(1 - sidak(0.01, 100), 100), 0.01, 1e-12);
-}
-
 TEST(Chi2, QuadratureFindsPeaksAndSteps) {
     const auto peak = [](double x, double y) {
         const double s = 0.01, dx = x - 0.3, dy = y - 0.6;

@@ -1,0 +1,103 @@
+// Classes of paths agree with what techniques are seen to make.
+
+#include "verify/path_class.h"
+
+#include <map>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "render/renderer.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+/// What a rendering made, by class and s.
+class ClassObserver final : public ContributionObserver {
+public:
+    explicit ClassObserver(const Scene& scene) : scene_(scene) {}
+    void observe(const Join& join, Rgb, float, uint64_t, const Workspace& paths) override {
+        if (join.technique.vertices() > 5) return;
+        const PathClass c = classify(scene_, join, paths.y, paths.z, 0);
+        EXPECT_EQ(PathClass::from_key(c.key()), c);
+        EXPECT_TRUE(can_make(join.technique, c))
+            << "s = " << join.technique.s << ", events " << c.delta_events;
+        EXPECT_GT(shortest_edge(scene_, join, paths.y, paths.z), 0);
+        made[c].insert(join.technique.s);
+    }
+    std::map<PathClass, std::set<int>> made;
+
+private:
+    const Scene& scene_;
+};
+
+std::map<PathClass, std::set<int>> classes_made(const Scene& scene, const std::string& method) {
+    ClassObserver observer(scene);
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(method);
+    settings.threads = 1;
+    settings.spp = 64;
+    settings.observer = &observer;
+    Renderer renderer(scene, settings);
+    const std::atomic<bool> interrupted{false};
+    renderer.run([](const Progress&) {}, interrupted);
+    return observer.made;
+}
+
+const std::map<std::string, std::string> kScenes = {
+    {"diffuse", front_camera(12) + room() + area_lamp()},
+    {"mixed", mixed_room(front_camera(12))},
+    {"lens", mixed_room(lens_camera(12))},
+    {"point", front_camera(12) + room() + sphere("0,-0.4,0", "0.5", kGlass) +
+                  "<emitter type=\"point\"><point name=\"position\" value=\"0.4,0.8,3.6\"/>"
+                  "</emitter>"}};
+
+class PathClasses : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(PathClasses, TellWhichTechniquesMakeThem) {
+    const Scene scene = build(kScenes.at(GetParam()));
+    const TechniqueCounts counts = make_integrator(IntegratorSpec::parse("bdpt"))->counts(scene, 1);
+    int complete = 0;
+    bool has_delta = false;
+    for (const auto& [c, s] : classes_made(scene, "bdpt:max_depth=4,roulette=0")) {
+        has_delta |= c.delta_events != 0;
+        std::set<int> possible;
+        for (int i = 0; i <= c.edges + 1; ++i) {
+            const Technique q = connection_technique(i, c.edges + 1 - i);
+            if (counts.of(q.strategy) > 0 && can_make(q, c)) possible.insert(i);
+        }
+        complete += s == possible;  // rare ones are not met in a short rendering
+    }
+    EXPECT_GE(complete, 4);
+    EXPECT_EQ(has_delta, GetParam() != std::string("diffuse"));
+    for (const char* method : {"path:max_depth=4", "light:max_depth=4"}) {
+        const TechniqueCounts own =
+            make_integrator(IntegratorSpec::parse(method))->counts(scene, 1);
+        for (const auto& [c, s] : classes_made(scene, method)) EXPECT_TRUE(can_make(own, c));
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, PathClasses,
+                         ::testing::Values("diffuse", "mixed", "lens", "point"),
+                         [](const auto& p) { return std::string(p.param); });
+
+/// Light tracing with a pinhole cannot make what is seen in a mirror; path tracing cannot make a point light in one.
+TEST(PathClass, SaysWhatAMethodCannotMake) {
+    const TechniqueCounts path{.hit = 1, .next_event = 1}, light{.splat = 9};
+    PathClass c{.edges = 3};
+    EXPECT_TRUE(can_make(path, c) && can_make(light, c));
+    c.delta_events = 1u << 2;
+    EXPECT_TRUE(can_make(path, c));
+    EXPECT_FALSE(can_make(light, c));
+    c.delta_events = 1u << 1;
+    EXPECT_TRUE(can_make(path, c) && can_make(light, c));
+    c.delta_emitter = true;
+    EXPECT_FALSE(can_make(path, c));
+    EXPECT_TRUE(can_make(light, c));
+    EXPECT_FALSE(can_make(connection_technique(2, 2), c));
+    EXPECT_TRUE(can_make(connection_technique(3, 1), c));
+}
+
+}  // namespace
+}  // namespace etendue::test
