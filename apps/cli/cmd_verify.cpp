@@ -105,13 +105,15 @@ void print_lengths(const VerifyReport& report, const MethodReport& m) {
                    describe(report, l.comparison));
 }
 
-/// One row a length, one column a number of light vertices s.
-void print_techniques(const VerifyReport& report, const MethodReport& m) {
-    if (m.techniques.empty()) return;
-    fmt::print("  techniques alone, ratio to the reference (standard error of the last digits; "
-               "share compared), by s\n");
+/// One row a length, one column a number of light vertices s; pairs apart.
+void print_techniques(const VerifyReport& report, const MethodReport& m, bool pairs) {
     std::map<int, std::vector<const TechniqueReport*>> rows;
-    for (const TechniqueReport& t : m.techniques) rows[t.technique.vertices() - 1].push_back(&t);
+    for (const TechniqueReport& t : m.techniques)
+        if (is_pair(t.technique.strategy) == pairs) rows[t.technique.vertices() - 1].push_back(&t);
+    if (rows.empty()) return;
+    fmt::print("  {} alone, ratio to the reference (standard error of the last digits; share "
+               "compared), by s\n",
+               pairs ? "pairs of vertices" : "connections");
     for (const auto& [edges, row] : rows) {
         std::string line = fmt::format("  {:>6} ", edges);
         int column = 0;
@@ -129,7 +131,7 @@ void print_techniques(const VerifyReport& report, const MethodReport& m) {
         fmt::print("{}\n", line);
     }
     for (const TechniqueReport& t : m.techniques)
-        if (report.deviates(t.comparison))
+        if (is_pair(t.technique.strategy) == pairs && report.deviates(t.comparison))
             fmt::print("  s = {}, t = {}: {}\n", t.technique.s, t.technique.t,
                        describe(report, t.comparison));
 }
@@ -166,7 +168,8 @@ void print_report(const VerifyReport& report, const Scene& scene, const VerifyOp
         fmt::print("{}, {} spp a run\n", m.method, m.spp);
         print_image(report, m);
         print_lengths(report, m);
-        print_techniques(report, m);
+        print_techniques(report, m, false);
+        print_techniques(report, m, true);
         if (m.slope)
             fmt::print("  error of the mean of 1 to {} runs: slope {:.3f}\n", m.errors.back().runs,
                        *m.slope);
@@ -211,8 +214,11 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m
     }
     for (const TechniqueReport& t : m.techniques) {
         j["techniques"].push_back(to_json(report, t.comparison));
-        j["techniques"].back().update(nlohmann::ordered_json{
-            {"s", t.technique.s}, {"t", t.technique.t}, {"coverage", t.coverage}});
+        j["techniques"].back().update(
+            nlohmann::ordered_json{{"is_pair", is_pair(t.technique.strategy)},
+                                   {"s", t.technique.s},
+                                   {"t", t.technique.t},
+                                   {"coverage", t.coverage}});
     }
     for (const ErrorOfRuns& e : m.errors)
         j["errors"].push_back({{"runs", e.runs}, {"rmse", e.rmse}});

@@ -36,9 +36,8 @@ public:
         const WalkOptions walk = depth_.walk();
         for (int t = 2; t <= z.size(); ++t) {
             if (counts.hit > 0)
-                for_each_hit(c.scene, z, t, counts, [&](const Join& j) {
-                    c.sink.add(j, j.contribution);
-                });
+                for_each_hit(c.scene, z, t, counts,
+                             [&](const Join& j) { c.sink.add(j, j.contribution); });
             if (z[t - 1].may_connect) at_vertex(t);
             if (t > depth_.max_depth) break;
             if (z[t - 1].may_connect && counts.connect > 0) {

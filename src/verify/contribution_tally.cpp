@@ -1,6 +1,7 @@
 #include "verify/contribution_tally.h"
 
 #include <algorithm>
+#include <tuple>
 
 namespace etendue {
 
@@ -8,8 +9,10 @@ void ContributionTally::observe(const Join& join, Rgb contribution, float share,
                                 const Workspace& paths) {
     const size_t edges = size_t(join.technique.vertices() - 1);
     if (edges >= cut_offs_.size()) return;
-    PathClass c = classify(scene_, join, paths.y, paths.z, cut_offs_[edges]);
-    Sums& sums = sums_[uint64_t(join.technique.s) << 32 | c.key()];
+    const Technique& q = join.technique;
+    const SubPath& y = is_pair(q.strategy) ? paths.pair : paths.y;
+    PathClass c = classify(scene_, join, y, paths.z, cut_offs_[edges]);
+    Sums& sums = sums_[uint64_t(q.strategy) << 40 | uint64_t(q.s) << 32 | c.key()];
     c.has_short_edge = false;
     std::vector<TileSum>& tiles = tiles_[c];
     tiles.resize(grid_.tiles());
@@ -38,11 +41,14 @@ std::vector<ContributionTally::Entry> ContributionTally::entries() const {
     std::vector<Entry> out;
     for (const auto& [key, sums] : sums_) {
         const PathClass c = PathClass::from_key(uint32_t(key));
-        const int s = int(key >> 32);
-        out.push_back({c, connection_technique(s, c.edges + 1 - s), sums.weighted, sums.alone});
+        const Strategy strategy = Strategy(key >> 40);
+        const int s = int(key >> 32 & 0xff);
+        out.push_back(
+            {c, {strategy, s, c.edges + 1 + is_pair(strategy) - s}, sums.weighted, sums.alone});
     }
     std::sort(out.begin(), out.end(), [](const Entry& a, const Entry& b) {
-        return std::pair(a.path_class, a.technique.s) < std::pair(b.path_class, b.technique.s);
+        return std::tuple(a.path_class, a.technique.strategy, a.technique.s) <
+               std::tuple(b.path_class, b.technique.strategy, b.technique.s);
     });
     return out;
 }

@@ -73,7 +73,7 @@ private:
     struct Sums {
         Tally weighted, alone;
     };
-    std::unordered_map<uint64_t, Sums> sums_;  ///< By class and s.
+    std::unordered_map<uint64_t, Sums> sums_;  ///< By class, strategy and s.
     std::map<PathClass, std::vector<TileSum>> tiles_;
 };
 

@@ -26,7 +26,8 @@ float shortest_edge(const Scene& scene, const Join& join, const SubPath& y, cons
     float shortest = std::min(q.s >= 2 ? shortest_edge(y, walked(q)) : kInf,
                               q.t >= 2 ? shortest_edge(z, q.t) : kInf);
     const bool to_lens_at_infinity = q.t <= 1 && scene.sensor().is_orthographic();
-    if (q.strategy != Strategy::Hit && !join.to_infinity && !to_lens_at_infinity)
+    const bool has_edge = q.strategy != Strategy::Hit && q.strategy != Strategy::Merge;
+    if (has_edge && !join.to_infinity && !to_lens_at_infinity)
         shortest = std::min(shortest, length(join.b - join.a));
     return shortest;
 }
@@ -47,8 +48,22 @@ PathClass classify(const Scene& scene, const Join& join, const SubPath& y, const
     return c;
 }
 
+std::vector<Technique> techniques_of_length(int edges) {
+    std::vector<Technique> out;
+    for (int s = 0; s <= edges + 1; ++s) out.push_back(connection_technique(s, edges + 1 - s));
+    for (const Strategy strategy : {Strategy::Merge, Strategy::Gather})
+        for (int s = 2; s <= edges; ++s) out.push_back({strategy, s, edges + 2 - s});
+    return out;
+}
+
 bool can_make(const Technique& q, const PathClass& c) {
     if (q.vertices() != c.edges + 1) return false;
+    // The vertex that both sub-paths have; a gather also resamples it from one side or the other.
+    const uint32_t x_m = 1u << (q.s - 1);
+    if (q.strategy == Strategy::Merge) return (c.delta_events & x_m) == 0;
+    if (q.strategy == Strategy::Gather)
+        return (c.delta_events & x_m) == 0 &&
+               !((c.delta_events & x_m << 1) && (c.delta_events & x_m >> 1));
     if (q.strategy == Strategy::Hit) return !c.delta_emitter;
     if (q.strategy == Strategy::HitLens) return true;
     if (q.s == 1 && q.t == 1) return !c.infinite_ends;
@@ -56,10 +71,8 @@ bool can_make(const Technique& q, const PathClass& c) {
 }
 
 bool can_make(const TechniqueCounts& counts, const PathClass& c) {
-    for (int s = 0; s <= c.edges + 1; ++s) {
-        const Technique q = connection_technique(s, c.edges + 1 - s);
+    for (const Technique& q : techniques_of_length(c.edges))
         if (counts.of(q.strategy) > 0 && can_make(q, c)) return true;
-    }
     return false;
 }
 

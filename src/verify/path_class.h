@@ -3,6 +3,7 @@
 // compared on paths that both can make.
 
 #include <compare>
+#include <vector>
 
 #include "pathspace/join.h"
 
@@ -38,6 +39,8 @@ PathClass classify(const Scene& scene, const Join& join, const SubPath& y, const
 /// Length of the path's shortest edge; those to infinity are not counted.
 float shortest_edge(const Scene& scene, const Join& join, const SubPath& y, const SubPath& z);
 
+/// All techniques that make paths of that many edges.
+std::vector<Technique> techniques_of_length(int edges);
 bool can_make(const Technique& technique, const PathClass& c);
 /// Whether some technique with a count can.
 bool can_make(const TechniqueCounts& counts, const PathClass& c);

@@ -533,9 +533,8 @@ VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& metho
                            tile_series(*against, runner.grid(), &common), m);
             compare_lengths(series, *against, common, options, runner.cut_offs(), m);
             for (int edges = options.shortest; edges <= options.longest; ++edges)
-                for (int s = 0; s <= edges + 1; ++s)
-                    if (const Technique q = connection_technique(s, edges + 1 - s);
-                        series.counts.of(q.strategy) > 0)
+                for (const Technique& q : techniques_of_length(edges))
+                    if (series.counts.of(q.strategy) > 0)
                         m.techniques.push_back(compare_technique(q, series, *against));
         }
         if (m.out_of_reach == 0) m.errors = errors_of_runs(series, error_reference);

@@ -63,10 +63,8 @@ TEST_P(PathClasses, TellWhichTechniquesMakeThem) {
     for (const auto& [c, s] : classes_made(scene, "bdpt:max_depth=4,roulette=0")) {
         has_delta |= c.delta_events != 0;
         std::set<int> possible;
-        for (int i = 0; i <= c.edges + 1; ++i) {
-            const Technique q = connection_technique(i, c.edges + 1 - i);
-            if (counts.of(q.strategy) > 0 && can_make(q, c)) possible.insert(i);
-        }
+        for (const Technique& q : techniques_of_length(c.edges))
+            if (counts.of(q.strategy) > 0 && can_make(q, c)) possible.insert(q.s);
         complete += s == possible;  // rare ones are not met in a short rendering
     }
     EXPECT_GE(complete, 4);
