@@ -288,6 +288,61 @@ TEST_F(ProgramTest, RendersTheSameBitsWithAnyNumberOfThreads) {
     EXPECT_EQ(pixels[0], pixels[2]);
 }
 
+TEST_F(ProgramTest, VerifiesMethods) {
+    const fs::path report = folder.path() / "report.json";
+    const std::vector<std::string> common = {"verify",    scene.string(), "-D",    "size=8",
+                                             "--lengths", "1..4",         "--spp", "16"};
+    const auto with = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> all = common;
+        all.insert(all.end(), more.begin(), more.end());
+        return run(all);
+    };
+    const ProgramResult r = with({"--json", report.string()});
+    EXPECT_EQ(r.status, 0) << r.errors;
+    EXPECT_NE(r.output.find("verdict: consistent with unbiased"), std::string::npos) << r.output;
+    const auto j = nlohmann::json::parse(read_text(report));
+    ASSERT_EQ(j["methods"].size(), 3u);
+    EXPECT_EQ(j["methods"][2]["method"], "bdpt");
+    EXPECT_EQ(j["methods"][2]["verdict"], "consistent");
+    EXPECT_EQ(j["methods"][2]["lengths"].size(), 4u);
+    EXPECT_GT(j["tests"], 20);
+
+    // A picture of this scene, and one whose lamp is another.
+    const auto picture = [&](const std::string& name, const std::string& more) {
+        const fs::path other = folder.path() / (name + ".xml");
+        write(other, scene_text(more));
+        const fs::path file = folder.path() / (name + ".exr");
+        EXPECT_EQ(run({"render", other.string(), "-o", file.string(), "-D", "size=8", "-i", "path",
+                       "--spp", "256", "--sampler", "independent", "--aov", "variance"})
+                      .status,
+                  0);
+        return file.string();
+    };
+    const std::string same = picture("same", "");
+    const std::string brighter = picture(
+        "brighter", "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.1\"/></emitter>");
+    EXPECT_EQ(with({"--methods", "path", "bdpt", "--reference", same}).status, 0);
+    const ProgramResult rejected = with({"--methods", "path", "--reference", brighter});
+    EXPECT_EQ(rejected.status, 1);
+    EXPECT_EQ(rejected.errors, "etendue: claimed to be unbiased, but rejected: path\n");
+
+    for (const auto& [arguments, message] :
+         std::vector<std::pair<std::vector<std::string>, std::string>>{
+             {{"--methods", "pathh"}, "did you mean \"path\"?"},
+             {{"--methods", "path:max_depth=3"}, "max_depth must not be given"},
+             {{"--lengths", "8..2"}, "--lengths must have the form"},
+             {{"--lengths", "1..99"}, "--lengths must have the form"},
+             {{"--runs", "1"}, "--runs"},
+             {{"--reference", image.string()}, "image.exr"},
+             {{"--reference", same, "--resolution", "9x9"}, "has 8 x 8 pixels"},
+             {{"--against", "path", "--reference", same}, "--reference"}}) {
+        const ProgramResult refused = with(arguments);
+        EXPECT_TRUE(refused.status == 1 || refused.status == 2) << refused.status;
+        EXPECT_NE(refused.errors.find(message), std::string::npos)
+            << "it says: " << refused.errors << "expected: " << message;
+    }
+}
+
 TEST_F(ProgramTest, TellsAboutItselfAndItsScenes) {
     for (const auto& arguments : {std::vector<std::string>{"--help"},
                                   {"--version"},
