@@ -62,12 +62,8 @@ void Bidirectional::add_if_visible(const SampleContext& c, const std::optional<J
     if (!j) return;
     const Technique& q = j->technique;
     const uint32_t number = uint32_t(q.s) << 16 | uint32_t(q.t);
-    if (q.t <= 1) {
-        if (const auto value = test(c, *j, c.splat_scale, number, work))
-            c.sink.add(*j, *value);
-    } else if (const auto value = test(c, *j, std::fabs(work.z.film_weight), number, work)) {
-        c.sink.add(*j, *value);
-    }
+    const float scale = q.t <= 1 ? c.splat_scale : std::fabs(work.z.film_weight);
+    if (const auto value = test(c, *j, scale, number, work)) c.sink.add(*j, *value);
 }
 
 }  // namespace etendue

@@ -21,8 +21,7 @@ struct Workspace {
     SubPath y, z;
     SubPath pair;  ///< The other path of a pair of vertices.
     Vertex scratch;
-    bool is_observed =
-        false;  ///< Somebody reads whole sub-paths, not only what joins need of them.
+    bool is_observed = false;  ///< Whole sub-paths are read, not only what joins need of them.
     RenderStats stats;
 };
 

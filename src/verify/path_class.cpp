@@ -14,17 +14,14 @@ float shortest_edge(const SubPath& path, int count) {
     return std::sqrt(shortest);
 }
 
-/// Light vertices that the walk made; the lens of C(s,0) is none of them.
-int walked(const Technique& q) {
-    return q.t == 0 ? q.s - 1 : q.s;
-}
-
 }  // namespace
 
 float shortest_edge(const Scene& scene, const Join& join, const SubPath& y, const SubPath& z) {
     const Technique& q = join.technique;
-    float shortest = std::min(q.s >= 2 ? shortest_edge(y, walked(q)) : kInf,
-                              q.t >= 2 ? shortest_edge(z, q.t) : kInf);
+    // Vertices of the walks: the lens of C(s,0) is not one; a gather drops one or the other.
+    int light = q.t == 0 ? q.s - 1 : q.s, eye = q.t;
+    if (q.strategy == Strategy::Gather) --(length2(join.a - z[eye - 2].p) == 0 ? eye : light);
+    float shortest = std::min(shortest_edge(y, light), shortest_edge(z, eye));
     const bool to_lens_at_infinity = q.t <= 1 && scene.sensor().is_orthographic();
     const bool has_edge = q.strategy != Strategy::Hit && q.strategy != Strategy::Merge;
     if (has_edge && !join.to_infinity && !to_lens_at_infinity)
@@ -58,12 +55,11 @@ std::vector<Technique> techniques_of_length(int edges) {
 
 bool can_make(const Technique& q, const PathClass& c) {
     if (q.vertices() != c.edges + 1) return false;
-    // The vertex that both sub-paths have; a gather also resamples it from one side or the other.
-    const uint32_t x_m = 1u << (q.s - 1);
-    if (q.strategy == Strategy::Merge) return (c.delta_events & x_m) == 0;
-    if (q.strategy == Strategy::Gather)
-        return (c.delta_events & x_m) == 0 &&
-               !((c.delta_events & x_m << 1) && (c.delta_events & x_m >> 1));
+    // The vertex that both sub-paths have. A gather samples it again from the one or the other side, not from the lens.
+    const uint32_t x_m = 1u << (q.s - 1), fixed = c.delta_events | 1u << c.edges;
+    if (is_pair(q.strategy) && (fixed & x_m)) return false;
+    if (q.strategy == Strategy::Merge) return true;
+    if (q.strategy == Strategy::Gather) return !((fixed & x_m << 1) && (fixed & x_m >> 1));
     if (q.strategy == Strategy::Hit) return !c.delta_emitter;
     if (q.strategy == Strategy::HitLens) return true;
     if (q.s == 1 && q.t == 1) return !c.infinite_ends;
