@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "statistics.h"
+#include "math/statistics.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -123,7 +123,7 @@ protected:
 
     void compare(const PairEvent& event) {
         sampler.seek(Stream::Auxiliary, ++number);
-        test::Moments found, r;
+        Moments found, r;
         for (int i = 0; i < kWalks / 20; ++i) found.add(walk_finds(event));
         if (found.mean() < 0.04) return;
         found = {};
