@@ -34,9 +34,9 @@ private:
     void check() const;
     CompareSettings settings(const Scene& scene) const;
     IntegratorSpec reference_integrator(const Scene& scene,
-                                        const std::vector<IntegratorSpec>& specs) const;
+                                        const std::vector<MethodSpec>& specs) const;
     RenderSettings reference_settings(const Scene& scene,
-                                      const std::vector<IntegratorSpec>& specs) const;
+                                      const std::vector<MethodSpec>& specs) const;
 };
 
 /// A line that is rewritten; nothing where no terminal shows it.
@@ -84,7 +84,7 @@ void CompareCommand::check() const {
 
 CompareSettings CompareCommand::settings(const Scene& scene) const {
     CompareSettings s;
-    for (const std::string& m : methods) s.methods.push_back(choose_integrator(scene, m));
+    for (const std::string& m : methods) s.methods.push_back({m, choose_integrator(scene, m)});
     s.sampler = parse_sampler(sampler);
     s.seed = seed;
     s.threads = threads;
@@ -98,19 +98,19 @@ CompareSettings CompareCommand::settings(const Scene& scene) const {
 /// bdpt unless the command line names another, with paths as long as those of the methods where these agree.
 IntegratorSpec
 CompareCommand::reference_integrator(const Scene& scene,
-                                     const std::vector<IntegratorSpec>& specs) const {
+                                     const std::vector<MethodSpec>& specs) const {
     if (!reference_method.empty()) return choose_integrator(scene, reference_method);
     IntegratorSpec spec = choose_integrator(scene, "bdpt");
-    if (std::ranges::all_of(specs, [&](const IntegratorSpec& s) {
-            return max_depth(s) == max_depth(specs.front());
+    if (std::ranges::all_of(specs, [&](const MethodSpec& s) {
+            return max_depth(s.integrator) == max_depth(specs.front().integrator);
         }))
-        spec.params["max_depth"] = max_depth(specs.front());
+        spec.params["max_depth"] = max_depth(specs.front().integrator);
     return spec;
 }
 
 /// Ten times the time of a method, or 16 times its samples, unless the command line tells.
 RenderSettings CompareCommand::reference_settings(const Scene& scene,
-                                                  const std::vector<IntegratorSpec>& specs) const {
+                                                  const std::vector<MethodSpec>& specs) const {
     RenderSettings s;
     s.integrator = reference_integrator(scene, specs);
     s.sampler = parse_sampler(sampler);
@@ -155,13 +155,13 @@ void CompareCommand::run() const {
             reference = read_reference(references[i], scene.film());
         } else {
             const RenderSettings how = reference_settings(scene, s.methods);
-            for (const IntegratorSpec& m : s.methods)
-                if (max_depth(m) != max_depth(how.integrator))
+            for (const MethodSpec& m : s.methods)
+                if (max_depth(m.integrator) != max_depth(how.integrator))
                     fmt::print(
                         stderr,
                         "warning: {} ends paths at max_depth {}, the reference at {}: errors "
                         "contain the difference\n",
-                        m.to_string(), max_depth(m), max_depth(how.integrator));
+                        m.name, max_depth(m.integrator), max_depth(how.integrator));
             reference = make_reference(
                 scene, {how, kept_references, scene_fingerprint(description)},
                 [&](const Progress& p) {

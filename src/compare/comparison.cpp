@@ -70,7 +70,7 @@ void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings
                 turn.limits,
                 [&](const Progress& p) {
                     progress(fmt::format("{}{}: {} spp, {:.1f} s", label,
-                                         settings.methods[method].to_string(), p.passes,
+                                         settings.methods[method].name, p.passes,
                                          p.seconds));
                 },
                 interrupted);
@@ -85,7 +85,7 @@ void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings
 /// A rendering of its own, since technique images cost time; a quarter of the method's.
 void render_techniques(const Scene& scene, const CompareSettings& settings, Method& method,
                        const std::atomic<bool>& interrupted) {
-    RenderSettings s = render_settings(settings, method.integrator, settings.seed);
+    RenderSettings s = render_settings(settings, method.spec.integrator, settings.seed);
     s.technique_depth = settings.technique_depth;
     s.seconds = method.runs.front().seconds / 4;
     Renderer renderer(scene, s);
@@ -143,13 +143,13 @@ std::optional<PowerLaw> mean_slope(const Method& m, const Get& get, std::vector<
 
 }  // namespace
 
-void check_methods(const std::vector<IntegratorSpec>& methods) {
+void check_methods(const std::vector<MethodSpec>& methods) {
     for (size_t i = 0; i < methods.size(); ++i) {
-        make_integrator(methods[i]);
+        make_integrator(methods[i].integrator);
         for (size_t j = 0; j < i; ++j)
-            if (methods[i].to_string() == methods[j].to_string())
+            if (methods[i].integrator.to_string() == methods[j].integrator.to_string())
                 throw std::runtime_error(
-                    fmt::format("method \"{}\" is given twice", methods[i].to_string()));
+                    fmt::format("method \"{}\" is given twice", methods[i].name));
     }
 }
 
@@ -198,10 +198,7 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
         out.reference_rel_mse = -noise.rel_mse;
     }
     check_methods(settings.methods);
-    for (const IntegratorSpec& spec : settings.methods) {
-        Method& m = out.methods.emplace_back();
-        m.integrator = spec;
-    }
+    for (const MethodSpec& spec : settings.methods) out.methods.emplace_back().spec = spec;
 
     for (int index = 0; index < settings.runs && !interrupted.load(); ++index) {
         const uint64_t seed = settings.seed + uint64_t(index);
@@ -209,7 +206,7 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
         for (size_t i = 0; i < contestants.size(); ++i) {
             contestants[i].memory.begin();
             contestants[i].renderer = std::make_unique<Renderer>(
-                scene, render_settings(settings, settings.methods[i], seed));
+                scene, render_settings(settings, settings.methods[i].integrator, seed));
             contestants[i].memory.end();
         }
         const std::string label =

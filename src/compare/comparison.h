@@ -14,8 +14,14 @@
 
 namespace etendue {
 
+/// What is compared: an integrator, and what people call it.
+struct MethodSpec {
+    std::string name;
+    IntegratorSpec integrator;
+};
+
 struct CompareSettings {
-    std::vector<IntegratorSpec> methods;
+    std::vector<MethodSpec> methods;
     SamplerKind sampler = SamplerKind::Sobol;
     uint64_t seed = 0;    ///< Of the first run; the others count on.
     int threads = 0;      ///< 0: all.
@@ -46,7 +52,7 @@ struct Run {
 };
 
 struct Method {
-    IntegratorSpec integrator;
+    MethodSpec spec;
     Estimator estimator = Estimator::Unbiased;
     std::vector<Run> runs;
     // Of the first run.
@@ -57,7 +63,7 @@ struct Method {
     std::vector<TechniqueImages::Entry> techniques;
     uint64_t technique_spp = 0;
 
-    std::string name() const { return integrator.to_string(); }
+    const std::string& name() const { return spec.name; }
 };
 
 struct Comparison {
@@ -81,7 +87,7 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
                    const CompareProgress& progress, const std::atomic<bool>& interrupted);
 
 /// Throws std::runtime_error where a method or its parameters do not exist, or two are the same.
-void check_methods(const std::vector<IntegratorSpec>& methods);
+void check_methods(const std::vector<MethodSpec>& methods);
 
 /// Where methods stop and let the next one go on. Checkpoints are a factor of √2 in time or 2 in samples apart, evenly in
 /// a logarithmic plot; long steps are cut into several turns.

@@ -97,6 +97,7 @@ Json to_json(const Method& m, const MethodSummary& summary) {
     Json runs = Json::array();
     for (const Run& r : m.runs) runs.push_back(to_json(r));
     return {{"name", m.name()},
+            {"integrator", m.spec.integrator.to_string()},
             {"estimator", to_string(m.estimator)},
             {"summary", to_json(summary)},
             {"flip", m.flip},
