@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -39,18 +40,25 @@ private:
                                       const std::vector<MethodSpec>& specs) const;
 };
 
-/// A line that is rewritten; nothing where no terminal shows it.
+/// A line that is rewritten, ten times a second at most; nothing where no terminal shows it.
 class StatusLine {
 public:
     explicit StatusLine(bool quiet) : active_(!quiet && isatty(STDERR_FILENO)) {}
     ~StatusLine() { clear(); }
-    void show(const std::string& text) const {
-        if (active_) fmt::print(stderr, "\r{}\033[K", text);
+    void show(const std::string& text) {
+        const auto now = Clock::now();
+        if (!active_ || now - last_ < std::chrono::milliseconds(100)) return;
+        last_ = now;
+        fmt::print(stderr, "\r{}\033[K", text);
     }
-    void clear() const { show(""); }
+    void clear() const {
+        if (active_) fmt::print(stderr, "\r\033[K");
+    }
 
 private:
+    using Clock = std::chrono::steady_clock;
     bool active_;
+    Clock::time_point last_;
 };
 
 /// The longest path as an integrator takes it, as text; its table's default where the spec does not say.
@@ -96,9 +104,8 @@ CompareSettings CompareCommand::settings(const Scene& scene) const {
 }
 
 /// bdpt unless the command line names another, with paths as long as those of the methods where these agree.
-IntegratorSpec
-CompareCommand::reference_integrator(const Scene& scene,
-                                     const std::vector<MethodSpec>& specs) const {
+IntegratorSpec CompareCommand::reference_integrator(const Scene& scene,
+                                                    const std::vector<MethodSpec>& specs) const {
     if (!reference_method.empty()) return choose_integrator(scene, reference_method);
     IntegratorSpec spec = choose_integrator(scene, "bdpt");
     if (std::ranges::all_of(specs, [&](const MethodSpec& s) {
@@ -149,7 +156,7 @@ void CompareCommand::run() const {
         const CompareSettings s = settings(scene);
         check_methods(s.methods);
 
-        const StatusLine status(quiet);
+        StatusLine status(quiet);
         std::optional<Reference> reference;
         if (!references.empty()) {
             reference = read_reference(references[i], scene.film());

@@ -70,8 +70,7 @@ void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings
                 turn.limits,
                 [&](const Progress& p) {
                     progress(fmt::format("{}{}: {} spp, {:.1f} s", label,
-                                         settings.methods[method].name, p.passes,
-                                         p.seconds));
+                                         settings.methods[method].name, p.passes, p.seconds));
                 },
                 interrupted);
             c.memory.end();

@@ -499,7 +499,6 @@ class Viewer {
     refresh() {
         this.table = toneTable(this.exposure, this.operator);
         for (const p of this.pictures) p.painted = null;
-        this.onRefresh?.();
         this.draw();
     }
 
@@ -681,7 +680,7 @@ function plotSection(page) {
 
 /// Veach's pyramid: a row for each length of path, a column for each s.
 async function pyramid(method, figures, viewer) {
-    const state = {kind: 'weighted'}, cells = [];
+    const state = {kind: 'weighted', exposure: viewer.startExposure}, cells = [];
     const lengths = [...new Set(method.techniques.map(t => t.s + t.t))].sort((a, b) => a - b);
     const columns = Math.max(...method.techniques.map(t => t.s)) + 1;
     for (const t of method.techniques) {
@@ -693,16 +692,20 @@ async function pyramid(method, figures, viewer) {
             unweighted: await decodeRadiance(t.unweighted)});
     }
     const draw = () => {
+        const table = toneTable(state.exposure, 'sRGB');
         for (const c of cells)
-            c.canvas.getContext('2d').drawImage(paintRadiance(c[state.kind], viewer.table), 0, 0);
+            c.canvas.getContext('2d').drawImage(paintRadiance(c[state.kind], table), 0, 0);
     };
+    const expose = by => () => { state.exposure += by; draw(); };
     draw();
     const bar = choice(['weighted', 'unweighted'], 0, i => { state.kind = ['weighted', 'unweighted'][i]; draw(); });
+    bar.element.append('exposure', element('button', {type: 'button', textContent: '−', onclick: expose(-1)}),
+        element('button', {type: 'button', textContent: '+', onclick: expose(1)}));
     const grid = element('div', {className: 'pyramid'}, cells.map(c => c.cell));
     grid.style.gridTemplateColumns = `repeat(${columns}, max-content)`;
-    return {draw, element: element('details', {}, [
+    return element('details', {}, [
         element('summary', {textContent: `${method.name}, ${figures.technique_spp} spp`}), bar.element,
-        element('div', {className: 'scroll'}, grid)])};
+        element('div', {className: 'scroll'}, grid)]);
 }
 
 async function fillViewer(holder, scene, page) {
@@ -716,14 +719,9 @@ async function fillViewer(holder, scene, page) {
     if (withTechniques.length === 0) return;
     holder.append(element('h3', {textContent: 'Contributions by technique'}), element('p', {className: 'note',
         textContent: 'A row for each length of path, a column for each number s of light vertices. Weighted images add ' +
-            'up to the picture; unweighted ones show what each technique would make alone. Exposure is that of the images.'}));
-    const drawings = [];
-    for (const m of withTechniques) {
-        const p = await pyramid(m, scene.methods.find(f => f.name === m.name), viewer);
-        drawings.push(p.draw);
-        holder.append(p.element);
-    }
-    viewer.onRefresh = () => drawings.forEach(draw => draw());
+            'up to the picture; unweighted ones show what each technique would make alone.'}));
+    for (const m of withTechniques)
+        holder.append(await pyramid(m, scene.methods.find(f => f.name === m.name), viewer));
 }
 
 function sceneSection(scene, page) {

@@ -140,7 +140,11 @@ const viewer = "document.querySelector('.viewer').viewer";
 /// What the first pane shows, as one number for each pixel of a coarse grid.
 const pixels = `(() => {
     const c = document.querySelector('.pane canvas');
-    const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+    // A copy, since reading often from the page's own canvas would make the browser complain.
+    const copy = Object.assign(document.createElement('canvas'), {width: c.width, height: c.height});
+    const context = copy.getContext('2d', {willReadFrequently: true});
+    context.drawImage(c, 0, 0);
+    const d = context.getImageData(0, 0, c.width, c.height).data;
     const out = [];
     for (let y = 8; y < c.height; y += 16) for (let x = 8; x < c.width; x += 16) {
         const at = 4 * (y * c.width + x);
