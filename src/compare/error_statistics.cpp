@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "math/statistics.h"
 
@@ -31,21 +32,21 @@ std::optional<Interval> mean_interval(std::span<const double> samples) {
 
 std::optional<PowerLaw> fit_power_law(std::span<const double> times, std::span<const double> errors,
                                       double from) {
-    int n = 0;
-    double x_sum = 0, y_sum = 0, xx = 0, xy = 0;
+    std::vector<double> x, y;
     for (size_t i = 0; i < times.size(); ++i) {
         if (!(times[i] >= from) || !(times[i] > 0) || !(errors[i] > 0)) continue;
-        const double x = std::log(times[i]), y = std::log(errors[i]);
-        ++n;
-        x_sum += x;
-        y_sum += y;
-        xx += x * x;
-        xy += x * y;
+        x.push_back(std::log(times[i]));
+        y.push_back(std::log(errors[i]));
     }
-    const double spread = n * xx - x_sum * x_sum;
-    if (n < 3 || !(spread > 0)) return {};
-    const double slope = (n * xy - x_sum * y_sum) / spread;
-    return PowerLaw{slope, std::exp((y_sum - slope * x_sum) / n), n};
+    if (x.size() < 3 || x.front() == x.back()) return {};
+    const double x_mean = Mean(x).value, y_mean = Mean(y).value;
+    double xx = 0, xy = 0;
+    for (size_t i = 0; i < x.size(); ++i) {
+        xx += (x[i] - x_mean) * (x[i] - x_mean);
+        xy += (x[i] - x_mean) * (y[i] - y_mean);
+    }
+    const double slope = xy / xx;
+    return PowerLaw{slope, std::exp(y_mean - slope * x_mean), int(x.size())};
 }
 
 std::optional<Efficiency> relative_efficiency(const Cost& base, const Cost& method) {

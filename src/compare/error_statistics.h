@@ -20,7 +20,8 @@ struct PowerLaw {
     double slope = 0, factor = 0;
     int points = 0;
 };
-/// Of the points with positive errors whose time is at least `from`; none where fewer than three remain.
+/// Of the points, in order of time, with positive errors and times of at least `from`; none where fewer than three
+/// remain.
 std::optional<PowerLaw> fit_power_law(std::span<const double> times, std::span<const double> errors,
                                       double from = 0);
 
