@@ -173,6 +173,11 @@ std::vector<Rgb> false_colours(const std::vector<float>& values) {
     return out;
 }
 
+/// Empty for connections.
+const char* pair_name(Strategy strategy) {
+    return strategy == Strategy::Merge ? "merge" : strategy == Strategy::Gather ? "gather" : "";
+}
+
 struct CurveKind {
     const char* file;
     const char* label;
@@ -246,15 +251,18 @@ private:
                   {"flip", grey_data_uri(w, h, m.flip_map)},
                   {"techniques", Json::array()}};
         for (const auto& t : m.techniques) {
-            const auto [s, eye] = std::pair{t.technique.s, t.technique.t};
-            write_image(file(fmt::format("{}-techniques/length{:02}_s{:02}_t{:02}.png", stem,
-                                         s + eye - 1, s, eye)),
+            const auto& [strategy, light, eye] = t.technique;
+            const int edges = t.technique.vertices() - 1;
+            write_image(file(fmt::format("{}-techniques/length{:02}_s{:02}_t{:02}.png", stem, edges,
+                                         light, eye)),
                         rgb_image(w, h, tone_map(t.weighted, mapping_)));
             constexpr int kThumbnail = 160;
             const RgbImage weighted = reduced(w, h, t.weighted, kThumbnail),
                            unweighted = reduced(w, h, t.unweighted, kThumbnail);
             page["techniques"].push_back(
-                {{"s", s},
+                {{"kind", pair_name(strategy)},
+                 {"edges", edges},
+                 {"s", light},
                  {"t", eye},
                  {"width", weighted.width},
                  {"height", weighted.height},

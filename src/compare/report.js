@@ -678,16 +678,18 @@ function plotSection(page) {
         element('div', {className: 'bar'}, [bar.element, save, saveSvg]), image]);
 }
 
-/// Veach's pyramid: a row for each length of path, a column for each s.
+/// Veach's pyramid: a row for each length of path, a column for each s; pairs of vertices to the right of connections.
 async function pyramid(method, figures, viewer) {
     const state = {kind: 'weighted', exposure: viewer.startExposure}, cells = [];
-    const lengths = [...new Set(method.techniques.map(t => t.s + t.t))].sort((a, b) => a - b);
-    const columns = Math.max(...method.techniques.map(t => t.s)) + 1;
+    const lengths = [...new Set(method.techniques.map(t => t.edges))].sort((a, b) => a - b);
+    const connections = Math.max(...method.techniques.filter(t => !t.kind).map(t => t.s), -1) + 1;
+    const column = t => t.kind ? connections + t.s : t.s + 1;
+    const columns = Math.max(...method.techniques.map(column));
     for (const t of method.techniques) {
         const canvas = element('canvas', {width: t.width, height: t.height});
-        const cell = element('div', {}, [canvas, `s = ${t.s}, t = ${t.t}`]);
-        cell.style.gridRow = lengths.indexOf(t.s + t.t) + 1;
-        cell.style.gridColumn = t.s + 1;
+        const cell = element('div', {}, [canvas, `${t.kind} s = ${t.s}, t = ${t.t}`]);
+        cell.style.gridRow = lengths.indexOf(t.edges) + 1;
+        cell.style.gridColumn = column(t);
         cells.push({cell, canvas, weighted: await decodeRadiance(t.weighted),
             unweighted: await decodeRadiance(t.unweighted)});
     }
