@@ -256,7 +256,7 @@ private:
             write_image(file(fmt::format("{}-techniques/length{:02}_s{:02}_t{:02}.png", stem, edges,
                                          light, eye)),
                         rgb_image(w, h, tone_map(t.weighted, mapping_)));
-            constexpr int kThumbnail = 160;
+            constexpr int kThumbnail = 120;
             const RgbImage weighted = reduced(w, h, t.weighted, kThumbnail),
                            unweighted = reduced(w, h, t.unweighted, kThumbnail);
             page["techniques"].push_back(
@@ -292,11 +292,11 @@ private:
     ToneMapping mapping_;
 };
 
-/// The file's name, or its folder's where that says more; numbered where several scenes share it.
+/// The file's name, or its folder's where it is but "scene..."; numbered where several scenes share it.
 std::string scene_name(const std::string& file, std::set<std::string>& taken) {
     const fs::path path = fs::absolute(file);
     std::string stem = path.stem().string();
-    if (stem == "scene" && path.has_parent_path()) stem = path.parent_path().filename().string();
+    if (stem.starts_with("scene") && path.has_parent_path()) stem = path.parent_path().filename().string();
     stem = file_stem(stem);
     std::string name = stem;
     for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}-{}", stem, i);

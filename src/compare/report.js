@@ -603,7 +603,7 @@ function download(canvas, name) {
 
 // ---------------------------------------------------------------------------------------- sections
 
-/// name; figure of a method (also used to find the best, which is the least unless `best` says otherwise); how it is shown
+/// Name; figure of a method; how the best is found, how it is shown, what stands below it, whether to doubt it.
 const columns = [
     ['spp', m => m.summary.spp, {show: v => large(v)}],
     ['rays', m => m.summary.rays, {show: v => large(v)}],
@@ -614,7 +614,8 @@ const columns = [
     ['trimmed', m => m.summary.rel_mse_trimmed, {best: Math.min}],
     ['MAPE', m => m.summary.mape, {best: Math.min}],
     ['FLIP', m => m.flip, {best: Math.min}],
-    ['mean ratio', m => m.summary.mean_ratio.value, {show: v => v.toFixed(4),
+    ['mean ratio', m => m.summary.mean_ratio.value, {show: v => v.toFixed(4), doubtful: m =>
+        m.summary.mean_ratio.low_95 > 1 || m.summary.mean_ratio.high_95 < 1,
         small: m => `± ${significant(m.summary.mean_ratio.high_95 - m.summary.mean_ratio.value, 2)}`}],
     ['spike', m => m.summary.spike, {best: Math.min}],
     ['slope', m => m.summary.rel_mse_slope?.slope, {show: v => v?.toFixed(2) ?? '–',
@@ -631,10 +632,11 @@ function figuresTable(scene) {
         ...columns.map(([name]) => element('th', {textContent: name}))]);
     const rows = scene.methods.map(m => element('tr', {}, [
         element('td', {}, [m.name, element('small', {textContent: m.estimator})]),
-        ...columns.map(([, get, {best, show = significant, small}]) => {
+        ...columns.map(([, get, {best, show = significant, small, doubtful}]) => {
             const value = get(m), cell = element('td', {textContent: show(value)});
             const all = scene.methods.map(get).filter(Number.isFinite);
             if (best && all.length > 1 && value === best(...all)) cell.className = 'best';
+            if (doubtful?.(m)) cell.className = 'doubtful';
             const more = small?.(m);
             if (more) cell.append(element('small', {textContent: more}));
             return cell;
@@ -747,7 +749,7 @@ const legend = [
     ['RMSE, relMSE, MAPE', 'With X the image, R the reference, both grey, and m the mean of R: √mean (X − R)², mean (X − R)² / (R² + 0.01 m²), mean |X − R| / (R + 0.01 m). With several runs, means over them; ± is a 95 % interval.'],
     ['trimmed', 'relMSE without the largest 0.1 % of the pixels’ errors.'],
     ['FLIP', 'Mean of HDR-FLIP, first run.'],
-    ['mean ratio', 'Mean of X over mean of R with a 95 % interval, which holds the spread of the passes of X and of R. The interval is too wide with the Sobol’ sampler, whose passes are spread against each other.'],
+    ['mean ratio', 'Mean of X over mean of R with a 95 % interval, which holds the spread of the passes of X and of R. Marked where 1 is outside. The interval is too wide with the Sobol’ sampler, whose passes are spread against each other.'],
     ['spike', '99.99th percentile over the pixels of |X − R| / m.'],
     ['slope', 'Of log relMSE against log time, over the last 1/32 to 1 of the time: −1 where the estimator is unbiased, its variance finite, and its samples independent. The dashed lines of the plots.'],
     ['memory', 'Peak of what became resident while the method ran (film, buffers, maps), without the scene, which all methods share. Measured in turns from the process’ resident set.'],
