@@ -296,7 +296,8 @@ private:
 std::string scene_name(const std::string& file, std::set<std::string>& taken) {
     const fs::path path = fs::absolute(file);
     std::string stem = path.stem().string();
-    if (stem.starts_with("scene") && path.has_parent_path()) stem = path.parent_path().filename().string();
+    if (stem.starts_with("scene") && path.has_parent_path())
+        stem = path.parent_path().filename().string();
     stem = file_stem(stem);
     std::string name = stem;
     for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}-{}", stem, i);
