@@ -61,6 +61,7 @@ void DiffCommand::print(const ImageErrors& e, const std::optional<FlipResult>& f
     line("L1", e.l1);
     line("MAPE", e.mape);
     line("SMAPE", e.smape);
+    line("spike", e.spike);
     if (flip_result) line(is_hdr() ? "FLIP (HDR)" : "FLIP (LDR)", flip_result->mean);
     line("mean ratio", e.mean_ratio);
     if (e.ignored > 0)
@@ -85,6 +86,7 @@ void DiffCommand::print_json(const ImageErrors& e,
                                 {"l1", e.l1},
                                 {"mape", e.mape},
                                 {"smape", e.smape},
+                                {"spike", e.spike},
                                 {"mean_ratio", e.mean_ratio}};
     if (flip_result) j[is_hdr() ? "flip_hdr" : "flip_ldr"] = flip_result->mean;
     fmt::print("{}\n", j.dump(2));

@@ -1,7 +1,6 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +12,7 @@
 #include "commands.h"
 #include "image/atomic_file.h"
 #include "image/image_io.h"
+#include "interrupt.h"
 #include "preview.h"
 #include "render/aov.h"
 #include "render/renderer.h"
@@ -20,12 +20,6 @@
 
 namespace etendue {
 namespace {
-
-std::atomic<bool> interrupted{false};
-
-extern "C" void on_interrupt(int) {
-    if (interrupted.exchange(true)) std::_Exit(130);  // the second Ctrl-C
-}
 
 struct RenderCommand {
     SceneOptions scene;
@@ -76,25 +70,6 @@ private:
     bool quiet_, terminal_, written_ = false;
     double last_ = 0;
 };
-
-/// The command line's integrator, or the scene's; parameters that are not given come from the scene's where it names the
-/// same ones.
-IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
-    const RenderDefaults& defaults = scene.defaults();
-    IntegratorSpec spec =
-        IntegratorSpec::parse(!text.empty()                 ? text
-                              : defaults.integrator.empty() ? "path"
-                                                            : defaults.integrator);
-    for (const auto& [name, value] : defaults.integrator_params) spec.params.emplace(name, value);
-    return spec;
-}
-
-SamplerKind parse_sampler(const std::string& name) {
-    if (name == "independent") return SamplerKind::Independent;
-    if (name == "sobol") return SamplerKind::Sobol;
-    throw std::runtime_error(
-        fmt::format("--sampler is \"{}\", but must be independent or sobol", name));
-}
 
 nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
                        StopReason reason) {
@@ -187,8 +162,7 @@ void RenderCommand::run() const {
     }
 
     Renderer renderer(s, settings);
-    std::signal(SIGINT, on_interrupt);
-    std::signal(SIGTERM, on_interrupt);
+    const std::atomic<bool>& interrupted = catch_interrupts();
     std::unique_ptr<Preview> viewer;
     if (!preview.empty())
         viewer =

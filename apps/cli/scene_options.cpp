@@ -37,6 +37,10 @@ std::vector<int> parse_integers(const std::string& text, char separator, size_t 
 
 void SceneOptions::add_to(CLI::App& command) {
     command.add_option("SCENE", file, "Scene file (.xml)")->required();
+    add_reading_options(command);
+}
+
+void SceneOptions::add_reading_options(CLI::App& command) {
     command
         .add_option("-D,--define", defines, "Value of a scene parameter, name=value; repeatable")
         ->allow_extra_args(false);
@@ -45,7 +49,7 @@ void SceneOptions::add_to(CLI::App& command) {
     command.add_option("--crop", crop, "Part of the image to render: x,y,w,h in pixels");
 }
 
-Scene load_scene(const SceneOptions& options) {
+SceneDescription read_scene(const SceneOptions& options) {
     if (!std::filesystem::exists(options.file))
         throw std::runtime_error(fmt::format("{}: there is no such file", options.file));
     if (std::filesystem::is_directory(options.file))
@@ -59,6 +63,15 @@ Scene load_scene(const SceneOptions& options) {
                 fmt::format("-D must have the form name=value, but is \"{}\"", d));
         read.defines[d.substr(0, equals)] = d.substr(equals + 1);
     }
+    const std::string extension = std::filesystem::path(options.file).extension().string();
+    if (extension != ".xml")
+        throw std::runtime_error(
+            fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3)",
+                        options.file, extension));
+    return read_mitsuba_xml(options.file, read);
+}
+
+Scene build_scene(const SceneDescription& description, const SceneOptions& options) {
     BuildOptions build;
     build.lenient = options.lenient;
     if (!options.resolution.empty()) {
@@ -71,12 +84,28 @@ Scene load_scene(const SceneOptions& options) {
         const auto v = parse_integers(options.crop, ',', 4, "--crop", "x,y,w,h");
         build.crop = {v[0], v[1], v[2], v[3]};
     }
-    const std::string extension = std::filesystem::path(options.file).extension().string();
-    if (extension != ".xml")
-        throw std::runtime_error(
-            fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3)",
-                        options.file, extension));
-    return build_scene(read_mitsuba_xml(options.file, read), build);
+    return build_scene(description, build);
+}
+
+Scene load_scene(const SceneOptions& options) {
+    return build_scene(read_scene(options), options);
+}
+
+IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
+    const RenderDefaults& defaults = scene.defaults();
+    IntegratorSpec spec =
+        IntegratorSpec::parse(!text.empty()                 ? text
+                              : defaults.integrator.empty() ? "path"
+                                                            : defaults.integrator);
+    for (const auto& [name, value] : defaults.integrator_params) spec.params.emplace(name, value);
+    return spec;
+}
+
+SamplerKind parse_sampler(const std::string& name) {
+    if (name == "independent") return SamplerKind::Independent;
+    if (name == "sobol") return SamplerKind::Sobol;
+    throw std::runtime_error(
+        fmt::format("--sampler is \"{}\", but must be independent or sobol", name));
 }
 
 }  // namespace etendue

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "integrator/integrator.h"
+#include "sampler/sampler.h"
 #include "scene/scene.h"
 
 namespace CLI {
@@ -19,9 +21,19 @@ struct SceneOptions {
     std::string resolution, crop;
 
     void add_to(CLI::App& command);
+    /// Without the scene file itself.
+    void add_reading_options(CLI::App& command);
 };
 
+SceneDescription read_scene(const SceneOptions& options);
+Scene build_scene(const SceneDescription& description, const SceneOptions& options);
 /// Reads and builds the scene.
 Scene load_scene(const SceneOptions& options);
+
+/// The command line's integrator, or the scene's; parameters that are not given come from the scene's where it names the
+/// same ones.
+IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
+
+SamplerKind parse_sampler(const std::string& name);
 
 }  // namespace etendue

@@ -5,6 +5,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "math/statistics.h"
+
 namespace etendue {
 namespace {
 
@@ -16,12 +18,6 @@ void for_chunks(uint64_t count, const Body& body) {
     tbb::parallel_for(uint64_t(0), (count + kChunk - 1) / kChunk, [&](uint64_t chunk) {
         body(chunk, chunk * kChunk, std::min(count, (chunk + 1) * kChunk));
     });
-}
-
-/// Two-sided 95 % quantile of Student's t [Abramowitz & Stegun 1964, 26.7.5].
-double t_quantile_95(double dof) {
-    const double z = 1.959964, z3 = z * z * z, z5 = z3 * z * z;
-    return z + (z3 + z) / (4 * dof) + (5 * z5 + 16 * z3 + 3 * z) / (96 * dof * dof);
 }
 
 }  // namespace

@@ -57,6 +57,21 @@ inline float to_float(Half h) {
     return std::bit_cast<float>(sign | magnitude);
 }
 
+/// The nearest half, ties to even, with infinity for what is too large.
+inline Half to_half(float f) {
+    const uint32_t bits = std::bit_cast<uint32_t>(f), sign = bits >> 16 & 0x8000u;
+    const uint32_t magnitude = bits & 0x7fffffffu;
+    if (magnitude > 0x7f800000u) return {uint16_t(sign | 0x7e00u)};
+    if (magnitude >= 0x477ff000u) return {uint16_t(sign | 0x7c00u)};
+    if (magnitude < 0x38800000u) {
+        // Subnormal: adding 1/2 aligns the fraction's last bit with 2^-24.
+        const float aligned = std::bit_cast<float>(magnitude) + 0.5f;
+        return {uint16_t(sign | (std::bit_cast<uint32_t>(aligned) - 0x3f000000u))};
+    }
+    const uint32_t rounded = magnitude + 0xfffu + (magnitude >> 13 & 1u);
+    return {uint16_t(sign | (rounded - 0x38000000u) >> 13)};
+}
+
 /// Pixels in the file's own precision: 8-bit codes, or linear values of 16 or 32 bits. Rows from the top, channels
 /// fastest; alpha is not multiplied in.
 struct PixelBuffer {

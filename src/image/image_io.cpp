@@ -9,6 +9,7 @@
 #include <new>
 #include <stdexcept>
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
@@ -257,6 +258,20 @@ PixelBuffer read_pixels(const std::string& path, bool raw) {
         buffer.data = std::move(data);
     }
     return buffer;
+}
+
+std::string encode_png(int width, int height, std::span<const uint8_t> codes) {
+    const int channels = int(codes.size() / (size_t(width) * height));
+    OIIO::ImageSpec spec(width, height, channels, OIIO::TypeUInt8);
+    spec["oiio:ColorSpace"] = "sRGB";
+    std::vector<unsigned char> bytes;
+    OIIO::Filesystem::IOVecOutput memory(bytes);
+    const auto output = OIIO::ImageOutput::create("png", &memory);
+    if (!output || !output->open("memory.png", spec) ||
+        !output->write_image(OIIO::TypeUInt8, codes.data()) || !output->close())
+        throw std::runtime_error("cannot encode a PNG: " +
+                                 one_line(output ? output->geterror() : OIIO::geterror()));
+    return {bytes.begin(), bytes.end()};
 }
 
 void check_image_extension(const std::string& path) {

@@ -1,6 +1,7 @@
 #pragma once
 // Image files. Every function throws std::runtime_error with one message that names the file.
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +31,9 @@ enum class ExrPrecision { Float, Half };
 /// is complete. Finite values beyond the range of half floats are clamped to it.
 void write_image(const std::string& path, const Image& image,
                  ExrPrecision precision = ExrPrecision::Float);
+
+/// The bytes of a PNG file with these 8-bit codes, of one (grey) or three channels. Codes of colours are sRGB.
+std::string encode_png(int width, int height, std::span<const uint8_t> codes);
 
 /// Throws unless write_image knows the extension: to be called before a long rendering.
 void check_image_extension(const std::string& path);

@@ -8,6 +8,7 @@ namespace etendue {
 namespace {
 
 constexpr double kTrimmed = 0.001;
+constexpr double kSpikeQuantile = 0.9999;
 
 double grey(Rgb c) {
     return (double(c.r) + c.g + c.b) / 3;
@@ -97,6 +98,9 @@ ImageErrors image_errors(std::span<const Rgb> image, std::span<const Rgb> refere
     const auto kept = std::max<size_t>(size_t(double(relative.size()) * (1 - kTrimmed)), 1);
     e.rel_mse_trimmed = mean(std::span(relative).first(kept));
     e.l1 = mean(absolute);
+    const auto spike = absolute.begin() + std::ptrdiff_t(kSpikeQuantile * double(absolute.size()));
+    std::nth_element(absolute.begin(), spike, absolute.end());
+    e.spike = ratio(*spike, m);
     e.mape = mean(mape);
     e.smape = mean(smape);
     e.mean_ratio = pixels.mean_ratio();

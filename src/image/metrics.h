@@ -31,6 +31,7 @@ struct ImageErrors {
     double l1 = 0;               ///< mean |X − R|
     double mape = 0;             ///< mean |X − R| / (|R| + 0.01 m)
     double smape = 0;            ///< mean |X − R| / ((|X| + |R|) / 2 + 0.01 m)
+    double spike = 0;            ///< The 99.99th percentile over pixels of |X − R| / m
     double mean_ratio = 0;       ///< mean X / m
 };
 /// Both images of the same size; throws std::invalid_argument otherwise or where no pixel is left.

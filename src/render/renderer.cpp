@@ -145,35 +145,44 @@ void Renderer::pass(uint32_t index) {
     });
 }
 
-StopReason Renderer::run(const std::function<void(const Progress&)>& progress,
+std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
+                                            const ErrorEstimate& error) const {
+    if (film_.passes() == 0) return {};
+    if (limits.spp && film_.passes() >= *limits.spp) return StopReason::Samples;
+    // The next pass is begun only if its larger part fits.
+    if (limits.seconds && seconds_ + 0.5 * seconds_ / double(film_.passes()) > *limits.seconds)
+        return StopReason::Time;
+    if (limits.error && error.valid && error.relative_rms <= *limits.error)
+        return StopReason::Error;
+    return {};
+}
+
+StopReason Renderer::run(const RenderLimits& limits,
+                         const std::function<void(const Progress&)>& progress,
                          const std::atomic<bool>& interrupted) {
     using Clock = std::chrono::steady_clock;
     const auto begin = Clock::now();
-    for (uint32_t index = 0;; ++index) {
-        pass(index);
-        seconds_ = std::chrono::duration<double>(Clock::now() - begin).count();
-        const double one_pass = seconds_ / double(index + 1);
+    const double before = seconds_;
+    if (const auto reason = reached(limits, film_.error())) return *reason;
+    while (true) {
+        pass(uint32_t(film_.passes()));
+        seconds_ = before + std::chrono::duration<double>(Clock::now() - begin).count();
         stats_ = RenderStats();
         for (const Workspace& w : workers_->spaces) stats_ += w.stats;
 
         Progress now{film_.passes(), seconds_, {}, double(stats_.rays()) / seconds_, film_.error()};
-        if (settings_.spp) now.fraction = double(now.passes) / double(*settings_.spp);
-        if (settings_.seconds)
-            now.fraction = std::max(now.fraction.value_or(0), seconds_ / *settings_.seconds);
+        if (limits.spp) now.fraction = double(now.passes) / double(*limits.spp);
+        if (limits.seconds)
+            now.fraction = std::max(now.fraction.value_or(0), seconds_ / *limits.seconds);
         // The error falls with the square root of the number of passes.
-        if (settings_.error && now.error.valid)
+        if (limits.error && now.error.valid)
             now.fraction =
-                std::max(now.fraction.value_or(0), sqr(*settings_.error / now.error.relative_rms));
+                std::max(now.fraction.value_or(0), sqr(*limits.error / now.error.relative_rms));
         if (now.fraction) now.fraction = std::min(*now.fraction, 1.0);
         progress(now);
 
         if (interrupted.load(std::memory_order_relaxed)) return StopReason::Interrupted;
-        if (settings_.spp && film_.passes() >= *settings_.spp) return StopReason::Samples;
-        // The next pass is begun only if its larger part fits.
-        if (settings_.seconds && seconds_ + 0.5 * one_pass > *settings_.seconds)
-            return StopReason::Time;
-        if (settings_.error && now.error.valid && now.error.relative_rms <= *settings_.error)
-            return StopReason::Error;
+        if (const auto reason = reached(limits, now.error)) return *reason;
     }
 }
 

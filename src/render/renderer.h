@@ -14,15 +14,18 @@
 
 namespace etendue {
 
-struct RenderSettings {
+/// When to stop: at whichever comes first. At least one pass is made.
+struct RenderLimits {
+    std::optional<uint64_t> spp;
+    std::optional<double> seconds;
+    std::optional<double> error;  ///< Relative RMS error of the image, see ErrorEstimate.
+};
+
+struct RenderSettings : RenderLimits {
     IntegratorSpec integrator{"path", {}};
     SamplerKind sampler = SamplerKind::Independent;
     uint64_t seed = 0;
     int threads = 0;  ///< 0: all.
-    // When to stop: at whichever comes first. At least one pass is made.
-    std::optional<uint64_t> spp;
-    std::optional<double> seconds;
-    std::optional<double> error;  ///< Relative RMS error of the image, see ErrorEstimate.
     /// Technique images up to this many edges; 0 for none.
     int technique_depth = 0;
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
@@ -30,7 +33,7 @@ struct RenderSettings {
 
 struct Progress {
     uint64_t passes;
-    double seconds;                  ///< Since the first pass began.
+    double seconds;                  ///< Spent in run().
     std::optional<double> fraction;  ///< Of the work, where that can be told.
     double rays_per_second;
     ErrorEstimate error;
@@ -50,16 +53,23 @@ public:
     /// Renders until a limit is reached or `interrupted` is set; the pass in flight is always finished. `progress` is
     /// called after every pass, from the calling thread.
     StopReason run(const std::function<void(const Progress&)>& progress,
+                   const std::atomic<bool>& interrupted) {
+        return run(settings_, progress, interrupted);
+    }
+    /// The same up to other limits. Limits count from the first pass on, and what is rendered in several calls is what
+    /// one call renders: a renderer goes on where it stopped.
+    StopReason run(const RenderLimits& limits, const std::function<void(const Progress&)>& progress,
                    const std::atomic<bool>& interrupted);
 
     const Film& film() const { return film_; }
     const Integrator& integrator() const { return *integrator_; }
     const RenderStats& stats() const { return stats_; }
-    double seconds() const { return seconds_; }
+    double seconds() const { return seconds_; }  ///< Spent in run().
     const TechniqueImages* techniques() const { return techniques_.get(); }
 
 private:
     void pass(uint32_t index);
+    std::optional<StopReason> reached(const RenderLimits& limits, const ErrorEstimate& error) const;
 
     const Scene& scene_;
     RenderSettings settings_;

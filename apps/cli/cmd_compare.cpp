@@ -1,0 +1,236 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "commands.h"
+#include "compare/comparison.h"
+#include "compare/report.h"
+#include "interrupt.h"
+#include "scene_options.h"
+
+namespace etendue {
+namespace {
+
+struct CompareCommand {
+    std::vector<std::string> scenes, methods, references;
+    SceneOptions reading;
+    std::string reference_method, sampler = "sobol", report = "out/compare",
+                                  kept_references = "out/references";
+    double seconds = 0, reference_seconds = 0;
+    uint64_t spp = 0, reference_spp = 0, seed = 0;
+    int runs = 1, threads = 0, technique_depth = 5;
+    bool quiet = false;
+
+    void run() const;
+
+private:
+    void check() const;
+    CompareSettings settings(const Scene& scene) const;
+    IntegratorSpec reference_integrator(const Scene& scene,
+                                        const std::vector<MethodSpec>& specs) const;
+    RenderSettings reference_settings(const Scene& scene,
+                                      const std::vector<MethodSpec>& specs) const;
+};
+
+/// A line that is rewritten, ten times a second at most; nothing where no terminal shows it.
+class StatusLine {
+public:
+    explicit StatusLine(bool quiet) : active_(!quiet && isatty(STDERR_FILENO)) {}
+    ~StatusLine() { clear(); }
+    void show(const std::string& text) {
+        const auto now = Clock::now();
+        if (!active_ || now - last_ < std::chrono::milliseconds(100)) return;
+        last_ = now;
+        fmt::print(stderr, "\r{}\033[K", text);
+    }
+    void clear() const {
+        if (active_) fmt::print(stderr, "\r\033[K");
+    }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    bool active_;
+    Clock::time_point last_;
+};
+
+/// The longest path as an integrator takes it, as text; its table's default where the spec does not say.
+std::string max_depth(const IntegratorSpec& spec) {
+    if (const auto found = spec.params.find("max_depth"); found != spec.params.end())
+        return found->second;
+    for (const IntegratorEntry& e : integrator_registry())
+        if (spec.name == e.info.name)
+            for (const ParamInfo& p : e.info.params)
+                if (std::string(p.name) == "max_depth") return p.fallback;
+    return "";
+}
+
+void CompareCommand::check() const {
+    if (seconds > 0 && spp > 0)
+        throw std::runtime_error(
+            "--time and --spp exclude each other: equal time or equal samples");
+    if (!(seconds > 0) && spp == 0)
+        throw std::runtime_error("--time or --spp is missing: how long each method renders");
+    if (!references.empty() && references.size() != scenes.size())
+        throw std::runtime_error(
+            fmt::format("--reference needs one image a scene: {} for {} scenes", references.size(),
+                        scenes.size()));
+    if (!references.empty() &&
+        (reference_seconds > 0 || reference_spp > 0 || !reference_method.empty()))
+        throw std::runtime_error("--reference excludes --reference-time, --reference-spp and "
+                                 "--reference-method, which make one");
+    if (std::filesystem::exists(report) && !std::filesystem::is_directory(report))
+        throw std::runtime_error(fmt::format("--report: \"{}\" is not a folder", report));
+}
+
+CompareSettings CompareCommand::settings(const Scene& scene) const {
+    CompareSettings s;
+    for (const std::string& m : methods) s.methods.push_back({m, choose_integrator(scene, m)});
+    s.sampler = parse_sampler(sampler);
+    s.seed = seed;
+    s.threads = threads;
+    if (seconds > 0) s.limits.seconds = seconds;
+    if (spp > 0) s.limits.spp = spp;
+    s.runs = runs;
+    s.technique_depth = technique_depth;
+    return s;
+}
+
+/// bdpt unless the command line names another, with paths as long as those of the methods where these agree.
+IntegratorSpec CompareCommand::reference_integrator(const Scene& scene,
+                                                    const std::vector<MethodSpec>& specs) const {
+    if (!reference_method.empty()) return choose_integrator(scene, reference_method);
+    IntegratorSpec spec = choose_integrator(scene, "bdpt");
+    if (std::ranges::all_of(specs, [&](const MethodSpec& s) {
+            return max_depth(s.integrator) == max_depth(specs.front().integrator);
+        }))
+        spec.params["max_depth"] = max_depth(specs.front().integrator);
+    return spec;
+}
+
+/// Ten times the time of a method, or 16 times its samples, unless the command line tells.
+RenderSettings CompareCommand::reference_settings(const Scene& scene,
+                                                  const std::vector<MethodSpec>& specs) const {
+    RenderSettings s;
+    s.integrator = reference_integrator(scene, specs);
+    s.sampler = parse_sampler(sampler);
+    s.threads = threads;
+    if (reference_seconds > 0) s.seconds = reference_seconds;
+    if (reference_spp > 0) s.spp = reference_spp;
+    if (!s.seconds && !s.spp && seconds > 0) s.seconds = 10 * seconds;
+    if (!s.seconds && !s.spp) s.spp = 16 * spp;
+    return s;
+}
+
+void print_summary(const Comparison& c) {
+    fmt::print(stderr, "{}\n  {:<28} {:>8} {:>9} {:>10} {:>10} {:>8} {:>8} {:>11}\n", c.scene_file,
+               "method", "spp", "time", "relMSE", "trimmed", "FLIP", "mean", "efficiency");
+    const std::vector<MethodSummary> summaries = summarize(c);
+    for (size_t i = 0; i < summaries.size(); ++i) {
+        const MethodSummary& s = summaries[i];
+        fmt::print(stderr,
+                   "  {:<28} {:>8.0f} {:>7.2f} s {:>10.3e} {:>10.3e} {:>8.4f} {:>8.4f} {:>11}\n",
+                   c.methods[i].name(), s.spp, s.seconds, s.rel_mse, s.rel_mse_trimmed,
+                   c.methods[i].flip, s.mean_ratio.value,
+                   s.efficiency ? fmt::format("{:.3g}", s.efficiency->value) : "unknown");
+    }
+}
+
+void CompareCommand::run() const {
+    check();
+    std::vector<Comparison> comparisons;
+    const std::atomic<bool>& interrupted = catch_interrupts();
+    for (size_t i = 0; i < scenes.size() && !interrupted.load(); ++i) {
+        SceneOptions options = reading;
+        options.file = scenes[i];
+        const SceneDescription description = read_scene(options);
+        const Scene scene = build_scene(description, options);
+        for (const std::string& w : scene.warnings()) fmt::print(stderr, "warning: {}\n", w);
+        const CompareSettings s = settings(scene);
+        check_methods(s.methods);
+
+        StatusLine status(quiet);
+        std::optional<Reference> reference;
+        if (!references.empty()) {
+            reference = read_reference(references[i], scene.film());
+        } else {
+            const RenderSettings how = reference_settings(scene, s.methods);
+            for (const MethodSpec& m : s.methods)
+                if (max_depth(m.integrator) != max_depth(how.integrator))
+                    fmt::print(
+                        stderr,
+                        "warning: {} ends paths at max_depth {}, the reference at {}: errors "
+                        "contain the difference\n",
+                        m.name, max_depth(m.integrator), max_depth(how.integrator));
+            reference = make_reference(
+                scene, {how, kept_references, scene_fingerprint(description)},
+                [&](const Progress& p) {
+                    status.show(fmt::format("{}: reference, {} spp, {:.1f} s", scenes[i], p.passes,
+                                            p.seconds));
+                },
+                interrupted);
+            if (!reference) break;
+        }
+        comparisons.push_back(compare(
+            scene, *reference, s,
+            [&](const std::string& text) { status.show(scenes[i] + ": " + text); }, interrupted));
+        status.clear();
+        if (!quiet) print_summary(comparisons.back());
+    }
+    if (comparisons.empty())
+        throw std::runtime_error("interrupted before anything could be compared");
+    write_report(comparisons, {report, ETENDUE_VERSION});
+    if (!quiet)
+        fmt::print(stderr, "{}\n", (std::filesystem::path(report) / "report.html").string());
+}
+
+}  // namespace
+
+void add_compare_command(CLI::App& app) {
+    auto command = std::make_shared<CompareCommand>();
+    CLI::App& c = *app.add_subcommand("compare", "Compare methods at equal time, as a report");
+    c.add_option("SCENE", command->scenes, "Scene files (.xml)")->required();
+    command->reading.add_reading_options(c);
+    c.add_option("-m,--methods", command->methods,
+                 "Integrators with parameters: path 'bdpt:max_depth=8'; the first is the yardstick")
+        ->required();
+    c.add_option("--time", command->seconds, "Seconds that each method renders")
+        ->check(CLI::PositiveNumber);
+    c.add_option("--spp", command->spp, "Samples per pixel of each method, instead of --time")
+        ->check(CLI::PositiveNumber);
+    c.add_option("--runs", command->runs, "Independent runs, with seeds that count on")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 10000));
+    c.add_option("--reference", command->references, "Images to judge by, one a scene");
+    c.add_option("--reference-time", command->reference_seconds,
+                 "Seconds to render the reference (default: 10 times --time)")
+        ->check(CLI::PositiveNumber);
+    c.add_option("--reference-spp", command->reference_spp,
+                 "Samples per pixel of the reference (default: 16 times --spp)")
+        ->check(CLI::PositiveNumber);
+    c.add_option("--reference-method", command->reference_method,
+                 "Integrator of the reference (default: bdpt)");
+    c.add_option("--references", command->kept_references, "Folder where references are kept")
+        ->capture_default_str();
+    c.add_option("--report", command->report, "Folder for the report")->capture_default_str();
+    c.add_option("--techniques-max-depth", command->technique_depth,
+                 "Longest path with technique images, edges; 0: none")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 16));
+    c.add_option("--seed", command->seed, "Seed of the first run")->capture_default_str();
+    c.add_option("--sampler", command->sampler, "independent or sobol")->capture_default_str();
+    c.add_option("--threads", command->threads, "Number of threads; 0: all")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 4096));
+    c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
+    c.callback([command] { command->run(); });
+}
+
+}  // namespace etendue

@@ -1,0 +1,17 @@
+# etendue_embed_text(TARGET HEADER NAME FILE [NAME FILE]...): defines std::string_view NAME of namespace etendue, which
+# HEADER declares, as the contents of FILE, for each pair; made anew when a file changes.
+function(etendue_embed_text target header)
+    set(output ${CMAKE_CURRENT_BINARY_DIR}/${target}_text.cpp)
+    set(text "#include \"${header}\"\n\nnamespace etendue {\n\n")
+    set(pairs ${ARGN})
+    while(pairs)
+        list(POP_FRONT pairs name file)
+        get_filename_component(file ${file} ABSOLUTE)
+        set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+        file(READ ${file} content)
+        string(APPEND text "const std::string_view ${name} = R\"etendue(${content})etendue\";\n")
+    endwhile()
+    string(APPEND text "\n}  // namespace etendue\n")
+    file(CONFIGURE OUTPUT ${output} CONTENT "@text@" @ONLY)
+    target_sources(${target} PRIVATE ${output})
+endfunction()

@@ -1,0 +1,285 @@
+#include "compare/comparison.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "compare/memory.h"
+#include "image/flip.h"
+
+namespace etendue {
+namespace {
+
+/// A method's part in one run.
+struct Contestant {
+    std::unique_ptr<Renderer> renderer;
+    MemoryMeter memory;
+    std::vector<Checkpoint> checkpoints;
+};
+
+ImageErrors errors_of(const std::vector<Rgb>& image, const Reference& r) {
+    return image_errors(image, r.half(0), {.reference2 = r.half(1)});
+}
+
+void add_checkpoint(Contestant& c, const Reference& reference) {
+    const Film& film = c.renderer->film();
+    if (film.passes() == 0) return;
+    if (!c.checkpoints.empty() && c.checkpoints.back().spp == film.passes()) return;
+    c.checkpoints.push_back(
+        {film.passes(), c.renderer->seconds(), errors_of(film.image(), reference)});
+}
+
+Run finished_run(const Contestant& c, uint64_t seed, const Reference& reference) {
+    const Renderer& r = *c.renderer;
+    Run run;
+    run.seed = seed;
+    run.spp = r.film().passes();
+    run.seconds = r.seconds();
+    run.stats = r.stats();
+    run.rejected = r.stats().rejected + r.film().rejected();
+    run.mean = r.film().mean_luminance();
+    run.checkpoints = c.checkpoints;
+    run.uncorrected = image_errors(r.film().image(), reference.pixels);
+    return run;
+}
+
+RenderSettings render_settings(const CompareSettings& s, const IntegratorSpec& integrator,
+                               uint64_t seed) {
+    RenderSettings settings;
+    settings.integrator = integrator;
+    settings.sampler = s.sampler;
+    settings.seed = seed;
+    settings.threads = s.threads;
+    return settings;
+}
+
+/// Methods take their turns forwards and backwards by turns, so that a machine that slows down steadily hits all alike.
+void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings& settings,
+                     const Reference& reference, const CompareProgress& progress,
+                     const std::string& label, const std::atomic<bool>& interrupted) {
+    bool forwards = true;
+    for (const Turn& turn : schedule(settings.limits)) {
+        for (size_t i = 0; i < contestants.size(); ++i) {
+            const size_t method = forwards ? i : contestants.size() - 1 - i;
+            Contestant& c = contestants[method];
+            c.memory.begin();
+            c.renderer->run(
+                turn.limits,
+                [&](const Progress& p) {
+                    progress(fmt::format("{}{}: {} spp, {:.1f} s", label,
+                                         settings.methods[method].name, p.passes, p.seconds));
+                },
+                interrupted);
+            c.memory.end();
+            if (interrupted.load()) return;
+            if (turn.is_checkpoint) add_checkpoint(c, reference);
+        }
+        forwards = !forwards;
+    }
+}
+
+/// A rendering of its own, since technique images cost time; a quarter of the method's.
+void render_techniques(const Scene& scene, const CompareSettings& settings, Method& method,
+                       const std::atomic<bool>& interrupted) {
+    RenderSettings s = render_settings(settings, method.spec.integrator, settings.seed);
+    s.technique_depth = settings.technique_depth;
+    s.seconds = method.runs.front().seconds / 4;
+    Renderer renderer(scene, s);
+    renderer.run([](const Progress&) {}, interrupted);
+    method.techniques = renderer.techniques()->images();
+    method.technique_spp = renderer.film().passes();
+}
+
+/// n, n/√2, n/2, ... or n, n/2, n/4, ... in ascending order.
+std::vector<double> geometric_steps(double last, double first, double factor) {
+    std::vector<double> steps;
+    for (double v = last; v >= first; v /= factor) steps.push_back(v);
+    std::reverse(steps.begin(), steps.end());
+    return steps;
+}
+
+template <class Get>
+std::vector<double> of_runs(const Method& m, const Get& get) {
+    std::vector<double> values;
+    for (const Run& r : m.runs) values.push_back(double(get(r)));
+    return values;
+}
+
+double mean(const std::vector<double>& values) {
+    double sum = 0;
+    for (double v : values) sum += v;
+    return values.empty() ? 0 : sum / double(values.size());
+}
+
+/// The error against time of one run.
+template <class Get>
+std::optional<PowerLaw> slope(const Run& run, const Get& get) {
+    std::vector<double> times, errors;
+    for (const Checkpoint& c : run.checkpoints) {
+        times.push_back(c.seconds);
+        errors.push_back(get(c.errors));
+    }
+    // What comes first is not the rule yet: a few samples have not found the rare paths.
+    return fit_power_law(times, errors, times.empty() ? 0 : times.back() / 32);
+}
+
+template <class Get>
+std::optional<PowerLaw> mean_slope(const Method& m, const Get& get, std::vector<double>& slopes) {
+    double log_factor = 0;
+    int points = 0;
+    for (const Run& r : m.runs)
+        if (const auto law = slope(r, get)) {
+            slopes.push_back(law->slope);
+            log_factor += std::log(law->factor);
+            points += law->points;
+        }
+    if (slopes.empty()) return {};
+    return PowerLaw{mean(slopes), std::exp(log_factor / double(slopes.size())), points};
+}
+
+}  // namespace
+
+void check_methods(const std::vector<MethodSpec>& methods) {
+    for (size_t i = 0; i < methods.size(); ++i) {
+        make_integrator(methods[i].integrator);
+        for (size_t j = 0; j < i; ++j)
+            if (methods[i].integrator.to_string() == methods[j].integrator.to_string())
+                throw std::runtime_error(
+                    fmt::format("method \"{}\" is given twice", methods[i].name));
+    }
+}
+
+std::vector<Turn> schedule(const RenderLimits& limits) {
+    constexpr double kTurns = 32, kLongestTurn = 2;
+    std::vector<Turn> turns;
+    if (limits.seconds) {
+        const double total = *limits.seconds, longest = std::min(total / kTurns, kLongestTurn);
+        double previous = 0;
+        for (const double step : geometric_steps(total, total / 300, std::sqrt(2.0))) {
+            const int parts = std::max(1, int(std::ceil((step - previous) / longest)));
+            for (int i = 1; i <= parts; ++i)
+                turns.push_back({{.spp = limits.spp,
+                                  .seconds = previous + (step - previous) * i / parts,
+                                  .error = {}},
+                                 i == parts});
+            previous = step;
+        }
+        return turns;
+    }
+    const uint64_t total = limits.spp.value_or(1);
+    const auto longest = uint64_t(std::ceil(double(total) / kTurns));
+    uint64_t previous = 0;
+    for (const double step : geometric_steps(double(total), 1, 2)) {
+        const auto target = uint64_t(std::ceil(step));
+        while (previous < target) {
+            previous = std::min(previous + longest, target);
+            turns.push_back({{.spp = previous, .seconds = {}, .error = {}}, previous == target});
+        }
+    }
+    return turns;
+}
+
+Comparison compare(const Scene& scene, const Reference& reference, const CompareSettings& settings,
+                   const CompareProgress& progress, const std::atomic<bool>& interrupted) {
+    Comparison out;
+    out.scene_file = scene.file();
+    out.film = scene.film();
+    out.settings = settings;
+    out.reference = reference;
+    out.scene_bytes = resident_bytes();
+    if (reference.has_variance()) {
+        // (R − R1)(R − R2) = −(R1 − R2)²/4, R being the mean of the two.
+        const ImageErrors noise = errors_of(reference.pixels, reference);
+        out.reference_mse = -noise.mse;
+        out.reference_rel_mse = -noise.rel_mse;
+    }
+    check_methods(settings.methods);
+    for (const MethodSpec& spec : settings.methods) out.methods.emplace_back().spec = spec;
+
+    for (int index = 0; index < settings.runs && !interrupted.load(); ++index) {
+        const uint64_t seed = settings.seed + uint64_t(index);
+        std::vector<Contestant> contestants(settings.methods.size());
+        for (size_t i = 0; i < contestants.size(); ++i) {
+            contestants[i].memory.begin();
+            contestants[i].renderer = std::make_unique<Renderer>(
+                scene, render_settings(settings, settings.methods[i].integrator, seed));
+            contestants[i].memory.end();
+        }
+        const std::string label =
+            settings.runs > 1 ? fmt::format("run {} of {}, ", index + 1, settings.runs) : "";
+        render_in_turns(contestants, settings, reference, progress, label, interrupted);
+        for (size_t i = 0; i < contestants.size(); ++i) {
+            Contestant& c = contestants[i];
+            add_checkpoint(c, reference);
+            if (c.checkpoints.empty()) continue;  // interrupted before its first pass
+            Method& m = out.methods[i];
+            m.runs.push_back(finished_run(c, seed, reference));
+            if (index > 0) continue;
+            m.estimator = c.renderer->integrator().estimator();
+            m.image = c.renderer->film().image();
+            m.peak_bytes = c.memory.peak_bytes();
+        }
+    }
+    for (Method& m : out.methods) {
+        if (m.runs.empty()) continue;
+        progress(fmt::format("{}: FLIP", m.name()));
+        FlipResult flip = hdr_flip(m.image, reference.pixels, reference.width, reference.height);
+        m.flip = flip.mean;
+        m.flip_map = std::move(flip.map);
+        if (settings.technique_depth == 0 || interrupted.load()) continue;
+        progress(fmt::format("{}: technique images", m.name()));
+        render_techniques(scene, settings, m, interrupted);
+    }
+    std::erase_if(out.methods, [](const Method& m) { return m.runs.empty(); });
+    out.interrupted = interrupted.load();
+    return out;
+}
+
+std::vector<MethodSummary> summarize(const Comparison& comparison) {
+    std::vector<MethodSummary> out;
+    std::vector<double> base_errors;
+    for (const Method& m : comparison.methods) {
+        MethodSummary& s = out.emplace_back();
+        s.spp = mean(of_runs(m, [](const Run& r) { return r.spp; }));
+        s.seconds = mean(of_runs(m, [](const Run& r) { return r.seconds; }));
+        s.rays = mean(of_runs(m, [](const Run& r) { return r.stats.rays(); }));
+        s.rmse =
+            std::sqrt(std::max(0.0, mean(of_runs(m, [](const Run& r) { return r.errors().mse; }))));
+        const std::vector<double> rel_mse =
+            of_runs(m, [](const Run& r) { return r.errors().rel_mse; });
+        s.rel_mse = mean(rel_mse);
+        s.rel_mse_interval = mean_interval(rel_mse);
+        s.rel_mse_trimmed =
+            mean(of_runs(m, [](const Run& r) { return r.errors().rel_mse_trimmed; }));
+        s.mape = mean(of_runs(m, [](const Run& r) { return r.errors().mape; }));
+        s.spike = mean(of_runs(m, [](const Run& r) { return r.errors().spike; }));
+
+        double variance = 0;
+        for (const Run& r : m.runs)
+            variance += r.mean.mean > 0 ? sqr(r.mean.standard_error / r.mean.mean) : 0;
+        s.mean_ratio = ratio_interval(
+            mean(of_runs(m, [](const Run& r) { return r.errors().mean_ratio; })),
+            std::sqrt(variance) / double(m.runs.size()), comparison.reference.mean_relative_error);
+
+        std::vector<double> rmse_slopes, slopes;
+        s.rmse_slope = mean_slope(
+            m, [](const ImageErrors& e) { return e.rmse; }, rmse_slopes);
+        s.rel_mse_slope = mean_slope(
+            m, [](const ImageErrors& e) { return e.rel_mse; }, slopes);
+        s.rel_mse_slope_interval = mean_interval(slopes);
+
+        if (out.size() == 1) base_errors = rel_mse;
+        s.efficiency =
+            relative_efficiency({base_errors, out.front().seconds}, {rel_mse, s.seconds});
+        const double measured =
+            mean(of_runs(m, [](const Run& r) { return r.uncorrected.rel_mse; }));
+        if (comparison.reference.has_variance() && measured > 0)
+            s.reference_share = 1 - s.rel_mse / measured;
+    }
+    return out;
+}
+
+}  // namespace etendue

@@ -1,0 +1,73 @@
+#include "compare/error_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "math/statistics.h"
+
+namespace etendue {
+namespace {
+
+struct Mean {
+    double value = 0;
+    double variance = 0;  ///< Of the mean; 0 for a single sample.
+
+    explicit Mean(std::span<const double> samples) {
+        const double n = double(samples.size());
+        for (double v : samples) value += v / n;
+        if (n < 2) return;
+        for (double v : samples) variance += (v - value) * (v - value) / (n * (n - 1));
+    }
+};
+
+}  // namespace
+
+std::optional<Interval> mean_interval(std::span<const double> samples) {
+    if (samples.size() < 2) return {};
+    const Mean m(samples);
+    const double half = t_quantile_95(double(samples.size() - 1)) * std::sqrt(m.variance);
+    return Interval{m.value, m.value - half, m.value + half};
+}
+
+std::optional<PowerLaw> fit_power_law(std::span<const double> times, std::span<const double> errors,
+                                      double from) {
+    std::vector<double> x, y;
+    for (size_t i = 0; i < times.size(); ++i) {
+        if (!(times[i] >= from) || !(times[i] > 0) || !(errors[i] > 0)) continue;
+        x.push_back(std::log(times[i]));
+        y.push_back(std::log(errors[i]));
+    }
+    if (x.size() < 3 || x.front() == x.back()) return {};
+    const double x_mean = Mean(x).value, y_mean = Mean(y).value;
+    double xx = 0, xy = 0;
+    for (size_t i = 0; i < x.size(); ++i) {
+        xx += (x[i] - x_mean) * (x[i] - x_mean);
+        xy += (x[i] - x_mean) * (y[i] - y_mean);
+    }
+    const double slope = xy / xx;
+    return PowerLaw{slope, std::exp(y_mean - slope * x_mean), int(x.size())};
+}
+
+std::optional<Efficiency> relative_efficiency(const Cost& base, const Cost& method) {
+    const Mean e0(base.squared_errors), e1(method.squared_errors);
+    const double c0 = e0.value * base.seconds, c1 = e1.value * method.seconds;
+    if (!(c0 > 0) || !(c1 > 0)) return {};
+    Efficiency out{c0 / c1, {}};
+    const size_t runs = std::min(base.squared_errors.size(), method.squared_errors.size());
+    if (runs < 2) return out;
+    // Variance of log e is var(e) / e² to first order; the degrees of freedom are those of the smaller side.
+    const double spread =
+        std::sqrt(e0.variance / (e0.value * e0.value) + e1.variance / (e1.value * e1.value));
+    const double factor = std::exp(t_quantile_95(double(runs - 1)) * spread);
+    out.interval = Interval{out.value, out.value / factor, out.value * factor};
+    return out;
+}
+
+Interval ratio_interval(double ratio, double relative_error_x, double relative_error_r) {
+    const double half =
+        kNormalQuantile95 * std::fabs(ratio) * std::hypot(relative_error_x, relative_error_r);
+    return {ratio, ratio - half, ratio + half};
+}
+
+}  // namespace etendue

@@ -1,0 +1,177 @@
+#include "compare/reference.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "image/image_io.h"
+#include "math/hash.h"
+
+namespace etendue {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Raised when references that are kept can no longer be used.
+constexpr uint64_t kFormat = 1;
+/// Far from the seeds that people give, so that no method shares the reference's random numbers.
+constexpr uint64_t kSeed = 0x7265666572656e63;
+
+uint64_t hash_bytes(uint64_t hash, std::string_view bytes) {
+    hash = hash_combine(hash, bytes.size());
+    while (!bytes.empty()) {
+        uint64_t word = 0;
+        const size_t n = std::min(bytes.size(), sizeof word);
+        std::copy_n(bytes.data(), n, reinterpret_cast<char*>(&word));
+        hash = hash_combine(hash, word);
+        bytes.remove_prefix(n);
+    }
+    return hash;
+}
+
+uint64_t hash_file(uint64_t hash, const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    return hash_bytes(hash, std::string(std::istreambuf_iterator<char>(in), {}));
+}
+
+double number(const Image& image, const std::string& name) {
+    const auto found = image.attributes.find("etendue." + name);
+    if (found == image.attributes.end()) return 0;
+    const double* value = std::get_if<double>(&found->second);
+    return value ? *value : 0;
+}
+
+std::string text(const Image& image, const std::string& name) {
+    const auto found = image.attributes.find("etendue." + name);
+    if (found == image.attributes.end()) return "";
+    const std::string* value = std::get_if<std::string>(&found->second);
+    return value ? *value : "";
+}
+
+std::vector<Rgb> mean_of(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+    std::vector<Rgb> mean(a.size());
+    for (size_t i = 0; i < a.size(); ++i) mean[i] = (a[i] + b[i]) * 0.5f;
+    return mean;
+}
+
+/// (X − R − σ)(X − R + σ) = (X − R)² − σ².
+void add_standard_error(Reference& r, const std::vector<Rgb>& variance) {
+    r.first = r.second = r.pixels;
+    for (size_t i = 0; i < variance.size(); ++i) {
+        const Rgb sigma = sqrt(variance[i]);
+        r.first[i] = r.pixels[i] - sigma;
+        r.second[i] = r.pixels[i] + sigma;
+    }
+}
+
+std::string cache_file(const FilmGeometry& film, const ReferenceSettings& settings) {
+    uint64_t hash = hash_combine(kFormat, settings.fingerprint);
+    for (int v : {film.width, film.height, film.crop_x, film.crop_y, film.crop_width,
+                  film.crop_height, int(settings.render.sampler)})
+        hash = hash_combine(hash, uint64_t(v));
+    hash = hash_bytes(hash, settings.render.integrator.to_string());
+    return (fs::path(settings.folder) / fmt::format("reference-{:016x}.exr", hash)).string();
+}
+
+bool is_long_enough(const Reference& r, const RenderLimits& limits) {
+    // A rendering ends within a pass of its limit.
+    return (!limits.spp || r.spp >= *limits.spp) &&
+           (!limits.seconds || r.seconds >= 0.95 * *limits.seconds);
+}
+
+void write_reference(const Reference& r) {
+    Image image = rgb_image(r.width, r.height, r.pixels);
+    add_rgb_layer(image, r.width, r.height, "first", r.first);
+    add_rgb_layer(image, r.width, r.height, "second", r.second);
+    image.attributes["etendue.integrator"] = r.method;
+    image.attributes["etendue.seconds"] = r.seconds;
+    image.attributes["etendue.spp"] = double(r.spp);
+    image.attributes["etendue.mean_relative_error"] = r.mean_relative_error;
+    write_image(r.file, image);
+}
+
+}  // namespace
+
+Reference read_reference(const std::string& file, const FilmGeometry& geometry) {
+    const Image image = read_image(file);
+    if (image.width != geometry.crop_width || image.height != geometry.crop_height)
+        throw std::runtime_error(fmt::format(
+            "reference \"{}\" has {} x {} pixels, but the scene is rendered with {} x {}", file,
+            image.width, image.height, geometry.crop_width, geometry.crop_height));
+    Reference r;
+    r.file = file;
+    r.width = image.width;
+    r.height = image.height;
+    r.pixels = rgb_pixels(image);
+    r.method = text(image, "integrator");
+    r.seconds = number(image, "seconds");
+    r.spp = uint64_t(number(image, "spp"));
+    r.mean_relative_error = number(image, "mean_relative_error");
+    if (const double mean = number(image, "mean_luminance"); mean > 0)
+        r.mean_relative_error = number(image, "mean_luminance_standard_error") / mean;
+    if (image.channel("first.R") >= 0 && image.channel("second.R") >= 0) {
+        r.first = rgb_pixels(image, "first");
+        r.second = rgb_pixels(image, "second");
+    } else if (image.channel("variance.R") >= 0) {
+        add_standard_error(r, rgb_pixels(image, "variance"));
+    }
+    return r;
+}
+
+std::optional<Reference> make_reference(const Scene& scene, const ReferenceSettings& settings,
+                                        const std::function<void(const Progress&)>& progress,
+                                        const std::atomic<bool>& interrupted) {
+    const std::string file = cache_file(scene.film(), settings);
+    if (fs::exists(file)) {
+        Reference kept = read_reference(file, scene.film());
+        kept.reused = true;
+        if (kept.has_variance() && is_long_enough(kept, settings.render)) return kept;
+    }
+    Reference r;
+    r.file = file;
+    r.width = scene.film().crop_width;
+    r.height = scene.film().crop_height;
+    r.method = settings.render.integrator.to_string();
+    double mean = 0, variance = 0;
+    for (int i = 0; i < 2; ++i) {
+        RenderSettings half = settings.render;
+        half.seed = kSeed + uint64_t(i);
+        if (half.spp) half.spp = (*half.spp + 1) / 2;
+        if (half.seconds) half.seconds = *half.seconds / 2;
+        Renderer renderer(scene, half);
+        if (renderer.run(progress, interrupted) == StopReason::Interrupted) return {};
+        (i == 0 ? r.first : r.second) = renderer.film().image();
+        r.seconds += renderer.seconds();
+        r.spp += renderer.film().passes();
+        const Film::MeanEstimate m = renderer.film().mean_luminance();
+        mean += m.mean / 2;
+        variance += m.standard_error * m.standard_error / 4;
+    }
+    r.pixels = mean_of(r.first, r.second);
+    if (mean > 0) r.mean_relative_error = std::sqrt(variance) / mean;
+    write_reference(r);
+    return r;
+}
+
+uint64_t scene_fingerprint(const SceneDescription& description) {
+    // The description rounds transforms for its readers; the file itself does not.
+    uint64_t hash = hash_file(hash_bytes(0, dump(description)), description.file);
+    for (const SceneObject& object : description.objects)
+        for (const Param& p : object.params) {
+            const std::string* name = std::get_if<std::string>(&p.value);
+            if (!name || name->empty()) continue;
+            for (const std::string& folder : description.search_paths) {
+                const fs::path path = fs::path(folder) / *name;
+                std::error_code ignored;
+                if (!fs::is_regular_file(path, ignored)) continue;
+                hash = hash_file(hash, path);
+                break;
+            }
+        }
+    return hash;
+}
+
+}  // namespace etendue

@@ -1,0 +1,356 @@
+#include "compare/report.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <thread>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "compare/embedded_image.h"
+#include "compare/plot.h"
+#include "compare/report_page.h"
+#include "image/atomic_file.h"
+#include "image/image_io.h"
+#include "image/tonemap.h"
+
+namespace etendue {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// ------------------------------------------------------------------------------------------------------- figures
+
+Json to_json(const Interval& i) {
+    return {{"value", i.value}, {"low_95", i.low}, {"high_95", i.high}};
+}
+Json to_json(const PowerLaw& p) {
+    return {{"slope", p.slope}, {"factor", p.factor}, {"points", p.points}};
+}
+Json to_json(const Efficiency& e);
+Json to_json(const ImageErrors& e) {
+    return {{"mse", e.mse},
+            {"rmse", e.rmse},
+            {"rel_mse", e.rel_mse},
+            {"rel_mse_trimmed", e.rel_mse_trimmed},
+            {"l1", e.l1},
+            {"mape", e.mape},
+            {"smape", e.smape},
+            {"spike", e.spike},
+            {"mean_ratio", e.mean_ratio},
+            {"not_finite", e.not_finite}};
+}
+template <class T>
+Json to_json(const std::optional<T>& v) {
+    return v ? to_json(*v) : Json();
+}
+Json to_json(const Efficiency& e) {
+    return {{"value", e.value}, {"interval", to_json(e.interval)}};
+}
+
+Json to_json(const Run& r) {
+    Json checkpoints = Json::array();
+    for (const Checkpoint& c : r.checkpoints)
+        checkpoints.push_back(
+            {{"spp", c.spp}, {"seconds", c.seconds}, {"errors", to_json(c.errors)}});
+    return {{"seed", r.seed},
+            {"spp", r.spp},
+            {"seconds", r.seconds},
+            {"rays", r.stats.rays()},
+            {"walk_rays", r.stats.walk_rays},
+            {"shadow_rays", r.stats.shadow_rays},
+            {"eye_paths", r.stats.eye_paths},
+            {"light_paths", r.stats.light_paths},
+            {"vertices", r.stats.vertices},
+            {"rejected_contributions", r.rejected},
+            {"mean_luminance", r.mean.mean},
+            {"mean_luminance_standard_error", r.mean.standard_error},
+            {"errors", to_json(r.errors())},
+            {"errors_with_reference_noise", to_json(r.uncorrected)},
+            {"checkpoints", checkpoints}};
+}
+
+Json to_json(const MethodSummary& s) {
+    return {{"spp", s.spp},
+            {"seconds", s.seconds},
+            {"rays", s.rays},
+            {"rmse", s.rmse},
+            {"rel_mse", s.rel_mse},
+            {"rel_mse_interval", to_json(s.rel_mse_interval)},
+            {"rel_mse_trimmed", s.rel_mse_trimmed},
+            {"mape", s.mape},
+            {"spike", s.spike},
+            {"mean_ratio", to_json(s.mean_ratio)},
+            {"rmse_slope", to_json(s.rmse_slope)},
+            {"rel_mse_slope", to_json(s.rel_mse_slope)},
+            {"rel_mse_slope_interval", to_json(s.rel_mse_slope_interval)},
+            {"efficiency", to_json(s.efficiency)},
+            {"reference_share", s.reference_share ? Json(*s.reference_share) : Json()}};
+}
+
+Json to_json(const Method& m, const MethodSummary& summary) {
+    Json runs = Json::array();
+    for (const Run& r : m.runs) runs.push_back(to_json(r));
+    return {{"name", m.name()},
+            {"integrator", m.spec.integrator.to_string()},
+            {"estimator", to_string(m.estimator)},
+            {"summary", to_json(summary)},
+            {"flip", m.flip},
+            {"peak_bytes", m.peak_bytes},
+            {"technique_spp", m.technique_spp},
+            {"runs", runs}};
+}
+
+Json to_json(const Comparison& c) {
+    const Reference& r = c.reference;
+    Json methods = Json::array();
+    const std::vector<MethodSummary> summaries = summarize(c);
+    for (size_t i = 0; i < c.methods.size(); ++i)
+        methods.push_back(to_json(c.methods[i], summaries[i]));
+    return {{"file", c.scene_file},
+            {"width", c.film.crop_width},
+            {"height", c.film.crop_height},
+            {"crop", {c.film.crop_x, c.film.crop_y, c.film.crop_width, c.film.crop_height}},
+            {"interrupted", c.interrupted},
+            {"scene_bytes", c.scene_bytes},
+            {"reference",
+             {{"file", r.file},
+              {"method", r.method},
+              {"spp", r.spp},
+              {"seconds", r.seconds},
+              {"reused", r.reused},
+              {"variance_known", r.has_variance()},
+              {"mse", c.reference_mse},
+              {"rel_mse", c.reference_rel_mse},
+              {"mean_relative_error", r.mean_relative_error}}},
+            {"methods", methods}};
+}
+
+Json to_json(const CompareSettings& s) {
+    return {{"seconds", s.limits.seconds ? Json(*s.limits.seconds) : Json()},
+            {"spp", s.limits.spp ? Json(*s.limits.spp) : Json()},
+            {"runs", s.runs},
+            {"seed", s.seed},
+            {"sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"},
+            {"threads", s.threads > 0 ? s.threads : int(std::thread::hardware_concurrency())},
+            {"technique_depth", s.technique_depth}};
+}
+
+std::string processor() {
+    std::ifstream info("/proc/cpuinfo");
+    for (std::string line; std::getline(info, line);)
+        if (line.starts_with("model name"))
+            if (const size_t colon = line.find(": "); colon != std::string::npos)
+                return line.substr(colon + 2);
+    return "unknown";
+}
+
+std::string dumped(const Json& json, int indent) {
+    return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+// ------------------------------------------------------------------------------------------------------- pictures
+
+/// Stops that bring the 95th percentile of the reference's luminance to 0.8, in steps of a quarter.
+float auto_exposure(const std::vector<Rgb>& pixels) {
+    std::vector<float> values;
+    for (Rgb c : pixels)
+        if (is_finite(c)) values.push_back(luminance(c));
+    if (values.empty()) return 0;
+    const auto high = values.begin() + std::ptrdiff_t(0.95 * double(values.size() - 1));
+    std::nth_element(values.begin(), high, values.end());
+    return *high > 0 ? std::round(4 * std::log2(0.8f / *high)) / 4 : 0;
+}
+
+std::vector<Rgb> false_colours(const std::vector<float>& values) {
+    std::vector<Rgb> out;
+    for (float v : values) out.push_back(magma(v));
+    return out;
+}
+
+/// Empty for connections.
+const char* pair_name(Strategy strategy) {
+    return strategy == Strategy::Merge ? "merge" : strategy == Strategy::Gather ? "gather" : "";
+}
+
+struct CurveKind {
+    const char* file;
+    const char* label;
+    double (*error)(const ImageErrors&);
+    bool has_law;
+};
+constexpr CurveKind kCurves[] = {
+    {"rmse", "RMSE", [](const ImageErrors& e) { return e.rmse; }, true},
+    {"rel_mse", "relMSE", [](const ImageErrors& e) { return e.rel_mse; }, true},
+    {"rel_mse_trimmed", "relMSE, trimmed", [](const ImageErrors& e) { return e.rel_mse_trimmed; },
+     false},
+    {"mape", "MAPE", [](const ImageErrors& e) { return e.mape; }, false},
+};
+
+/// Of the first run, with the slope over all of them.
+LogLogPlot convergence(const Comparison& c, const std::vector<MethodSummary>& summaries,
+                       const CurveKind& kind, const std::string& title) {
+    LogLogPlot plot{title, "rendering time (s)", kind.label, {}};
+    for (size_t i = 0; i < c.methods.size(); ++i) {
+        PlotCurve& curve = plot.curves.emplace_back();
+        curve.label = c.methods[i].name();
+        for (const Checkpoint& p : c.methods[i].runs.front().checkpoints)
+            curve.points.push_back({p.seconds, kind.error(p.errors)});
+        if (kind.has_law)
+            curve.law = &kind == &kCurves[0] ? summaries[i].rmse_slope : summaries[i].rel_mse_slope;
+    }
+    return plot;
+}
+
+/// Writes the pictures of one scene to its folder, and what of them the page shows to its JSON.
+class SceneFigures {
+public:
+    SceneFigures(const Comparison& comparison, const std::string& folder, const std::string& name)
+        : c_(comparison), folder_(folder),
+          name_(name), mapping_{ToneOperator::Srgb, auto_exposure(comparison.reference.pixels), 0} {
+    }
+
+    Json write() const {
+        Json page{{"name", name_}, {"exposure", mapping_.exposure}};
+        write_picture("reference", c_.reference.pixels);
+        page["reference"] =
+            radiance_data_uri(c_.reference.width, c_.reference.height, c_.reference.pixels);
+        page["methods"] = Json::array();
+        for (const Method& m : c_.methods) page["methods"].push_back(write_method(m));
+        page["plots"] = write_plots();
+        return page;
+    }
+
+private:
+    std::string file(const std::string& name) const {
+        return (fs::path(folder_) / name_ / name).string();
+    }
+    void write_picture(const std::string& stem, const std::vector<Rgb>& pixels) const {
+        const auto [w, h] = std::pair{c_.reference.width, c_.reference.height};
+        write_image(file(stem + ".exr"), rgb_image(w, h, pixels));
+        write_image(file(stem + ".png"), rgb_image(w, h, tone_map(pixels, mapping_)));
+    }
+    void write_map(const std::string& stem, const std::vector<float>& values) const {
+        write_image(file(stem + ".png"),
+                    rgb_image(c_.reference.width, c_.reference.height, false_colours(values)));
+    }
+
+    Json write_method(const Method& m) const {
+        const auto [w, h] = std::pair{c_.reference.width, c_.reference.height};
+        const std::string stem = file_stem(m.name());
+        write_picture(stem, m.image);
+        write_map(stem + "-flip", m.flip_map);
+        write_map(stem + "-relse", relative_squared_errors(m.image, c_.reference.pixels));
+        Json page{{"name", m.name()},
+                  {"image", radiance_data_uri(w, h, m.image)},
+                  {"flip", grey_data_uri(w, h, m.flip_map)},
+                  {"techniques", Json::array()}};
+        for (const auto& t : m.techniques) {
+            const auto& [strategy, light, eye] = t.technique;
+            const int edges = t.technique.vertices() - 1;
+            write_image(file(fmt::format("{}-techniques/length{:02}_s{:02}_t{:02}.png", stem, edges,
+                                         light, eye)),
+                        rgb_image(w, h, tone_map(t.weighted, mapping_)));
+            constexpr int kThumbnail = 120;
+            const RgbImage weighted = reduced(w, h, t.weighted, kThumbnail),
+                           unweighted = reduced(w, h, t.unweighted, kThumbnail);
+            page["techniques"].push_back(
+                {{"kind", pair_name(strategy)},
+                 {"edges", edges},
+                 {"s", light},
+                 {"t", eye},
+                 {"width", weighted.width},
+                 {"height", weighted.height},
+                 {"weighted", radiance_data_uri(weighted.width, weighted.height, weighted.pixels)},
+                 {"unweighted",
+                  radiance_data_uri(weighted.width, weighted.height, unweighted.pixels)}});
+        }
+        return page;
+    }
+
+    Json write_plots() const {
+        Json page = Json::array();
+        const std::vector<MethodSummary> summaries = summarize(c_);
+        for (const CurveKind& kind : kCurves) {
+            const std::string svg = convergence(c_, summaries, kind, name_).svg();
+            const std::string name = fmt::format("convergence-{}.svg", kind.file);
+            write_file_atomically(file(name), svg);
+            page.push_back({{"label", kind.label},
+                            {"file", fmt::format("{}-{}", name_, name)},
+                            {"svg", "data:image/svg+xml;base64," + base64(svg)}});
+        }
+        return page;
+    }
+
+    const Comparison& c_;
+    const std::string &folder_, &name_;
+    ToneMapping mapping_;
+};
+
+/// The file's name, or its folder's where it is but "scene..."; numbered where several scenes share it.
+std::string scene_name(const std::string& file, std::set<std::string>& taken) {
+    const fs::path path = fs::absolute(file);
+    std::string stem = path.stem().string();
+    if (stem.starts_with("scene") && path.has_parent_path())
+        stem = path.parent_path().filename().string();
+    stem = file_stem(stem);
+    std::string name = stem;
+    for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}-{}", stem, i);
+    return name;
+}
+
+// ------------------------------------------------------------------------------------------------------- page
+
+void replace(std::string& page, std::string_view mark, std::string_view text) {
+    page.replace(page.find(mark), mark.size(), text);
+}
+
+/// JSON that may stand in a <script>.
+std::string script_json(const Json& json) {
+    std::string text = dumped(json, -1);
+    for (size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3)
+        text.insert(at + 1, "\\");
+    return text;
+}
+
+}  // namespace
+
+std::string file_stem(const std::string& text) {
+    std::string out = text;
+    for (char& c : out)
+        if (!std::isalnum(static_cast<unsigned char>(c)) &&
+            std::string_view("._=-").find(c) == std::string_view::npos)
+            c = '_';
+    return out;
+}
+
+void write_report(const std::vector<Comparison>& comparisons, const ReportOptions& options) {
+    Json report{{"program", "etendue " + options.version},
+                {"processor", processor()},
+                {"settings", comparisons.empty() ? Json() : to_json(comparisons.front().settings)},
+                {"scenes", Json::array()}};
+    Json pictures = Json::array();
+    std::set<std::string> names;
+    for (const Comparison& c : comparisons) {
+        const std::string name = scene_name(c.scene_file, names);
+        Json scene = to_json(c);
+        scene["name"] = name;
+        report["scenes"].push_back(std::move(scene));
+        pictures.push_back(SceneFigures(c, options.folder, name).write());
+    }
+    std::string page(kReportHtml);
+    replace(page, "/*{{style}}*/", kReportCss);
+    replace(page, "/*{{program}}*/", kReportJs);
+    replace(page, "{{report}}", script_json(report));
+    replace(page, "{{pictures}}", script_json(pictures));
+    write_file_atomically((fs::path(options.folder) / "report.json").string(),
+                          dumped(report, 2) + "\n");
+    write_file_atomically((fs::path(options.folder) / "report.html").string(), page);
+}
+
+}  // namespace etendue

@@ -1,0 +1,115 @@
+#include "compare/error_statistics.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "math/statistics.h"
+#include "random.h"
+
+namespace etendue {
+namespace {
+
+using testing::Random;
+
+/// Box and Muller's.
+double normal(Random& random) {
+    const double u = 1 - random.next_1d(), v = random.next_1d();
+    return std::sqrt(-2 * std::log(u)) * std::cos(2 * M_PI * v);
+}
+
+TEST(StudentQuantile, AgreesWithTables) {
+    // [Abramowitz & Stegun 1964, table 26.10]
+    for (const auto& [dof, t] : {std::pair{1.0, 12.706},
+                                 {2.0, 4.303},
+                                 {3.0, 3.182},
+                                 {4.0, 2.776},
+                                 {9.0, 2.262},
+                                 {30.0, 2.042},
+                                 {1e9, 1.960}})
+        EXPECT_NEAR(t_quantile_95(dof) / t, 1, 0.01) << dof;
+}
+
+TEST(MeanInterval, HoldsTheMeanInNineteenOfTwentyCases) {
+    Random random(1);
+    constexpr int kTrials = 20000;
+    for (const int n : {2, 4, 16}) {
+        int inside = 0;
+        for (int i = 0; i < kTrials; ++i) {
+            std::vector<double> samples;
+            for (int k = 0; k < n; ++k) samples.push_back(5 + 2 * normal(random));
+            const Interval interval = *mean_interval(samples);
+            inside += interval.low <= 5 && 5 <= interval.high;
+        }
+        // Four standard deviations, and 0.001 for the quantile: false alarms below 1e-4.
+        EXPECT_NEAR(double(inside) / kTrials, 0.95, 4 * std::sqrt(0.95 * 0.05 / kTrials) + 0.001)
+            << n << " samples";
+    }
+}
+
+TEST(MeanInterval, NeedsTwoSamples) {
+    EXPECT_FALSE(mean_interval({}));
+    EXPECT_FALSE(mean_interval(std::vector<double>{1}));
+    const Interval same = *mean_interval(std::vector<double>{3, 3});
+    EXPECT_EQ(same.low, 3);
+    EXPECT_EQ(same.high, 3);
+}
+
+TEST(PowerLaw, FindsTheExponent) {
+    std::vector<double> times, errors;
+    for (int i = 0; i < 12; ++i) {
+        times.push_back(0.1 * std::pow(1.5, i));
+        errors.push_back(7 * std::pow(times.back(), -0.5));
+    }
+    const PowerLaw law = *fit_power_law(times, errors);
+    EXPECT_NEAR(law.slope, -0.5, 1e-12);
+    EXPECT_NEAR(law.factor, 7, 1e-9);
+    EXPECT_EQ(law.points, 12);
+}
+
+TEST(PowerLaw, LeavesOutWhatALogarithmOrTheCallerLeavesOut) {
+    // Errors below the reference's noise may be negative; early times are another regime.
+    const std::vector<double> times = {0.01, 1, 2, 4, 8, 16}, errors = {1e9, 1, 0.5, -1, 0.125, 0};
+    const PowerLaw law = *fit_power_law(times, errors, 0.5);
+    EXPECT_EQ(law.points, 3);
+    EXPECT_NEAR(law.slope, -1, 1e-12);
+    EXPECT_FALSE(fit_power_law(times, errors, 1.5));
+    EXPECT_FALSE(fit_power_law(std::vector<double>{2, 2, 2}, std::vector<double>{1, 2, 3}));
+    EXPECT_FALSE(fit_power_law({}, {}));
+}
+
+TEST(Efficiency, IsTheRatioOfErrorTimesTime) {
+    const std::vector<double> base = {0.4}, method = {0.1};
+    const Efficiency e = *relative_efficiency({base, 10}, {method, 20});
+    EXPECT_NEAR(e.value, 2, 1e-12);
+    EXPECT_FALSE(e.interval);
+    EXPECT_FALSE(relative_efficiency({base, 10}, {std::vector<double>{-0.1}, 20}));
+}
+
+TEST(Efficiency, IntervalHoldsTheTruth) {
+    Random random(2);
+    constexpr int kTrials = 4000, kRuns = 8;
+    int inside = 0;
+    for (int i = 0; i < kTrials; ++i) {
+        std::vector<double> base, method;
+        for (int k = 0; k < kRuns; ++k) {
+            base.push_back(4 * (1 + 0.1 * normal(random)));
+            method.push_back(1 + 0.1 * normal(random));
+        }
+        const Interval e = *relative_efficiency({base, 1}, {method, 1})->interval;
+        inside += e.low <= 4 && 4 <= e.high;
+    }
+    // Student's t with the runs of one side is a little wide for two.
+    EXPECT_GE(double(inside) / kTrials, 0.94);
+    EXPECT_LE(double(inside) / kTrials, 0.985);
+}
+
+TEST(RatioInterval, AddsRelativeVariances) {
+    const Interval i = ratio_interval(2, 0.03, 0.04);
+    EXPECT_NEAR(i.high - i.value, kNormalQuantile95 * 2 * 0.05, 1e-12);
+    EXPECT_NEAR(i.value - i.low, kNormalQuantile95 * 2 * 0.05, 1e-12);
+}
+
+}  // namespace
+}  // namespace etendue
