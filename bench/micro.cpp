@@ -303,8 +303,8 @@ void add_path_space(const Report& report, const Options& options, const WalkInpu
     add(report, options, "mis weight of a connection", [&](size_t i) {
         const SubPath &y = in.y[i % WalkInputs::kPairs], &z = in.z[i * 7 % WalkInputs::kPairs];
         return power_heuristic(counts.connect,
-                               outward_sum<Side::Light>(y, 2, false, 0.4, 0.3, counts) +
-                                   outward_sum<Side::Eye>(z, 2, false, 0.2, 0.1, counts));
+                               outward_sum<Side::Light>(y, 2, false, {0.4, 0.3}, counts) +
+                                   outward_sum<Side::Eye>(z, 2, false, {0.2, 0.1}, counts));
     });
 }
 

@@ -80,17 +80,38 @@ Vec3 sample_visible_ggx(Vec3 w_std, Vec2 u) {
 
 }  // namespace
 
-float Microfacet::max_D_of_halfway(Vec3 wo, const DirectionCone& c) const {
-    constexpr float kSlack = 1e-3f;  // for acos
+namespace {
+
+constexpr float kAcosSlack = 1e-3f;
+
+}  // namespace
+
+HalfwayBound halfway_of_reflection(Vec3 wo, const DirectionCone& c) {
+    HalfwayBound bound;
+    if (wo.z < 0) return halfway_of_reflection(-wo, {-c.axis, c.angle});
     const Vec3 h = wo + c.axis;
     const float length_h = length(h);
-    float theta = 0;
-    if (length_h > 1e-3f) {
-        const float cos_d =
-            std::cos(std::acos(clamp(0.5f * length_h, 0.0f, 1.0f)) + 0.5f * c.angle + kSlack);
-        if (cos_d > 0)
-            theta = std::acos(clamp(h.z / length_h, -1.0f, 1.0f)) - c.angle / (2 * cos_d) - kSlack;
-    }
+    if (!(length_h > 1e-3f)) return bound;
+    const float cos_d =
+        std::cos(std::acos(clamp(0.5f * length_h, 0.0f, 1.0f)) + 0.5f * c.angle + kAcosSlack);
+    if (!(cos_d > 0)) return bound;
+    bound.theta = std::acos(clamp(h.z / length_h, -1.0f, 1.0f)) - c.angle / (2 * cos_d) - kAcosSlack;
+    bound.cos_d = cos_d;
+    return bound;
+}
+
+HalfwayBound halfway_of_refraction(Vec3 wo, const DirectionCone& c, float eta) {
+    HalfwayBound bound;
+    const Vec3 h = wo + c.axis * eta;
+    const float length_h = length(h), spread = 2 * eta * std::sin(0.5f * c.angle);
+    bound.length = std::fmax(std::fabs(eta - 1), length_h - spread);
+    if (spread < length_h)
+        bound.theta = std::acos(clamp(std::fabs(h.z) / length_h, 0.0f, 1.0f)) -
+                      std::asin(spread / length_h) - kAcosSlack;
+    return bound;
+}
+
+float Microfacet::max_D(float theta) const {
     if (theta >= 0.5f * kPi) return 0;
     const float cos2 = theta > 0 ? sqr(std::cos(theta)) : 1.0f, sin2 = 1 - cos2;
     const float max_alpha2 = sqr(std::fmax(alpha_x_, alpha_y_)), norm = kPi * alpha_x_ * alpha_y_;
@@ -101,6 +122,11 @@ float Microfacet::max_D_of_halfway(Vec3 wo, const DirectionCone& c) const {
     // exp(-tan²θ/α²)/cos⁴θ has its maximum at tan²θ = 2α² - 1.
     const float tan2 = std::fmax(sin2 / cos2, 2 * max_alpha2 - 1);
     return std::exp(-tan2 / max_alpha2) * sqr(1 + tan2) / norm;
+}
+
+float Microfacet::max_pdf_of_refraction(Vec3 wo, const DirectionCone& c, float eta) const {
+    const HalfwayBound h = halfway_of_refraction(wo, c, eta);
+    return max_D(h.theta) * sqr(eta / h.length) / sigma(wo);
 }
 
 Vec3 Microfacet::sample_visible(Vec3 w, Vec2 u) const {

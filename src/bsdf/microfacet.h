@@ -12,6 +12,17 @@
 
 namespace etendue {
 
+/// What is known of the halfway vectors of one direction and all those of a cone.
+struct HalfwayBound {
+    float theta = 0;   ///< They are at least this far from ±z.
+    float cos_d = 0;   ///< At least so much is the cosine between them and the directions they halve.
+    float length = 0;  ///< Of wo + η wi, at least.
+};
+/// m ∝ ±(wo + wi). As wi turns by dα, m turns by at most dα / (2 cos θ_d), θ_d = ∠(wo, m) = ∠(wo, wi)/2.
+HalfwayBound halfway_of_reflection(Vec3 wo, const DirectionCone& c);
+/// m ∝ ±(wo + η wi).
+HalfwayBound halfway_of_refraction(Vec3 wo, const DirectionCone& c, float eta);
+
 class Microfacet {
 public:
     enum class Kind : uint8_t { Beckmann, Ggx };
@@ -34,9 +45,15 @@ public:
         return density > 0 ? density / (norm * sqr(cos2)) : 0;
     }
 
-    /// Bound of D over the halfway vectors of `wo` and all directions of a cone. As wi turns by dα the halfway vector
-    /// turns by at most dα / (2 cos θ_d), θ_d = ∠(wo, m) = ∠(wo, wi)/2; D falls with θ_m.
-    float max_D_of_halfway(Vec3 wo, const DirectionCone& c) const;
+    /// Bound of D over all normals that are at least `theta` from z.
+    float max_D(float theta) const;
+    /// Bound of D_wo(m) dω_m/dω_i over a cone of reflected directions: D / (4 σ(wo)).
+    float max_pdf_of_reflection(Vec3 wo, const DirectionCone& c) const {
+        return 0.25f * max_D(halfway_of_reflection(wo, c).theta) / sigma(wo);
+    }
+    /// The same of refracted directions: D |wo·m| |wi·m| η² / (|wo + η wi|² σ(wo)), `eta` being η on their side over η on
+    /// wo's.
+    float max_pdf_of_refraction(Vec3 wo, const DirectionCone& c, float eta) const;
 
     /// Projected area σ(w), for `w` on either side.
     float sigma(Vec3 w) const {

@@ -192,6 +192,31 @@ BsdfEval PrincipledLobe::eval(Vec3 wo, Vec3 wi) const {
     return {};
 }
 
+float PrincipledLobe::max_pdf(Vec3 wo, const DirectionCone& c) const {
+    const bool is_above = wo.z > 0;
+    const Vec3 own{0, 0, is_above ? 1.0f : -1.0f};
+    const Microfacet main = main_distribution();
+    const Selection p = is_above ? selection() : Selection{0, 0, 1};
+    const float max_cos = c.max_cos(own);
+    float bound = 0;
+    if (max_cos > 0) {
+        bound = p.main * main.max_pdf_of_reflection(wo, c) + p.diffuse * max_cos * kInvPi;
+        if (p.clearcoat > 0) {
+            const HalfwayBound h = halfway_of_reflection(wo, c);
+            const Gtr1 coat{sqr(clearcoat_alpha(clearcoat_gloss))};
+            const float theta = clamp(h.theta, 0.0f, 0.5f * kPi);
+            bound += p.clearcoat * coat.D({std::sin(theta), 0, std::cos(theta)}) *
+                     std::cos(theta) / (4 * h.cos_d);
+        }
+    }
+    if (refraction_weight() > 0 && c.max_cos(-own) > 0) {
+        const float share = is_above ? refraction_weight() : 1.0f;
+        bound = std::fmax(bound, p.main * share *
+                                     main.max_pdf_of_refraction(wo, c, is_above ? eta : 1 / eta));
+    }
+    return bound;
+}
+
 std::optional<BsdfSample> PrincipledLobe::sample(Vec3 wo, float u_lobe, Vec2 u) const {
     const bool is_above = wo.z > 0;
     if (!is_above && !(wo.z < 0 && refraction_weight() > 0)) return {};

@@ -20,7 +20,7 @@ struct PrincipledLobe {
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const;
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const;
-    float max_pdf(Vec3 /*wo*/, const DirectionCone& /*c*/) const { return kInf; }
+    float max_pdf(Vec3 wo, const DirectionCone& c) const;
     Rgb albedo_estimate() const { return base_color; }
     float roughness() const;
     bool has_smooth() const { return true; }

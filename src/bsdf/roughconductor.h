@@ -15,7 +15,7 @@ struct RoughConductorLobe {
     BsdfEval eval(Vec3 wo, Vec3 wi) const;
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const;
     float max_pdf(Vec3 wo, const DirectionCone& c) const {
-        return 0.25f * distribution.max_D_of_halfway(wo, c) / distribution.sigma(wo);
+        return distribution.max_pdf_of_reflection(wo, c);
     }
     Rgb albedo_estimate() const { return reflectance * fresnel_conductor(1, eta, k); }
     float roughness() const { return distribution.min_alpha(); }

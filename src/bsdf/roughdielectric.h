@@ -15,7 +15,15 @@ struct RoughDielectricLobe {
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const;
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const;
-    float max_pdf(Vec3 /*wo*/, const DirectionCone& /*c*/) const { return kInf; }
+    float max_pdf(Vec3 wo, const DirectionCone& c) const {
+        const Vec3 own{0, 0, std::copysign(1.0f, wo.z)};
+        float bound = 0;
+        if (c.max_cos(own) > 0) bound = distribution.max_pdf_of_reflection(wo, c);
+        if (c.max_cos(-own) > 0)
+            bound = std::fmax(bound, distribution.max_pdf_of_refraction(
+                                         wo, c, wo.z > 0 ? eta : 1 / eta));
+        return bound;
+    }
     Rgb albedo_estimate() const {
         return lerp(fresnel_dielectric(1, eta).R, transmittance, reflectance);
     }

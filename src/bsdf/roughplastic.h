@@ -48,7 +48,7 @@ struct RoughPlasticLobe {
     float max_pdf(Vec3 wo, const DirectionCone& c) const {
         const float To = RoughTransmittance::lookup(transmittance, wo.z);
         const float q = coat_probability(1 - To, specular_share);
-        return q * 0.25f * distribution.max_D_of_halfway(wo, c) / distribution.sigma(wo) +
+        return q * distribution.max_pdf_of_reflection(wo, c) +
                (1 - q) * std::fmax(c.max_cos({0, 0, 1}), 0.0f) * kInvPi;
     }
     Rgb albedo_estimate() const {

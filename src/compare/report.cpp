@@ -251,19 +251,19 @@ private:
                   {"flip", grey_data_uri(w, h, m.flip_map)},
                   {"techniques", Json::array()}};
         for (const auto& t : m.techniques) {
-            const auto& [strategy, light, eye] = t.technique;
-            const int edges = t.technique.vertices() - 1;
+            const Technique& q = t.technique;
+            const int edges = q.vertices() - 1;
             write_image(file(fmt::format("{}-techniques/length{:02}_s{:02}_t{:02}.png", stem, edges,
-                                         light, eye)),
+                                         q.s, q.t)),
                         rgb_image(w, h, tone_map(t.weighted, mapping_)));
             constexpr int kThumbnail = 120;
             const RgbImage weighted = reduced(w, h, t.weighted, kThumbnail),
                            unweighted = reduced(w, h, t.unweighted, kThumbnail);
             page["techniques"].push_back(
-                {{"kind", pair_name(strategy)},
+                {{"kind", pair_name(q.strategy)},
                  {"edges", edges},
-                 {"s", light},
-                 {"t", eye},
+                 {"s", q.s},
+                 {"t", q.t},
                  {"width", weighted.width},
                  {"height", weighted.height},
                  {"weighted", radiance_data_uri(weighted.width, weighted.height, weighted.pixels)},

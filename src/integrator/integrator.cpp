@@ -107,6 +107,13 @@ bool IntegratorParams::flag(const char* name) const {
     return t == "true";
 }
 
+void IntegratorParams::refuse_choice(const char* name,
+                                     const std::vector<std::string>& known) const {
+    throw std::runtime_error(
+        fmt::format("integrator \"{}\": parameter \"{}\" must be one of {}, but is \"{}\"",
+                    integrator_, name, fmt::join(known, ", "), text(name)));
+}
+
 std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec) {
     std::vector<std::string> known;
     for (const IntegratorEntry& e : integrator_registry()) {

@@ -1,6 +1,7 @@
 #pragma once
 // Integrators: which sub-paths are traced, which techniques join them, how many samples each takes. Nothing else.
 
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
@@ -72,6 +73,13 @@ struct IntegratorSpec {
     std::string to_string() const;
 };
 
+/// One of the words that a parameter may be, and what it stands for.
+template <class T>
+struct Choice {
+    const char* name;
+    T value;
+};
+
 /// Typed access to a spec's parameters; the table's defaults where absent.
 class IntegratorParams {
 public:
@@ -79,9 +87,19 @@ public:
     int integer(const char* name) const;
     float number(const char* name) const;
     bool flag(const char* name) const;
+    template <class T, size_t N>
+    T choice(const char* name, const std::array<Choice<T>, N>& choices) const {
+        std::vector<std::string> known;
+        for (const Choice<T>& c : choices) {
+            if (text(name) == c.name) return c.value;
+            known.push_back(c.name);
+        }
+        refuse_choice(name, known);
+    }
     const std::string& integrator() const { return integrator_; }
 
 private:
+    [[noreturn]] void refuse_choice(const char* name, const std::vector<std::string>& known) const;
     const std::string& text(const char* name) const;
     std::map<std::string, std::string> values_;
     std::string integrator_;

@@ -7,6 +7,7 @@
 
 #include "integrator/upg.h"
 
+#include <array>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -17,13 +18,30 @@
 namespace etendue {
 namespace {
 
+/// Of neighbourhoods, with the bound `slab`: what trials aim at is flat then, and nearly all of it is met where the
+/// surface is smooth.
+constexpr float kFlatness = 0.05f;
+
+constexpr std::array<Choice<TrialBound>, 3> kBounds{
+    {{"box", TrialBound::Box}, {"cone", TrialBound::Cone}, {"slab", TrialBound::Slab}}};
+constexpr std::array<Choice<PairRule>, 4> kRules{{{"gloss", PairRule::Gloss},
+                                                  {"eye", PairRule::Eye},
+                                                  {"light", PairRule::Light},
+                                                  {"both", PairRule::Both}}};
+
 class UpgIntegrator final : public Integrator {
 public:
     UpgIntegrator(const IntegratorParams& p, bool connects)
-        : paths_(p), radius_(p.number("radius")), connects_(connects) {
+        : paths_(p), radius_(p.number("radius")), connects_(connects),
+          bound_(p.choice("bound", kBounds)),
+          flatness_(bound_ == TrialBound::Slab ? kFlatness : 1.0f), rule_(p.choice("drop", kRules)),
+          short_rate_(p.number("short_rate")), clamps_(p.flag("clamp")) {
         if (!(radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));
+        if (!(short_rate_ >= 0 && short_rate_ <= 1))
+            throw std::runtime_error(
+                fmt::format("{}: short_rate must lie in [0, 1]", p.integrator()));
     }
 
     void begin_pass(const PassContext& pass) override {
@@ -58,46 +76,86 @@ private:
         n.gather = N;
         n.disc = kPi * radius * radius;
         n.min_pair_edges = 3;
+        n.short_pair_rate = short_rate_;
+        n.pair_rule = rule_;
+        n.clamps_disc = clamps_;
         return n;
     }
 
+    /// `vertex` and z_{t-1} lie within the radius.
     void gather(const SampleContext& c, const TechniqueCounts& n, int t, uint32_t vertex,
                 Workspace& work) const {
+        const int s = photons_.paths().depth(vertex) + 1, edges = s + t - 2;
+        const float rate = n.gathers(edges) / n.gather;
+        if (edges > paths_.max_depth() || !(rate > 0)) return;
+        const uint32_t number = uint32_t(hash_combine(vertex, uint64_t(t)));
+        if (rate < 1) {
+            c.sampler.seek(Stream::Roulette, number + 1);
+            if (!(c.sampler.next_1d_unstructured() < rate)) return;
+        }
+        const Vertex& last = work.z[t - 2];
+        const uint8_t before = photons_.paths().gloss_before(vertex),
+                      after = gloss(last, last.is_delta);
+        for (const bool eye : {true, false})
+            if (drops(n.pair_rule, eye, before, after))
+                join(c, n, {Strategy::Gather, s, t, eye}, vertex, number + eye, rate, work);
+    }
+
+    void join(const SampleContext& c, const TechniqueCounts& n, const Technique& q, uint32_t vertex,
+              uint32_t number, float rate, Workspace& work) const {
         const SubPath& z = work.z;
         SubPath& y = work.pair;
-        const int s = photons_.paths().restore_up_to(c.scene, vertex, 2, work.is_observed, y);
-        if (s + t - 2 > paths_.max_depth()) return;
-        const auto drops_eye = drops_eye_vertex_of_pair(y, s, z, t);
-        if (!drops_eye) return;
+        const LightPaths& paths = photons_.paths();
+        const auto near = [&](const Vertex& kept) {
+            return Neighbourhood{kept.p, kept.ng, photons_.radius(), flatness_ * photons_.radius()};
+        };
+        const bool eye = q.drops_eye;
+        if (!eye && !near(z[q.t - 1]).contains(paths.vertices()[vertex].p)) return;
+        paths.restore_first(c.scene, vertex, eye ? q.s : q.s - 1, work.is_observed, y);
+        if (eye && !near(y[q.s - 1]).contains(z[q.t - 1].p)) return;
         ++work.stats.pairs;
-        const auto j = join_gather(c.scene, y, s, z, t, n, *drops_eye);
+        const auto j = join_gather(c.scene, y, q.s, z, q.t, eye, n);
         if (!j) return;
-        const uint32_t number = uint32_t(hash_combine(vertex, uint64_t(t)));
-        const float scale = std::fabs(z.film_weight) * c.splat_scale;
+        const float scale = std::fabs(z.film_weight) * c.splat_scale / rate;
         const auto value = paths_.test(c, *j, scale / j->found, number, work);
         if (!value) return;
         ++work.stats.visible_pairs;
         c.sampler.seek(Stream::Auxiliary, number);
-        const PairEvent event{.from = *drops_eye ? z[t - 2] : y[s - 2],
-                              .mode =
-                                  *drops_eye ? TransportMode::Radiance : TransportMode::Importance,
+        const PairEvent event{.from = eye ? z[q.t - 2] : y[q.s - 2],
+                              .mode = eye ? TransportMode::Radiance : TransportMode::Importance,
                               .u_emission = y.u_emission,
-                              .center = *drops_eye ? y[s - 1].p : z[t - 1].p,
-                              .radius = photons_.radius()};
+                              .near = near(eye ? y[q.s - 1] : z[q.t - 1]),
+                              .bound = bound_};
         const double r =
             reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
-        c.sink.add(*j, *value * float(r * c.splat_scale));
+        c.sink.add(*j, *value * (float(r) * c.splat_scale / rate));
     }
 
     Bidirectional paths_;
     float radius_;
     bool connects_;
+    TrialBound bound_;
+    float flatness_;  ///< Half the height of a neighbourhood over its radius.
+    PairRule rule_;
+    float short_rate_;
+    bool clamps_;
     Photons photons_;
 };
 
 std::vector<ParamInfo> params() {
     std::vector<ParamInfo> params = Bidirectional::params();
     params.push_back(radius_param());
+    params.push_back({"bound", ParamKind::String, "slab",
+                      "Directions that Bernoulli trials propose: slab (partners lie near the "
+                      "tangent plane), cone (in a ball), or box (in a ball; boxes of random numbers "
+                      "at diffuse vertices)."});
+    params.push_back({"drop", ParamKind::String, "gloss",
+                      "Which vertex of a pair is dropped: gloss (that sampled from the less glossy "
+                      "vertex), eye, light, or both in turn."});
+    params.push_back({"short_rate", ParamKind::Float, "1",
+                      "Share of the pairs that are used for paths of three edges."});
+    params.push_back({"clamp", ParamKind::Bool, "true",
+                      "Whether weights take the probability of a pair for at most 1."});
     return params;
 }
 

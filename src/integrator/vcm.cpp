@@ -36,9 +36,9 @@ public:
         const auto merge = [&](int t) {
             if (!merges_) return;
             photons_.for_each_near(work.z[t - 1].p, [&](uint32_t vertex) {
-                const int s =
-                    photons_.paths().restore_up_to(c.scene, vertex, 1, work.is_observed, work.pair);
+                const int s = photons_.paths().depth(vertex) + 1;
                 if (s + t - 2 > paths_.max_depth()) return;
+                photons_.paths().restore_first(c.scene, vertex, s, work.is_observed, work.pair);
                 if (const auto j = join_merge(work.pair, s, work.z, t, n))
                     c.sink.add(*j, j->contribution * c.splat_scale);
             });

@@ -39,8 +39,8 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
         const double rev_prev =
             v.is_infinite ? to_area(e.pdf_d, v, z[last - 1]) : e.pdf_d * v.to_predecessor;
         double inner = bracket<Side::Eye>(z, last - 1, z[last - 1].is_delta, rev_prev,
-                                          emitter_gloss(emitter.is_area()), last, counts) +
-                       v.weight_sum;
+                                          gloss_of_emitter(emitter.is_area()), last, counts) +
+                       stored_sum<Side::Eye>(z, last, last, counts);
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
         // Two ends at infinity cannot be connected.
         if (last == 1 && !(v.is_infinite && z[0].is_infinite)) inner += sqr(double(counts.splat));
@@ -82,7 +82,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
         others += sqr(p_L / p_NE) *
                   outward_sum<Side::Eye>(z, last, false,
-                                         {rev_last, rev_prev, emitter_gloss(emitter.is_area()), t},
+                                         {rev_last, rev_prev, gloss_of_emitter(emitter.is_area()), t},
                                          counts);
     }
     return Join{.technique = {Strategy::NextEvent, 1, t},
@@ -140,16 +140,15 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     edge.rev_a = double(fb.pdf) * (a.has_cosine ? abs_dot(a.ng, edge.w) : 1.0f) * inv_dist2;
     edge.rev_b = double(fa.pdf) * abs_dot(b.ng, edge.w) * inv_dist2;
     if (a.is_infinite) edge.rev_a = fb.pdf;
-    const bool gathers = counts.gather > 0;
     edge.total =
         sqr(count) +
         outward_sum<Side::Light>(y, s - 1, false,
                                  {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f,
-                                  gathers ? gloss(b, false) : 0, s + t - 1},
+                                  gloss(b, false), s + t - 1},
                                  counts) +
         outward_sum<Side::Eye>(
             z, t - 1, false,
-            {edge.rev_b, fb.pdf_rev * b.to_predecessor, gathers ? gloss(a, false) : 0, s + t - 1},
+            {edge.rev_b, fb.pdf_rev * b.to_predecessor, gloss(a, false), s + t - 1},
             counts);
     return edge;
 }
@@ -172,25 +171,18 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
                 .ng_b = b.ng};
 }
 
-std::optional<bool> drops_eye_vertex_of_pair(const SubPath& y, int s, const SubPath& z, int t) {
-    const float before = gloss(y[s - 2], y[s - 2].is_delta),
-                after = gloss(z[t - 2], z[t - 2].is_delta);
-    if (before >= kDeltaGloss && after >= kDeltaGloss) return {};
-    return drops_eye_vertex(before, after);
-}
-
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
-                                int t, const TechniqueCounts& counts, bool drops_eye) {
-    if (s + t - 2 < counts.min_pair_edges) return {};
+                                int t, bool drops_eye, const TechniqueCounts& counts) {
+    const double count = counts.gathers(s + t - 2);
+    if (!(count > 0)) return {};
     const auto edge = connect(scene, y, drops_eye ? s : s - 1, z, drops_eye ? t - 1 : t, counts);
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
-    const double kept = drops_eye ? edge->rev_a : edge->rev_b;
-    const double found = std::fmin(1, counts.disc * kept);
-    return Join{.technique = {Strategy::Gather, s, t},
+    const double found = counts.found(drops_eye ? edge->rev_a : edge->rev_b);
+    return Join{.technique = {Strategy::Gather, s, t, drops_eye},
                 .emitter = y[0].emitter,
                 .contribution = edge->contribution,
-                .mis_weight = float(sqr(counts.gather * found) / edge->total),
+                .mis_weight = float(sqr(count * found) / edge->total),
                 .film = z.film,
                 .a = b.p,
                 .ng_a = b.ng,

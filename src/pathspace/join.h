@@ -42,12 +42,11 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
 /// M(s,t): y_{s-1} and z_{t-1} taken for one vertex [Georgiev et al. 2012; Hachisuka et al. 2012]. For one light path.
 std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
                                const TechniqueCounts& counts);
-/// Whether a gather of y_{s-1} and z_{t-1} drops z_{t-1} (else y_{s-1}); nothing where neither can be sampled again.
-std::optional<bool> drops_eye_vertex_of_pair(const SubPath& y, int s, const SubPath& z, int t);
 /// U(s,t): z_{t-1} (`drops_eye`) or y_{s-1} is dropped and the other joined to the dropped one's predecessor [Qin et al.
-/// 2015]. For one light path, and without the factor r = 1/p_c of the event that the pair was found.
+/// 2015]. For one light path, and without the factor r = 1/p_c of the event that the pair was found. The dropped vertex
+/// is not read.
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
-                                int t, const TechniqueCounts& counts, bool drops_eye);
+                                int t, bool drops_eye, const TechniqueCounts& counts);
 /// C(s,1): y_{s-1} is connected to a point on the lens.
 std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler,
                                const TechniqueCounts& counts);

@@ -32,10 +32,11 @@ void LightPaths::Chunk::add(const SubPath& y) {
                              .to_predecessor = v.to_predecessor,
                              .weight_sum = float(v.weight_sum),
                              .path = 0,
-                             .medium = v.medium,
                              .is_delta = v.is_delta,
                              .may_connect = v.may_connect,
-                             .survival = v.survival});
+                             .medium = v.medium,
+                             .survival_steps = v.survival.steps(),
+                             .gloss = v.gloss});
     }
     head.end = uint32_t(vertices_.size());
 }
@@ -45,7 +46,7 @@ void LightPaths::assemble(std::span<const Chunk> chunks) {
     vertices_.clear();
     size_t paths = 0, total = 0;
     for (const Chunk& c : chunks) paths += c.heads_.size(), total += c.vertices_.size();
-    if (total >= UINT32_MAX)
+    if (total >= UINT32_MAX || paths >= size_t(1) << 30)
         throw std::runtime_error("a pass has more light vertices than can be kept; limit "
                                  "max_depth, or render in crops");
     heads_.reserve(paths);
@@ -56,7 +57,7 @@ void LightPaths::assemble(std::span<const Chunk> chunks) {
         for (Chunk::Head head : c.heads_) {
             head.begin += offset, head.end += offset;
             for (uint32_t i = head.begin; i < head.end; ++i)
-                vertices_[i].path = uint32_t(heads_.size());
+                vertices_[i].path = uint32_t(heads_.size()) & 0x3fffffffu;
             heads_.push_back(head);
         }
     }
@@ -79,6 +80,7 @@ void LightPaths::restore_head(uint64_t index, SubPath& y) const {
     y0.uv = head.uv;
     y0.location.prim = head.prim;
     y0.may_connect = true;
+    y0.gloss = gloss_of_emitter(head.emitter->is_area());
     y0.pdf_fwd = head.pdf_fwd;
     y0.beta = head.beta;
 }
@@ -96,6 +98,7 @@ void LightPaths::restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, 
         v.kind = Vertex::Kind::Surface;
         v.p = stored.p;
         v.may_connect = stored.may_connect;
+        v.gloss = stored.gloss;
     }
     v.medium = stored.medium;
     v.beta = stored.beta;
@@ -103,7 +106,7 @@ void LightPaths::restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, 
     v.to_predecessor = stored.to_predecessor;
     v.weight_sum = double(stored.weight_sum);
     v.is_delta = stored.is_delta;
-    v.survival = stored.survival;
+    v.survival = Survival::from_steps(stored.survival_steps);
     if (i == 1) v.next_event_ratio = heads_[stored.path].next_event_ratio;
 }
 
@@ -118,20 +121,25 @@ void LightPaths::restore(const Scene& scene, uint64_t index, SubPath& y) const {
     }
 }
 
-int LightPaths::restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, bool whole,
-                              SubPath& y) const {
+uint8_t LightPaths::gloss_before(uint32_t vertex) const {
+    const Chunk::Head& head = heads_[vertices_[vertex].path];
+    if (vertex == head.begin) return gloss_of_emitter(head.emitter->is_area());
+    const LightVertex& previous = vertices_[vertex - 1];
+    return previous.is_delta ? kDeltaGloss : uint8_t(previous.gloss);
+}
+
+void LightPaths::restore_first(const Scene& scene, uint32_t vertex, int size, bool whole,
+                               SubPath& y) const {
     const uint64_t path = vertices_[vertex].path;
     const uint32_t begin = heads_[path].begin;
-    const int last = int(vertex - begin) + 1;
     y.clear();
     restore_head(path, y);
-    for (int i = 1; i <= last; ++i) {
+    for (int i = 1; i < size; ++i) {
         y.append();
         // A BSDF looks toward its predecessor, whose place must be known.
-        if (whole || i >= last - 2)
-            restore_vertex(scene, begin + uint32_t(i) - 1, i > last - bsdfs, y, i);
+        if (whole || i >= size - 3)
+            restore_vertex(scene, begin + uint32_t(i) - 1, i == size - 1, y, i);
     }
-    return last + 1;
 }
 
 }  // namespace etendue

@@ -14,10 +14,9 @@ struct LightVertex {
     Rgb beta;
     SurfaceLocation location;
     float pdf_fwd, to_predecessor, weight_sum;  ///< As in Vertex.
-    uint32_t path;
-    MediumId medium : 14;
-    bool is_delta : 1, may_connect : 1;
-    Survival survival;
+    uint32_t path : 30, is_delta : 1, may_connect : 1;
+    MediumId medium;
+    uint16_t survival_steps : 10, gloss : 6;
 };
 static_assert(sizeof(LightVertex) == 64);
 
@@ -54,9 +53,13 @@ public:
 
     /// The whole path `index` as it was walked.
     void restore(const Scene& scene, uint64_t index, SubPath& y) const;
-    /// The path up to `vertex`; of its vertices only what joins with the last one (`bsdfs` = 1), or the last two, read:
-    /// y_0 and the last three; all of them, without the earlier BSDFs, if `whole`. Returns s.
-    int restore_up_to(const Scene& scene, uint32_t vertex, int bsdfs, bool whole, SubPath& y) const;
+    /// i of the vertex y_i.
+    int depth(uint32_t vertex) const { return int(vertex - heads_[vertices_[vertex].path].begin) + 1; }
+    /// The gloss of y_{i-1}, or of its event, for the vertex y_i.
+    uint8_t gloss_before(uint32_t vertex) const;
+    /// The first `size` vertices of the path that `vertex` is on; of them only what joins with the last one read: y_0
+    /// and the last three; all of them, without the earlier BSDFs, if `whole`.
+    void restore_first(const Scene& scene, uint32_t vertex, int size, bool whole, SubPath& y) const;
 
 private:
     void restore_head(uint64_t index, SubPath& y) const;

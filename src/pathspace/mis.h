@@ -13,6 +13,7 @@
 // has the same weight as an explicit sum; a test holds them together.
 
 #include "math/vec.h"
+#include "pathspace/gloss.h"
 #include "pathspace/technique.h"
 #include "pathspace/vertex.h"
 
@@ -20,22 +21,10 @@ namespace etendue {
 
 enum class Side : uint8_t { Light, Eye };
 
-/// Order in which the end points of a gathered pair are kept [Qin et al. 2015, appendix B]: the one that was sampled
-/// from the glossier vertex. A delta event cannot be sampled again.
-inline constexpr float kDeltaGloss = 3, kLensGloss = 4;
-inline float emitter_gloss(bool is_area) {
-    return is_area ? 0.0f : 2.0f;
-}
 /// `is_delta`: whether the path's event at the vertex is a delta event.
-inline float gloss(const Vertex& v, bool is_delta) {
+inline uint8_t gloss(const Vertex& v, bool is_delta) {
     if (v.kind == Vertex::Kind::Sensor) return kLensGloss;
-    if (is_delta) return kDeltaGloss;
-    if (v.kind == Vertex::Kind::Emitter) return emitter_gloss(v.has_cosine);
-    return 1 - v.bsdf.roughness();
-}
-/// Which end point of the pair at x_m is dropped: z_{t-1} (else y_{s-1}), from the gloss of x_{m-1} and x_{m+1}.
-inline bool drops_eye_vertex(float gloss_before, float gloss_after) {
-    return gloss_after <= gloss_before;
+    return is_delta ? kDeltaGloss : v.gloss;
 }
 
 /// c_i of a sub-path: samples of the technique split between v[i-1] and v[i], times the ratio of its own density to the
@@ -54,39 +43,37 @@ inline double split_count(const SubPath& v, int i, bool delta, const TechniqueCo
     return v[i - 1].is_delta ? 0.0 : n.connect;
 }
 
-/// m_i of a sub-path, for the inner vertex v[i] of a path: n·p of a merge is N_L π d² p_L(x_m) p_E(x_m) times the
+/// m_i² of a sub-path, for the inner vertex v[i] of a path: n·p of a merge is N_L π d² p_L(x_m) p_E(x_m) times the
 /// densities of all others. A gather leaves the dropped vertex's density out and has the probability of its disc
-/// instead, at most 1 [Qin et al. 2015, eq. 24]. `rev`: density of v[i] from the other side; `inward`: gloss of the
-/// vertex beyond v[i].
+/// instead. `rev`: density of v[i] from the other side; `inward`: gloss of the vertex beyond v[i].
 template <Side side>
-inline double pair_count(const SubPath& v, int i, double rev, float inward,
-                         const TechniqueCounts& n) {
-    if (i == 0 || !v[i].may_connect) return 0;
+inline double squared_pair_count(const SubPath& v, int i, double rev, uint8_t inward, int edges,
+                                 const TechniqueCounts& n) {
+    if (i == 0 || !v[i].may_connect || edges < n.min_pair_edges) return 0;
     const double fwd = v[i].pdf_fwd;
-    if (n.merge > 0) return double(n.merge) * n.disc * fwd;
-    const float outward = gloss(v[i - 1], v[i - 1].is_delta);
-    if (outward >= kDeltaGloss && inward >= kDeltaGloss) return 0;
-    const bool drops_eye =
-        side == Side::Light ? drops_eye_vertex(outward, inward) : drops_eye_vertex(inward, outward);
-    const bool drops_own = drops_eye == (side == Side::Eye);
-    if (drops_own) return n.gather * std::fmin(1, n.disc * fwd);
-    return rev > 0 ? n.gather * std::fmin(1, n.disc * rev) * (fwd / rev) : 0.0;
+    if (n.merge > 0) return sqr(double(n.merge) * n.disc * fwd);
+    constexpr bool eye = side == Side::Eye;
+    const uint8_t outward = gloss(v[i - 1], v[i - 1].is_delta);
+    const uint8_t before = eye ? inward : outward, after = eye ? outward : inward;
+    double sum = 0;
+    if (drops(n.pair_rule, eye, before, after)) sum += sqr(n.found(fwd));
+    if (rev > 0 && drops(n.pair_rule, !eye, before, after)) sum += sqr(n.found(rev) * (fwd / rev));
+    return sum * sqr(double(n.gathers(edges)));
 }
 
 /// b_i of a sub-path. `delta`, `rev`, `inward` as above; `edges`: length of the path, or any larger number.
 template <Side side>
-inline double bracket(const SubPath& v, int i, bool delta, double rev, float inward, int edges,
+inline double bracket(const SubPath& v, int i, bool delta, double rev, uint8_t inward, int edges,
                       const TechniqueCounts& n) {
     double b = sqr(split_count<side>(v, i, delta, n));
-    if (n.disc > 0 && !delta && edges >= n.min_pair_edges)
-        b += sqr(pair_count<side>(v, i, rev, inward, n));
+    if (n.disc > 0 && !delta) b += squared_pair_count<side>(v, i, rev, inward, edges, n);
     return b;
 }
 
 /// What lies beyond the last vertex of one side of a join.
 struct Across {
     double rev_last, rev_prev;  ///< Densities of v[last], v[last-1] as sampled from there.
-    float gloss = 0;            ///< Of the next vertex; read only where there are gathers.
+    uint8_t gloss = 0;          ///< Of the next vertex; read only where there are gathers.
     int edges = 0;              ///< Length of the whole path.
 };
 
@@ -96,7 +83,7 @@ inline double outward_sum(const SubPath& v, int last, bool last_is_delta, const 
                           const TechniqueCounts& n) {
     double inner = bracket<side>(v, last, last_is_delta, a.rev_last, a.gloss, a.edges, n);
     if (last >= 1) {
-        const float inward = n.gather > 0 ? gloss(v[last], last_is_delta) : 0;
+        const uint8_t inward = gloss(v[last], last_is_delta);
         const double prev =
             bracket<side>(v, last - 1, v[last - 1].is_delta, a.rev_prev, inward, a.edges, n) +
             v[last].weight_sum;
@@ -105,15 +92,21 @@ inline double outward_sum(const SubPath& v, int last, bool last_is_delta, const 
     return sqr(a.rev_last / v[last].pdf_fwd) * inner;
 }
 
-/// The sum from level i on, stored at v[i+2] once v[i].pdf_rev is known; `below` is that of level i-1. Where pairs are
-/// possible (i ≥ 1) the path has three edges at least.
+/// The sum from level i on, stored at v[i+2] once v[i].pdf_rev is known; `below` is that of level i-1.
 template <Side side>
-inline double level_sum(const SubPath& v, int i, double below, const TechniqueCounts& n) {
-    constexpr int kManyEdges = 1 << 30;
+inline double level_sum(const SubPath& v, int i, double below, const TechniqueCounts& n,
+                        int edges = 1 << 30) {
     const double rev = v[i].pdf_rev;
-    const float inward = n.gather > 0 ? gloss(v[i + 1], v[i + 1].is_delta) : 0;
+    const uint8_t inward = gloss(v[i + 1], v[i + 1].is_delta);
     return sqr(rev / v[i].pdf_fwd) *
-           (bracket<side>(v, i, v[i].is_delta, rev, inward, kManyEdges, n) + below);
+           (bracket<side>(v, i, v[i].is_delta, rev, inward, edges, n) + below);
+}
+/// v[last].weight_sum of a path of so many edges. What was stored is that of longer paths than three edges, the one
+/// length with a rate of its own.
+template <Side side>
+inline double stored_sum(const SubPath& v, int last, int edges, const TechniqueCounts& n) {
+    if (edges != 3 || last != 3 || n.short_pair_rate == 1) return v[last].weight_sum;
+    return level_sum<side>(v, 1, v[2].weight_sum, n, edges);
 }
 
 /// Power heuristic of a technique with `count` samples against the sum of the others' (n·p)², relative to its p.

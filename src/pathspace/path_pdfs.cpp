@@ -35,19 +35,18 @@ double PathPdfs::density(const Technique& q) const {
 }
 
 double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) const {
-    const double n = counts.of(q.strategy);
+    const int k = vertices() - 1, m = q.s - 1;
+    const double n = q.strategy == Strategy::Gather ? counts.gathers(k) : counts.of(q.strategy);
     if (!(n > 0)) return 0;
     if (!is_pair(q.strategy)) return n * density(q);
-    const int k = vertices() - 1, m = q.s - 1;
     if (m < 1 || m >= k || k < counts.min_pair_edges || is_delta[m]) return 0;
     double others = 1;  // of all vertices but x_m
     for (int i = 0; i < m; ++i) others *= light[i];
     for (int i = m + 1; i <= k; ++i) others *= eye[i];
     if (q.strategy == Strategy::Merge) return n * others * light[m] * eye[m] * counts.disc;
-    if (gloss[m - 1] >= kDeltaGloss && gloss[m + 1] >= kDeltaGloss) return 0;
-    const bool drops_eye = drops_eye_vertex(gloss[m - 1], gloss[m + 1]);
-    const double kept = drops_eye ? light[m] : eye[m], dropped = drops_eye ? eye[m] : light[m];
-    return n * others * kept * std::fmin(1, counts.disc * dropped);
+    if (!drops(counts.pair_rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
+    const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
+    return n * others * kept * counts.found(dropped);
 }
 
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {
@@ -56,7 +55,10 @@ double mis_weight(const PathPdfs& pdfs, const Technique& technique, const Techni
     const int n = pdfs.vertices();
     for (int s = 0; s <= n; ++s) {
         add(connection_technique(s, n - s));
-        if (s > 0) add({Strategy::Merge, s, n + 1 - s}), add({Strategy::Gather, s, n + 1 - s});
+        if (s == 0) continue;
+        add({Strategy::Merge, s, n + 1 - s});
+        for (const bool drops_eye : {false, true})
+            add({Strategy::Gather, s, n + 1 - s, drops_eye});
     }
     return sqr(pdfs.sampled(technique, counts)) / sum;
 }
@@ -78,7 +80,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.eye.assign(size_t(n), 1);
     p.is_delta = delta;
     for (int i = 0; i < n; ++i)
-        p.gloss.push_back(i == 0 ? emitter_gloss(x[0]->emitter->is_area())
+        p.gloss.push_back(i == 0 ? gloss_of_emitter(x[0]->emitter->is_area())
                                  : gloss(*x[i], delta[size_t(i)]));
 
     // Emission: x_0 and the direction to x_1.

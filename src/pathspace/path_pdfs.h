@@ -14,7 +14,7 @@ namespace etendue {
 struct PathPdfs {
     std::vector<double> light, eye;
     std::vector<bool> is_delta;  ///< Events.
-    std::vector<float> gloss;    ///< See drops_eye_vertex().
+    std::vector<uint8_t> gloss;  ///< See gloss.h.
     double next_event = 0;       ///< p_NE(x_0) as chosen for x_1.
     bool can_hit_emitter = true;
     bool can_connect_ends = true;  ///< Not both are at infinity.

@@ -1,5 +1,6 @@
 #include "pathspace/reciprocal.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "math/warp.h"
@@ -7,90 +8,186 @@
 namespace etendue {
 namespace {
 
-/// Where the rays of trials start and go. What they must hit lies in the sphere.
+/// Where the rays of trials start and go. All that may be proposed has the probability mass() in the walk's density.
 class Trials {
 public:
-    Trials(const PairEvent& event, Sampler& sampler) : e_(event), sampler_(sampler) {
-        if (e_.from.is_infinite)
-            propose_from_disc();
-        else
-            choose_proposal();
+    Trials(const PairEvent& event, Sampler& sampler)
+        : e_(event), sampler_(sampler), radius_(event.near.radius),
+          half_height_(event.near.half_height) {
+        if (e_.from.is_infinite) {
+            propose_parallel();
+            return;
+        }
+        // Rays start beside `from`, so that what its own directions meet may lie as much beside the neighbourhood.
+        const float beside = length(offset_origin(e_.from.p, e_.from.ng, e_.from.ng) - e_.from.p);
+        radius_ += beside;
+        half_height_ += beside;
+        to_center_ = e_.near.p - e_.from.p;
+        dist2_ = length2(to_center_);
+        if (from_emitter()) {
+            if (e_.from.has_cosine) cosine_ = e_.from.ng;
+        } else {
+            cosine_ = e_.from.bsdf.diffuse_normal();
+        }
+        if (e_.bound == TrialBound::Box && cosine_) {
+            propose_box();
+            return;
+        }
+        propose_cone();
+        if (e_.bound == TrialBound::Slab) propose_plane();
     }
 
-    /// Probability of all that may be proposed, in the density that the walk has.
     double mass() const { return mass_; }
 
-    /// A proposed ray, up to the end of the sphere; nothing where the trial fails without one.
+    /// A proposed ray, up to the end of the neighbourhood; nothing where the trial fails without one.
     std::optional<Ray> next(RenderStats& stats) {
         Ray ray;
         switch (proposal_) {
         case Proposal::Walk:
             if (!walk(ray.d)) return {};
             break;
+        case Proposal::Box:
+            ray.d = in_box(sampler_.next_2d());
+            if (!(pdf(ray.d) > 0)) return {};
+            break;
         case Proposal::Ellipse:
             ray.d = in_ellipse(sampler_.next_2d());
             if (!(pdf(ray.d) > 0)) return {};
             break;
-        case Proposal::Cone: {
+        case Proposal::Cone:
             ray.d = in_cone(sampler_.next_2d());
-            const float p = pdf(ray.d);
-            if (p > max_pdf_ * (1 + 1e-4f)) ++stats.bounds_exceeded;
-            if (!(sampler_.next_1d() * max_pdf_ < p)) return {};
+            if (!passes(pdf(ray.d), stats)) return {};
+            break;
+        case Proposal::Plane: {
+            const Vec3 v = on_plane(sampler_.next_2d()) - e_.from.p;
+            const float dist2 = length2(v), inv_dist = 1 / std::sqrt(dist2);
+            ray.d = v * inv_dist;
+            if (!passes(pdf(ray.d) * height_ * inv_dist / dist2, stats)) return {};
             break;
         }
-        case Proposal::Disc:
+        case Proposal::Parallel: {
             ray.d = -e_.from.p;
-            ray.o = on_disc(sampler_.next_2d());
-            if (!is_near(ray.o, disc_.center + e_.from.p * disc_.radius, sqr(disc_.radius)))
-                return {};
+            const Vec3 q = on_plane(sampler_.next_2d());
+            const Vec3 start = disc_.center + e_.from.p * disc_.radius;
+            ray.o = q + e_.from.p * dot(start - q, e_.from.p);
+            if (!(length2(ray.o - start) < sqr(disc_.radius))) return {};
             break;
         }
-        if (proposal_ != Proposal::Disc)
+        }
+        if (proposal_ != Proposal::Parallel)
             ray.o = e_.from.has_cosine ? offset_origin(e_.from.p, e_.from.ng, ray.d) : e_.from.p;
-        return to_end_of_sphere(ray) ? std::optional(ray) : std::nullopt;
+        return e_.near.clip(ray) ? std::optional(ray) : std::nullopt;
     }
 
 private:
-    enum class Proposal { Walk, Ellipse, Cone, Disc };
+    enum class Proposal { Walk, Box, Ellipse, Cone, Plane, Parallel };
 
     bool from_emitter() const { return e_.from.kind == Vertex::Kind::Emitter; }
 
-    void propose_from_disc() {
-        proposal_ = Proposal::Disc;
-        disc_ = e_.from.emitter->disc();
-        frame_ = Frame::from_normal(e_.from.p);
-        mass_ = sqr(double(e_.radius) / disc_.radius);
+    /// Thinning: an event of density `pdf` is kept with probability pdf / max_pdf_.
+    bool passes(float pdf, RenderStats& stats) {
+        if (pdf > max_pdf_ * (1 + 1e-4f)) ++stats.bounds_exceeded;
+        return sampler_.next_1d() * max_pdf_ < pdf;
+    }
+    /// Bound of the density of directions within `angle` of the centre's.
+    float max_pdf(float angle) const {
+        if (cosine_) {
+            const float cos = dot(to_center_, *cosine_) / std::sqrt(dist2_);
+            return cos > std::cos(angle) ? kInvPi : kInvPi * cos_difference(cos, angle);
+        }
+        if (from_emitter()) return e_.from.emitter->max_pdf_d();
+        return e_.from.bsdf.max_pdf(e_.from.wo, {to_center_ / std::sqrt(dist2_), angle});
+    }
+    /// cos(acos c - a), at least 0.
+    static float cos_difference(float c, float a) {
+        return std::max(0.0f, c * std::cos(a) + safe_sqrt(1 - c * c) * std::sin(a));
     }
 
-    void choose_proposal() {
-        const Vec3 v = e_.center - e_.from.p;
-        const double sin2 = sqr(double(e_.radius)) / double(length2(v));
-        if (!(sin2 < 1)) return;  // all around: the walk's own directions
-        frame_ = Frame::from_normal(normalize(v));
-        const double sin = std::sqrt(sin2), cos = std::sqrt(1 - sin2);
-        one_minus_cos_ = float(sin2 / (1 + cos));
+    /// A light at infinity draws parallel rays uniformly from a disc.
+    void propose_parallel() {
+        proposal_ = Proposal::Parallel;
+        disc_ = e_.from.emitter->disc();
+        const double cos = abs_dot(e_.near.n, e_.from.p);
+        const double disc2 = sqr(double(disc_.radius));
+        // Through this part of the tangent plane passes all that meets the neighbourhood.
+        const double through =
+            double(radius_) + double(half_height_) * std::sqrt(std::max(0.0, 1 - cos * cos)) / cos;
+        const double slab = sqr(through) * cos, ball = sqr(double(radius_));
+        if (e_.bound == TrialBound::Slab && slab < ball) {
+            set_plane(e_.near.n, float(through));
+            mass_ = slab / disc2;
+        } else {
+            set_plane(e_.from.p, radius_);
+            mass_ = ball / disc2;
+        }
+    }
 
-        const auto normal = from_emitter()
-                                ? (e_.from.has_cosine ? std::optional(e_.from.ng) : std::nullopt)
-                                : e_.from.bsdf.diffuse_normal();
-        const double cos_axis = normal ? double(dot(frame_.n, *normal)) : 0;
-        if (normal && cos_axis > sin * 1.001) {
+    void propose_cone() {
+        const double sin2 = sqr(double(radius_)) / dist2_;
+        if (!(sin2 < 1)) return;  // all around: the walk's own directions
+        const double sin = std::sqrt(sin2), cos = std::sqrt(1 - sin2);
+        const Vec3 axis = to_center_ / std::sqrt(dist2_);
+        const double cos_axis = cosine_ ? double(dot(axis, *cosine_)) : 0;
+        if (cosine_ && cos_axis > sin * 1.001) {
             // The cosine density is uniform on the unit disc of (ω_x, ω_y), where the cone is an ellipse.
             proposal_ = Proposal::Ellipse;
             mass_ = sin2 * cos_axis;
             sin_ = float(sin), cos_ = float(cos), cos_axis_ = float(cos_axis);
-            const Vec3 radial = frame_.n - *normal * cos_axis_;
-            frame_ = Frame::from_normal_and_tangent(*normal, radial);
+            const Vec3 radial = axis - *cosine_ * cos_axis_;
+            frame_ = Frame::from_normal_and_tangent(*cosine_, radial);
             sin_axis_ = length(radial);
             return;
         }
-        const DirectionCone cone{frame_.n, float(std::asin(sin))};
-        max_pdf_ =
-            from_emitter() ? e_.from.emitter->max_pdf_d() : e_.from.bsdf.max_pdf(e_.from.wo, cone);
-        const double mass = 2 * double(kPi) * one_minus_cos_ * max_pdf_;
-        if (!(mass < 1)) return;
+        const double one_minus_cos = sin2 / (1 + cos);
+        const float bound = max_pdf(float(std::asin(sin)));
+        const double mass = 2 * double(kPi) * one_minus_cos * bound;
+        if (!(mass < mass_)) return;
         proposal_ = Proposal::Cone;
         mass_ = mass;
+        max_pdf_ = bound;
+        one_minus_cos_ = float(one_minus_cos);
+        frame_ = Frame::from_normal(axis);
+    }
+
+    /// Points P of the tangent plane, all of those through which the neighbourhood is seen. Their area density is
+    /// p_σ H / |P - x|³, with the height H of x over the plane.
+    void propose_plane() {
+        const float height = abs_dot(e_.near.n, to_center_), h = half_height_;
+        if (!(height > 2 * h)) return;
+        const float foot = safe_sqrt(dist2_ - sqr(height));
+        const float through = radius_ + (radius_ + foot) * h / (height - h);
+        const float sin = through / std::sqrt(dist2_);
+        if (!(sin < 1)) return;
+        const float nearest2 = sqr(height) + sqr(std::max(0.0f, foot - through));
+        const double bound =
+            double(max_pdf(std::asin(sin))) * height / (nearest2 * std::sqrt(nearest2));
+        const double area = double(kPi) * sqr(double(through));
+        if (!(area * bound < mass_)) return;
+        proposal_ = Proposal::Plane;
+        mass_ = area * bound;
+        max_pdf_ = float(bound);
+        height_ = height;
+        set_plane(e_.near.n, through);
+    }
+
+    /// With u_1 = sin² θ and u_2 = φ/2π about the normal.
+    void propose_box() {
+        const double sin2 = sqr(double(radius_)) / dist2_;
+        if (!(sin2 < 1)) return;
+        const float alpha = std::asin(float(std::sqrt(sin2)));
+        const Vec3 axis = to_center_ / std::sqrt(dist2_);
+        const float theta = std::acos(std::clamp(dot(axis, *cosine_), -1.0f, 1.0f));
+        const bool holds_pole = !(theta > alpha);
+        const float half_phi =
+            holds_pole ? kPi
+                       : std::asin(std::min(1.0f, std::sin(alpha) / std::sin(theta)));
+        box_lo_ = {holds_pole ? 0.0f : sqr(std::sin(std::min(theta - alpha, kPi / 2))), -half_phi};
+        box_size_ = {sqr(std::sin(std::min(theta + alpha, kPi / 2))) - box_lo_.x, 2 * half_phi};
+        const double mass = double(box_size_.x) * box_size_.y / (2 * double(kPi));
+        if (!(mass > 0)) return;
+        proposal_ = Proposal::Box;
+        mass_ = mass;
+        frame_ = Frame::from_normal_and_tangent(*cosine_, axis);
     }
 
     /// A direction as the walk draws it; false where the walk ends or leaves by a delta event.
@@ -111,6 +208,19 @@ private:
                               : e_.from.bsdf.eval(e_.from.wo, d, e_.mode).pdf;
     }
 
+    void set_plane(Vec3 n, float radius) {
+        frame_ = Frame::from_normal(n);
+        plane_radius_ = radius;
+    }
+    Vec3 on_plane(Vec2 u) const {
+        const Vec2 disk = sample_uniform_disk(u) * plane_radius_;
+        return e_.near.p + frame_.s * disk.x + frame_.t * disk.y;
+    }
+    Vec3 in_box(Vec2 u) const {
+        const float sin2 = box_lo_.x + u.x * box_size_.x, phi = box_lo_.y + u.y * box_size_.y;
+        const float sin = std::sqrt(sin2);
+        return frame_.to_world({sin * std::cos(phi), sin * std::sin(phi), safe_sqrt(1 - sin2)});
+    }
     Vec3 in_ellipse(Vec2 u) const {
         const Vec2 disk = sample_uniform_disk(u);
         const float x = cos_ * sin_axis_ + sin_ * cos_axis_ * disk.x, y = sin_ * disk.y;
@@ -120,34 +230,47 @@ private:
         const float h = one_minus_cos_ * u.x, sin = safe_sqrt(h * (2 - h)), phi = 2 * kPi * u.y;
         return frame_.to_world({sin * std::cos(phi), sin * std::sin(phi), 1 - h});
     }
-    Vec3 on_disc(Vec2 u) const {
-        const Vec3 plane = disc_.center + e_.from.p * disc_.radius;
-        const Vec3 foot = e_.center + e_.from.p * dot(plane - e_.center, e_.from.p);
-        const Vec2 disk = sample_uniform_disk(u) * e_.radius;
-        return foot + frame_.s * disk.x + frame_.t * disk.y;
-    }
-
-    /// Sets the ray's end where it leaves the sphere; false where it misses it.
-    bool to_end_of_sphere(Ray& ray) const {
-        const Vec3 v = e_.center - ray.o;
-        const float b = dot(v, ray.d), off2 = length2(v - ray.d * b);
-        const float half2 = sqr(e_.radius) - off2;
-        if (!(half2 > 0)) return false;
-        ray.tmax = (b + std::sqrt(half2)) * (1 + 1e-5f);
-        return ray.tmax > 0;
-    }
 
     const PairEvent& e_;
     Sampler& sampler_;
+    float radius_, half_height_;
+    Vec3 to_center_;
+    float dist2_ = 0;
+    std::optional<Vec3> cosine_;  ///< Normal of a density cos θ/π.
     Proposal proposal_ = Proposal::Walk;
     double mass_ = 1;
-    Frame frame_;  ///< About the cone's axis, the diffuse normal, or the light's direction.
+    Frame frame_;  ///< About the cone's axis, the cosine's normal, or the plane's normal.
+    float max_pdf_ = 0;
     float sin_ = 0, cos_ = 1, sin_axis_ = 0, cos_axis_ = 1;
-    float one_minus_cos_ = 0, max_pdf_ = 0;
+    float one_minus_cos_ = 0;
+    float plane_radius_ = 0, height_ = 0;
+    Vec2 box_lo_, box_size_;
     Emitter::Disc disc_;
 };
 
 }  // namespace
+
+bool Neighbourhood::clip(Ray& ray) const {
+    const Vec3 v = p - ray.o;
+    const float b = dot(v, ray.d), off2 = length2(v - ray.d * b);
+    const float half2 = sqr(radius) - off2;
+    if (!(half2 > 0)) return false;
+    const float half = std::sqrt(half2);
+    float begin = b - half, end = b + half;
+    const float to_plane = dot(v, n), slope = dot(ray.d, n);
+    if (slope != 0) {
+        const float mid = to_plane / slope, reach = half_height / std::fabs(slope);
+        begin = std::max(begin, mid - reach);
+        end = std::min(end, mid + reach);
+    } else if (std::fabs(to_plane) > half_height) {
+        return false;
+    }
+    // What rounding puts outside is left to contains().
+    const float slack = 1e-5f * std::fabs(end);
+    if (!(end > 0) || begin > end + slack) return false;
+    ray.tmax = end + slack;
+    return true;
+}
 
 double reciprocal_probability(const Scene& scene, const PairEvent& event, Sampler& sampler,
                               Vertex& scratch, RenderStats& stats) {
@@ -162,7 +285,7 @@ double reciprocal_probability(const Scene& scene, const PairEvent& event, Sample
         ++stats.trial_rays;
         const float u = scene.has_masks() ? sampler.next_1d() : 0.0f;
         if (!scene.intersect(*ray, u, hit) ||
-            !is_near(hit.geometry.p, event.center, sqr(event.radius)))
+            !event.near.contains(hit.geometry.p))
             continue;
         arena.reset();
         scratch.set_surface(*hit.shape, hit.location, hit.geometry, -ray->d, arena);

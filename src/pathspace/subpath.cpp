@@ -131,6 +131,7 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
     y0.uv = e.uv;
     y0.location.prim = e.prim;
     y0.may_connect = true;
+    y0.gloss = gloss_of_emitter(emitter.is_area());
     y0.pdf_fwd = emitter.selection_pmf * e.pdf_y0;
     y0.beta = Rgb(1 / y0.pdf_fwd);
 

@@ -24,6 +24,7 @@ constexpr bool is_pair(Strategy strategy) {
 struct Technique {
     Strategy strategy;
     int s, t;
+    bool drops_eye = false;  ///< Of a gather: z_{t-1} is dropped, else y_{s-1}.
 
     /// Of the full path.
     int vertices() const { return s + t - is_pair(strategy); }
@@ -40,6 +41,14 @@ constexpr Technique connection_technique(int s, int t) {
             s, t};
 }
 
+/// Which end point of a pair is dropped where either could be [Qin et al. 2015, appendix B and table 2].
+enum class PairRule : uint8_t {
+    Gloss,  ///< The one that was sampled from the less glossy vertex; z_{t-1} where they are alike.
+    Eye,    ///< z_{t-1}.
+    Light,  ///< y_{s-1}.
+    Both,   ///< Each of them, for a path of its own.
+};
+
 /// How many samples of each strategy an algorithm takes per eye sub-path, 0 for those it does not run. Eye densities are
 /// per pixel, so one eye path a pixel counts 1 and whatever reaches any pixel counts N_L, the number of light paths.
 struct TechniqueCounts {
@@ -47,9 +56,21 @@ struct TechniqueCounts {
     float merge = 0, gather = 0;  ///< Of each inner vertex of the path; one of the two is 0.
     float disc = 0;               ///< π d², the area in which a pair's partner is sought.
     int min_pair_edges = 2;       ///< Shorter paths are not made from pairs.
+    float short_pair_rate = 1;    ///< Share of the gathers that are made of paths of three edges.
+    PairRule pair_rule = PairRule::Gloss;
+    bool clamps_disc = true;      ///< Weights know that no probability exceeds 1 [ibid., eq. 24].
 
     bool uses_light_paths() const {
         return connect > 0 || splat > 0 || hit_lens > 0 || merge > 0 || gather > 0;
+    }
+    /// Samples of each pair of a path of so many edges.
+    float gathers(int edges) const {
+        return edges < min_pair_edges ? 0.0f : edges == 3 ? gather * short_pair_rate : gather;
+    }
+    /// Approximate probability that a pair is found whose dropped vertex has the area density `pdf` [ibid., eq. 24].
+    double found(double pdf) const {
+        const double p = double(disc) * pdf;
+        return clamps_disc && p > 1 ? 1 : p;
     }
     float of(Strategy strategy) const {
         switch (strategy) {

@@ -7,20 +7,27 @@
 
 #include "bsdf/material.h"
 #include "emitter/emitter.h"
+#include "pathspace/gloss.h"
 #include "scene/scene.h"
 
 namespace etendue {
 
-/// A probability in steps of 2^-16, so that what is kept of it compactly is what was decided by.
+/// A probability in steps of 2^-10, so that what is kept of it compactly is what was decided by.
 class Survival {
 public:
     Survival() = default;
     /// Rounded up.
-    explicit Survival(float q) : steps_(uint16_t(std::ceil(q * 0x1p16f) - 1)) {}
-    float value() const { return float(steps_ + 1) * 0x1p-16f; }
+    explicit Survival(float q) : steps_(uint16_t(std::ceil(q * 0x1p10f) - 1)) {}
+    float value() const { return float(steps_ + 1) * 0x1p-10f; }
+    uint16_t steps() const { return steps_; }
+    static Survival from_steps(unsigned steps) {
+        Survival q;
+        q.steps_ = uint16_t(steps);
+        return q;
+    }
 
 private:
-    uint16_t steps_ = 0xffff;
+    uint16_t steps_ = 0x3ff;
 };
 
 /// One end or scattering point with everything that connections and weights need.
@@ -49,6 +56,7 @@ struct Vertex {
     bool may_connect = false;   ///< Has a smooth lobe, or is an end point.
     MediumId medium = kVacuum;  ///< On the edge to the predecessor.
     Survival survival;          ///< Of the roulette before the walk left this vertex.
+    uint8_t gloss = 0;          ///< Of the emitter or the material, see gloss.h.
     const SceneShape* shape = nullptr;
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or on the surface.
     SurfaceLocation location;          ///< Of a surface; of an emitter's y_0 only `prim`.
@@ -68,6 +76,7 @@ struct Vertex {
         uv = g.uv;
         on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo}, arena, bsdf);
         may_connect = bsdf.has_smooth();
+        gloss = gloss_of_roughness(bsdf.roughness());
     }
 
     /// Medium on the edge that leaves along `w`.

@@ -144,7 +144,7 @@ inline bool nearly(Rgb a, Rgb b, double relative, double absolute) {
 }
 
 /// What sample() says of itself: a unit direction, weight = f/pdf, and the densities and η of
-/// eval(). `relative` allows for what one rounding of a direction does to a sharp lobe.
+/// eval(), within the bound of max_pdf(). `relative` allows for what one rounding of a direction does to a sharp lobe.
 template <class L>
 void expect_sample_agrees_with_eval(const L& lobe, Vec3 wo, double relative = 1e-3,
                                     int samples = 2000) {
@@ -171,6 +171,14 @@ void expect_sample_agrees_with_eval(const L& lobe, Vec3 wo, double relative = 1e
         ASSERT_TRUE(nearly(e.f, s->weight * s->pdf, relative, 1e-6))
             << where << ": f " << e.f.g << " weight·pdf " << s->weight.g * s->pdf;
         ASSERT_FLOAT_EQ(e.eta, s->eta) << where;
+        // Cones about the direction, of all sizes, that hold it.
+        const float angle = kPi * std::pow(random.next(), 4.0f);
+        const Frame frame = Frame::from_normal(s->wi);
+        const float off = angle * random.next(), phi = 2 * kPi * random.next();
+        const DirectionCone cone{frame.to_world({std::sin(off) * std::cos(phi),
+                                                 std::sin(off) * std::sin(phi), std::cos(off)}),
+                                 angle};
+        ASSERT_LE(s->pdf, lobe.max_pdf(wo, cone) * (1 + relative)) << where << ", angle " << angle;
     }
 }
 

@@ -130,6 +130,7 @@ struct AsLobe {
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const {
         return bsdf.sample(wo, u_lobe, u, mode);
     }
+    float max_pdf(Vec3 wo, const DirectionCone& c) const { return bsdf.max_pdf(wo, c); }
     float roughness() const { return bsdf.roughness(); }
     Rgb albedo_estimate() const { return bsdf.albedo_estimate(); }
 };

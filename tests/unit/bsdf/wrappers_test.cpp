@@ -23,6 +23,10 @@ struct MaterialLobe {
         ComponentArena arena;
         return bsdf(wo, arena).sample(wo, u_lobe, u, mode);
     }
+    float max_pdf(Vec3 wo, const DirectionCone& c) const {
+        ComponentArena arena;
+        return bsdf(wo, arena).max_pdf(wo, c);
+    }
     Bsdf bsdf(Vec3 wo, ComponentArena& arena) const {
         return material->bsdf(plane_point(wo, uv), arena);
     }

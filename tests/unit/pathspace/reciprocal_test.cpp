@@ -98,8 +98,7 @@ protected:
             ray = {offset_origin(e.from.p, e.from.ng, s->wi), s->wi, kInf};
         }
         SurfaceHit hit;
-        if (!scene.intersect(ray, 0, hit) || !is_near(hit.geometry.p, e.center, sqr(e.radius)))
-            return false;
+        if (!scene.intersect(ray, 0, hit) || !e.near.contains(hit.geometry.p)) return false;
         ComponentArena arena;
         scratch.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, arena);
         return scratch.may_connect;
@@ -116,7 +115,9 @@ protected:
                     continue;
                 // Off the surface, as other vertices near it are.
                 const Vec3 center = next.p + (next.p - path[0].p) * 0.01f;
-                compare({from, mode, path.u_emission, center, radius});
+                for (const auto& [bound, flatness] : kShapes)
+                    compare({from, mode, path.u_emission,
+                             {center, next.ng, radius, flatness * radius}, bound});
             }
         }
     }
@@ -138,7 +139,10 @@ protected:
         weights += 1 / sqr(spread);
     }
 
-    static constexpr int kWalks = 20000;
+    /// Bounds and the shapes of neighbourhoods that they are for: a ball, or a flat one.
+    static constexpr std::pair<TrialBound, float> kShapes[] = {
+        {TrialBound::Box, 1}, {TrialBound::Cone, 1}, {TrialBound::Slab, 0.1f}};
+    static constexpr int kWalks = 10000;
     Scene scene;
     Film film;
     Sampler sampler;
