@@ -96,6 +96,7 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"visible_pairs", s.visible_pairs},
         {"trials", s.trials},
         {"trial_rays", s.trial_rays},
+        {"pairs_by_trials", s.pairs_by_trials},
         {"bounds_exceeded", s.bounds_exceeded},
         {"runaways", s.runaways},
         {"eye_paths", s.eye_paths},

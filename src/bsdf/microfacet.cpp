@@ -95,7 +95,8 @@ HalfwayBound halfway_of_reflection(Vec3 wo, const DirectionCone& c) {
     const float cos_d =
         std::cos(std::acos(clamp(0.5f * length_h, 0.0f, 1.0f)) + 0.5f * c.angle + kAcosSlack);
     if (!(cos_d > 0)) return bound;
-    bound.theta = std::acos(clamp(h.z / length_h, -1.0f, 1.0f)) - c.angle / (2 * cos_d) - kAcosSlack;
+    bound.theta =
+        std::acos(clamp(h.z / length_h, -1.0f, 1.0f)) - c.angle / (2 * cos_d) - kAcosSlack;
     bound.cos_d = cos_d;
     return bound;
 }

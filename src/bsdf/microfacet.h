@@ -14,8 +14,9 @@ namespace etendue {
 
 /// What is known of the halfway vectors of one direction and all those of a cone.
 struct HalfwayBound {
-    float theta = 0;   ///< They are at least this far from ±z.
-    float cos_d = 0;   ///< At least so much is the cosine between them and the directions they halve.
+    float theta = 0;  ///< They are at least this far from ±z.
+    float cos_d =
+        0;  ///< At least so much is the cosine between them and the directions they halve.
     float length = 0;  ///< Of wo + η wi, at least.
 };
 /// m ∝ ±(wo + wi). As wi turns by dα, m turns by at most dα / (2 cos θ_d), θ_d = ∠(wo, m) = ∠(wo, wi)/2.

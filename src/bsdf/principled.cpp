@@ -205,8 +205,8 @@ float PrincipledLobe::max_pdf(Vec3 wo, const DirectionCone& c) const {
             const HalfwayBound h = halfway_of_reflection(wo, c);
             const Gtr1 coat{sqr(clearcoat_alpha(clearcoat_gloss))};
             const float theta = clamp(h.theta, 0.0f, 0.5f * kPi);
-            bound += p.clearcoat * coat.D({std::sin(theta), 0, std::cos(theta)}) *
-                     std::cos(theta) / (4 * h.cos_d);
+            bound += p.clearcoat * coat.D({std::sin(theta), 0, std::cos(theta)}) * std::cos(theta) /
+                     (4 * h.cos_d);
         }
     }
     if (refraction_weight() > 0 && c.max_cos(-own) > 0) {

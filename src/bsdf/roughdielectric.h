@@ -20,8 +20,8 @@ struct RoughDielectricLobe {
         float bound = 0;
         if (c.max_cos(own) > 0) bound = distribution.max_pdf_of_reflection(wo, c);
         if (c.max_cos(-own) > 0)
-            bound = std::fmax(bound, distribution.max_pdf_of_refraction(
-                                         wo, c, wo.z > 0 ? eta : 1 / eta));
+            bound = std::fmax(bound,
+                              distribution.max_pdf_of_refraction(wo, c, wo.z > 0 ? eta : 1 / eta));
         return bound;
     }
     Rgb albedo_estimate() const {

@@ -11,14 +11,28 @@ class Photons {
 public:
     /// Traces all light paths of the pass, with the techniques t ≤ 1, and keeps them. Connectible vertices y_i, i ≥ 1,
     /// can be found within `radius`.
+    /// Throws std::runtime_error where they would take more than `max_bytes`.
     void trace(const PassContext& pass, const Bidirectional& paths, const TechniqueCounts& counts,
-               float radius);
+               float radius, uint64_t max_bytes);
 
     const LightPaths& paths() const { return paths_; }
     /// Calls use(vertex) for the numbers of the light vertices nearer to `p` than the radius.
     template <class Use>
     void for_each_near(Vec3 p, const Use& use) const {
-        grid_.for_each_near(p, radius_, use);
+        constexpr int kBatch = 32;
+        uint32_t found[kBatch];
+        int count = 0;
+        const auto use_found = [&] {
+            for (int i = 0; i < count; ++i) paths_.prefetch_head(found[i]);
+            for (int i = 0; i < count; ++i) use(found[i]);
+            count = 0;
+        };
+        grid_.for_each_near(p, radius_, [&](uint32_t vertex) {
+            paths_.prefetch(vertex);
+            found[count++] = vertex;
+            if (count == kBatch) use_found();
+        });
+        use_found();
     }
     float radius() const { return radius_; }
 
@@ -32,5 +46,8 @@ private:
 /// The parameter `radius`, or where it is 0 a default from the size of the scene: 0.3 % of the bounding radius.
 float gather_radius(float given, const Scene& scene);
 ParamInfo radius_param();
+/// The parameter `memory`, in bytes.
+uint64_t photon_memory(const IntegratorParams& p);
+ParamInfo memory_param();
 
 }  // namespace etendue

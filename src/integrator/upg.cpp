@@ -32,7 +32,7 @@ constexpr std::array<Choice<PairRule>, 4> kRules{{{"gloss", PairRule::Gloss},
 class UpgIntegrator final : public Integrator {
 public:
     UpgIntegrator(const IntegratorParams& p, bool connects)
-        : paths_(p), radius_(p.number("radius")), connects_(connects),
+        : paths_(p), radius_(p.number("radius")), connects_(connects), memory_(photon_memory(p)),
           bound_(p.choice("bound", kBounds)),
           flatness_(bound_ == TrialBound::Slab ? kFlatness : 1.0f), rule_(p.choice("drop", kRules)),
           short_rate_(p.number("short_rate")), clamps_(p.flag("clamp")) {
@@ -46,7 +46,7 @@ public:
 
     void begin_pass(const PassContext& pass) override {
         const float radius = gather_radius(radius_, pass.scene);
-        photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius);
+        photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -134,6 +134,7 @@ private:
     Bidirectional paths_;
     float radius_;
     bool connects_;
+    uint64_t memory_;
     TrialBound bound_;
     float flatness_;  ///< Half the height of a neighbourhood over its radius.
     PairRule rule_;
@@ -145,10 +146,12 @@ private:
 std::vector<ParamInfo> params() {
     std::vector<ParamInfo> params = Bidirectional::params();
     params.push_back(radius_param());
-    params.push_back({"bound", ParamKind::String, "slab",
-                      "Directions that Bernoulli trials propose: slab (partners lie near the "
-                      "tangent plane), cone (in a ball), or box (in a ball; boxes of random numbers "
-                      "at diffuse vertices)."});
+    params.push_back(memory_param());
+    params.push_back(
+        {"bound", ParamKind::String, "slab",
+         "Directions that Bernoulli trials propose: slab (partners lie near the "
+         "tangent plane), cone (in a ball), or box (in a ball; boxes of random numbers "
+         "at diffuse vertices)."});
     params.push_back({"drop", ParamKind::String, "gloss",
                       "Which vertex of a pair is dropped: gloss (that sampled from the less glossy "
                       "vertex), eye, light, or both in turn."});

@@ -17,7 +17,7 @@ class VcmIntegrator final : public Integrator {
 public:
     explicit VcmIntegrator(const IntegratorParams& p)
         : paths_(p), radius_(p.number("radius")), alpha_(p.number("alpha")),
-          connects_(p.flag("connections")), merges_(p.flag("merges")) {
+          connects_(p.flag("connections")), merges_(p.flag("merges")), memory_(photon_memory(p)) {
         if (!(radius_ >= 0)) throw std::runtime_error("vcm: radius must not be negative");
         if (!(alpha_ > 0 && alpha_ <= 1)) throw std::runtime_error("vcm: alpha must lie in (0, 1]");
         if (!connects_ && !merges_)
@@ -27,7 +27,7 @@ public:
     void begin_pass(const PassContext& pass) override {
         const float radius =
             gather_radius(radius_, pass.scene) * std::pow(float(pass.index + 1), (alpha_ - 1) / 2);
-        photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius);
+        photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -76,6 +76,7 @@ private:
     Bidirectional paths_;
     float radius_, alpha_;
     bool connects_, merges_;
+    uint64_t memory_;
     Photons photons_;
 };
 
@@ -84,6 +85,7 @@ private:
 IntegratorEntry vcm_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
     params.push_back(radius_param());
+    params.push_back(memory_param());
     params.push_back({"alpha", ParamKind::Float, "0.75",
                       "The radius of pass i is radius·i^((alpha-1)/2); 1: it does not shrink, and "
                       "the image stays biased."});

@@ -80,10 +80,10 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const double rev_last = double(d.pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
         const double rev_prev = f.pdf_rev * v.to_predecessor;
         const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
-        others += sqr(p_L / p_NE) *
-                  outward_sum<Side::Eye>(z, last, false,
-                                         {rev_last, rev_prev, gloss_of_emitter(emitter.is_area()), t},
-                                         counts);
+        others += sqr(p_L / p_NE) * outward_sum<Side::Eye>(z, last, false,
+                                                           {rev_last, rev_prev,
+                                                            gloss_of_emitter(emitter.is_area()), t},
+                                                           counts);
     }
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .emitter = &emitter,
@@ -142,14 +142,13 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     if (a.is_infinite) edge.rev_a = fb.pdf;
     edge.total =
         sqr(count) +
-        outward_sum<Side::Light>(y, s - 1, false,
-                                 {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f,
-                                  gloss(b, false), s + t - 1},
-                                 counts) +
+        outward_sum<Side::Light>(
+            y, s - 1, false,
+            {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f, gloss(b, false), s + t - 1},
+            counts) +
         outward_sum<Side::Eye>(
             z, t - 1, false,
-            {edge.rev_b, fb.pdf_rev * b.to_predecessor, gloss(a, false), s + t - 1},
-            counts);
+            {edge.rev_b, fb.pdf_rev * b.to_predecessor, gloss(a, false), s + t - 1}, counts);
     return edge;
 }
 

@@ -53,8 +53,16 @@ public:
 
     /// The whole path `index` as it was walked.
     void restore(const Scene& scene, uint64_t index, SubPath& y) const;
+    /// Hints that `vertex` will be read soon; then, that its path will be.
+    void prefetch(uint32_t vertex) const { __builtin_prefetch(&vertices_[vertex]); }
+    void prefetch_head(uint32_t vertex) const {
+        __builtin_prefetch(&heads_[vertices_[vertex].path]);
+    }
+
     /// i of the vertex y_i.
-    int depth(uint32_t vertex) const { return int(vertex - heads_[vertices_[vertex].path].begin) + 1; }
+    int depth(uint32_t vertex) const {
+        return int(vertex - heads_[vertices_[vertex].path].begin) + 1;
+    }
     /// The gloss of y_{i-1}, or of its event, for the vertex y_i.
     uint8_t gloss_before(uint32_t vertex) const;
     /// The first `size` vertices of the path that `vertex` is on; of them only what joins with the last one read: y_0

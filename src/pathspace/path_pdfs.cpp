@@ -57,8 +57,7 @@ double mis_weight(const PathPdfs& pdfs, const Technique& technique, const Techni
         add(connection_technique(s, n - s));
         if (s == 0) continue;
         add({Strategy::Merge, s, n + 1 - s});
-        for (const bool drops_eye : {false, true})
-            add({Strategy::Gather, s, n + 1 - s, drops_eye});
+        for (const bool drops_eye : {false, true}) add({Strategy::Gather, s, n + 1 - s, drops_eye});
     }
     return sqr(pdfs.sampled(technique, counts)) / sum;
 }

@@ -30,15 +30,25 @@ public:
         const Vec3 scaled = p * inv_cell_;
         const int x0 = low(scaled.x), y0 = low(scaled.y), z0 = low(scaled.z);
         const float radius2 = radius * radius;
+        // All eight at a time, since what takes the time is waiting for memory.
+        Cell cells[8];
+        uint32_t begin[8], end[8];
         for (int corner = 0; corner < 8; ++corner) {
-            const Cell cell{x0 + (corner & 1), y0 + (corner >> 1 & 1), z0 + (corner >> 2)};
-            const uint32_t bucket = bucket_of(cell);
-            for (uint32_t i = begins_[bucket]; i < begins_[bucket + 1]; ++i) {
+            cells[corner] = {x0 + (corner & 1), y0 + (corner >> 1 & 1), z0 + (corner >> 2)};
+            begin[corner] = bucket_of(cells[corner]);
+            __builtin_prefetch(&begins_[begin[corner]]);
+        }
+        for (int corner = 0; corner < 8; ++corner) {
+            const uint32_t bucket = begin[corner];
+            begin[corner] = begins_[bucket], end[corner] = begins_[bucket + 1];
+            if (begin[corner] < end[corner]) __builtin_prefetch(&entries_[begin[corner]]);
+        }
+        for (int corner = 0; corner < 8; ++corner)
+            for (uint32_t i = begin[corner]; i < end[corner]; ++i) {
                 const Entry& e = entries_[i];
                 // Other cells may share the bucket.
-                if (length2(e.p - p) < radius2 && cell_of(e.p) == cell) use(e.index);
+                if (length2(e.p - p) < radius2 && cell_of(e.p) == cells[corner]) use(e.index);
             }
-        }
     }
     size_t memory_bytes() const {
         return entries_.capacity() * sizeof(Entry) + begins_.capacity() * sizeof(uint32_t);

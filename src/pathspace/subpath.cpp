@@ -78,6 +78,7 @@ RenderStats& RenderStats::operator+=(const RenderStats& o) {
     visible_pairs += o.visible_pairs;
     trials += o.trials;
     trial_rays += o.trial_rays;
+    for (size_t i = 0; i < pairs_by_trials.size(); ++i) pairs_by_trials[i] += o.pairs_by_trials[i];
     bounds_exceeded += o.bounds_exceeded;
     runaways += o.runaways;
     rejected += o.rejected;

@@ -1,6 +1,10 @@
 #pragma once
 // The walk: the one way in which sub-paths are made, from either end.
 
+#include <algorithm>
+#include <array>
+#include <bit>
+
 #include "pathspace/mis.h"
 #include "pathspace/vertex.h"
 #include "sampler/sampler.h"
@@ -14,10 +18,16 @@ struct RenderStats {
     uint64_t joins_skipped = 0;             ///< By roulette, before their shadow ray.
     uint64_t pairs = 0, visible_pairs = 0;  ///< Gathered; of these, joined without obstacle.
     uint64_t trials = 0, trial_rays = 0;    ///< Of all visible pairs.
-    uint64_t bounds_exceeded = 0;           ///< Densities above their bound: must stay 0.
-    uint64_t runaways = 0;                  ///< Pairs given up after too many trials: must stay 0.
-    uint64_t rejected = 0;                  ///< Contributions that were not finite or negative.
+    /// Visible pairs by trials: 1, 2, 3–4, 5–8, … The share of those with 1 is 1 - Var(r)/E(r)².
+    std::array<uint64_t, 24> pairs_by_trials{};
+    uint64_t bounds_exceeded = 0;  ///< Densities above their bound: must stay 0.
+    uint64_t runaways = 0;         ///< Pairs given up after too many trials: must stay 0.
+    uint64_t rejected = 0;         ///< Contributions that were not finite or negative.
 
+    void count_trials(uint64_t n) {
+        ++pairs_by_trials[std::min<size_t>(size_t(std::bit_width(n - 1)),
+                                           pairs_by_trials.size() - 1)];
+    }
     RenderStats& operator+=(const RenderStats& o);
     uint64_t rays() const { return walk_rays + shadow_rays + trial_rays; }
 };

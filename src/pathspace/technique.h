@@ -58,7 +58,7 @@ struct TechniqueCounts {
     int min_pair_edges = 2;       ///< Shorter paths are not made from pairs.
     float short_pair_rate = 1;    ///< Share of the gathers that are made of paths of three edges.
     PairRule pair_rule = PairRule::Gloss;
-    bool clamps_disc = true;      ///< Weights know that no probability exceeds 1 [ibid., eq. 24].
+    bool clamps_disc = true;  ///< Weights know that no probability exceeds 1 [ibid., eq. 24].
 
     bool uses_light_paths() const {
         return connect > 0 || splat > 0 || hit_lens > 0 || merge > 0 || gather > 0;

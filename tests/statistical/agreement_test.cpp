@@ -1,6 +1,7 @@
 // The integrators agree with path tracing, tile by tile. Every scene has only light that path tracing finds too: no
 // emitter without extent lies in view or behind mirrors and glass.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "render_tiles.h"
@@ -131,6 +132,18 @@ protected:
     }
 };
 class LongAgreement : public Agreement {};
+
+/// Every choice of gathers is as unbiased as the default.
+TEST(GatherChoices, AgreeWithPathTracing) {
+    const Scene scene = build(mixed_room(front_camera(kSize)));
+    const Tiles path = render_tiles(scene, "path", {400, 4, 1});
+    uint64_t seed = 5;
+    for (const char* choice : {"bound=box", "bound=cone", "drop=eye", "drop=light", "drop=both",
+                               "clamp=false", "short_rate=0.3", "short_rate=0"})
+        expect_same_image(
+            render_tiles(scene, fmt::format("upg+bdpt:radius=0.12,{}", choice), {192, 4, seed++}),
+            path, 0.08, choice);
+}
 
 TEST_P(Agreement, WithPathTracing) {
     expect_agreement(1);

@@ -116,8 +116,11 @@ protected:
                 // Off the surface, as other vertices near it are.
                 const Vec3 center = next.p + (next.p - path[0].p) * 0.01f;
                 for (const auto& [bound, flatness] : kShapes)
-                    compare({from, mode, path.u_emission,
-                             {center, next.ng, radius, flatness * radius}, bound});
+                    compare({from,
+                             mode,
+                             path.u_emission,
+                             {center, next.ng, radius, flatness * radius},
+                             bound});
             }
         }
     }
@@ -173,6 +176,54 @@ TEST_P(Reciprocal, IsThatOfTheWalk) {
     EXPECT_EQ(stats.bounds_exceeded, 0u);
     EXPECT_EQ(stats.runaways, 0u);
     RecordProperty("trials_per_pair", std::to_string(double(stats.trials) / (kWalks / 8 * n)));
+}
+
+/// Only a strip of 2w × 2d of the neighbourhood is seen through a slit of width w half way: about one trial of a hundred
+/// hits, and a cap on their number shows. p_c = ∫ cos²θ / (π |v|²) = ∫ H² / (π |v|⁴) over the strip.
+TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
+    constexpr double w = 0.0016, d = 0.2, H = 2;
+    const auto plate = [](const char* x) {
+        return test::rectangle(std::string("<scale x=\"2\" y=\"4\"/><translate x=\"") + x +
+                                   "\" z=\"1\"/>",
+                               test::diffuse("0,0,0"));
+    };
+    const Scene scene = test::build(
+        test::front_camera(8) + test::area_lamp() + plate("2.0008") + plate("-2.0008") +
+        test::rectangle("<scale value=\"4\"/><rotate x=\"1\" angle=\"180\"/><translate z=\"2\"/>",
+                        test::diffuse("0.5,0.5,0.5")) +
+        test::rectangle("<scale value=\"4\"/>", test::diffuse("0.5,0.5,0.5")));
+    SurfaceHit hit;
+    ASSERT_TRUE(scene.intersect({{0, 0, 0.5f}, {0, 0, -1}, kInf}, 0, hit));
+    ComponentArena arena;
+    Vertex floor, scratch;
+    floor.set_surface(*hit.shape, hit.location, hit.geometry, {0, 0, 1}, arena);
+
+    double p_c = 0;
+    constexpr int kSteps = 4000;
+    for (int i = 0; i < kSteps; ++i) {
+        // The strip is so narrow that x² does not matter.
+        const double y = d * ((i + 0.5) * 2 / kSteps - 1);
+        p_c += 2 * w * (2 * d / kSteps) * sqr(H) / (M_PI * sqr(sqr(y) + sqr(H)));
+    }
+    Sampler sampler(SamplerKind::Independent, 3);
+    sampler.start(0, 0);
+    sampler.seek(Stream::Auxiliary, 1);
+    RenderStats stats;
+    for (const auto& [bound, flatness] :
+         {std::pair{TrialBound::Slab, 0.05f}, {TrialBound::Cone, 1}}) {
+        const PairEvent event{floor,
+                              TransportMode::Radiance,
+                              {},
+                              {{0, 0, 2}, {0, 0, -1}, d, flatness * float(d)},
+                              bound};
+        Moments r;
+        for (int i = 0; i < 20000; ++i)
+            r.add(reciprocal_probability(scene, event, sampler, scratch, stats) * p_c);
+        EXPECT_GE(welch_p(r, Moments::exact(1), 0.005), 1e-4)
+            << r.mean() << " ± " << std::sqrt(r.squared_error());
+    }
+    EXPECT_GT(stats.trials, 50 * 40000u) << "the slit is too wide for what this tests";
+    EXPECT_EQ(stats.runaways, 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Starts, Reciprocal, testing::ValuesIn(cases()),
