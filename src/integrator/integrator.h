@@ -43,6 +43,7 @@ struct PassContext {
     uint32_t index;        ///< Of the pass, from 0.
     uint64_t light_paths;  ///< N_L.
     uint64_t chunks;
+    const RenderStats& so_far;  ///< Of all earlier passes; the same for any number of threads.
     /// Calls `use(chunk, context, work)` for every light path in parallel; those of one chunk in order by one thread.
     /// Only splats may be added.
     using Use = std::function<void(uint64_t, const SampleContext&, Workspace&)>;

@@ -34,16 +34,6 @@ void Photons::trace(const PassContext& pass, const Bidirectional& paths,
     grid_.build(entries, radius);
 }
 
-float gather_radius(float given, const Scene& scene) {
-    return given > 0 ? given : 0.003f * scene.bounds().radius();
-}
-
-ParamInfo radius_param() {
-    return {"radius", ParamKind::Float, "0",
-            "Distance within which vertices form pairs, in scene units; 0: 0.3 % of the radius of "
-            "the scene's bounds."};
-}
-
 uint64_t photon_memory(const IntegratorParams& p) {
     const int mebibytes = p.integer("memory");
     if (mebibytes < 1)

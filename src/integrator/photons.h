@@ -43,9 +43,6 @@ private:
     std::vector<LightPaths::Chunk> chunks_;
 };
 
-/// The parameter `radius`, or where it is 0 a default from the size of the scene: 0.3 % of the bounding radius.
-float gather_radius(float given, const Scene& scene);
-ParamInfo radius_param();
 /// The parameter `memory`, in bytes.
 uint64_t photon_memory(const IntegratorParams& p);
 ParamInfo memory_param();

@@ -7,7 +7,9 @@
 
 #include "integrator/upg.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -21,6 +23,10 @@ namespace {
 /// Of neighbourhoods, with the bound `slab`: what trials aim at is flat then, and nearly all of it is met where the
 /// surface is smooth.
 constexpr float kFlatness = 0.05f;
+
+/// Of the default radius: pairs of an eye path, and its largest share of the radius of the scene's bounds.
+constexpr double kPairs = 4;
+constexpr float kLargest = 0.02f;
 
 constexpr std::array<Choice<TrialBound>, 3> kBounds{
     {{"box", TrialBound::Box}, {"cone", TrialBound::Cone}, {"slab", TrialBound::Slab}}};
@@ -45,7 +51,7 @@ public:
     }
 
     void begin_pass(const PassContext& pass) override {
-        const float radius = gather_radius(radius_, pass.scene);
+        const float radius = radius_ > 0 ? radius_ : radius_for(pass);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 
@@ -65,6 +71,19 @@ public:
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:
+    /// Such that an eye path finds kPairs pairs, as far as the last pass tells. A pass knows of earlier ones only, so that
+    /// its image has the right expectation whatever they found.
+    float radius_for(const PassContext& pass) {
+        const float size = pass.scene.bounds().radius(), largest = kLargest * size;
+        if (pass.index == 0) return std::min(largest, size / std::sqrt(float(pass.light_paths)));
+        const double pairs = double(pass.so_far.pairs - pairs_so_far_),
+                     paths = double(pass.so_far.eye_paths - eye_paths_so_far_);
+        pairs_so_far_ = pass.so_far.pairs;
+        eye_paths_so_far_ = pass.so_far.eye_paths;
+        const double factor = std::clamp(std::sqrt(kPairs * paths / (pairs + 1)), 0.5, 2.0);
+        return std::min(largest, photons_.radius() * float(factor));
+    }
+
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths, float radius) const {
         const float N = float(light_paths);
         TechniqueCounts n;
@@ -132,6 +151,7 @@ private:
     }
 
     Bidirectional paths_;
+    uint64_t pairs_so_far_ = 0, eye_paths_so_far_ = 0;
     float radius_;
     bool connects_;
     uint64_t memory_;
@@ -145,7 +165,10 @@ private:
 
 std::vector<ParamInfo> params() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back(radius_param());
+    params.push_back(
+        {"radius", ParamKind::Float, "0",
+         "Distance within which vertices form pairs, in scene units; 0: chosen anew for "
+         "every pass, such that an eye path finds about four."});
     params.push_back(memory_param());
     params.push_back(
         {"bound", ParamKind::String, "slab",

@@ -25,8 +25,8 @@ public:
     }
 
     void begin_pass(const PassContext& pass) override {
-        const float radius =
-            gather_radius(radius_, pass.scene) * std::pow(float(pass.index + 1), (alpha_ - 1) / 2);
+        const float radius = (radius_ > 0 ? radius_ : 0.003f * pass.scene.bounds().radius()) *
+                             std::pow(float(pass.index + 1), (alpha_ - 1) / 2);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 
@@ -84,7 +84,9 @@ private:
 
 IntegratorEntry vcm_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back(radius_param());
+    params.push_back({"radius", ParamKind::Float, "0",
+                      "Distance within which vertices are merged in the first pass, in scene "
+                      "units; 0: 0.3 % of the radius of the scene's bounds."});
     params.push_back(memory_param());
     params.push_back({"alpha", ParamKind::Float, "0.75",
                       "The radius of pass i is radius·i^((alpha-1)/2); 1: it does not shrink, and "

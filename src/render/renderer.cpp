@@ -130,7 +130,7 @@ void Renderer::pass(uint32_t index) {
         });
     };
     workers_->arena.execute([&] {
-        integrator_->begin_pass({scene_, index, light_paths, chunks, [&](const auto& use) {
+        integrator_->begin_pass({scene_, index, light_paths, chunks, stats_, [&](const auto& use) {
                                      for_each_sample([&](uint64_t chunk, const SampleContext& c,
                                                          Workspace& work,
                                                          FilmSink&) { use(chunk, c, work); });

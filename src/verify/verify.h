@@ -54,6 +54,9 @@ struct Comparison {
     double detectable(double level) const;
 };
 inline constexpr double kEnoughContributions = 200;
+/// Shares of the light: where more than these comes too rarely for a test, other tests lack rare contributions, too, and
+/// cannot be relied on: those of all tiles; the verdict.
+inline constexpr double kTooMuchUntested = 0.05, kTooMuchTooRare = 0.1;
 /// What rounding may do to a mean, relative.
 inline constexpr double kRounding = 1e-4;
 
@@ -115,7 +118,7 @@ struct VerifyReport {
     double level = 0;  ///< Of each test.
     std::vector<MethodReport> methods;
 
-    /// Undecided: nothing deviates, but less than nine tenths of the light could be compared.
+    /// Undecided where less than nine tenths of the light could be compared.
     Verdict verdict(const MethodReport& method) const;
     bool deviates(const Comparison& c) const { return c.is_tested() && c.p < level; }
 };
