@@ -8,6 +8,7 @@
 
 #include "math/warp.h"
 #include "pathspace/join.h"
+#include "pathspace/light_paths.h"
 #include "pathspace/mis.h"
 #include "readers/mitsuba_xml.h"
 #include "scene/builder.h"
@@ -313,7 +314,7 @@ void report_sizes(const Report& report) {
     const auto bytes = [](const char* name, size_t size) {
         return Figure{name, "bytes", false, {double(size)}};
     };
-    report.add("sizes", {bytes("vertex", sizeof(Vertex)), bytes("bsdf", sizeof(Bsdf)),
+    report.add("sizes", {bytes("light_vertex", sizeof(LightVertex)), bytes("vertex", sizeof(Vertex)), bytes("bsdf", sizeof(Bsdf)),
                          bytes("bsdf_component", sizeof(BsdfComponent)),
                          bytes("lobe", sizeof(Lobe)), bytes("join", sizeof(Join))});
 }

@@ -68,9 +68,24 @@ void Film::add_splat(Vec2 point, Rgb value) {
 }
 
 void Film::begin_pass(uint64_t light_paths) {
-    if (light_paths > 0 && !splats_)
+    if (light_paths > 0 && !splats_) {
         splats_ = std::make_unique<SplatBuffer>(geometry_.pixel_count());
+        average_blocks();
+    }
     splat_scale_ = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
+}
+
+void Film::average_blocks() {
+    const int width = geometry_.crop_width, height = geometry_.crop_height;
+    const int rows = (height + kBlock - 1) / kBlock;
+    expected_blocks_.assign(blocks_across() * uint64_t(rows), 0);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            const int columns = std::min(kBlock, width - x / kBlock * kBlock),
+                      lines = std::min(kBlock, height - y / kBlock * kBlock);
+            expected_blocks_[uint64_t(y / kBlock) * blocks_across() + uint64_t(x / kBlock)] +=
+                expected_[uint64_t(y) * width + x] / float(columns * lines);
+        }
 }
 
 void Film::end_pass() {
@@ -117,6 +132,7 @@ void Film::end_pass() {
             expected_[i] = std::max(expected_[i], float(0.1 * mean));
         }
     });
+    if (splats_) average_blocks();
     if (!second) return;
     double pair = 0;
     for (double p : pair_sum) pair += p;

@@ -52,6 +52,7 @@ class SplatBuffer {
 public:
     explicit SplatBuffer(uint64_t pixels);
     void add(uint64_t pixel, Rgb value);
+    void prefetch(uint64_t pixel) const { __builtin_prefetch(&sums_[pixel * 3], 1); }
     /// Adds everything to `sums`, in an order that does not depend on the threads, and clears the buffer.
     void fold_into(std::span<Rgb> sums);
 
@@ -110,11 +111,16 @@ public:
     /// Luminance that earlier passes lead to expect of a pixel, at least a tenth of the image's mean; 0 in the first pass.
     /// It does not depend on the pass in flight.
     float expected_luminance(uint64_t pixel) const { return expected_[pixel]; }
-    /// The same at a film point (clamped to the crop).
+    /// The same about a film point (clamped to the crop): the mean of a block of pixels, since splats land anywhere and
+    /// would wait for the memory of single ones.
     float expected_luminance(Vec2 point) const {
-        const int x = std::clamp(int(point.x) - geometry_.crop_x, 0, geometry_.crop_width - 1);
-        const int y = std::clamp(int(point.y) - geometry_.crop_y, 0, geometry_.crop_height - 1);
-        return expected_[uint64_t(y) * geometry_.crop_width + x];
+        const auto [x, y] = clamped(point);
+        return expected_blocks_[uint64_t(y / kBlock) * blocks_across() + uint64_t(x / kBlock)];
+    }
+    /// Hints that a splat at `point` may follow.
+    void prefetch_splat(Vec2 point) const {
+        const auto [x, y] = clamped(point);
+        splats_->prefetch(uint64_t(y) * geometry_.crop_width + uint64_t(x));
     }
 
     /// Mean of all passes.
@@ -135,6 +141,16 @@ private:
         double sum[3] = {0, 0, 0}, square[3] = {0, 0, 0};
     };
 
+    static constexpr int kBlock = 4;
+
+    /// Pixel within the crop.
+    std::pair<int, int> clamped(Vec2 point) const {
+        return {std::clamp(int(point.x) - geometry_.crop_x, 0, geometry_.crop_width - 1),
+                std::clamp(int(point.y) - geometry_.crop_y, 0, geometry_.crop_height - 1)};
+    }
+    uint64_t blocks_across() const { return uint64_t(geometry_.crop_width + kBlock - 1) / kBlock; }
+    void average_blocks();
+
     FilmGeometry geometry_;
     ReconstructionFilter filter_;
     std::vector<Rgb> eye_;
@@ -142,6 +158,7 @@ private:
     float splat_scale_ = 0;
     std::vector<Moments> moments_;
     std::vector<float> expected_;
+    std::vector<float> expected_blocks_;  ///< Means of kBlock × kBlock pixels.
     std::vector<float>
         previous_;  ///< Luminance of the last even pass, for the spread between neighbours.
     std::vector<double>

@@ -38,6 +38,7 @@ void Bidirectional::light_path(const SampleContext& c, const TechniqueCounts& co
 std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, float scale,
                                        uint32_t number, Workspace& work) const {
     Rgb contribution = j.contribution;
+    if (j.technique.t <= 1) c.film.prefetch_splat(j.film);
     if (roulette_ > 0) {
         const float expected = j.technique.t <= 1 ? c.film.expected_luminance(j.film)
                                                   : c.film.expected_luminance(c.pixel);
