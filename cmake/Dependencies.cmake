@@ -5,6 +5,7 @@ find_package(spdlog REQUIRED)
 find_package(pugixml REQUIRED)
 find_package(OpenImageIO REQUIRED)
 find_package(ZLIB REQUIRED)
+find_package(nanoflann REQUIRED)
 find_package(nlohmann_json REQUIRED)
 
 # Embree 3.13 is what Debian 12 has; the code also compiles against 4.

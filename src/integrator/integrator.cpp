@@ -8,6 +8,8 @@
 #include "integrator/bdpt.h"
 #include "integrator/light.h"
 #include "integrator/path.h"
+#include "integrator/pm.h"
+#include "integrator/sppm.h"
 #include "integrator/upg.h"
 #include "integrator/vcm.h"
 
@@ -15,7 +17,8 @@ namespace etendue {
 
 const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
-        path_entry(), light_entry(), bdpt_entry(), vcm_entry(), upg_entry(), upg_bdpt_entry()};
+        path_entry(), light_entry(), bdpt_entry(), pm_entry(),      ppm_entry(),
+        sppm_entry(), vcm_entry(),   upg_entry(),  upg_bdpt_entry()};
     return entries;
 }
 

@@ -42,12 +42,16 @@ struct PassContext {
     const Scene& scene;
     uint32_t index;        ///< Of the pass, from 0.
     uint64_t light_paths;  ///< N_L.
-    uint64_t chunks;
+    uint64_t pixels;
     const RenderStats& so_far;  ///< Of all earlier passes; the same for any number of threads.
-    /// Calls `use(chunk, context, work)` for every light path in parallel; those of one chunk in order by one thread.
-    /// Only splats may be added.
+    /// Calls `use(chunk, context, work)` for the samples 0 … count-1 in parallel; those of one chunk in order by one
+    /// thread. Only splats may be added.
     using Use = std::function<void(uint64_t, const SampleContext&, Workspace&)>;
-    std::function<void(const Use& use)> for_each_light_path;
+    std::function<void(uint64_t count, const Use& use)> for_each_sample;
+    std::function<uint64_t(uint64_t count)>
+        chunks;  ///< That for_each_sample() cuts so many samples into.
+
+    void for_each_light_path(const Use& use) const { for_each_sample(light_paths, use); }
 };
 
 class Integrator {
@@ -61,6 +65,12 @@ public:
     virtual TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const = 0;
     /// Light paths per pixel in one pass: 0 or 1.
     virtual bool traces_light_paths() const = 0;
+    /// Light paths of one pass over a film of so many pixels.
+    virtual uint64_t light_paths(uint64_t pixels) const {
+        return traces_light_paths() ? pixels : 0;
+    }
+    /// Whether contributions come with the sub-paths they were made of, so that `verify` can tell their paths.
+    virtual bool keeps_paths() const { return true; }
     virtual Estimator estimator() const = 0;
 };
 

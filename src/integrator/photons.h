@@ -1,11 +1,25 @@
 #pragma once
 // The light vertices of a pass from which eye vertices choose partners.
 
+#include <atomic>
+
 #include "integrator/bidirectional.h"
 #include "pathspace/light_paths.h"
 #include "pathspace/point_grid.h"
 
 namespace etendue {
+
+/// What all threads of a pass keep of its light paths.
+class PhotonMemory {
+public:
+    explicit PhotonMemory(uint64_t max_bytes) : max_bytes_(max_bytes) {}
+    /// Throws std::runtime_error where they have taken too much.
+    void take(uint64_t bytes);
+
+private:
+    uint64_t max_bytes_;
+    std::atomic<uint64_t> bytes_ = 0;
+};
 
 class Photons {
 public:
@@ -41,6 +55,22 @@ private:
     PointGrid grid_;
     float radius_ = 0;
     std::vector<LightPaths::Chunk> chunks_;
+};
+
+/// r_i = r_1 i^((α-1)/2), so that bias and noise both vanish [Knaus & Zwicker 2011, eq. 15].
+class RadiusSchedule {
+public:
+    /// `doc` of the first radius.
+    static std::vector<ParamInfo> params(const char* doc);
+    /// `default_share`: first radius, where none is given, of the radius of the scene's bounds.
+    RadiusSchedule(const IntegratorParams& params, float default_share);
+
+    /// Of the pass with this index, from 0.
+    float radius(const Scene& scene, uint32_t pass) const;
+    bool shrinks() const { return alpha_ < 1; }
+
+private:
+    float first_, alpha_, default_share_;
 };
 
 /// The parameter `memory`, in bytes.

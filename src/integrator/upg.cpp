@@ -14,8 +14,7 @@
 
 #include <fmt/format.h>
 
-#include "integrator/photons.h"
-#include "pathspace/reciprocal.h"
+#include "integrator/gather.h"
 
 namespace etendue {
 namespace {
@@ -58,9 +57,15 @@ public:
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
         photons_.paths().restore(c.scene, c.pixel, work.y);
+        const auto by_trials = [&](PairEvent event, const Join&) {
+            event.bound = bound_;
+            return reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
+        };
+        const Gather gather{c, paths_, photons_, n, flatness_, work};
         paths_.eye_path(c, n, work, [&](int t) {
             photons_.for_each_near(work.z[t - 1].p,
-                                   [&](uint32_t vertex) { gather(c, n, t, vertex, work); });
+                                   [&](uint32_t vertex) { gather(t, vertex, by_trials); });
+            return Onward::ByAnyEvent;
         });
     }
 
@@ -99,55 +104,6 @@ private:
         n.pair_rule = rule_;
         n.clamps_disc = clamps_;
         return n;
-    }
-
-    /// `vertex` and z_{t-1} lie within the radius.
-    void gather(const SampleContext& c, const TechniqueCounts& n, int t, uint32_t vertex,
-                Workspace& work) const {
-        const int s = photons_.paths().depth(vertex) + 1, edges = s + t - 2;
-        const float rate = n.gathers(edges) / n.gather;
-        if (edges > paths_.max_depth() || !(rate > 0)) return;
-        const uint32_t number = uint32_t(hash_combine(vertex, uint64_t(t)));
-        if (rate < 1) {
-            c.sampler.seek(Stream::Roulette, number + 1);
-            if (!(c.sampler.next_1d_unstructured() < rate)) return;
-        }
-        const Vertex& last = work.z[t - 2];
-        const uint8_t before = photons_.paths().gloss_before(vertex),
-                      after = gloss(last, last.is_delta);
-        for (const bool eye : {true, false})
-            if (drops(n.pair_rule, eye, before, after))
-                join(c, n, {Strategy::Gather, s, t, eye}, vertex, number + eye, rate, work);
-    }
-
-    void join(const SampleContext& c, const TechniqueCounts& n, const Technique& q, uint32_t vertex,
-              uint32_t number, float rate, Workspace& work) const {
-        const SubPath& z = work.z;
-        SubPath& y = work.pair;
-        const LightPaths& paths = photons_.paths();
-        const auto near = [&](const Vertex& kept) {
-            return Neighbourhood{kept.p, kept.ng, photons_.radius(), flatness_ * photons_.radius()};
-        };
-        const bool eye = q.drops_eye;
-        if (!eye && !near(z[q.t - 1]).contains(paths.vertices()[vertex].p)) return;
-        paths.restore_first(c.scene, vertex, eye ? q.s : q.s - 1, work.is_observed, y);
-        if (eye && !near(y[q.s - 1]).contains(z[q.t - 1].p)) return;
-        ++work.stats.pairs;
-        const auto j = join_gather(c.scene, y, q.s, z, q.t, eye, n);
-        if (!j) return;
-        const float scale = std::fabs(z.film_weight) * c.splat_scale / rate;
-        const auto value = paths_.test(c, *j, scale / j->found, number, work);
-        if (!value) return;
-        ++work.stats.visible_pairs;
-        c.sampler.seek(Stream::Auxiliary, number);
-        const PairEvent event{.from = eye ? z[q.t - 2] : y[q.s - 2],
-                              .mode = eye ? TransportMode::Radiance : TransportMode::Importance,
-                              .u_emission = y.u_emission,
-                              .near = near(eye ? y[q.s - 1] : z[q.t - 1]),
-                              .bound = bound_};
-        const double r =
-            reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
-        c.sink.add(*j, *value * (float(r) * c.splat_scale / rate));
     }
 
     Bidirectional paths_;

@@ -1,49 +1,55 @@
 // Vertex connection and merging, or unified path sampling [Georgiev et al. 2012; Hachisuka et al. 2012]: bidirectional
-// path tracing whose eye vertices also merge with light vertices of all paths of the pass.
+// path tracing whose eye vertices also merge with light vertices of all paths of the pass. With `exact` they gather
+// them instead, with the disc's approximation of the probability that the pair was found [Bekaert et al. 2003; Qin et
+// al. 2015, fig. 11 b].
 //
-// Techniques: C(s,t) and M(s,t). Consistent where the radius shrinks, r_i = r_1 i^((α-1)/2) [Knaus & Zwicker 2011].
+// Techniques: C(s,t) and M(s,t), or U(s,t). Consistent where the radius shrinks [Knaus & Zwicker 2011].
 
 #include "integrator/vcm.h"
 
-#include <cmath>
 #include <stdexcept>
 
-#include "integrator/photons.h"
+#include "integrator/gather.h"
 
 namespace etendue {
 namespace {
 
+/// Of the scene's.
+constexpr float kDefaultRadius = 0.003f;
+
 class VcmIntegrator final : public Integrator {
 public:
     explicit VcmIntegrator(const IntegratorParams& p)
-        : paths_(p), radius_(p.number("radius")), alpha_(p.number("alpha")),
-          connects_(p.flag("connections")), merges_(p.flag("merges")), memory_(photon_memory(p)) {
-        if (!(radius_ >= 0)) throw std::runtime_error("vcm: radius must not be negative");
-        if (!(alpha_ > 0 && alpha_ <= 1)) throw std::runtime_error("vcm: alpha must lie in (0, 1]");
+        : paths_(p), radius_(p, kDefaultRadius), connects_(p.flag("connections")),
+          merges_(p.flag("merges")), is_exact_(p.flag("exact")), memory_(photon_memory(p)) {
         if (!connects_ && !merges_)
             throw std::runtime_error("vcm: connections and merges cannot both be off");
+        if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact needs merges");
     }
 
     void begin_pass(const PassContext& pass) override {
-        const float radius = (radius_ > 0 ? radius_ : 0.003f * pass.scene.bounds().radius()) *
-                             std::pow(float(pass.index + 1), (alpha_ - 1) / 2);
+        const float radius = radius_.radius(pass.scene, pass.index);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
         photons_.paths().restore(c.scene, c.pixel, work.y);
-        const auto merge = [&](int t) {
-            if (!merges_) return;
-            photons_.for_each_near(work.z[t - 1].p, [&](uint32_t vertex) {
-                const int s = photons_.paths().depth(vertex) + 1;
-                if (s + t - 2 > paths_.max_depth()) return;
-                photons_.paths().restore_first(c.scene, vertex, s, work.is_observed, work.pair);
-                if (const auto j = join_merge(work.pair, s, work.z, t, n))
-                    c.sink.add(*j, j->contribution * c.splat_scale);
-            });
+        // q π d² p̃ for p_c [Qin et al. 2015, eq. 7], where q is the survival of the roulette before the dropped vertex.
+        const auto by_disc = [](const PairEvent& event, const Join& j) {
+            return 1 / double(event.from.survival.value() * j.found);
         };
-        paths_.eye_path(c, n, work, merge);
+        const Gather gather{c, paths_, photons_, n, 1, work};
+        paths_.eye_path(c, n, work, [&](int t) {
+            if (!merges_) return Onward::ByAnyEvent;
+            photons_.for_each_near(work.z[t - 1].p, [&](uint32_t vertex) {
+                if (is_exact_)
+                    gather(t, vertex, by_disc);
+                else
+                    merge(c, n, t, vertex, work);
+            });
+            return Onward::ByAnyEvent;
+        });
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
@@ -51,9 +57,9 @@ public:
     }
     bool traces_light_paths() const override { return true; }
     Estimator estimator() const override {
-        return !merges_     ? Estimator::Unbiased
-               : alpha_ < 1 ? Estimator::Consistent
-                            : Estimator::Biased;
+        return !merges_            ? Estimator::Unbiased
+               : radius_.shrinks() ? Estimator::Consistent
+                                   : Estimator::Biased;
     }
 
 private:
@@ -67,15 +73,25 @@ private:
             n.hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f;
         }
         if (merges_) {
-            n.merge = N;
+            (is_exact_ ? n.gather : n.merge) = N;
             n.disc = kPi * radius * radius;
+            n.clamps_disc = false;
         }
         return n;
     }
 
+    void merge(const SampleContext& c, const TechniqueCounts& n, int t, uint32_t vertex,
+               Workspace& work) const {
+        const int s = photons_.paths().depth(vertex) + 1;
+        if (s + t - 2 > paths_.max_depth()) return;
+        photons_.paths().restore_first(c.scene, vertex, s, work.is_observed, work.pair);
+        if (const auto j = join_merge(work.pair, s, work.z, t, n))
+            c.sink.add(*j, j->contribution * c.splat_scale);
+    }
+
     Bidirectional paths_;
-    float radius_, alpha_;
-    bool connects_, merges_;
+    RadiusSchedule radius_;
+    bool connects_, merges_, is_exact_;
     uint64_t memory_;
     Photons photons_;
 };
@@ -84,16 +100,18 @@ private:
 
 IntegratorEntry vcm_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back({"radius", ParamKind::Float, "0",
-                      "Distance within which vertices are merged in the first pass, in scene "
-                      "units; 0: 0.3 % of the radius of the scene's bounds."});
+    for (const ParamInfo& p : RadiusSchedule::params("Distance within which vertices are merged in "
+                                                     "the first pass, in scene units; 0: 0.3 % "
+                                                     "of the radius of the scene's bounds."))
+        params.push_back(p);
     params.push_back(memory_param());
-    params.push_back({"alpha", ParamKind::Float, "0.75",
-                      "The radius of pass i is radius·i^((alpha-1)/2); 1: it does not shrink, and "
-                      "the image stays biased."});
     params.push_back({"connections", ParamKind::Bool, "true",
                       "Whether sub-paths are connected, to emitters and the lens too."});
     params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged."});
+    params.push_back(
+        {"exact", ParamKind::Bool, "false",
+         "Whether the paths of merges are true ones, with a shadow ray and the BSDFs of "
+         "both ends; their probability stays that of a disc [Bekaert et al. 2003]."});
     return {{"integrator", "vcm",
              "Vertex connection and merging. Consistent; biased with a fixed radius.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {

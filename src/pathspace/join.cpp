@@ -191,6 +191,16 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
                 .found = float(found)};
 }
 
+namespace {
+
+/// Radiance that a photon's flux, spread over the area `disc`, brings to the lens from b = z_{t-1}. `f` is that of b for
+/// the photon's direction `wi`, whose cosine belongs to the flux.
+Rgb density_estimate(Rgb power, Vec3 wi, const BsdfEval& f, const Vertex& b, float disc) {
+    return power * f.f * b.beta * (1 / (abs_dot(wi, b.ng) * disc));
+}
+
+}  // namespace
+
 std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
                                const TechniqueCounts& counts) {
     const Vertex &a = y[s - 1], &b = z[t - 1];
@@ -208,8 +218,20 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
     const double np = double(counts.merge) * counts.disc * b.pdf_fwd;
     return Join{.technique = {Strategy::Merge, s, t},
                 .emitter = y[0].emitter,
-                .contribution = a.beta * f.f * b.beta * (1 / (abs_dot(a.wo, b.ng) * counts.disc)),
+                .contribution = density_estimate(a.beta, a.wo, f, b, counts.disc),
                 .mis_weight = float(sqr(np) / total),
+                .film = z.film,
+                .needs_test = false};
+}
+
+std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, float disc) {
+    const Vertex& b = z[t - 1];
+    const BsdfEval f = b.bsdf.eval(b.wo, photon.wi, TransportMode::Radiance);
+    if (f.f.is_zero()) return {};
+    return Join{.technique = {Strategy::Merge, photon.s, t},
+                .emitter = photon.emitter,
+                .contribution = density_estimate(photon.power, photon.wi, f, b, disc),
+                .mis_weight = 1,
                 .film = z.film,
                 .needs_test = false};
 }

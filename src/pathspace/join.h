@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "pathspace/photon.h"
 #include "pathspace/subpath.h"
 
 namespace etendue {
@@ -17,7 +18,8 @@ struct Join {
     /// The edge that the join adds; b is a direction where `to_infinity`. A hit adds none.
     Vec3 a{}, ng_a{}, b{}, ng_b{};
     bool to_infinity = false;
-    float found = 1;  ///< Of a gather: approximate probability that the pair was found, eq. 24.
+    float found =
+        1;  ///< Of a gather: the disc's approximation π d² p of p_c [Qin et al. 2015, eq. 7].
     bool needs_test = true;
 };
 
@@ -42,6 +44,9 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
 /// M(s,t): y_{s-1} and z_{t-1} taken for one vertex [Georgiev et al. 2012; Hachisuka et al. 2012]. For one light path.
 std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
                                const TechniqueCounts& counts);
+/// M(s,t) of a photon near z_{t-1} whose power is spread over the area `disc` [Jensen 2001, §7.2], as the only technique
+/// that makes its path: weight 1.
+std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, float disc);
 /// U(s,t): z_{t-1} (`drops_eye`) or y_{s-1} is dropped and the other joined to the dropped one's predecessor [Qin et al.
 /// 2015]. For one light path, and without the factor r = 1/p_c of the event that the pair was found. The dropped vertex
 /// is not read.

@@ -142,4 +142,21 @@ void LightPaths::restore_first(const Scene& scene, uint32_t vertex, int size, bo
     }
 }
 
+Photon LightPaths::photon(uint32_t vertex) const {
+    const LightVertex& v = vertices_[vertex];
+    const Chunk::Head& head = heads_[v.path];
+    const bool follows_y0 = vertex == head.begin;
+    const Vec3 wi = follows_y0 && head.emitter->is_infinite()
+                        ? head.p
+                        : normalize((follows_y0 ? head.p : vertices_[vertex - 1].p) - v.p);
+    return {v.p, wi, v.beta, head.emitter, int(vertex - head.begin) + 2};
+}
+
+bool LightPaths::came_by_delta_events(uint32_t vertex) const {
+    const uint32_t begin = heads_[vertices_[vertex].path].begin;
+    while (vertex > begin)
+        if (!vertices_[--vertex].is_delta) return false;
+    return true;
+}
+
 }  // namespace etendue

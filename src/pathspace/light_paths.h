@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "pathspace/photon.h"
 #include "pathspace/vertex.h"
 
 namespace etendue {
@@ -68,6 +69,11 @@ public:
     /// The first `size` vertices of the path that `vertex` is on; of them only what joins with the last one read: y_0
     /// and the last three; all of them, without the earlier BSDFs, if `whole`.
     void restore_first(const Scene& scene, uint32_t vertex, int size, bool whole, SubPath& y) const;
+
+    /// What arrives at `vertex`.
+    Photon photon(uint32_t vertex) const;
+    /// Whether all scattering before `vertex` was by delta events.
+    bool came_by_delta_events(uint32_t vertex) const;
 
 private:
     void restore_head(uint64_t index, SubPath& y) const;

@@ -189,6 +189,19 @@ bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options,
     return true;
 }
 
+bool look_along(const Scene& scene, Sampler& sampler, Vec3 wi, Rgb beta, SubPath& z,
+                RenderStats& stats) {
+    const int last = z.size() - 1;
+    sampler.seek(Stream::Eye, uint32_t(last));
+    Vertex& v = z[last];
+    v.is_delta = false;
+    const Ray ray{offset_origin(v.p, v.ng, wi), wi, kInf};
+    if (append_surface(scene, sampler, z, ray, beta, 1, false, v.medium_toward(wi), stats))
+        return true;
+    z.truncate(last + 1);
+    return false;
+}
+
 template bool extend<TransportMode::Radiance>(const Scene&, Sampler&, const WalkOptions&,
                                               const TechniqueCounts&, SubPath&, RenderStats&);
 template bool extend<TransportMode::Importance>(const Scene&, Sampler&, const WalkOptions&,

@@ -54,4 +54,9 @@ template <TransportMode mode>
 bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options,
             const TechniqueCounts& counts, SubPath& path, RenderStats& stats);
 
+/// Appends the surface that an eye path meets from its last vertex along `wi`, which has not been sampled: with throughput
+/// `beta`, fit for its radiance, but not for weights. False where it leaves the scene.
+bool look_along(const Scene& scene, Sampler& sampler, Vec3 wi, Rgb beta, SubPath& z,
+                RenderStats& stats);
+
 }  // namespace etendue

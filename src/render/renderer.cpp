@@ -109,18 +109,18 @@ Renderer::~Renderer() = default;
 
 void Renderer::pass(uint32_t index) {
     const uint64_t pixels = scene_.film().pixel_count();
-    const uint64_t light_paths = integrator_->traces_light_paths() ? pixels : 0;
+    const uint64_t light_paths = integrator_->light_paths(pixels);
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
-    const uint64_t chunks = (pixels + kChunk - 1) / kChunk;
     film_.begin_pass(light_paths);
-    // Calls use(chunk, context, work, sink) for every sample of the pass.
-    const auto for_each_sample = [&](const auto& use) {
-        tbb::parallel_for(uint64_t(0), chunks, [&](uint64_t chunk) {
+    const auto chunks = [](uint64_t samples) { return (samples + kChunk - 1) / kChunk; };
+    // Calls use(chunk, context, work, sink) for the samples 0 … count-1 of the pass.
+    const auto for_each_sample = [&](uint64_t count, const auto& use) {
+        tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
             Workspace& work = workers_->spaces.local();
             work.is_observed = settings_.observer != nullptr;
             Sampler sampler(settings_.sampler, settings_.seed);
             FilmSink sink(film_, techniques_.get(), settings_.observer, splat_scale, work);
-            const uint64_t end = std::min(pixels, (chunk + 1) * kChunk);
+            const uint64_t end = std::min(count, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
                 sampler.start(index, pixel);
                 use(chunk,
@@ -130,16 +130,19 @@ void Renderer::pass(uint32_t index) {
         });
     };
     workers_->arena.execute([&] {
-        integrator_->begin_pass({scene_, index, light_paths, chunks, stats_, [&](const auto& use) {
-                                     for_each_sample([&](uint64_t chunk, const SampleContext& c,
-                                                         Workspace& work,
-                                                         FilmSink&) { use(chunk, c, work); });
-                                 }});
-        for_each_sample([&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {
-            sink.begin(c.pixel);
-            integrator_->sample(c, work);
-            sink.end();
-        });
+        integrator_->begin_pass(
+            {scene_, index, light_paths, pixels, stats_,
+             [&](uint64_t count, const PassContext::Use& use) {
+                 for_each_sample(count, [&](uint64_t chunk, const SampleContext& c, Workspace& work,
+                                            FilmSink&) { use(chunk, c, work); });
+             },
+             chunks});
+        for_each_sample(pixels,
+                        [&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {
+                            sink.begin(c.pixel);
+                            integrator_->sample(c, work);
+                            sink.end();
+                        });
         film_.end_pass();
         if (techniques_) techniques_->end_pass();
     });

@@ -330,6 +330,7 @@ private:
             e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);
             powers.push_back(e->power());
             if (e->is_infinite() && !e->is_delta()) scene_.infinite_.push_back(e.get());
+            scene_.has_delta_emitters_ |= e->is_delta();
         }
         scene_.selection_ = AliasTable(powers);
         for (size_t i = 0; i < powers.size() && !scene_.selection_.empty(); ++i)

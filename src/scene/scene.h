@@ -77,6 +77,8 @@ public:
     }
     bool has_emitters() const { return !selection_.empty(); }
     bool has_emitter_choice() const { return emitters_.size() > 1; }
+    /// Whether some emitter can never be hit.
+    bool has_delta_emitters() const { return has_delta_emitters_; }
 
     const Sensor& sensor() const { return *sensor_; }
     const FilmGeometry& film() const { return film_; }
@@ -122,6 +124,7 @@ private:
     RenderDefaults defaults_;
     Bounds3 bounds_;
     bool has_masks_ = false;
+    bool has_delta_emitters_ = false;
     std::vector<std::string> warnings_;
     Statistics statistics_;
 };

@@ -152,9 +152,12 @@ Run Runner::render_run(const IntegratorSpec& spec, uint64_t stream, uint64_t run
 
 Series Runner::render(const IntegratorSpec& spec, uint64_t stream) const {
     const auto integrator = make_integrator(spec);
+    if (!integrator->keeps_paths())
+        throw std::runtime_error(fmt::format(
+            "{} cannot be verified: its photons do not keep their paths; use compare", spec.name));
     Series series;
-    series.counts = integrator->counts(
-        scene_, integrator->traces_light_paths() ? scene_.film().pixel_count() : 0);
+    series.counts =
+        integrator->counts(scene_, integrator->light_paths(scene_.film().pixel_count()));
     series.estimator = integrator->estimator();
     series.spp = choose_spp(spec, stream);
     series.runs.resize(size_t(options_.runs));

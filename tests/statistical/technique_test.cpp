@@ -17,6 +17,7 @@ constexpr int kSize = 8, kLongest = 6;
 
 struct TechniqueCase {
     const char *name, *sensor, *integrator;
+    int min_pair_edges = 0;  ///< Of the paths that are made from pairs; 0: none.
 };
 
 class Techniques : public ::testing::TestWithParam<TechniqueCase> {
@@ -76,9 +77,10 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         while (m.count() < kRuns) m.add(0);
     const bool lens = scene.sensor().has_finite_lens();
     size_t expected_count = 0;
-    const bool gathers = GetParam().integrator[0] == 'u';
+    const int pairs_from = GetParam().min_pair_edges;
     for (int k = 1; k <= kLongest; ++k)
-        expected_count += size_t(k + 1 + lens) + (gathers && k >= 3 ? size_t(k - 1) : 0);
+        expected_count +=
+            size_t(k + 1 + lens) + (pairs_from > 0 && k >= pairs_from ? size_t(k - 1) : 0);
     EXPECT_EQ(alone.size(), expected_count) << "a technique made nothing";
     const double level = sidak(0.01, int(alone.size() + together.size()));
     // Few light paths meet the lens.
@@ -100,12 +102,15 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         expect_mean(m, length, false, fmt::format("length {}, weighted", length));
 }
 
-INSTANTIATE_TEST_SUITE_P(Sensors, Techniques,
-                         ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
-                                           TechniqueCase{"thinlens", "thinlens", "bdpt:"},
-                                           TechniqueCase{"gathers", "perspective",
-                                                         "upg+bdpt:radius=0.2,"}),
-                         [](const auto& p) { return std::string(p.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Sensors, Techniques,
+    ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
+                      TechniqueCase{"thinlens", "thinlens", "bdpt:"},
+                      TechniqueCase{"gathers", "perspective", "upg+bdpt:radius=0.2,", 3},
+                      TechniqueCase{"merges", "perspective", "vcm:radius=0.2,", 2},
+                      TechniqueCase{"exact_merges", "perspective", "vcm:exact=true,radius=0.2,",
+                                    2}),
+    [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace
 }  // namespace etendue::test

@@ -157,6 +157,50 @@ protected:
         tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
     }
 
+    /// z_{t-1} as if the light path had found it too, from y_{s-2}: where the two coincide a merge is its definition.
+    void check_merge(int s, int t) {
+        const Vertex &b = z[t - 1], &from = y[s - 2];
+        if (!b.may_connect || !from.may_connect) return;
+        SubPath merged;
+        for (int i = 0; i < s - 1; ++i) merged.append() = y[i];
+        merged[s - 2].is_delta = false;
+        Vertex& a = merged.append();
+        a = b;
+        a.wo = from.is_infinite ? from.p : normalize(from.p - b.p);
+        if (s == 2) {
+            const Emitter::Emission e = from.emitter->eval_emission(from.ng, from.uv, -a.wo);
+            if (e.Le_cos.is_zero()) return;
+            a.beta = from.beta * e.Le_cos / e.pdf_d;
+            a.pdf_fwd = to_area(e.pdf_d, from, b);
+            a.next_event_ratio = next_event_ratio(from, -a.wo);
+            a.weight_sum = 0;
+        } else {
+            const BsdfEval f = from.bsdf.eval(from.wo, -a.wo, TransportMode::Importance);
+            if (f.f.is_zero()) return;
+            a.beta = from.beta * f.f / f.pdf;
+            a.pdf_fwd = to_area(f.pdf, from, b);
+            merged[s - 3].pdf_rev = f.pdf_rev * from.to_predecessor;
+            a.weight_sum = level_sum<Side::Light>(merged, s - 3, merged[s - 2].weight_sum, counts);
+        }
+        a.to_predecessor = from.is_infinite ? 1.0f
+                                            : (from.has_cosine ? abs_dot(from.ng, a.wo) : 1.0f) /
+                                                  length2(from.p - a.p);
+        const auto j = join_merge(merged, s, z, t, counts);
+        if (!j) return;
+        const auto x = path_vertices(merged, s, z, t - 1);
+        for (size_t i = 0; i < x.size(); ++i)
+            if (i != size_t(s - 1) && x[i]->is_delta) return;
+        const PathValue value = evaluate_path(scene, x, std::vector<bool>(x.size(), false));
+        const double p = density_of(merged, s) * density_of(z, t) * double(counts.disc);
+        Tally& tally = tallies[Strategy::Merge];
+        for (int c = 0; c < 3; ++c)
+            if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);
+        tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
+        // The same flux without its path.
+        const auto alone = join_photon({a.p, a.wo, a.beta, y[0].emitter, s}, z, t, counts.disc);
+        EXPECT_EQ(alone->contribution.g, j->contribution.g);
+    }
+
     /// Rays start a little off their surface, so on short edges the walk's directions differ from those between the stored
     /// points: a few comparisons deviate by more than rounding. A wrong factor makes all of its strategy deviate.
     struct Tally {
@@ -192,6 +236,8 @@ TEST_P(Joins, EqualTheDefinition) {
                     check(*j, path_vertices(y, s, z, t), density_of(y, s) * density_of(z, t));
         for (int s = 2; s <= y.size() && counts.gather > 0; ++s)
             for (int t = 2; t <= z.size(); ++t) check_gather(s, t);
+        for (int s = 2; s <= y.size() && counts.merge > 0; ++s)
+            for (int t = 2; t <= z.size(); ++t) check_merge(s, t);
         for (int t = 2; t <= z.size(); ++t)
             for_each_hit(scene, z, t, counts, [&](const Join& j) {
                 Vertex x0 = z[t - 1];
@@ -219,6 +265,7 @@ TEST_P(Joins, EqualTheDefinition) {
     }
     EXPECT_GT(checked, 500);
     EXPECT_GE(tallies.size(), 3u);
+    EXPECT_EQ(tallies.count(Strategy::Merge) > 0, counts.merge > 0);
     for (const auto& [strategy, tally] : tallies)
         EXPECT_LT(tally.deviating, 0.03 * tally.compared)
             << "strategy " << int(strategy) << ", " << tally.compared << " comparisons";

@@ -1,0 +1,69 @@
+#pragma once
+// The gather of a pair: one of its vertices dropped, the other joined to the dropped one's predecessor.
+
+#include "integrator/photons.h"
+#include "pathspace/reciprocal.h"
+
+namespace etendue {
+
+/// U(s,t) of the eye sub-path work.z and the light vertices near its last vertex.
+struct Gather {
+    const SampleContext& c;
+    const Bidirectional& paths;
+    const Photons& photons;
+    const TechniqueCounts& n;
+    float flatness;  ///< Half the height of a neighbourhood over its radius.
+    Workspace& work;
+
+    /// Of the pair of `vertex` and z_{t-1}, which lie within the radius. `reciprocal(event, join)` is r, an estimate of
+    /// 1/p_c; it is asked last, with the sampler at numbers that belong to this technique of the pair alone.
+    template <class Reciprocal>
+    void operator()(int t, uint32_t vertex, const Reciprocal& reciprocal) const {
+        const int s = photons.paths().depth(vertex) + 1, edges = s + t - 2;
+        const float rate = n.gathers(edges) / n.gather;
+        if (edges > paths.max_depth() || !(rate > 0)) return;
+        const uint32_t number = uint32_t(hash_combine(vertex, uint64_t(t)));
+        if (rate < 1) {
+            c.sampler.seek(Stream::Roulette, number + 1);
+            if (!(c.sampler.next_1d_unstructured() < rate)) return;
+        }
+        const Vertex& last = work.z[t - 2];
+        const uint8_t before = photons.paths().gloss_before(vertex),
+                      after = gloss(last, last.is_delta);
+        for (const bool eye : {true, false})
+            if (drops(n.pair_rule, eye, before, after))
+                join({Strategy::Gather, s, t, eye}, vertex, number + eye, rate, reciprocal);
+    }
+
+private:
+    template <class Reciprocal>
+    void join(const Technique& q, uint32_t vertex, uint32_t number, float rate,
+              const Reciprocal& reciprocal) const {
+        const SubPath& z = work.z;
+        SubPath& y = work.pair;
+        const LightPaths& light = photons.paths();
+        const auto near = [&](const Vertex& kept) {
+            return Neighbourhood{kept.p, kept.ng, photons.radius(), flatness * photons.radius()};
+        };
+        const bool eye = q.drops_eye;
+        if (!eye && !near(z[q.t - 1]).contains(light.vertices()[vertex].p)) return;
+        light.restore_first(c.scene, vertex, eye ? q.s : q.s - 1, work.is_observed, y);
+        if (eye && !near(y[q.s - 1]).contains(z[q.t - 1].p)) return;
+        ++work.stats.pairs;
+        const auto j = join_gather(c.scene, y, q.s, z, q.t, eye, n);
+        if (!j) return;
+        const float scale = std::fabs(z.film_weight) * c.splat_scale / rate;
+        const auto value = paths.test(c, *j, scale / j->found, number, work);
+        if (!value) return;
+        ++work.stats.visible_pairs;
+        c.sampler.seek(Stream::Auxiliary, number);
+        const PairEvent event{.from = eye ? z[q.t - 2] : y[q.s - 2],
+                              .mode = eye ? TransportMode::Radiance : TransportMode::Importance,
+                              .u_emission = y.u_emission,
+                              .near = near(eye ? y[q.s - 1] : z[q.t - 1])};
+        const double r = reciprocal(event, *j);
+        c.sink.add(*j, *value * (float(r) * c.splat_scale / rate));
+    }
+};
+
+}  // namespace etendue

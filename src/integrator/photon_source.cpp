@@ -1,0 +1,35 @@
+#include "integrator/photon_source.h"
+
+#include "integrator/photons.h"
+
+namespace etendue {
+
+std::vector<MapPhoton> TracedPhotons::trace(const PassContext& pass) {
+    std::vector<std::vector<MapPhoton>> chunks(pass.chunks(pass.light_paths));
+    // A photon is in a chunk, among all, may be among the caustics, and has a leaf in each tree.
+    constexpr uint64_t kPhotonBytes = 3 * sizeof(MapPhoton) + 32;
+    PhotonMemory memory(max_bytes_);
+    pass.for_each_light_path([&](uint64_t chunk, const SampleContext& c, Workspace& work) {
+        const SubPath& y = work.y;
+        mapping_.paths().light_path(c, {}, work);
+        memory.take(uint64_t(y.size()) * kPhotonBytes);
+        bool by_delta = y.size() > 0 && y[0].emitter->is_delta(), by_glossy = true;
+        for (int i = 1; i < y.size(); ++i) {
+            const Vertex& v = y[i];
+            using Origin = MapPhoton::Origin;
+            const Origin origin = i == 1 || !by_glossy ? Origin::Any
+                                  : by_delta           ? Origin::DeltaCaustic
+                                                       : Origin::Caustic;
+            if (v.may_connect && (mapping_.is_diffuse(v) || origin == Origin::DeltaCaustic))
+                chunks[chunk].push_back(
+                    {{v.p, v.wo, v.beta * c.splat_scale, y[0].emitter, i + 1}, origin});
+            by_delta &= v.is_delta;
+            by_glossy &= v.is_delta || !mapping_.is_diffuse(v);
+        }
+    });
+    std::vector<MapPhoton> photons;
+    for (const auto& chunk : chunks) photons.insert(photons.end(), chunk.begin(), chunk.end());
+    return photons;
+}
+
+}  // namespace etendue

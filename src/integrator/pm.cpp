@@ -1,0 +1,269 @@
+// Photon mapping [Jensen 2001]: photons are traced once, and the eye path's first vertex that is diffuse enough gets
+// direct light by next event, caustics by the density of the photons of a caustic map, and all other light by final
+// gather rays, which end at the first diffuse vertex and estimate the density of all photons there. On surfaces that are
+// diffuse alone an irradiance cache, filled before the samples of a pass, may stand for most of the gather rays.
+//
+// Techniques: M(s,t), and hits and next events, each path by one of them (see photon_mapping.h). Biased: density
+// estimates blur light over the radius of the nearest photons, which does not shrink.
+
+#include "integrator/pm.h"
+
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "integrator/irradiance_cache.h"
+#include "integrator/photon_source.h"
+#include "integrator/photons.h"
+
+namespace etendue {
+namespace {
+
+int checked(const IntegratorParams& p, const char* name, int low, int high) {
+    const int value = p.integer(name);
+    if (value < low || value > high)
+        throw std::runtime_error(fmt::format("{}: {} must lie in [{}, {}], but is {}",
+                                             p.integrator(), name, low, high, value));
+    return value;
+}
+
+/// Adds up what comes from one direction.
+class RadianceSum final : public ContributionSink {
+public:
+    void add(const Join& join, Rgb contribution) override {
+        sum_ += contribution * join.mis_weight;
+    }
+    Rgb sum() const { return sum_; }
+
+private:
+    Rgb sum_;
+};
+
+class PmIntegrator final : public Integrator {
+public:
+    explicit PmIntegrator(const IntegratorParams& p)
+        : mapping_(p, true), source_(std::make_unique<TracedPhotons>(mapping_, photon_memory(p))),
+          light_paths_(uint64_t(checked(p, "light_paths", 1, 1 << 30))),
+          nearest_(checked(p, "nearest", 2, PhotonMap::kMostNeighbours)),
+          gather_rays_(checked(p, "gather_rays", 0, 1 << 20)), radius_(p.number("radius")),
+          retrace_(p.flag("retrace")), cache_error_(p.number("cache_error")),
+          cache_rays_(checked(p, "cache_rays", 16, 1 << 20)) {
+        if (!(radius_ >= 0)) throw std::runtime_error("pm: radius must not be negative");
+        if (!(cache_error_ >= 0 && cache_error_ <= 1))
+            throw std::runtime_error("pm: cache_error must lie in [0, 1]");
+        if (cache_error_ > 0 && p.integer("max_depth") >= 0)
+            throw std::runtime_error(
+                "pm: an irradiance cache holds paths of all lengths: expected max_depth=-1");
+        if (cache_error_ > 0 && gather_rays_ == 0)
+            throw std::runtime_error("pm: an irradiance cache needs gather_rays");
+    }
+
+    void begin_pass(const PassContext& pass) override {
+        pass_ = pass.index;
+        max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();
+        if (pass.index > 0 && !retrace_) return;
+        std::vector<MapPhoton> all = source_->trace(pass), caustic;
+        for (const MapPhoton& photon : all)
+            if (photon.is_caustic()) caustic.push_back(photon);
+        global_.build(std::move(all));
+        caustic_.build(std::move(caustic));
+        if (cache_error_ > 0) fill_cache(pass);
+    }
+
+    void sample(const SampleContext& c, Workspace& work) const override {
+        Sampler of_walk = c.sampler;
+        mapping_.eye_path(c, of_walk, work, [&](int t, bool is_diffuse) {
+            if (!is_diffuse) {
+                if (c.scene.has_delta_emitters())
+                    estimate(c, caustic_, t, 1, work.z, [](const MapPhoton& photon) {
+                        return photon.origin == MapPhoton::Origin::DeltaCaustic;
+                    });
+            } else if (gather_rays_ == 0) {
+                estimate(c, global_, t, 1, work.z,
+                         [](const MapPhoton& photon) { return photon.s > 2; });
+            } else {
+                estimate(c, caustic_, t, 1, work.z, [](const MapPhoton&) { return true; });
+                if (!add_cached(c, t, work.z)) final_gather(c, t, work);
+            }
+        });
+    }
+
+    TechniqueCounts counts(const Scene&, uint64_t light_paths) const override {
+        TechniqueCounts n = mapping_.counts();
+        n.merge = float(light_paths);
+        return n;
+    }
+    bool traces_light_paths() const override { return true; }
+    uint64_t light_paths(uint64_t) const override { return light_paths_; }
+    bool keeps_paths() const override { return false; }
+    Estimator estimator() const override { return Estimator::Biased; }
+
+    static constexpr float kDefaultRadius = 0.03f;
+
+private:
+    /// Density estimate at z_{t-1} from the photons that `use` accepts. Their surfaces may face another way: in a corner
+    /// the photons of one wall stand for those that the disc of the other lacks.
+    template <class Use>
+    void estimate(const SampleContext& c, const PhotonMap& map, int t, float scale,
+                  const SubPath& z, const Use& use) const {
+        PhotonMap::Neighbours near;
+        map.find(z[t - 1].p, nearest_, max_radius_, near);
+        for (int i = 0; i < near.count; ++i) {
+            const MapPhoton& photon = map.photons()[near.index[size_t(i)]];
+            if (photon.s + t - 2 > mapping_.paths().max_depth() || !use(photon)) continue;
+            if (const auto j = join_photon(photon, z, t, near.disc))
+                c.sink.add(*j, j->contribution * scale);
+        }
+    }
+
+    /// Goes on from z_{t-1}, which a gather ray met, to the first diffuse vertex, and adds what all photons bring there.
+    /// What comes straight from emitters is that of next events, what comes from them over surfaces that are not diffuse
+    /// that of the caustic map.
+    void end_gather_ray(const SampleContext& c, int t, float scale, Workspace& work) const {
+        const SubPath& z = work.z;
+        mapping_.paths().go_on(c, {}, work, t, [&](int u) {
+            if (!mapping_.is_diffuse(z[u - 1])) return Onward::ByAnyEvent;
+            estimate(c, global_, u, scale, z, [](const MapPhoton&) { return true; });
+            return PhotonMapping::after_photons(z[u - 1]);
+        });
+    }
+
+    /// Light that reaches z_{t-1} from another diffuse surface.
+    void final_gather(const SampleContext& c, int t, Workspace& work) const {
+        SubPath& z = work.z;
+        const float eta2 = z.eta2;
+        for (int ray = 0; ray < gather_rays_; ++ray) {
+            // A sample of its own; the rays of all passes are successive points of one sequence.
+            Sampler of_ray = c.sampler;
+            of_ray.start(pass_ * uint32_t(gather_rays_) + uint32_t(ray),
+                         hash_combine(c.pixel, uint64_t(t)));
+            const SampleContext gather{c.scene,       c.film, c.pixel, c.light_paths,
+                                       c.splat_scale, of_ray, c.sink};
+            mapping_.paths().step(gather, {}, work);
+            if (!z[t - 1].is_delta) end_gather_ray(gather, t + 1, 1 / float(gather_rays_), work);
+            z.truncate(t);
+            z.eta2 = eta2;
+        }
+    }
+
+    /// The normal at which a cache may serve v.
+    static std::optional<Vec3> cache_normal(const Vertex& v) {
+        const auto n = v.bsdf.diffuse_normal();
+        return n && dot(v.wo, *n) > 0 ? n : std::nullopt;
+    }
+
+    /// Records where the eye paths of ever more pixels find none; by levels, so that those of one level do not depend on
+    /// each other, whichever thread makes them.
+    void fill_cache(const PassContext& pass) {
+        constexpr uint32_t kCoarsest = 16, kFinest = 2;
+        const float size = pass.scene.bounds().radius();
+        cache_.reset(cache_error_, 0.01f * size, 0.5f * size);
+        const uint64_t width = uint64_t(pass.scene.film().crop_width);
+        std::vector<std::vector<IrradianceRecord>> chunks(pass.chunks(pass.pixels));
+        for (uint32_t spacing = kCoarsest; spacing >= kFinest; spacing /= 2) {
+            for (auto& chunk : chunks) chunk.clear();
+            pass.for_each_sample(
+                pass.pixels, [&](uint64_t chunk, const SampleContext& c, Workspace& work) {
+                    if (c.pixel % width % spacing != 0 || c.pixel / width % spacing != 0) return;
+                    mapping_.paths().eye_path(c, {}, work, [&](int t) {
+                        const Vertex& v = work.z[t - 1];
+                        if (!mapping_.is_diffuse(v)) return Onward::ByAnyEvent;
+                        const auto n = cache_normal(v);
+                        if (n && !cache_.find(v.p, *n))
+                            chunks[chunk].push_back(record(c, t, *n, work));
+                        return PhotonMapping::after_photons(v);
+                    });
+                });
+            std::vector<IrradianceRecord> records;
+            for (const auto& chunk : chunks)
+                records.insert(records.end(), chunk.begin(), chunk.end());
+            cache_.add(records);
+        }
+    }
+
+    /// Of the light of final_gather() at z_{t-1}.
+    IrradianceRecord record(const SampleContext& c, int t, Vec3 n, Workspace& work) const {
+        SubPath& z = work.z;
+        const float eta2 = z.eta2;
+        Sampler of_cells = c.sampler, of_ray = c.sampler;
+        of_cells.seek(Stream::Auxiliary, uint32_t(t));
+        uint32_t ray = 0;
+        const auto radiance = [&](Vec3 d) -> IncidentRadiance {
+            const Vertex& v = z[t - 1];
+            if (!(dot(d, v.ng) * dot(v.wo, v.ng) > 0)) return {};
+            RadianceSum sum;
+            of_ray.start(ray++, hash_combine(c.pixel, uint64_t(t)));
+            const SampleContext gather{c.scene,       c.film, c.pixel, c.light_paths,
+                                       c.splat_scale, of_ray, sum};
+            if (!look_along(c.scene, of_ray, d, Rgb(1), z, work.stats)) return {};
+            const float distance = length(z[t].p - z[t - 1].p);
+            end_gather_ray(gather, t + 1, 1, work);
+            z.truncate(t);
+            z.eta2 = eta2;
+            return {sum.sum(), distance};
+        };
+        return measure_irradiance(z[t - 1].p, n, cache_rays_, of_cells, radiance);
+    }
+
+    /// Adds what the cache knows of the light of final_gather(), if it does.
+    bool add_cached(const SampleContext& c, int t, const SubPath& z) const {
+        if (cache_.size() == 0) return false;
+        const Vertex& v = z[t - 1];
+        const auto n = cache_normal(v);
+        if (!n) return false;
+        const auto E = cache_.find(v.p, *n);
+        if (!E) return false;
+        // Filed under the shortest paths that it holds.
+        c.sink.add({.technique = {Strategy::Merge, 3, t},
+                    .emitter = nullptr,
+                    .contribution = {},
+                    .mis_weight = 1,
+                    .film = z.film},
+                   v.beta * v.bsdf.eval(v.wo, *n, TransportMode::Radiance).f * *E);
+        return true;
+    }
+
+    PhotonMapping mapping_;
+    std::unique_ptr<PhotonSource> source_;
+    uint64_t light_paths_;
+    int nearest_, gather_rays_;
+    float radius_, max_radius_ = 0;
+    bool retrace_;
+    float cache_error_;
+    int cache_rays_;
+    uint32_t pass_ = 0;
+    IrradianceCache cache_;
+    PhotonMap global_, caustic_;
+};
+
+}  // namespace
+
+IntegratorEntry pm_entry() {
+    std::vector<ParamInfo> params = PhotonMapping::params();
+    params.push_back(
+        {"light_paths", ParamKind::Int, "500000", "Light paths whose photons are kept."});
+    params.push_back(memory_param());
+    params.push_back(
+        {"retrace", ParamKind::Bool, "false",
+         "Whether every pass traces photons of its own; else all use the first pass's."});
+    params.push_back({"nearest", ParamKind::Int, "60",
+                      "Photons of a density estimate; the farthest tells the radius."});
+    params.push_back(
+        {"radius", ParamKind::Float, "0",
+         "Largest radius of a density estimate, in scene units; 0: 3 % of the radius of "
+         "the scene's bounds."});
+    params.push_back({"gather_rays", ParamKind::Int, "16",
+                      "Final gather rays of an eye path in a pass; 0: photons are seen directly."});
+    params.push_back(
+        {"cache_error", ParamKind::Float, "0",
+         "Error that the irradiance cache allows (a of Ward et al., 0.1 to 0.4); 0: no "
+         "cache."});
+    params.push_back(
+        {"cache_rays", ParamKind::Int, "256", "Final gather rays of a record of the cache."});
+    return {{"integrator", "pm", "Photon mapping with final gathering. Biased.", params},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                return std::make_unique<PmIntegrator>(p);
+            }};
+}
+
+}  // namespace etendue
