@@ -381,8 +381,8 @@ TechniqueReport compare_technique(const Technique& q, const Series& method,
     Found all;
     for (const auto& [c, f] : found) {
         if (!can_make(reference.counts, c)) continue;
-        if (std::min(f.alone.effective_count(), f.expected.effective_count()) <
-            kEnoughContributions)
+        if (f.alone.effective_count() < kEnoughAlone ||
+            f.expected.effective_count() < kEnoughContributions)
             continue;
         classes.insert(c);
         all.alone += f.alone, all.expected += f.expected;

@@ -54,6 +54,8 @@ struct Comparison {
     double detectable(double level) const;
 };
 inline constexpr double kEnoughContributions = 200;
+/// The same of a technique alone, whose values have longer tails than weights leave them.
+inline constexpr double kEnoughAlone = 4000;
 /// Shares of the light: where more than these comes too rarely for a test, other tests lack rare contributions, too, and
 /// cannot be relied on: those of all tiles; the verdict.
 inline constexpr double kTooMuchUntested = 0.05, kTooMuchTooRare = 0.1;
