@@ -15,7 +15,8 @@ public:
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, c.light_paths);
         paths_.light_path(c, counts, work);
-        paths_.eye_path(c, counts, work, [](int) {});
+        paths_.eye_path(c, counts, work,
+                        [&](int t) { paths_.connect_to_own(c, counts, t, work); });
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {

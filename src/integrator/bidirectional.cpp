@@ -35,6 +35,14 @@ void Bidirectional::light_path(const SampleContext& c, const TechniqueCounts& co
     }
 }
 
+void Bidirectional::connect_to_own(const SampleContext& c, const TechniqueCounts& counts, int t,
+                                   Workspace& work) const {
+    if (!(counts.connect > 0)) return;
+    const int longest = std::min(work.y.size(), depth_.max_depth + 1 - t);
+    for (int s = 2; s <= longest; ++s)
+        add_if_visible(c, join_connect(c.scene, work.y, s, work.z, t, counts), work);
+}
+
 std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, float scale,
                                        uint32_t number, Workspace& work) const {
     Rgb contribution = j.contribution;

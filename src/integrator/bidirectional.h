@@ -26,29 +26,40 @@ public:
     /// The light sub-path work.y, with its techniques t ≤ 1.
     void light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
 
-    /// The eye sub-path work.z with its techniques t ≥ 2, connected to work.y. `at_vertex(t)` is called for every
-    /// z_{t-1} that may be joined, while it is the last.
+    /// The eye sub-path `z`; `at_vertex(t)` is called for every z_{t-1}, t ≥ 2, while it is the last.
     template <class AtVertex>
-    void eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                  const AtVertex& at_vertex) const {
-        SubPath &y = work.y, &z = work.z;
-        start_eye_path(c.scene, c.film, c.pixel, c.sampler, z, work.stats);
+    void walk_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sampler& sampler,
+                       const TechniqueCounts& counts, SubPath& z, RenderStats& stats,
+                       const AtVertex& at_vertex) const {
+        start_eye_path(scene, film, pixel, sampler, z, stats);
         const WalkOptions walk = depth_.walk();
         for (int t = 2; t <= z.size(); ++t) {
+            at_vertex(t);
+            if (t > depth_.max_depth) break;
+            extend<TransportMode::Radiance>(scene, sampler, walk, counts, z, stats);
+        }
+    }
+
+    /// The eye sub-path work.z with its hits and next events. `join(t)` is called for every z_{t-1} that may be joined
+    /// to light vertices, while it is the last.
+    template <class JoinVertex>
+    void eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
+                  const JoinVertex& join) const {
+        const SubPath& z = work.z;
+        walk_eye_path(c.scene, c.film, c.pixel, c.sampler, counts, work.z, work.stats, [&](int t) {
             if (counts.hit > 0)
                 for_each_hit(c.scene, z, t, counts,
                              [&](const Join& j) { c.sink.add(j, j.contribution); });
-            if (z[t - 1].may_connect) at_vertex(t);
-            if (t > depth_.max_depth) break;
-            if (z[t - 1].may_connect && counts.connect > 0) {
+            if (!z[t - 1].may_connect) return;
+            join(t);
+            if (counts.next_event > 0 && t <= depth_.max_depth)
                 add_if_visible(c, join_next_event(c.scene, z, t, c.sampler, counts), work);
-                const int longest = std::min(y.size(), depth_.max_depth + 1 - t);
-                for (int s = 2; s <= longest; ++s)
-                    add_if_visible(c, join_connect(c.scene, y, s, z, t, counts), work);
-            }
-            extend<TransportMode::Radiance>(c.scene, c.sampler, walk, counts, z, work.stats);
-        }
+        });
     }
+
+    /// Connects z_{t-1} to all vertices of work.y but y_0.
+    void connect_to_own(const SampleContext& c, const TechniqueCounts& counts, int t,
+                        Workspace& work) const;
 
     /// What is left of a join's contribution after the roulette and the shadow ray; nothing where they end it. A unit of
     /// contribution adds `scale` to its pixel; `number` tells joins of one sample apart.

@@ -22,6 +22,7 @@ struct Workspace {
     SubPath y, z;
     SubPath pair;  ///< The other path of a pair of vertices.
     Vertex scratch;
+    std::vector<float> masses;  ///< Of light vertices, seen from one eye vertex.
     bool is_observed = false;  ///< Whole sub-paths are read, not only what joins need of them.
     RenderStats stats;
 };
@@ -40,6 +41,7 @@ struct SampleContext {
 /// What an integrator may do before the samples of a pass.
 struct PassContext {
     const Scene& scene;
+    const Film& film;
     uint32_t index;        ///< Of the pass, from 0.
     uint64_t light_paths;  ///< N_L.
     uint64_t chunks;
@@ -48,6 +50,10 @@ struct PassContext {
     /// Only splats may be added.
     using Use = std::function<void(uint64_t, const SampleContext&, Workspace&)>;
     std::function<void(const Use& use)> for_each_light_path;
+    /// Calls `task(i, sampler, work)` for i < count in parallel: paths that bring nothing to the film. The task starts the
+    /// sampler; paths from the number of pixels on have numbers of their own.
+    using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;
+    std::function<void(uint64_t count, const Task& task)> for_each_other_path;
 };
 
 class Integrator {
@@ -62,6 +68,8 @@ public:
     /// Light paths per pixel in one pass: 0 or 1.
     virtual bool traces_light_paths() const = 0;
     virtual Estimator estimator() const = 0;
+    /// What a run tells of the integrator's own structures, by name; as of the last pass.
+    virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
 
 /// The text after an integrator's name: `bdpt:max_depth=12,rr_depth=5`. Checked against the integrator's table.
@@ -97,6 +105,9 @@ public:
         }
         refuse_choice(name, known);
     }
+    /// As integer() and number(), within [low, high].
+    int integer(const char* name, int low, int high) const;
+    float number(const char* name, float low, float high) const;
     const std::string& integrator() const { return integrator_; }
 
 private:

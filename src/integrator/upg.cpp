@@ -59,6 +59,7 @@ public:
         const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
         photons_.paths().restore(c.scene, c.pixel, work.y);
         paths_.eye_path(c, n, work, [&](int t) {
+            paths_.connect_to_own(c, n, t, work);
             photons_.for_each_near(work.z[t - 1].p,
                                    [&](uint32_t vertex) { gather(c, n, t, vertex, work); });
         });

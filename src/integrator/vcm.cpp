@@ -33,7 +33,8 @@ public:
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
         photons_.paths().restore(c.scene, c.pixel, work.y);
-        const auto merge = [&](int t) {
+        const auto join = [&](int t) {
+            paths_.connect_to_own(c, n, t, work);
             if (!merges_) return;
             photons_.for_each_near(work.z[t - 1].p, [&](uint32_t vertex) {
                 const int s = photons_.paths().depth(vertex) + 1;
@@ -43,7 +44,7 @@ public:
                     c.sink.add(*j, j->contribution * c.splat_scale);
             });
         };
-        paths_.eye_path(c, n, work, merge);
+        paths_.eye_path(c, n, work, join);
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {

@@ -130,11 +130,24 @@ void Renderer::pass(uint32_t index) {
         });
     };
     workers_->arena.execute([&] {
-        integrator_->begin_pass({scene_, index, light_paths, chunks, stats_, [&](const auto& use) {
-                                     for_each_sample([&](uint64_t chunk, const SampleContext& c,
-                                                         Workspace& work,
-                                                         FilmSink&) { use(chunk, c, work); });
-                                 }});
+        integrator_->begin_pass(
+            {.scene = scene_,
+             .film = film_,
+             .index = index,
+             .light_paths = light_paths,
+             .chunks = chunks,
+             .for_each_light_path =
+                 [&](const auto& use) {
+                     for_each_sample([&](uint64_t chunk, const SampleContext& c, Workspace& work,
+                                         FilmSink&) { use(chunk, c, work); });
+                 },
+             .for_each_other_path =
+                 [&](uint64_t count, const auto& task) {
+                     tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                         Sampler sampler(settings_.sampler, settings_.seed);
+                         task(i, sampler, workers_->spaces.local());
+                     });
+                 }});
         for_each_sample([&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {
             sink.begin(c.pixel);
             integrator_->sample(c, work);

@@ -16,6 +16,7 @@ enum class Stream : uint8_t {
     Connection,  ///< Next event and lens points of splats; vertex = that of the sub-path.
     Roulette,    ///< Whether a join is evaluated; vertex = 2^16·s + t.
     Auxiliary,   ///< Loops of unbounded length.
+    Selection,   ///< Which light vertices an eye vertex is connected to; vertex = its own.
 };
 
 enum class SamplerKind : uint8_t {

@@ -76,6 +76,11 @@ std::vector<Planted> planted() {
         {"PdfOfEvaluation", softly_lit, "path", Techniques, 0, 256},
         {"PdfOfSampling", softly_lit, "path", Techniques, 0},
         {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques, 256},
+        {"PmfOfOneRecord", lit_room, "pcbpt:roulette=0,record_fraction=0.04", Image | Lengths, 0},
+        {"NoUniformShare", lit_room, "pcbpt:roulette=0,record_fraction=0.004,neighbours=1",
+         Image | Lengths, 0},
+        {"UniformDenominator", lit_room, "pcbpt:roulette=0,record_fraction=0.04", Image | Lengths,
+         0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
     };
 }

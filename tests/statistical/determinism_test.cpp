@@ -59,7 +59,7 @@ TEST_P(Determinism, OfThreadsAndSeeds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Integrators, Determinism,
-                         ::testing::Combine(::testing::Values("path", "light", "bdpt"),
+                         ::testing::Combine(::testing::Values("path", "light", "bdpt", "pcbpt"),
                                             ::testing::Values(SamplerKind::Independent,
                                                               SamplerKind::Sobol)),
                          [](const auto& p) {

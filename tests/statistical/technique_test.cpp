@@ -43,7 +43,7 @@ protected:
 TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
     const Scene scene = furnace(GetParam().sensor);
     constexpr int kRuns = 24;
-    std::map<std::tuple<bool, int, int>, Moments> alone;  // by (is it a pair, s, t)
+    std::map<std::tuple<Strategy, int, int>, Moments> alone;
     std::map<int, Moments> together;                      // by length
     for (int run = 0; run < kRuns; ++run) {
         RenderSettings settings;
@@ -60,7 +60,7 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         std::vector<Rgb> sum(scene.film().pixel_count());
         for (const TechniqueImages::Entry& e : renderer.techniques()->images()) {
             const Technique& q = e.technique;
-            Moments& m = alone[{is_pair(q.strategy), q.s, q.t}];
+            Moments& m = alone[{q.strategy, q.s, q.t}];
             while (m.count() < run) m.add(0);  // runs in which it made nothing
             m.add(mean(e.unweighted));
             length_sum[q.vertices() - 1] += mean(e.weighted);
@@ -76,9 +76,11 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         while (m.count() < kRuns) m.add(0);
     const bool lens = scene.sensor().has_finite_lens();
     size_t expected_count = 0;
-    const bool gathers = GetParam().integrator[0] == 'u';
+    const std::string integrator = GetParam().integrator;
+    const bool gathers = integrator.starts_with("upg"), both = integrator.find("both") != std::string::npos;
     for (int k = 1; k <= kLongest; ++k)
-        expected_count += size_t(k + 1 + lens) + (gathers && k >= 3 ? size_t(k - 1) : 0);
+        expected_count += size_t(k + 1 + lens) + (gathers && k >= 3 ? size_t(k - 1) : 0) +
+                          (both && k >= 2);
     EXPECT_EQ(alone.size(), expected_count) << "a technique made nothing";
     const double level = sidak(0.01, int(alone.size() + together.size()));
     // Few light paths meet the lens.
@@ -92,9 +94,9 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
             << what << ": too few samples";
     };
     for (const auto& [q, m] : alone) {
-        const auto [pair, s, t] = q;
-        expect_mean(m, s + t - 1 - pair, t == 0,
-                    fmt::format("{}s = {}, t = {}", pair ? "pair, " : "", s, t));
+        const auto [strategy, s, t] = q;
+        expect_mean(m, s + t - 1 - is_pair(strategy), t == 0,
+                    fmt::format("strategy {}, s = {}, t = {}", int(strategy), s, t));
     }
     for (const auto& [length, m] : together)
         expect_mean(m, length, false, fmt::format("length {}, weighted", length));
@@ -104,7 +106,14 @@ INSTANTIATE_TEST_SUITE_P(Sensors, Techniques,
                          ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
                                            TechniqueCase{"thinlens", "thinlens", "bdpt:"},
                                            TechniqueCase{"gathers", "perspective",
-                                                         "upg+bdpt:radius=0.2,"}),
+                                                         "upg+bdpt:radius=0.2,"},
+                                           TechniqueCase{"stored", "perspective", "pcbpt:"},
+                                           TechniqueCase{"stored_standard", "thinlens",
+                                                         "pcbpt:weights=standard,connections=10,"
+                                                         "light_paths=20,direct=both,"},
+                                           TechniqueCase{"stored_exact", "perspective",
+                                                         "pcbpt:cache=false,pmf=weighted,"
+                                                         "light_paths=10,direct=next_event,"}),
                          [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace
