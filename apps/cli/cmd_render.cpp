@@ -106,6 +106,12 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"mean_luminance", mean.mean},
         {"mean_luminance_standard_error", mean.standard_error},
     };
+    const PhaseSeconds& p = s.phases;
+    j["phase_seconds"] = {{"light_paths", p.light_paths},
+                          {"records", p.records},
+                          {"eye_paths", p.eye_paths - p.connections},
+                          {"connections", p.connections}};
+    for (const auto& [name, value] : r.integrator().figures()) j[name] = value;
     if (e.valid)
         j["relative_error"] = {
             {"estimate", e.relative_rms}, {"low_95", e.low}, {"high_95", e.high}};

@@ -28,6 +28,12 @@ struct FilmGeometry {
         return {float(crop_x + int(index % crop_width)) + 0.5f,
                 float(crop_y + int(index / crop_width)) + 0.5f};
     }
+    /// The crop's pixel that a film point lies in, or the one nearest to it.
+    uint64_t pixel_at(Vec2 point) const {
+        const int x = std::clamp(int(point.x) - crop_x, 0, crop_width - 1);
+        const int y = std::clamp(int(point.y) - crop_y, 0, crop_height - 1);
+        return uint64_t(y) * uint64_t(crop_width) + uint64_t(x);
+    }
 };
 
 /// Calls `use(pixel index, h)` for every pixel of the crop whose filter reaches the film point.
@@ -110,12 +116,6 @@ public:
     /// Luminance that earlier passes lead to expect of a pixel, at least a tenth of the image's mean; 0 in the first pass.
     /// It does not depend on the pass in flight.
     float expected_luminance(uint64_t pixel) const { return expected_[pixel]; }
-    /// The same at a film point (clamped to the crop).
-    float expected_luminance(Vec2 point) const {
-        const int x = std::clamp(int(point.x) - geometry_.crop_x, 0, geometry_.crop_width - 1);
-        const int y = std::clamp(int(point.y) - geometry_.crop_y, 0, geometry_.crop_height - 1);
-        return expected_[uint64_t(y) * geometry_.crop_width + x];
-    }
 
     /// Mean of all passes.
     std::vector<Rgb> image() const;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "integrator/integrator.h"
+#include "pathspace/light_paths.h"
 
 namespace etendue {
 
@@ -23,6 +24,24 @@ public:
                 .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
     }
 
+    /// Sets the thresholds of efficiency-optimised roulette from what earlier passes brought.
+    void begin_pass(const PassContext& pass);
+
+    /// The light sub-path `y`; `before(s)` and `after(s)` are called for every y_{s-1} before and after the walk leaves it.
+    template <class Before, class After>
+    void walk_light_path(const Scene& scene, Sampler& sampler, const TechniqueCounts& counts,
+                         SubPath& y, RenderStats& stats, const Before& before,
+                         const After& after) const {
+        // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
+        const WalkOptions walk{depth_.max_depth + scene.sensor().has_finite_lens(),
+                               depth_.rr_depth};
+        if (!start_light_path(scene, sampler, y, stats)) return;
+        for (int s = 1; s <= y.size() && s <= depth_.max_depth; ++s) {
+            before(s);
+            if (s >= 2) extend<TransportMode::Importance>(scene, sampler, walk, counts, y, stats);
+            after(s);
+        }
+    }
     /// The light sub-path work.y, with its techniques t ≤ 1.
     void light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
 
@@ -45,6 +64,7 @@ public:
     template <class JoinVertex>
     void eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                   const JoinVertex& join) const {
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
         const SubPath& z = work.z;
         walk_eye_path(c.scene, c.film, c.pixel, c.sampler, counts, work.z, work.stats, [&](int t) {
             if (counts.hit > 0)
@@ -61,6 +81,14 @@ public:
     void connect_to_own(const SampleContext& c, const TechniqueCounts& counts, int t,
                         Workspace& work) const;
 
+    /// Traces the light paths of the pass with their techniques t ≤ 1, and keeps the first `kept`.
+    void trace_light_paths(const PassContext& pass, const TechniqueCounts& counts, uint64_t kept,
+                           std::vector<LightPaths::Chunk>& chunks, LightPaths& paths) const;
+
+    /// Adds C(s,t), where there is one, times `factor`, if it is visible: one of several joins that z_{t-1} draws.
+    void add_drawn(const SampleContext& c, const std::optional<Join>& j, float factor, int draw,
+                   Workspace& work) const;
+
     /// What is left of a join's contribution after the roulette and the shadow ray; nothing where they end it. A unit of
     /// contribution adds `scale` to its pixel; `number` tells joins of one sample apart.
     std::optional<Rgb> test(const SampleContext& c, const Join& join, float scale, uint32_t number,
@@ -69,11 +97,18 @@ public:
     int max_depth() const { return depth_.max_depth; }
 
 private:
+    /// Of join_survival().
+    float threshold(const SampleContext& c, const Join& join) const;
+    /// Adds the join, where there is one, times `factor`, unless test() ends it.
+    void add(const SampleContext& c, const std::optional<Join>& j, float factor, uint32_t number,
+             Workspace& work) const;
     void add_if_visible(const SampleContext& c, const std::optional<Join>& j,
                         Workspace& work) const;
 
     DepthOptions depth_;
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
+    bool is_optimised_;              ///< The thresholds below instead.
+    std::vector<float> thresholds_;  ///< By pixel, of this pass; empty until there are some.
 };
 
 }  // namespace etendue

@@ -17,7 +17,8 @@ namespace etendue {
 
 const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
-        path_entry(), light_entry(), bdpt_entry(), vcm_entry(), upg_entry(), upg_bdpt_entry(), pcbpt_entry()};
+        path_entry(), light_entry(),    bdpt_entry(), vcm_entry(),
+        upg_entry(),  upg_bdpt_entry(), pcbpt_entry()};
     return entries;
 }
 

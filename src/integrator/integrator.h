@@ -23,7 +23,7 @@ struct Workspace {
     SubPath pair;  ///< The other path of a pair of vertices.
     Vertex scratch;
     std::vector<float> masses;  ///< Of light vertices, seen from one eye vertex.
-    bool is_observed = false;  ///< Whole sub-paths are read, not only what joins need of them.
+    bool is_observed = false;   ///< Whole sub-paths are read, not only what joins need of them.
     RenderStats stats;
 };
 
@@ -42,8 +42,9 @@ struct SampleContext {
 struct PassContext {
     const Scene& scene;
     const Film& film;
-    uint32_t index;        ///< Of the pass, from 0.
-    uint64_t light_paths;  ///< N_L.
+    uint32_t index;          ///< Of the pass, from 0.
+    uint64_t light_paths;    ///< N_L.
+    double rays_per_sample;  ///< Of all kinds, in earlier passes; 0 in the first.
     uint64_t chunks;
     const RenderStats& so_far;  ///< Of all earlier passes; the same for any number of threads.
     /// Calls `use(chunk, context, work)` for every light path in parallel; those of one chunk in order by one thread.

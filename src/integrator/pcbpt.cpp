@@ -31,6 +31,7 @@ public:
           uses_cache_(p.flag("cache")), direct_(Direct(p.choice("direct", kDirect))) {}
 
     void begin_pass(const PassContext& pass) override {
+        paths_.begin_pass(pass);
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
         trace_light_paths(pass, n);
         make_records(pass, n);
@@ -40,6 +41,7 @@ public:
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         paths_.eye_path(c, n, work, [&](int t) {
             if (vertices_.empty() || t > paths_.max_depth()) return;
+            const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
             if (uses_cache_) {
                 connect(c, n, t, records_.mixture(work.z[t - 1], neighbours_, uniform_), work);
                 return;
@@ -76,14 +78,7 @@ private:
 
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
         const uint64_t M = kept(pass.light_paths);
-        chunks_.resize(pass.chunks);
-        for (LightPaths::Chunk& chunk : chunks_) chunk.clear();
-        pass.for_each_light_path([&](uint64_t chunk, const SampleContext& c, Workspace& work) {
-            paths_.light_path(c, n, work);
-            if (c.pixel < M) chunks_[chunk].add(work.y);
-        });
-        compact_.assemble(chunks_);
-
+        paths_.trace_light_paths(pass, n, M, chunks_, compact_);
         stored_.resize(M);
         vertices_.clear();
         for (uint32_t i = 0; i < M; ++i) {
@@ -100,6 +95,7 @@ private:
         record_chunks_.resize(count);
         std::vector<std::pair<uint64_t, uint64_t>> found(count);  // eye vertices, shadow rays
         pass.for_each_other_path(count, [&](uint64_t i, Sampler& sampler, Workspace& work) {
+            const PhaseTimer timer(work.stats, &PhaseSeconds::records);
             record_chunks_[i].clear();
             sampler.start(pass.index, pixels + i);
             const uint64_t before = work.stats.shadow_rays;
@@ -153,20 +149,12 @@ private:
         const double samples = double(connections_) * double(kept(c.light_paths));
         for (int k = 0; k < connections_; ++k) {
             c.sampler.seek(Stream::Selection, uint32_t(k) << 16 | uint32_t(t));
-            const double u = double(c.sampler.next_1d_unstructured()) +
-                             0x1p-24 * double(c.sampler.next_1d_unstructured());
-            const auto [index, pmf] = mixture.sample((k + u) / connections_);
+            const auto [index, pmf] = mixture.sample((k + c.sampler.next_1d_fine()) / connections_);
             const auto [path, s] = vertices_[index];
             if (s + t - 1 > paths_.max_depth()) continue;
-            const auto j = join_connect(c.scene, stored_[path], s, work.z, t, n);
-            if (!j) continue;
-            const float scale = float(1 / (samples * pmf));
-            const uint32_t number = (0x8000u + uint32_t(k)) << 16 | uint32_t(t);
-            const auto value =
-                paths_.test(c, *j, std::fabs(work.z.film_weight) * scale, number, work);
-            if (!value) continue;
             if (work.is_observed) compact_.restore(c.scene, path, work.y);
-            c.sink.add(*j, *value * scale);
+            paths_.add_drawn(c, join_connect(c.scene, stored_[path], s, work.z, t, n),
+                             float(1 / (samples * pmf)), k, work);
         }
     }
 
@@ -185,10 +173,10 @@ private:
     Direct direct_;
 
     // Of the pass.
-    int connections_ = 0;                ///< K
+    int connections_ = 0;  ///< K
     LightPaths compact_;
-    std::vector<SubPath> stored_;        ///< The M light paths, ready to be joined.
-    std::vector<StoredVertex> vertices_; ///< Their V connectible vertices.
+    std::vector<SubPath> stored_;         ///< The M light paths, ready to be joined.
+    std::vector<StoredVertex> vertices_;  ///< Their V connectible vertices.
     ImportanceRecords records_;
     std::vector<LightPaths::Chunk> chunks_;
     std::vector<ImportanceRecords::Chunk> record_chunks_;

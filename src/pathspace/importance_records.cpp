@@ -57,19 +57,35 @@ void ImportanceRecords::Chunk::add(const Vertex& z, std::vector<float>& masses) 
 /// Over the places of the records.
 struct ImportanceRecords::Tree {
     struct Points {
-        const std::vector<Chunk::Place>& places;
-        size_t kdtree_get_point_count() const { return places.size(); }
-        float kdtree_get_pt(size_t i, size_t axis) const { return places[i].p[int(axis)]; }
+        std::vector<std::array<float, 3>> points;
+        size_t kdtree_get_point_count() const { return points.size(); }
+        float kdtree_get_pt(size_t i, size_t axis) const { return points[i][axis]; }
         template <class Box>
         bool kdtree_get_bbox(Box&) const {
             return false;
         }
     };
-    using Index =
-        nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>, Points, 3,
-                                            uint32_t>;
+    using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>,
+                                                      Points, 3, uint32_t>;
 
-    explicit Tree(const std::vector<Chunk::Place>& places) : points{places}, index(3, points) {}
+    explicit Tree(const std::vector<Chunk::Place>& places)
+        : points{[&] {
+              std::vector<std::array<float, 3>> p;
+              for (const Chunk::Place& place : places)
+                  p.push_back({place.p.x, place.p.y, place.p.z});
+              return p;
+          }()},
+          index(3, points) {}
+
+    /// The places nearest to `p`, up to a factor 1 + ε in distance; which they are is no matter of correctness.
+    size_t nearest(Vec3 p, int count, uint32_t* places, float* distances2) const {
+        constexpr float kEpsilon = 0.5f;
+        nanoflann::KNNResultSet<float, uint32_t> found{size_t(count)};
+        found.init(places, distances2);
+        const float query[] = {p.x, p.y, p.z};
+        index.findNeighbors(found, query, nanoflann::SearchParams(0, kEpsilon, false));
+        return found.size();
+    }
 
     Points points;
     Index index;
@@ -94,8 +110,7 @@ VertexMixture ImportanceRecords::mixture(const Vertex& z, int neighbours, double
     if (!tree_) return mixture;
     std::array<uint32_t, VertexMixture::kMostParts> nearest;
     std::array<float, VertexMixture::kMostParts> distances2;
-    const size_t found = tree_->index.knnSearch(&z.p.x, size_t(neighbours), nearest.data(),
-                                                distances2.data());
+    const size_t found = tree_->nearest(z.p, neighbours, nearest.data(), distances2.data());
     // Inverse distance; a record at the very place counts as if it were a tenth as far as the farthest.
     const float reach = 0.1f * std::sqrt(distances2[found - 1]) + 1e-20f;
     std::array<double, VertexMixture::kMostParts> weights;

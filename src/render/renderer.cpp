@@ -123,6 +123,7 @@ void Renderer::pass(uint32_t index) {
             const uint64_t end = std::min(pixels, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
                 sampler.start(index, pixel);
+                work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
                 use(chunk,
                     SampleContext{scene_, film_, pixel, light_paths, splat_scale, sampler, sink},
                     work, sink);
@@ -135,6 +136,9 @@ void Renderer::pass(uint32_t index) {
              .film = film_,
              .index = index,
              .light_paths = light_paths,
+             .rays_per_sample =
+                 index > 0 ? double(stats_.rays()) / (double(film_.passes()) * double(pixels))
+                           : 0.0,
              .chunks = chunks,
              .for_each_light_path =
                  [&](const auto& use) {
@@ -145,7 +149,9 @@ void Renderer::pass(uint32_t index) {
                  [&](uint64_t count, const auto& task) {
                      tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
                          Sampler sampler(settings_.sampler, settings_.seed);
-                         task(i, sampler, workers_->spaces.local());
+                         Workspace& work = workers_->spaces.local();
+                         work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
+                         task(i, sampler, work);
                      });
                  }});
         for_each_sample([&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {

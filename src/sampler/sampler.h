@@ -74,6 +74,11 @@ public:
         if (kind_ == SamplerKind::PrimarySample) return next_1d_structured();
         return to_unit_float(uint32_t(bits(key_) >> 32));
     }
+    /// The same with 48 bits, from two slots.
+    double next_1d_fine() {
+        const double high = double(next_1d_unstructured());
+        return high + 0x1p-24 * double(next_1d_unstructured());
+    }
     SamplerKind kind() const { return kind_; }
 
 private:

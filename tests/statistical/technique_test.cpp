@@ -44,7 +44,7 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
     const Scene scene = furnace(GetParam().sensor);
     constexpr int kRuns = 24;
     std::map<std::tuple<Strategy, int, int>, Moments> alone;
-    std::map<int, Moments> together;                      // by length
+    std::map<int, Moments> together;  // by length
     for (int run = 0; run < kRuns; ++run) {
         RenderSettings settings;
         settings.integrator = IntegratorSpec::parse(
@@ -77,10 +77,11 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
     const bool lens = scene.sensor().has_finite_lens();
     size_t expected_count = 0;
     const std::string integrator = GetParam().integrator;
-    const bool gathers = integrator.starts_with("upg"), both = integrator.find("both") != std::string::npos;
+    const bool gathers = integrator.starts_with("upg"),
+               both = integrator.find("both") != std::string::npos;
     for (int k = 1; k <= kLongest; ++k)
-        expected_count += size_t(k + 1 + lens) + (gathers && k >= 3 ? size_t(k - 1) : 0) +
-                          (both && k >= 2);
+        expected_count +=
+            size_t(k + 1 + lens) + (gathers && k >= 3 ? size_t(k - 1) : 0) + (both && k >= 2);
     EXPECT_EQ(alone.size(), expected_count) << "a technique made nothing";
     const double level = sidak(0.01, int(alone.size() + together.size()));
     // Few light paths meet the lens.

@@ -78,9 +78,9 @@ TEST(ImportanceRecords, MixThoseThatAreNearAndAlike) {
     const auto add = [](ImportanceRecords::Chunk& chunk, const Vertex& z,
                         std::vector<float> masses) { chunk.add(z, masses); };
     add(chunks[0], place({0, 0, 0}), {1, 0, 0, 0});
-    add(chunks[0], place({0, 0, 0}, {0, 0, -1}), {0, 1, 0, 0});          // the other side
+    add(chunks[0], place({0, 0, 0}, {0, 0, -1}), {0, 1, 0, 0});  // the other side
     add(chunks[1], place({1, 0, 0}), {0, 0, 1, 0});
-    add(chunks[1], place({0, 0, 0.1f}), {0, 0, 0, 0});                   // has no mass
+    add(chunks[1], place({0, 0, 0.1f}), {0, 0, 0, 0});  // has no mass
     records.assemble(chunks, 4);
     EXPECT_EQ(records.size(), 3u);
 
