@@ -7,6 +7,7 @@
 
 #include "integrator/bdpt.h"
 
+#include <array>
 #include <cmath>
 
 #include "integrator/bidirectional.h"
@@ -14,10 +15,12 @@
 namespace etendue {
 namespace {
 
+constexpr std::array<Choice<bool>, 2> kConnections{{{"path", false}, {"cache", true}}};  // the cache?
+
 class BdptIntegrator final : public Integrator {
 public:
     explicit BdptIntegrator(const IntegratorParams& p)
-        : paths_(p), uses_cache_(p.choice("connections", {"path", "cache"}) == 1),
+        : paths_(p), uses_cache_(p.choice("connections", kConnections)),
           given_draws_(p.integer("cache_draws", 0, 1024)) {}
 
     void begin_pass(const PassContext& pass) override {
@@ -85,17 +88,21 @@ private:
             c.sampler.seek(Stream::Selection, uint32_t(i) << 16 | uint32_t(t));
             const double u = (i + c.sampler.next_1d_fine()) / draws_;
             const uint32_t vertex = connectible_[size_t(u * double(connectible_.size()))];
-            const int s = cache_.restore_up_to(c.scene, vertex, 1, work.is_observed, work.y);
+            const int s = cache_.depth(vertex) + 1;
             if (s + t - 1 > paths_.max_depth()) continue;
+            cache_.restore_first(c.scene, vertex, s, work.is_observed, work.y);
             paths_.add_drawn(c, join_connect(c.scene, work.y, s, work.z, t, n), factor, i, work);
         }
     }
 
+    /// Before the pilot; not that of other methods.
+    static constexpr float kUnknownCount = 0.5f;
+
     Bidirectional paths_;
     bool uses_cache_;
     int given_draws_;
-    int draws_ = 0;    ///< C; 0 before the first pass.
-    float count_ = 1;  ///< C·N_L/V̄
+    int draws_ = 0;                ///< C; 0 before the first pass.
+    float count_ = kUnknownCount;  ///< C·N_L/V̄
 
     // Of the pass.
     LightPaths cache_;

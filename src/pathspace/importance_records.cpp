@@ -75,11 +75,12 @@ struct ImportanceRecords::Tree {
                   p.push_back({place.p.x, place.p.y, place.p.z});
               return p;
           }()},
-          index(3, points) {}
+          index(3, points, {kLeafSize}) {}
 
-    /// The places nearest to `p`, up to a factor 1 + ε in distance; which they are is no matter of correctness.
+    static constexpr size_t kLeafSize = 6;
+    /// The places nearest to `p`, up to a factor of 2 in distance; which they are is no matter of correctness.
     size_t nearest(Vec3 p, int count, uint32_t* places, float* distances2) const {
-        constexpr float kEpsilon = 0.5f;
+        constexpr float kEpsilon = 3;
         nanoflann::KNNResultSet<float, uint32_t> found{size_t(count)};
         found.init(places, distances2);
         const float query[] = {p.x, p.y, p.z};

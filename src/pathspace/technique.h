@@ -49,6 +49,12 @@ enum class PairRule : uint8_t {
     Both,   ///< Each of them, for a path of its own.
 };
 
+/// Whether it joins an eye and a light sub-path inside the scene: neither a hit of an emitter nor light brought to the
+/// lens [Popov et al. 2015].
+constexpr bool is_inner(const Technique& q) {
+    return q.s >= 1 && q.t >= 2;
+}
+
 /// How many samples of each strategy an algorithm takes per eye sub-path, 0 for those it does not run. Eye densities are
 /// per pixel, so one eye path a pixel counts 1 and whatever reaches any pixel counts N_L, the number of light paths.
 struct TechniqueCounts {
@@ -61,6 +67,7 @@ struct TechniqueCounts {
     PairRule pair_rule = PairRule::Gloss;
     bool clamps_disc = true;  ///< Weights know that no probability exceeds 1 [ibid., eq. 24].
 
+    friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
     bool uses_light_paths() const {
         return connect > 0 || connect_emission > 0 || splat > 0 || hit_lens > 0 || merge > 0 ||
                gather > 0;

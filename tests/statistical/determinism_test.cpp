@@ -1,5 +1,6 @@
 // The same seed gives the same bits, whatever the number of threads.
 
+#include <cctype>
 #include <cstring>
 
 #include <gtest/gtest.h>
@@ -58,15 +59,17 @@ TEST_P(Determinism, OfThreadsAndSeeds) {
     EXPECT_FALSE(same_bits(one.image, render(scene, integrator, sampler, 6, 1).image));
 }
 
-INSTANTIATE_TEST_SUITE_P(Integrators, Determinism,
-                         ::testing::Combine(::testing::Values("path", "light", "bdpt", "pcbpt"),
-                                            ::testing::Values(SamplerKind::Independent,
-                                                              SamplerKind::Sobol)),
-                         [](const auto& p) {
-                             return std::string(std::get<0>(p.param)) +
-                                    (std::get<1>(p.param) == SamplerKind::Sobol ? "_sobol"
-                                                                                : "_independent");
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Integrators, Determinism,
+    ::testing::Combine(::testing::Values("path", "light", "bdpt", "bdpt:eorr=true",
+                                         "bdpt:connections=cache", "pcbpt"),
+                       ::testing::Values(SamplerKind::Independent, SamplerKind::Sobol)),
+    [](const auto& p) {
+        std::string name = std::get<0>(p.param);
+        for (char& c : name)
+            if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+        return name + (std::get<1>(p.param) == SamplerKind::Sobol ? "_sobol" : "_independent");
+    });
 
 }  // namespace
 }  // namespace etendue::test

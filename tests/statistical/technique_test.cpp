@@ -103,19 +103,42 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         expect_mean(m, length, false, fmt::format("length {}, weighted", length));
 }
 
-INSTANTIATE_TEST_SUITE_P(Sensors, Techniques,
-                         ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
-                                           TechniqueCase{"thinlens", "thinlens", "bdpt:"},
-                                           TechniqueCase{"gathers", "perspective",
-                                                         "upg+bdpt:radius=0.2,"},
-                                           TechniqueCase{"stored", "perspective", "pcbpt:"},
-                                           TechniqueCase{"stored_standard", "thinlens",
-                                                         "pcbpt:weights=standard,connections=10,"
-                                                         "light_paths=20,direct=both,"},
-                                           TechniqueCase{"stored_exact", "perspective",
-                                                         "pcbpt:cache=false,pmf=weighted,"
-                                                         "light_paths=10,direct=next_event,"}),
-                         [](const auto& p) { return std::string(p.param.name); });
+/// An image of inner paths alone is the sum of their techniques' parts of the whole.
+TEST(InnerPaths, AreTheSumOfTheirTechniques) {
+    const Scene scene = build(front_camera(kSize) + room() + area_lamp());
+    const auto render = [&](bool inner_only) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse("bdpt:max_depth=4,roulette=0");
+        settings.spp = 4;
+        settings.technique_depth = 4;
+        settings.inner_paths_only = inner_only;
+        auto renderer = std::make_unique<Renderer>(scene, settings);
+        const std::atomic<bool> interrupted{false};
+        renderer->run([](const Progress&) {}, interrupted);
+        return renderer;
+    };
+    const std::vector<Rgb> inner = render(true)->film().image();
+    std::vector<Rgb> sum(inner.size());
+    for (const TechniqueImages::Entry& e : render(false)->techniques()->images())
+        if (e.technique.s >= 1 && e.technique.t >= 2)
+            for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
+    for (size_t i = 0; i < sum.size(); ++i) EXPECT_NEAR(inner[i].g, sum[i].g, 1e-4f * sum[i].g);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Sensors, Techniques,
+    ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
+                      TechniqueCase{"thinlens", "thinlens", "bdpt:"},
+                      TechniqueCase{"gathers", "perspective", "upg+bdpt:radius=0.2,"},
+                      TechniqueCase{"cache", "perspective", "bdpt:connections=cache,"},
+                      TechniqueCase{"stored", "perspective", "pcbpt:"},
+                      TechniqueCase{"stored_standard", "thinlens",
+                                    "pcbpt:weights=standard,connections=10,"
+                                    "light_paths=20,direct=both,"},
+                      TechniqueCase{"stored_exact", "perspective",
+                                    "pcbpt:cache=false,pmf=weighted,"
+                                    "light_paths=10,direct=next_event,"}),
+    [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace
 }  // namespace etendue::test
