@@ -15,12 +15,13 @@
 namespace etendue {
 namespace {
 
-constexpr std::array<Choice<bool>, 2> kConnections{{{"path", false}, {"cache", true}}};  // the cache?
+constexpr std::array<Choice<bool>, 2> kConnections{
+    {{"path", false}, {"cache", true}}};  // the cache?
 
 class BdptIntegrator final : public Integrator {
 public:
     explicit BdptIntegrator(const IntegratorParams& p)
-        : paths_(p), uses_cache_(p.choice("connections", kConnections)),
+        : paths_(p), uses_cache_(p.choice("connections", kUsesCache)),
           given_draws_(p.integer("cache_draws", 0, 1024)) {}
 
     void begin_pass(const PassContext& pass) override {

@@ -16,7 +16,7 @@ std::vector<ParamInfo> Bidirectional::params() {
         {"eorr", ParamKind::Bool, "false",
          "Efficiency-optimised roulette: joins that would add less to their pixel than "
          "the root of its variance over the rays of a sample (as earlier passes have "
-         "both), instead of `roulette`."});
+         "both), instead of `roulette`, which must not be 0."});
     return params;
 }
 
@@ -73,7 +73,7 @@ void Bidirectional::begin_pass(const PassContext& pass) {
 
 float Bidirectional::threshold(const SampleContext& c, const Join& j) const {
     const uint64_t pixel = j.technique.t <= 1 ? c.film.geometry().pixel_at(j.film) : c.pixel;
-    if (!is_optimised_) return roulette_ * c.film.expected_luminance(pixel);
+    if (!is_optimised_ || roulette_ == 0) return roulette_ * c.film.expected_luminance(pixel);
     // With a survival of q = C/δ the rays of a join fall to q, and its variance grows by C²(1/q - 1): the product of the
     // sample's rays T and variance V is least where δ² = V/T [Veach 1997, §10.4.2].
     return thresholds_.empty() ? 0.0f : thresholds_[pixel];

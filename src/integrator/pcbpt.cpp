@@ -9,6 +9,7 @@
 
 #include "integrator/pcbpt.h"
 
+#include <array>
 #include <cmath>
 
 #include "integrator/bidirectional.h"
@@ -18,6 +19,14 @@
 namespace etendue {
 namespace {
 
+/// How C(1,t) are made.
+enum class Direct { Stored, NextEvent, Both };
+
+constexpr std::array<Choice<Direct>, 3> kDirect{
+    {{"stored", Direct::Stored}, {"next_event", Direct::NextEvent}, {"both", Direct::Both}}};
+constexpr std::array<Choice<bool>, 2> kIsStandard{{{"upper", false}, {"standard", true}}};
+constexpr std::array<Choice<bool>, 2> kIsWeighted{{{"contribution", false}, {"weighted", true}}};
+
 class PcbptIntegrator final : public Integrator {
 public:
     explicit PcbptIntegrator(const IntegratorParams& p)
@@ -25,10 +34,9 @@ public:
           given_connections_(p.integer("connections", 0, 1024)),
           record_fraction_(p.number("record_fraction", 0, 1)),
           neighbours_(p.integer("neighbours", 1, VertexMixture::kMostParts)),
-          uniform_(p.number("uniform", 1e-3f, 1)),
-          is_standard_(p.choice("weights", {"upper", "standard"}) == 1),
-          is_weighted_(p.choice("pmf", {"contribution", "weighted"}) == 1),
-          uses_cache_(p.flag("cache")), direct_(Direct(p.choice("direct", kDirect))) {}
+          uniform_(p.number("uniform", 1e-3f, 1)), is_standard_(p.choice("weights", kIsStandard)),
+          is_weighted_(p.choice("pmf", kIsWeighted)), uses_cache_(p.flag("cache")),
+          direct_(p.choice("direct", kDirect)) {}
 
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
@@ -68,9 +76,6 @@ public:
                 {"records", records_.size()},
                 {"record_bytes", records_.memory_bytes()}};
     }
-
-    enum class Direct { Stored, NextEvent, Both };
-    static inline const std::vector<std::string> kDirect = {"stored", "next_event", "both"};
 
 private:
     /// M.

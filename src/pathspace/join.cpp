@@ -83,9 +83,9 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
         others += sqr(p_L / p_NE) *
                   (sqr(double(counts.connect_emission)) +
-                   outward_sum<Side::Eye>(z, last, false,
-                                          {rev_last, rev_prev, gloss_of_emitter(emitter.is_area()), t},
-                                          counts));
+                   outward_sum<Side::Eye>(
+                       z, last, false, {rev_last, rev_prev, gloss_of_emitter(emitter.is_area()), t},
+                       counts));
     }
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .emitter = &emitter,
@@ -144,10 +144,10 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     if (a.is_infinite) edge.rev_a = fb.pdf;
     edge.total =
         squares +
-        outward_sum<Side::Light>(y, s - 1, false,
-                                 {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f,
-                                  gloss(b, false), s + t - 1},
-                                 counts) +
+        outward_sum<Side::Light>(
+            y, s - 1, false,
+            {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f, gloss(b, false), s + t - 1},
+            counts) +
         outward_sum<Side::Eye>(
             z, t - 1, false,
             {edge.rev_b, fb.pdf_rev * b.to_predecessor, gloss(a, false), s + t - 1}, counts);
@@ -187,8 +187,7 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
     const double found = counts.found(drops_eye ? edge->rev_a : edge->rev_b);
-    Join join =
-        joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * found, y, a, z, b);
+    Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * found, y, a, z, b);
     join.found = float(found);
     return join;
 }
