@@ -15,8 +15,7 @@
 namespace etendue {
 namespace {
 
-constexpr std::array<Choice<bool>, 2> kConnections{
-    {{"path", false}, {"cache", true}}};  // the cache?
+constexpr std::array<Choice<bool>, 2> kUsesCache{{{"path", false}, {"cache", true}}};
 
 class BdptIntegrator final : public Integrator {
 public:
