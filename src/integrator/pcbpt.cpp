@@ -31,7 +31,7 @@ class PcbptIntegrator final : public Integrator {
 public:
     explicit PcbptIntegrator(const IntegratorParams& p)
         : paths_(p), light_paths_(uint64_t(p.integer("light_paths", 1, 1 << 20))),
-          given_connections_(p.integer("connections", 0, 1024)),
+          given_connections_(p.number("connections", 0, 1024)),
           record_fraction_(p.number("record_fraction", 0, 1)),
           neighbours_(p.integer("neighbours", 1, VertexMixture::kMostParts)),
           uniform_(p.number("uniform", 1e-3f, 1)), is_standard_(p.choice("weights", kIsStandard)),
@@ -50,14 +50,10 @@ public:
         paths_.eye_path(c, n, work, [&](int t) {
             if (vertices_.empty() || t > paths_.max_depth()) return;
             const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
-            if (uses_cache_) {
-                connect(c, n, t, records_.mixture(work.z[t - 1], neighbours_, uniform_), work);
-                return;
-            }
-            VertexMixture mixture{uint32_t(vertices_.size())};
-            evaluate(c.scene, n, t, work);
-            if (to_cdf(work.masses)) mixture.add(work.masses.data(), 1 - uniform_);
-            connect(c, n, t, mixture, work);
+            // Where K is no integer, one of its neighbours with the mean K.
+            c.sampler.seek(Stream::Selection, uint32_t(t));
+            const int draws = int(connections_ + c.sampler.next_1d_fine());
+            if (draws > 0) connect(c, n, t, draws, mixture(c.scene, n, t, work), work);
         });
     }
 
@@ -116,7 +112,7 @@ private:
         });
         records_.assemble(record_chunks_, uint32_t(vertices_.size()));
 
-        connections_ = given_connections_;
+        connections_ = double(given_connections_);
         if (connections_ > 0) return;
         // The records are the pilot: bdpt would trace as many shadow rays from an eye vertex as they did for one light
         // path. What the records cost themselves is taken off. K may depend on them, as the draws do not.
@@ -124,7 +120,7 @@ private:
         for (const auto& [v, r] : found) vertices += v, rays += r;
         const double M = double(kept(pass.light_paths));
         const double of_bdpt = vertices > 0 ? double(rays) / (M * double(vertices)) : 0.0;
-        connections_ = std::max(1, int(of_bdpt * (1 - double(record_fraction_) * M)));
+        connections_ = std::max(kFewest, of_bdpt * (1 - double(record_fraction_) * M));
     }
 
     /// R2 sequence: multiples of the powers of the plastic number's inverse, modulo 1 [Roberts 2018].
@@ -148,13 +144,23 @@ private:
         }
     }
 
-    /// K draws from the mixture, each a connection: (1/K) Σ (1/M) w C / pmf.
-    void connect(const SampleContext& c, const TechniqueCounts& n, int t,
+    /// What z_{t-1} draws from.
+    VertexMixture mixture(const Scene& scene, const TechniqueCounts& n, int t,
+                          Workspace& work) const {
+        if (uses_cache_) return records_.mixture(work.z[t - 1], neighbours_, uniform_);
+        VertexMixture exact{uint32_t(vertices_.size())};
+        evaluate(scene, n, t, work);
+        if (to_cdf(work.masses)) exact.add(work.masses.data(), 1 - uniform_);
+        return exact;
+    }
+
+    /// `draws` of the connections of z_{t-1}: (1/K) Σ (1/M) w C / pmf.
+    void connect(const SampleContext& c, const TechniqueCounts& n, int t, int draws,
                  const VertexMixture& mixture, Workspace& work) const {
-        const double samples = double(connections_) * double(kept(c.light_paths));
-        for (int k = 0; k < connections_; ++k) {
-            c.sampler.seek(Stream::Selection, uint32_t(k) << 16 | uint32_t(t));
-            const auto [index, pmf] = mixture.sample((k + c.sampler.next_1d_fine()) / connections_);
+        const double samples = connections_ * double(kept(c.light_paths));
+        for (int k = 0; k < draws; ++k) {
+            c.sampler.seek(Stream::Selection, uint32_t(k + 1) << 16 | uint32_t(t));
+            const auto [index, pmf] = mixture.sample((k + c.sampler.next_1d_fine()) / draws);
             const auto [path, s] = vertices_[index];
             if (s + t - 1 > paths_.max_depth()) continue;
             if (work.is_observed) compact_.restore(c.scene, path, work.y);
@@ -163,6 +169,9 @@ private:
         }
     }
 
+    /// K at least, where it is automatic.
+    static constexpr double kFewest = 0.25;
+
     struct StoredVertex {
         uint32_t path;
         int s;
@@ -170,7 +179,7 @@ private:
 
     Bidirectional paths_;
     uint64_t light_paths_;
-    int given_connections_;
+    float given_connections_;
     float record_fraction_;
     int neighbours_;
     float uniform_;
@@ -178,7 +187,7 @@ private:
     Direct direct_;
 
     // Of the pass.
-    int connections_ = 0;  ///< K
+    double connections_ = 0;  ///< K
     LightPaths compact_;
     std::vector<SubPath> stored_;         ///< The M light paths, ready to be joined.
     std::vector<StoredVertex> vertices_;  ///< Their V connectible vertices.
@@ -193,25 +202,25 @@ IntegratorEntry pcbpt_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
     params.push_back({"light_paths", ParamKind::Int, "100",
                       "M: light paths of a pass whose vertices all eye vertices may connect to."});
-    params.push_back({"connections", ParamKind::Int, "0",
-                      "K: connections of each eye vertex; 0: as many as keep the rays of "
-                      "connections and records below those of bdpt's connections."});
+    params.push_back({"connections", ParamKind::Float, "0",
+                      "K: connections of each eye vertex, on average; 0: as many as bdpt has rays "
+                      "for, less those of the records, but at least 0.25."});
     params.push_back({"record_fraction", ParamKind::Float, "0.004",
                       "Eye paths along which importance records are made, over the pixels."});
     params.push_back({"neighbours", ParamKind::Int, "6",
                       "Records between which the mass function is interpolated, at most 16."});
-    params.push_back({"uniform", ParamKind::Float, "0.1",
+    params.push_back({"uniform", ParamKind::Float, "0.5",
                       "Share of connections that are drawn uniformly, at least 0.001."});
     params.push_back({"weights", ParamKind::String, "upper",
                       "upper: connections count 1 in the weights, since all pixels share the light "
                       "paths; standard: they count M."});
-    params.push_back({"direct", ParamKind::String, "stored",
+    params.push_back({"direct", ParamKind::String, "next_event",
                       "How C(1,t) are made: stored (connections to the light paths' own y_0), "
                       "next_event, or both."});
     params.push_back({"cache", ParamKind::Bool, "true",
                       "false: the mass function is evaluated at every eye vertex instead of "
                       "interpolated; slow, for comparison."});
-    params.push_back({"pmf", ParamKind::String, "contribution",
+    params.push_back({"pmf", ParamKind::String, "weighted",
                       "What the mass function follows: contribution, or weighted, which has the "
                       "MIS weight too."});
     return {{"integrator", "pcbpt",

@@ -131,7 +131,8 @@ INSTANTIATE_TEST_SUITE_P(
                       TechniqueCase{"thinlens", "thinlens", "bdpt:"},
                       TechniqueCase{"gathers", "perspective", "upg+bdpt:radius=0.2,"},
                       TechniqueCase{"cache", "perspective", "bdpt:connections=cache,"},
-                      TechniqueCase{"stored", "perspective", "pcbpt:"},
+                      TechniqueCase{"stored", "perspective",
+                                    "pcbpt:direct=stored,uniform=0.1,connections=1.5,"},
                       TechniqueCase{"stored_standard", "thinlens",
                                     "pcbpt:weights=standard,connections=10,"
                                     "light_paths=20,direct=both,"},
