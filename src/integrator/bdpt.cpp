@@ -10,7 +10,7 @@
 #include <array>
 #include <cmath>
 
-#include "integrator/bidirectional.h"
+#include "integrator/photons.h"
 
 namespace etendue {
 namespace {
@@ -21,14 +21,14 @@ class BdptIntegrator final : public Integrator {
 public:
     explicit BdptIntegrator(const IntegratorParams& p)
         : paths_(p), uses_cache_(p.choice("connections", kUsesCache)),
-          given_draws_(p.integer("cache_draws", 0, 1024)) {}
+          given_draws_(p.integer("cache_draws", 0, 1024)), memory_(photon_memory(p)) {}
 
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
         if (!uses_cache_) return;
         if (draws_ == 0) choose_draws(pass);
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                 chunks_, cache_);
+                                 memory_ / kVertexBytes, chunks_, cache_);
         connectible_.clear();
         for (uint32_t i = 0; i < cache_.vertices().size(); ++i)
             if (cache_.vertices()[i].may_connect) connectible_.push_back(i);
@@ -95,12 +95,15 @@ private:
         }
     }
 
+    /// A vertex is in a chunk and in the cache, and has a number among the connectible.
+    static constexpr uint64_t kVertexBytes = 2 * sizeof(LightVertex) + 2 * sizeof(uint32_t);
     /// Before the pilot; not that of other methods.
     static constexpr float kUnknownCount = 0.5f;
 
     Bidirectional paths_;
     bool uses_cache_;
     int given_draws_;
+    uint64_t memory_;
     int draws_ = 0;                ///< C; 0 before the first pass.
     float count_ = kUnknownCount;  ///< C·N_L/V̄
 
@@ -120,6 +123,7 @@ IntegratorEntry bdpt_entry() {
     params.push_back({"cache_draws", ParamKind::Int, "0",
                       "Connections of each eye vertex to the cache; 0: as many as a light path has "
                       "vertices."});
+    params.push_back(memory_param());
     return {{"integrator", "bdpt",
              "Bidirectional path tracing with all connections and MIS. Unbiased.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {

@@ -1,5 +1,6 @@
 #include "integrator/bidirectional.h"
 
+#include <atomic>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -80,13 +81,22 @@ float Bidirectional::threshold(const SampleContext& c, const Join& j) const {
 }
 
 void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCounts& counts,
-                                      uint64_t kept, std::vector<LightPaths::Chunk>& chunks,
+                                      uint64_t kept, uint64_t most_vertices,
+                                      std::vector<LightPaths::Chunk>& chunks,
                                       LightPaths& paths) const {
     chunks.resize(pass.chunks);
     for (LightPaths::Chunk& chunk : chunks) chunk.clear();
+    std::atomic<uint64_t> vertices = 0;
     pass.for_each_light_path([&](uint64_t chunk, const SampleContext& c, Workspace& work) {
         light_path(c, counts, work);
-        if (c.pixel < kept) chunks[chunk].add(work.y);
+        if (c.pixel >= kept) return;
+        chunks[chunk].add(work.y);
+        const auto own = uint64_t(work.y.size());
+        if (vertices.fetch_add(own, std::memory_order_relaxed) + own > most_vertices)
+            throw std::runtime_error(fmt::format(
+                "a pass has more than {} light vertices, too many to keep; render in crops (--crop) "
+                "or smaller, limit max_depth, or raise the integrator's parameter \"memory\"",
+                most_vertices));
     });
     paths.assemble(chunks);
 }

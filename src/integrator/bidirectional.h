@@ -81,9 +81,11 @@ public:
     void connect_to_own(const SampleContext& c, const TechniqueCounts& counts, int t,
                         Workspace& work) const;
 
-    /// Traces the light paths of the pass with their techniques t ≤ 1, and keeps the first `kept`.
+    /// Traces the light paths of the pass with their techniques t ≤ 1, and keeps the first `kept`. Throws
+    /// std::runtime_error where these have more than `most_vertices`.
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& counts, uint64_t kept,
-                           std::vector<LightPaths::Chunk>& chunks, LightPaths& paths) const;
+                           uint64_t most_vertices, std::vector<LightPaths::Chunk>& chunks,
+                           LightPaths& paths) const;
 
     /// Adds C(s,t), where there is one, times `factor`, if it is visible: one of several joins that z_{t-1} draws.
     void add_drawn(const SampleContext& c, const std::optional<Join>& j, float factor, int draw,

@@ -79,7 +79,7 @@ private:
 
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
         const uint64_t M = kept(pass.light_paths);
-        paths_.trace_light_paths(pass, n, M, chunks_, compact_);
+        paths_.trace_light_paths(pass, n, M, UINT32_MAX, chunks_, compact_);
         stored_.resize(M);
         vertices_.clear();
         for (uint32_t i = 0; i < M; ++i) {

@@ -1,6 +1,5 @@
 #include "integrator/photons.h"
 
-#include <atomic>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -10,7 +9,10 @@ namespace etendue {
 void Photons::trace(const PassContext& pass, const Bidirectional& paths,
                     const TechniqueCounts& counts, float radius, uint64_t max_bytes) {
     radius_ = radius;
-    paths.trace_light_paths(pass, counts, pass.light_paths, chunks_, paths_);
+    // A vertex is in a chunk, among all, and in the grid.
+    constexpr uint64_t kVertexBytes = 2 * sizeof(LightVertex) + sizeof(PointGrid::Entry) + 8;
+    paths.trace_light_paths(pass, counts, pass.light_paths, max_bytes / kVertexBytes, chunks_,
+                            paths_);
 
     std::vector<PointGrid::Entry> entries;
     const auto vertices = paths_.vertices();

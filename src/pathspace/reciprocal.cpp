@@ -179,8 +179,7 @@ private:
         const float theta = std::acos(std::clamp(dot(axis, *cosine_), -1.0f, 1.0f));
         const bool holds_pole = !(theta > alpha);
         const float half_phi =
-            holds_pole ? kPi
-                       : std::asin(std::min(1.0f, std::sin(alpha) / std::sin(theta)));
+            holds_pole ? kPi : std::asin(std::min(1.0f, std::sin(alpha) / std::sin(theta)));
         box_lo_ = {holds_pole ? 0.0f : sqr(std::sin(std::min(theta - alpha, kPi / 2))), -half_phi};
         box_size_ = {sqr(std::sin(std::min(theta + alpha, kPi / 2))) - box_lo_.x, 2 * half_phi};
         const double mass = double(box_size_.x) * box_size_.y / (2 * double(kPi));
@@ -284,9 +283,7 @@ double reciprocal_probability(const Scene& scene, const PairEvent& event, Sample
         if (!ray) continue;
         ++stats.trial_rays;
         const float u = scene.has_masks() ? sampler.next_1d() : 0.0f;
-        if (!scene.intersect(*ray, u, hit) ||
-            !event.near.contains(hit.geometry.p))
-            continue;
+        if (!scene.intersect(*ray, u, hit) || !event.near.contains(hit.geometry.p)) continue;
         arena.reset();
         scratch.set_surface(*hit.shape, hit.location, hit.geometry, -ray->d, arena);
         if (!scratch.may_connect) continue;

@@ -22,7 +22,7 @@ struct Neighbourhood {
 
 /// Which directions trials propose.
 enum class TrialBound : uint8_t {
-    Box,   ///< A box of random numbers that holds the ball [Qin et al. 2015, supplement]; for diffuse vertices.
+    Box,  ///< A box of random numbers that holds the ball [Qin et al. 2015, supplement]; for diffuse vertices.
     Cone,  ///< The cone that holds the ball.
     Slab,  ///< The part of the tangent plane through which all of a flat neighbourhood is seen, or the cone.
 };

@@ -116,8 +116,11 @@ protected:
                 // Off the surface, as other vertices near it are.
                 const Vec3 center = next.p + (next.p - path[0].p) * 0.01f;
                 for (const auto& [bound, flatness] : kShapes)
-                    compare({from, mode, path.u_emission,
-                             {center, next.ng, radius, flatness * radius}, bound});
+                    compare({from,
+                             mode,
+                             path.u_emission,
+                             {center, next.ng, radius, flatness * radius},
+                             bound});
             }
         }
     }
