@@ -57,7 +57,10 @@ void Bidirectional::begin_pass(const PassContext& pass) {
     const FilmGeometry& g = pass.film.geometry();
     const std::vector<Rgb> variance = pass.film.variance();
     thresholds_.resize(variance.size());
-    const double scale = double(pass.film.passes()) / pass.rays_per_sample;
+    // Variance of one pass over the rays of a sample.
+    const double passes = double(pass.film.passes());
+    const double samples = passes * double(g.pixel_count());
+    const double scale = passes / (double(pass.so_far.rays()) / samples);
     for (int y = 0; y < g.crop_height; ++y)
         for (int x = 0; x < g.crop_width; ++x) {
             double sum = 0;

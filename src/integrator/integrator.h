@@ -42,9 +42,8 @@ struct SampleContext {
 struct PassContext {
     const Scene& scene;
     const Film& film;
-    uint32_t index;          ///< Of the pass, from 0.
-    uint64_t light_paths;    ///< N_L.
-    double rays_per_sample;  ///< Of all kinds, in earlier passes; 0 in the first.
+    uint32_t index;        ///< Of the pass, from 0.
+    uint64_t light_paths;  ///< N_L.
     uint64_t chunks;
     const RenderStats& so_far;  ///< Of all earlier passes; the same for any number of threads.
     /// Calls `use(chunk, context, work)` for every light path in parallel; those of one chunk in order by one thread.

@@ -52,7 +52,7 @@ public:
 
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
-        const float radius = gather_radius(radius_, pass.scene);
+        const float radius = radius_ > 0 ? radius_ : radius_for(pass);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 

@@ -26,8 +26,8 @@ public:
 
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
-        const float radius =
-            gather_radius(radius_, pass.scene) * std::pow(float(pass.index + 1), (alpha_ - 1) / 2);
+        const float radius = (radius_ > 0 ? radius_ : 0.003f * pass.scene.bounds().radius()) *
+                             std::pow(float(pass.index + 1), (alpha_ - 1) / 2);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 

@@ -138,10 +138,8 @@ void Renderer::pass(uint32_t index) {
              .film = film_,
              .index = index,
              .light_paths = light_paths,
-             .rays_per_sample =
-                 index > 0 ? double(stats_.rays()) / (double(film_.passes()) * double(pixels))
-                           : 0.0,
              .chunks = chunks,
+             .so_far = stats_,
              .for_each_light_path =
                  [&](const auto& use) {
                      for_each_sample([&](uint64_t chunk, const SampleContext& c, Workspace& work,
