@@ -97,7 +97,8 @@ void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCo
         const auto own = uint64_t(work.y.size());
         if (vertices.fetch_add(own, std::memory_order_relaxed) + own > most_vertices)
             throw std::runtime_error(fmt::format(
-                "a pass has more than {} light vertices, too many to keep; render in crops (--crop) "
+                "a pass has more than {} light vertices, too many to keep; render in crops "
+                "(--crop) "
                 "or smaller, limit max_depth, or raise the integrator's parameter \"memory\"",
                 most_vertices));
     });

@@ -52,8 +52,9 @@ TEST_F(CompareTest, JudgesInnerPathsAlone) {
 }
 
 TEST_F(CompareTest, RefusesInnerPathsOfOtherWeights) {
-    expect_refusal({scene, "--methods", "bdpt", "pcbpt:direct=both", "--spp", "1", "--paths", "inner"},
-                   "\"pcbpt:direct=both\" weighs its techniques otherwise than \"bdpt");
+    expect_refusal(
+        {scene, "--methods", "bdpt", "pcbpt:direct=both", "--spp", "1", "--paths", "inner"},
+        "\"pcbpt:direct=both\" weighs its techniques otherwise than \"bdpt");
     expect_refusal({scene, "--methods", "bdpt", "--spp", "1", "--paths", "outer"}, "outer");
 }
 
