@@ -314,9 +314,10 @@ void report_sizes(const Report& report) {
     const auto bytes = [](const char* name, size_t size) {
         return Figure{name, "bytes", false, {double(size)}};
     };
-    report.add("sizes", {bytes("light_vertex", sizeof(LightVertex)), bytes("vertex", sizeof(Vertex)), bytes("bsdf", sizeof(Bsdf)),
-                         bytes("bsdf_component", sizeof(BsdfComponent)),
-                         bytes("lobe", sizeof(Lobe)), bytes("join", sizeof(Join))});
+    report.add("sizes",
+               {bytes("light_vertex", sizeof(LightVertex)), bytes("vertex", sizeof(Vertex)),
+                bytes("bsdf", sizeof(Bsdf)), bytes("bsdf_component", sizeof(BsdfComponent)),
+                bytes("lobe", sizeof(Lobe)), bytes("join", sizeof(Join))});
 }
 
 }  // namespace

@@ -7,6 +7,7 @@ find_package(OpenImageIO REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(nanoflann REQUIRED)
 find_package(nlohmann_json REQUIRED)
+find_package(nanoflann REQUIRED)
 
 # Embree 3.13 is what Debian 12 has; the code also compiles against 4.
 find_package(embree 4 QUIET)

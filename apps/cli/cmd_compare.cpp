@@ -22,8 +22,8 @@ namespace {
 struct CompareCommand {
     std::vector<std::string> scenes, methods, references;
     SceneOptions reading;
-    std::string reference_method, sampler = "sobol", report = "out/compare",
-                                  kept_references = "out/references";
+    std::string paths = "all", reference_method, sampler = "sobol", report = "out/compare",
+                kept_references = "out/references";
     double seconds = 0, reference_seconds = 0;
     uint64_t spp = 0, reference_spp = 0, seed = 0;
     int runs = 1, threads = 0, technique_depth = 5;
@@ -99,6 +99,7 @@ CompareSettings CompareCommand::settings(const Scene& scene) const {
     if (seconds > 0) s.limits.seconds = seconds;
     if (spp > 0) s.limits.spp = spp;
     s.runs = runs;
+    s.inner_paths_only = paths == "inner";
     s.technique_depth = technique_depth;
     return s;
 }
@@ -122,6 +123,7 @@ RenderSettings CompareCommand::reference_settings(const Scene& scene,
     s.integrator = reference_integrator(scene, specs);
     s.sampler = parse_sampler(sampler);
     s.threads = threads;
+    s.inner_paths_only = paths == "inner";
     if (reference_seconds > 0) s.seconds = reference_seconds;
     if (reference_spp > 0) s.spp = reference_spp;
     if (!s.seconds && !s.spp && seconds > 0) s.seconds = 10 * seconds;
@@ -162,6 +164,7 @@ void CompareCommand::run() const {
             reference = read_reference(references[i], scene.film());
         } else {
             const RenderSettings how = reference_settings(scene, s.methods);
+            if (s.inner_paths_only) check_inner_paths(scene, s.methods, how.integrator);
             for (const MethodSpec& m : s.methods)
                 if (max_depth(m.integrator) != max_depth(how.integrator))
                     fmt::print(
@@ -208,6 +211,11 @@ void add_compare_command(CLI::App& app) {
     c.add_option("--runs", command->runs, "Independent runs, with seeds that count on")
         ->capture_default_str()
         ->check(CLI::Range(1, 10000));
+    c.add_option("--paths", command->paths,
+                 "all, or inner: the image shows only paths that join both sub-paths inside the "
+                 "scene, s >= 1 and t >= 2")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"all", "inner"}));
     c.add_option("--reference", command->references, "Images to judge by, one a scene");
     c.add_option("--reference-time", command->reference_seconds,
                  "Seconds to render the reference (default: 10 times --time)")

@@ -106,6 +106,12 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"mean_luminance", mean.mean},
         {"mean_luminance_standard_error", mean.standard_error},
     };
+    const PhaseSeconds& p = s.phases;
+    j["phase_seconds"] = {{"light_paths", p.light_paths},
+                          {"records", p.records},
+                          {"eye_paths", p.eye_paths - p.connections},
+                          {"connections", p.connections}};
+    for (const auto& [name, value] : r.integrator().figures()) j[name] = value;
     if (e.valid)
         j["relative_error"] = {
             {"estimate", e.relative_rms}, {"low_95", e.low}, {"high_95", e.high}};
@@ -123,9 +129,10 @@ void check_aovs(const std::vector<std::string>& names) {
 
 void write_techniques(const Renderer& r, const Scene& scene, const std::string& folder) {
     for (const auto& t : r.techniques()->images()) {
+        const bool is_stored = t.technique.strategy == Strategy::Connect && t.technique.s == 1;
         const std::string stem =
-            fmt::format("{}/length{:02}_s{:02}_t{:02}", folder, t.technique.vertices() - 1,
-                        t.technique.s, t.technique.t);
+            fmt::format("{}/length{:02}_s{:02}_t{:02}{}", folder, t.technique.vertices() - 1,
+                        t.technique.s, t.technique.t, is_stored ? "_stored" : "");
         const auto [w, h] = std::pair{scene.film().crop_width, scene.film().crop_height};
         write_image(stem + "_weighted.exr", rgb_image(w, h, t.weighted));
         write_image(stem + "_unweighted.exr", rgb_image(w, h, t.unweighted));

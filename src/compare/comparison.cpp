@@ -53,6 +53,7 @@ RenderSettings render_settings(const CompareSettings& s, const IntegratorSpec& i
     settings.sampler = s.sampler;
     settings.seed = seed;
     settings.threads = s.threads;
+    settings.inner_paths_only = s.inner_paths_only;
     return settings;
 }
 
@@ -150,6 +151,19 @@ void check_methods(const std::vector<MethodSpec>& methods) {
                 throw std::runtime_error(
                     fmt::format("method \"{}\" is given twice", methods[i].name));
     }
+}
+
+void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& methods,
+                       const IntegratorSpec& reference) {
+    const auto counts = [&](const IntegratorSpec& spec) {
+        return make_integrator(spec)->counts(scene, scene.film().pixel_count());
+    };
+    for (const MethodSpec& m : methods)
+        if (!(counts(m.integrator) == counts(reference)))
+            throw std::runtime_error(fmt::format(
+                "--paths inner: \"{}\" weighs its techniques otherwise than \"{}\", by which it is "
+                "judged; their inner paths do not have the same mean",
+                m.name, reference.to_string()));
 }
 
 std::vector<Turn> schedule(const RenderLimits& limits) {

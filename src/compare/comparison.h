@@ -27,6 +27,7 @@ struct CompareSettings {
     int threads = 0;      ///< 0: all.
     RenderLimits limits;  ///< Of each method in each run: seconds or spp.
     int runs = 1;
+    bool inner_paths_only = false;  ///< As in RenderSettings.
     /// Technique images up to this many edges, from a rendering of their own; 0 for none.
     int technique_depth = 0;
 };
@@ -88,6 +89,11 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
 
 /// Throws std::runtime_error where a method or its parameters do not exist, or two are the same.
 void check_methods(const std::vector<MethodSpec>& methods);
+
+/// Throws std::runtime_error where a method weighs its techniques otherwise than the reference's: then the inner paths of
+/// both have different means.
+void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& methods,
+                       const IntegratorSpec& reference);
 
 /// Where methods stop and let the next one go on. Checkpoints are a factor of √2 in time or 2 in samples apart, evenly in
 /// a logarithmic plot; long steps are cut into several turns.

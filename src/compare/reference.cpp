@@ -73,6 +73,7 @@ std::string cache_file(const FilmGeometry& film, const ReferenceSettings& settin
                   film.crop_height, int(settings.render.sampler)})
         hash = hash_combine(hash, uint64_t(v));
     hash = hash_bytes(hash, settings.render.integrator.to_string());
+    if (settings.render.inner_paths_only) hash = hash_bytes(hash, "inner");
     return (fs::path(settings.folder) / fmt::format("reference-{:016x}.exr", hash)).string();
 }
 

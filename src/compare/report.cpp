@@ -135,6 +135,7 @@ Json to_json(const CompareSettings& s) {
     return {{"seconds", s.limits.seconds ? Json(*s.limits.seconds) : Json()},
             {"spp", s.limits.spp ? Json(*s.limits.spp) : Json()},
             {"runs", s.runs},
+            {"paths", s.inner_paths_only ? "inner" : "all"},
             {"seed", s.seed},
             {"sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"},
             {"threads", s.threads > 0 ? s.threads : int(std::thread::hardware_concurrency())},
@@ -174,8 +175,12 @@ std::vector<Rgb> false_colours(const std::vector<float>& values) {
 }
 
 /// Empty for connections.
-const char* pair_name(Strategy strategy) {
-    return strategy == Strategy::Merge ? "merge" : strategy == Strategy::Gather ? "gather" : "";
+/// Of techniques beside connection_technique(s, t).
+const char* kind_name(const Technique& q) {
+    return q.strategy == Strategy::Merge                 ? "merge"
+           : q.strategy == Strategy::Gather              ? "gather"
+           : q.strategy == Strategy::Connect && q.s == 1 ? "stored"
+                                                         : "";
 }
 
 struct CurveKind {
@@ -252,15 +257,16 @@ private:
                   {"techniques", Json::array()}};
         for (const auto& t : m.techniques) {
             const Technique& q = t.technique;
+            const std::string kind = kind_name(q);
             const int edges = q.vertices() - 1;
-            write_image(file(fmt::format("{}-techniques/length{:02}_s{:02}_t{:02}.png", stem, edges,
-                                         q.s, q.t)),
+            write_image(file(fmt::format("{}-techniques/length{:02}_s{:02}_t{:02}{}.png", stem,
+                                         edges, q.s, q.t, kind)),
                         rgb_image(w, h, tone_map(t.weighted, mapping_)));
             constexpr int kThumbnail = 120;
             const RgbImage weighted = reduced(w, h, t.weighted, kThumbnail),
                            unweighted = reduced(w, h, t.unweighted, kThumbnail);
             page["techniques"].push_back(
-                {{"kind", pair_name(q.strategy)},
+                {{"kind", kind},
                  {"edges", edges},
                  {"s", q.s},
                  {"t", q.t},

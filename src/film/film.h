@@ -28,6 +28,12 @@ struct FilmGeometry {
         return {float(crop_x + int(index % crop_width)) + 0.5f,
                 float(crop_y + int(index / crop_width)) + 0.5f};
     }
+    /// The crop's pixel that a film point lies in, or the one nearest to it.
+    uint64_t pixel_at(Vec2 point) const {
+        const int x = std::clamp(int(point.x) - crop_x, 0, crop_width - 1);
+        const int y = std::clamp(int(point.y) - crop_y, 0, crop_height - 1);
+        return uint64_t(y) * uint64_t(crop_width) + uint64_t(x);
+    }
 };
 
 /// Calls `use(pixel index, h)` for every pixel of the crop whose filter reaches the film point.

@@ -1,39 +1,135 @@
 // Bidirectional path tracing [Veach & Guibas 1994; Lafortune & Willems 1993]: all techniques C(s,t), combined by the power
 // heuristic. Unbiased. Joins that will add little are thinned by roulette before their shadow ray.
+//
+// An eye vertex is connected to the light path of its own pixel, or to C of the V connectible vertices y_i, i ≥ 1, of all
+// light paths of the pass, the light-vertex cache [Davidovič et al. 2014]. Then C(s,t), s, t ≥ 2, brings V/(C·N_L) times
+// what each brings, and counts C·N_L/V̄ in the weights, V̄ being the mean of V: V itself depends on the paths.
 
 #include "integrator/bdpt.h"
 
+#include <array>
+#include <cmath>
+
 #include "integrator/bidirectional.h"
+#include "integrator/photon_memory.h"
 
 namespace etendue {
 namespace {
 
+constexpr std::array<Choice<bool>, 2> kUsesCache{{{"path", false}, {"cache", true}}};
+
 class BdptIntegrator final : public Integrator {
 public:
-    explicit BdptIntegrator(const IntegratorParams& params) : paths_(params) {}
+    explicit BdptIntegrator(const IntegratorParams& p)
+        : paths_(p), uses_cache_(p.choice("connections", kUsesCache)),
+          given_draws_(p.integer("cache_draws", 0, 1024)), memory_(photon_memory(p)) {}
+
+    void begin_pass(const PassContext& pass) override {
+        paths_.begin_pass(pass);
+        if (!uses_cache_) return;
+        if (draws_ == 0) choose_draws(pass);
+        paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
+                                 kVertexBytes, memory_, chunks_, cache_);
+        connectible_.clear();
+        for (uint32_t i = 0; i < cache_.vertices().size(); ++i)
+            if (cache_.vertices()[i].may_connect) connectible_.push_back(i);
+    }
 
     void sample(const SampleContext& c, Workspace& work) const override {
-        const TechniqueCounts counts = this->counts(c.scene, c.light_paths);
-        paths_.light_path(c, counts, work);
-        paths_.eye_path(c, counts, work, [](int) { return Onward::ByAnyEvent; });
+        const TechniqueCounts n = counts(c.scene, c.light_paths);
+        if (!uses_cache_) paths_.light_path(c, n, work);
+        paths_.eye_path(c, n, work, [&](int t) {
+            paths_.add_next_event(c, n, t, work);
+            if (uses_cache_)
+                connect_to_cache(c, n, t, work);
+            else
+                paths_.connect_to_own(c, n, t, work);
+            return Onward::ByAnyEvent;
+        });
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
-        return Bidirectional::counts(scene, light_paths);
+        TechniqueCounts n = Bidirectional::counts(scene, light_paths);
+        if (uses_cache_) n.connect = count_;
+        return n;
     }
     bool traces_light_paths() const override { return true; }
     Estimator estimator() const override { return Estimator::Unbiased; }
+    std::vector<std::pair<std::string, double>> figures() const override {
+        if (!uses_cache_) return {};
+        return {{"cache_draws", draws_},
+                {"cached_vertices", connectible_.size()},
+                {"cache_bytes",
+                 cache_.memory_bytes() + connectible_.capacity() * sizeof(connectible_[0])}};
+    }
 
 private:
+    /// C as given, or as many as an average light path has vertices, from paths that bring nothing to the film.
+    void choose_draws(const PassContext& pass) {
+        constexpr uint64_t kPilotPaths = 8192;
+        const TechniqueCounts n = counts(pass.scene, pass.light_paths);
+        const uint64_t pixels = pass.scene.film().pixel_count();
+        std::vector<int> found(kPilotPaths);
+        pass.for_each_other_path(kPilotPaths, [&](uint64_t i, Sampler& sampler, Workspace& work) {
+            sampler.start(0, pixels + i);
+            const auto nothing = [](int) {};
+            paths_.walk_light_path(pass.scene, sampler, n, work.y, work.stats, nothing, nothing);
+            for (int s = 2; s <= work.y.size(); ++s) found[i] += work.y[s - 1].may_connect;
+        });
+        double vertices = 0;
+        for (const int v : found) vertices += double(v) / kPilotPaths;
+        draws_ = given_draws_ > 0 ? given_draws_ : std::max(1, int(std::lround(vertices)));
+        count_ = vertices > 0 ? float(draws_ / vertices) : 1.0f;
+    }
+
+    void connect_to_cache(const SampleContext& c, const TechniqueCounts& n, int t,
+                          Workspace& work) const {
+        if (connectible_.empty()) return;
+        const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
+        const float factor =
+            float(double(connectible_.size()) / (double(draws_) * double(c.light_paths)));
+        for (int i = 0; i < draws_; ++i) {
+            c.sampler.seek(Stream::Selection, uint32_t(i) << 16 | uint32_t(t));
+            const double u = (i + c.sampler.next_1d_fine()) / draws_;
+            const uint32_t vertex = connectible_[size_t(u * double(connectible_.size()))];
+            const int s = cache_.depth(vertex) + 1;
+            if (s + t - 1 > paths_.max_depth()) continue;
+            cache_.restore_first(c.scene, vertex, s, work.is_observed, work.y);
+            paths_.add_drawn(c, join_connect(c.scene, work.y, s, work.z, t, n), factor, i, work);
+        }
+    }
+
+    /// A vertex is in a chunk and in the cache, and has a number among the connectible.
+    static constexpr uint64_t kVertexBytes = 2 * sizeof(LightVertex) + 2 * sizeof(uint32_t);
+    /// Before the pilot; not that of other methods.
+    static constexpr float kUnknownCount = 0.5f;
+
     Bidirectional paths_;
+    bool uses_cache_;
+    int given_draws_;
+    uint64_t memory_;
+    int draws_ = 0;                ///< C; 0 before the first pass.
+    float count_ = kUnknownCount;  ///< C·N_L/V̄
+
+    // Of the pass.
+    LightPaths cache_;
+    std::vector<uint32_t> connectible_;
+    std::vector<LightPaths::Chunk> chunks_;
 };
 
 }  // namespace
 
 IntegratorEntry bdpt_entry() {
+    std::vector<ParamInfo> params = Bidirectional::params();
+    params.push_back({"connections", ParamKind::String, "path",
+                      "What eye vertices are connected to: path (the light path of the pixel) or "
+                      "cache (random vertices of all light paths of the pass)."});
+    params.push_back({"cache_draws", ParamKind::Int, "0",
+                      "Connections of each eye vertex to the cache; 0: as many as a light path has "
+                      "vertices."});
+    params.push_back(memory_param());
     return {{"integrator", "bdpt",
-             "Bidirectional path tracing with all connections and MIS. Unbiased.",
-             Bidirectional::params()},
+             "Bidirectional path tracing with all connections and MIS. Unbiased.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<BdptIntegrator>(p);
             }};

@@ -1,5 +1,6 @@
 #include "integrator/integrator.h"
 
+#include <algorithm>
 #include <charconv>
 #include <stdexcept>
 
@@ -8,6 +9,7 @@
 #include "integrator/bdpt.h"
 #include "integrator/light.h"
 #include "integrator/path.h"
+#include "integrator/pcbpt.h"
 #include "integrator/pm.h"
 #include "integrator/sppm.h"
 #include "integrator/upg.h"
@@ -17,8 +19,8 @@ namespace etendue {
 
 const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
-        path_entry(), light_entry(), bdpt_entry(), pm_entry(),      ppm_entry(),
-        sppm_entry(), vcm_entry(),   upg_entry(),  upg_bdpt_entry()};
+        path_entry(), light_entry(), bdpt_entry(), pm_entry(),       ppm_entry(),
+        sppm_entry(), vcm_entry(),   upg_entry(),  upg_bdpt_entry(), pcbpt_entry()};
     return entries;
 }
 
@@ -115,6 +117,27 @@ void IntegratorParams::refuse_choice(const char* name,
     throw std::runtime_error(
         fmt::format("integrator \"{}\": parameter \"{}\" must be one of {}, but is \"{}\"",
                     integrator_, name, fmt::join(known, ", "), text(name)));
+}
+
+namespace {
+
+template <class T>
+T checked_range(const std::string& integrator, const char* name, T value, T low, T high) {
+    if (!(value >= low && value <= high))
+        throw std::runtime_error(
+            fmt::format("integrator \"{}\": parameter \"{}\" must lie in [{}, {}], but is {}",
+                        integrator, name, low, high, value));
+    return value;
+}
+
+}  // namespace
+
+int IntegratorParams::integer(const char* name, int low, int high) const {
+    return checked_range(integrator_, name, integer(name), low, high);
+}
+
+float IntegratorParams::number(const char* name, float low, float high) const {
+    return checked_range(integrator_, name, number(name), low, high);
 }
 
 std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec) {

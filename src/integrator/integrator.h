@@ -22,7 +22,8 @@ struct Workspace {
     SubPath y, z;
     SubPath pair;  ///< The other path of a pair of vertices.
     Vertex scratch;
-    bool is_observed = false;  ///< Whole sub-paths are read, not only what joins need of them.
+    std::vector<float> masses;  ///< Of light vertices, seen from one eye vertex.
+    bool is_observed = false;   ///< Whole sub-paths are read, not only what joins need of them.
     RenderStats stats;
 };
 
@@ -40,6 +41,7 @@ struct SampleContext {
 /// What an integrator may do before the samples of a pass.
 struct PassContext {
     const Scene& scene;
+    const Film& film;
     uint32_t index;        ///< Of the pass, from 0.
     uint64_t light_paths;  ///< N_L.
     uint64_t pixels;
@@ -50,6 +52,10 @@ struct PassContext {
     std::function<void(uint64_t count, const Use& use)> for_each_sample;
     std::function<uint64_t(uint64_t count)>
         chunks;  ///< That for_each_sample() cuts so many samples into.
+    /// Calls `task(i, sampler, work)` for i < count in parallel: paths that bring nothing to the film. The task starts the
+    /// sampler; paths from the number of pixels on have numbers of their own.
+    using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;
+    std::function<void(uint64_t count, const Task& task)> for_each_other_path;
 
     void for_each_light_path(const Use& use) const { for_each_sample(light_paths, use); }
 };
@@ -72,6 +78,8 @@ public:
     /// Whether contributions come with the sub-paths they were made of, so that `verify` can tell their paths.
     virtual bool keeps_paths() const { return true; }
     virtual Estimator estimator() const = 0;
+    /// What a run tells of the integrator's own structures, by name; as of the last pass.
+    virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
 
 /// The text after an integrator's name: `bdpt:max_depth=12,rr_depth=5`. Checked against the integrator's table.
@@ -107,6 +115,9 @@ public:
         }
         refuse_choice(name, known);
     }
+    /// As integer() and number(), within [low, high].
+    int integer(const char* name, int low, int high) const;
+    float number(const char* name, float low, float high) const;
     const std::string& integrator() const { return integrator_; }
 
 private:

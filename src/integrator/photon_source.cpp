@@ -1,5 +1,6 @@
 #include "integrator/photon_source.h"
 
+#include "integrator/photon_memory.h"
 #include "integrator/photons.h"
 
 namespace etendue {

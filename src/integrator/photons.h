@@ -1,25 +1,11 @@
 #pragma once
 // The light vertices of a pass from which eye vertices choose partners.
 
-#include <atomic>
-
 #include "integrator/bidirectional.h"
 #include "pathspace/light_paths.h"
 #include "pathspace/point_grid.h"
 
 namespace etendue {
-
-/// What all threads of a pass keep of its light paths.
-class PhotonMemory {
-public:
-    explicit PhotonMemory(uint64_t max_bytes) : max_bytes_(max_bytes) {}
-    /// Throws std::runtime_error where they have taken too much.
-    void take(uint64_t bytes);
-
-private:
-    uint64_t max_bytes_;
-    std::atomic<uint64_t> bytes_ = 0;
-};
 
 class Photons {
 public:
@@ -72,9 +58,5 @@ public:
 private:
     float first_, alpha_, default_share_;
 };
-
-/// The parameter `memory`, in bytes.
-uint64_t photon_memory(const IntegratorParams& p);
-ParamInfo memory_param();
 
 }  // namespace etendue

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "integrator/irradiance_cache.h"
+#include "integrator/photon_memory.h"
 #include "integrator/photon_source.h"
 #include "integrator/photons.h"
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "integrator/photon_mapping.h"
+#include "integrator/photon_memory.h"
 #include "integrator/photons.h"
 
 namespace etendue {

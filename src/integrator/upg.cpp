@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "integrator/gather.h"
+#include "integrator/photon_memory.h"
 
 namespace etendue {
 namespace {
@@ -50,6 +51,7 @@ public:
     }
 
     void begin_pass(const PassContext& pass) override {
+        paths_.begin_pass(pass);
         const float radius = radius_ > 0 ? radius_ : radius_for(pass);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
@@ -63,6 +65,8 @@ public:
         };
         const Gather gather{c, paths_, photons_, n, flatness_, work};
         paths_.eye_path(c, n, work, [&](int t) {
+            paths_.add_next_event(c, n, t, work);
+            paths_.connect_to_own(c, n, t, work);
             photons_.for_each_near(work.z[t - 1].p,
                                    [&](uint32_t vertex) { gather(t, vertex, by_trials); });
             return Onward::ByAnyEvent;

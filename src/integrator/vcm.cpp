@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "integrator/gather.h"
+#include "integrator/photon_memory.h"
 
 namespace etendue {
 namespace {
@@ -28,6 +29,7 @@ public:
     }
 
     void begin_pass(const PassContext& pass) override {
+        paths_.begin_pass(pass);
         const float radius = radius_.radius(pass.scene, pass.index);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
@@ -41,6 +43,8 @@ public:
         };
         const Gather gather{c, paths_, photons_, n, 1, work};
         paths_.eye_path(c, n, work, [&](int t) {
+            paths_.add_next_event(c, n, t, work);
+            paths_.connect_to_own(c, n, t, work);
             if (!merges_) return Onward::ByAnyEvent;
             photons_.for_each_near(work.z[t - 1].p, [&](uint32_t vertex) {
                 if (is_exact_)

@@ -34,7 +34,8 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     const double p_NE = double(emitter.selection_pmf) * e.pdf / v.pdf_fwd;
     const double p_L = double(emitter.selection_pmf) * e.pdf_y0 / v.pdf_fwd;
     double others = 0;
-    if (last >= 2 && !z[last - 1].is_delta) others += sqr(counts.next_event * p_NE);
+    if (last >= 2 && !z[last - 1].is_delta)
+        others += sqr(counts.next_event * p_NE) + sqr(counts.connect_emission * p_L);
     if (counts.uses_light_paths()) {
         const double rev_prev =
             v.is_infinite ? to_area(e.pdf_d, v, z[last - 1]) : e.pdf_d * v.to_predecessor;
@@ -80,10 +81,11 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const double rev_last = double(d.pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
         const double rev_prev = f.pdf_rev * v.to_predecessor;
         const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
-        others += sqr(p_L / p_NE) * outward_sum<Side::Eye>(z, last, false,
-                                                           {rev_last, rev_prev,
-                                                            gloss_of_emitter(emitter.is_area()), t},
-                                                           counts);
+        others += sqr(p_L / p_NE) *
+                  (sqr(double(counts.connect_emission)) +
+                   outward_sum<Side::Eye>(
+                       z, last, false, {rev_last, rev_prev, gloss_of_emitter(emitter.is_area()), t},
+                       counts));
     }
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .emitter = &emitter,
@@ -123,12 +125,12 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     const BsdfEval fb = b.bsdf.eval(b.wo, -edge.w, TransportMode::Radiance);
     if (fb.f.is_zero()) return {};
     BsdfEval fa;
-    double count = counts.connect;
+    double squares = sqr(double(counts.connect));
     if (s == 1) {
         const Emitter::Emission e = a.emitter->eval_emission(a.ng, a.uv, edge.w);
         fa.f = e.Le_cos;
         fa.pdf = e.pdf_d;
-        count = double(counts.next_event) * next_event_ratio(a, edge.w);
+        squares = emission_squares(double(next_event_ratio(a, edge.w)), counts);
     } else {
         fa = a.bsdf.eval(a.wo, edge.w, TransportMode::Importance);
     }
@@ -141,7 +143,7 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     edge.rev_b = double(fa.pdf) * abs_dot(b.ng, edge.w) * inv_dist2;
     if (a.is_infinite) edge.rev_a = fb.pdf;
     edge.total =
-        sqr(count) +
+        squares +
         outward_sum<Side::Light>(
             y, s - 1, false,
             {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f, gloss(b, false), s + t - 1},
@@ -152,22 +154,29 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     return edge;
 }
 
+/// The join by the edge between `a` of y and `b` of z; `np` relative to p of the split there.
+Join joined(const Edge& edge, const Technique& technique, double np, const SubPath& y,
+            const Vertex& a, const SubPath& z, const Vertex& b) {
+    return {.technique = technique,
+            .emitter = y[0].emitter,
+            .contribution = edge.contribution,
+            .mis_weight = float(sqr(np) / edge.total),
+            .film = z.film,
+            .a = b.p,
+            .ng_a = b.ng,
+            .b = a.p,
+            .ng_b = a.has_cosine ? a.ng : Vec3{},
+            .to_infinity = a.is_infinite};
+}
+
 }  // namespace
 
 std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
                                  int t, const TechniqueCounts& counts) {
     const auto edge = connect(scene, y, s, z, t, counts);
     if (!edge) return {};
-    const Vertex &a = y[s - 1], &b = z[t - 1];
-    return Join{.technique = {Strategy::Connect, s, t},
-                .emitter = y[0].emitter,
-                .contribution = edge->contribution,
-                .mis_weight = float(sqr(double(counts.connect)) / edge->total),
-                .film = z.film,
-                .a = a.p,
-                .ng_a = a.ng,
-                .b = b.p,
-                .ng_b = b.ng};
+    const Technique technique{Strategy::Connect, s, t};
+    return joined(*edge, technique, double(counts.of(technique)), y, y[s - 1], z, z[t - 1]);
 }
 
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
@@ -178,17 +187,9 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
     const double found = counts.found(drops_eye ? edge->rev_a : edge->rev_b);
-    return Join{.technique = {Strategy::Gather, s, t, drops_eye},
-                .emitter = y[0].emitter,
-                .contribution = edge->contribution,
-                .mis_weight = float(sqr(count * found) / edge->total),
-                .film = z.film,
-                .a = b.p,
-                .ng_a = b.ng,
-                .b = a.p,
-                .ng_b = a.has_cosine ? a.ng : Vec3{},
-                .to_infinity = a.is_infinite,
-                .found = float(found)};
+    Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * found, y, a, z, b);
+    join.found = float(found);
+    return join;
 }
 
 namespace {
@@ -210,7 +211,7 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
     if (f.f.is_zero()) return {};
     // Relative to the split after x_m, which has p_L(x_m) but not p_E(x_m).
     const double total =
-        sqr(split_count<Side::Eye>(z, t - 1, false, counts)) +
+        split_squares<Side::Eye>(z, t - 1, false, counts) +
         outward_sum<Side::Light>(y, s - 1, false, {b.pdf_fwd, f.pdf * a.to_predecessor, 0, edges},
                                  counts) +
         sqr(f.pdf_rev * b.to_predecessor / z[t - 2].pdf_fwd) *

@@ -38,7 +38,7 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
 /// C(1,t): a point on an emitter drawn for z_{t-1}.
 std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,
                                     const TechniqueCounts& counts);
-/// C(s,t), s ≥ 2, t ≥ 2.
+/// C(s,t), t ≥ 2; where s = 1, y_0 is what the emission sampled (Strategy::Connect, not NextEvent).
 std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
                                  int t, const TechniqueCounts& counts);
 /// M(s,t): y_{s-1} and z_{t-1} taken for one vertex [Georgiev et al. 2012; Hachisuka et al. 2012]. For one light path.

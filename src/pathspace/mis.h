@@ -6,8 +6,8 @@
 // before x_i (i light vertices) is  p_i = Π_{j<i} p_L(x_j) · Π_{j≥i} p_E(x_j).  Moving the split past a vertex multiplies by
 // a ratio, so relative to the present split the sum over all others is, on each side, a nested product
 //     S_L = ρ_L² (b_L + ρ_{L-1}² (b_{L-1} + … )),     ρ_i = pdf_rev_i / pdf_fwd_i,
-//     b_i = c_i² + m_i²,
-// where c_i is the number of samples of the technique whose split lies between v_{i-1} and v_i, 0 where an event there
+//     b_i = Σ c_i² + m_i²,
+// where c_i is the number of samples of a technique whose split lies between v_{i-1} and v_i, 0 where an event there
 // is a delta event, and m_i that of pairs at v_i, relative to the density of this split. Everything but the last two
 // levels is known while the sub-path is walked: v[L].weight_sum holds the sum inside from level L-2 on. `path_pdfs.h`
 // has the same weight as an explicit sum; a test holds them together.
@@ -27,20 +27,25 @@ inline uint8_t gloss(const Vertex& v, bool is_delta) {
     return is_delta ? kDeltaGloss : v.gloss;
 }
 
-/// c_i of a sub-path: samples of the technique split between v[i-1] and v[i], times the ratio of its own density to the
-/// walk's where it samples y_0 in another way. `delta` tells whether the event at v[i] is one.
+/// Of the techniques C(1,t), relative to p_L of y_0.
+inline double emission_squares(double next_event_ratio, const TechniqueCounts& n) {
+    return sqr(n.next_event * next_event_ratio) + sqr(double(n.connect_emission));
+}
+
+/// Σ c_i² of a sub-path over the techniques split between v[i-1] and v[i]: their samples, times the ratio of their own
+/// density to the walk's where they sample y_0 in another way. `delta` tells whether the event at v[i] is one.
 template <Side side>
-inline double split_count(const SubPath& v, int i, bool delta, const TechniqueCounts& n) {
+inline double split_squares(const SubPath& v, int i, bool delta, const TechniqueCounts& n) {
     if constexpr (side == Side::Light) {
-        if (i == 0) return v[0].emitter->is_delta() ? 0.0 : n.hit;
+        if (i == 0) return v[0].emitter->is_delta() ? 0.0 : sqr(double(n.hit));
         if (delta) return 0;
-        if (i == 1) return double(n.next_event) * v[1].next_event_ratio;
+        if (i == 1) return emission_squares(v[1].next_event_ratio, n);
     } else {
-        if (i == 0) return n.hit_lens;
+        if (i == 0) return sqr(double(n.hit_lens));
         if (delta) return 0;
-        if (i == 1) return n.splat;
+        if (i == 1) return sqr(double(n.splat));
     }
-    return v[i - 1].is_delta ? 0.0 : n.connect;
+    return v[i - 1].is_delta ? 0.0 : sqr(double(n.connect));
 }
 
 /// m_i² of a sub-path, for the inner vertex v[i] of a path: n·p of a merge is N_L π d² p_L(x_m) p_E(x_m) times the
@@ -65,7 +70,7 @@ inline double squared_pair_count(const SubPath& v, int i, double rev, uint8_t in
 template <Side side>
 inline double bracket(const SubPath& v, int i, bool delta, double rev, uint8_t inward, int edges,
                       const TechniqueCounts& n) {
-    double b = sqr(split_count<side>(v, i, delta, n));
+    double b = split_squares<side>(v, i, delta, n);
     if (n.disc > 0 && !delta) b += squared_pair_count<side>(v, i, rev, inward, edges, n);
     return b;
 }

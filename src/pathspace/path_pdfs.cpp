@@ -36,7 +36,7 @@ double PathPdfs::density(const Technique& q) const {
 
 double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) const {
     const int k = vertices() - 1, m = q.s - 1;
-    const double n = q.strategy == Strategy::Gather ? counts.gathers(k) : counts.of(q.strategy);
+    const double n = counts.of(q);
     if (!(n > 0)) return 0;
     if (!is_pair(q.strategy)) return n * density(q);
     if (m < 1 || m >= k || k < counts.min_pair_edges || is_delta[m]) return 0;
@@ -55,6 +55,7 @@ double mis_weight(const PathPdfs& pdfs, const Technique& technique, const Techni
     const int n = pdfs.vertices();
     for (int s = 0; s <= n; ++s) {
         add(connection_technique(s, n - s));
+        if (s == 1 && n > 2) add({Strategy::Connect, 1, n - 1});
         if (s == 0) continue;
         add({Strategy::Merge, s, n + 1 - s});
         for (const bool drops_eye : {false, true}) add({Strategy::Gather, s, n + 1 - s, drops_eye});

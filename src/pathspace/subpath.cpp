@@ -67,6 +67,7 @@ float next_event_ratio(const Vertex& y0, Vec3 w) {
 }
 
 RenderStats& RenderStats::operator+=(const RenderStats& o) {
+    phases += o.phases;
     eye_paths += o.eye_paths;
     light_paths += o.light_paths;
     vertices += o.vertices;

@@ -1,9 +1,7 @@
 #pragma once
 // The walk: the one way in which sub-paths are made, from either end.
 
-#include <algorithm>
-#include <array>
-#include <bit>
+#include <chrono>
 
 #include "pathspace/mis.h"
 #include "pathspace/vertex.h"
@@ -11,8 +9,25 @@
 
 namespace etendue {
 
+/// Where the time of samples goes, seconds on one thread. Only every kTimedSamples-th sample is timed.
+struct PhaseSeconds {
+    double light_paths = 0;  ///< With their techniques t ≤ 1.
+    double eye_paths = 0;    ///< With all that follows.
+    double connections = 0;  ///< To light vertices, their choice included.
+    double records = 0;      ///< Importance records.
+
+    PhaseSeconds& operator+=(const PhaseSeconds& o) {
+        light_paths += o.light_paths, eye_paths += o.eye_paths;
+        connections += o.connections, records += o.records;
+        return *this;
+    }
+};
+
 /// Counters of one worker; merged at the end of a pass.
 struct RenderStats {
+    static constexpr int kTimedSamples = 8;
+    PhaseSeconds phases;
+    bool is_timed = false;  ///< The sample at hand.
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
     uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
     uint64_t joins_skipped = 0;             ///< By roulette, before their shadow ray.
@@ -30,6 +45,27 @@ struct RenderStats {
     }
     RenderStats& operator+=(const RenderStats& o);
     uint64_t rays() const { return walk_rays + shadow_rays + trial_rays; }
+};
+
+/// Adds the time until its end to a phase, where the sample is timed.
+class PhaseTimer {
+public:
+    PhaseTimer(RenderStats& stats, double PhaseSeconds::*phase)
+        : seconds_(stats.is_timed ? &(stats.phases.*phase) : nullptr) {
+        if (seconds_) begin_ = Clock::now();
+    }
+    ~PhaseTimer() {
+        if (seconds_)
+            *seconds_ += RenderStats::kTimedSamples *
+                         std::chrono::duration<double>(Clock::now() - begin_).count();
+    }
+    PhaseTimer(const PhaseTimer&) = delete;
+    PhaseTimer& operator=(const PhaseTimer&) = delete;
+
+private:
+    using Clock = std::chrono::steady_clock;
+    double* seconds_;
+    Clock::time_point begin_;
 };
 
 /// How far a walk goes.

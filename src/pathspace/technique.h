@@ -9,7 +9,7 @@ namespace etendue {
 enum class Strategy : uint8_t {
     Hit,        ///< C(0,t): the eye path lands on an emitter.
     NextEvent,  ///< C(1,t), t ≥ 2: a point chosen on an emitter for z_{t-1}.
-    Connect,    ///< C(s,t), s ≥ 2, t ≥ 2.
+    Connect,    ///< C(s,t), s ≥ 2, t ≥ 2; with s = 1, to the y_0 of a light path.
     Splat,      ///< C(s,1): the light path is connected to the lens.
     HitLens,    ///< C(s,0): the light path lands on a finite lens.
     Merge,      ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are taken for one vertex.
@@ -49,10 +49,17 @@ enum class PairRule : uint8_t {
     Both,   ///< Each of them, for a path of its own.
 };
 
+/// Whether it joins an eye and a light sub-path inside the scene: neither a hit of an emitter nor light brought to the
+/// lens [Popov et al. 2015].
+constexpr bool is_inner(const Technique& q) {
+    return q.s >= 1 && q.t >= 2;
+}
+
 /// How many samples of each strategy an algorithm takes per eye sub-path, 0 for those it does not run. Eye densities are
 /// per pixel, so one eye path a pixel counts 1 and whatever reaches any pixel counts N_L, the number of light paths.
 struct TechniqueCounts {
     float hit = 0, next_event = 0, connect = 0, splat = 0, hit_lens = 0;
+    float connect_emission = 0;   ///< C(1,t) with y_0 as light paths sample it, Strategy::Connect.
     float merge = 0, gather = 0;  ///< Of each inner vertex of the path; one of the two is 0.
     float disc = 0;               ///< π d², the area in which a pair's partner is sought.
     int min_pair_edges = 2;       ///< Shorter paths are not made from pairs.
@@ -60,8 +67,10 @@ struct TechniqueCounts {
     PairRule pair_rule = PairRule::Gloss;
     bool clamps_disc = true;  ///< Weights know that no probability exceeds 1 [ibid., eq. 24].
 
+    friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
     bool uses_light_paths() const {
-        return connect > 0 || splat > 0 || hit_lens > 0 || merge > 0 || gather > 0;
+        return connect > 0 || connect_emission > 0 || splat > 0 || hit_lens > 0 || merge > 0 ||
+               gather > 0;
     }
     /// Samples of each pair of a path of so many edges.
     float gathers(int edges) const {
@@ -72,15 +81,15 @@ struct TechniqueCounts {
         const double p = double(disc) * pdf;
         return clamps_disc && p > 1 ? 1 : p;
     }
-    float of(Strategy strategy) const {
-        switch (strategy) {
+    float of(const Technique& q) const {
+        switch (q.strategy) {
         case Strategy::Hit: return hit;
         case Strategy::NextEvent: return next_event;
-        case Strategy::Connect: return connect;
+        case Strategy::Connect: return q.s == 1 ? connect_emission : connect;
         case Strategy::Splat: return splat;
         case Strategy::HitLens: return hit_lens;
         case Strategy::Merge: return merge;
-        case Strategy::Gather: return gather;
+        case Strategy::Gather: return gathers(q.vertices() - 1);
         }
         return 0;
     }

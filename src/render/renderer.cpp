@@ -18,10 +18,10 @@ constexpr uint64_t kChunk = 256;
 /// The sink of a rendering: the film, and who else wants to know.
 class FilmSink final : public ContributionSink {
 public:
-    FilmSink(Film& film, TechniqueImages* techniques, ContributionObserver* observer,
+    FilmSink(Film& film, TechniqueImages* techniques, const RenderSettings& settings,
              float splat_scale, Workspace& work)
-        : film_(film), techniques_(techniques), observer_(observer), splat_scale_(splat_scale),
-          work_(work) {}
+        : film_(film), techniques_(techniques), observer_(settings.observer),
+          inner_only_(settings.inner_paths_only), splat_scale_(splat_scale), work_(work) {}
 
     void begin(uint64_t pixel) {
         pixel_ = pixel;
@@ -30,6 +30,7 @@ public:
     void end() { film_.add_eye(pixel_, sum_); }
 
     void add(const Join& join, Rgb contribution) override {
+        if (inner_only_ && !is_inner(join.technique)) return;
         const bool is_splat = join.technique.t <= 1;
         const Rgb value = contribution * join.mis_weight;
         if (!is_finite(value)) {
@@ -59,6 +60,7 @@ private:
     Film& film_;
     TechniqueImages* techniques_;
     ContributionObserver* observer_;
+    bool inner_only_;
     float splat_scale_;
     Workspace& work_;
     uint64_t pixel_ = 0;
@@ -119,10 +121,11 @@ void Renderer::pass(uint32_t index) {
             Workspace& work = workers_->spaces.local();
             work.is_observed = settings_.observer != nullptr;
             Sampler sampler(settings_.sampler, settings_.seed);
-            FilmSink sink(film_, techniques_.get(), settings_.observer, splat_scale, work);
+            FilmSink sink(film_, techniques_.get(), settings_, splat_scale, work);
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
                 sampler.start(index, pixel);
+                work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
                 use(chunk,
                     SampleContext{scene_, film_, pixel, light_paths, splat_scale, sampler, sink},
                     work, sink);
@@ -131,12 +134,28 @@ void Renderer::pass(uint32_t index) {
     };
     workers_->arena.execute([&] {
         integrator_->begin_pass(
-            {scene_, index, light_paths, pixels, stats_,
-             [&](uint64_t count, const PassContext::Use& use) {
-                 for_each_sample(count, [&](uint64_t chunk, const SampleContext& c, Workspace& work,
-                                            FilmSink&) { use(chunk, c, work); });
-             },
-             chunks});
+            {.scene = scene_,
+             .film = film_,
+             .index = index,
+             .light_paths = light_paths,
+             .pixels = pixels,
+             .so_far = stats_,
+             .for_each_sample =
+                 [&](uint64_t count, const PassContext::Use& use) {
+                     for_each_sample(count,
+                                     [&](uint64_t chunk, const SampleContext& c, Workspace& work,
+                                         FilmSink&) { use(chunk, c, work); });
+                 },
+             .chunks = chunks,
+             .for_each_other_path =
+                 [&](uint64_t count, const PassContext::Task& task) {
+                     tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                         Sampler sampler(settings_.sampler, settings_.seed);
+                         Workspace& work = workers_->spaces.local();
+                         work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
+                         task(i, sampler, work);
+                     });
+                 }});
         for_each_sample(pixels,
                         [&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {
                             sink.begin(c.pixel);

@@ -28,6 +28,8 @@ struct RenderSettings : RenderLimits {
     int threads = 0;  ///< 0: all.
     /// Technique images up to this many edges; 0 for none.
     int technique_depth = 0;
+    bool inner_paths_only =
+        false;  ///< The image shows only what inner techniques bring, see is_inner().
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
 };
 

@@ -3,10 +3,12 @@
 namespace etendue {
 namespace {
 
-/// Place of a technique in the triangle of (vertices, s): n vertices have s = 0 … n. Pairs have one of their own.
+/// Place of a technique in the triangle of (vertices, s): n vertices have s = 0 … n. Pairs, which have s ≥ 2, and
+/// connections to y_0 have one of their own.
 size_t triangle_index(const Technique& q) {
     const size_t n = size_t(q.vertices());
-    return 2 * ((n - 2) * (n + 3) / 2 + size_t(q.s)) + is_pair(q.strategy);
+    const bool is_second = is_pair(q.strategy) || (q.strategy == Strategy::Connect && q.s == 1);
+    return 2 * ((n - 2) * (n + 3) / 2 + size_t(q.s)) + is_second;
 }
 
 }  // namespace

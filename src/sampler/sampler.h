@@ -16,6 +16,7 @@ enum class Stream : uint8_t {
     Connection,  ///< Next event and lens points of splats; vertex = that of the sub-path.
     Roulette,    ///< Whether a join is evaluated; vertex = 2^16·s + t.
     Auxiliary,   ///< Loops of unbounded length.
+    Selection,   ///< Which light vertices an eye vertex is connected to; vertex = its own.
 };
 
 enum class SamplerKind : uint8_t {
@@ -72,6 +73,11 @@ public:
     float next_1d_unstructured() {
         if (kind_ == SamplerKind::PrimarySample) return next_1d_structured();
         return to_unit_float(uint32_t(bits(key_) >> 32));
+    }
+    /// The same with 48 bits, from two slots.
+    double next_1d_fine() {
+        const double high = double(next_1d_unstructured());
+        return high + 0x1p-24 * double(next_1d_unstructured());
     }
     SamplerKind kind() const { return kind_; }
 

@@ -48,6 +48,7 @@ PathClass classify(const Scene& scene, const Join& join, const SubPath& y, const
 std::vector<Technique> techniques_of_length(int edges) {
     std::vector<Technique> out;
     for (int s = 0; s <= edges + 1; ++s) out.push_back(connection_technique(s, edges + 1 - s));
+    if (edges >= 2) out.push_back({Strategy::Connect, 1, edges});
     for (const Strategy strategy : {Strategy::Merge, Strategy::Gather})
         for (int s = 2; s <= edges; ++s) out.push_back({strategy, s, edges + 2 - s});
     return out;
@@ -68,7 +69,7 @@ bool can_make(const Technique& q, const PathClass& c) {
 
 bool can_make(const TechniqueCounts& counts, const PathClass& c) {
     for (const Technique& q : techniques_of_length(c.edges))
-        if (counts.of(q.strategy) > 0 && can_make(q, c)) return true;
+        if (counts.of(q) > 0 && can_make(q, c)) return true;
     return false;
 }
 

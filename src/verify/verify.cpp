@@ -559,7 +559,7 @@ VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& metho
                 alone ? runner.render(*alone, 2 + uint64_t(methods.size() + i)) : Series{};
             for (int edges = options.shortest; edges <= options.longest; ++edges)
                 for (const Technique& q : techniques_of_length(edges))
-                    if (series.counts.of(q.strategy) > 0)
+                    if (series.counts.of(q) > 0)
                         m.techniques.push_back(
                             compare_technique(q, alone ? unthinned : series, *against));
         }

@@ -62,6 +62,13 @@ std::string smooth_mesh() {
 
 std::vector<Planted> planted() {
     const std::string lit_room = front_camera(kSize) + room() + area_lamp();
+    // Records know little of what lies behind a wall; with the choices of the paper.
+    const std::string by_paper =
+        "pcbpt:roulette=0,record_fraction=0.02,direct=stored,uniform=0.1,pmf=contribution";
+    const std::string divided_room =
+        lit_room + rectangle("<scale value=\"0.8\"/><rotate y=\"1\" angle=\"90\"/>"
+                             "<translate x=\"-0.1\" y=\"-0.2\"/>",
+                             diffuse("0.7,0.7,0.7"));
     const std::string softly_lit = front_camera(kSize) + room() + large_lamp();
     return {
         {"EtaSquared", front_camera(kSize) + room() + lamp_in_glass(), "light",
@@ -76,6 +83,9 @@ std::vector<Planted> planted() {
         {"PdfOfEvaluation", softly_lit, "path", Techniques, 0, 256},
         {"PdfOfSampling", softly_lit, "path", Techniques, 0},
         {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques, 256},
+        {"PmfOfOneRecord", divided_room, by_paper, Image | Lengths, 0},
+        {"NoUniformShare", divided_room, by_paper + ",neighbours=1", Image | Lengths, 0},
+        {"UniformDenominator", divided_room, by_paper, Image | Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
     };
 }

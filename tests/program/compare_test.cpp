@@ -38,6 +38,26 @@ protected:
     fs::path report = folder.path() / "report";
 };
 
+TEST_F(CompareTest, JudgesInnerPathsAlone) {
+    const ProgramResult r =
+        run({scene, "--methods", "bdpt", "pcbpt:direct=next_event", "--spp", "4", "--reference-spp",
+             "64", "--resolution", "32x24", "--paths", "inner", "--techniques-max-depth", "2"});
+    ASSERT_EQ(r.status, 0) << r.errors;
+    const nlohmann::json j = nlohmann::json::parse(read_text(report / "report.json"));
+    EXPECT_EQ(j["settings"]["paths"], "inner");
+    for (const nlohmann::json& m : j["scenes"][0]["methods"])
+        EXPECT_NEAR(m["summary"]["mean_ratio"]["value"].get<double>(), 1, 0.2);
+    EXPECT_TRUE(fs::exists(report / "cornell/bdpt-techniques/length02_s01_t02.png"));
+    EXPECT_FALSE(fs::exists(report / "cornell/bdpt-techniques/length02_s02_t01.png"));
+}
+
+TEST_F(CompareTest, RefusesInnerPathsOfOtherWeights) {
+    expect_refusal(
+        {scene, "--methods", "bdpt", "pcbpt:direct=both", "--spp", "1", "--paths", "inner"},
+        "\"pcbpt:direct=both\" weighs its techniques otherwise than \"bdpt");
+    expect_refusal({scene, "--methods", "bdpt", "--spp", "1", "--paths", "outer"}, "outer");
+}
+
 TEST_F(CompareTest, WritesAReport) {
     const ProgramResult r =
         run({scene, "--methods", "path", "bdpt:max_depth=-1", "--spp", "8", "--reference-spp", "64",

@@ -61,7 +61,8 @@ TEST_P(Determinism, OfThreadsAndSeeds) {
 
 INSTANTIATE_TEST_SUITE_P(
     Integrators, Determinism,
-    ::testing::Combine(::testing::Values("path", "light", "bdpt", "vcm", "vcm:exact=true",
+    ::testing::Combine(::testing::Values("path", "light", "bdpt", "bdpt:eorr=true",
+                                         "bdpt:connections=cache", "pcbpt", "vcm", "vcm:exact=true",
                                          "upg+bdpt", "sppm", "ppm:eye_paths=2",
                                          "pm:light_paths=2000",
                                          "pm:light_paths=2000,cache_error=0.3,cache_rays=32"),

@@ -44,8 +44,8 @@ protected:
 TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
     const Scene scene = furnace(GetParam().sensor);
     constexpr int kRuns = 24;
-    std::map<std::tuple<bool, int, int>, Moments> alone;  // by (is it a pair, s, t)
-    std::map<int, Moments> together;                      // by length
+    std::map<std::tuple<Strategy, int, int>, Moments> alone;
+    std::map<int, Moments> together;  // by length
     for (int run = 0; run < kRuns; ++run) {
         RenderSettings settings;
         settings.integrator = IntegratorSpec::parse(
@@ -61,7 +61,7 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         std::vector<Rgb> sum(scene.film().pixel_count());
         for (const TechniqueImages::Entry& e : renderer.techniques()->images()) {
             const Technique& q = e.technique;
-            Moments& m = alone[{is_pair(q.strategy), q.s, q.t}];
+            Moments& m = alone[{q.strategy, q.s, q.t}];
             while (m.count() < run) m.add(0);  // runs in which it made nothing
             m.add(mean(e.unweighted));
             length_sum[q.vertices() - 1] += mean(e.weighted);
@@ -78,9 +78,11 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
     const bool lens = scene.sensor().has_finite_lens();
     size_t expected_count = 0;
     const int pairs_from = GetParam().min_pair_edges;
+    const bool both = std::string(GetParam().integrator).find("both") != std::string::npos;
     for (int k = 1; k <= kLongest; ++k)
-        expected_count +=
-            size_t(k + 1 + lens) + (pairs_from > 0 && k >= pairs_from ? size_t(k - 1) : 0);
+        expected_count += size_t(k + 1 + lens) +
+                          (pairs_from > 0 && k >= pairs_from ? size_t(k - 1) : 0) +
+                          (both && k >= 2);
     EXPECT_EQ(alone.size(), expected_count) << "a technique made nothing";
     const double level = sidak(0.01, int(alone.size() + together.size()));
     // Few light paths meet the lens.
@@ -94,12 +96,34 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
             << what << ": too few samples";
     };
     for (const auto& [q, m] : alone) {
-        const auto [pair, s, t] = q;
-        expect_mean(m, s + t - 1 - pair, t == 0,
-                    fmt::format("{}s = {}, t = {}", pair ? "pair, " : "", s, t));
+        const auto [strategy, s, t] = q;
+        expect_mean(m, s + t - 1 - is_pair(strategy), t == 0,
+                    fmt::format("strategy {}, s = {}, t = {}", int(strategy), s, t));
     }
     for (const auto& [length, m] : together)
         expect_mean(m, length, false, fmt::format("length {}, weighted", length));
+}
+
+/// An image of inner paths alone is the sum of their techniques' parts of the whole.
+TEST(InnerPaths, AreTheSumOfTheirTechniques) {
+    const Scene scene = build(front_camera(kSize) + room() + area_lamp());
+    const auto render = [&](bool inner_only) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse("bdpt:max_depth=4,roulette=0");
+        settings.spp = 4;
+        settings.technique_depth = 4;
+        settings.inner_paths_only = inner_only;
+        auto renderer = std::make_unique<Renderer>(scene, settings);
+        const std::atomic<bool> interrupted{false};
+        renderer->run([](const Progress&) {}, interrupted);
+        return renderer;
+    };
+    const std::vector<Rgb> inner = render(true)->film().image();
+    std::vector<Rgb> sum(inner.size());
+    for (const TechniqueImages::Entry& e : render(false)->techniques()->images())
+        if (e.technique.s >= 1 && e.technique.t >= 2)
+            for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
+    for (size_t i = 0; i < sum.size(); ++i) EXPECT_NEAR(inner[i].g, sum[i].g, 1e-4f * sum[i].g);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -108,8 +132,16 @@ INSTANTIATE_TEST_SUITE_P(
                       TechniqueCase{"thinlens", "thinlens", "bdpt:"},
                       TechniqueCase{"gathers", "perspective", "upg+bdpt:radius=0.2,", 3},
                       TechniqueCase{"merges", "perspective", "vcm:radius=0.2,", 2},
-                      TechniqueCase{"exact_merges", "perspective", "vcm:exact=true,radius=0.2,",
-                                    2}),
+                      TechniqueCase{"exact_merges", "perspective", "vcm:exact=true,radius=0.2,", 2},
+                      TechniqueCase{"cache", "perspective", "bdpt:connections=cache,"},
+                      TechniqueCase{"stored", "perspective",
+                                    "pcbpt:direct=stored,uniform=0.1,connections=1.5,"},
+                      TechniqueCase{"stored_standard", "thinlens",
+                                    "pcbpt:weights=standard,connections=10,"
+                                    "light_paths=20,direct=both,"},
+                      TechniqueCase{"stored_exact", "perspective",
+                                    "pcbpt:cache=false,pmf=weighted,"
+                                    "light_paths=10,direct=next_event,"}),
     [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace

@@ -62,10 +62,10 @@ public:
         const PathPdfs pdfs = evaluate_path(scene_, x, std::vector<bool>(x.size(), false)).pdfs;
         ++weights_;
         wrong_weights_ += !(std::fabs(mis_weight(pdfs, q, own_) - double(join.mis_weight)) < 2e-3);
-        const double own = double(own_.of(q.strategy)) * pdfs.density(q);
+        const double own = double(own_.of(q)) * pdfs.density(q);
         const size_t cell = size_t(row * kTiles + column);
         const auto add = [&](int s, const Technique& partner, const TechniqueCounts& counts) {
-            const double other = double(counts.of(partner.strategy)) * pdfs.density(partner);
+            const double other = double(counts.of(partner)) * pdfs.density(partner);
             cells_[{n, s}][cell] += other / (own + other);
         };
         // As a sample of its own technique, and as one of those that all others are compared with.
@@ -124,7 +124,7 @@ inline std::vector<DensityTest> test_sample_densities(const Scene& scene,
             for (int n = 2; n <= SampleCounter::kLongest + 1; ++n)
                 for (int s = 0; s < n; ++s) {
                     const Technique q = connection_technique(s, n - s);
-                    if (!(counts[0].of(q.strategy) > 0)) continue;
+                    if (!(counts[0].of(q) > 0)) continue;
                     const auto cells = counter.cells(q, side == 1);
                     for (size_t c = 0; c < cells.size(); ++c)
                         found[100 * n + s][c][side].add(cells[c]);

@@ -48,9 +48,10 @@ std::vector<Case> cases() {
     };
 }
 
-enum class Pairs { None, Merges, Gathers, Variants };  // the last: of the choices of gathers
+/// What there is besides the connections of bidirectional path tracing; Variants: of the choices of gathers.
+enum class Extra { None, Merges, Gathers, Variants, Stored };
 
-class Joins : public testing::TestWithParam<std::tuple<Case, Pairs>> {
+class Joins : public testing::TestWithParam<std::tuple<Case, Extra>> {
 protected:
     Joins()
         : scene(test::build(std::get<Case>(GetParam()).xml)), film(scene.film(), scene.filter()),
@@ -61,12 +62,15 @@ protected:
                   .connect = 1,
                   .splat = N,
                   .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
-        if (pairs() != Pairs::None) {
-            (pairs() == Pairs::Merges ? counts.merge : counts.gather) = N;
+        if (extra() == Extra::Stored) {
+            counts.connect = 5;
+            counts.connect_emission = 3;
+        } else if (extra() != Extra::None) {
+            (extra() == Extra::Merges ? counts.merge : counts.gather) = N;
             // Large enough for the clamp of gathers to matter now and then.
             counts.disc = 0.3f;
-            counts.min_pair_edges = pairs() == Pairs::Merges ? 2 : 3;
-            if (pairs() == Pairs::Variants) {
+            counts.min_pair_edges = extra() == Extra::Merges ? 2 : 3;
+            if (extra() == Extra::Variants) {
                 counts.pair_rule = PairRule::Both;
                 counts.clamps_disc = false;
                 counts.short_pair_rate = 0.3f;
@@ -74,7 +78,7 @@ protected:
         }
     }
 
-    static Pairs pairs() { return std::get<Pairs>(GetParam()); }
+    static Extra extra() { return std::get<Extra>(GetParam()); }
 
     /// Both sub-paths of sample `index`, without roulette.
     void trace(uint32_t index) {
@@ -230,7 +234,7 @@ protected:
 TEST_P(Joins, EqualTheDefinition) {
     for (uint32_t index = 0; index < 2000 && !HasFatalFailure(); ++index) {
         trace(index);
-        for (int s = 2; s <= y.size(); ++s)
+        for (int s = extra() == Extra::Stored ? 1 : 2; s <= y.size(); ++s)
             for (int t = 2; t <= z.size(); ++t)
                 if (const auto j = join_connect(scene, y, s, z, t, counts))
                     check(*j, path_vertices(y, s, z, t), density_of(y, s) * density_of(z, t));
@@ -305,14 +309,15 @@ TEST_P(Joins, StoredSumsEqualTheExplicitSum) {
     EXPECT_LT(tallies[Strategy::Connect].deviating, 0.002 * compared + 1);
 }
 
-const auto kName = [](const testing::TestParamInfo<std::tuple<Case, Pairs>>& p) {
-    const char* suffix[] = {"", "_merges", "_gathers", "_variants"};
-    return std::get<Case>(p.param).name + std::string(suffix[int(std::get<Pairs>(p.param))]);
+const auto kName = [](const testing::TestParamInfo<std::tuple<Case, Extra>>& p) {
+    const char* suffix[] = {"", "_merges", "_gathers", "_variants", "_stored"};
+    return std::get<Case>(p.param).name + std::string(suffix[int(std::get<Extra>(p.param))]);
 };
 INSTANTIATE_TEST_SUITE_P(Scenes, Joins,
                          testing::Combine(testing::ValuesIn(cases()),
-                                          testing::Values(Pairs::None, Pairs::Merges,
-                                                          Pairs::Gathers, Pairs::Variants)),
+                                          testing::Values(Extra::None, Extra::Merges,
+                                                          Extra::Gathers, Extra::Variants,
+                                                          Extra::Stored)),
                          kName);
 
 }  // namespace

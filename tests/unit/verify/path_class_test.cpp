@@ -64,7 +64,7 @@ TEST_P(PathClasses, TellWhichTechniquesMakeThem) {
         has_delta |= c.delta_events != 0;
         std::set<int> possible;
         for (const Technique& q : techniques_of_length(c.edges))
-            if (counts.of(q.strategy) > 0 && can_make(q, c)) possible.insert(q.s);
+            if (counts.of(q) > 0 && can_make(q, c)) possible.insert(q.s);
         complete += s == possible;  // rare ones are not met in a short rendering
     }
     EXPECT_GE(complete, 4);

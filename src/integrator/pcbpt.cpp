@@ -1,0 +1,236 @@
+// Bidirectional path tracing with probabilistic connections [Popov et al. 2015]: the vertices of the first M light paths
+// of a pass are kept, and every eye vertex is connected to K of them, drawn from a mass function that follows what they
+// bring there. It is known at importance records along few eye paths and interpolated between them.
+//
+// Techniques: C(0,t), C(s,1), C(s,0) as in bdpt; C(s,t) with s, t ≥ 2 from the kept vertices; C(1,t) from their y_0, from
+// next events, or from both. Unbiased. All eye paths of a pass share the M light paths, so M samples of a connection are
+// worth no more than one in the weights [eq. 16-17]: they count 1 (`upper`), or M as if they were independent (`standard`).
+// Neither K nor the mass function is in a weight, since a path that was made otherwise has none.
+
+#include "integrator/pcbpt.h"
+
+#include <array>
+#include <cmath>
+
+#include "integrator/bidirectional.h"
+#include "pathspace/importance_records.h"
+#include "pathspace/light_paths.h"
+
+namespace etendue {
+namespace {
+
+/// How C(1,t) are made.
+enum class Direct { Stored, NextEvent, Both };
+
+constexpr std::array<Choice<Direct>, 3> kDirect{
+    {{"stored", Direct::Stored}, {"next_event", Direct::NextEvent}, {"both", Direct::Both}}};
+constexpr std::array<Choice<bool>, 2> kIsStandard{{{"upper", false}, {"standard", true}}};
+constexpr std::array<Choice<bool>, 2> kIsWeighted{{{"contribution", false}, {"weighted", true}}};
+
+class PcbptIntegrator final : public Integrator {
+public:
+    explicit PcbptIntegrator(const IntegratorParams& p)
+        : paths_(p), light_paths_(uint64_t(p.integer("light_paths", 1, 1 << 20))),
+          given_connections_(p.number("connections", 0, 1024)),
+          record_fraction_(p.number("record_fraction", 0, 1)),
+          neighbours_(p.integer("neighbours", 1, VertexMixture::kMostParts)),
+          uniform_(p.number("uniform", 1e-3f, 1)), is_standard_(p.choice("weights", kIsStandard)),
+          is_weighted_(p.choice("pmf", kIsWeighted)), uses_cache_(p.flag("cache")),
+          direct_(p.choice("direct", kDirect)) {}
+
+    void begin_pass(const PassContext& pass) override {
+        paths_.begin_pass(pass);
+        const TechniqueCounts n = counts(pass.scene, pass.light_paths);
+        trace_light_paths(pass, n);
+        make_records(pass, n);
+    }
+
+    void sample(const SampleContext& c, Workspace& work) const override {
+        const TechniqueCounts n = counts(c.scene, c.light_paths);
+        paths_.eye_path(c, n, work, [&](int t) {
+            paths_.add_next_event(c, n, t, work);
+            if (vertices_.empty()) return Onward::ByAnyEvent;
+            const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
+            // Where K is no integer, one of its neighbours with the mean K.
+            c.sampler.seek(Stream::Selection, uint32_t(t));
+            const int draws = int(connections_ + c.sampler.next_1d_fine());
+            if (draws > 0) connect(c, n, t, draws, mixture(c.scene, n, t, work), work);
+            return Onward::ByAnyEvent;
+        });
+    }
+
+    TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
+        TechniqueCounts n = Bidirectional::counts(scene, light_paths);
+        n.connect = is_standard_ ? float(kept(light_paths)) : 1.0f;
+        if (direct_ != Direct::NextEvent) n.connect_emission = n.connect;
+        if (direct_ == Direct::Stored) n.next_event = 0;
+        return n;
+    }
+    bool traces_light_paths() const override { return true; }
+    Estimator estimator() const override { return Estimator::Unbiased; }
+    std::vector<std::pair<std::string, double>> figures() const override {
+        return {{"connections", connections_},
+                {"stored_vertices", vertices_.size()},
+                {"records", records_.size()},
+                {"record_bytes", records_.memory_bytes()}};
+    }
+
+private:
+    /// M.
+    uint64_t kept(uint64_t light_paths) const { return std::min(light_paths_, light_paths); }
+
+    void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
+        const uint64_t M = kept(pass.light_paths);
+        paths_.trace_light_paths(pass, n, M, sizeof(LightVertex), UINT64_MAX, chunks_, compact_);
+        stored_.resize(M);
+        vertices_.clear();
+        for (uint32_t i = 0; i < M; ++i) {
+            compact_.restore(pass.scene, i, stored_[i]);
+            for (int s = direct_ == Direct::NextEvent ? 2 : 1; s <= stored_[i].size(); ++s)
+                if (stored_[i][s - 1].may_connect) vertices_.push_back({i, s});
+        }
+    }
+
+    void make_records(const PassContext& pass, const TechniqueCounts& n) {
+        const FilmGeometry& g = pass.scene.film();
+        const uint64_t pixels = g.pixel_count();
+        const auto count = uint64_t(std::ceil(record_fraction_ * double(pixels)));
+        record_chunks_.resize(count);
+        std::vector<std::pair<uint64_t, uint64_t>> found(count);  // eye vertices, shadow rays
+        pass.for_each_other_path(count, [&](uint64_t i, Sampler& sampler, Workspace& work) {
+            const PhaseTimer timer(work.stats, &PhaseSeconds::records);
+            record_chunks_[i].clear();
+            sampler.start(pass.index, pixels + i);
+            const uint64_t before = work.stats.shadow_rays;
+            const uint64_t pixel = low_discrepancy_pixel(g, pass.index * count + i);
+            start_eye_path(pass.scene, pass.film, pixel, sampler, work.z, work.stats);
+            paths_.walk_eye_path(pass.scene, sampler, n, work.z, work.stats, 2, [&](int t) {
+                if (!work.z[t - 1].may_connect) return Onward::ByAnyEvent;
+                evaluate(pass.scene, n, t, work);
+                record_chunks_[i].add(work.z[t - 1], work.masses);
+                ++found[i].first;
+                return Onward::ByAnyEvent;
+            });
+            found[i].second = work.stats.shadow_rays - before;
+        });
+        records_.assemble(record_chunks_, uint32_t(vertices_.size()));
+
+        connections_ = double(given_connections_);
+        if (connections_ > 0) return;
+        // The records are the pilot: bdpt would trace as many shadow rays from an eye vertex as they did for one light
+        // path. What the records cost themselves is taken off. K may depend on them, as the draws do not.
+        uint64_t vertices = 0, rays = 0;
+        for (const auto& [v, r] : found) vertices += v, rays += r;
+        const double M = double(kept(pass.light_paths));
+        const double of_bdpt = vertices > 0 ? double(rays) / (M * double(vertices)) : 0.0;
+        connections_ = std::max(kFewest, of_bdpt * (1 - double(record_fraction_) * M));
+    }
+
+    /// R2 sequence: multiples of the powers of the plastic number's inverse, modulo 1 [Roberts 2018].
+    static uint64_t low_discrepancy_pixel(const FilmGeometry& g, uint64_t i) {
+        const uint64_t x = (i * 0xc13fa9a902a6328full) >> 32, y = (i * 0x91e10da5c79e7b1dull) >> 32;
+        return (y * uint64_t(g.crop_height) >> 32) * uint64_t(g.crop_width) +
+               (x * uint64_t(g.crop_width) >> 32);
+    }
+
+    /// work.masses: what every stored vertex would bring to z_{t-1}.
+    void evaluate(const Scene& scene, const TechniqueCounts& n, int t, Workspace& work) const {
+        work.masses.clear();
+        for (const StoredVertex& v : vertices_) {
+            const auto j = join_connect(scene, stored_[v.path], v.s, work.z, t, n);
+            float mass = 0;
+            if (j) {
+                mass = luminance(j->contribution) * visibility(scene, *j, work.stats);
+                if (is_weighted_) mass *= j->mis_weight;
+            }
+            work.masses.push_back(std::isfinite(mass) ? mass : 0);
+        }
+    }
+
+    /// What z_{t-1} draws from.
+    VertexMixture mixture(const Scene& scene, const TechniqueCounts& n, int t,
+                          Workspace& work) const {
+        if (uses_cache_) return records_.mixture(work.z[t - 1], neighbours_, uniform_);
+        VertexMixture exact{uint32_t(vertices_.size())};
+        evaluate(scene, n, t, work);
+        if (to_cdf(work.masses)) exact.add(work.masses.data(), 1 - uniform_);
+        return exact;
+    }
+
+    /// `draws` of the connections of z_{t-1}: (1/K) Σ (1/M) w C / pmf.
+    void connect(const SampleContext& c, const TechniqueCounts& n, int t, int draws,
+                 const VertexMixture& mixture, Workspace& work) const {
+        const double samples = connections_ * double(kept(c.light_paths));
+        for (int k = 0; k < draws; ++k) {
+            c.sampler.seek(Stream::Selection, uint32_t(k + 1) << 16 | uint32_t(t));
+            const auto [index, pmf] = mixture.sample((k + c.sampler.next_1d_fine()) / draws);
+            const auto [path, s] = vertices_[index];
+            if (s + t - 1 > paths_.max_depth()) continue;
+            if (work.is_observed) compact_.restore(c.scene, path, work.y);
+            paths_.add_drawn(c, join_connect(c.scene, stored_[path], s, work.z, t, n),
+                             float(1 / (samples * pmf)), k, work);
+        }
+    }
+
+    /// K at least, where it is automatic.
+    static constexpr double kFewest = 0.25;
+
+    struct StoredVertex {
+        uint32_t path;
+        int s;
+    };
+
+    Bidirectional paths_;
+    uint64_t light_paths_;
+    float given_connections_;
+    float record_fraction_;
+    int neighbours_;
+    float uniform_;
+    bool is_standard_, is_weighted_, uses_cache_;
+    Direct direct_;
+
+    // Of the pass.
+    double connections_ = 0;  ///< K
+    LightPaths compact_;
+    std::vector<SubPath> stored_;         ///< The M light paths, ready to be joined.
+    std::vector<StoredVertex> vertices_;  ///< Their V connectible vertices.
+    ImportanceRecords records_;
+    std::vector<LightPaths::Chunk> chunks_;
+    std::vector<ImportanceRecords::Chunk> record_chunks_;
+};
+
+}  // namespace
+
+IntegratorEntry pcbpt_entry() {
+    std::vector<ParamInfo> params = Bidirectional::params();
+    params.push_back({"light_paths", ParamKind::Int, "100",
+                      "M: light paths of a pass whose vertices all eye vertices may connect to."});
+    params.push_back({"connections", ParamKind::Float, "0",
+                      "K: connections of each eye vertex, on average; 0: as many as bdpt has rays "
+                      "for, less those of the records, but at least 0.25."});
+    params.push_back({"record_fraction", ParamKind::Float, "0.004",
+                      "Eye paths along which importance records are made, over the pixels."});
+    params.push_back({"neighbours", ParamKind::Int, "6",
+                      "Records between which the mass function is interpolated, at most 16."});
+    params.push_back({"uniform", ParamKind::Float, "0.5",
+                      "Share of connections that are drawn uniformly, at least 0.001."});
+    params.push_back({"weights", ParamKind::String, "upper",
+                      "upper: connections count 1 in the weights, since all pixels share the light "
+                      "paths; standard: they count M."});
+    params.push_back({"direct", ParamKind::String, "next_event",
+                      "How C(1,t) are made: stored (connections to the light paths' own y_0), "
+                      "next_event, or both."});
+    params.push_back({"cache", ParamKind::Bool, "true",
+                      "false: the mass function is evaluated at every eye vertex instead of "
+                      "interpolated; slow, for comparison."});
+    params.push_back({"pmf", ParamKind::String, "weighted",
+                      "What the mass function follows: contribution, or weighted, which has the "
+                      "MIS weight too."});
+    return {{"integrator", "pcbpt",
+             "Bidirectional path tracing with probabilistic connections. Unbiased.", params},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                return std::make_unique<PcbptIntegrator>(p);
+            }};
+}
+
+}  // namespace etendue
