@@ -137,7 +137,7 @@ std::vector<ParamInfo> params() {
          "at diffuse vertices)."});
     params.push_back({"drop", ParamKind::String, "gloss",
                       "Which vertex of a pair is dropped: gloss (that sampled from the less glossy "
-                      "vertex), eye, light, or both in turn."});
+                      "vertex), eye, light, or both, for a path each."});
     params.push_back({"short_rate", ParamKind::Float, "1",
                       "Share of the pairs that are used for paths of three edges."});
     params.push_back({"clamp", ParamKind::Bool, "true",

@@ -1,6 +1,7 @@
 #pragma once
 // What one rendering brought, by class of paths and by technique.
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <unordered_map>
@@ -12,19 +13,28 @@ namespace etendue {
 
 /// Luminance of many contributions to one mean.
 struct Tally {
-    double sum = 0, squares = 0;
+    double sum = 0, squares = 0, fourths = 0;
 
     void add(double v) {
         sum += v;
         squares += v * v;
+        fourths += v * v * v * v;
     }
     Tally& operator+=(const Tally& o) {
         sum += o.sum;
         squares += o.squares;
+        fourths += o.fourths;
         return *this;
     }
-    /// How many equal contributions would be spread as much [Kish 1965]: where it is small, a t-test is void.
-    double effective_count() const { return squares > 0 ? sum * sum / squares : 0.0; }
+    Tally scaled(double factor) const {
+        const double square = factor * factor;
+        return {sum * factor, squares * square, fourths * square * square};
+    }
+    /// How many equal contributions would be spread as much [Kish 1965]: where it is small, a t-test is void. And so it is
+    /// where the spread itself rests on few: four times the same of the squares, if that is less.
+    double effective_count() const {
+        return squares > 0 ? std::min(sum * sum / squares, 4 * squares * squares / fourths) : 0.0;
+    }
 };
 
 /// The image cut into count × count tiles.

@@ -137,7 +137,7 @@ Run Runner::render_run(const IntegratorSpec& spec, uint64_t stream, uint64_t run
     Renderer r = renderer(spec, stream, run, spp, &tally);
     render_all(r);
     const double scale = 1 / (double(spp) * double(scene_.film().pixel_count()));
-    const auto scaled = [&](Tally t) { return Tally{t.sum * scale, t.squares * scale * scale}; };
+    const auto scaled = [&](Tally t) { return t.scaled(scale); };
     Run out{r.film().image(), tally.entries(), tally.tiles(),
             r.stats().rejected + r.film().rejected()};
     for (ContributionTally::Entry& e : out.entries)
@@ -305,7 +305,7 @@ TileSeries tile_series(const ReferenceImage& image, const TileGrid& grid) {
     std::vector<double> pixels(grid.tiles() + 1);
     for (uint64_t i = 0; i < image.pixels.size(); ++i) ++pixels[grid.tile(i)], ++pixels.back();
     TileSeries out{std::vector<std::array<Moments, 3>>(means.size()),
-                   std::vector<Tally>(means.size(), Tally{1, 0x1p-40})};
+                   std::vector<Tally>(means.size(), Tally{1, 0x1p-40, 0x1p-120})};
     for (size_t i = 0; i < means.size(); ++i)
         for (size_t k = 0; k < 3; ++k)
             out.means[i][k] =
