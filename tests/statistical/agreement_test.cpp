@@ -117,11 +117,13 @@ std::vector<AgreementCase> cases() {
 
 class Agreement : public ::testing::TestWithParam<AgreementCase> {
 protected:
-    void expect_agreement(uint64_t factor) {
+    /// `path` finds the lamp through rough glass by few bright samples, and means of few of them are no normal variables:
+    /// it has `path_factor` times as many.
+    void expect_agreement(uint64_t factor, uint64_t path_factor) {
         const AgreementCase& c = GetParam();
         const Scene scene = build(c.xml);
         const double resolution = c.resolution / std::sqrt(double(factor));
-        const Tiles path = render_tiles(scene, "path", {2 * factor * c.passes, 4, 1});
+        const Tiles path = render_tiles(scene, "path", {path_factor * factor * c.passes, 4, 1});
         expect_same_image(render_tiles(scene, "bdpt", {factor * c.passes, 4, 2}), path, resolution,
                           "bdpt against path");
         expect_same_image(render_tiles(scene, "upg+bdpt:radius=0.12", {factor * c.passes, 4, 4}),
@@ -150,10 +152,10 @@ TEST(GatherChoices, AgreeWithPathTracing) {
 }
 
 TEST_P(Agreement, WithPathTracing) {
-    expect_agreement(1);
+    expect_agreement(1, 2);
 }
 TEST_P(LongAgreement, WithPathTracing) {
-    expect_agreement(16);
+    expect_agreement(16, 16);
 }
 
 const auto kName = [](const ::testing::TestParamInfo<AgreementCase>& p) {

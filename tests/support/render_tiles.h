@@ -94,13 +94,13 @@ Tiles exact_tiles(const FilmGeometry& g, int tiles, const Radiance& radiance) {
 /// What rounding may do to a mean, relative.
 inline constexpr double kRounding = 1e-4;
 
-/// Welch's test of every tile and of the whole image, by channel; a family-wise false alarm in 1 % of all runs with
-/// fresh seeds. The test must be able to see a relative error of `resolution` of the image's mean: four standard
+/// Welch's test of every tile and of the whole image, by channel; a false alarm in 0.01 % of all calls with fresh seeds,
+/// and so in 1 % of all suites of a hundred calls. The test must be able to see a relative error of `resolution` of the image's mean: four standard
 /// errors have to be less.
 inline void expect_same_image(const Tiles& a, const Tiles& b, double resolution,
                               const std::string& what) {
     ASSERT_EQ(a.across, b.across);
-    const double level = sidak(0.01, int(a.values.size()));
+    const double level = sidak(1e-4, int(a.values.size()));
     const size_t whole = size_t(a.parts() - 1) * 3;
     size_t different = 0, worst = 0;
     double lowest = 2, seen = 0;
