@@ -83,9 +83,9 @@ std::vector<Planted> planted() {
         {"PdfOfEvaluation", softly_lit, "path", Techniques, 0, 256},
         {"PdfOfSampling", softly_lit, "path", Techniques, 0},
         {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques, 256},
-        {"PmfOfOneRecord", divided_room, by_paper, Image | Lengths, 0},
-        {"NoUniformShare", divided_room, by_paper + ",neighbours=1", Image | Lengths, 0},
-        {"UniformDenominator", divided_room, by_paper, Image | Lengths, 0},
+        {"PmfOfOneRecord", divided_room, by_paper, Image | Lengths, 0, 512},
+        {"NoUniformShare", divided_room, by_paper + ",neighbours=1", Image | Lengths, 0, 512},
+        {"UniformDenominator", divided_room, by_paper, Image | Lengths, 0, 512},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
     };
 }
