@@ -24,7 +24,7 @@ struct Gather {
         if (edges > paths.max_depth() || !(rate > 0)) return;
         const uint32_t number = uint32_t(hash_combine(vertex, uint64_t(t)));
         if (rate < 1) {
-            c.sampler.seek(Stream::Roulette, number + 1);
+            c.sampler.seek(Stream::Roulette, number + 2);  // join() has the first two
             if (!(c.sampler.next_1d_unstructured() < rate)) return;
         }
         const Vertex& last = work.z[t - 2];

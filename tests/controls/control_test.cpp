@@ -150,6 +150,12 @@ TEST_P(NoError, IsFound) {
 const auto kName = [](const auto& p) { return std::string(p.param.name); };
 INSTANTIATE_TEST_SUITE_P(Planted, Control, ::testing::ValuesIn(planted()), kName);
 INSTANTIATE_TEST_SUITE_P(Clean, NoError, ::testing::ValuesIn(planted()), kName);
+// Two roulettes of one pair, which need numbers of their own.
+INSTANTIATE_TEST_SUITE_P(CleanPairs, NoError,
+                         ::testing::Values(Planted{
+                             "RateOfShortPaths", front_camera(kSize) + room() + area_lamp(),
+                             "upg+bdpt:short_rate=0.1,roulette=0.5,radius=0.15", 0, 0}),
+                         kName);
 
 }  // namespace
 }  // namespace etendue::test
