@@ -15,38 +15,47 @@ struct Gather {
     float flatness;  ///< Half the height of a neighbourhood over its radius.
     Workspace& work;
 
-    /// Of the pair of `vertex` and z_{t-1}, which lie within the radius. `reciprocal(event, join)` is r, an estimate of
-    /// 1/p_c; it is asked last, with the sampler at numbers that belong to this technique of the pair alone.
+    /// The pairs of z_{t-1}. `reciprocal(event, join)` is r, an estimate of 1/p_c; it is asked last, with the sampler at
+    /// numbers that belong to this technique of the pair alone.
     template <class Reciprocal>
-    void operator()(int t, uint32_t vertex, const Reciprocal& reciprocal) const {
-        const int s = photons.paths().depth(vertex) + 1, edges = s + t - 2;
-        const float rate = n.gathers(edges) / n.gather;
-        if (edges > paths.max_depth() || !(rate > 0)) return;
-        const uint32_t number = uint32_t(hash_combine(vertex, uint64_t(t)));
-        if (rate < 1) {
-            c.sampler.seek(Stream::Roulette, number + 2);  // join() has the first two
-            if (!(c.sampler.next_1d_unstructured() < rate)) return;
-        }
+    void operator()(int t, const Reciprocal& reciprocal) const {
         const Vertex& last = work.z[t - 2];
-        const uint8_t before = photons.paths().gloss_before(vertex),
-                      after = gloss(last, last.is_delta);
-        for (const bool eye : {true, false})
-            if (drops(n.pair_rule, eye, before, after))
-                join({Strategy::Gather, s, t, eye}, vertex, number + eye, rate, reciprocal);
+        const uint8_t after = gloss(last, last.is_delta);
+        const auto drops_here = [&](bool eye, const Partner& partner) {
+            return drops(n.pair_rule, eye, partner.gloss_before, after);
+        };
+        const Neighbourhood near_eye = near(work.z[t - 1]);
+        const auto may_pair = [&](const Partner& y) {
+            const int edges = y.s + t - 2;
+            return edges <= paths.max_depth() && n.gathers(edges) > 0 &&
+                   (drops_here(true, y) || (drops_here(false, y) && near_eye.contains(y.p)));
+        };
+        photons.for_each_near(work.z[t - 1].p, may_pair, [&](const Partner& y) {
+            const float rate = n.gathers(y.s + t - 2) / n.gather;
+            const uint32_t number = uint32_t(hash_combine(y.vertex, uint64_t(t)));
+            if (rate < 1) {
+                c.sampler.seek(Stream::Roulette, number + 2);  // join() has the first two
+                if (!(c.sampler.next_1d_unstructured() < rate)) return;
+            }
+            for (const bool eye : {true, false})
+                if (drops_here(eye, y) && (eye || near_eye.contains(y.p)))
+                    join({Strategy::Gather, y.s, t, eye}, y.vertex, number + eye, rate,
+                         reciprocal);
+        });
     }
 
 private:
+    Neighbourhood near(const Vertex& kept) const {
+        return {kept.p, kept.ng, photons.radius(), flatness * photons.radius()};
+    }
+
     template <class Reciprocal>
     void join(const Technique& q, uint32_t vertex, uint32_t number, float rate,
               const Reciprocal& reciprocal) const {
         const SubPath& z = work.z;
         SubPath& y = work.pair;
         const LightPaths& light = photons.paths();
-        const auto near = [&](const Vertex& kept) {
-            return Neighbourhood{kept.p, kept.ng, photons.radius(), flatness * photons.radius()};
-        };
         const bool eye = q.drops_eye;
-        if (!eye && !near(z[q.t - 1]).contains(light.vertices()[vertex].p)) return;
         light.restore_first(c.scene, vertex, eye ? q.s : q.s - 1, work.is_observed, y);
         if (eye && !near(y[q.s - 1]).contains(z[q.t - 1].p)) return;
         ++work.stats.pairs;

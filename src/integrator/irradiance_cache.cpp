@@ -87,8 +87,8 @@ void IrradianceCache::add(std::span<const IrradianceRecord> records) {
 std::optional<Rgb> IrradianceCache::find(Vec3 p, Vec3 n) const {
     Rgb sum;
     float weights = 0;
-    grid_.for_each_near(p, error_ * max_distance_, [&](uint32_t i) {
-        const IrradianceRecord& r = records_[i];
+    grid_.for_each_near(p, error_ * max_distance_, [&](const PointGrid::Entry& e) {
+        const IrradianceRecord& r = records_[e.index];
         const Vec3 d = p - r.p;
         const float change = length(d) / r.distance + safe_sqrt(1 - dot(n, r.n));
         if (!(change < error_)) return;

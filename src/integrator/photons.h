@@ -7,6 +7,14 @@
 
 namespace etendue {
 
+/// A light vertex y_{s-1} near an eye vertex, with as much as is known without looking it up.
+struct Partner {
+    Vec3 p;
+    uint32_t vertex;
+    int s;
+    uint8_t gloss_before;  ///< Of y_{s-2}, or of its event.
+};
+
 class Photons {
 public:
     /// Traces all light paths of the pass, with the techniques t ≤ 1, and keeps them. Connectible vertices y_i, i ≥ 1,
@@ -16,20 +24,22 @@ public:
                float radius, uint64_t max_bytes);
 
     const LightPaths& paths() const { return paths_; }
-    /// Calls use(vertex) for the numbers of the light vertices nearer to `p` than the radius.
-    template <class Use>
-    void for_each_near(Vec3 p, const Use& use) const {
+    /// Calls use(partner) for the light vertices nearer to `p` than the radius for which may_pair(partner) holds.
+    template <class MayPair, class Use>
+    void for_each_near(Vec3 p, const MayPair& may_pair, const Use& use) const {
         constexpr int kBatch = 32;
-        uint32_t found[kBatch];
+        Partner found[kBatch];
         int count = 0;
         const auto use_found = [&] {
-            for (int i = 0; i < count; ++i) paths_.prefetch_head(found[i]);
+            for (int i = 0; i < count; ++i) paths_.prefetch_head(found[i].vertex);
             for (int i = 0; i < count; ++i) use(found[i]);
             count = 0;
         };
-        grid_.for_each_near(p, radius_, [&](uint32_t vertex) {
-            paths_.prefetch(vertex);
-            found[count++] = vertex;
+        grid_.for_each_near(p, radius_, [&](const PointGrid::Entry& e) {
+            const Partner partner{e.p, e.index, int(e.tag >> 8), uint8_t(e.tag & 0xff)};
+            if (!may_pair(partner)) return;
+            paths_.prefetch(e.index);
+            found[count++] = partner;
             if (count == kBatch) use_found();
         });
         use_found();

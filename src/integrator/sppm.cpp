@@ -55,15 +55,17 @@ private:
     void merge(const SampleContext& c, int t, bool is_diffuse, Workspace& work) const {
         if (!is_diffuse && !c.scene.has_delta_emitters()) return;
         const LightPaths& light = photons_.paths();
-        photons_.for_each_near(work.z[t - 1].p, [&](uint32_t vertex) {
-            const Photon photon = light.photon(vertex);
-            if (photon.s < mapping_.shortest() || photon.s + t - 2 > mapping_.paths().max_depth())
-                return;
-            if (!is_diffuse && !(photon.emitter->is_delta() && light.came_by_delta_events(vertex)))
+        const auto may_pair = [&](const Partner& y) {
+            return y.s >= mapping_.shortest() && y.s + t - 2 <= mapping_.paths().max_depth();
+        };
+        photons_.for_each_near(work.z[t - 1].p, may_pair, [&](const Partner& y) {
+            const Photon photon = light.photon(y.vertex);
+            if (!is_diffuse &&
+                !(photon.emitter->is_delta() && light.came_by_delta_events(y.vertex)))
                 return;
             const auto j = join_photon(photon, work.z, t, disc());
             if (!j) return;
-            if (work.is_observed) light.restore_first(c.scene, vertex, photon.s, true, work.pair);
+            if (work.is_observed) light.restore_first(c.scene, y.vertex, y.s, true, work.pair);
             c.sink.add(*j, j->contribution * c.splat_scale);
         });
     }

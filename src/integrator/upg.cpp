@@ -67,8 +67,7 @@ public:
         paths_.eye_path(c, n, work, [&](int t) {
             paths_.add_next_event(c, n, t, work);
             paths_.connect_to_own(c, n, t, work);
-            photons_.for_each_near(work.z[t - 1].p,
-                                   [&](uint32_t vertex) { gather(t, vertex, by_trials); });
+            gather(t, by_trials);
             return Onward::ByAnyEvent;
         });
     }

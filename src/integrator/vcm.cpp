@@ -45,13 +45,8 @@ public:
         paths_.eye_path(c, n, work, [&](int t) {
             paths_.add_next_event(c, n, t, work);
             paths_.connect_to_own(c, n, t, work);
-            if (!merges_) return Onward::ByAnyEvent;
-            photons_.for_each_near(work.z[t - 1].p, [&](uint32_t vertex) {
-                if (is_exact_)
-                    gather(t, vertex, by_disc);
-                else
-                    merge(c, n, t, vertex, work);
-            });
+            if (merges_ && is_exact_) gather(t, by_disc);
+            if (merges_ && !is_exact_) merge(c, n, t, work);
             return Onward::ByAnyEvent;
         });
     }
@@ -84,13 +79,13 @@ private:
         return n;
     }
 
-    void merge(const SampleContext& c, const TechniqueCounts& n, int t, uint32_t vertex,
-               Workspace& work) const {
-        const int s = photons_.paths().depth(vertex) + 1;
-        if (s + t - 2 > paths_.max_depth()) return;
-        photons_.paths().restore_first(c.scene, vertex, s, work.is_observed, work.pair);
-        if (const auto j = join_merge(work.pair, s, work.z, t, n))
-            c.sink.add(*j, j->contribution * c.splat_scale);
+    void merge(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
+        const auto may_pair = [&](const Partner& y) { return y.s + t - 2 <= paths_.max_depth(); };
+        photons_.for_each_near(work.z[t - 1].p, may_pair, [&](const Partner& y) {
+            photons_.paths().restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair);
+            if (const auto j = join_merge(work.pair, y.s, work.z, t, n))
+                c.sink.add(*j, j->contribution * c.splat_scale);
+        });
     }
 
     Bidirectional paths_;

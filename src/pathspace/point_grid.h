@@ -13,16 +13,17 @@ namespace etendue {
 
 class PointGrid {
 public:
-    /// A point and the caller's number for it.
+    /// A point, the caller's number for it, and what the caller wants to know of it before looking that up.
     struct Entry {
         Vec3 p;
         uint32_t index;
+        uint32_t tag = 0;
     };
 
     /// For queries of up to `radius`. The order of the entries decides that of the answers.
     void build(std::span<const Entry> entries, float radius);
 
-    /// Calls use(index) for every point nearer to `p` than `radius`, at most that of build().
+    /// Calls use(entry) for every point nearer to `p` than `radius`, at most that of build().
     template <class Use>
     void for_each_near(Vec3 p, float radius, const Use& use) const {
         if (entries_.empty()) return;
@@ -47,7 +48,7 @@ public:
             for (uint32_t i = begin[corner]; i < end[corner]; ++i) {
                 const Entry& e = entries_[i];
                 // Other cells may share the bucket.
-                if (length2(e.p - p) < radius2 && cell_of(e.p) == cells[corner]) use(e.index);
+                if (length2(e.p - p) < radius2 && cell_of(e.p) == cells[corner]) use(e);
             }
     }
     size_t memory_bytes() const {
