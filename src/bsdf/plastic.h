@@ -39,8 +39,9 @@ struct PlasticLobe {
         const Vec3 wi = sample_cosine_hemisphere(u);
         return make_sample(wi, eval(wo, wi));
     }
-    float max_pdf(Vec3 /*wo*/, const DirectionCone& c) const {
-        return std::fmax(c.max_cos({0, 0, 1}), 0.0f) * kInvPi;
+    float max_pdf(Vec3 wo, const DirectionCone& c) const {
+        const float F = fresnel_dielectric(wo.z, eta).R, q = coat_probability(F, specular_share);
+        return (1 - q) * std::fmax(c.max_cos({0, 0, 1}), 0.0f) * kInvPi;
     }
     Rgb albedo_estimate() const {
         const float F = fresnel_dielectric(1, eta).R;

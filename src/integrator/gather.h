@@ -39,8 +39,7 @@ struct Gather {
             }
             for (const bool eye : {true, false})
                 if (drops_here(eye, y) && (eye || near_eye.contains(y.p)))
-                    join({Strategy::Gather, y.s, t, eye}, y.vertex, number + eye, rate,
-                         reciprocal);
+                    join({Strategy::Gather, y.s, t, eye}, y.vertex, number + eye, rate, reciprocal);
         });
     }
 

@@ -17,7 +17,8 @@ void Photons::trace(const PassContext& pass, const Bidirectional& paths,
     std::vector<PointGrid::Entry> entries;
     const auto vertices = paths_.vertices();
     for (uint32_t i = 0; i < vertices.size(); ++i)
-        if (vertices[i].may_connect) entries.push_back(
+        if (vertices[i].may_connect)
+            entries.push_back(
                 {vertices[i].p, i, uint32_t(paths_.depth(i) + 1) << 8 | paths_.gloss_before(i)});
     grid_.build(entries, radius);
 }

@@ -22,7 +22,7 @@ namespace {
 
 /// Of neighbourhoods, with the bound `slab`: what trials aim at is flat then, and nearly all of it is met where the
 /// surface is smooth.
-constexpr float kFlatness = 0.05f;
+constexpr float kFlatness = 0.02f;
 
 /// Of the default radius: pairs of an eye path, and its largest share of the radius of the scene's bounds.
 constexpr double kPairs = 4;

@@ -1,6 +1,7 @@
 #include "pathspace/reciprocal.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "math/warp.h"
@@ -34,7 +35,7 @@ public:
             return;
         }
         propose_cone();
-        if (e_.bound == TrialBound::Slab) propose_plane();
+        if (e_.bound == TrialBound::Slab) propose_patch();
     }
 
     double mass() const { return mass_; }
@@ -58,16 +59,17 @@ public:
             ray.d = in_cone(sampler_.next_2d());
             if (!passes(pdf(ray.d), stats)) return {};
             break;
-        case Proposal::Plane: {
-            const Vec3 v = on_plane(sampler_.next_2d()) - e_.from.p;
-            const float dist2 = length2(v), inv_dist = 1 / std::sqrt(dist2);
-            ray.d = v * inv_dist;
-            if (!passes(pdf(ray.d) * height_ * inv_dist / dist2, stats)) return {};
+        case Proposal::Patch:
+            if (!toward(in_patch(sampler_.next_2d()), ray.d, stats)) return {};
+            break;
+        case Proposal::Cells: {
+            const auto q = in_cell();
+            if (!q || !toward(*q, ray.d, stats)) return {};
             break;
         }
         case Proposal::Parallel: {
             ray.d = -e_.from.p;
-            const Vec3 q = on_plane(sampler_.next_2d());
+            const Vec3 q = in_patch(sampler_.next_2d());
             const Vec3 start = disc_.center + e_.from.p * disc_.radius;
             ray.o = q + e_.from.p * dot(start - q, e_.from.p);
             if (!(length2(ray.o - start) < sqr(disc_.radius))) return {};
@@ -80,7 +82,24 @@ public:
     }
 
 private:
-    enum class Proposal { Walk, Box, Ellipse, Cone, Plane, Parallel };
+    enum class Proposal { Walk, Box, Ellipse, Cone, Patch, Cells, Parallel };
+
+    /// Part of a plane through the neighbourhood's centre: a disc or a rectangle.
+    struct Patch {
+        Vec3 s, t;
+        Vec2 half;  ///< Extents along these.
+        bool is_round;
+        float height = 0;  ///< Of `from` over the plane,
+        Vec2 foot;         ///< and its foot.
+
+        double area() const { return (is_round ? double(kPi) : 4.0) * double(half.x) * half.y; }
+        float radius() const { return is_round ? half.x : std::hypot(half.x, half.y); }
+    };
+    struct Cell {
+        Vec2 center;
+        float max_pdf;
+        double mass;
+    };
 
     bool from_emitter() const { return e_.from.kind == Vertex::Kind::Emitter; }
 
@@ -89,14 +108,14 @@ private:
         if (pdf > max_pdf_ * (1 + 1e-4f)) ++stats.bounds_exceeded;
         return sampler_.next_1d() * max_pdf_ < pdf;
     }
-    /// Bound of the density of directions within `angle` of the centre's.
-    float max_pdf(float angle) const {
+    /// Bound of the density of directions.
+    float max_pdf(const DirectionCone& c) const {
         if (cosine_) {
-            const float cos = dot(to_center_, *cosine_) / std::sqrt(dist2_);
-            return cos > std::cos(angle) ? kInvPi : kInvPi * cos_difference(cos, angle);
+            const float cos = dot(c.axis, *cosine_);
+            return cos > std::cos(c.angle) ? kInvPi : kInvPi * cos_difference(cos, c.angle);
         }
         if (from_emitter()) return e_.from.emitter->max_pdf_d();
-        return e_.from.bsdf.max_pdf(e_.from.wo, {to_center_ / std::sqrt(dist2_), angle});
+        return e_.from.bsdf.max_pdf(e_.from.wo, c);
     }
     /// cos(acos c - a), at least 0.
     static float cos_difference(float c, float a) {
@@ -114,10 +133,10 @@ private:
             double(radius_) + double(half_height_) * std::sqrt(std::max(0.0, 1 - cos * cos)) / cos;
         const double slab = sqr(through) * cos, ball = sqr(double(radius_));
         if (e_.bound == TrialBound::Slab && slab < ball) {
-            set_plane(e_.near.n, float(through));
+            patch_ = disc_about(e_.near.n, float(through));
             mass_ = slab / disc2;
         } else {
-            set_plane(e_.from.p, radius_);
+            patch_ = disc_about(e_.from.p, radius_);
             mass_ = ball / disc2;
         }
     }
@@ -139,7 +158,7 @@ private:
             return;
         }
         const double one_minus_cos = sin2 / (1 + cos);
-        const float bound = max_pdf(float(std::asin(sin)));
+        const float bound = max_pdf({axis, float(std::asin(sin))});
         const double mass = 2 * double(kPi) * one_minus_cos * bound;
         if (!(mass < mass_)) return;
         proposal_ = Proposal::Cone;
@@ -149,25 +168,84 @@ private:
         frame_ = Frame::from_normal(axis);
     }
 
-    /// Points P of the tangent plane, all of those through which the neighbourhood is seen. Their area density is
-    /// p_σ H / |P - x|³, with the height H of x over the plane.
-    void propose_plane() {
+    /// Points P of a patch through all of which the neighbourhood is seen. With the height H of `from` over its plane their
+    /// area density is p_σ H / |P - x|³.
+    void propose_patch() {
         const float height = abs_dot(e_.near.n, to_center_), h = half_height_;
-        if (!(height > 2 * h)) return;
-        const float foot = safe_sqrt(dist2_ - sqr(height));
-        const float through = radius_ + (radius_ + foot) * h / (height - h);
-        const float sin = through / std::sqrt(dist2_);
-        if (!(sin < 1)) return;
-        const float nearest2 = sqr(height) + sqr(std::max(0.0f, foot - through));
-        const double bound =
-            double(max_pdf(std::asin(sin))) * height / (nearest2 * std::sqrt(nearest2));
-        const double area = double(kPi) * sqr(double(through));
-        if (!(area * bound < mass_)) return;
-        proposal_ = Proposal::Plane;
-        mass_ = area * bound;
-        max_pdf_ = float(bound);
-        height_ = height;
-        set_plane(e_.near.n, through);
+        Patch patch;
+        if (height > 2 * h) {
+            const float foot = safe_sqrt(dist2_ - sqr(height));
+            patch = disc_about(e_.near.n, radius_ + (radius_ + foot) * h / (height - h));
+            patch.height = height;
+            patch.foot = {-dot(to_center_, patch.s), -dot(to_center_, patch.t)};
+        } else if (sqr(radius_) < 0.25f * dist2_) {
+            patch = seen_edge_on();
+        } else {
+            return;
+        }
+        // From this far on a smaller mass is worth its cost.
+        constexpr double kLoose = 1.5;
+        const float dist = std::sqrt(dist2_);
+        const double density = max_area_pdf(patch, {}, patch.radius());
+        if (patch.area() * density < mass_) {
+            proposal_ = Proposal::Patch;
+            mass_ = patch.area() * density;
+            max_pdf_ = float(density);
+            patch_ = patch;
+        }
+        const double found = double(kPi) * sqr(double(e_.near.radius)) *
+                             double(pdf(to_center_ / dist) * height / (dist2_ * dist));
+        if (mass_ > kLoose * found) propose_cells(patch);
+    }
+    /// Bound of the area density of points within `reach` of `center`; infinite where that goes all around `from`.
+    double max_area_pdf(const Patch& patch, Vec2 center, float reach) const {
+        const Vec3 v = to_center_ + patch.s * center.x + patch.t * center.y;
+        const float dist = length(v), sin = reach / dist;
+        if (!(sin < 1)) return double(kInf);
+        const float to_foot = std::hypot(center.x - patch.foot.x, center.y - patch.foot.y);
+        const double nearest2 =
+            sqr(double(patch.height)) + sqr(double(std::max(0.0f, to_foot - reach)));
+        return double(max_pdf({v / dist, std::asin(sin)})) * patch.height /
+               (nearest2 * std::sqrt(nearest2));
+    }
+    /// A grid of cells over the patch, each with its own bound.
+    void propose_cells(const Patch& patch) {
+        const Vec2 half = patch.half * (1.0f / kCells);
+        const float reach = std::hypot(half.x, half.y);
+        double mass = 0;
+        cell_count_ = 0;
+        for (int i = 0; i < kCells * kCells; ++i) {
+            const Vec2 center{(2 * float(i % kCells) + 1) * half.x - patch.half.x,
+                              (2 * float(i / kCells) + 1) * half.y - patch.half.y};
+            if (patch.is_round && std::hypot(center.x, center.y) > patch.half.x + reach) continue;
+            const double density = max_area_pdf(patch, center, reach);
+            const double cell = 4 * double(half.x) * half.y * density;
+            if (!(mass + cell < mass_)) return;
+            mass += cell;
+            cells_[size_t(cell_count_++)] = {center, float(density), cell};
+        }
+        if (!(mass > 0)) return;
+        proposal_ = Proposal::Cells;
+        mass_ = mass;
+        patch_ = patch;
+    }
+    /// A rectangle across the direction to a neighbourhood that lies almost in its tangent plane. In perspective the ball
+    /// is a disc there, and what the slab leaves of it a strip.
+    Patch seen_edge_on() const {
+        const float dist = std::sqrt(dist2_);
+        const Vec3 axis = to_center_ / dist;
+        const float sin_tilt = std::fabs(dot(e_.near.n, axis)),
+                    cos_tilt = safe_sqrt(1 - sqr(sin_tilt));
+        Patch patch;
+        patch.t = normalize(e_.near.n - axis * dot(e_.near.n, axis));
+        patch.s = cross(axis, patch.t);
+        const float disc = radius_ / safe_sqrt(1 - sqr(radius_ / dist));
+        const float strip =
+            (half_height_ + radius_ * sin_tilt) / cos_tilt * dist / (dist - radius_);
+        patch.half = {disc, std::min(disc, strip)};
+        patch.is_round = false;
+        patch.height = dist;
+        return patch;
     }
 
     /// With u_1 = sin² θ and u_2 = φ/2π about the normal.
@@ -207,13 +285,34 @@ private:
                               : e_.from.bsdf.eval(e_.from.wo, d, e_.mode).pdf;
     }
 
-    void set_plane(Vec3 n, float radius) {
-        frame_ = Frame::from_normal(n);
-        plane_radius_ = radius;
+    Patch disc_about(Vec3 n, float radius) const {
+        const Frame frame = Frame::from_normal(n);
+        return {.s = frame.s, .t = frame.t, .half = {radius, radius}, .is_round = true, .foot = {}};
     }
-    Vec3 on_plane(Vec2 u) const {
-        const Vec2 disk = sample_uniform_disk(u) * plane_radius_;
-        return e_.near.p + frame_.s * disk.x + frame_.t * disk.y;
+    Vec3 at(Vec2 q) const { return e_.near.p + patch_.s * q.x + patch_.t * q.y; }
+    Vec3 in_patch(Vec2 u) const {
+        const Vec2 q = patch_.is_round ? sample_uniform_disk(u) : Vec2{2 * u.x - 1, 2 * u.y - 1};
+        return at({q.x * patch_.half.x, q.y * patch_.half.y});
+    }
+    /// Nothing where the cell reaches beyond the patch. Sets max_pdf_.
+    std::optional<Vec3> in_cell() {
+        double u = double(sampler_.next_1d()) * mass_;
+        int i = 0;
+        while (i + 1 < cell_count_ && u >= cells_[size_t(i)].mass) u -= cells_[size_t(i++)].mass;
+        const Vec2 v = sampler_.next_2d();
+        const Cell& cell = cells_[size_t(i)];
+        max_pdf_ = cell.max_pdf;
+        const Vec2 q{cell.center.x + (2 * v.x - 1) * patch_.half.x / kCells,
+                     cell.center.y + (2 * v.y - 1) * patch_.half.y / kCells};
+        if (patch_.is_round && sqr(q.x) + sqr(q.y) > sqr(patch_.half.x)) return {};
+        return at(q);
+    }
+    /// The direction to a point of the patch; false where thinning ends the trial.
+    bool toward(Vec3 q, Vec3& d, RenderStats& stats) {
+        const Vec3 v = q - e_.from.p;
+        const float dist2 = length2(v), inv_dist = 1 / std::sqrt(dist2);
+        d = v * inv_dist;
+        return passes(pdf(d) * patch_.height * inv_dist / dist2, stats);
     }
     Vec3 in_box(Vec2 u) const {
         const float sin2 = box_lo_.x + u.x * box_size_.x, phi = box_lo_.y + u.y * box_size_.y;
@@ -238,11 +337,14 @@ private:
     std::optional<Vec3> cosine_;  ///< Normal of a density cos θ/π.
     Proposal proposal_ = Proposal::Walk;
     double mass_ = 1;
-    Frame frame_;  ///< About the cone's axis, the cosine's normal, or the plane's normal.
+    Frame frame_;  ///< About the cone's axis or the cosine's normal.
     float max_pdf_ = 0;
     float sin_ = 0, cos_ = 1, sin_axis_ = 0, cos_axis_ = 1;
     float one_minus_cos_ = 0;
-    float plane_radius_ = 0, height_ = 0;
+    static constexpr int kCells = 4;  ///< Along either side of a patch.
+    Patch patch_;
+    std::array<Cell, kCells * kCells> cells_;
+    int cell_count_ = 0;
     Vec2 box_lo_, box_size_;
     Emitter::Disc disc_;
 };

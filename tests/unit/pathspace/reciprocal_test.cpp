@@ -144,7 +144,7 @@ protected:
 
     /// Bounds and the shapes of neighbourhoods that they are for: a ball, or a flat one.
     static constexpr std::pair<TrialBound, float> kShapes[] = {
-        {TrialBound::Box, 1}, {TrialBound::Cone, 1}, {TrialBound::Slab, 0.1f}};
+        {TrialBound::Box, 1}, {TrialBound::Cone, 1}, {TrialBound::Slab, 0.1f}, {TrialBound::Slab, 0.02f}};
     static constexpr int kWalks = 10000;
     Scene scene;
     Film film;
@@ -224,6 +224,50 @@ TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
     }
     EXPECT_GT(stats.trials, 50 * 40000u) << "the slit is too wide for what this tests";
     EXPECT_EQ(stats.runaways, 0u);
+}
+
+/// A floor seen from a wall, close above its plane. p_c = ∫ cosθ H / (π |v|³) over the disc, with cosθ = x / |v|.
+TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
+    constexpr double kDistance = 1, H = 0.012, kRadius = 0.4;
+    const Scene scene = test::build(
+        test::front_camera(8) + test::area_lamp() +
+        test::rectangle("<scale value=\"4\"/>", test::diffuse("0.5,0.5,0.5")) +
+        test::rectangle("<scale value=\"4\"/><rotate y=\"1\" angle=\"90\"/><translate "
+                        "x=\"-1\" z=\"4.001\"/>",
+                        test::diffuse("0.5,0.5,0.5")));
+    SurfaceHit hit;
+    ASSERT_TRUE(scene.intersect({{0, 0, float(H)}, {-1, 0, 0}, kInf}, 0, hit));
+    ComponentArena arena;
+    Vertex wall, scratch;
+    wall.set_surface(*hit.shape, hit.location, hit.geometry, {1, 0, 0}, arena);
+    ASSERT_NEAR(double(wall.p.x), -kDistance, 1e-5);
+
+    double p_c = 0;
+    constexpr int kSteps = 1000;
+    for (int i = 0; i < kSteps; ++i)
+        for (int j = 0; j < kSteps; ++j) {
+            const double x = kRadius * ((i + 0.5) * 2 / kSteps - 1),
+                         y = kRadius * ((j + 0.5) * 2 / kSteps - 1);
+            if (x * x + y * y > sqr(kRadius)) continue;
+            const double dist2 = sqr(x + kDistance) + sqr(y) + sqr(H);
+            p_c += sqr(2 * kRadius / kSteps) * (x + kDistance) * H / (M_PI * sqr(dist2));
+        }
+    Sampler sampler(SamplerKind::Independent, 3);
+    sampler.start(0, 0);
+    sampler.seek(Stream::Auxiliary, 1);
+    RenderStats stats;
+    const PairEvent event{wall,
+                          TransportMode::Radiance,
+                          {},
+                          {{0, 0, 0}, {0, 0, 1}, kRadius, 0.02f * float(kRadius)},
+                          TrialBound::Slab};
+    Moments r;
+    for (int i = 0; i < 40000; ++i)
+        r.add(reciprocal_probability(scene, event, sampler, scratch, stats) * p_c);
+    EXPECT_GE(welch_p(r, Moments::exact(1), 0.002), 1e-4)
+        << r.mean() << " ± " << std::sqrt(r.squared_error());
+    EXPECT_LT(double(stats.trials) / 40000, 10) << "the ball's cone would need a hundred";
+    EXPECT_EQ(stats.bounds_exceeded, 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Starts, Reciprocal, testing::ValuesIn(cases()),
