@@ -10,7 +10,7 @@ namespace etendue {
 
 std::vector<ParamInfo> Bidirectional::params() {
     std::vector<ParamInfo> params = depth_params();
-    params.push_back({"roulette", ParamKind::Float, "0.05",
+    params.push_back({"roulette", ParamKind::Float, "0.15",
                       "Joins that would add less than this share of the pixel's luminance (as "
                       "earlier passes have it) are tested "
                       "with a probability proportional to what they add; 0: all are tested."});

@@ -143,8 +143,10 @@ protected:
     }
 
     /// Bounds and the shapes of neighbourhoods that they are for: a ball, or a flat one.
-    static constexpr std::pair<TrialBound, float> kShapes[] = {
-        {TrialBound::Box, 1}, {TrialBound::Cone, 1}, {TrialBound::Slab, 0.1f}, {TrialBound::Slab, 0.02f}};
+    static constexpr std::pair<TrialBound, float> kShapes[] = {{TrialBound::Box, 1},
+                                                               {TrialBound::Cone, 1},
+                                                               {TrialBound::Slab, 0.1f},
+                                                               {TrialBound::Slab, 0.02f}};
     static constexpr int kWalks = 10000;
     Scene scene;
     Film film;
@@ -229,12 +231,12 @@ TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
 /// A floor seen from a wall, close above its plane. p_c = ∫ cosθ H / (π |v|³) over the disc, with cosθ = x / |v|.
 TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
     constexpr double kDistance = 1, H = 0.012, kRadius = 0.4;
-    const Scene scene = test::build(
-        test::front_camera(8) + test::area_lamp() +
-        test::rectangle("<scale value=\"4\"/>", test::diffuse("0.5,0.5,0.5")) +
-        test::rectangle("<scale value=\"4\"/><rotate y=\"1\" angle=\"90\"/><translate "
-                        "x=\"-1\" z=\"4.001\"/>",
-                        test::diffuse("0.5,0.5,0.5")));
+    const Scene scene =
+        test::build(test::front_camera(8) + test::area_lamp() +
+                    test::rectangle("<scale value=\"4\"/>", test::diffuse("0.5,0.5,0.5")) +
+                    test::rectangle("<scale value=\"4\"/><rotate y=\"1\" angle=\"90\"/><translate "
+                                    "x=\"-1\" z=\"4.001\"/>",
+                                    test::diffuse("0.5,0.5,0.5")));
     SurfaceHit hit;
     ASSERT_TRUE(scene.intersect({{0, 0, float(H)}, {-1, 0, 0}, kInf}, 0, hit));
     ComponentArena arena;
