@@ -5,6 +5,7 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <memory>
 
@@ -186,8 +187,8 @@ void measure_gather_cost(const Report& report, const Options& options, const Sce
     if (!report.wants(name)) return;
     const IntegratorSpec vcm = integrator_for(scene, "vcm"),
                          upg = integrator_for(scene, "upg+bdpt");
-    constexpr uint64_t kPassesToAdapt = 8;
-    const float radius = own_radius(scene, upg, kPassesToAdapt);
+    constexpr uint64_t kAdaptingPasses = 8;
+    const float radius = own_radius(scene, upg, kAdaptingPasses);
     GatherCost merging(scene, vcm, radius), gathering(scene, upg, radius);
     // Differences of what is much alike need longer runs.
     const double seconds = 4 * options.seconds;
@@ -414,90 +415,78 @@ void measure_map(const Report& report, const Options& options, const Scene& scen
 
 // ------------------------------------------------------------------------------------------------- growth
 
-/// Exponent of y over x.
+struct GridSize {
+    double photons, radius;
+};
+
+/// Of y over x.
 double exponent(const std::vector<double>& x, const std::vector<double>& y) {
     return fit_power_law(x, y).value().slope;
 }
 
+/// The grid alone, by photons at one radius and by radius with all photons.
 void measure_growth(const Report& report, const Options& options, const Scene& scene,
                     const std::string& scene_name) {
     const std::string name = "growth " + scene_name;
     if (!report.wants(name)) return;
     Walks walks(scene);
     const std::vector<Vec3> queries = walks.queries();
-    std::vector<double> photons, radii;
-    for (int log2 = options.quick ? 12 : 14; log2 <= (options.quick ? 16 : 20); log2 += 2)
-        photons.push_back(double(uint64_t(1) << log2));
-    for (double scale : {0.25, 0.5, 1.0, 2.0, 4.0}) radii.push_back(scale * walks.radius());
+    const int smallest = options.quick ? 12 : 14, largest = smallest + 6;
+    const double most = std::exp2(largest), radius = walks.radius();
+    std::vector<GridSize> by_photons, by_radius;
+    for (int log2 = smallest; log2 <= largest; log2 += 2)
+        by_photons.push_back({std::exp2(log2), radius});
+    for (double scale : {0.25, 0.5, 1.0, 2.0, 4.0}) by_radius.push_back({most, scale * radius});
 
     std::vector<PointGrid::Entry> entries;
-    for (uint64_t light_paths = 1 << 14; double(entries.size()) < photons.back();
-         light_paths *= 2) {
+    for (uint64_t light_paths = 1024; double(entries.size()) < most; light_paths *= 2) {
         std::vector<LightPaths::Chunk> chunks;
         LightPaths paths;
         walks.keep(light_paths, chunks, paths);
         entries = entries_of(paths);
     }
-
-    /// By number of photons, or by radius.
-    struct Times {
-        std::vector<double> build, query;
-    };
     PointGrid grid;
+    const auto build = [&](const GridSize& size) {
+        grid.build({entries.data(), size_t(size.photons)}, float(size.radius));
+    };
     const double least = options.seconds / 20;
-    const auto add = [&](Times& times, double count, double radius) {
-        const std::span<const PointGrid::Entry> first(entries.data(), size_t(count));
-        times.build.push_back(
-            processor_seconds_of(least, [&] { grid.build(first, float(radius)); }));
-        times.query.push_back(query_seconds(grid, queries, float(radius), least));
-    };
-    struct Run {
-        Times by_photons, by_radius;
-    };
-    const auto runs = repeat(options.repeats, [&] {
-        Run run;
-        for (double count : photons) add(run.by_photons, count, walks.radius());
-        for (double radius : radii) add(run.by_radius, photons.back(), radius);
-        return run;
-    });
-    const auto medians = [&](std::vector<double> Times::*side, Times Run::*by, size_t points,
-                             const auto& scale) {
-        std::vector<double> values;
-        for (size_t i = 0; i < points; ++i)
-            values.push_back(1e9 * scale(i) *
-                             median(each(runs, [&](const Run& r) { return ((r.*by).*side)[i]; })));
-        return values;
-    };
-    const auto found = [&](double count, double radius) {
-        grid.build({entries.data(), size_t(count)}, float(radius));
-        return answer(grid, queries, float(radius)).found / double(queries.size());
-    };
-    std::vector<double> found_by_photons, found_by_radius;
-    for (double count : photons) found_by_photons.push_back(found(count, walks.radius()));
-    for (double radius : radii) found_by_radius.push_back(found(photons.back(), radius));
 
-    const auto one = [](size_t) { return 1.0; };
-    const auto a_photon = [&](size_t i) { return 1 / photons[i]; };
-    const auto a_photon_of_all = [&](size_t) { return 1 / photons.back(); };
-    report.add(
-        name,
-        {{"build_with_photons", "1", false,
-          each(runs, [&](const Run& r) { return exponent(photons, r.by_photons.build); })},
-         {"query_with_photons", "1", false,
-          each(runs, [&](const Run& r) { return exponent(photons, r.by_photons.query); })},
-         {"build_with_radius", "1", false,
-          each(runs, [&](const Run& r) { return exponent(radii, r.by_radius.build); })},
-         {"query_with_radius", "1", false,
-          each(runs, [&](const Run& r) { return exponent(radii, r.by_radius.query); })}},
-        {{"photons", photons},
-         {"build_ns_a_photon", medians(&Times::build, &Run::by_photons, photons.size(), a_photon)},
-         {"query_ns", medians(&Times::query, &Run::by_photons, photons.size(), one)},
-         {"found_a_query", found_by_photons},
-         {"radii", radii},
-         {"build_ns_a_photon_by_radius",
-          medians(&Times::build, &Run::by_radius, radii.size(), a_photon_of_all)},
-         {"query_ns_by_radius", medians(&Times::query, &Run::by_radius, radii.size(), one)},
-         {"found_a_query_by_radius", found_by_radius}});
+    const auto measure = [&](const std::vector<GridSize>& sizes, const char* unit,
+                             double GridSize::*variable) {
+        /// Seconds, by size.
+        struct Run {
+            std::vector<double> build, query;
+        };
+        const auto runs = repeat(options.repeats, [&] {
+            Run run;
+            for (const GridSize& size : sizes) {
+                run.build.push_back(processor_seconds_of(least, [&] { build(size); }));
+                run.query.push_back(query_seconds(grid, queries, float(size.radius), least));
+            }
+            return run;
+        });
+        std::vector<double> x;
+        for (const GridSize& size : sizes) x.push_back(size.*variable);
+        for (size_t i = 0; i < sizes.size(); ++i) {
+            build(sizes[i]);
+            const Answers a = answer(grid, queries, float(sizes[i].radius));
+            report.add(
+                fmt::format("{} {}={:.7g}", name, unit, x[i]),
+                {{"build", "ns/photon", false,
+                  each(runs, [&](const Run& r) { return 1e9 * r.build[i] / sizes[i].photons; })},
+                 {"query", "ns", false,
+                  each(runs, [&](const Run& r) { return 1e9 * r.query[i]; })}},
+                {{"candidates_a_query", a.candidates / double(queries.size())},
+                 {"found_a_query", a.found / double(queries.size())}});
+        }
+        report.add(fmt::format("{} with {}", name, unit),
+                   {{"exponent_of_build", "1", false,
+                     each(runs, [&](const Run& r) { return exponent(x, r.build); })},
+                    {"exponent_of_query", "1", false,
+                     each(runs, [&](const Run& r) { return exponent(x, r.query); })}});
+    };
+    measure(by_photons, "photons", &GridSize::photons);
+    measure(by_radius, "radius", &GridSize::radius);
 }
 
 }  // namespace
