@@ -101,7 +101,11 @@ public:
         paths_.eye_path(c, n, work, [&](int t) {
             paths_.add_next_event(c, n, t, work);
             paths_.connect_to_own(c, n, t, work);
-            photons_.for_each_near(work.z[t - 1].p, [&](uint32_t) { ++work.stats.pairs; });
+            const auto only_count = [&](const Partner&) {
+                ++work.stats.pairs;
+                return false;
+            };
+            photons_.for_each_near(work.z[t - 1].p, only_count, [](const Partner&) {});
             return Onward::ByAnyEvent;
         });
     }
@@ -310,7 +314,7 @@ private:
     const RenderStats nothing_so_far_;
 };
 
-/// The light vertices that eye vertices can find, as Photons lists them.
+/// The light vertices that eye vertices can find.
 std::vector<PointGrid::Entry> entries_of(const LightPaths& paths) {
     std::vector<PointGrid::Entry> entries;
     for (uint32_t i = 0; i < paths.vertices().size(); ++i)
@@ -325,7 +329,7 @@ struct Answers {
 Answers answer(const PointGrid& grid, const std::vector<Vec3>& queries, float radius) {
     uint64_t found = 0, candidates = 0;
     for (Vec3 p : queries) {
-        grid.for_each_near(p, radius, [&](uint32_t) { ++found; });
+        grid.for_each_near(p, radius, [&](const PointGrid::Entry&) { ++found; });
         candidates += grid.candidates(p);
     }
     return {double(found), double(candidates)};
@@ -334,7 +338,8 @@ double query_seconds(const PointGrid& grid, const std::vector<Vec3>& queries, fl
                      double least) {
     uint64_t sum = 0;
     const double seconds = processor_seconds_of(least, [&] {
-        for (Vec3 p : queries) grid.for_each_near(p, radius, [&](uint32_t index) { sum += index; });
+        for (Vec3 p : queries)
+            grid.for_each_near(p, radius, [&](const PointGrid::Entry& e) { sum += e.index; });
     });
     // What is never looked at need not be found.
     [[maybe_unused]] volatile uint64_t looked_at = sum;
@@ -363,8 +368,8 @@ void measure_map(const Report& report, const Options& options, const Scene& scen
     walks.keep(light_paths, chunks, paths);
     grid.build(entries_of(paths), radius);
     const double held = heap_bytes() - heap_before;
-    const double vertices = double(paths.vertices().size()),
-                 photons = double(entries_of(paths).size());
+    const std::vector<PointGrid::Entry> entries = entries_of(paths);
+    const double vertices = double(paths.vertices().size()), photons = double(entries.size());
     const Answers answers = answer(grid, queries, radius);
 
     struct Run {
@@ -375,7 +380,7 @@ void measure_map(const Report& report, const Options& options, const Scene& scen
         Run run;
         run.trace = processor_seconds_of(least, [&] { walks.trace(light_paths); });
         run.keep = processor_seconds_of(least, [&] { walks.keep(light_paths, chunks, paths); });
-        run.build = processor_seconds_of(least, [&] { grid.build(entries_of(paths), radius); });
+        run.build = processor_seconds_of(least, [&] { grid.build(entries, radius); });
         run.query = query_seconds(grid, queries, radius, least);
         return run;
     });

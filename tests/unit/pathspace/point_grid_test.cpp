@@ -30,7 +30,8 @@ TEST(PointGrid, FindsWhatALoopFinds) {
         for (float radius : {kRadius, 0.5f * kRadius})
             for (const auto& query : points(300, 2)) {
                 std::vector<uint32_t> found, expected;
-                grid.for_each_near(query.p, radius, [&](uint32_t i) { found.push_back(i); });
+                grid.for_each_near(query.p, radius,
+                                   [&](const PointGrid::Entry& e) { found.push_back(e.index); });
                 for (const auto& e : entries)
                     if (length2(e.p - query.p) < radius * radius) expected.push_back(e.index);
                 std::sort(found.begin(), found.end());
@@ -48,7 +49,7 @@ TEST(PointGrid, LooksAtFewThatAreFar) {
     double candidates = 0, found = 0;
     for (const auto& query : points(2000, 2)) {
         candidates += double(grid.candidates(query.p));
-        grid.for_each_near(query.p, kRadius, [&](uint32_t) { ++found; });
+        grid.for_each_near(query.p, kRadius, [&](const PointGrid::Entry&) { ++found; });
     }
     // Eight cells have 15.3 times the volume of the ball; other cells share their buckets.
     EXPECT_GT(candidates, 10 * found);
