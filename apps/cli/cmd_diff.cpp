@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "compare/error_json.h"
 #include "image/flip.h"
 #include "image/image_io.h"
 #include "image/metrics.h"
@@ -74,20 +75,8 @@ void DiffCommand::print(const ImageErrors& e, const std::optional<FlipResult>& f
 
 void DiffCommand::print_json(const ImageErrors& e,
                              const std::optional<FlipResult>& flip_result) const {
-    nlohmann::ordered_json j = {{"image", image},
-                                {"reference", reference},
-                                {"pixels", e.pixels},
-                                {"not_finite", e.not_finite},
-                                {"ignored", e.ignored},
-                                {"mse", e.mse},
-                                {"rmse", e.rmse},
-                                {"rel_mse", e.rel_mse},
-                                {"rel_mse_trimmed", e.rel_mse_trimmed},
-                                {"l1", e.l1},
-                                {"mape", e.mape},
-                                {"smape", e.smape},
-                                {"spike", e.spike},
-                                {"mean_ratio", e.mean_ratio}};
+    nlohmann::ordered_json j = {{"image", image}, {"reference", reference}};
+    j.update(to_json(e));
     if (flip_result) j[is_hdr() ? "flip_hdr" : "flip_ldr"] = flip_result->mean;
     fmt::print("{}\n", j.dump(2));
 }

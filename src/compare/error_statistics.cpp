@@ -26,7 +26,7 @@ struct Mean {
 std::optional<Interval> mean_interval(std::span<const double> samples) {
     if (samples.size() < 2) return {};
     const Mean m(samples);
-    const double half = t_quantile_95(double(samples.size() - 1)) * std::sqrt(m.variance);
+    const double half = student_quantile(0.05, double(samples.size() - 1)) * std::sqrt(m.variance);
     return Interval{m.value, m.value - half, m.value + half};
 }
 
@@ -59,7 +59,7 @@ std::optional<Efficiency> relative_efficiency(const Cost& base, const Cost& meth
     // Variance of log e is var(e) / e² to first order; the degrees of freedom are those of the smaller side.
     const double spread =
         std::sqrt(e0.variance / (e0.value * e0.value) + e1.variance / (e1.value * e1.value));
-    const double factor = std::exp(t_quantile_95(double(runs - 1)) * spread);
+    const double factor = std::exp(student_quantile(0.05, double(runs - 1)) * spread);
     out.interval = Interval{out.value, out.value / factor, out.value * factor};
     return out;
 }

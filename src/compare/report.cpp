@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "compare/embedded_image.h"
+#include "compare/error_json.h"
 #include "compare/plot.h"
 #include "compare/report_page.h"
 #include "image/atomic_file.h"
@@ -33,18 +34,6 @@ Json to_json(const PowerLaw& p) {
     return {{"slope", p.slope}, {"factor", p.factor}, {"points", p.points}};
 }
 Json to_json(const Efficiency& e);
-Json to_json(const ImageErrors& e) {
-    return {{"mse", e.mse},
-            {"rmse", e.rmse},
-            {"rel_mse", e.rel_mse},
-            {"rel_mse_trimmed", e.rel_mse_trimmed},
-            {"l1", e.l1},
-            {"mape", e.mape},
-            {"smape", e.smape},
-            {"spike", e.spike},
-            {"mean_ratio", e.mean_ratio},
-            {"not_finite", e.not_finite}};
-}
 template <class T>
 Json to_json(const std::optional<T>& v) {
     return v ? to_json(*v) : Json();

@@ -15,7 +15,8 @@ EmissionSample InfiniteEmitter::sample_emission(Vec2 u_y0, Vec2 u_d) const {
 
 bool InfiniteEmitter::sample_direct(Vec3, Vec2 u, DirectSample& out) const {
     const Sample s = sample_direction(u);
-    if (s.L.is_zero()) return false;
+    // Rounding may take a direction into a cell of the environment without density.
+    if (s.L.is_zero() || !(s.pdf > 0)) return false;
     out = {s.d, -s.d, s.d, kInf, s.L, s.pdf, s.pdf, pdf_disk_, {}, 0};
     return true;
 }

@@ -173,7 +173,7 @@ ErrorEstimate Film::error() const {
     mean /= double(count);
     const double spread =
         std::sqrt(std::max(0.0, square / double(count) - mean * mean) / double(count - 1));
-    const double half = t_quantile_95(double(count - 1)) * spread;
+    const double half = student_quantile(0.05, double(count - 1)) * spread;
     const double n = double(passes_);
     e.relative_rms = std::sqrt(mean / n);
     e.low = std::sqrt(std::max(0.0, mean - half) / n);

@@ -15,6 +15,8 @@ public:
     static std::vector<ParamInfo> params();
     PhotonMapping(const IntegratorParams& params, bool next_event);
 
+    void begin_pass(const PassContext& pass) { paths_.begin_pass(pass); }
+
     /// Samples of what is made without photons.
     TechniqueCounts counts() const { return {.hit = 1, .next_event = next_event_ ? 1.0f : 0.0f}; }
     /// Light vertices of the shortest path that photons make.

@@ -60,6 +60,7 @@ public:
     }
 
     void begin_pass(const PassContext& pass) override {
+        mapping_.begin_pass(pass);
         pass_ = pass.index;
         max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();
         if (pass.index > 0 && !retrace_) return;

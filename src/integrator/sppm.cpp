@@ -27,6 +27,7 @@ public:
           eye_paths_(uint32_t(eye_paths)) {}
 
     void begin_pass(const PassContext& pass) override {
+        mapping_.begin_pass(pass);
         photons_.trace(pass, mapping_.paths(), {}, radius_.radius(pass.scene, pass.index), memory_);
         pass_ = pass.index;
     }

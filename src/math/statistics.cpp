@@ -5,17 +5,35 @@
 
 namespace etendue {
 
+namespace {
+
+/// The continued fraction of the incomplete beta function I_x(a,b) [NIST DLMF, 8.17.22] by Lentz's method.
+double beta_fraction(double x, double a, double b) {
+    double value = 1, c = 1, d = 0;
+    for (int i = 1; i < 10000; ++i) {
+        const double m = i / 2;
+        const double term = i % 2 ? -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1))
+                                  : m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
+        d = 1 / (1 + term * d);
+        c = 1 + term / c;
+        value *= c * d;
+        if (std::fabs(c * d - 1) < 1e-15) break;
+    }
+    return 1 / value;
+}
+
+}  // namespace
+
 double student_tail(double t, double dof) {
-    // With T = √ν tan θ the density is ∝ cos^(ν-1) θ; beyond ten standard deviations of θ nothing is left.
-    constexpr int kSteps = 4000;
-    const double lo = std::atan(t / std::sqrt(dof));
-    const double step = std::min(M_PI / 2 - lo, 10 / std::sqrt(dof)) / kSteps;
-    double sum = 0;
-    for (int i = 0; i < kSteps; ++i)
-        sum += std::pow(std::cos(lo + (i + 0.5) * step), dof - 1) * step;
-    const double half =
-        std::sqrt(M_PI) / 2 * std::exp(std::lgamma(dof / 2) - std::lgamma((dof + 1) / 2));
-    return std::min(1.0, sum / half);
+    // The normal distribution to a relative t⁴ / 4ν.
+    if (dof > 1e6) return std::erfc(t / std::sqrt(2.0));
+    // I_x(ν/2, 1/2) with x = ν / (ν + t²) [NIST DLMF, 8.17.17].
+    const double a = dof / 2, b = 0.5, x = dof / (dof + t * t), y = t * t / (dof + t * t);
+    const double front =
+        std::exp(std::lgamma(a + b) - std::lgamma(a) - a * std::log1p(t * t / dof)) *
+        std::sqrt(y / M_PI);
+    return x < (a + 1) / (a + b + 2) ? front / a * beta_fraction(x, a, b)
+                                     : 1 - front / b * beta_fraction(y, b, a);
 }
 
 double student_quantile(double p, double dof) {

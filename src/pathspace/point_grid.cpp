@@ -19,4 +19,15 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
     for (size_t i = 0; i < entries.size(); ++i) entries_[next[bucket[i]]++] = entries[i];
 }
 
+size_t PointGrid::candidates(Vec3 p) const {
+    if (entries_.empty()) return 0;
+    const Cell lowest = lowest_cell(p);
+    size_t count = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const uint32_t bucket = bucket_of(lowest.neighbour(corner));
+        count += begins_[bucket + 1] - begins_[bucket];
+    }
+    return count;
+}
+
 }  // namespace etendue

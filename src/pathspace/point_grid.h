@@ -27,15 +27,13 @@ public:
     template <class Use>
     void for_each_near(Vec3 p, float radius, const Use& use) const {
         if (entries_.empty()) return;
-        // Cells are twice the radius wide, so that a ball meets at most eight.
-        const Vec3 scaled = p * inv_cell_;
-        const int x0 = low(scaled.x), y0 = low(scaled.y), z0 = low(scaled.z);
+        const Cell lowest = lowest_cell(p);
         const float radius2 = radius * radius;
         // All eight at a time, since what takes the time is waiting for memory.
         Cell cells[8];
         uint32_t begin[8], end[8];
         for (int corner = 0; corner < 8; ++corner) {
-            cells[corner] = {x0 + (corner & 1), y0 + (corner >> 1 & 1), z0 + (corner >> 2)};
+            cells[corner] = lowest.neighbour(corner);
             begin[corner] = bucket_of(cells[corner]);
             __builtin_prefetch(&begins_[begin[corner]]);
         }
@@ -51,6 +49,8 @@ public:
                 if (length2(e.p - p) < radius2 && cell_of(e.p) == cells[corner]) use(e);
             }
     }
+    /// Entries that for_each_near() looks at.
+    size_t candidates(Vec3 p) const;
     size_t memory_bytes() const {
         return entries_.capacity() * sizeof(Entry) + begins_.capacity() * sizeof(uint32_t);
     }
@@ -59,9 +59,17 @@ private:
     struct Cell {
         int x, y, z;
         friend bool operator==(const Cell&, const Cell&) = default;
+        /// One of the eight that share the upper corner of this one.
+        Cell neighbour(int corner) const {
+            return {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)};
+        }
     };
-    /// The lower of the two cells that a ball meets along one axis.
-    static int low(float scaled) { return int(std::floor(scaled - 0.5f)); }
+    /// Of those that a ball meets: at most eight, since cells are twice the radius wide.
+    Cell lowest_cell(Vec3 p) const {
+        const Vec3 s = p * inv_cell_;
+        return {int(std::floor(s.x - 0.5f)), int(std::floor(s.y - 0.5f)),
+                int(std::floor(s.z - 0.5f))};
+    }
     Cell cell_of(Vec3 p) const {
         const Vec3 s = p * inv_cell_;
         return {int(std::floor(s.x)), int(std::floor(s.y)), int(std::floor(s.z))};

@@ -100,7 +100,11 @@ struct Renderer::Workers {
 };
 
 Renderer::Renderer(const Scene& scene, const RenderSettings& settings)
-    : scene_(scene), settings_(settings), integrator_(make_integrator(settings.integrator)),
+    : Renderer(scene, settings, make_integrator(settings.integrator)) {}
+
+Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
+                   std::unique_ptr<Integrator> integrator)
+    : scene_(scene), settings_(settings), integrator_(std::move(integrator)),
       film_(scene.film(), scene.filter()), workers_(std::make_unique<Workers>(settings.threads)) {
     if (settings.technique_depth > 0)
         techniques_ = std::make_unique<TechniqueImages>(scene.film(), scene.filter(),

@@ -50,6 +50,9 @@ class Renderer {
 public:
     /// Throws std::runtime_error where the integrator's parameters are wrong. The scene must outlive the renderer.
     Renderer(const Scene& scene, const RenderSettings& settings);
+    /// With this integrator instead of the settings'.
+    Renderer(const Scene& scene, const RenderSettings& settings,
+             std::unique_ptr<Integrator> integrator);
     ~Renderer();
 
     /// Renders until a limit is reached or `interrupted` is set; the pass in flight is always finished. `progress` is

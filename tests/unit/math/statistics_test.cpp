@@ -1,5 +1,9 @@
 #include "math/statistics.h"
 
+#include <cmath>
+#include <limits>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 namespace etendue {
@@ -16,15 +20,39 @@ TEST(Statistics, MomentsOfFourNumbers) {
     EXPECT_EQ(Moments::exact(3).squared_error(), 0);
 }
 
+TEST(Statistics, StudentTailsWithClosedForms) {
+    for (double t : {0.0, 0.1, 1.0, 2.0, 5.0, 30.0}) {
+        // ν = 1, 2, 4: the distribution function is elementary.
+        EXPECT_NEAR(student_tail(t, 1), 1 - 2 / M_PI * std::atan(t), 1e-12) << t;
+        EXPECT_NEAR(student_tail(t, 2), 1 - t / std::sqrt(2 + t * t), 1e-12) << t;
+        const double c = t / std::sqrt(4 + t * t);
+        EXPECT_NEAR(student_tail(t, 4), 1 - c * (3 - c * c) / 2, 1e-12) << t;
+    }
+    // Far tails keep their relative precision: ν = 2, where the tail is 1/t² - 3/2 t⁻⁴ + ….
+    EXPECT_NEAR(student_tail(1e6, 2) * 1e12, 1, 1e-9);
+    // The normal distribution, and what comes next to it.
+    for (double dof : {9e5, 2e6, std::numeric_limits<double>::infinity()})
+        EXPECT_NEAR(student_tail(4, dof) / std::erfc(4 / std::sqrt(2.0)), 1, 1e-4) << dof;
+}
+
 /// Tabulated quantiles [Abramowitz & Stegun 1964, table 26.10].
-TEST(Statistics, StudentTails) {
-    EXPECT_NEAR(student_tail(12.706, 1), 0.05, 1e-4);
-    EXPECT_NEAR(student_tail(2.228, 10), 0.05, 1e-4);
-    EXPECT_NEAR(student_tail(3.169, 10), 0.01, 1e-5);
-    EXPECT_NEAR(student_tail(1.96, 1e6), 0.05, 1e-4);
-    EXPECT_NEAR(student_tail(0, 5), 1, 1e-6);
-    EXPECT_NEAR(student_quantile(0.05, 10), 2.2281, 1e-3);
-    EXPECT_NEAR(student_quantile(1e-5, 40), 5.0525, 5e-2);
+TEST(Statistics, StudentQuantiles) {
+    for (const auto& [dof, t] : {std::pair{1.0, 12.706},
+                                 {2.0, 4.303},
+                                 {3.0, 3.182},
+                                 {4.0, 2.776},
+                                 {9.0, 2.262},
+                                 {10.0, 2.228},
+                                 {30.0, 2.042},
+                                 {1e9, 1.960}})
+        EXPECT_NEAR(student_quantile(0.05, dof), t, 6e-4) << dof;
+    EXPECT_NEAR(student_quantile(0.01, 10), 3.169, 6e-4);
+    // [ibid., 26.7.5] to order 1/ν.
+    const double z = kNormalQuantile95, dof = 3e4;
+    EXPECT_NEAR(student_quantile(0.05, dof), z + (z * z * z + z) / (4 * dof), 1e-7);
+    for (double p : {1e-9, 1e-3, 0.5, 1.0})
+        for (double n : {1.0, 2.5, 40.0, 3e4})
+            EXPECT_NEAR(student_tail(student_quantile(p, n), n) / p, 1, 1e-6) << p << ' ' << n;
 }
 
 TEST(Statistics, WelchFindsWhatDiffers) {

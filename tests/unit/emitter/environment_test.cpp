@@ -1,0 +1,35 @@
+#include "emitter/environment.h"
+
+#include <algorithm>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "random.h"
+
+namespace etendue {
+namespace {
+
+/// A lit upper and a dark lower half: numbers next to 1 lead to the border between them, where a direction, rounded, may
+/// lie in a cell without density.
+TEST(Environment, EverySampleHasADensity) {
+    constexpr int kWidth = 8, kSamples = 2000;
+    testing::Random random(1);
+    for (int height = 4; height <= 64; height += 2) {
+        std::vector<Rgb> pixels(size_t(kWidth * height));
+        std::fill(pixels.begin(), pixels.begin() + kWidth * height / 2, Rgb(1));
+        const auto environment = make_environment(kWidth, height, pixels, Transform());
+        int sampled = 0;
+        for (int i = 0; i < kSamples; ++i) {
+            const Vec2 u{random.next_1d(), 1 - float(1 + i % 8) * 0x1p-24f};
+            DirectSample d;
+            if (!environment->sample_direct({}, u, d)) continue;
+            ++sampled;
+            EXPECT_GT(d.pdf, 0) << height << ' ' << u.x;
+        }
+        EXPECT_GT(sampled, kSamples / 4) << height;
+    }
+}
+
+}  // namespace
+}  // namespace etendue
