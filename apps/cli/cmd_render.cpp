@@ -177,17 +177,22 @@ void RenderCommand::run() const {
             std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
 
     StopReason reason;
+    std::vector<double> pass_seconds;
+    double before = 0;
     {
         ProgressLine line(quiet);
         reason = renderer.run(
             [&](const Progress& p) {
                 line.show(p);
+                pass_seconds.push_back(p.seconds - before);
+                before = p.seconds;
                 if (viewer) viewer->update(renderer.film(), p.seconds);
             },
             interrupted);
     }
 
-    const nlohmann::json report = to_json(renderer, s, settings, reason);
+    nlohmann::json report = to_json(renderer, s, settings, reason);
+    report["pass_seconds"] = pass_seconds;
     Image image = rgb_image(s.film().crop_width, s.film().crop_height, renderer.film().image());
     for (const auto& [key, value] : report.items())
         if (value.is_string())

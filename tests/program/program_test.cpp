@@ -206,6 +206,13 @@ TEST_F(ProgramTest, WritesImageWithLayersAndMetadataAndStatistics) {
     EXPECT_EQ(j["rejected_contributions"], 0);
     EXPECT_EQ(j["eye_paths"], 8 * 12 * 12);
     EXPECT_EQ(j["light_paths"], 8 * 12 * 12);
+    double seconds = 0;
+    for (const nlohmann::json& pass : j["pass_seconds"]) {
+        EXPECT_GT(pass.get<double>(), 0);
+        seconds += pass.get<double>();
+    }
+    EXPECT_EQ(j["pass_seconds"].size(), 8u);
+    EXPECT_NEAR(seconds, j["seconds"].get<double>(), 1e-9);
 }
 
 TEST_F(ProgramTest, WritesEveryFormat) {
