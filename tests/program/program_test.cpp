@@ -217,10 +217,12 @@ TEST_F(ProgramTest, WritesImageWithLayersAndMetadataAndStatistics) {
 }
 
 TEST_F(ProgramTest, CountsThePairsOfEveryPass) {
+    const fs::path cornell = fs::path(ETENDUE_SOURCE_DIR) / "scenes/cornell.xml";
     const fs::path stats = folder.path() / "stats.json";
     for (const char* method : {"vcm:radius=0.2", "upg+bdpt:radius=0.2"}) {
-        const ProgramResult r = run({"render", scene.string(), "-o", image.string(), "-i", method,
-                                     "--spp", "4", "--stats", stats.string(), "--quiet"});
+        const ProgramResult r =
+            run({"render", cornell.string(), "-o", image.string(), "-i", method, "--resolution",
+                 "16x16", "--spp", "4", "--stats", stats.string(), "--quiet"});
         ASSERT_EQ(r.status, 0) << r.errors;
         const nlohmann::json j = nlohmann::json::parse(read_text(stats));
         uint64_t sum = 0;
