@@ -7,6 +7,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import matplotlib.ticker
 import numpy as np
 
 # The same figures give the same bytes.
@@ -53,14 +54,26 @@ def plot_lines(axes, curves, *, title="", x="", y="", logarithmic=True, marker=N
     if logarithmic:
         axes.set_xscale("log")
         axes.set_yscale("log")
+        _label_few_values(axes.xaxis)
+        _label_few_values(axes.yaxis)
     axes.set_title(title)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
 
 
+def _label_few_values(axis):
+    """Labels 1, 2, 5, 10 … where the axis spans little, else powers of ten."""
+    low, high = axis.get_view_interval()
+    factors = (1, 2, 5) if high < 50 * low else (1,)
+    axis.set_major_locator(matplotlib.ticker.LogLocator(subs=factors))
+    axis.set_major_formatter(matplotlib.ticker.StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+
+
 def displayed(image, exposure):
-    """sRGB of radiance times `exposure`, clamped."""
-    x = np.clip(image * exposure, 0, 1)
+    """sRGB; radiance of 1/exposure becomes half of white [Reinhard et al. 2002]."""
+    x = np.maximum(image, 0) * exposure
+    x = x / (1 + x)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
@@ -68,8 +81,8 @@ def plot_pictures(images, exposure, *, boxes=(), zoom=2):
     """Pictures side by side with their names below, and boxes (x, y, w, h) in the first of them."""
     first = next(iter(images.values()))
     height, width = (zoom * n / 100 for n in first.shape[:2])
-    figure, axes = panels(len(images), height=height + 0.25, width=width + 0.03)
-    figure.set_constrained_layout_pads(w_pad=0.01, h_pad=0.01, wspace=0, hspace=0)
+    figure, axes = panels(len(images), height=height + 0.45, width=width + 0.03)
+    figure.set_constrained_layout_pads(w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
     for a, (name, image) in zip(axes, images.items()):
         a.imshow(displayed(image, exposure), interpolation="nearest")
         a.set_xlabel(name)

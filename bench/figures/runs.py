@@ -15,7 +15,7 @@ SHARED = pathlib.Path(os.environ.get("ETENDUE_SCENES", ROOT.parent / "shared" / 
 SCENES = {
     "ajar": ("scenes/ajar.xml", (160, 120)),
     "cornell": ("scenes/cornell.xml", (64, 64)),
-    "leak": ("scenes/leak.xml", (160, 120)),
+    "leak": ("scenes/leak.xml", (128, 96)),
     "ring": ("scenes/ring.xml", (160, 120)),
     "cornell-box": ("cornell-box-mts3/scene_v3.xml", (128, 128)),
     "veach-ajar": ("veach-ajar-mts3/scene.xml", (160, 90)),
@@ -81,12 +81,12 @@ class Runs:
         """Samples of a pixel that the slowest of the methods makes in so many seconds, scaled."""
         speeds = []
         for method in methods:
-            stats, _ = self.render(scene, method, spp=3, **options)
+            stats, _ = self.render(scene, method, spp=2, **options)
             speeds.append(1 / np.median(stats["pass_seconds"]))
         return max(2, round(min(speeds) * self.scale * seconds))
 
     def compare(self, scene, methods, *, seconds=None, spp=None, runs=1, paths="all",
-                lengths="1..", reference="bdpt"):
+                lengths="1..", size=None):
         """What `etendue compare` reports of each method, in short. `seconds` are those of all methods and runs
         together, to be scaled."""
         report = self.folder / "report"
@@ -95,10 +95,10 @@ class Runs:
             arguments += ["--spp", spp]
         else:
             arguments += ["--time", max(0.05, self.scale * seconds / len(methods) / runs)]
-        arguments += ["--resolution", "{}x{}".format(*SCENES[scene][1])]
+        arguments += ["--resolution", "{}x{}".format(*(size or SCENES[scene][1]))]
         arguments += ["--paths", paths, "--lengths", lengths, "--techniques-max-depth", 0]
         arguments += ["--reference-time", self.scale * REFERENCE_SECONDS]
-        arguments += ["--reference-method", reference, "--references", self.folder / "references"]
+        arguments += ["--reference-method", "bdpt", "--references", self.folder / "references"]
         arguments += ["--report", report, "--seed", FIRST_SEED, "--threads", self.threads]
         self._call(*arguments, "--quiet")
         return _comparison(json.loads((report / "report.json").read_text()), scene)
@@ -144,7 +144,9 @@ def _comparison(report, scene):
             m["rel_mse_trimmed"] * m["seconds"]
         )
     return {
-        **scene_settings(scene, **{key: settings[key] for key in shown}),
+        "file": SCENES[scene][0],
+        "resolution": "{width}x{height}".format(**compared),
+        **{key: settings[key] for key in shown},
         "reference": {k: reference[k] for k in ("method", "spp", "seconds", "rel_mse")},
         "methods": methods,
     }

@@ -8,6 +8,7 @@ from runs import FIRST_SEED, mean_curve, power_law, scene_settings
 # ------------------------------------------------------------------------------------ figure 7: bias
 
 CONVERGENCE_RUNS = 64
+FEWEST_CONVERGENCE_RUNS = 16  # where times are scaled down
 # Below the lamp, whose edges would decide the error.
 CONVERGENCE_CROP = (0, 16, 64, 48)
 CONVERGENCE_RADIUS = 0.1
@@ -16,8 +17,9 @@ CONVERGENCE_RADIUS = 0.1
 def convergence(runs, seconds):
     """Fig. 7: error of the mean of 1 to 64 independent runs."""
     scene, crop = "cornell", CONVERGENCE_CROP
+    count = CONVERGENCE_RUNS if runs.scale >= 0.1 else FEWEST_CONVERGENCE_RUNS
     methods = [f"upg+bdpt:radius={CONVERGENCE_RADIUS}", f"vcm:radius={CONVERGENCE_RADIUS},alpha=1"]
-    spp = runs.spp_within(scene, methods, seconds / 4 / CONVERGENCE_RUNS, crop=crop)
+    spp = runs.spp_within(scene, methods, seconds / 4 / count, crop=crop)
     # Two halves, so that the reference's noise cancels; together they have as many samples as a method's runs.
     reference_spp = runs.spp_within(scene, ["bdpt"], seconds / 4, crop=crop)
     reference = [
@@ -25,24 +27,24 @@ def convergence(runs, seconds):
         for seed in (1_000_001, 1_000_002)
     ]
     results, curves = [], []
-    rows = [["method", "slope, 1 to 64 runs", "slope, 16 to 64", "RMSE of 1", "of 64", "bias"]]
+    rows = [["method", f"slope, 1 to {count} runs", f"slope, {count // 4} to {count}", "RMSE of 1", f"of {count}", "bias"]]
     for method in methods:
         images = np.array([
             runs.render(scene, method, spp=spp, seed=FIRST_SEED + i, crop=crop)[1]
-            for i in range(CONVERGENCE_RUNS)
+            for i in range(count)
         ])
         counts, mse = _mse_of_means(images, reference)
         rmse = np.sqrt(np.maximum(mse, 0))
         usable = mse > 0
         slope, slope_error = power_law(counts[usable], rmse[usable])
-        last = usable & (counts >= 16)
+        last = usable & (counts >= count // 4)
         last_slope = power_law(counts[last], rmse[last])[0] if last.sum() > 1 else None
         # mse(n) = variance / n + bias².
         bias_squared = (counts[-1] * mse[-1] - mse[0]) / (counts[-1] - 1)
         bias = float(np.sign(bias_squared) * np.sqrt(abs(bias_squared)))
         results.append({
             "method": method, "runs": counts, "mse": mse, "slope": slope,
-            "slope_standard_error": slope_error, "slope_from_16_runs": last_slope, "bias": bias,
+            "slope_standard_error": slope_error, "slope_of_last_quarter": last_slope, "bias": bias,
         })
         rows.append([method, f"{slope:.3f} ± {slope_error:.3f}", last_slope, rmse[0], rmse[-1], bias])
         curves.append((f"{method}: slope {slope:.2f}", counts, rmse))
@@ -52,7 +54,7 @@ def convergence(runs, seconds):
     ideal = np.sqrt(first["mse"][0] / counts)
     axes.plot(counts, ideal, color="#999999", linestyle=":", label="slope −0.5")
     axes.legend()
-    settings = scene_settings(scene, crop=crop, runs=CONVERGENCE_RUNS, spp=spp, reference="bdpt",
+    settings = scene_settings(scene, crop=crop, runs=count, spp=spp, reference="bdpt",
                               reference_spp=2 * reference_spp)
     paper = {"upg+bdpt": "a line of slope -0.5", "vcm": "levels off"}
     return Figure({**settings, "methods": results}, rows, figure, paper)
@@ -80,49 +82,51 @@ SPEED_METHODS = (f"upg+bdpt:radius={SPEED_RADIUS}", f"vcm:radius={1.5 * SPEED_RA
 
 
 def speed(runs, seconds):
-    """Fig. 8: samples a second, pass by pass."""
+    """Fig. 8: eye paths a second, and pairs merged or gathered a second, pass by pass."""
     (scene,) = runs.available("veach-ajar")
     passes = max(20, round(min(1, runs.scale) * SPEED_PASSES))
     repeats = max(1, runs.spp_within(scene, SPEED_METHODS, seconds / len(SPEED_METHODS)) // passes)
     times = {method: [] for method in SPEED_METHODS}
+    pairs = {method: [] for method in SPEED_METHODS}
     for i in range(repeats):  # in turns, so that a change of the machine's speed is one for all
         for method in SPEED_METHODS if i % 2 == 0 else SPEED_METHODS[::-1]:
-            stats, _ = runs.render(scene, method, spp=passes, seed=FIRST_SEED + i)
+            stats, image = runs.render(scene, method, spp=passes, seed=FIRST_SEED + i)
             times[method].append(stats["pass_seconds"])
-            pixels = stats["width"] * stats["height"]
-    results, curves = [], []
-    rows = [["method", "samples a second", "over vcm's first ten passes", "drift over all passes"]]
-    progressive = np.median(times[SPEED_METHODS[1]], axis=0)[:10].mean()
-    for method, measured in times.items():
-        median = np.median(measured, axis=0)
-        drift, error = _drift(median)
-        results.append({"method": method, "drift": drift, "drift_standard_error": error,
-                        "samples_per_second": float(pixels / median.mean()),
-                        "pass_seconds": measured})
-        rows.append([method, float(pixels / median.mean()), float(progressive / median.mean()),
-                     f"{100 * drift:+.1f} ± {100 * error:.1f} %"])
-        curves.append((method, np.arange(1, passes + 1), pixels / median / 1000))
-    figure, (axes,) = panels(1, width=5.2, height=3)
-    plot_lines(axes, curves, x="pass", y="thousand samples a second", logarithmic=False)
-    axes.set_ylim(bottom=0)
-    axes.legend()
+            pairs[method].append(stats["pass_pairs"])
+    eye_paths = image.shape[0] * image.shape[1]
+    what = {"eye paths": {m: eye_paths / np.median(times[m], axis=0) for m in times},
+            "pairs": {m: np.median(pairs[m], axis=0) / np.median(times[m], axis=0) for m in times}}
+    rows = [["method", "a second", "in the first tenth", "in the last tenth", "drift, first to last pass"]]
+    results = []
+    figure, axes = panels(len(what), width=3.8, height=2.9)
+    for (name, speeds), a in zip(what.items(), axes):
+        for method, speed_of_pass in speeds.items():
+            drift, error = _drift(speed_of_pass)
+            first, last = (float(part.mean()) for part in (speed_of_pass[:passes // 10],
+                                                           speed_of_pass[-(passes // 10):]))
+            results.append({"method": method, "a second": name, "first_tenth": first,
+                            "last_tenth": last, "drift": drift, "drift_standard_error": error})
+            rows.append([method, name, first, last, f"{100 * drift:+.1f} ± {100 * error:.1f} %"])
+        plot_lines(a, [(method, np.arange(1, passes + 1), s / 1000) for method, s in speeds.items()],
+                   x="pass", y=f"thousand {name} a second", logarithmic=False)
+        a.set_ylim(bottom=0)
+    axes[0].legend(loc="lower right")
     paper = {"vcm": "falls; below upg+bdpt after about two hours", "upg+bdpt": "constant",
              "radius of vcm over that of upg": 1.5, "time of a photon, upg over vcm": 4}
     settings = scene_settings(scene, passes=passes, repeats=repeats)
-    return Figure({**settings, "methods": results}, rows, figure, paper)
+    return Figure({**settings, "speeds": results, "pass_seconds": times, "pass_pairs": pairs}, rows,
+                  figure, paper)
 
 
-def _drift(pass_seconds):
+def _drift(speeds):
     """Relative change of the speed from the first to the last pass, by a linear fit, and its standard error. The first
     tenth is left out: memory is still being claimed."""
-    begin = len(pass_seconds) // 10
-    speeds = 1 / np.array(pass_seconds)[begin:]
+    speeds = speeds[len(speeds) // 10:]
     x = np.linspace(-0.5, 0.5, len(speeds))
     slope = (x * speeds).sum() / (x**2).sum()
     rest = speeds - speeds.mean() - slope * x
     error = np.sqrt((rest**2).sum() / (len(x) - 2) / (x**2).sum())
-    scale = len(pass_seconds) / len(speeds) / speeds.mean()
-    return float(slope * scale), float(error * scale)
+    return float(slope / speeds.mean()), float(error / speeds.mean())
 
 
 # -------------------------------------------------------------------------------- figure 9: trials
@@ -217,18 +221,19 @@ def radius(runs, seconds):
 
 # ---------------------------------------------------------------------- figure 11: leak and darkening
 
-LEAK_RADIUS = 0.1
+LEAK_RADIUS = 0.08
 LEAK_METHODS = {
     "reference (bdpt)": "bdpt",
     "vcm": f"vcm:radius={LEAK_RADIUS},alpha=1",
     "vcm, exact": f"vcm:radius={LEAK_RADIUS},alpha=1,exact=true",
     "upg+bdpt": f"upg+bdpt:radius={LEAK_RADIUS}",
 }
-# x, y, w, h in the picture of 160 x 120.
+# x, y, w, h in pixels.
 LEAK_REGIONS = {
-    "foot": (52, 88, 8, 14),
-    "corner": (96, 68, 40, 3),
-    "floor": (20, 90, 20, 14),
+    "foot": (61, 70, 4, 5),
+    "crease": (78, 61, 20, 2),
+    "edge": (80, 79, 24, 3),
+    "floor": (16, 73, 16, 10),
 }
 LEAK_RUNS = 8
 
@@ -236,11 +241,11 @@ LEAK_RUNS = 8
 def leak(runs, seconds):
     """Fig. 11: light leaks and darkening of vcm, with approximate and with exact paths, and of upg+bdpt."""
     scene = "leak"
-    methods = list(LEAK_METHODS.values())
-    spp = runs.spp_within(scene, methods, seconds / len(methods) / LEAK_RUNS)
+    share = seconds / len(LEAK_METHODS) / LEAK_RUNS
+    spp = {name: runs.spp_within(scene, [method], share) for name, method in LEAK_METHODS.items()}
     images = {
         name: np.array([
-            runs.render(scene, method, spp=spp, seed=FIRST_SEED + 1000 * i + j)[1]
+            runs.render(scene, method, spp=spp[name], seed=FIRST_SEED + 1000 * i + j)[1]
             for j in range(LEAK_RUNS)
         ])
         for i, (name, method) in enumerate(LEAK_METHODS.items())
@@ -252,12 +257,13 @@ def leak(runs, seconds):
             region: _relative_difference(images[name], images[reference], box)
             for region, box in LEAK_REGIONS.items()
         }
-        results.append({"method": method, "regions": regions})
+        results.append({"method": method, "spp": spp[name], "regions": regions})
         rows.append([name] + [f"{100 * d:+.1f} ± {100 * e:.1f} %" for d, e in regions.values()])
     means = {name: i.mean(axis=0) for name, i in images.items()}
-    exposure = 0.8 / np.percentile(means[reference], 80)
+    exposure = 0.3 / np.percentile(means[reference], 60)
     figure = plot_pictures(means, exposure, boxes=LEAK_REGIONS.items())
-    settings = scene_settings(scene, spp=spp, runs=LEAK_RUNS, reference="bdpt",
+    settings = scene_settings(scene, runs=LEAK_RUNS, reference="bdpt",
+                              reference_spp=spp[reference],
                               regions={"what": "x, y, width, height", **LEAK_REGIONS})
     what = "difference of the mean to the reference's over the latter, and its standard error"
     paper = {"vcm": "leaks, blurred shadows", "exact": "reduced, but darkening at sharp features",
