@@ -156,7 +156,7 @@ def phases(runs, seconds):
     rows = [["scene", "method", *(p.replace("_", " ") for p in PHASES), "connections K",
              "selection and connections over bdpt's", "with records"]]
     results, methods = [], ("bdpt", "pcbpt")
-    figure, (axes,) = panels(1, width=5.2, height=2.8)
+    figure, (axes,) = panels(1, width=6, height=2.8)
     bars, names = [], []
     for scene in scenes:
         spp = runs.spp_within(scene, methods, seconds / len(scenes) / 2, threads=1)
@@ -183,7 +183,7 @@ def phases(runs, seconds):
         left += width
     axes.invert_yaxis()
     axes.set_xlabel("seconds of a pass, one thread")
-    axes.legend()
+    axes.legend(loc="upper left", bbox_to_anchor=(1, 1))
     for scene, (*_, pmf, selection, inner_bdpt) in PAPER_PHASES.items():
         rows.append([f"paper, {scene}", "pcbpt", None, None, pmf / 1000, selection / 1000, None,
                      selection / inner_bdpt, (selection + pmf) / inner_bdpt])

@@ -280,12 +280,13 @@ def _relative_difference(images, reference, box):
 
 # ----------------------------------------------------------------------------- table 1: path lengths
 
+# On a substitute: the paper's scene, "stairs", is not public.
 DEPTHS = {"1..2": "k ≤ 2", "3..3": "k = 3", "4..4": "k = 4", "5..": "k > 4"}
 PAPER_DEPTHS = {"bdpt": (0.0074, 0.0614, 0.0733, 0.1570), "upg": (0.0123, 0.0333, 0.0310, 0.0418)}
 
 
 def depth(runs, seconds):
-    """Table 1: errors of paths of k edges alone, at equal time. The paper's scene, "stairs", is not public."""
+    """Table 1: errors of paths of k edges alone, at equal time."""
     (scene,) = runs.available("staircase2")
     rows = [["", "RMSE, bdpt", "upg+bdpt", "ratio", "ratio of relMSE", "trimmed", "paper: bdpt", "upg",
              "ratio"]]
@@ -308,18 +309,19 @@ def depth(runs, seconds):
     axes.set_xticks(range(len(DEPTHS)), DEPTHS.values())
     axes.set_ylabel("RMSE of upg+bdpt / bdpt")
     axes.legend()
-    return Figure(results, rows, figure, {"lengths": list(DEPTHS), "rmse": PAPER_DEPTHS})
+    paper = {"scene": "stairs", "lengths": list(DEPTHS), "rmse": PAPER_DEPTHS}
+    return Figure(results, rows, figure, paper)
 
 
 # ------------------------------------------------------------------------------ table 2: end points
 
 DROPS = ("gloss", "eye", "light", "both")
-# x̄(s',t'-1) lacks the eye's end point, x̄(s'-1,t') the light's.
+# x̄(s',t'-1) lacks the eye's end point, x̄(s'-1,t') the light's. Its scene, "living room", is not public.
 PAPER_DROPS = {"eye": 0.0438, "light": 0.0172, "both": 0.0274, "gloss": 0.0148}
 
 
 def endpoint(runs, seconds):
-    """Table 2: which end point of a pair is dropped. The paper's scene, "living room", is not public."""
+    """Table 2: which end point of a pair is dropped, for paths of three edges and more (the paper: all)."""
     scenes = runs.available("living-room", "veach-ajar")
     methods = [f"upg+bdpt:drop={drop}" for drop in DROPS]
     rows = [["scene", "drop", "equal time: RMSE", "relMSE", "trimmed", "over gloss",
@@ -327,9 +329,9 @@ def endpoint(runs, seconds):
     results = {}
     figure, axes = panels(len(scenes), width=3.2, height=2.6)
     for scene, a in zip(scenes, axes):
-        time = runs.compare(scene, methods, seconds=seconds / len(scenes) / 2)
+        time = runs.compare(scene, methods, seconds=seconds / len(scenes) / 2, lengths="3..")
         spp = max(1, round(min(m["spp"] for m in time["methods"])))
-        samples = runs.compare(scene, methods, spp=spp)
+        samples = runs.compare(scene, methods, spp=spp, lengths="3..")
         results[scene] = {"equal_time": time, "equal_samples": samples}
         base, base_samples = (c["methods"][0]["rel_mse_trimmed"] for c in (time, samples))
         for drop, m, s in zip(DROPS, time["methods"], samples["methods"]):
@@ -341,7 +343,8 @@ def endpoint(runs, seconds):
                        for drop, m in zip(DROPS, time["methods"])],
                    title=scene, x="seconds", y="relMSE, trimmed")
     axes[0].legend()
-    return Figure(results, rows, figure, {"rmse at equal time": PAPER_DROPS})
+    paper = {"scene": "living room", "rmse at equal time": PAPER_DROPS}
+    return Figure(results, rows, figure, paper)
 
 
 # ------------------------------------------------------------------------------ figure 14: equal time
