@@ -82,10 +82,11 @@ def plot_pictures(images, exposure, *, boxes=(), zoom=2):
     """Pictures side by side with their names below, and boxes (x, y, w, h) in the first of them."""
     first = next(iter(images.values()))
     height, width = (zoom * n / 100 for n in first.shape[:2])
-    figure, axes = panels(len(images), height=height + 0.45, width=width + 0.03)
+    figure, axes = panels(len(images), height=height + 0.35, width=width + 0.03)
     figure.set_constrained_layout_pads(w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
     for a, (name, image) in zip(axes, images.items()):
         a.imshow(displayed(image, exposure), interpolation="nearest")
+        a.set_anchor("N")
         a.set_xlabel(name)
         a.set_xticks([])
         a.set_yticks([])
