@@ -14,6 +14,7 @@
 #include "compare/comparison.h"
 #include "compare/report.h"
 #include "interrupt.h"
+#include "path_lengths.h"
 #include "scene_options.h"
 
 namespace etendue {
@@ -22,8 +23,8 @@ namespace {
 struct CompareCommand {
     std::vector<std::string> scenes, methods, references;
     SceneOptions reading;
-    std::string paths = "all", reference_method, sampler = "sobol", report = "out/compare",
-                kept_references = "out/references";
+    std::string paths = "all", lengths = "1..", reference_method, sampler = "sobol",
+                report = "out/compare", kept_references = "out/references";
     double seconds = 0, reference_seconds = 0;
     uint64_t spp = 0, reference_spp = 0, seed = 0;
     int runs = 1, threads = 0, technique_depth = 5;
@@ -33,6 +34,7 @@ struct CompareCommand {
 
 private:
     void check() const;
+    PathSelection shown() const;
     CompareSettings settings(const Scene& scene) const;
     IntegratorSpec reference_integrator(const Scene& scene,
                                         const std::vector<MethodSpec>& specs) const;
@@ -90,6 +92,12 @@ void CompareCommand::check() const {
         throw std::runtime_error(fmt::format("--report: \"{}\" is not a folder", report));
 }
 
+PathSelection CompareCommand::shown() const {
+    PathSelection p = parse_lengths(lengths);
+    p.inner_only = paths == "inner";
+    return p;
+}
+
 CompareSettings CompareCommand::settings(const Scene& scene) const {
     CompareSettings s;
     for (const std::string& m : methods) s.methods.push_back({m, choose_integrator(scene, m)});
@@ -99,7 +107,7 @@ CompareSettings CompareCommand::settings(const Scene& scene) const {
     if (seconds > 0) s.limits.seconds = seconds;
     if (spp > 0) s.limits.spp = spp;
     s.runs = runs;
-    s.inner_paths_only = paths == "inner";
+    s.shown = shown();
     s.technique_depth = technique_depth;
     return s;
 }
@@ -123,7 +131,7 @@ RenderSettings CompareCommand::reference_settings(const Scene& scene,
     s.integrator = reference_integrator(scene, specs);
     s.sampler = parse_sampler(sampler);
     s.threads = threads;
-    s.inner_paths_only = paths == "inner";
+    s.shown = shown();
     if (reference_seconds > 0) s.seconds = reference_seconds;
     if (reference_spp > 0) s.spp = reference_spp;
     if (!s.seconds && !s.spp && seconds > 0) s.seconds = 10 * seconds;
@@ -164,7 +172,7 @@ void CompareCommand::run() const {
             reference = read_reference(references[i], scene.film());
         } else {
             const RenderSettings how = reference_settings(scene, s.methods);
-            if (s.inner_paths_only) check_inner_paths(scene, s.methods, how.integrator);
+            if (s.shown.inner_only) check_inner_paths(scene, s.methods, how.integrator);
             for (const MethodSpec& m : s.methods)
                 if (max_depth(m.integrator) != max_depth(how.integrator))
                     fmt::print(
@@ -216,6 +224,9 @@ void add_compare_command(CLI::App& app) {
                  "scene, s >= 1 and t >= 2")
         ->capture_default_str()
         ->check(CLI::IsMember({"all", "inner"}));
+    c.add_option("--lengths", command->lengths,
+                 "Path lengths, in edges, that the image shows: 3..5, 4..4, or 4.. without an end")
+        ->capture_default_str();
     c.add_option("--reference", command->references, "Images to judge by, one a scene");
     c.add_option("--reference-time", command->reference_seconds,
                  "Seconds to render the reference (default: 10 times --time)")

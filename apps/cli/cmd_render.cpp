@@ -177,17 +177,27 @@ void RenderCommand::run() const {
             std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
 
     StopReason reason;
+    std::vector<double> pass_seconds;
+    std::vector<uint64_t> pass_pairs;
+    double seconds_before = 0;
+    uint64_t pairs_before = 0;
     {
         ProgressLine line(quiet);
         reason = renderer.run(
             [&](const Progress& p) {
                 line.show(p);
+                pass_seconds.push_back(p.seconds - seconds_before);
+                pass_pairs.push_back(renderer.stats().pairs - pairs_before);
+                seconds_before = p.seconds;
+                pairs_before = renderer.stats().pairs;
                 if (viewer) viewer->update(renderer.film(), p.seconds);
             },
             interrupted);
     }
 
-    const nlohmann::json report = to_json(renderer, s, settings, reason);
+    nlohmann::json report = to_json(renderer, s, settings, reason);
+    report["pass_seconds"] = pass_seconds;
+    report["pass_pairs"] = pass_pairs;
     Image image = rgb_image(s.film().crop_width, s.film().crop_height, renderer.film().image());
     for (const auto& [key, value] : report.items())
         if (value.is_string())

@@ -11,6 +11,7 @@
 #include "commands.h"
 #include "image/atomic_file.h"
 #include "image/image_io.h"
+#include "path_lengths.h"
 #include "scene_options.h"
 #include "verify/verify.h"
 
@@ -27,17 +28,6 @@ struct VerifyCommand {
 
     void run();
 };
-
-/// The form a..b.
-void parse_lengths(const std::string& text, VerifyOptions& options) {
-    int read = 0;
-    if (std::sscanf(text.c_str(), "%d..%d%n", &options.shortest, &options.longest, &read) != 2 ||
-        size_t(read) != text.size() || options.shortest < 1 || options.longest < options.shortest ||
-        options.longest > PathClass::kMostEdges)
-        throw std::runtime_error(
-            fmt::format("--lengths must have the form 2..8, within 1..{}, but is \"{}\"",
-                        PathClass::kMostEdges, text));
-}
 
 ReferenceImage read_reference(const std::string& path, const Scene& scene) {
     const Image image = read_image(path);
@@ -242,7 +232,9 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
 }
 
 void VerifyCommand::run() {
-    parse_lengths(lengths, options);
+    const PathSelection selected = parse_lengths(lengths, PathClass::kMostEdges);
+    options.shortest = selected.shortest;
+    options.longest = selected.longest;
     if (spp > 0) options.spp = spp;
     options.against = IntegratorSpec::parse(against);
     std::vector<IntegratorSpec> specs;

@@ -53,7 +53,7 @@ RenderSettings render_settings(const CompareSettings& s, const IntegratorSpec& i
     settings.sampler = s.sampler;
     settings.seed = seed;
     settings.threads = s.threads;
-    settings.inner_paths_only = s.inner_paths_only;
+    settings.shown = s.shown;
     return settings;
 }
 

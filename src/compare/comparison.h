@@ -27,7 +27,7 @@ struct CompareSettings {
     int threads = 0;      ///< 0: all.
     RenderLimits limits;  ///< Of each method in each run: seconds or spp.
     int runs = 1;
-    bool inner_paths_only = false;  ///< As in RenderSettings.
+    PathSelection shown;  ///< As in RenderSettings.
     /// Technique images up to this many edges, from a rendering of their own; 0 for none.
     int technique_depth = 0;
 };

@@ -73,7 +73,10 @@ std::string cache_file(const FilmGeometry& film, const ReferenceSettings& settin
                   film.crop_height, int(settings.render.sampler)})
         hash = hash_combine(hash, uint64_t(v));
     hash = hash_bytes(hash, settings.render.integrator.to_string());
-    if (settings.render.inner_paths_only) hash = hash_bytes(hash, "inner");
+    const PathSelection& shown = settings.render.shown;
+    if (shown.inner_only) hash = hash_bytes(hash, "inner");
+    if (!shown.has_all_lengths())
+        hash = hash_bytes(hash, fmt::format("{}..{}", shown.shortest, shown.longest));
     return (fs::path(settings.folder) / fmt::format("reference-{:016x}.exr", hash)).string();
 }
 

@@ -761,7 +761,9 @@ document.getElementById('settings').textContent =
     `${report.program}. Each method ${s.seconds ? `for ${s.seconds} s` : `with ${s.spp} samples per pixel`}, ` +
     `${s.runs === 1 ? 'one run' : `${s.runs} runs`} from seed ${s.seed}, sampler ${s.sampler}, ` +
     `${s.threads} threads of ${report.processor}.` +
-    (s.paths === 'inner' ? ' Only paths that join both sub-paths inside the scene are shown and judged.' : '');
+    (s.paths === 'inner' ? ' Only paths that join both sub-paths inside the scene are shown and judged.' : '') +
+    (s.shortest_path > 1 || s.longest_path
+        ? ` Only paths of ${s.shortest_path} to ${s.longest_path ?? '∞'} edges are shown and judged.` : '');
 document.getElementById('contents').append(...report.scenes.map(
     scene => element('a', {href: `#${scene.name}`, textContent: scene.name})));
 document.getElementById('scenes').append(...report.scenes.map((scene, i) => sceneSection(scene, pictures[i])));

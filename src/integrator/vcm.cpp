@@ -83,8 +83,10 @@ private:
         const auto may_pair = [&](const Partner& y) { return y.s + t - 2 <= paths_.max_depth(); };
         photons_.for_each_near(work.z[t - 1].p, may_pair, [&](const Partner& y) {
             photons_.paths().restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair);
-            if (const auto j = join_merge(work.pair, y.s, work.z, t, n))
-                c.sink.add(*j, j->contribution * c.splat_scale);
+            const auto j = join_merge(work.pair, y.s, work.z, t, n);
+            if (!j) return;
+            ++work.stats.pairs;
+            c.sink.add(*j, j->contribution * c.splat_scale);
         });
     }
 

@@ -3,6 +3,7 @@
 // light vertices and t eye vertices.
 
 #include <cstdint>
+#include <limits>
 
 namespace etendue {
 
@@ -54,6 +55,20 @@ enum class PairRule : uint8_t {
 constexpr bool is_inner(const Technique& q) {
     return q.s >= 1 && q.t >= 2;
 }
+
+/// Which paths an image shows.
+struct PathSelection {
+    static constexpr int kNoLimit = std::numeric_limits<int>::max();
+
+    bool inner_only = false;               ///< Only what inner techniques bring, see is_inner().
+    int shortest = 1, longest = kNoLimit;  ///< Path lengths, in edges.
+
+    bool contains(const Technique& q) const {
+        const int edges = q.vertices() - 1;
+        return edges >= shortest && edges <= longest && (!inner_only || is_inner(q));
+    }
+    bool has_all_lengths() const { return shortest <= 1 && longest == kNoLimit; }
+};
 
 /// How many samples of each strategy an algorithm takes per eye sub-path, 0 for those it does not run. Eye densities are
 /// per pixel, so one eye path a pixel counts 1 and whatever reaches any pixel counts N_L, the number of light paths.

@@ -21,7 +21,7 @@ public:
     FilmSink(Film& film, TechniqueImages* techniques, const RenderSettings& settings,
              float splat_scale, Workspace& work)
         : film_(film), techniques_(techniques), observer_(settings.observer),
-          inner_only_(settings.inner_paths_only), splat_scale_(splat_scale), work_(work) {}
+          shown_(settings.shown), splat_scale_(splat_scale), work_(work) {}
 
     void begin(uint64_t pixel) {
         pixel_ = pixel;
@@ -30,7 +30,7 @@ public:
     void end() { film_.add_eye(pixel_, sum_); }
 
     void add(const Join& join, Rgb contribution) override {
-        if (inner_only_ && !is_inner(join.technique)) return;
+        if (!shown_.contains(join.technique)) return;
         const bool is_splat = join.technique.t <= 1;
         const Rgb value = contribution * join.mis_weight;
         if (!is_finite(value)) {
@@ -60,7 +60,7 @@ private:
     Film& film_;
     TechniqueImages* techniques_;
     ContributionObserver* observer_;
-    bool inner_only_;
+    PathSelection shown_;
     float splat_scale_;
     Workspace& work_;
     uint64_t pixel_ = 0;

@@ -28,8 +28,7 @@ struct RenderSettings : RenderLimits {
     int threads = 0;  ///< 0: all.
     /// Technique images up to this many edges; 0 for none.
     int technique_depth = 0;
-    bool inner_paths_only =
-        false;  ///< The image shows only what inner techniques bring, see is_inner().
+    PathSelection shown;                       ///< Others are made, but do not reach the image.
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
 };
 

@@ -58,6 +58,26 @@ TEST_F(CompareTest, RefusesInnerPathsOfOtherWeights) {
     expect_refusal({scene, "--methods", "bdpt", "--spp", "1", "--paths", "outer"}, "outer");
 }
 
+TEST_F(CompareTest, JudgesPathsOfGivenLengths) {
+    const auto mean = [&](const std::string& lengths) {
+        const ProgramResult r =
+            run({scene, "--methods", "bdpt", "--spp", "64", "--reference-spp", "256",
+                 "--resolution", "32x24", "--lengths", lengths, "--techniques-max-depth", "0"});
+        EXPECT_EQ(r.status, 0) << r.errors;
+        const nlohmann::json j = nlohmann::json::parse(read_text(report / "report.json"));
+        const nlohmann::json& m = j["scenes"][0]["methods"][0];
+        EXPECT_NEAR(m["summary"]["mean_ratio"]["value"].get<double>(), 1, 0.1) << lengths;
+        return m["runs"][0]["mean_luminance"].get<double>();
+    };
+    const double all = mean("1.."), shortest = mean("1..2"), rest = mean("3..");
+    EXPECT_GT(shortest, rest);
+    EXPECT_NEAR(shortest + rest, all, 0.05 * all);
+    fs::remove_all(report);
+    for (const char* lengths : {"3", "0..2", "3..2", "..", "2..x"})
+        expect_refusal({scene, "--methods", "bdpt", "--spp", "1", "--lengths", lengths},
+                       "--lengths must have the form");
+}
+
 TEST_F(CompareTest, WritesAReport) {
     const ProgramResult r =
         run({scene, "--methods", "path", "bdpt:max_depth=-1", "--spp", "8", "--reference-spp", "64",

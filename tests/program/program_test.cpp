@@ -206,6 +206,31 @@ TEST_F(ProgramTest, WritesImageWithLayersAndMetadataAndStatistics) {
     EXPECT_EQ(j["rejected_contributions"], 0);
     EXPECT_EQ(j["eye_paths"], 8 * 12 * 12);
     EXPECT_EQ(j["light_paths"], 8 * 12 * 12);
+    double seconds = 0;
+    for (const nlohmann::json& pass : j["pass_seconds"]) {
+        EXPECT_GT(pass.get<double>(), 0);
+        seconds += pass.get<double>();
+    }
+    EXPECT_EQ(j["pass_seconds"].size(), 8u);
+    EXPECT_EQ(j["pass_pairs"], std::vector<int>(8, 0));
+    EXPECT_NEAR(seconds, j["seconds"].get<double>(), 1e-9);
+}
+
+TEST_F(ProgramTest, CountsThePairsOfEveryPass) {
+    const fs::path cornell = fs::path(ETENDUE_SOURCE_DIR) / "scenes/cornell.xml";
+    const fs::path stats = folder.path() / "stats.json";
+    for (const char* method : {"vcm:radius=0.2", "upg+bdpt:radius=0.2"}) {
+        const ProgramResult r =
+            run({"render", cornell.string(), "-o", image.string(), "-i", method, "--resolution",
+                 "16x16", "--spp", "4", "--stats", stats.string(), "--quiet"});
+        ASSERT_EQ(r.status, 0) << r.errors;
+        const nlohmann::json j = nlohmann::json::parse(read_text(stats));
+        uint64_t sum = 0;
+        for (const nlohmann::json& pairs : j["pass_pairs"]) sum += pairs.get<uint64_t>();
+        EXPECT_EQ(j["pass_pairs"].size(), 4u);
+        EXPECT_EQ(sum, j["pairs"].get<uint64_t>());
+        EXPECT_GT(sum, 0u) << method;
+    }
 }
 
 TEST_F(ProgramTest, WritesEveryFormat) {

@@ -104,26 +104,34 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         expect_mean(m, length, false, fmt::format("length {}, weighted", length));
 }
 
-/// An image of inner paths alone is the sum of their techniques' parts of the whole.
-TEST(InnerPaths, AreTheSumOfTheirTechniques) {
+/// An image of some paths alone is the sum of their techniques' parts of the whole.
+TEST(PathSelection, ImagesAreTheSumOfTheirTechniques) {
     const Scene scene = build(front_camera(kSize) + room() + area_lamp());
-    const auto render = [&](bool inner_only) {
+    const auto render = [&](const PathSelection& shown) {
         RenderSettings settings;
         settings.integrator = IntegratorSpec::parse("bdpt:max_depth=4,roulette=0");
         settings.spp = 4;
         settings.technique_depth = 4;
-        settings.inner_paths_only = inner_only;
+        settings.shown = shown;
         auto renderer = std::make_unique<Renderer>(scene, settings);
         const std::atomic<bool> interrupted{false};
         renderer->run([](const Progress&) {}, interrupted);
         return renderer;
     };
-    const std::vector<Rgb> inner = render(true)->film().image();
-    std::vector<Rgb> sum(inner.size());
-    for (const TechniqueImages::Entry& e : render(false)->techniques()->images())
-        if (e.technique.s >= 1 && e.technique.t >= 2)
-            for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
-    for (size_t i = 0; i < sum.size(); ++i) EXPECT_NEAR(inner[i].g, sum[i].g, 1e-4f * sum[i].g);
+    const auto all = render({})->techniques()->images();
+    const auto expect_sum = [&](const PathSelection& shown, const auto& is_shown) {
+        const std::vector<Rgb> image = render(shown)->film().image();
+        std::vector<Rgb> sum(image.size());
+        for (const TechniqueImages::Entry& e : all)
+            if (is_shown(e.technique.s, e.technique.t))
+                for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
+        for (size_t i = 0; i < sum.size(); ++i) EXPECT_NEAR(image[i].g, sum[i].g, 1e-4f * sum[i].g);
+    };
+    expect_sum({.inner_only = true}, [](int s, int t) { return s >= 1 && t >= 2; });
+    expect_sum({.shortest = 2, .longest = 3},
+               [](int s, int t) { return s + t - 1 == 2 || s + t - 1 == 3; });
+    expect_sum({.inner_only = true, .shortest = 3},
+               [](int s, int t) { return s >= 1 && t >= 2 && s + t - 1 >= 3; });
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -1,0 +1,95 @@
+"""Makes the figures and tables of the papers with etendue: NAME.json with all that was measured, the paper's figures
+beside it, and NAME.svg, or NAME.png where it is pictures.
+
+Errors are those of small pictures and short times, on a machine with nothing else to do. Run one figure again to see
+how far they scatter.
+"""
+
+import argparse
+import os
+import pathlib
+import sys
+import tempfile
+import time
+
+import pcbpt
+import upg
+from output import save, text_table
+from runs import REFERENCE_SECONDS, ROOT, Runs, Skipped
+
+# What makes it, and seconds of its methods. References take REFERENCE_SECONDS more for each scene, and each choice of
+# paths; figures that are made together share them.
+FIGURES = {
+    "upg-convergence": (upg.convergence, 150),
+    "upg-speed": (upg.speed, 90),
+    "upg-trials": (upg.trials, 60),
+    "upg-radius": (upg.radius, 160),
+    "upg-leak": (upg.leak, 120),
+    "upg-depth": (upg.depth, 160),
+    "upg-endpoint": (upg.endpoint, 160),
+    "equal-time": (upg.equal_time, 300),
+    "pcbpt-cache": (pcbpt.cache, 120),
+    "pcbpt-weights": (pcbpt.weights, 40),
+    "pcbpt-paths": (pcbpt.light_paths, 120),
+    "pcbpt-phases": (pcbpt.phases, 30),
+    "pcbpt-inner": (pcbpt.inner, 100),
+    "pcbpt-convergence": (pcbpt.convergence, 150),
+}
+QUICK = 0.015
+
+
+def parse_arguments():
+    listing = "\n".join(f"  {n:20}{f.__doc__}" for n, (f, _) in FIGURES.items())
+    parser = argparse.ArgumentParser(
+        prog="figures", description=__doc__, epilog=f"figures:\n{listing}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("names", nargs="+", metavar="NAME", help="figures to make, or all")
+    parser.add_argument("--etendue", default=str(ROOT / "build/release/etendue"), help="the program")
+    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs/figures",
+                        help="folder for what is made (docs/figures)")
+    parser.add_argument("--threads", type=int, default=os.cpu_count())
+    parser.add_argument("--scale", type=float, default=1, help="factor of all times")
+    parser.add_argument("--quick", action="store_true",
+                        help="seconds for each figure, to try the program: --scale %g" % QUICK)
+    arguments = parser.parse_args()
+    unknown = [n for n in arguments.names if n not in FIGURES and n != "all"]
+    if unknown:
+        parser.error(f"there is no figure \"{unknown[0]}\" (there are: {', '.join(FIGURES)})")
+    if not os.access(arguments.etendue, os.X_OK):
+        parser.error(f"{arguments.etendue}: no such program; scripts/build makes it")
+    if not arguments.scale > 0:
+        parser.error("--scale must be above 0")
+    if arguments.quick:
+        arguments.scale = QUICK
+    if "all" in arguments.names:
+        arguments.names = list(FIGURES)
+    return arguments
+
+
+def main():
+    arguments = parse_arguments()
+    failed = False
+    with tempfile.TemporaryDirectory() as folder:
+        runs = Runs(arguments.etendue, arguments.threads, arguments.scale, folder)
+        for name in arguments.names:
+            make, seconds = FIGURES[name]
+            begin = time.monotonic()
+            print(f"\n{name}: {make.__doc__}\n", flush=True)
+            try:
+                figure = make(runs, seconds)
+            except Skipped as reason:
+                print(f"left out: {reason}")
+                continue
+            except RuntimeError as error:
+                print(f"figures: {name}: {error}", file=sys.stderr)
+                failed = True
+                continue
+            save(name, arguments.out, figure, {"shows": make.__doc__, "settings": runs.description()})
+            print(text_table(figure.rows))
+            print(f"\n{time.monotonic() - begin:.0f} s", flush=True)
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
