@@ -9,8 +9,9 @@ namespace etendue {
 void Photons::trace(const PassContext& pass, const Bidirectional& paths,
                     const TechniqueCounts& counts, float radius, uint64_t max_bytes) {
     radius_ = radius;
-    // A vertex is in a chunk, among all, and in the grid.
-    constexpr uint64_t kVertexBytes = 2 * sizeof(LightVertex) + sizeof(PointGrid::Entry) + 8;
+    // A vertex is in a chunk, which may have as much to spare, among all, and in the grid, whose entries were a list.
+    constexpr uint64_t kVertexBytes =
+        3 * sizeof(LightVertex) + 2 * sizeof(PointGrid::Entry) + 2 * sizeof(uint32_t);
     paths.trace_light_paths(pass, counts, pass.light_paths, kVertexBytes, max_bytes, chunks_,
                             paths_);
 
