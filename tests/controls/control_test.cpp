@@ -60,6 +60,12 @@ std::string smooth_mesh() {
            diffuse("0.8,0.6,0.4") + "</shape>";
 }
 
+/// A camera that sees nothing but a sphere, which fills little of the neighbourhoods about it.
+std::string small_sphere() {
+    return sensor("0,0,3.4", "0,0,0", kSize, "1.4") +
+           sphere("0,0,0", "0.06", diffuse("0.9,0.9,0.9"));
+}
+
 std::vector<Planted> planted() {
     const std::string lit_room = front_camera(kSize) + room() + area_lamp();
     // Records know little of what lies behind a wall; with the choices of the paper.
@@ -86,6 +92,11 @@ std::vector<Planted> planted() {
         {"PmfOfOneRecord", divided_room, by_paper, Image | Lengths, 0, 512},
         {"NoUniformShare", divided_room, by_paper + ",neighbours=1", Image | Lengths, 0, 512},
         {"UniformDenominator", divided_room, by_paper, Image | Lengths, 0, 512},
+        {"CapOfTrials", small_sphere() + room() + area_lamp(),
+         "upg+bdpt:radius=0.6,bound=cone,roulette=0", Lengths, 0},
+        {"DiscProbability", lit_room, "upg+bdpt:radius=0.3,clamp=false,roulette=0", Lengths, 0},
+        {"ClampInEstimator", lit_room, "upg+bdpt:radius=0.5,roulette=0", Lengths, 0},
+        {"PredicatesDiffer", lit_room, "upg+bdpt:radius=0.2,roulette=0", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
     };
 }
