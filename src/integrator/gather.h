@@ -15,8 +15,9 @@ struct Gather {
     float flatness;  ///< Half the height of a neighbourhood over its radius.
     Workspace& work;
 
-    /// The pairs of z_{t-1}. `reciprocal(event, join)` is r, an estimate of 1/p_c; it is asked last, with the sampler at
-    /// numbers that belong to this technique of the pair alone.
+    /// The pairs of z_{t-1}. `reciprocal(event, join, seen)` is r, an estimate of 1/p_c; it is asked last, with the sampler
+    /// at numbers that belong to this technique of the pair alone. `seen`: the inverse of the probability that roulette
+    /// spared the join, times its transmittance.
     template <class Reciprocal>
     void operator()(int t, const Reciprocal& reciprocal) const {
         const Vertex& last = work.z[t - 2];
@@ -69,7 +70,7 @@ private:
                               .mode = eye ? TransportMode::Radiance : TransportMode::Importance,
                               .u_emission = y.u_emission,
                               .near = near(eye ? y[q.s - 1] : z[q.t - 1])};
-        const double r = reciprocal(event, *j);
+        const double r = reciprocal(event, *j, luminance(*value) / luminance(j->contribution));
         c.sink.add(*j, *value * (float(r) * c.splat_scale / rate));
     }
 };

@@ -24,6 +24,13 @@ void Photons::trace(const PassContext& pass, const Bidirectional& paths,
     grid_.build(entries, radius);
 }
 
+void Photons::learn_density(float radius) {
+    std::vector<Vec3> points;
+    for (const LightVertex& v : paths_.vertices())
+        if (v.may_connect) points.push_back(v.p);
+    if (!points.empty()) density_.build(points, radius);
+}
+
 std::vector<ParamInfo> RadiusSchedule::params(const char* doc) {
     return {{"radius", ParamKind::Float, "0", doc},
             {"alpha", ParamKind::Float, "0.75",

@@ -24,6 +24,9 @@ public:
                float radius, uint64_t max_bytes);
 
     const LightPaths& paths() const { return paths_; }
+    /// Takes the light vertices of the last pass, if there was one, for the density of partners within `radius`.
+    void learn_density(float radius);
+    const PairDensity& density() const { return density_; }
     /// Calls use(partner) for the light vertices nearer to `p` than the radius for which may_pair(partner) holds.
     template <class MayPair, class Use>
     void for_each_near(Vec3 p, const MayPair& may_pair, const Use& use) const {
@@ -49,6 +52,7 @@ public:
 private:
     LightPaths paths_;
     PointGrid grid_;
+    PairDensity density_;
     float radius_ = 0;
     std::vector<LightPaths::Chunk> chunks_;
 };

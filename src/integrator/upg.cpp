@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "integrator/gather.h"
+#include "integrator/pair_count.h"
 #include "integrator/photon_memory.h"
 
 namespace etendue {
@@ -52,16 +53,27 @@ public:
 
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
+        if (connects_) count_.begin_pass(pass.so_far);
         const float radius = radius_ > 0 ? radius_ : radius_for(pass);
+        photons_.learn_density(radius);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
         photons_.paths().restore(c.scene, c.pixel, work.y);
-        const auto by_trials = [&](PairEvent event, const Join&) {
+        const auto by_trials = [&](PairEvent event, const Join& j, float seen) {
             event.bound = bound_;
-            return reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
+            const double r =
+                reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
+            const float pixel = c.film.expected_luminance(c.pixel);
+            if (connects_ && pixel > 0) {
+                const float brought =
+                    luminance(j.contribution) * std::fabs(work.z.film_weight) * c.splat_scale;
+                count_.observe(double(brought / pixel), double(j.mis_weight), double(j.found), r,
+                               double(seen), work.stats);
+            }
+            return r;
         };
         const Gather gather{c, paths_, photons_, n, flatness_, work};
         paths_.eye_path(c, n, work, [&](int t) {
@@ -77,6 +89,9 @@ public:
     }
     bool traces_light_paths() const override { return true; }
     Estimator estimator() const override { return Estimator::Unbiased; }
+    std::vector<std::pair<std::string, double>> figures() const override {
+        return {{"radius", photons_.radius()}, {"pair_count", connects_ ? count_.value() : 1}};
+    }
 
 private:
     /// Such that an eye path finds kPairs pairs, as far as the last pass tells. A pass knows of earlier ones only, so that
@@ -100,12 +115,13 @@ private:
             n.splat = N;
             n.hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f;
         }
-        n.gather = N;
+        n.gather = connects_ ? N * count_.value() : N;
         n.disc = kPi * radius * radius;
         n.min_pair_edges = 3;
         n.short_pair_rate = short_rate_;
         n.pair_rule = rule_;
         n.clamps_disc = clamps_;
+        n.density = &photons_.density();
         return n;
     }
 
@@ -120,6 +136,7 @@ private:
     float short_rate_;
     bool clamps_;
     Photons photons_;
+    PairCount count_;
 };
 
 std::vector<ParamInfo> params() {

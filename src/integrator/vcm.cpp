@@ -38,7 +38,7 @@ public:
         const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
         photons_.paths().restore(c.scene, c.pixel, work.y);
         // q π d² p̃ for p_c [Qin et al. 2015, eq. 7], where q is the survival of the roulette before the dropped vertex.
-        const auto by_disc = [](const PairEvent& event, const Join& j) {
+        const auto by_disc = [](const PairEvent& event, const Join& j, float) {
             return 1 / double(event.from.survival.value() * j.found);
         };
         const Gather gather{c, paths_, photons_, n, 1, work};

@@ -181,12 +181,12 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
 
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
                                 int t, bool drops_eye, const TechniqueCounts& counts) {
-    const double count = counts.gathers(s + t - 2);
-    if (!(count > 0)) return {};
+    if (!(counts.gathers(s + t - 2) > 0)) return {};
     const auto edge = connect(scene, y, drops_eye ? s : s - 1, z, drops_eye ? t - 1 : t, counts);
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
     const double found = counts.found(drops_eye ? edge->rev_a : edge->rev_b);
+    const double count = counts.gathers_at(drops_eye ? y[s - 1].p : z[t - 1].p, s + t - 2);
     Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * found, y, a, z, b);
     join.found = float(found);
     return join;

@@ -46,7 +46,7 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     if (q.strategy == Strategy::Merge) return n * others * light[m] * eye[m] * counts.disc;
     if (!drops(counts.pair_rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
     const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
-    return n * others * kept * counts.found(dropped);
+    return counts.gathers_at(place[m], k) * others * kept * counts.found(dropped);
 }
 
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {
@@ -79,6 +79,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.light.assign(size_t(n), 1);
     p.eye.assign(size_t(n), 1);
     p.is_delta = delta;
+    for (int i = 0; i < n; ++i) p.place.push_back(x[size_t(i)]->p);
     for (int i = 0; i < n; ++i)
         p.gloss.push_back(i == 0 ? gloss_of_emitter(x[0]->emitter->is_area())
                                  : gloss(*x[i], delta[size_t(i)]));

@@ -15,7 +15,8 @@ struct PathPdfs {
     std::vector<double> light, eye;
     std::vector<bool> is_delta;  ///< Events.
     std::vector<uint8_t> gloss;  ///< See gloss.h.
-    double next_event = 0;       ///< p_NE(x_0) as chosen for x_1.
+    std::vector<Vec3> place;
+    double next_event = 0;  ///< p_NE(x_0) as chosen for x_1.
     bool can_hit_emitter = true;
     bool can_connect_ends = true;  ///< Not both are at infinity.
 

@@ -80,6 +80,7 @@ RenderStats& RenderStats::operator+=(const RenderStats& o) {
     trials += o.trials;
     trial_rays += o.trial_rays;
     for (size_t i = 0; i < pairs_by_trials.size(); ++i) pairs_by_trials[i] += o.pairs_by_trials[i];
+    for (size_t i = 0; i < second_moments.size(); ++i) second_moments[i] += o.second_moments[i];
     bounds_exceeded += o.bounds_exceeded;
     runaways += o.runaways;
     rejected += o.rejected;

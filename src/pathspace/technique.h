@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "pathspace/pair_density.h"
+
 namespace etendue {
 
 enum class Strategy : uint8_t {
@@ -81,6 +83,8 @@ struct TechniqueCounts {
     float short_pair_rate = 1;    ///< Share of the gathers that are made of paths of three edges.
     PairRule pair_rule = PairRule::Gloss;
     bool clamps_disc = true;  ///< Weights know that no probability exceeds 1 [ibid., eq. 24].
+    const PairDensity* density =
+        nullptr;  ///< Of the partners that a gather has; nullptr: as if it had one.
 
     friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
     bool uses_light_paths() const {
@@ -90,6 +94,11 @@ struct TechniqueCounts {
     /// Samples of each pair of a path of so many edges.
     float gathers(int edges) const {
         return edges < min_pair_edges ? 0.0f : edges == 3 ? gather * short_pair_rate : gather;
+    }
+    /// The same where x_m lies at `p`, for the weights: pairs of one vertex are not independent.
+    double gathers_at(Vec3 p, int edges) const {
+        const double n = double(gathers(edges));
+        return density ? n * density->share(p) : n;
     }
     /// Approximate probability that a pair is found whose dropped vertex has the area density `pdf` [ibid., eq. 24].
     double found(double pdf) const {

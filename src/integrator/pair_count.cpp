@@ -1,0 +1,31 @@
+#include "integrator/pair_count.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace etendue {
+
+void PairCount::begin_pass(const RenderStats& so_far) {
+    const auto& moments = so_far.second_moments;
+    const auto least = std::min_element(moments.begin(), moments.end());
+    choice_ = *least > 0 ? int(least - moments.begin()) : 1;
+}
+
+void PairCount::observe(double luminance, double weight, double found, double r, double seen,
+                        RenderStats& stats) const {
+    if (!(weight < 1)) return;  // whatever c is
+    // Odds of the gather and density of the others over its own, both for c = 1.
+    const double odds = weight / (1 - weight) / sqr(double(value())), others = 1 / std::sqrt(odds);
+    for (int k = 0; k < int(stats.second_moments.size()); ++k) {
+        const double w = 1 / (1 + 1 / (odds * sqr(double(of(k)))));
+        const double moment =
+            seen * sqr(luminance) * r * (sqr(w) * r + sqr(1 - w) / (others * found));
+        // Whole numbers, since their sum does not depend on the order. The bound is that of a pair as bright as a thousand
+        // pixels.
+        constexpr double kUnit = 0x1p20, kMost = 1e6 * kUnit;
+        if (moment > 0)
+            stats.second_moments[size_t(k)] += uint64_t(std::min(moment * kUnit, kMost));
+    }
+}
+
+}  // namespace etendue
