@@ -6,6 +6,7 @@
 
 #include "path_ends.h"
 #include "pathspace/path_pdfs.h"
+#include "random.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -51,7 +52,7 @@ std::vector<Case> cases() {
 /// What there is besides the connections of bidirectional path tracing; Variants: of the choices of gathers.
 enum class Extra { None, Merges, Gathers, Variants, Stored };
 
-class Joins : public testing::TestWithParam<std::tuple<Case, Extra>> {
+class Joins : public ::testing::TestWithParam<std::tuple<Case, Extra>> {
 protected:
     Joins()
         : scene(test::build(std::get<Case>(GetParam()).xml)), film(scene.film(), scene.filter()),
@@ -74,6 +75,12 @@ protected:
                 counts.pair_rule = PairRule::Both;
                 counts.clamps_disc = false;
                 counts.short_pair_rate = 0.3f;
+                // Shares between 1 and about 1/20, from cell to cell.
+                std::vector<Vec3> points;
+                testing::Random random(11);
+                for (int i = 0; i < 3000; ++i) points.push_back(random.in_cube() * 2);
+                density.build(points, 0.3f);
+                counts.density = &density;
             }
         }
     }
@@ -225,6 +232,7 @@ protected:
     Film film;
     Sampler sampler;
     TechniqueCounts counts;
+    PairDensity density;
     SubPath y, z;
     RenderStats stats;
     std::map<Strategy, Tally> tallies;
@@ -309,15 +317,15 @@ TEST_P(Joins, StoredSumsEqualTheExplicitSum) {
     EXPECT_LT(tallies[Strategy::Connect].deviating, 0.002 * compared + 1);
 }
 
-const auto kName = [](const testing::TestParamInfo<std::tuple<Case, Extra>>& p) {
+const auto kName = [](const ::testing::TestParamInfo<std::tuple<Case, Extra>>& p) {
     const char* suffix[] = {"", "_merges", "_gathers", "_variants", "_stored"};
     return std::get<Case>(p.param).name + std::string(suffix[int(std::get<Extra>(p.param))]);
 };
 INSTANTIATE_TEST_SUITE_P(Scenes, Joins,
-                         testing::Combine(testing::ValuesIn(cases()),
-                                          testing::Values(Extra::None, Extra::Merges,
-                                                          Extra::Gathers, Extra::Variants,
-                                                          Extra::Stored)),
+                         ::testing::Combine(::testing::ValuesIn(cases()),
+                                            ::testing::Values(Extra::None, Extra::Merges,
+                                                              Extra::Gathers, Extra::Variants,
+                                                              Extra::Stored)),
                          kName);
 
 }  // namespace

@@ -1,0 +1,44 @@
+// How far gathers are believed in, where it is known how many there are.
+
+#include "integrator/pair_count.h"
+
+#include <gtest/gtest.h>
+
+namespace etendue {
+namespace {
+
+/// What is chosen after pairs that are found with a `covered` part of the disc's probability, the weight of a gather being
+/// `weight` for the count with which it begins.
+float chosen(double covered, double weight) {
+    constexpr double kFound = 0.01;
+    RenderStats stats;
+    const PairCount first;
+    first.observe(1, weight, kFound, 1 / (covered * kFound), 1, stats);
+    PairCount next;
+    next.begin_pass(stats);
+    return next.value();
+}
+
+TEST(PairCount, BeginsWithOneHalf) {
+    PairCount count;
+    count.begin_pass({});
+    EXPECT_EQ(count.value(), 0.5f);
+}
+
+/// The second moment w²/κ + (1-w)²/ρ of a gather that covers the part κ of its disc, and of others with the density ρ, is
+/// least for odds κ/ρ of the gather. Here ρ = 1, so that its odds are c².
+TEST(PairCount, FollowsTheLeastSecondMoment) {
+    const double odds_at_half = 0.25;
+    EXPECT_EQ(chosen(1, odds_at_half / (1 + odds_at_half)), 1);
+    // √0.1 lies between 1/2 and 1/4.
+    EXPECT_EQ(chosen(0.1, odds_at_half / (1 + odds_at_half)), 0.25f);
+}
+
+TEST(PairCount, LeavesOutWhatNothingElseMakes) {
+    RenderStats stats;
+    PairCount().observe(1, 1, 0.01, 100, 1, stats);
+    for (const uint64_t m : stats.second_moments) EXPECT_EQ(m, 0u);
+}
+
+}  // namespace
+}  // namespace etendue

@@ -1,0 +1,42 @@
+// The density of partners against the number of them.
+
+#include "pathspace/pair_density.h"
+
+#include <gtest/gtest.h>
+
+#include "random.h"
+
+namespace etendue {
+namespace {
+
+TEST(PairDensity, CountsNothingBeforeItIsBuilt) {
+    EXPECT_EQ(PairDensity().share({0, 0, 0}), 1);
+}
+
+/// Of points spread evenly over a floor, half of it with four times as many.
+TEST(PairDensity, IsThatOfThePlane) {
+    constexpr float kRadius = 0.05f;
+    constexpr int kPoints = 20000;  // a unit of area of the sparser half
+    testing::Random random(5);
+    std::vector<Vec3> points;
+    for (int i = 0; i < kPoints; ++i)
+        points.push_back({random.between(-1, 0), random.next_1d(), 0.01f});
+    for (int i = 0; i < 4 * kPoints; ++i)
+        points.push_back({random.next_1d(), random.next_1d(), 0.01f});
+    PairDensity density;
+    density.build(points, kRadius);
+    double partners[2] = {};
+    constexpr int kPlaces = 2000;
+    for (int i = 0; i < kPlaces; ++i)
+        for (const int half : {0, 1})
+            partners[half] += 1 / density.share({random.between(-0.9f, -0.1f) + float(half),
+                                                 random.between(0.1f, 0.9f), 0.01f}) -
+                              1;
+    const double expected = double(kPi) * double(kRadius) * double(kRadius) * kPoints;
+    EXPECT_NEAR(partners[0] / kPlaces / expected, 1, 0.1);
+    EXPECT_NEAR(partners[1] / kPlaces / (4 * expected), 1, 0.1);
+    EXPECT_GT(density.share({0, 0.5f, 5}), 0.9 / (1 + 4 * expected));
+}
+
+}  // namespace
+}  // namespace etendue
