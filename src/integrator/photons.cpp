@@ -9,9 +9,10 @@ namespace etendue {
 void Photons::trace(const PassContext& pass, const Bidirectional& paths,
                     const TechniqueCounts& counts, float radius, uint64_t max_bytes) {
     radius_ = radius;
-    // A vertex is in a chunk, which may have as much to spare, among all, and in the grid, whose entries were a list.
+    // A vertex is in a chunk, which may have as much to spare, among all, and in the grid, whose entries were a list. There
+    // are up to four buckets for it, in the last pass's counts too, and twice while the grid is built.
     constexpr uint64_t kVertexBytes =
-        3 * sizeof(LightVertex) + 2 * sizeof(PointGrid::Entry) + 2 * sizeof(uint32_t);
+        3 * sizeof(LightVertex) + 2 * sizeof(PointGrid::Entry) + 13 * sizeof(uint32_t);
     paths.trace_light_paths(pass, counts, pass.light_paths, kVertexBytes, max_bytes, chunks_,
                             paths_);
 
@@ -25,10 +26,7 @@ void Photons::trace(const PassContext& pass, const Bidirectional& paths,
 }
 
 void Photons::learn_density(float radius) {
-    std::vector<Vec3> points;
-    for (const LightVertex& v : paths_.vertices())
-        if (v.may_connect) points.push_back(v.p);
-    if (!points.empty()) density_.build(points, radius);
+    if (!paths_.vertices().empty()) density_ = PairDensity(grid_.take_cells(), radius);
 }
 
 std::vector<ParamInfo> RadiusSchedule::params(const char* doc) {

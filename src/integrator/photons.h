@@ -24,7 +24,7 @@ public:
                float radius, uint64_t max_bytes);
 
     const LightPaths& paths() const { return paths_; }
-    /// Takes the light vertices of the last pass, if there was one, for the density of partners within `radius`.
+    /// Ends the last pass: its light vertices, if there are any, tell the density of partners within `radius`.
     void learn_density(float radius);
     const PairDensity& density() const { return density_; }
     /// Calls use(partner) for the light vertices nearer to `p` than the radius for which may_pair(partner) holds.

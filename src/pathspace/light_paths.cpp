@@ -1,6 +1,9 @@
 #include "pathspace/light_paths.h"
 
+#include <algorithm>
 #include <stdexcept>
+
+#include <tbb/parallel_for.h>
 
 namespace etendue {
 
@@ -42,25 +45,31 @@ void LightPaths::Chunk::add(const SubPath& y) {
 }
 
 void LightPaths::assemble(std::span<const Chunk> chunks) {
-    heads_.clear();
-    vertices_.clear();
+    struct Begin {
+        size_t path, vertex;
+    };
+    std::vector<Begin> begins;
     size_t paths = 0, total = 0;
-    for (const Chunk& c : chunks) paths += c.heads_.size(), total += c.vertices_.size();
+    for (const Chunk& c : chunks) {
+        begins.push_back({paths, total});
+        paths += c.heads_.size(), total += c.vertices_.size();
+    }
     if (total >= UINT32_MAX || paths >= size_t(1) << 30)
         throw std::runtime_error("a pass has more light vertices than can be kept; limit "
                                  "max_depth, or render in crops");
-    heads_.reserve(paths);
-    vertices_.reserve(total);
-    for (const Chunk& c : chunks) {
-        const uint32_t offset = uint32_t(vertices_.size());
-        vertices_.insert(vertices_.end(), c.vertices_.begin(), c.vertices_.end());
+    heads_.resize(paths);
+    vertices_.resize(total);
+    tbb::parallel_for(size_t(0), chunks.size(), [&](size_t chunk) {
+        const Chunk& c = chunks[chunk];
+        auto [path, first] = begins[chunk];
+        std::copy(c.vertices_.begin(), c.vertices_.end(), vertices_.begin() + ptrdiff_t(first));
         for (Chunk::Head head : c.heads_) {
-            head.begin += offset, head.end += offset;
+            head.begin += uint32_t(first), head.end += uint32_t(first);
             for (uint32_t i = head.begin; i < head.end; ++i)
-                vertices_[i].path = uint32_t(heads_.size()) & 0x3fffffffu;
-            heads_.push_back(head);
+                vertices_[i].path = uint32_t(path) & 0x3fffffffu;
+            heads_[path++] = head;
         }
-    }
+    });
 }
 
 size_t LightPaths::memory_bytes() const {

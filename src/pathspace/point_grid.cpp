@@ -2,30 +2,55 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
+
+#include <tbb/parallel_for.h>
 
 namespace etendue {
 
+HashedCells::HashedCells(size_t points, float radius)
+    : inv_width_(0.5f / radius),
+      // So many that few cells share one.
+      mask_(uint32_t(std::bit_ceil(std::max<size_t>(2 * points, 1)) - 1)) {}
+
 void PointGrid::build(std::span<const Entry> entries, float radius) {
-    inv_cell_ = 0.5f / radius;
-    const size_t buckets = std::bit_ceil(std::max<size_t>(entries.size(), 1));
-    mask_ = uint32_t(buckets - 1);
-    begins_.assign(buckets + 1, 0);
+    cells_ = HashedCells(entries.size(), radius);
+    std::vector<uint32_t>& begins = cells_.begins;
+    const uint32_t buckets = cells_.buckets();
     std::vector<uint32_t> bucket(entries.size());
-    for (size_t i = 0; i < entries.size(); ++i)
-        ++begins_[(bucket[i] = bucket_of(cell_of(entries[i].p))) + 1];
-    for (size_t b = 0; b < buckets; ++b) begins_[b + 1] += begins_[b];
+    tbb::parallel_for(size_t(0), entries.size(), [&](size_t i) {
+        bucket[i] = cells_.bucket_of(cells_.cell_of(entries[i].p));
+    });
+    // Each part has some of the buckets, and looks at all entries in order.
+    constexpr uint32_t kParts = 8;
+    const auto for_each_part = [&](const auto& use) {
+        tbb::parallel_for(uint32_t(0), kParts, [&](uint32_t part) {
+            const auto bound = [&](uint32_t i) { return uint32_t(uint64_t(buckets) * i / kParts); };
+            const uint32_t begin = bound(part), end = bound(part + 1);
+            for (size_t i = 0; i < bucket.size(); ++i)
+                if (bucket[i] - begin < end - begin) use(i);
+        });
+    };
+    begins.assign(size_t(buckets) + 1, 0);
+    for_each_part([&](size_t i) { ++begins[bucket[i] + 1]; });
+    for (size_t b = 0; b < buckets; ++b) begins[b + 1] += begins[b];
     entries_.resize(entries.size());
-    std::vector<uint32_t> next(begins_.begin(), begins_.end() - 1);
-    for (size_t i = 0; i < entries.size(); ++i) entries_[next[bucket[i]]++] = entries[i];
+    std::vector<uint32_t> next(begins.begin(), begins.end() - 1);
+    for_each_part([&](size_t i) { entries_[next[bucket[i]]++] = entries[i]; });
+}
+
+HashedCells PointGrid::take_cells() {
+    entries_.clear();
+    return std::exchange(cells_, HashedCells());
 }
 
 size_t PointGrid::candidates(Vec3 p) const {
     if (entries_.empty()) return 0;
-    const Cell lowest = lowest_cell(p);
+    const HashedCells::Cell lowest = cells_.lowest_cell(p);
     size_t count = 0;
     for (int corner = 0; corner < 8; ++corner) {
-        const uint32_t bucket = bucket_of(lowest.neighbour(corner));
-        count += begins_[bucket + 1] - begins_[bucket];
+        const uint32_t bucket = cells_.bucket_of(lowest.neighbour(corner));
+        count += cells_.begins[bucket + 1] - cells_.begins[bucket];
     }
     return count;
 }

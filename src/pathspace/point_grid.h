@@ -1,5 +1,5 @@
 #pragma once
-// Points within a distance of another: a hashed grid, built by counting.
+// Points within a distance of another, and how many lie about it: a hashed grid, built by counting.
 
 #include <cmath>
 #include <cstdint>
@@ -10,6 +10,52 @@
 #include "math/vec.h"
 
 namespace etendue {
+
+/// Cubes of space in hashed buckets, and the numbers of points in these.
+class HashedCells {
+public:
+    struct Cell {
+        int x, y, z;
+        friend bool operator==(const Cell&, const Cell&) = default;
+        /// One of the eight that share the upper corner of this one.
+        Cell neighbour(int corner) const {
+            return {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)};
+        }
+    };
+    /// For `points`; wide enough that a ball of `radius` meets at most eight.
+    HashedCells(size_t points = 0, float radius = 1);
+
+    float width() const { return 1 / inv_width_; }
+    /// Of those that a ball meets.
+    Cell lowest_cell(Vec3 p) const {
+        const Vec3 s = p * inv_width_;
+        return {int(std::floor(s.x - 0.5f)), int(std::floor(s.y - 0.5f)),
+                int(std::floor(s.z - 0.5f))};
+    }
+    Cell cell_of(Vec3 p) const {
+        const Vec3 s = p * inv_width_;
+        return {int(std::floor(s.x)), int(std::floor(s.y)), int(std::floor(s.z))};
+    }
+    uint32_t bucket_of(const Cell& c) const {
+        const uint64_t key = uint64_t(uint32_t(c.x)) * 0x9e3779b97f4a7c15ull ^
+                             uint64_t(uint32_t(c.y)) * 0xc2b2ae3d27d4eb4full ^
+                             uint64_t(uint32_t(c.z)) * 0x165667b19e3779f9ull;
+        return uint32_t(mix64(key)) & mask_;
+    }
+    /// Points in the bucket of the cell of `p`, those of other cells included.
+    uint32_t points_about(Vec3 p) const {
+        const uint32_t bucket = bucket_of(cell_of(p));
+        return begins[bucket + 1] - begins[bucket];
+    }
+    uint32_t buckets() const { return mask_ + 1; }
+
+    std::vector<uint32_t>
+        begins;  ///< Of each bucket in the list of all points; one more than there are.
+
+private:
+    float inv_width_;
+    uint32_t mask_;
+};
 
 class PointGrid {
 public:
@@ -22,69 +68,45 @@ public:
 
     /// For queries of up to `radius`. The order of the entries decides that of the answers.
     void build(std::span<const Entry> entries, float radius);
+    /// The numbers of points, without the points: nothing is found until the next build().
+    HashedCells take_cells();
 
     /// Calls use(entry) for every point nearer to `p` than `radius`, at most that of build().
     template <class Use>
     void for_each_near(Vec3 p, float radius, const Use& use) const {
         if (entries_.empty()) return;
-        const Cell lowest = lowest_cell(p);
+        const HashedCells::Cell lowest = cells_.lowest_cell(p);
+        const std::vector<uint32_t>& begins = cells_.begins;
         const float radius2 = radius * radius;
         // All eight at a time, since what takes the time is waiting for memory.
-        Cell cells[8];
+        HashedCells::Cell cells[8];
         uint32_t begin[8], end[8];
         for (int corner = 0; corner < 8; ++corner) {
             cells[corner] = lowest.neighbour(corner);
-            begin[corner] = bucket_of(cells[corner]);
-            __builtin_prefetch(&begins_[begin[corner]]);
+            begin[corner] = cells_.bucket_of(cells[corner]);
+            __builtin_prefetch(&begins[begin[corner]]);
         }
         for (int corner = 0; corner < 8; ++corner) {
             const uint32_t bucket = begin[corner];
-            begin[corner] = begins_[bucket], end[corner] = begins_[bucket + 1];
+            begin[corner] = begins[bucket], end[corner] = begins[bucket + 1];
             if (begin[corner] < end[corner]) __builtin_prefetch(&entries_[begin[corner]]);
         }
         for (int corner = 0; corner < 8; ++corner)
             for (uint32_t i = begin[corner]; i < end[corner]; ++i) {
                 const Entry& e = entries_[i];
                 // Other cells may share the bucket.
-                if (length2(e.p - p) < radius2 && cell_of(e.p) == cells[corner]) use(e);
+                if (length2(e.p - p) < radius2 && cells_.cell_of(e.p) == cells[corner]) use(e);
             }
     }
     /// Entries that for_each_near() looks at.
     size_t candidates(Vec3 p) const;
     size_t memory_bytes() const {
-        return entries_.capacity() * sizeof(Entry) + begins_.capacity() * sizeof(uint32_t);
+        return entries_.capacity() * sizeof(Entry) + cells_.begins.capacity() * sizeof(uint32_t);
     }
 
 private:
-    struct Cell {
-        int x, y, z;
-        friend bool operator==(const Cell&, const Cell&) = default;
-        /// One of the eight that share the upper corner of this one.
-        Cell neighbour(int corner) const {
-            return {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)};
-        }
-    };
-    /// Of those that a ball meets: at most eight, since cells are twice the radius wide.
-    Cell lowest_cell(Vec3 p) const {
-        const Vec3 s = p * inv_cell_;
-        return {int(std::floor(s.x - 0.5f)), int(std::floor(s.y - 0.5f)),
-                int(std::floor(s.z - 0.5f))};
-    }
-    Cell cell_of(Vec3 p) const {
-        const Vec3 s = p * inv_cell_;
-        return {int(std::floor(s.x)), int(std::floor(s.y)), int(std::floor(s.z))};
-    }
-    uint32_t bucket_of(const Cell& c) const {
-        const uint64_t key = uint64_t(uint32_t(c.x)) * 0x9e3779b97f4a7c15ull ^
-                             uint64_t(uint32_t(c.y)) * 0xc2b2ae3d27d4eb4full ^
-                             uint64_t(uint32_t(c.z)) * 0x165667b19e3779f9ull;
-        return uint32_t(mix64(key)) & mask_;
-    }
-
-    float inv_cell_ = 1;
-    uint32_t mask_ = 0;
-    std::vector<uint32_t> begins_;  ///< Of each bucket; one more than there are.
-    std::vector<Entry> entries_;    ///< Sorted by bucket.
+    HashedCells cells_;
+    std::vector<Entry> entries_;  ///< Sorted by bucket.
 };
 
 }  // namespace etendue

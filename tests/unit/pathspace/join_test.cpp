@@ -76,10 +76,12 @@ protected:
                 counts.clamps_disc = false;
                 counts.short_pair_rate = 0.3f;
                 // Shares between 1 and about 1/20, from cell to cell.
-                std::vector<Vec3> points;
+                std::vector<PointGrid::Entry> points;
                 testing::Random random(11);
-                for (int i = 0; i < 3000; ++i) points.push_back(random.in_cube() * 2);
-                density.build(points, 0.3f);
+                for (int i = 0; i < 12000; ++i) points.push_back({random.in_cube() * 2, 0});
+                PointGrid grid;
+                grid.build(points, 0.3f);
+                density = PairDensity(grid.take_cells(), 0.3f);
                 counts.density = &density;
             }
         }

@@ -18,24 +18,26 @@ TEST(PairDensity, IsThatOfThePlane) {
     constexpr float kRadius = 0.05f;
     constexpr int kPoints = 20000;  // a unit of area of the sparser half
     testing::Random random(5);
-    std::vector<Vec3> points;
+    std::vector<PointGrid::Entry> points;
     for (int i = 0; i < kPoints; ++i)
-        points.push_back({random.between(-1, 0), random.next_1d(), 0.01f});
+        points.push_back({{random.between(-1, 0), random.next_1d(), 0.01f}, 0});
     for (int i = 0; i < 4 * kPoints; ++i)
-        points.push_back({random.next_1d(), random.next_1d(), 0.01f});
-    PairDensity density;
-    density.build(points, kRadius);
+        points.push_back({{random.next_1d(), random.next_1d(), 0.01f}, 0});
+    PointGrid grid;
+    grid.build(points, 1.4f * kRadius);
+    const PairDensity density(grid.take_cells(), kRadius);
     double partners[2] = {};
     constexpr int kPlaces = 2000;
     for (int i = 0; i < kPlaces; ++i)
         for (const int half : {0, 1})
-            partners[half] += 1 / density.share({random.between(-0.9f, -0.1f) + float(half),
-                                                 random.between(0.1f, 0.9f), 0.01f}) -
-                              1;
+            partners[half] += (1 / density.share({random.between(-0.9f, -0.1f) + float(half),
+                                                  random.between(0.1f, 0.9f), 0.01f}) -
+                               1) /
+                              PairDensity::kCorrelation;
     const double expected = double(kPi) * double(kRadius) * double(kRadius) * kPoints;
     EXPECT_NEAR(partners[0] / kPlaces / expected, 1, 0.1);
     EXPECT_NEAR(partners[1] / kPlaces / (4 * expected), 1, 0.1);
-    EXPECT_GT(density.share({0, 0.5f, 5}), 0.9 / (1 + 4 * expected));
+    EXPECT_GT(density.share({0, 0.5f, 5}), 0.9 / (1 + 4 * PairDensity::kCorrelation * expected));
 }
 
 }  // namespace
