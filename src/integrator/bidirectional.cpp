@@ -82,15 +82,14 @@ void Bidirectional::begin_pass(const PassContext& pass) {
         }
 }
 
-float Bidirectional::threshold(const SampleContext& c, const Join& j) const {
-    const bool is_splat = j.technique.t <= 1;
+float Bidirectional::threshold(const SampleContext& c, const Vec2* splat) const {
     if (!is_optimised_ || roulette_ == 0)
         return roulette_ *
-               (is_splat ? c.film.expected_luminance(j.film) : c.film.expected_luminance(c.pixel));
+               (splat ? c.film.expected_luminance(*splat) : c.film.expected_luminance(c.pixel));
     // With a survival of q = C/δ the rays of a join fall to q, and its variance grows by C²(1/q - 1): the product of the
     // sample's rays T and variance V is least where δ² = V/T [Veach 1997, §10.4.2].
     if (thresholds_.empty()) return 0;
-    return thresholds_[is_splat ? c.film.geometry().pixel_at(j.film) : c.pixel];
+    return thresholds_[splat ? c.film.geometry().pixel_at(*splat) : c.pixel];
 }
 
 void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCounts& counts,
@@ -112,8 +111,10 @@ void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCo
 std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, float scale,
                                        uint32_t number, Workspace& work) const {
     Rgb contribution = j.contribution;
-    if (j.technique.t <= 1) c.film.prefetch_splat(j.film);
-    const float q = join_survival(luminance(contribution) * j.mis_weight * scale, threshold(c, j));
+    const bool is_splat = j.technique.t <= 1;
+    if (is_splat) c.film.prefetch_splat(j.film);
+    const float q = join_survival(luminance(contribution) * j.mis_weight * scale,
+                                  threshold(c, is_splat ? &j.film : nullptr));
     if (q < 1) {
         c.sampler.seek(Stream::Roulette, number);
         if (!(c.sampler.next_1d_unstructured() < q)) {

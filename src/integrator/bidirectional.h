@@ -115,10 +115,12 @@ public:
                         Workspace& work) const;
 
     int max_depth() const { return depth_.max_depth; }
+    /// Of join_survival(), for what is added to the own pixel.
+    float threshold(const SampleContext& c) const { return threshold(c, nullptr); }
 
 private:
-    /// Of join_survival().
-    float threshold(const SampleContext& c, const Join& join) const;
+    /// Of join_survival(); `splat`: where it is added, nullptr: to the own pixel.
+    float threshold(const SampleContext& c, const Vec2* splat) const;
     /// Adds the join, where there is one, times `factor`, unless test() ends it.
     void add(const SampleContext& c, const std::optional<Join>& j, float factor, uint32_t number,
              Workspace& work) const;

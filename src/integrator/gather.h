@@ -25,22 +25,26 @@ struct Gather {
         const auto drops_here = [&](bool eye, const Partner& partner) {
             return drops(n.pair_rule, eye, partner.gloss_before, after);
         };
-        const Neighbourhood near_eye = near(work.z[t - 1]);
-        const auto may_pair = [&](const Partner& y) {
+        const Vertex& z = work.z[t - 1];
+        const Neighbourhood near_eye = near(z);
+        const float threshold = paths.threshold(c), brought = reflected(t);
+        const auto may_pair = [&](Partner& y) {
             const int edges = y.s + t - 2;
-            return edges <= paths.max_depth() && n.gathers(edges) > 0 &&
-                   (drops_here(true, y) || (drops_here(false, y) && near_eye.contains(y.p)));
-        };
-        photons.for_each_near(work.z[t - 1].p, may_pair, [&](const Partner& y) {
-            const float rate = n.gathers(y.s + t - 2) / n.gather;
-            const uint32_t number = uint32_t(hash_combine(y.vertex, uint64_t(t)));
-            if (rate < 1) {
-                c.sampler.seek(Stream::Roulette, number + 2);  // join() has the first two
-                if (!(c.sampler.next_1d_unstructured() < rate)) return;
+            if (edges > paths.max_depth() || !(n.gathers(edges) > 0) ||
+                !(drops_here(true, y) || (drops_here(false, y) && near_eye.contains(y.p))))
+                return false;
+            ++work.stats.pairs;
+            y.rate = rate(edges) * join_survival(brought * y.flux, threshold);
+            if (y.rate < 1) {
+                c.sampler.seek(Stream::Roulette, number(y, t) + 2);  // join() has the first two
+                if (!(c.sampler.next_1d_unstructured() < y.rate)) return false;
             }
+            return true;
+        };
+        photons.for_each_near(z.p, may_pair, [&](const Partner& y) {
             for (const bool eye : {true, false})
                 if (drops_here(eye, y) && (eye || near_eye.contains(y.p)))
-                    join({Strategy::Gather, y.s, t, eye}, y.vertex, number + eye, rate, reciprocal);
+                    join({Strategy::Gather, y.s, t, eye}, y, number(y, t) + eye, reciprocal);
         });
     }
 
@@ -49,19 +53,37 @@ private:
         return {kept.p, kept.ng, photons.radius(), flatness * photons.radius()};
     }
 
+    static uint32_t number(const Partner& y, int t) {
+        return uint32_t(hash_combine(y.vertex, uint64_t(t)));
+    }
+    /// The share of pairs that is used of paths of so many edges.
+    float rate(int edges) const { return n.gathers(edges) / n.gather; }
+
+    /// What a pair at z_{t-1} adds to its pixel for each unit of flux, as far as roulette knows before it looks up the
+    /// light path: as a merge does on a diffuse surface, or on one as bright as the highlight of a glossy one, and an
+    /// eighth of that for the weight. What joins bring is mostly less.
+    float reflected(int t) const {
+        constexpr float kWeight = 0.125f;
+        const Vertex& z = work.z[t - 1];
+        const float roughness = 1 - float(z.gloss) / kSharpestGloss;
+        const float highlight = std::max(1.0f, 0.25f / sqr(roughness));
+        const float clamped = std::max(1.0f, n.disc * z.pdf_fwd);
+        return kWeight * highlight * clamped * luminance(z.beta) * std::fabs(work.z.film_weight) *
+               c.splat_scale / (kPi * n.disc);
+    }
+
     template <class Reciprocal>
-    void join(const Technique& q, uint32_t vertex, uint32_t number, float rate,
+    void join(const Technique& q, const Partner& partner, uint32_t number,
               const Reciprocal& reciprocal) const {
         const SubPath& z = work.z;
         SubPath& y = work.pair;
         const LightPaths& light = photons.paths();
         const bool eye = q.drops_eye;
-        light.restore_first(c.scene, vertex, eye ? q.s : q.s - 1, work.is_observed, y);
+        light.restore_first(c.scene, partner.vertex, eye ? q.s : q.s - 1, work.is_observed, y);
         if (eye && !near(y[q.s - 1]).contains(z[q.t - 1].p)) return;
-        ++work.stats.pairs;
         const auto j = join_gather(c.scene, y, q.s, z, q.t, eye, n);
         if (!j) return;
-        const float scale = std::fabs(z.film_weight) * c.splat_scale / rate;
+        const float scale = std::fabs(z.film_weight) * c.splat_scale / partner.rate;
         const auto value = paths.test(c, *j, scale / j->found, number, work);
         if (!value) return;
         ++work.stats.visible_pairs;
@@ -70,8 +92,10 @@ private:
                               .mode = eye ? TransportMode::Radiance : TransportMode::Importance,
                               .u_emission = y.u_emission,
                               .near = near(eye ? y[q.s - 1] : z[q.t - 1])};
-        const double r = reciprocal(event, *j, luminance(*value) / luminance(j->contribution));
-        c.sink.add(*j, *value * (float(r) * c.splat_scale / rate));
+        const float survival = partner.rate / rate(q.s + q.t - 2);
+        const double r =
+            reciprocal(event, *j, luminance(*value) / (luminance(j->contribution) * survival));
+        c.sink.add(*j, *value * (float(r) * c.splat_scale / partner.rate));
     }
 };
 

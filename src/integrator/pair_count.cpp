@@ -7,8 +7,12 @@ namespace etendue {
 
 void PairCount::begin_pass(const RenderStats& so_far) {
     const auto& moments = so_far.second_moments;
-    const auto least = std::min_element(moments.begin(), moments.end());
-    choice_ = *least > 0 ? int(least - moments.begin()) : 1;
+    const uint64_t least = *std::min_element(moments.begin(), moments.end());
+    if (least == 0) return;
+    // A few bright pairs decide the moments of large c: these are given up only where it is clear.
+    constexpr double kClear = 1.25;
+    choice_ = 0;
+    while (double(moments[size_t(choice_)]) > kClear * double(least)) ++choice_;
 }
 
 void PairCount::observe(double luminance, double weight, double found, double r, double seen,

@@ -13,7 +13,7 @@ namespace etendue {
 /// one. Pairs and their r of earlier passes estimate it, so that an image keeps the right expectation.
 class PairCount {
 public:
-    /// Chooses c, from what passes before left; 1/2 where there are none.
+    /// Chooses c, from what passes before left: the largest with nearly the least moment; 1/2 where they left nothing.
     void begin_pass(const RenderStats& so_far);
     /// c.
     float value() const { return of(choice_); }

@@ -1,5 +1,6 @@
 #include "integrator/photons.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -20,8 +21,10 @@ void Photons::trace(const PassContext& pass, const Bidirectional& paths,
     const auto vertices = paths_.vertices();
     for (uint32_t i = 0; i < vertices.size(); ++i)
         if (vertices[i].may_connect)
-            entries.push_back(
-                {vertices[i].p, i, uint32_t(paths_.depth(i) + 1) << 8 | paths_.gloss_before(i)});
+            entries.push_back({vertices[i].p, i,
+                               uint32_t(paths_.depth(i) + 1) << 8 | paths_.gloss_before(i),
+                               luminance(vertices[i].beta) *
+                                   std::max(1.0f, kPi * sqr(radius) * vertices[i].pdf_fwd)});
     grid_.build(entries, radius);
 }
 

@@ -13,6 +13,9 @@ struct Partner {
     uint32_t vertex;
     int s;
     uint8_t gloss_before;  ///< Of y_{s-2}, or of its event.
+    float
+        flux;  ///< Luminance, times the area density of y_{s-1} over the disc's where it is larger.
+    float rate = 1;  ///< The share of such partners that is used, as may_pair sets it.
 };
 
 class Photons {
@@ -39,7 +42,7 @@ public:
             count = 0;
         };
         grid_.for_each_near(p, radius_, [&](const PointGrid::Entry& e) {
-            const Partner partner{e.p, e.index, int(e.tag >> 8), uint8_t(e.tag & 0xff)};
+            Partner partner{e.p, e.index, int(e.tag >> 8), uint8_t(e.tag & 0xff), e.weight};
             if (!may_pair(partner)) return;
             paths_.prefetch(e.index);
             found[count++] = partner;

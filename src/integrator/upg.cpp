@@ -26,8 +26,8 @@ namespace {
 constexpr float kFlatness = 0.02f;
 
 /// Of the default radius: pairs of an eye path, and its largest share of the radius of the scene's bounds.
-constexpr double kPairs = 4;
-constexpr float kLargest = 0.02f;
+constexpr double kPairs = 12;
+constexpr float kLargest = 0.04f;
 
 constexpr std::array<Choice<TrialBound>, 3> kBounds{
     {{"box", TrialBound::Box}, {"cone", TrialBound::Cone}, {"slab", TrialBound::Slab}}};
@@ -54,6 +54,7 @@ public:
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
         if (connects_) count_.begin_pass(pass.so_far);
+        learns_count_ = connects_ && pass.index > 0;  // the first pass's weights know of no density
         const float radius = radius_ > 0 ? radius_ : radius_for(pass);
         photons_.learn_density(radius);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
@@ -67,7 +68,7 @@ public:
             const double r =
                 reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
             const float pixel = c.film.expected_luminance(c.pixel);
-            if (connects_ && pixel > 0) {
+            if (learns_count_ && pixel > 0) {
                 const float brought =
                     luminance(j.contribution) * std::fabs(work.z.film_weight) * c.splat_scale;
                 count_.observe(double(brought / pixel), double(j.mis_weight), double(j.found), r,
@@ -135,6 +136,7 @@ private:
     PairRule rule_;
     float short_rate_;
     bool clamps_;
+    bool learns_count_ = false;
     Photons photons_;
     PairCount count_;
 };
@@ -144,7 +146,7 @@ std::vector<ParamInfo> params() {
     params.push_back(
         {"radius", ParamKind::Float, "0",
          "Distance within which vertices form pairs, in scene units; 0: chosen anew for "
-         "every pass, such that an eye path finds about four."});
+         "every pass, such that an eye path finds about twelve."});
     params.push_back(memory_param());
     params.push_back(
         {"bound", ParamKind::String, "slab",

@@ -18,9 +18,7 @@ public:
     /// From the light vertices of that pass; `radius`: of pairs.
     PairDensity(HashedCells vertices, float radius);
     /// 1/(1 + ρ n) at `p`.
-    double share(Vec3 p) const {
-        return vertices_.begins.empty() ? 1 : 1 / (1 + scale_ * vertices_.points_about(p));
-    }
+    double share(Vec3 p) const { return 1 / (1 + scale_ * vertices_.points_about(p)); }
 
     /// ρ. What competes with a gather shares most of the eye path too, hence far less than 1: of 0.05, 0.2, 0.5 and 1, 0.2 had
     /// the least errors on scenes with few and with many partners (veach-ajar, staircase2, veach-bidir, living-room).
@@ -28,8 +26,8 @@ public:
 
 private:
     HashedCells vertices_;
-    double scale_ =
-        0;  ///< ρ times the area of a disc over that of the square that a plane has of a cell.
+    /// ρ times the area of a disc over that of the square that a plane has of a cell.
+    double scale_ = 0;
 };
 
 }  // namespace etendue

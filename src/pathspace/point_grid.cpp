@@ -11,12 +11,12 @@ namespace etendue {
 HashedCells::HashedCells(size_t points, float radius)
     : inv_width_(0.5f / radius),
       // So many that few cells share one.
-      mask_(uint32_t(std::bit_ceil(std::max<size_t>(2 * points, 1)) - 1)) {}
+      mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}
 
 void PointGrid::build(std::span<const Entry> entries, float radius) {
     cells_ = HashedCells(entries.size(), radius);
-    std::vector<uint32_t>& begins = cells_.begins;
-    const uint32_t buckets = cells_.buckets();
+    std::vector<uint32_t>& begins = cells_.begins_;
+    const uint32_t buckets = cells_.mask_ + 1;
     std::vector<uint32_t> bucket(entries.size());
     tbb::parallel_for(size_t(0), entries.size(), [&](size_t i) {
         bucket[i] = cells_.bucket_of(cells_.cell_of(entries[i].p));
@@ -50,7 +50,7 @@ size_t PointGrid::candidates(Vec3 p) const {
     size_t count = 0;
     for (int corner = 0; corner < 8; ++corner) {
         const uint32_t bucket = cells_.bucket_of(lowest.neighbour(corner));
-        count += cells_.begins[bucket + 1] - cells_.begins[bucket];
+        count += cells_.begins_[bucket + 1] - cells_.begins_[bucket];
     }
     return count;
 }

@@ -44,17 +44,18 @@ public:
     }
     /// Points in the bucket of the cell of `p`, those of other cells included.
     uint32_t points_about(Vec3 p) const {
+        if (begins_.empty()) return 0;
         const uint32_t bucket = bucket_of(cell_of(p));
-        return begins[bucket + 1] - begins[bucket];
+        return begins_[bucket + 1] - begins_[bucket];
     }
-    uint32_t buckets() const { return mask_ + 1; }
-
-    std::vector<uint32_t>
-        begins;  ///< Of each bucket in the list of all points; one more than there are.
 
 private:
+    friend class PointGrid;
+
     float inv_width_;
     uint32_t mask_;
+    /// Of each bucket in the list of all points; one more than there are. Filled by PointGrid.
+    std::vector<uint32_t> begins_;
 };
 
 class PointGrid {
@@ -64,6 +65,7 @@ public:
         Vec3 p;
         uint32_t index;
         uint32_t tag = 0;
+        float weight = 0;
     };
 
     /// For queries of up to `radius`. The order of the entries decides that of the answers.
@@ -76,7 +78,7 @@ public:
     void for_each_near(Vec3 p, float radius, const Use& use) const {
         if (entries_.empty()) return;
         const HashedCells::Cell lowest = cells_.lowest_cell(p);
-        const std::vector<uint32_t>& begins = cells_.begins;
+        const std::vector<uint32_t>& begins = cells_.begins_;
         const float radius2 = radius * radius;
         // All eight at a time, since what takes the time is waiting for memory.
         HashedCells::Cell cells[8];
@@ -101,7 +103,7 @@ public:
     /// Entries that for_each_near() looks at.
     size_t candidates(Vec3 p) const;
     size_t memory_bytes() const {
-        return entries_.capacity() * sizeof(Entry) + cells_.begins.capacity() * sizeof(uint32_t);
+        return entries_.capacity() * sizeof(Entry) + cells_.begins_.capacity() * sizeof(uint32_t);
     }
 
 private:

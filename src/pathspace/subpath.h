@@ -30,9 +30,9 @@ struct RenderStats {
     bool is_timed = false;  ///< The sample at hand.
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
     uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
-    uint64_t joins_skipped = 0;           ///< By roulette, before their shadow ray.
-    uint64_t pairs = 0;                   ///< Merged by vcm, or gathered.
-    uint64_t visible_pairs = 0;           ///< Gathered, and joined without obstacle.
+    uint64_t joins_skipped = 0;  ///< By roulette, before their shadow ray.
+    uint64_t pairs = 0;          ///< Merged by vcm, or found by gathers, before any roulette.
+    uint64_t visible_pairs = 0;  ///< Gathered, and joined without obstacle.
     uint64_t trials = 0, trial_rays = 0;  ///< Of all visible pairs.
     /// Visible pairs by trials: 1, 2, 3–4, 5–8, … The share of those with 1 is 1 - Var(r)/E(r)².
     std::array<uint64_t, 24> pairs_by_trials{};

@@ -30,8 +30,9 @@ TEST(PairCount, BeginsWithOneHalf) {
 TEST(PairCount, FollowsTheLeastSecondMoment) {
     const double odds_at_half = 0.25;
     EXPECT_EQ(chosen(1, odds_at_half / (1 + odds_at_half)), 1);
-    // √0.1 lies between 1/2 and 1/4.
-    EXPECT_EQ(chosen(0.1, odds_at_half / (1 + odds_at_half)), 0.25f);
+    // √0.1 lies between 1/2 and 1/4, whose moments hardly differ; √0.02 between 1/4 and 1/8.
+    EXPECT_EQ(chosen(0.1, odds_at_half / (1 + odds_at_half)), 0.5f);
+    EXPECT_EQ(chosen(0.02, odds_at_half / (1 + odds_at_half)), 0.25f);
 }
 
 TEST(PairCount, LeavesOutWhatNothingElseMakes) {
