@@ -25,7 +25,7 @@ FIGURES = {
     "upg-trials": (upg.trials, 60),
     "upg-radius": (upg.radius, 160),
     "upg-leak": (upg.leak, 120),
-    "upg-depth": (upg.depth, 160),
+    "upg-depth": (upg.depth, 240),
     "upg-endpoint": (upg.endpoint, 160),
     "equal-time": (upg.equal_time, 300),
     "pcbpt-cache": (pcbpt.cache, 120),

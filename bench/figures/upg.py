@@ -287,24 +287,29 @@ PAPER_DEPTHS = {"bdpt": (0.0074, 0.0614, 0.0733, 0.1570), "upg": (0.0123, 0.0333
 
 def depth(runs, seconds):
     """Table 1: errors of paths of k edges alone, at equal time."""
-    (scene,) = runs.available("staircase2")
-    rows = [["", "RMSE, bdpt", "upg+bdpt", "ratio", "ratio of relMSE", "trimmed", "paper: bdpt", "upg",
-             "ratio"]]
-    results, ratios = {}, []
-    for i, (lengths, title) in enumerate(DEPTHS.items()):
-        comparison = runs.compare(scene, ["bdpt", "upg+bdpt"], seconds=seconds / len(DEPTHS),
-                                  lengths=lengths)
-        bdpt, upg = comparison["methods"]
-        results[title] = comparison
-        theirs = [PAPER_DEPTHS[name][i] for name in ("bdpt", "upg")]
-        ratios.append([upg["rmse"] / bdpt["rmse"] if bdpt["rmse"] > 0 else None,
-                       theirs[1] / theirs[0]])
-        rows.append([title, bdpt["rmse"], upg["rmse"], ratios[-1][0],
-                     upg["rel_mse"] / bdpt["rel_mse"],
-                     upg["rel_mse_trimmed"] / bdpt["rel_mse_trimmed"], *theirs, ratios[-1][1]])
+    scenes = runs.available("veach-ajar", "staircase2")
+    rows = [["scene", "", "RMSE, bdpt", "upg+bdpt", "ratio", "ratio of relMSE", "trimmed", "paper: bdpt",
+             "upg", "ratio"]]
+    results = {}
+    theirs = np.array([PAPER_DEPTHS["bdpt"], PAPER_DEPTHS["upg"]])
+    ratios = {scene: [] for scene in scenes}
+    for scene in scenes:
+        results[scene] = {}
+        for (lengths, title), (bdpt_there, upg_there) in zip(DEPTHS.items(), theirs.T):
+            comparison = runs.compare(scene, ["bdpt", "upg+bdpt"], lengths=lengths,
+                                      seconds=seconds / len(DEPTHS) / len(scenes))
+            bdpt, upg = comparison["methods"]
+            results[scene][title] = comparison
+            ratio = {name: upg[name] / bdpt[name] if bdpt[name] > 0 else None
+                     for name in ("rmse", "rel_mse", "rel_mse_trimmed")}
+            ratios[scene].append(ratio["rmse"] or 0)
+            rows.append([scene, title, bdpt["rmse"], upg["rmse"], *ratio.values(), bdpt_there, upg_there,
+                         upg_there / bdpt_there])
     figure, (axes,) = panels(1, width=4.2, height=2.8)
-    for i, name in enumerate((f"here, {scene}", "paper, stairs")):
-        axes.bar(np.arange(len(DEPTHS)) + 0.4 * (i - 0.5), [r[i] or 0 for r in ratios], 0.4, label=name)
+    bars = {f"here, {scene}": values for scene, values in ratios.items()}
+    bars["paper, stairs"] = theirs[1] / theirs[0]
+    for i, (label, values) in enumerate(bars.items()):
+        axes.bar(np.arange(len(DEPTHS)) + 0.27 * (i - 1), values, 0.27, label=label)
     axes.axhline(1, color="#999999", linestyle=":")
     axes.set_xticks(range(len(DEPTHS)), DEPTHS.values())
     axes.set_ylabel("RMSE of upg+bdpt / bdpt")
