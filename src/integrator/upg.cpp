@@ -26,8 +26,8 @@ namespace {
 constexpr float kFlatness = 0.02f;
 
 /// Of the default radius: pairs of an eye path, and its largest share of the radius of the scene's bounds.
-constexpr double kPairs = 12;
-constexpr float kLargest = 0.04f;
+constexpr double kPairs = 8;
+constexpr float kLargest = 0.02f;
 
 constexpr std::array<Choice<TrialBound>, 3> kBounds{
     {{"box", TrialBound::Box}, {"cone", TrialBound::Cone}, {"slab", TrialBound::Slab}}};
@@ -146,7 +146,7 @@ std::vector<ParamInfo> params() {
     params.push_back(
         {"radius", ParamKind::Float, "0",
          "Distance within which vertices form pairs, in scene units; 0: chosen anew for "
-         "every pass, such that an eye path finds about twelve."});
+         "every pass, such that an eye path finds about eight."});
     params.push_back(memory_param());
     params.push_back(
         {"bound", ParamKind::String, "slab",
