@@ -11,7 +11,6 @@
 #include <cmath>
 
 #include "integrator/bidirectional.h"
-#include "integrator/photon_memory.h"
 
 namespace etendue {
 namespace {
@@ -28,8 +27,10 @@ public:
         paths_.begin_pass(pass);
         if (!uses_cache_) return;
         if (draws_ == 0) choose_draws(pass);
+        collector_.begin(pass, kVertexBytes, memory_);
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                 kVertexBytes, memory_, chunks_, cache_);
+                                 collector_);
+        collector_.assemble(cache_);
         connectible_.clear();
         for (uint32_t i = 0; i < cache_.vertices().size(); ++i)
             if (cache_.vertices()[i].may_connect) connectible_.push_back(i);
@@ -114,7 +115,7 @@ private:
     // Of the pass.
     LightPaths cache_;
     std::vector<uint32_t> connectible_;
-    std::vector<LightPaths::Chunk> chunks_;
+    LightPathCollector collector_;
 };
 
 }  // namespace

@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "integrator/photon_memory.h"
-
 namespace etendue {
 
 std::vector<ParamInfo> Bidirectional::params() {
@@ -93,19 +91,11 @@ float Bidirectional::threshold(const SampleContext& c, const Vec2* splat) const 
 }
 
 void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCounts& counts,
-                                      uint64_t kept, uint64_t vertex_bytes, uint64_t max_bytes,
-                                      std::vector<LightPaths::Chunk>& chunks,
-                                      LightPaths& paths) const {
-    chunks.resize(pass.chunks(pass.light_paths));
-    for (LightPaths::Chunk& chunk : chunks) chunk.clear();
-    PhotonMemory memory(max_bytes);
-    pass.for_each_light_path([&](uint64_t chunk, const SampleContext& c, Workspace& work) {
+                                      uint64_t kept, LightPathCollector& collector) const {
+    pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
         light_path(c, counts, work);
-        if (c.pixel >= kept) return;
-        chunks[chunk].add(work.y);
-        memory.take(uint64_t(work.y.size()) * vertex_bytes);
+        if (c.pixel < kept) collector.add(c.chunk, work.y);
     });
-    paths.assemble(chunks);
 }
 
 std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, float scale,

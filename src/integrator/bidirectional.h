@@ -4,8 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "integrator/integrator.h"
-#include "pathspace/light_paths.h"
+#include "integrator/light_path_collector.h"
 
 namespace etendue {
 
@@ -96,11 +95,10 @@ public:
     void connect_to_own(const SampleContext& c, const TechniqueCounts& counts, int t,
                         Workspace& work) const;
 
-    /// Traces the light paths of the pass with their techniques t ≤ 1, and keeps the first `kept`. Throws
-    /// std::runtime_error where these take more than `max_bytes`, at so many a vertex.
+    /// Traces the light paths of the pass with their techniques t ≤ 1; the first `kept` go into `collector`, which has
+    /// begun.
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& counts, uint64_t kept,
-                           uint64_t vertex_bytes, uint64_t max_bytes,
-                           std::vector<LightPaths::Chunk>& chunks, LightPaths& paths) const;
+                           LightPathCollector& collector) const;
 
     /// Adds C(s,t), where there is one, times `factor`, if it is visible: one of several joins that z_{t-1} draws.
     void add_drawn(const SampleContext& c, const std::optional<Join>& j, float factor, int draw,

@@ -12,7 +12,8 @@ struct Gather {
     const Bidirectional& paths;
     const Photons& photons;
     const TechniqueCounts& n;
-    float flatness;  ///< Half the height of a neighbourhood over its radius.
+    float flatness;   ///< Half the height of a neighbourhood over its radius.
+    float threshold;  ///< Of roulette, see Bidirectional::threshold().
     Workspace& work;
 
     /// The pairs of z_{t-1}. `reciprocal(event, join, seen)` is r, an estimate of 1/p_c; it is asked last, with the sampler
@@ -20,6 +21,10 @@ struct Gather {
     /// spared the join, times its transmittance.
     template <class Reciprocal>
     void operator()(int t, const Reciprocal& reciprocal) const {
+        const float brought = reflected(t);
+        // Where most partners are not worth a look, z_{t-1} mostly looks for none.
+        const float looks = join_survival(brought * photons.typical_flux(), threshold);
+        if (!survives(looks, uint32_t(hash_combine(UINT32_MAX, uint64_t(t))))) return;
         const Vertex& last = work.z[t - 2];
         const uint8_t after = gloss(last, last.is_delta);
         const auto drops_here = [&](bool eye, const Partner& partner) {
@@ -27,28 +32,30 @@ struct Gather {
         };
         const Vertex& z = work.z[t - 1];
         const Neighbourhood near_eye = near(z);
-        const float threshold = paths.threshold(c), brought = reflected(t);
         const auto may_pair = [&](Partner& y) {
             const int edges = y.s + t - 2;
-            if (edges > paths.max_depth() || !(n.gathers(edges) > 0) ||
-                !(drops_here(true, y) || (drops_here(false, y) && near_eye.contains(y.p))))
-                return false;
+            if (edges > paths.max_depth() || !(n.gathers(edges) > 0)) return false;
+            y.drops_eye = drops_here(true, y);
+            y.drops_light = drops_here(false, y) && near_eye.contains(y.p);
+            if (!y.drops_eye && !y.drops_light) return false;
             ++work.stats.pairs;
-            y.rate = rate(edges) * join_survival(brought * y.flux, threshold);
-            if (y.rate < 1) {
-                c.sampler.seek(Stream::Roulette, number(y, t) + 2);  // join() has the first two
-                if (!(c.sampler.next_1d_unstructured() < y.rate)) return false;
-            }
-            return true;
+            const float wanted = rate(edges) * join_survival(brought * y.flux, threshold);
+            y.rate = std::min(wanted, looks);
+            return survives(y.rate / looks, number(y, t) + 2);  // join() has the first two
         };
         photons.for_each_near(z.p, may_pair, [&](const Partner& y) {
             for (const bool eye : {true, false})
-                if (drops_here(eye, y) && (eye || near_eye.contains(y.p)))
+                if (eye ? y.drops_eye : y.drops_light)
                     join({Strategy::Gather, y.s, t, eye}, y, number(y, t) + eye, reciprocal);
         });
     }
 
 private:
+    bool survives(float q, uint32_t number) const {
+        if (!(q < 1)) return true;
+        c.sampler.seek(Stream::Roulette, number);
+        return c.sampler.next_1d_unstructured() < q;
+    }
     Neighbourhood near(const Vertex& kept) const {
         return {kept.p, kept.ng, photons.radius(), flatness * photons.radius()};
     }

@@ -32,10 +32,16 @@ struct SampleContext {
     const Scene& scene;
     const Film& film;
     uint64_t pixel;        ///< Index within the crop; also that of the light path.
+    uint64_t chunk;        ///< Part of the pass; its samples are taken in order by one thread.
     uint64_t light_paths;  ///< N_L of the pass.
     float splat_scale;     ///< 1 / N_L: what a splat is worth on the film.
     Sampler& sampler;
     ContributionSink& sink;
+
+    /// The same sample with other numbers, and contributions to `to`.
+    SampleContext with(Sampler& numbers, ContributionSink& to) const {
+        return {scene, film, pixel, chunk, light_paths, splat_scale, numbers, to};
+    }
 };
 
 /// What an integrator may do before the samples of a pass.
@@ -46,12 +52,10 @@ struct PassContext {
     uint64_t light_paths;  ///< N_L.
     uint64_t pixels;
     const RenderStats& so_far;  ///< Of all earlier passes; the same for any number of threads.
-    /// Calls `use(chunk, context, work)` for the samples 0 … count-1 in parallel; those of one chunk in order by one
-    /// thread. Only splats may be added.
-    using Use = std::function<void(uint64_t, const SampleContext&, Workspace&)>;
+    /// Calls `use(context, work)` for the samples 0 … count-1 in parallel. Only splats may be added.
+    using Use = std::function<void(const SampleContext&, Workspace&)>;
     std::function<void(uint64_t count, const Use& use)> for_each_sample;
-    std::function<uint64_t(uint64_t count)>
-        chunks;  ///< That for_each_sample() cuts so many samples into.
+    std::function<uint64_t(uint64_t count)> chunks;  ///< That so many samples are cut into.
     /// Calls `task(i, sampler, work)` for i < count in parallel: paths that bring nothing to the film. The task starts the
     /// sampler; paths from the number of pixels on have numbers of their own.
     using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;

@@ -81,7 +81,9 @@ private:
 
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
         const uint64_t M = kept(pass.light_paths);
-        paths_.trace_light_paths(pass, n, M, sizeof(LightVertex), UINT64_MAX, chunks_, compact_);
+        collector_.begin(pass, sizeof(LightVertex), UINT64_MAX);
+        paths_.trace_light_paths(pass, n, M, collector_);
+        collector_.assemble(compact_);
         stored_.resize(M);
         vertices_.clear();
         for (uint32_t i = 0; i < M; ++i) {
@@ -195,7 +197,7 @@ private:
     std::vector<SubPath> stored_;         ///< The M light paths, ready to be joined.
     std::vector<StoredVertex> vertices_;  ///< Their V connectible vertices.
     ImportanceRecords records_;
-    std::vector<LightPaths::Chunk> chunks_;
+    LightPathCollector collector_;
     std::vector<ImportanceRecords::Chunk> record_chunks_;
 };
 
@@ -208,7 +210,7 @@ IntegratorEntry pcbpt_entry() {
     params.push_back({"connections", ParamKind::Float, "0",
                       "K: connections of each eye vertex, on average; 0: as many as bdpt has rays "
                       "for, less those of the records, but at least 0.25."});
-    params.push_back({"record_fraction", ParamKind::Float, "0.004",
+    params.push_back({"record_fraction", ParamKind::Float, "0.001",
                       "Eye paths along which importance records are made, over the pixels."});
     params.push_back({"neighbours", ParamKind::Int, "6",
                       "Records between which the mass function is interpolated, at most 16."});

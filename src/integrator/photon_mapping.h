@@ -33,8 +33,7 @@ public:
     template <class AddPhotons>
     void eye_path(const SampleContext& c, Sampler& of_walk, Workspace& work,
                   const AddPhotons& add_photons) const {
-        const SampleContext walk{c.scene,       c.film,  c.pixel, c.light_paths,
-                                 c.splat_scale, of_walk, c.sink};
+        const SampleContext walk = c.with(of_walk, c.sink);
         paths_.eye_path(walk, counts(), work, [&](int t) {
             const Vertex& v = work.z[t - 1];
             const bool ends = is_diffuse(v);

@@ -1,6 +1,5 @@
 #include "integrator/photon_source.h"
 
-#include "integrator/photon_memory.h"
 #include "integrator/photons.h"
 
 namespace etendue {
@@ -10,7 +9,7 @@ std::vector<MapPhoton> TracedPhotons::trace(const PassContext& pass) {
     // A photon is in a chunk, among all, may be among the caustics, and has a leaf in each tree.
     constexpr uint64_t kPhotonBytes = 3 * sizeof(MapPhoton) + 32;
     PhotonMemory memory(max_bytes_);
-    pass.for_each_light_path([&](uint64_t chunk, const SampleContext& c, Workspace& work) {
+    pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
         const SubPath& y = work.y;
         mapping_.paths().light_path(c, {}, work);
         memory.take(uint64_t(y.size()) * kPhotonBytes);
@@ -22,7 +21,7 @@ std::vector<MapPhoton> TracedPhotons::trace(const PassContext& pass) {
                                   : by_delta           ? Origin::DeltaCaustic
                                                        : Origin::Caustic;
             if (v.may_connect && (mapping_.is_diffuse(v) || origin == Origin::DeltaCaustic))
-                chunks[chunk].push_back(
+                chunks[c.chunk].push_back(
                     {{v.p, v.wo, v.beta * c.splat_scale, y[0].emitter, i + 1}, origin});
             by_delta &= v.is_delta;
             by_glossy &= v.is_delta || !mapping_.is_diffuse(v);

@@ -13,9 +13,11 @@ struct Partner {
     uint32_t vertex;
     int s;
     uint8_t gloss_before;  ///< Of y_{s-2}, or of its event.
-    float
-        flux;  ///< Luminance, times the area density of y_{s-1} over the disc's where it is larger.
-    float rate = 1;  ///< The share of such partners that is used, as may_pair sets it.
+    /// Luminance, times the area density of y_{s-1} over the disc's where it is larger.
+    float flux;
+    // For may_pair to set:
+    float rate;  ///< The share of such partners that is used.
+    bool drops_eye, drops_light;
 };
 
 class Photons {
@@ -26,10 +28,22 @@ public:
     void trace(const PassContext& pass, const Bidirectional& paths, const TechniqueCounts& counts,
                float radius, uint64_t max_bytes);
 
+    /// The same with as many light paths that are nothing else: they have no techniques t ≤ 1, and numbers of their own.
+    void trace_apart(const PassContext& pass, const Bidirectional& paths,
+                     const TechniqueCounts& counts, float radius, uint64_t max_bytes);
+
+    /// Instead, light paths that samples trace themselves, for the next pass: begin_keeping() before the pass, keep() for
+    /// each sample, take_kept() after it. Radius and bound stay as they are.
+    void begin_keeping(const PassContext& pass);
+    void keep(const SampleContext& c, const SubPath& y) const { collector_.add(c.chunk, y); }
+    void take_kept();
+
     const LightPaths& paths() const { return paths_; }
-    /// Ends the last pass: its light vertices, if there are any, tell the density of partners within `radius`.
+    /// The light vertices, if there are any, tell the density of partners within `radius`.
     void learn_density(float radius);
     const PairDensity& density() const { return density_; }
+    /// A light vertex's `flux` as most of the light has it.
+    float typical_flux() const { return typical_flux_; }
     /// Calls use(partner) for the light vertices nearer to `p` than the radius for which may_pair(partner) holds.
     template <class MayPair, class Use>
     void for_each_near(Vec3 p, const MayPair& may_pair, const Use& use) const {
@@ -42,10 +56,12 @@ public:
             count = 0;
         };
         grid_.for_each_near(p, radius_, [&](const PointGrid::Entry& e) {
-            Partner partner{e.p, e.index, int(e.tag >> 8), uint8_t(e.tag & 0xff), e.weight};
+            Partner& partner = found[count];
+            partner = {e.p,  e.index, int(e.tag >> 8), uint8_t(e.tag & 0xff), e.weight, 1,
+                       true, true};
             if (!may_pair(partner)) return;
             paths_.prefetch(e.index);
-            found[count++] = partner;
+            ++count;
             if (count == kBatch) use_found();
         });
         use_found();
@@ -56,8 +72,9 @@ private:
     LightPaths paths_;
     PointGrid grid_;
     PairDensity density_;
-    float radius_ = 0;
-    std::vector<LightPaths::Chunk> chunks_;
+    float radius_ = 0, typical_flux_ = 0;
+    uint64_t max_bytes_ = 0;
+    mutable LightPathCollector collector_;  ///< Each chunk is filled by one thread.
 };
 
 /// r_i = r_1 i^((α-1)/2), so that bias and noise both vanish [Knaus & Zwicker 2011, eq. 15].

@@ -139,8 +139,7 @@ private:
             Sampler of_ray = c.sampler;
             of_ray.start(pass_ * uint32_t(gather_rays_) + uint32_t(ray),
                          hash_combine(c.pixel, uint64_t(t)));
-            const SampleContext gather{c.scene,       c.film, c.pixel, c.light_paths,
-                                       c.splat_scale, of_ray, c.sink};
+            const SampleContext gather = c.with(of_ray, c.sink);
             mapping_.paths().step(gather, {}, work);
             if (!z[t - 1].is_delta) end_gather_ray(gather, t + 1, 1 / float(gather_rays_), work);
             z.truncate(t);
@@ -164,18 +163,17 @@ private:
         std::vector<std::vector<IrradianceRecord>> chunks(pass.chunks(pass.pixels));
         for (uint32_t spacing = kCoarsest; spacing >= kFinest; spacing /= 2) {
             for (auto& chunk : chunks) chunk.clear();
-            pass.for_each_sample(
-                pass.pixels, [&](uint64_t chunk, const SampleContext& c, Workspace& work) {
-                    if (c.pixel % width % spacing != 0 || c.pixel / width % spacing != 0) return;
-                    mapping_.paths().eye_path(c, {}, work, [&](int t) {
-                        const Vertex& v = work.z[t - 1];
-                        if (!mapping_.is_diffuse(v)) return Onward::ByAnyEvent;
-                        const auto n = cache_normal(v);
-                        if (n && !cache_.find(v.p, *n))
-                            chunks[chunk].push_back(record(c, t, *n, work));
-                        return PhotonMapping::after_photons(v);
-                    });
+            pass.for_each_sample(pass.pixels, [&](const SampleContext& c, Workspace& work) {
+                if (c.pixel % width % spacing != 0 || c.pixel / width % spacing != 0) return;
+                mapping_.paths().eye_path(c, {}, work, [&](int t) {
+                    const Vertex& v = work.z[t - 1];
+                    if (!mapping_.is_diffuse(v)) return Onward::ByAnyEvent;
+                    const auto n = cache_normal(v);
+                    if (n && !cache_.find(v.p, *n))
+                        chunks[c.chunk].push_back(record(c, t, *n, work));
+                    return PhotonMapping::after_photons(v);
                 });
+            });
             std::vector<IrradianceRecord> records;
             for (const auto& chunk : chunks)
                 records.insert(records.end(), chunk.begin(), chunk.end());
@@ -195,8 +193,7 @@ private:
             if (!(dot(d, v.ng) * dot(v.wo, v.ng) > 0)) return {};
             RadianceSum sum;
             of_ray.start(ray++, hash_combine(c.pixel, uint64_t(t)));
-            const SampleContext gather{c.scene,       c.film, c.pixel, c.light_paths,
-                                       c.splat_scale, of_ray, sum};
+            const SampleContext gather = c.with(of_ray, sum);
             if (!look_along(c.scene, of_ray, d, Rgb(1), z, work.stats)) return {};
             const float distance = length(z[t].p - z[t - 1].p);
             end_gather_ray(gather, t + 1, 1, work);

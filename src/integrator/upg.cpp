@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 
@@ -53,16 +54,24 @@ public:
 
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
-        if (connects_) count_.begin_pass(pass.so_far);
         learns_count_ = connects_ && pass.index > 0;  // the first pass's weights know of no density
-        const float radius = radius_ > 0 ? radius_ : radius_for(pass);
-        photons_.learn_density(radius);
-        photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
+        if (learns(pass.index)) {
+            if (connects_) count_.begin_pass(pass.so_far);
+            const float radius = radius_ > 0 ? radius_ : radius_for(pass);
+            photons_.learn_density(radius);
+            photons_.trace_apart(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius,
+                                 memory_);
+        } else {
+            photons_.take_kept();
+        }
+        keeps_ = !learns(pass.index + 1);
+        if (keeps_) photons_.begin_keeping(pass);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
-        photons_.paths().restore(c.scene, c.pixel, work.y);
+        if (connects_) paths_.light_path(c, n, work);
+        if (keeps_) photons_.keep(c, work.y);
         const auto by_trials = [&](PairEvent event, const Join& j, float seen) {
             event.bound = bound_;
             const double r =
@@ -76,7 +85,7 @@ public:
             }
             return r;
         };
-        const Gather gather{c, paths_, photons_, n, flatness_, work};
+        const Gather gather{c, paths_, photons_, n, flatness_, paths_.threshold(c), work};
         paths_.eye_path(c, n, work, [&](int t) {
             paths_.add_next_event(c, n, t, work);
             paths_.connect_to_own(c, n, t, work);
@@ -95,8 +104,13 @@ public:
     }
 
 private:
-    /// Such that an eye path finds kPairs pairs, as far as the last pass tells. A pass knows of earlier ones only, so that
-    /// its image has the right expectation whatever they found.
+    /// Whether the pass chooses radius, c and density anew. Pairs are made with the light paths of the pass before, so
+    /// that each sample traces its own just when it connects to it. But light vertices carry sums of weights, which must
+    /// be those of the pass: one that chooses anew traces light paths for its pairs apart. Without connections all do. A
+    /// choice knows nothing of the light paths that it is used with, so that the image has the right expectation.
+    bool learns(uint32_t pass) const { return !connects_ || std::has_single_bit(pass + 1); }
+
+    /// Such that an eye path finds kPairs pairs, as far as the passes since the last choice tell.
     float radius_for(const PassContext& pass) {
         const float size = pass.scene.bounds().radius(), largest = kLargest * size;
         if (pass.index == 0) return std::min(largest, size / std::sqrt(float(pass.light_paths)));
@@ -104,7 +118,7 @@ private:
                      paths = double(pass.so_far.eye_paths - eye_paths_so_far_);
         pairs_so_far_ = pass.so_far.pairs;
         eye_paths_so_far_ = pass.so_far.eye_paths;
-        const double factor = std::clamp(std::sqrt(kPairs * paths / (pairs + 1)), 0.5, 2.0);
+        const double factor = std::clamp(std::sqrt(kPairs * paths / (pairs + 1)), 0.25, 4.0);
         return std::min(largest, photons_.radius() * float(factor));
     }
 
@@ -137,6 +151,7 @@ private:
     float short_rate_;
     bool clamps_;
     bool learns_count_ = false;
+    bool keeps_ = false;  ///< The light paths of the pass, for the next.
     Photons photons_;
     PairCount count_;
 };
@@ -145,8 +160,8 @@ std::vector<ParamInfo> params() {
     std::vector<ParamInfo> params = Bidirectional::params();
     params.push_back(
         {"radius", ParamKind::Float, "0",
-         "Distance within which vertices form pairs, in scene units; 0: chosen anew for "
-         "every pass, such that an eye path finds about eight."});
+         "Distance within which vertices form pairs, in scene units; 0: chosen by what earlier "
+         "passes found, such that an eye path finds about eight."});
     params.push_back(memory_param());
     params.push_back(
         {"bound", ParamKind::String, "slab",

@@ -41,7 +41,7 @@ public:
         const auto by_disc = [](const PairEvent& event, const Join& j, float) {
             return 1 / double(event.from.survival.value() * j.found);
         };
-        const Gather gather{c, paths_, photons_, n, 1, work};
+        const Gather gather{c, paths_, photons_, n, 1, paths_.threshold(c), work};
         paths_.eye_path(c, n, work, [&](int t) {
             paths_.add_next_event(c, n, t, work);
             paths_.connect_to_own(c, n, t, work);

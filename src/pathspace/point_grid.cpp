@@ -2,21 +2,18 @@
 
 #include <algorithm>
 #include <bit>
-#include <utility>
 
 #include <tbb/parallel_for.h>
 
 namespace etendue {
 
-HashedCells::HashedCells(size_t points, float radius)
+CellHash::CellHash(size_t points, float radius)
     : inv_width_(0.5f / radius),
-      // So many that few cells share one.
       mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}
 
 void PointGrid::build(std::span<const Entry> entries, float radius) {
-    cells_ = HashedCells(entries.size(), radius);
-    std::vector<uint32_t>& begins = cells_.begins_;
-    const uint32_t buckets = cells_.mask_ + 1;
+    cells_ = CellHash(entries.size(), radius);
+    const uint32_t buckets = cells_.buckets();
     std::vector<uint32_t> bucket(entries.size());
     tbb::parallel_for(size_t(0), entries.size(), [&](size_t i) {
         bucket[i] = cells_.bucket_of(cells_.cell_of(entries[i].p));
@@ -31,27 +28,20 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
                 if (bucket[i] - begin < end - begin) use(i);
         });
     };
-    begins.assign(size_t(buckets) + 1, 0);
-    for_each_part([&](size_t i) { ++begins[bucket[i] + 1]; });
-    for (size_t b = 0; b < buckets; ++b) begins[b + 1] += begins[b];
+    begins_.assign(size_t(buckets) + 1, 0);
+    for_each_part([&](size_t i) { ++begins_[bucket[i] + 1]; });
+    for (size_t b = 0; b < buckets; ++b) begins_[b + 1] += begins_[b];
     entries_.resize(entries.size());
-    std::vector<uint32_t> next(begins.begin(), begins.end() - 1);
+    std::vector<uint32_t> next(begins_.begin(), begins_.end() - 1);
     for_each_part([&](size_t i) { entries_[next[bucket[i]]++] = entries[i]; });
-}
-
-HashedCells PointGrid::take_cells() {
-    entries_.clear();
-    return std::exchange(cells_, HashedCells());
 }
 
 size_t PointGrid::candidates(Vec3 p) const {
     if (entries_.empty()) return 0;
-    const HashedCells::Cell lowest = cells_.lowest_cell(p);
+    const CellHash::Cell lowest = cells_.lowest_cell(p);
     size_t count = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-        const uint32_t bucket = cells_.bucket_of(lowest.neighbour(corner));
-        count += cells_.begins_[bucket + 1] - cells_.begins_[bucket];
-    }
+    for (int corner = 0; corner < 8; ++corner)
+        count += points_in(cells_.bucket_of(lowest.neighbour(corner)));
     return count;
 }
 

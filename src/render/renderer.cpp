@@ -119,7 +119,7 @@ void Renderer::pass(uint32_t index) {
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     film_.begin_pass(light_paths);
     const auto chunks = [](uint64_t samples) { return (samples + kChunk - 1) / kChunk; };
-    // Calls use(chunk, context, work, sink) for the samples 0 … count-1 of the pass.
+    // Calls use(context, work, sink) for the samples 0 … count-1 of the pass.
     const auto for_each_sample = [&](uint64_t count, const auto& use) {
         tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
             Workspace& work = workers_->spaces.local();
@@ -130,8 +130,8 @@ void Renderer::pass(uint32_t index) {
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
                 sampler.start(index, pixel);
                 work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
-                use(chunk,
-                    SampleContext{scene_, film_, pixel, light_paths, splat_scale, sampler, sink},
+                use(SampleContext{scene_, film_, pixel, chunk, light_paths, splat_scale, sampler,
+                                  sink},
                     work, sink);
             }
         });
@@ -146,9 +146,8 @@ void Renderer::pass(uint32_t index) {
              .so_far = stats_,
              .for_each_sample =
                  [&](uint64_t count, const PassContext::Use& use) {
-                     for_each_sample(count,
-                                     [&](uint64_t chunk, const SampleContext& c, Workspace& work,
-                                         FilmSink&) { use(chunk, c, work); });
+                     for_each_sample(count, [&](const SampleContext& c, Workspace& work,
+                                                FilmSink&) { use(c, work); });
                  },
              .chunks = chunks,
              .for_each_other_path =
@@ -160,12 +159,11 @@ void Renderer::pass(uint32_t index) {
                          task(i, sampler, work);
                      });
                  }});
-        for_each_sample(pixels,
-                        [&](uint64_t, const SampleContext& c, Workspace& work, FilmSink& sink) {
-                            sink.begin(c.pixel);
-                            integrator_->sample(c, work);
-                            sink.end();
-                        });
+        for_each_sample(pixels, [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
+            sink.begin(c.pixel);
+            integrator_->sample(c, work);
+            sink.end();
+        });
         film_.end_pass();
         if (techniques_) techniques_->end_pass();
     });

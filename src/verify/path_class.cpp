@@ -54,10 +54,29 @@ std::vector<Technique> techniques_of_length(int edges) {
     return out;
 }
 
+namespace {
+
+/// x_i by its bit, of those where a walk cannot choose a direction again.
+uint32_t fixed_vertices(const PathClass& c) {
+    return c.delta_events | 1u << c.edges;
+}
+/// The vertex that both sub-paths of a pair have.
+uint32_t pair_vertex(const Technique& q) {
+    return 1u << (q.s - 1);
+}
+
+}  // namespace
+
+int times_made(const Technique& q, const PathClass& c, PairRule rule) {
+    if (q.strategy != Strategy::Gather || rule != PairRule::Both) return 1;
+    const uint32_t x_m = pair_vertex(q), fixed = fixed_vertices(c);
+    return !(fixed & x_m << 1) + !(fixed & x_m >> 1);
+}
+
 bool can_make(const Technique& q, const PathClass& c) {
     if (q.vertices() != c.edges + 1) return false;
-    // The vertex that both sub-paths have. A gather samples it again from the one or the other side, not from the lens.
-    const uint32_t x_m = 1u << (q.s - 1), fixed = c.delta_events | 1u << c.edges;
+    // A gather samples the vertex again from the one or the other side.
+    const uint32_t x_m = pair_vertex(q), fixed = fixed_vertices(c);
     if (is_pair(q.strategy) && (fixed & x_m)) return false;
     if (q.strategy == Strategy::Merge) return true;
     if (q.strategy == Strategy::Gather) return !((fixed & x_m << 1) && (fixed & x_m >> 1));

@@ -42,6 +42,9 @@ float shortest_edge(const Scene& scene, const Join& join, const SubPath& y, cons
 /// All techniques that make paths of that many edges.
 std::vector<Technique> techniques_of_length(int edges);
 bool can_make(const Technique& technique, const PathClass& c);
+/// How often `technique` makes each path of the class that it can make: a gather whose pairs drop both vertices, for a
+/// path each, mostly does twice.
+int times_made(const Technique& technique, const PathClass& c, PairRule rule);
 /// Whether some technique with a count can.
 bool can_make(const TechniqueCounts& counts, const PathClass& c);
 

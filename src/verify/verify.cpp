@@ -364,6 +364,9 @@ TechniqueReport compare_technique(const Technique& q, const Series& method,
     struct Found {
         Tally alone, expected;
     };
+    const auto times_made = [&](const PathClass& c) {
+        return double(etendue::times_made(q, c, method.counts.pair_rule));
+    };
     std::map<PathClass, Found> found;
     double length_total = 0;
     for (const Run& r : method.runs)
@@ -375,10 +378,11 @@ TechniqueReport compare_technique(const Technique& q, const Series& method,
             if (e.technique.vertices() != q.vertices()) continue;
             length_total += e.weighted.sum;
             if (!e.path_class.has_short_edge && can_make(q, e.path_class))
-                found[e.path_class].expected += e.weighted;
+                found[e.path_class].expected += e.weighted.scaled(times_made(e.path_class));
         }
     std::set<PathClass> classes;
     Found all;
+    double covered = 0;
     for (const auto& [c, f] : found) {
         if (!can_make(reference.counts, c)) continue;
         if (f.alone.effective_count() < kEnoughAlone ||
@@ -386,6 +390,7 @@ TechniqueReport compare_technique(const Technique& q, const Series& method,
             continue;
         classes.insert(c);
         all.alone += f.alone, all.expected += f.expected;
+        covered += f.expected.sum / times_made(c);
     }
     const auto mean = [&](const Series& s, const auto& value) {
         return over_runs(s, [&](const Run& r) {
@@ -396,9 +401,10 @@ TechniqueReport compare_technique(const Technique& q, const Series& method,
         });
     };
     return {
-        q, length_total > 0 ? all.expected.sum / length_total : 0.0,
+        q, length_total > 0 ? covered / length_total : 0.0,
         compare(mean(method, [&](const auto& e) { return e.technique == q ? e.alone.sum : 0.0; }),
-                mean(reference, [](const auto& e) { return e.weighted.sum; }),
+                mean(reference,
+                     [&](const auto& e) { return e.weighted.sum * times_made(e.path_class); }),
                 std::min(all.alone.effective_count(), all.expected.effective_count()))};
 }
 

@@ -52,7 +52,7 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
             fmt::format("{}max_depth={},rr_depth=3,roulette=0", GetParam().integrator, kLongest));
         settings.seed = uint64_t(run);
         settings.threads = 1;
-        settings.spp = scene.sensor().has_finite_lens() ? 64 : 24;
+        settings.spp = scene.sensor().has_finite_lens() ? 64 : 32;
         settings.technique_depth = kLongest;
         Renderer renderer(scene, settings);
         const std::atomic<bool> interrupted{false};

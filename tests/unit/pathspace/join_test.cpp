@@ -6,6 +6,7 @@
 
 #include "path_ends.h"
 #include "pathspace/path_pdfs.h"
+#include "pathspace/point_grid.h"
 #include "random.h"
 #include "test_scenes.h"
 
@@ -81,7 +82,7 @@ protected:
                 for (int i = 0; i < 12000; ++i) points.push_back({random.in_cube() * 2, 0});
                 PointGrid grid;
                 grid.build(points, 0.3f);
-                density = PairDensity(grid.take_cells(), 0.3f);
+                density = PairDensity(grid, 0.3f);
                 counts.density = &density;
             }
         }

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pathspace/point_grid.h"
 #include "random.h"
 
 namespace etendue {
@@ -25,7 +26,7 @@ TEST(PairDensity, IsThatOfThePlane) {
         points.push_back({{random.next_1d(), random.next_1d(), 0.01f}, 0});
     PointGrid grid;
     grid.build(points, 1.4f * kRadius);
-    const PairDensity density(grid.take_cells(), kRadius);
+    const PairDensity density(grid, kRadius);
     double partners[2] = {};
     constexpr int kPlaces = 2000;
     for (int i = 0; i < kPlaces; ++i)

@@ -97,5 +97,16 @@ TEST(PathClass, SaysWhatAMethodCannotMake) {
     EXPECT_TRUE(can_make(connection_technique(3, 1), c));
 }
 
+/// A pair may drop the one and the other vertex, unless a neighbour cannot sample it again.
+TEST(PathClass, SaysHowOftenAPairMakesAPath) {
+    const Technique middle{Strategy::Gather, 3, 3}, at_lens{Strategy::Gather, 4, 2};
+    const PathClass diffuse{.edges = 4}, by_mirror{.edges = 4, .delta_events = 1u << 1};
+    EXPECT_EQ(times_made(middle, diffuse, PairRule::Both), 2);
+    EXPECT_EQ(times_made(middle, diffuse, PairRule::Gloss), 1);
+    EXPECT_EQ(times_made(at_lens, diffuse, PairRule::Both), 1);
+    EXPECT_EQ(times_made(middle, by_mirror, PairRule::Both), 1);
+    EXPECT_EQ(times_made(connection_technique(2, 3), diffuse, PairRule::Both), 1);
+}
+
 }  // namespace
 }  // namespace etendue::test
