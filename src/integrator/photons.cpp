@@ -4,58 +4,53 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 namespace etendue {
 
 void Photons::trace(const PassContext& pass, const Bidirectional& paths,
                     const TechniqueCounts& counts, float radius, uint64_t max_bytes) {
-    radius_ = radius;
-    max_bytes_ = max_bytes;
-    begin_keeping(pass);
-    paths.trace_light_paths(pass, counts, pass.light_paths, collector_);
-    take_kept();
-}
-
-void Photons::trace_apart(const PassContext& pass, const Bidirectional& paths,
-                          const TechniqueCounts& counts, float radius, uint64_t max_bytes) {
-    radius_ = radius;
-    max_bytes_ = max_bytes;
-    begin_keeping(pass);
-    const uint64_t count = pass.light_paths, chunks = pass.chunks(count);
-    const auto none = [](int) {};
-    pass.for_each_other_path(chunks, [&](uint64_t chunk, Sampler& sampler, Workspace& work) {
-        for (uint64_t i = count * chunk / chunks; i < count * (chunk + 1) / chunks; ++i) {
-            work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
-            const PhaseTimer timer(work.stats, &PhaseSeconds::light_paths);
-            sampler.start(pass.index, pass.pixels + i);
-            paths.walk_light_path(pass.scene, sampler, counts, work.y, work.stats, none, none);
-            collector_.add(chunk, work.y);
-        }
-    });
-    take_kept();
-}
-
-void Photons::begin_keeping(const PassContext& pass) {
     // A vertex is in a chunk, which may have as much to spare, among all, and in the grid, whose entries were a list. There
     // are up to four buckets for it, twice while the grid is built, and in bytes for the density.
     constexpr uint64_t kVertexBytes =
         3 * sizeof(LightVertex) + 2 * sizeof(PointGrid::Entry) + 10 * sizeof(uint32_t);
-    collector_.begin(pass, kVertexBytes, max_bytes_);
+    radius_ = radius;
+    collector_.begin(pass, kVertexBytes, max_bytes);
+    paths.trace_light_paths(pass, counts, pass.light_paths, collector_);
+    collector_.assemble(paths_);
+    index();
 }
 
-void Photons::take_kept() {
-    collector_.assemble(paths_);
-    std::vector<PointGrid::Entry> entries;
-    double flux = 0, flux2 = 0;
+void Photons::index() {
+    // Counted, then written, by blocks, so that their order depends on no thread.
     const auto vertices = paths_.vertices();
-    for (uint32_t i = 0; i < vertices.size(); ++i) {
+    constexpr size_t kBlock = 4096;
+    struct Block {
+        size_t begin = 0;
+        double flux = 0, flux2 = 0;
+    };
+    std::vector<Block> blocks((vertices.size() + kBlock - 1) / kBlock + 1);
+    const auto for_each_connectible = [&](const auto& use) {
+        tbb::parallel_for(size_t(0), blocks.size() - 1, [&](size_t block) {
+            const size_t end = std::min(vertices.size(), (block + 1) * kBlock);
+            size_t rank = 0;
+            for (size_t i = block * kBlock; i < end; ++i)
+                if (vertices[i].may_connect) use(block, rank++, uint32_t(i));
+        });
+    };
+    for_each_connectible([&](size_t block, size_t, uint32_t) { ++blocks[block + 1].begin; });
+    for (size_t i = 1; i < blocks.size(); ++i) blocks[i].begin += blocks[i - 1].begin;
+    std::vector<PointGrid::Entry> entries(blocks.back().begin);
+    for_each_connectible([&](size_t block, size_t rank, uint32_t i) {
         const LightVertex& v = vertices[i];
-        if (!v.may_connect) continue;
         const float clamped = luminance(v.beta) * std::max(1.0f, kPi * sqr(radius_) * v.pdf_fwd);
-        flux += double(clamped), flux2 += sqr(double(clamped));
-        entries.push_back(
-            {v.p, i, uint32_t(paths_.depth(i) + 1) << 8 | paths_.gloss_before(i), clamped});
-    }
+        entries[blocks[block].begin + rank] = {
+            v.p, i, uint32_t(paths_.depth(i) + 1) << 8 | paths_.gloss_before(i), clamped};
+        blocks[block].flux += double(clamped);
+        blocks[block].flux2 += sqr(double(clamped));
+    });
+    double flux = 0, flux2 = 0;
+    for (const Block& b : blocks) flux += b.flux, flux2 += b.flux2;
     typical_flux_ = flux > 0 ? float(flux2 / flux) : 0.0f;
     grid_.build(entries, radius_);
 }

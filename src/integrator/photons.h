@@ -28,18 +28,8 @@ public:
     void trace(const PassContext& pass, const Bidirectional& paths, const TechniqueCounts& counts,
                float radius, uint64_t max_bytes);
 
-    /// The same with as many light paths that are nothing else: they have no techniques t ≤ 1, and numbers of their own.
-    void trace_apart(const PassContext& pass, const Bidirectional& paths,
-                     const TechniqueCounts& counts, float radius, uint64_t max_bytes);
-
-    /// Instead, light paths that samples trace themselves, for the next pass: begin_keeping() before the pass, keep() for
-    /// each sample, take_kept() after it. Radius and bound stay as they are.
-    void begin_keeping(const PassContext& pass);
-    void keep(const SampleContext& c, const SubPath& y) const { collector_.add(c.chunk, y); }
-    void take_kept();
-
     const LightPaths& paths() const { return paths_; }
-    /// The light vertices, if there are any, tell the density of partners within `radius`.
+    /// Ends the last pass: its light vertices, if there are any, tell the density of partners within `radius`.
     void learn_density(float radius);
     const PairDensity& density() const { return density_; }
     /// A light vertex's `flux` as most of the light has it.
@@ -69,12 +59,14 @@ public:
     float radius() const { return radius_; }
 
 private:
+    /// The grid of connectible vertices, and the typical flux.
+    void index();
+
     LightPaths paths_;
     PointGrid grid_;
     PairDensity density_;
     float radius_ = 0, typical_flux_ = 0;
-    uint64_t max_bytes_ = 0;
-    mutable LightPathCollector collector_;  ///< Each chunk is filled by one thread.
+    LightPathCollector collector_;
 };
 
 /// r_i = r_1 i^((α-1)/2), so that bias and noise both vanish [Knaus & Zwicker 2011, eq. 15].

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <stdexcept>
 
@@ -54,24 +53,16 @@ public:
 
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
+        if (connects_) count_.begin_pass(pass.so_far);
         learns_count_ = connects_ && pass.index > 0;  // the first pass's weights know of no density
-        if (learns(pass.index)) {
-            if (connects_) count_.begin_pass(pass.so_far);
-            const float radius = radius_ > 0 ? radius_ : radius_for(pass);
-            photons_.learn_density(radius);
-            photons_.trace_apart(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius,
-                                 memory_);
-        } else {
-            photons_.take_kept();
-        }
-        keeps_ = !learns(pass.index + 1);
-        if (keeps_) photons_.begin_keeping(pass);
+        const float radius = radius_ > 0 ? radius_ : radius_for(pass);
+        photons_.learn_density(radius);
+        photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
-        if (connects_) paths_.light_path(c, n, work);
-        if (keeps_) photons_.keep(c, work.y);
+        if (connects_) photons_.paths().restore(c.scene, c.pixel, work.y);
         const auto by_trials = [&](PairEvent event, const Join& j, float seen) {
             event.bound = bound_;
             const double r =
@@ -104,13 +95,8 @@ public:
     }
 
 private:
-    /// Whether the pass chooses radius, c and density anew. Pairs are made with the light paths of the pass before, so
-    /// that each sample traces its own just when it connects to it. But light vertices carry sums of weights, which must
-    /// be those of the pass: one that chooses anew traces light paths for its pairs apart. Without connections all do. A
-    /// choice knows nothing of the light paths that it is used with, so that the image has the right expectation.
-    bool learns(uint32_t pass) const { return !connects_ || std::has_single_bit(pass + 1); }
-
-    /// Such that an eye path finds kPairs pairs, as far as the passes since the last choice tell.
+    /// Such that an eye path finds kPairs pairs, as far as the last pass tells. A pass knows of earlier ones only, so that
+    /// its image has the right expectation whatever they found.
     float radius_for(const PassContext& pass) {
         const float size = pass.scene.bounds().radius(), largest = kLargest * size;
         if (pass.index == 0) return std::min(largest, size / std::sqrt(float(pass.light_paths)));
@@ -118,7 +104,7 @@ private:
                      paths = double(pass.so_far.eye_paths - eye_paths_so_far_);
         pairs_so_far_ = pass.so_far.pairs;
         eye_paths_so_far_ = pass.so_far.eye_paths;
-        const double factor = std::clamp(std::sqrt(kPairs * paths / (pairs + 1)), 0.25, 4.0);
+        const double factor = std::clamp(std::sqrt(kPairs * paths / (pairs + 1)), 0.5, 2.0);
         return std::min(largest, photons_.radius() * float(factor));
     }
 
@@ -151,7 +137,6 @@ private:
     float short_rate_;
     bool clamps_;
     bool learns_count_ = false;
-    bool keeps_ = false;  ///< The light paths of the pass, for the next.
     Photons photons_;
     PairCount count_;
 };
