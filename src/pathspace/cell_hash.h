@@ -1,6 +1,8 @@
 #pragma once
 // Cubes of space in hashed buckets.
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -22,7 +24,9 @@ public:
     };
     /// So many buckets that few cells of `points` points share one; cells so wide that a ball of `radius` meets at most
     /// eight.
-    CellHash(size_t points = 0, float radius = 1);
+    CellHash(size_t points = 0, float radius = 1)
+        : inv_width_(0.5f / radius),
+          mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}
 
     float width() const { return 1 / inv_width_; }
     uint32_t buckets() const { return mask_ + 1; }

@@ -1,15 +1,8 @@
 #include "pathspace/point_grid.h"
 
-#include <algorithm>
-#include <bit>
-
 #include <tbb/parallel_for.h>
 
 namespace etendue {
-
-CellHash::CellHash(size_t points, float radius)
-    : inv_width_(0.5f / radius),
-      mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}
 
 void PointGrid::build(std::span<const Entry> entries, float radius) {
     cells_ = CellHash(entries.size(), radius);
