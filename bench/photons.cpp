@@ -241,14 +241,15 @@ public:
     /// Light paths, and nothing else.
     void trace(uint64_t light_paths) {
         const PassContext pass = context(light_paths);
-        pass.for_each_light_path([&](uint64_t, const SampleContext& c, Workspace& work) {
+        pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
             paths_.light_path(c, counts(light_paths), work);
         });
     }
-    void keep(uint64_t light_paths, std::vector<LightPaths::Chunk>& chunks, LightPaths& kept) {
+    void keep(uint64_t light_paths, LightPathCollector& collector, LightPaths& kept) {
         const PassContext pass = context(light_paths);
-        paths_.trace_light_paths(pass, counts(light_paths), light_paths, sizeof(LightVertex),
-                                 UINT64_MAX, chunks, kept);
+        collector.begin(pass, sizeof(LightVertex), UINT64_MAX);
+        paths_.trace_light_paths(pass, counts(light_paths), light_paths, collector);
+        collector.assemble(kept);
     }
     /// Eye vertices that would look for photons, in the order of a pass; of every eighth chunk.
     std::vector<Vec3> queries() {
@@ -289,9 +290,8 @@ private:
                     [this, light_paths](uint64_t count, const PassContext::Use& use) {
                         for (uint64_t i = 0; i < count; ++i) {
                             sampler_.start(0, i);
-                            use(i / kChunk,
-                                {scene_, film_, i, light_paths, 1 / float(light_paths), sampler_,
-                                 sink_},
+                            use({scene_, film_, i, i / kChunk, light_paths, 1 / float(light_paths),
+                                 sampler_, sink_},
                                 work_);
                         }
                     },
@@ -362,10 +362,10 @@ void measure_map(const Report& report, const Options& options, const Scene& scen
     const float radius = walks.radius();
 
     const double heap_before = heap_bytes();
-    std::vector<LightPaths::Chunk> chunks;
+    LightPathCollector collector;
     LightPaths paths;
     PointGrid grid;
-    walks.keep(light_paths, chunks, paths);
+    walks.keep(light_paths, collector, paths);
     grid.build(entries_of(paths), radius);
     const double held = heap_bytes() - heap_before;
     const std::vector<PointGrid::Entry> entries = entries_of(paths);
@@ -379,7 +379,7 @@ void measure_map(const Report& report, const Options& options, const Scene& scen
     const auto runs = repeat(options.repeats, [&] {
         Run run;
         run.trace = processor_seconds_of(least, [&] { walks.trace(light_paths); });
-        run.keep = processor_seconds_of(least, [&] { walks.keep(light_paths, chunks, paths); });
+        run.keep = processor_seconds_of(least, [&] { walks.keep(light_paths, collector, paths); });
         run.build = processor_seconds_of(least, [&] { grid.build(entries, radius); });
         run.query = query_seconds(grid, queries, radius, least);
         return run;
@@ -445,9 +445,9 @@ void measure_growth(const Report& report, const Options& options, const Scene& s
 
     std::vector<PointGrid::Entry> entries;
     for (uint64_t light_paths = 1024; double(entries.size()) < most; light_paths *= 2) {
-        std::vector<LightPaths::Chunk> chunks;
+        LightPathCollector collector;
         LightPaths paths;
-        walks.keep(light_paths, chunks, paths);
+        walks.keep(light_paths, collector, paths);
         entries = entries_of(paths);
     }
     PointGrid grid;
