@@ -1,6 +1,7 @@
 #pragma once
 // The gather of a pair: one of its vertices dropped, the other joined to the dropped one's predecessor.
 
+#include "integrator/pair_worth.h"
 #include "integrator/photons.h"
 #include "pathspace/reciprocal.h"
 
@@ -11,6 +12,7 @@ struct Gather {
     const SampleContext& c;
     const Bidirectional& paths;
     const Photons& photons;
+    const PairWorth& worth;
     const TechniqueCounts& n;
     float flatness;   ///< Half the height of a neighbourhood over its radius.
     float threshold;  ///< Of roulette, see Bidirectional::threshold().
@@ -23,7 +25,8 @@ struct Gather {
     void operator()(int t, const Reciprocal& reciprocal) const {
         const float brought = reflected(t);
         // Where most partners are not worth a look, z_{t-1} mostly looks for none.
-        const float looks = join_survival(brought * photons.typical_flux(), threshold);
+        const float looks =
+            join_survival(worth.of_search(t) * brought * photons.mean_flux(), threshold);
         if (!survives(looks, uint32_t(hash_combine(UINT32_MAX, uint64_t(t))))) return;
         const Vertex& last = work.z[t - 2];
         const uint8_t after = gloss(last, last.is_delta);
@@ -39,7 +42,9 @@ struct Gather {
             y.drops_light = drops_here(false, y) && near_eye.contains(y.p);
             if (!y.drops_eye && !y.drops_light) return false;
             ++work.stats.pairs;
-            const float wanted = rate(edges) * join_survival(brought * y.flux, threshold);
+            y.estimate = brought * y.flux;
+            const float wanted =
+                rate(edges) * join_survival(worth.of(y.s, t) * y.estimate, threshold);
             y.rate = std::min(wanted, looks);
             return survives(y.rate / looks, number(y, t) + 2);  // join() has the first two
         };
@@ -67,15 +72,13 @@ private:
     float rate(int edges) const { return n.gathers(edges) / n.gather; }
 
     /// What a pair at z_{t-1} adds to its pixel for each unit of flux, as far as roulette knows before it looks up the
-    /// light path: as a merge does on a diffuse surface, or on one as bright as the highlight of a glossy one, and an
-    /// eighth of that for the weight. What joins bring is mostly less.
+    /// light path: as a merge does on a diffuse surface, or on one as bright as the highlight of a glossy one.
     float reflected(int t) const {
-        constexpr float kWeight = 0.125f;
         const Vertex& z = work.z[t - 1];
         const float roughness = 1 - float(z.gloss) / kSharpestGloss;
         const float highlight = std::max(1.0f, 0.25f / sqr(roughness));
         const float clamped = std::max(1.0f, n.disc * z.pdf_fwd);
-        return kWeight * highlight * clamped * luminance(z.beta) * std::fabs(work.z.film_weight) *
+        return highlight * clamped * luminance(z.beta) * std::fabs(work.z.film_weight) *
                c.splat_scale / (kPi * n.disc);
     }
 
@@ -89,9 +92,14 @@ private:
         light.restore_first(c.scene, partner.vertex, eye ? q.s : q.s - 1, work.is_observed, y);
         if (eye && !near(y[q.s - 1]).contains(z[q.t - 1].p)) return;
         const auto j = join_gather(c.scene, y, q.s, z, q.t, eye, n);
+        const float scale = std::fabs(z.film_weight) * c.splat_scale;
+        if (partner.estimate > 0) {
+            const float brings =
+                j ? luminance(j->contribution) * j->mis_weight * scale / j->found : 0;
+            PairWorth::observe(q.s, q.t, brings / partner.estimate, work.stats);
+        }
         if (!j) return;
-        const float scale = std::fabs(z.film_weight) * c.splat_scale / partner.rate;
-        const auto value = paths.test(c, *j, scale / j->found, number, work);
+        const auto value = paths.test(c, *j, scale / (partner.rate * j->found), number, work);
         if (!value) return;
         ++work.stats.visible_pairs;
         c.sampler.seek(Stream::Auxiliary, number);

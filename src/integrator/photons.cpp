@@ -27,7 +27,7 @@ void Photons::index() {
     constexpr size_t kBlock = 4096;
     struct Block {
         size_t begin = 0;
-        double flux = 0, flux2 = 0;
+        double flux = 0;
     };
     std::vector<Block> blocks((vertices.size() + kBlock - 1) / kBlock + 1);
     const auto for_each_connectible = [&](const auto& use) {
@@ -47,11 +47,10 @@ void Photons::index() {
         entries[blocks[block].begin + rank] = {
             v.p, i, uint32_t(paths_.depth(i) + 1) << 8 | paths_.gloss_before(i), clamped};
         blocks[block].flux += double(clamped);
-        blocks[block].flux2 += sqr(double(clamped));
     });
-    double flux = 0, flux2 = 0;
-    for (const Block& b : blocks) flux += b.flux, flux2 += b.flux2;
-    typical_flux_ = flux > 0 ? float(flux2 / flux) : 0.0f;
+    double flux = 0;
+    for (const Block& b : blocks) flux += b.flux;
+    mean_flux_ = entries.empty() ? 0.0f : float(flux / double(entries.size()));
     grid_.build(entries, radius_);
 }
 

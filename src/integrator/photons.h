@@ -16,7 +16,8 @@ struct Partner {
     /// Luminance, times the area density of y_{s-1} over the disc's where it is larger.
     float flux;
     // For may_pair to set:
-    float rate;  ///< The share of such partners that is used.
+    float estimate;  ///< Of what its join adds to the pixel, which PairWorth corrects.
+    float rate;      ///< The share of such partners that is used.
     bool drops_eye, drops_light;
 };
 
@@ -32,8 +33,8 @@ public:
     /// Ends the last pass: its light vertices, if there are any, tell the density of partners within `radius`.
     void learn_density(float radius);
     const PairDensity& density() const { return density_; }
-    /// A light vertex's `flux` as most of the light has it.
-    float typical_flux() const { return typical_flux_; }
+    /// Of the partners.
+    float mean_flux() const { return mean_flux_; }
     /// Calls use(partner) for the light vertices nearer to `p` than the radius for which may_pair(partner) holds.
     template <class MayPair, class Use>
     void for_each_near(Vec3 p, const MayPair& may_pair, const Use& use) const {
@@ -47,7 +48,7 @@ public:
         };
         grid_.for_each_near(p, radius_, [&](const PointGrid::Entry& e) {
             Partner& partner = found[count];
-            partner = {e.p,  e.index, int(e.tag >> 8), uint8_t(e.tag & 0xff), e.weight, 1,
+            partner = {e.p,  e.index, int(e.tag >> 8), uint8_t(e.tag & 0xff), e.weight, 0, 1,
                        true, true};
             if (!may_pair(partner)) return;
             paths_.prefetch(e.index);
@@ -59,13 +60,13 @@ public:
     float radius() const { return radius_; }
 
 private:
-    /// The grid of connectible vertices, and the typical flux.
+    /// The grid of connectible vertices, and their mean flux.
     void index();
 
     LightPaths paths_;
     PointGrid grid_;
     PairDensity density_;
-    float radius_ = 0, typical_flux_ = 0;
+    float radius_ = 0, mean_flux_ = 0;
     LightPathCollector collector_;
 };
 

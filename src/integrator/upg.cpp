@@ -16,6 +16,7 @@
 
 #include "integrator/gather.h"
 #include "integrator/pair_count.h"
+#include "integrator/pair_worth.h"
 #include "integrator/photon_memory.h"
 
 namespace etendue {
@@ -54,6 +55,7 @@ public:
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
         if (connects_) count_.begin_pass(pass.so_far);
+        worth_.begin_pass(pass.so_far);
         learns_count_ = connects_ && pass.index > 0;  // the first pass's weights know of no density
         const float radius = radius_ > 0 ? radius_ : radius_for(pass);
         photons_.learn_density(radius);
@@ -76,7 +78,7 @@ public:
             }
             return r;
         };
-        const Gather gather{c, paths_, photons_, n, flatness_, paths_.threshold(c), work};
+        const Gather gather{c, paths_, photons_, worth_, n, flatness_, paths_.threshold(c), work};
         paths_.eye_path(c, n, work, [&](int t) {
             paths_.add_next_event(c, n, t, work);
             paths_.connect_to_own(c, n, t, work);
@@ -139,6 +141,7 @@ private:
     bool learns_count_ = false;
     Photons photons_;
     PairCount count_;
+    PairWorth worth_;
 };
 
 std::vector<ParamInfo> params() {

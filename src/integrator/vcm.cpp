@@ -30,6 +30,7 @@ public:
 
     void begin_pass(const PassContext& pass) override {
         paths_.begin_pass(pass);
+        worth_.begin_pass(pass.so_far);
         const float radius = radius_.radius(pass.scene, pass.index);
         photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
     }
@@ -41,7 +42,7 @@ public:
         const auto by_disc = [](const PairEvent& event, const Join& j, float) {
             return 1 / double(event.from.survival.value() * j.found);
         };
-        const Gather gather{c, paths_, photons_, n, 1, paths_.threshold(c), work};
+        const Gather gather{c, paths_, photons_, worth_, n, 1, paths_.threshold(c), work};
         paths_.eye_path(c, n, work, [&](int t) {
             paths_.add_next_event(c, n, t, work);
             paths_.connect_to_own(c, n, t, work);
@@ -95,6 +96,7 @@ private:
     bool connects_, merges_, is_exact_;
     uint64_t memory_;
     Photons photons_;
+    PairWorth worth_;
 };
 
 }  // namespace

@@ -37,9 +37,14 @@ struct RenderStats {
     /// Visible pairs by trials: 1, 2, 3–4, 5–8, … The share of those with 1 is 1 - Var(r)/E(r)².
     std::array<uint64_t, 24> pairs_by_trials{};
     std::array<uint64_t, 6> second_moments{};  ///< See PairCount.
-    uint64_t bounds_exceeded = 0;              ///< Densities above their bound: must stay 0.
-    uint64_t runaways = 0;  ///< Pairs given up after too many trials: must stay 0.
-    uint64_t rejected = 0;  ///< Contributions that were not finite or negative.
+    struct PairJoins {
+        uint64_t count = 0, squares = 0;
+    };
+    static constexpr int kPairLengths = 8;
+    std::array<PairJoins, kPairLengths * kPairLengths> pair_joins{};  ///< See PairWorth.
+    uint64_t bounds_exceeded = 0;  ///< Densities above their bound: must stay 0.
+    uint64_t runaways = 0;         ///< Pairs given up after too many trials: must stay 0.
+    uint64_t rejected = 0;         ///< Contributions that were not finite or negative.
 
     void count_trials(uint64_t n) {
         ++pairs_by_trials[std::min<size_t>(size_t(std::bit_width(n - 1)),
