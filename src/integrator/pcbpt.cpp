@@ -120,12 +120,14 @@ private:
         connections_ = double(given_connections_);
         if (connections_ > 0) return;
         // The records are the pilot: bdpt would trace as many shadow rays from an eye vertex as they did for one light
-        // path. What the records cost themselves is taken off. K may depend on them, as the draws do not.
+        // path. What the records cost themselves is taken off, and what takes time besides rays: finding the records, and
+        // searching them at each draw. K may depend on them, as the draws do not.
         uint64_t vertices = 0, rays = 0;
         for (const auto& [v, r] : found) vertices += v, rays += r;
         const double M = double(kept(pass.light_paths));
         const double of_bdpt = vertices > 0 ? double(rays) / (M * double(vertices)) : 0.0;
-        connections_ = std::max(kFewest, of_bdpt * (1 - double(record_fraction_) * M));
+        const double left = of_bdpt * (1 - double(record_fraction_) * M) - kRaysOfSearch;
+        connections_ = std::max(kFewest, left / kRaysOfDraw);
     }
 
     /// R2 sequence: multiples of the powers of the plastic number's inverse, modulo 1 [Roberts 2018].
@@ -176,6 +178,8 @@ private:
 
     /// K at least, where it is automatic.
     static constexpr double kFewest = 0.25;
+    /// What a mixture takes to be found, and a draw from it with its join, in connections of bdpt.
+    static constexpr double kRaysOfSearch = 0.5, kRaysOfDraw = 1.1;
 
     struct StoredVertex {
         uint32_t path;
@@ -208,8 +212,8 @@ IntegratorEntry pcbpt_entry() {
     params.push_back({"light_paths", ParamKind::Int, "100",
                       "M: light paths of a pass whose vertices all eye vertices may connect to."});
     params.push_back({"connections", ParamKind::Float, "0",
-                      "K: connections of each eye vertex, on average; 0: as many as bdpt has rays "
-                      "for, less those of the records, but at least 0.25."});
+                      "K: connections of each eye vertex, on average; 0: as many as bdpt has time "
+                      "for, less that of the records, but at least 0.25."});
     params.push_back({"record_fraction", ParamKind::Float, "0.001",
                       "Eye paths along which importance records are made, over the pixels."});
     params.push_back({"neighbours", ParamKind::Int, "6",
