@@ -177,7 +177,7 @@ private:
     }
 
     /// K at least, where it is automatic.
-    static constexpr double kFewest = 0.25;
+    static constexpr double kFewest = 0.125;
     /// What a mixture takes to be found, and a draw from it with its join, in connections of bdpt.
     static constexpr double kRaysOfSearch = 0.5, kRaysOfDraw = 1.1;
 
@@ -213,7 +213,7 @@ IntegratorEntry pcbpt_entry() {
                       "M: light paths of a pass whose vertices all eye vertices may connect to."});
     params.push_back({"connections", ParamKind::Float, "0",
                       "K: connections of each eye vertex, on average; 0: as many as bdpt has time "
-                      "for, less that of the records, but at least 0.25."});
+                      "for, less that of the records, but at least 0.125."});
     params.push_back({"record_fraction", ParamKind::Float, "0.001",
                       "Eye paths along which importance records are made, over the pixels."});
     params.push_back({"neighbours", ParamKind::Int, "6",
