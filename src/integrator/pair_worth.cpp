@@ -32,7 +32,7 @@ void PairWorth::observe(int s, int t, float brought, RenderStats& stats) {
     constexpr float kMost = 8;
     RenderStats::PairJoins& joins = stats.pair_joins[index(s, t)];
     ++joins.count;
-    joins.squares += uint64_t(kUnit * sqr(double(std::min(brought, kMost))));
+    if (brought > 0) joins.squares += uint64_t(kUnit * sqr(double(std::min(brought, kMost))));
 }
 
 }  // namespace etendue

@@ -20,7 +20,8 @@ public:
     /// Of the search for partners of z_{t-1}, which may find several.
     float of_search(int t) const { return searches_[column(t)]; }
 
-    /// A join that brought so many times the estimate, which may be 0 times.
+    /// A join that brought so many times the estimate: 0 where it failed, and no number, which counts as 0, where its pair
+    /// could not have been found.
     static void observe(int s, int t, float brought, RenderStats& stats);
 
 private:

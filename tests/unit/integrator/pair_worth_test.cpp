@@ -2,6 +2,9 @@
 
 #include "integrator/pair_worth.h"
 
+#include <cmath>
+#include <limits>
+
 #include <gtest/gtest.h>
 
 namespace etendue {
@@ -26,6 +29,16 @@ TEST(PairWorth, IsTheRootMeanSquareOfWhatJoinsBrought) {
     EXPECT_NEAR(worth_after(0.1f, 3, 4) / one, 0.1f, 0.001f);
     // Half of them brought nothing; before any join, an eighth is assumed.
     EXPECT_NEAR(one / before_any(), std::sqrt(0.5f) / 0.125f, 0.01f);
+}
+
+TEST(PairWorth, TakesWhatIsNoNumberForNothing) {
+    RenderStats none, nan;
+    PairWorth::observe(3, 4, 0, none);
+    PairWorth::observe(3, 4, std::numeric_limits<float>::quiet_NaN(), nan);
+    PairWorth a, b;
+    a.begin_pass(none);
+    b.begin_pass(nan);
+    EXPECT_EQ(a.of(3, 4), b.of(3, 4));
 }
 
 TEST(PairWorth, TellsLengthsApartUpToALimit) {
