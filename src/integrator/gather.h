@@ -24,22 +24,24 @@ struct Gather {
     template <class Reciprocal>
     void operator()(int t, const Reciprocal& reciprocal) const {
         const float brought = reflected(t);
-        // Where most partners are not worth a look, z_{t-1} mostly looks for none.
+        const Vertex& z = work.z[t - 1];
+        // Where most partners are not worth a look, z_{t-1} mostly looks for none. A search that finds n of them has a
+        // second moment of n (n+1), and takes n+1 times as long as to find none.
+        const float partners = std::max(1.0f, photons.density().partners(z.p));
         const float looks =
-            join_survival(worth.of_search(t) * brought * photons.mean_flux(), threshold);
+            join_survival(worth.of_search(t) * brought * photons.mean_flux() * std::sqrt(partners), threshold);
         if (!survives(looks, uint32_t(hash_combine(UINT32_MAX, uint64_t(t))))) return;
         const Vertex& last = work.z[t - 2];
         const uint8_t after = gloss(last, last.is_delta);
         const auto drops_here = [&](bool eye, const Partner& partner) {
             return drops(n.pair_rule, eye, partner.gloss_before, after);
         };
-        const Vertex& z = work.z[t - 1];
-        const Neighbourhood near_eye = near(z);
+        const Neighbourhood near_eye = near(z, z.arrival_side());
         const auto may_pair = [&](Partner& y) {
             const int edges = y.s + t - 2;
             if (edges > paths.max_depth() || !(n.gathers(edges) > 0)) return false;
-            y.drops_eye = drops_here(true, y);
-            y.drops_light = drops_here(false, y) && near_eye.contains(y.p);
+            y.drops_eye = drops_here(true, y) && y.side.admits(near_eye.side);
+            y.drops_light = drops_here(false, y) && near_eye.contains(y.p, y.side);
             if (!y.drops_eye && !y.drops_light) return false;
             ++work.stats.pairs;
             y.estimate = brought * y.flux;
@@ -61,8 +63,8 @@ private:
         c.sampler.seek(Stream::Roulette, number);
         return c.sampler.next_1d_unstructured() < q;
     }
-    Neighbourhood near(const Vertex& kept) const {
-        return {kept.p, kept.ng, photons.radius(), flatness * photons.radius()};
+    Neighbourhood near(const Vertex& kept, ArrivalSide side) const {
+        return {kept.p, kept.ng, side, photons.radius(), flatness * photons.radius()};
     }
 
     static uint32_t number(const Partner& y, int t) {
@@ -90,7 +92,10 @@ private:
         const LightPaths& light = photons.paths();
         const bool eye = q.drops_eye;
         light.restore_first(c.scene, partner.vertex, eye ? q.s : q.s - 1, work.is_observed, y);
-        if (eye && !near(y[q.s - 1]).contains(z[q.t - 1].p)) return;
+        const Vertex& last = z[q.t - 1];
+        const Neighbourhood kept =
+            eye ? near(y[q.s - 1], partner.side) : near(last, last.arrival_side());
+        if (eye && !kept.contains(last.p, last.arrival_side())) return;
         const auto j = join_gather(c.scene, y, q.s, z, q.t, eye, n);
         const float scale = std::fabs(z.film_weight) * c.splat_scale;
         if (partner.estimate > 0) {
@@ -106,7 +111,7 @@ private:
         const PairEvent event{.from = eye ? z[q.t - 2] : y[q.s - 2],
                               .mode = eye ? TransportMode::Radiance : TransportMode::Importance,
                               .u_emission = y.u_emission,
-                              .near = near(eye ? y[q.s - 1] : z[q.t - 1])};
+                              .near = kept};
         const float survival = partner.rate / rate(q.s + q.t - 2);
         const double r =
             reciprocal(event, *j, luminance(*value) / (luminance(j->contribution) * survival));

@@ -15,7 +15,7 @@ void PairWorth::begin_pass(const RenderStats& so_far) {
     // As if there had been a few joins that brought what is first assumed.
     constexpr double kFirst = 0.125, kJoins = 16;
     // By trial on four scenes; a factor of two in either is hardly seen.
-    constexpr float kLook = 2, kSearch = 0.5f;
+    constexpr float kLook = 2, kSearch = 0.7f;
     searches_.fill(0);
     for (size_t i = 0; i < values_.size(); ++i) {
         const RenderStats::PairJoins& joins = so_far.pair_joins[i];

@@ -12,6 +12,7 @@ struct Partner {
     Vec3 p;
     uint32_t vertex;
     int s;
+    ArrivalSide side;
     uint8_t gloss_before;  ///< Of y_{s-2}, or of its event.
     /// Luminance, times the area density of y_{s-1} over the disc's where it is larger.
     float flux;
@@ -48,8 +49,16 @@ public:
         };
         grid_.for_each_near(p, radius_, [&](const PointGrid::Entry& e) {
             Partner& partner = found[count];
-            partner = {e.p,  e.index, int(e.tag >> 8), uint8_t(e.tag & 0xff), e.weight, 0, 1,
-                       true, true};
+            partner = {.p = e.p,
+                       .vertex = e.index,
+                       .s = size_of(e),
+                       .side = ArrivalSide::from_bits(e.tag >> 16),
+                       .gloss_before = uint8_t(e.tag & 0xff),
+                       .flux = e.weight,
+                       .estimate = 0,
+                       .rate = 1,
+                       .drops_eye = true,
+                       .drops_light = true};
             if (!may_pair(partner)) return;
             paths_.prefetch(e.index);
             ++count;
@@ -60,6 +69,12 @@ public:
     float radius() const { return radius_; }
 
 private:
+    /// Tags of the grid's entries: arrival side, s or kManyVertices, and gloss before.
+    static constexpr uint32_t kManyVertices = 255;
+    int size_of(const PointGrid::Entry& e) const {
+        const uint32_t s = e.tag >> 8 & 0xff;
+        return s < kManyVertices ? int(s) : paths_.depth(e.index) + 1;
+    }
     /// The grid of connectible vertices, and their mean flux.
     void index();
 

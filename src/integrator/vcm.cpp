@@ -81,7 +81,10 @@ private:
     }
 
     void merge(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
-        const auto may_pair = [&](const Partner& y) { return y.s + t - 2 <= paths_.max_depth(); };
+        const ArrivalSide side = work.z[t - 1].arrival_side();
+        const auto may_pair = [&](const Partner& y) {
+            return y.s + t - 2 <= paths_.max_depth() && side.admits(y.side);
+        };
         photons_.for_each_near(work.z[t - 1].p, may_pair, [&](const Partner& y) {
             photons_.paths().restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair);
             const auto j = join_merge(work.pair, y.s, work.z, t, n);

@@ -10,6 +10,7 @@ namespace etendue {
 void LightPaths::Chunk::clear() {
     heads_.clear();
     vertices_.clear();
+    sides_.clear();
 }
 
 void LightPaths::Chunk::add(const SubPath& y) {
@@ -40,6 +41,7 @@ void LightPaths::Chunk::add(const SubPath& y) {
                              .medium = v.medium,
                              .survival_steps = v.survival.steps(),
                              .gloss = v.gloss});
+        sides_.push_back(v.arrival_side());
     }
     head.end = uint32_t(vertices_.size());
 }
@@ -59,10 +61,12 @@ void LightPaths::assemble(std::span<const Chunk> chunks) {
                                  "max_depth, or render in crops");
     heads_.resize(paths);
     vertices_.resize(total);
+    sides_.resize(total);
     tbb::parallel_for(size_t(0), chunks.size(), [&](size_t chunk) {
         const Chunk& c = chunks[chunk];
         auto [path, first] = begins[chunk];
         std::copy(c.vertices_.begin(), c.vertices_.end(), vertices_.begin() + ptrdiff_t(first));
+        std::copy(c.sides_.begin(), c.sides_.end(), sides_.begin() + ptrdiff_t(first));
         for (Chunk::Head head : c.heads_) {
             head.begin += uint32_t(first), head.end += uint32_t(first);
             for (uint32_t i = head.begin; i < head.end; ++i)
@@ -73,7 +77,8 @@ void LightPaths::assemble(std::span<const Chunk> chunks) {
 }
 
 size_t LightPaths::memory_bytes() const {
-    return heads_.capacity() * sizeof(Chunk::Head) + vertices_.capacity() * sizeof(LightVertex);
+    return heads_.capacity() * sizeof(Chunk::Head) + vertices_.capacity() * sizeof(LightVertex) +
+           sides_.capacity() * sizeof(ArrivalSide);
 }
 
 void LightPaths::restore_head(uint64_t index, SubPath& y) const {

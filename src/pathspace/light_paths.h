@@ -43,12 +43,14 @@ public:
         };
         std::vector<Head> heads_;
         std::vector<LightVertex> vertices_;
+        std::vector<ArrivalSide> sides_;  ///< Of these.
     };
 
     /// Takes the chunks' paths in order, whichever threads made them.
     void assemble(std::span<const Chunk> chunks);
 
     std::span<const LightVertex> vertices() const { return vertices_; }
+    std::span<const ArrivalSide> arrival_sides() const { return sides_; }
     size_t size() const { return heads_.size(); }
     size_t memory_bytes() const;
 
@@ -81,6 +83,7 @@ private:
 
     std::vector<Chunk::Head> heads_;
     std::vector<LightVertex> vertices_;
+    std::vector<ArrivalSide> sides_;  ///< Of these; in the order of joins they are read before them.
 };
 
 }  // namespace etendue

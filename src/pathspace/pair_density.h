@@ -27,6 +27,9 @@ public:
         return levels_.empty() ? 1 : double(shares_[levels_[cells_.bucket_of(cells_.cell_of(p))]]);
     }
 
+    /// n at `p`, to as much.
+    float partners(Vec3 p) const { return float((1 / share(p) - 1) / kCorrelation); }
+
     /// ρ. What competes with a gather shares most of the eye path too, hence far less than 1: of 0.05, 0.2, 0.5 and 1, 0.2 had
     /// the least errors on scenes with few and with many partners (veach-ajar, staircase2, veach-bidir, living-room).
     static constexpr double kCorrelation = 0.2;

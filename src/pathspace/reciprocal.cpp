@@ -1,10 +1,11 @@
 #include "pathspace/reciprocal.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <variant>
 
 #include "math/warp.h"
+#include "pathspace/seen_region.h"
 
 namespace etendue {
 namespace {
@@ -35,7 +36,7 @@ public:
             return;
         }
         propose_cone();
-        if (e_.bound == TrialBound::Slab) propose_patch();
+        if (e_.bound == TrialBound::Slab) propose_region();
     }
 
     double mass() const { return mass_; }
@@ -59,17 +60,18 @@ public:
             ray.d = in_cone(sampler_.next_2d());
             if (!passes(pdf(ray.d), stats)) return {};
             break;
-        case Proposal::Patch:
-            if (!toward(in_patch(sampler_.next_2d()), ray.d, stats)) return {};
+        case Proposal::Region:
+            if (!in_region(ray.d, stats)) return {};
             break;
-        case Proposal::Cells: {
-            const auto q = in_cell();
-            if (!q || !toward(*q, ray.d, stats)) return {};
+        case Proposal::WholeRegion:
+            // Its mass is known, so that only what leaves the bound for it is a trial.
+            while (!in_region(ray.d, stats)) continue;
+            if (!(pdf(ray.d) > 0)) return {};
             break;
-        }
         case Proposal::Parallel: {
             ray.d = -e_.from.p;
-            const Vec3 q = in_patch(sampler_.next_2d());
+            const Vec2 u = sample_uniform_disk(sampler_.next_2d()) * parallel_radius_;
+            const Vec3 q = e_.near.p + frame_.s * u.x + frame_.t * u.y;
             const Vec3 start = disc_.center + e_.from.p * disc_.radius;
             ray.o = q + e_.from.p * dot(start - q, e_.from.p);
             if (!(length2(ray.o - start) < sqr(disc_.radius))) return {};
@@ -82,24 +84,7 @@ public:
     }
 
 private:
-    enum class Proposal { Walk, Box, Ellipse, Cone, Patch, Cells, Parallel };
-
-    /// Part of a plane through the neighbourhood's centre: a disc or a rectangle.
-    struct Patch {
-        Vec3 s, t;
-        Vec2 half;  ///< Extents along these.
-        bool is_round;
-        float height = 0;  ///< Of `from` over the plane,
-        Vec2 foot;         ///< and its foot.
-
-        double area() const { return (is_round ? double(kPi) : 4.0) * double(half.x) * half.y; }
-        float radius() const { return is_round ? half.x : std::hypot(half.x, half.y); }
-    };
-    struct Cell {
-        Vec2 center;
-        float max_pdf;
-        double mass;
-    };
+    enum class Proposal { Walk, Box, Ellipse, Cone, Region, WholeRegion, Parallel };
 
     bool from_emitter() const { return e_.from.kind == Vertex::Kind::Emitter; }
 
@@ -133,10 +118,12 @@ private:
             double(radius_) + double(half_height_) * std::sqrt(std::max(0.0, 1 - cos * cos)) / cos;
         const double slab = sqr(through) * cos, ball = sqr(double(radius_));
         if (e_.bound == TrialBound::Slab && slab < ball) {
-            patch_ = disc_about(e_.near.n, float(through));
+            frame_ = Frame::from_normal(e_.near.n);
+            parallel_radius_ = float(through);
             mass_ = slab / disc2;
         } else {
-            patch_ = disc_about(e_.from.p, radius_);
+            frame_ = Frame::from_normal(e_.from.p);
+            parallel_radius_ = radius_;
             mass_ = ball / disc2;
         }
     }
@@ -168,84 +155,58 @@ private:
         frame_ = Frame::from_normal(axis);
     }
 
-    /// Points P of a patch through all of which the neighbourhood is seen. With the height H of `from` over its plane their
-    /// area density is p_σ H / |P - x|³.
-    void propose_patch() {
-        const float height = abs_dot(e_.near.n, to_center_), h = half_height_;
-        Patch patch;
-        if (height > 2 * h) {
-            const float foot = safe_sqrt(dist2_ - sqr(height));
-            patch = disc_about(e_.near.n, radius_ + (radius_ + foot) * h / (height - h));
-            patch.height = height;
-            patch.foot = {-dot(to_center_, patch.s), -dot(to_center_, patch.t)};
-        } else if (sqr(radius_) < 0.25f * dist2_) {
-            patch = seen_edge_on();
-        } else {
-            return;
-        }
-        // From this far on a smaller mass is worth its cost.
-        constexpr double kLoose = 1.5;
-        const float dist = std::sqrt(dist2_);
-        const double density = max_area_pdf(patch, {}, patch.radius());
-        if (patch.area() * density < mass_) {
-            proposal_ = Proposal::Patch;
-            mass_ = patch.area() * density;
-            max_pdf_ = float(density);
-            patch_ = patch;
-        }
-        const double found = double(kPi) * sqr(double(e_.near.radius)) *
-                             double(pdf(to_center_ / dist) * height / (dist2_ * dist));
-        if (mass_ > kLoose * found) propose_cells(patch);
+    /// A region through all of which the neighbourhood is seen.
+    void propose_region() {
+        // Below this height over the plane, in half heights of the slab, a disc would be much larger than the slab.
+        constexpr float kLow = 2;
+        const SlabView view(to_center_, e_.near.n, radius_, half_height_);
+        if (view.height > kLow * half_height_) propose(SeenDisc(view));
+        if (!(view.height > kLow * half_height_) || proposal_ == Proposal::Walk)
+            propose(SeenBand(view));
     }
-    /// Bound of the area density of points within `reach` of `center`; infinite where that goes all around `from`.
-    double max_area_pdf(const Patch& patch, Vec2 center, float reach) const {
-        const Vec3 v = to_center_ + patch.s * center.x + patch.t * center.y;
-        const float dist = length(v), sin = reach / dist;
-        if (!(sin < 1)) return double(kInf);
-        const float to_foot = std::hypot(center.x - patch.foot.x, center.y - patch.foot.y);
-        const double nearest2 =
-            sqr(double(patch.height)) + sqr(double(std::max(0.0f, to_foot - reach)));
-        return double(max_pdf({v / dist, std::asin(sin)})) * patch.height /
-               (nearest2 * std::sqrt(nearest2));
-    }
-    /// A grid of cells over the patch, each with its own bound.
-    void propose_cells(const Patch& patch) {
-        const Vec2 half = patch.half * (1.0f / kCells);
-        const float reach = std::hypot(half.x, half.y);
-        double mass = 0;
-        cell_count_ = 0;
-        for (int i = 0; i < kCells * kCells; ++i) {
-            const Vec2 center{(2 * float(i % kCells) + 1) * half.x - patch.half.x,
-                              (2 * float(i / kCells) + 1) * half.y - patch.half.y};
-            if (patch.is_round && std::hypot(center.x, center.y) > patch.half.x + reach) continue;
-            const double density = max_area_pdf(patch, center, reach);
-            const double cell = 4 * double(half.x) * half.y * density;
-            if (!(mass + cell < mass_)) return;
-            mass += cell;
-            cells_[size_t(cell_count_++)] = {center, float(density), cell};
+    void propose(const SeenDisc& disc) {
+        const double whole = cosine_ ? disc.cosine_mass(*cosine_) : 0;
+        if (whole > 0 && whole < mass_) {
+            // Loss costs no trials there, only time.
+            constexpr double kEnough = 2, kMost = 16;
+            const BoundedCells cells = divide(disc, kEnough * whole);
+            if (cells.mass() < kMost * whole) {
+                accept(Proposal::WholeRegion, disc, cells, whole);
+                return;
+            }
         }
-        if (!(mass > 0)) return;
-        proposal_ = Proposal::Cells;
+        propose_cells(disc);
+    }
+    void propose(const SeenBand& band) { propose_cells(band); }
+    template <class Region>
+    void propose_cells(const Region& region) {
+        // From this far on over what would be without loss, more cells gain little.
+        constexpr double kEnough = 1.1;
+        const RegionPoint center = region.at({0.5f, 0.5f});
+        const double without_loss = region.measure() * double(pdf(center.d) * center.scale);
+        const BoundedCells cells = divide(region, kEnough * without_loss);
+        if (cells.mass() < mass_) accept(Proposal::Region, region, cells, cells.mass());
+    }
+    template <class Region>
+    BoundedCells divide(const Region& region, double enough) const {
+        return {region, [&](const DirectionCone& c) { return max_pdf(c); }, enough};
+    }
+    template <class Region>
+    void accept(Proposal proposal, const Region& region, const BoundedCells& cells, double mass) {
+        proposal_ = proposal;
+        region_ = region;
+        cells_ = cells;
         mass_ = mass;
-        patch_ = patch;
     }
-    /// A rectangle across the direction to a neighbourhood that lies almost in its tangent plane. In perspective the ball
-    /// is a disc there, and what the slab leaves of it a strip.
-    Patch seen_edge_on() const {
-        const float dist = std::sqrt(dist2_);
-        const Vec3 axis = to_center_ / dist;
-        const float sin_tilt = std::fabs(dot(e_.near.n, axis)),
-                    cos_tilt = safe_sqrt(1 - sqr(sin_tilt));
-        Patch patch;
-        patch.t = normalize(e_.near.n - axis * dot(e_.near.n, axis));
-        patch.s = cross(axis, patch.t);
-        const float disc = radius_ / safe_sqrt(1 - sqr(radius_ / dist));
-        const float strip =
-            (half_height_ + radius_ * sin_tilt) / cos_tilt * dist / (dist - radius_);
-        patch.half = {disc, std::min(disc, strip)};
-        patch.is_round = false;
-        patch.height = dist;
-        return patch;
+    /// A direction of the region; false where thinning ends the trial.
+    bool in_region(Vec3& d, RenderStats& stats) {
+        const float u_cell = sampler_.next_1d();
+        const auto choice = cells_->choose(u_cell, sampler_.next_2d());
+        const RegionPoint point =
+            std::visit([&](const auto& region) { return region.at(choice.u); }, *region_);
+        d = point.d;
+        max_pdf_ = choice.bound;
+        return passes(pdf(d) * point.scale, stats);
     }
 
     /// With u_1 = sin² θ and u_2 = φ/2π about the normal.
@@ -285,35 +246,6 @@ private:
                               : e_.from.bsdf.eval(e_.from.wo, d, e_.mode).pdf;
     }
 
-    Patch disc_about(Vec3 n, float radius) const {
-        const Frame frame = Frame::from_normal(n);
-        return {.s = frame.s, .t = frame.t, .half = {radius, radius}, .is_round = true, .foot = {}};
-    }
-    Vec3 at(Vec2 q) const { return e_.near.p + patch_.s * q.x + patch_.t * q.y; }
-    Vec3 in_patch(Vec2 u) const {
-        const Vec2 q = patch_.is_round ? sample_uniform_disk(u) : Vec2{2 * u.x - 1, 2 * u.y - 1};
-        return at({q.x * patch_.half.x, q.y * patch_.half.y});
-    }
-    /// Nothing where the cell reaches beyond the patch. Sets max_pdf_.
-    std::optional<Vec3> in_cell() {
-        double u = double(sampler_.next_1d()) * mass_;
-        int i = 0;
-        while (i + 1 < cell_count_ && u >= cells_[size_t(i)].mass) u -= cells_[size_t(i++)].mass;
-        const Vec2 v = sampler_.next_2d();
-        const Cell& cell = cells_[size_t(i)];
-        max_pdf_ = cell.max_pdf;
-        const Vec2 q{cell.center.x + (2 * v.x - 1) * patch_.half.x / kCells,
-                     cell.center.y + (2 * v.y - 1) * patch_.half.y / kCells};
-        if (patch_.is_round && sqr(q.x) + sqr(q.y) > sqr(patch_.half.x)) return {};
-        return at(q);
-    }
-    /// The direction to a point of the patch; false where thinning ends the trial.
-    bool toward(Vec3 q, Vec3& d, RenderStats& stats) {
-        const Vec3 v = q - e_.from.p;
-        const float dist2 = length2(v), inv_dist = 1 / std::sqrt(dist2);
-        d = v * inv_dist;
-        return passes(pdf(d) * patch_.height * inv_dist / dist2, stats);
-    }
     Vec3 in_box(Vec2 u) const {
         const float sin2 = box_lo_.x + u.x * box_size_.x, phi = box_lo_.y + u.y * box_size_.y;
         const float sin = std::sqrt(sin2);
@@ -341,12 +273,11 @@ private:
     float max_pdf_ = 0;
     float sin_ = 0, cos_ = 1, sin_axis_ = 0, cos_axis_ = 1;
     float one_minus_cos_ = 0;
-    static constexpr int kCells = 4;  ///< Along either side of a patch.
-    Patch patch_;
-    std::array<Cell, kCells * kCells> cells_;
-    int cell_count_ = 0;
+    std::optional<std::variant<SeenDisc, SeenBand>> region_;
+    std::optional<BoundedCells> cells_;
     Vec2 box_lo_, box_size_;
     Emitter::Disc disc_;
+    float parallel_radius_ = 0;  ///< Of the disc about the vertex through which parallel rays go.
 };
 
 }  // namespace
@@ -385,10 +316,11 @@ double reciprocal_probability(const Scene& scene, const PairEvent& event, Sample
         if (!ray) continue;
         ++stats.trial_rays;
         const float u = scene.has_masks() ? sampler.next_1d() : 0.0f;
-        if (!scene.intersect(*ray, u, hit) || !event.near.contains(hit.geometry.p)) continue;
+        if (!scene.intersect(*ray, u, hit)) continue;
         arena.reset();
         scratch.set_surface(*hit.shape, hit.location, hit.geometry, -ray->d, arena);
-        if (!scratch.may_connect) continue;
+        if (!scratch.may_connect || !event.near.contains(scratch.p, scratch.arrival_side()))
+            continue;
         stats.count_trials(n);
         return double(n) / (double(event.from.survival.value()) * trials.mass());
     }

@@ -7,14 +7,17 @@
 namespace etendue {
 
 /// Where the partners of a vertex lie: the part of a ball about it that is at most `half_height` away from its tangent
-/// plane. The one predicate of gathers and trials.
+/// plane, on its own side of the surface if light does not pass through. The one predicate of gathers and trials.
 struct Neighbourhood {
     Vec3 p, n;  ///< The vertex and its geometric normal.
+    ArrivalSide side;
     float radius, half_height;
 
-    bool contains(Vec3 q) const {
+    /// `arrival`: of the partner, at `q`.
+    bool contains(Vec3 q, ArrivalSide arrival) const {
         const Vec3 v = q - p;
-        return length2(v) < sqr(radius) && std::fabs(dot(v, n)) <= half_height;
+        return length2(v) < sqr(radius) && std::fabs(dot(v, n)) <= half_height &&
+               side.admits(arrival);
     }
     /// Sets the ray's end where it leaves the neighbourhood; false where it misses it.
     bool clip(Ray& ray) const;

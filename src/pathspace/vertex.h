@@ -7,6 +7,7 @@
 
 #include "bsdf/material.h"
 #include "emitter/emitter.h"
+#include "pathspace/arrival_side.h"
 #include "pathspace/gloss.h"
 #include "scene/scene.h"
 
@@ -77,6 +78,11 @@ struct Vertex {
         on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo}, arena, bsdf);
         may_connect = bsdf.has_smooth();
         gloss = gloss_of_roughness(bsdf.roughness());
+    }
+
+    /// Of a point of a surface.
+    ArrivalSide arrival_side() const {
+        return {dot(ng, wo) < 0 ? -ng : ng, shape->material->is_transmissive()};
     }
 
     /// Medium on the edge that leaves along `w`.

@@ -98,10 +98,10 @@ protected:
             ray = {offset_origin(e.from.p, e.from.ng, s->wi), s->wi, kInf};
         }
         SurfaceHit hit;
-        if (!scene.intersect(ray, 0, hit) || !e.near.contains(hit.geometry.p)) return false;
+        if (!scene.intersect(ray, 0, hit)) return false;
         ComponentArena arena;
         scratch.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, arena);
-        return scratch.may_connect;
+        return scratch.may_connect && e.near.contains(scratch.p, scratch.arrival_side());
     }
 
     template <TransportMode mode>
@@ -119,7 +119,7 @@ protected:
                     compare({from,
                              mode,
                              path.u_emission,
-                             {center, next.ng, radius, flatness * radius},
+                             {center, next.ng, next.arrival_side(), radius, flatness * radius},
                              bound});
             }
         }
@@ -216,7 +216,7 @@ TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
         const PairEvent event{floor,
                               TransportMode::Radiance,
                               {},
-                              {{0, 0, 2}, {0, 0, -1}, d, flatness * float(d)},
+                              {{0, 0, 2}, {0, 0, -1}, {{0, 0, -1}, false}, d, flatness * float(d)},
                               bound};
         Moments r;
         for (int i = 0; i < 20000; ++i)
@@ -261,7 +261,7 @@ TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
     const PairEvent event{wall,
                           TransportMode::Radiance,
                           {},
-                          {{0, 0, 0}, {0, 0, 1}, kRadius, 0.02f * float(kRadius)},
+                          {{0, 0, 0}, {0, 0, 1}, {{0, 0, 1}, false}, kRadius, 0.02f * float(kRadius)},
                           TrialBound::Slab};
     Moments r;
     for (int i = 0; i < 40000; ++i)
