@@ -250,7 +250,7 @@ struct WalkInputs {
         Sampler sampler(SamplerKind::Independent, 8);
         RenderStats stats;
         sampler.start(0, index);
-        start_eye_path(scene, film, index % film.geometry().pixel_count(), sampler, path, stats);
+        start_eye_path(scene, film, index % film.geometry().pixel_count(), sampler, kCounts, path, stats);
         while (path.size() >= 2 &&
                extend<TransportMode::Radiance>(scene, sampler, kWalk, kCounts, path, stats)) {
         }
@@ -260,7 +260,7 @@ struct WalkInputs {
         Sampler sampler(SamplerKind::Independent, 9);
         RenderStats stats;
         sampler.start(0, index);
-        if (!start_light_path(scene, sampler, path, stats)) return 0;
+        if (!start_light_path(scene, sampler, kCounts, path, stats)) return 0;
         while (path.size() >= 2 &&
                extend<TransportMode::Importance>(scene, sampler, kWalk, kCounts, path, stats)) {
         }

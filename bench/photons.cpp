@@ -260,7 +260,7 @@ public:
             if (pixel / kChunk % 8 != 0) continue;
             sampler_.start(0, pixel);
             SubPath& z = work_.z;
-            start_eye_path(scene_, film_, pixel, sampler_, z, work_.stats);
+            start_eye_path(scene_, film_, pixel, sampler_, n, z, work_.stats);
             paths_.walk_eye_path(scene_, sampler_, n, z, work_.stats, 2, [&](int t) {
                 if (z[t - 1].may_connect) points.push_back(z[t - 1].p);
                 return Onward::ByAnyEvent;

@@ -37,7 +37,7 @@ public:
         // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
         const WalkOptions walk{depth_.max_depth + scene.sensor().has_finite_lens(),
                                depth_.rr_depth};
-        if (!start_light_path(scene, sampler, y, stats)) return;
+        if (!start_light_path(scene, sampler, counts, y, stats)) return;
         for (int s = 1; s <= y.size() && s <= depth_.max_depth; ++s) {
             before(s);
             if (s >= 2) extend<TransportMode::Importance>(scene, sampler, walk, counts, y, stats);
@@ -66,7 +66,7 @@ public:
     void eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                   const JoinVertex& join) const {
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        start_eye_path(c.scene, c.film, c.pixel, c.sampler, work.z, work.stats);
+        start_eye_path(c.scene, c.film, c.pixel, c.sampler, counts, work.z, work.stats);
         go_on(c, counts, work, 2, join);
     }
     /// The same from z_{t-1} on, the last vertex so far.

@@ -18,7 +18,7 @@ public:
         const WalkOptions walk{depth_.max_depth + c.scene.sensor().has_finite_lens(),
                                depth_.rr_depth};
         SubPath& y = work.y;
-        if (!start_light_path(c.scene, c.sampler, y, work.stats)) return;
+        if (!start_light_path(c.scene, c.sampler, counts, y, work.stats)) return;
         for (int s = 1; s <= y.size(); ++s) {
             if (s > depth_.max_depth) break;
             if (const auto j = join_splat(c.scene, y, s, c.sampler, counts))

@@ -17,7 +17,7 @@ public:
         const TechniqueCounts counts = this->counts(c.scene, 0);
         const WalkOptions walk = depth_.walk();
         SubPath& z = work.z;
-        start_eye_path(c.scene, c.film, c.pixel, c.sampler, z, work.stats);
+        start_eye_path(c.scene, c.film, c.pixel, c.sampler, counts, z, work.stats);
         for (int t = 2; t <= z.size(); ++t) {
             for_each_hit(c.scene, z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution); });

@@ -105,7 +105,7 @@ private:
             sampler.start(pass.index, pixels + i);
             const uint64_t before = work.stats.shadow_rays;
             const uint64_t pixel = low_discrepancy_pixel(g, pass.index * count + i);
-            start_eye_path(pass.scene, pass.film, pixel, sampler, work.z, work.stats);
+            start_eye_path(pass.scene, pass.film, pixel, sampler, n, work.z, work.stats);
             paths_.walk_eye_path(pass.scene, sampler, n, work.z, work.stats, 2, [&](int t) {
                 if (!work.z[t - 1].may_connect) return Onward::ByAnyEvent;
                 evaluate(pass.scene, n, t, work);

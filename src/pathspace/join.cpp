@@ -186,7 +186,7 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
     const double found = counts.found(drops_eye ? edge->rev_a : edge->rev_b);
-    const double count = counts.gathers_at(drops_eye ? y[s - 1].p : z[t - 1].p, s + t - 2);
+    const double count = counts.gathers_at((drops_eye ? y[s - 1] : z[t - 1]).pair_level, s + t - 2);
     Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * found, y, a, z, b);
     join.found = float(found);
     return join;

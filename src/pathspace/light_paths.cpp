@@ -10,7 +10,7 @@ namespace etendue {
 void LightPaths::Chunk::clear() {
     heads_.clear();
     vertices_.clear();
-    sides_.clear();
+    places_.clear();
 }
 
 void LightPaths::Chunk::add(const SubPath& y) {
@@ -41,7 +41,7 @@ void LightPaths::Chunk::add(const SubPath& y) {
                              .medium = v.medium,
                              .survival_steps = v.survival.steps(),
                              .gloss = v.gloss});
-        sides_.push_back(v.arrival_side());
+        places_.push_back({v.arrival_side(), v.pair_level});
     }
     head.end = uint32_t(vertices_.size());
 }
@@ -61,12 +61,12 @@ void LightPaths::assemble(std::span<const Chunk> chunks) {
                                  "max_depth, or render in crops");
     heads_.resize(paths);
     vertices_.resize(total);
-    sides_.resize(total);
+    places_.resize(total);
     tbb::parallel_for(size_t(0), chunks.size(), [&](size_t chunk) {
         const Chunk& c = chunks[chunk];
         auto [path, first] = begins[chunk];
         std::copy(c.vertices_.begin(), c.vertices_.end(), vertices_.begin() + ptrdiff_t(first));
-        std::copy(c.sides_.begin(), c.sides_.end(), sides_.begin() + ptrdiff_t(first));
+        std::copy(c.places_.begin(), c.places_.end(), places_.begin() + ptrdiff_t(first));
         for (Chunk::Head head : c.heads_) {
             head.begin += uint32_t(first), head.end += uint32_t(first);
             for (uint32_t i = head.begin; i < head.end; ++i)
@@ -78,7 +78,7 @@ void LightPaths::assemble(std::span<const Chunk> chunks) {
 
 size_t LightPaths::memory_bytes() const {
     return heads_.capacity() * sizeof(Chunk::Head) + vertices_.capacity() * sizeof(LightVertex) +
-           sides_.capacity() * sizeof(ArrivalSide);
+           places_.capacity() * sizeof(LightVertexPlace);
 }
 
 void LightPaths::restore_head(uint64_t index, SubPath& y) const {
@@ -120,6 +120,7 @@ void LightPaths::restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, 
     v.to_predecessor = stored.to_predecessor;
     v.weight_sum = double(stored.weight_sum);
     v.is_delta = stored.is_delta;
+    v.pair_level = places_[vertex].pair_level;
     v.survival = Survival::from_steps(stored.survival_steps);
     if (i == 1) v.next_event_ratio = heads_[stored.path].next_event_ratio;
 }

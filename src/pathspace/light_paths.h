@@ -21,6 +21,12 @@ struct LightVertex {
 };
 static_assert(sizeof(LightVertex) == 64);
 
+/// What else there is of y_i, as in Vertex.
+struct LightVertexPlace {
+    ArrivalSide side;
+    uint8_t pair_level;
+};
+
 class LightPaths {
 public:
     /// What one chunk of a pass's paths leaves; filled by one thread.
@@ -43,14 +49,14 @@ public:
         };
         std::vector<Head> heads_;
         std::vector<LightVertex> vertices_;
-        std::vector<ArrivalSide> sides_;  ///< Of these.
+        std::vector<LightVertexPlace> places_;
     };
 
     /// Takes the chunks' paths in order, whichever threads made them.
     void assemble(std::span<const Chunk> chunks);
 
     std::span<const LightVertex> vertices() const { return vertices_; }
-    std::span<const ArrivalSide> arrival_sides() const { return sides_; }
+    ArrivalSide arrival_side(uint32_t vertex) const { return places_[vertex].side; }
     size_t size() const { return heads_.size(); }
     size_t memory_bytes() const;
 
@@ -83,7 +89,7 @@ private:
 
     std::vector<Chunk::Head> heads_;
     std::vector<LightVertex> vertices_;
-    std::vector<ArrivalSide> sides_;  ///< Of these; in the order of joins they are read before them.
+    std::vector<LightVertexPlace> places_;
 };
 
 }  // namespace etendue

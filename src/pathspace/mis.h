@@ -63,7 +63,7 @@ inline double squared_pair_count(const SubPath& v, int i, double rev, uint8_t in
     double sum = 0;
     if (drops(n.pair_rule, eye, before, after)) sum += sqr(n.found(fwd));
     if (rev > 0 && drops(n.pair_rule, !eye, before, after)) sum += sqr(n.found(rev) * (fwd / rev));
-    return sum > 0 ? sum * sqr(n.gathers_at(v[i].p, edges)) : 0;
+    return sum > 0 ? sum * sqr(n.gathers_at(v[i].pair_level, edges)) : 0;
 }
 
 /// b_i of a sub-path. `delta`, `rev`, `inward` as above; `edges`: length of the path, or any larger number.

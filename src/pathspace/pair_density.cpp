@@ -15,10 +15,14 @@ constexpr double kLevelsPerOctave = 16;
 
 }  // namespace
 
-PairDensity::PairDensity(const PointGrid& vertices, float radius)
-    : cells_(vertices.cells()), levels_(cells_.buckets()) {
+PairDensity::PairDensity() {
     for (size_t level = 0; level < shares_.size(); ++level)
         shares_[level] = float(std::exp2(-double(level) / kLevelsPerOctave));
+}
+
+PairDensity::PairDensity(const PointGrid& vertices, float radius) : PairDensity() {
+    cells_ = vertices.cells();
+    levels_.resize(cells_.buckets());
     // The area of a disc over that of the square that a plane has of a cell.
     const double scale = kCorrelation * double(kPi) * sqr(double(radius / cells_.width()));
     tbb::parallel_for(uint32_t(0), cells_.buckets(), [&](uint32_t bucket) {

@@ -19,16 +19,18 @@ class PointGrid;
 class PairDensity {
 public:
     /// All partners count.
-    PairDensity() = default;
+    PairDensity();
     /// From the light vertices of that pass; `radius`: of pairs.
     PairDensity(const PointGrid& vertices, float radius);
     /// 1/(1 + ρ n) at `p`, to about 2 %: weights need it small in memory, not exact.
-    double share(Vec3 p) const {
-        return levels_.empty() ? 1 : double(shares_[levels_[cells_.bucket_of(cells_.cell_of(p))]]);
+    double share(Vec3 p) const { return share(level(p)); }
+    /// The same in two steps, of which vertices remember the first, that takes the time.
+    uint8_t level(Vec3 p) const {
+        return levels_.empty() ? uint8_t(0) : levels_[cells_.bucket_of(cells_.cell_of(p))];
     }
-
-    /// n at `p`, to as much.
-    float partners(Vec3 p) const { return float((1 / share(p) - 1) / kCorrelation); }
+    double share(uint8_t level) const { return double(shares_[level]); }
+    /// n, as exactly.
+    float partners(uint8_t level) const { return (1 / shares_[level] - 1) / float(kCorrelation); }
 
     /// ρ. What competes with a gather shares most of the eye path too, hence far less than 1: of 0.05, 0.2, 0.5 and 1, 0.2 had
     /// the least errors on scenes with few and with many partners (veach-ajar, staircase2, veach-bidir, living-room).
@@ -36,8 +38,8 @@ public:
 
 private:
     CellHash cells_;
-    std::vector<uint8_t> levels_;      ///< Of the buckets of cells.
-    std::array<float, 256> shares_{};  ///< By level.
+    std::vector<uint8_t> levels_;    ///< Of the buckets of cells.
+    std::array<float, 256> shares_;  ///< By level.
 };
 
 }  // namespace etendue

@@ -15,7 +15,8 @@ Survival survival(const SubPath& path) {
 /// Traces from the last vertex along `d` and appends what is found, with throughput `beta` and density `pdf_sa` of the
 /// direction (discrete for a delta event). False where the ray leaves the scene.
 bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const Ray& ray, Rgb beta,
-                    float pdf_sa, bool is_delta, MediumId medium, RenderStats& stats) {
+                    float pdf_sa, bool is_delta, MediumId medium, const TechniqueCounts& counts,
+                    RenderStats& stats) {
     ++stats.walk_rays;
     SurfaceHit hit;
     const float u = scene.has_masks() ? sampler.next_1d() : 0.0f;
@@ -26,6 +27,7 @@ bool append_surface(const Scene& scene, Sampler& sampler, SubPath& path, const R
     Vertex& v = path.append();
     v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
     v.medium = medium;
+    v.pair_level = counts.pair_level(v.p);
     v.beta = medium == kVacuum ? beta : beta * scene.attenuation(medium, hit.t);
     // hit.t is short of the distance by the offset of the ray's origin; densities are of the points themselves.
     const Vertex& previous = path[path.size() - 2];
@@ -92,7 +94,7 @@ RenderStats& RenderStats::operator+=(const RenderStats& o) {
 }
 
 void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sampler& sampler,
-                    SubPath& z, RenderStats& stats) {
+                    const TechniqueCounts& counts, SubPath& z, RenderStats& stats) {
     ++stats.eye_paths;
     z.clear();
     sampler.seek(Stream::Eye, 0);
@@ -111,13 +113,14 @@ void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sample
     lens.p = lens.is_infinite ? -ray.d : ray.p;
 
     const Ray start{ray.p, ray.d, kInf};
-    if (append_surface(scene, sampler, z, start, Rgb(1), ray.pdf_dir, false, kVacuum, stats))
+    if (append_surface(scene, sampler, z, start, Rgb(1), ray.pdf_dir, false, kVacuum, counts, stats))
         return;
     z.truncate(1);
     if (!scene.infinite_emitters().empty()) append_escape(z, ray.d, Rgb(1), ray.pdf_dir);
 }
 
-bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderStats& stats) {
+bool start_light_path(const Scene& scene, Sampler& sampler, const TechniqueCounts& counts,
+                      SubPath& y, RenderStats& stats) {
     y.clear();
     if (!scene.has_emitters()) return false;
     ++stats.light_paths;
@@ -147,7 +150,7 @@ bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderSt
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
     const Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
     if (!append_surface(scene, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, false, kVacuum,
-                        stats)) {
+                        counts, stats)) {
         y.truncate(1);
         return true;
     }
@@ -185,7 +188,7 @@ bool extend(const Scene& scene, Sampler& sampler, const WalkOptions& options,
     const MediumId medium = v.medium_toward(s->wi);
     const Ray ray{offset_origin(v.p, v.ng, s->wi), s->wi, kInf};
     const bool found =
-        append_surface(scene, sampler, path, ray, beta, s->pdf, s->is_delta, medium, stats);
+        append_surface(scene, sampler, path, ray, beta, s->pdf, s->is_delta, medium, counts, stats);
     if (!found) {
         path.truncate(last + 1);
         if (!eye || scene.infinite_emitters().empty()) return false;
@@ -202,7 +205,7 @@ bool look_along(const Scene& scene, Sampler& sampler, Vec3 wi, Rgb beta, SubPath
     Vertex& v = z[last];
     v.is_delta = false;
     const Ray ray{offset_origin(v.p, v.ng, wi), wi, kInf};
-    if (append_surface(scene, sampler, z, ray, beta, 1, false, v.medium_toward(wi), stats))
+    if (append_surface(scene, sampler, z, ray, beta, 1, false, v.medium_toward(wi), {}, stats))
         return true;
     z.truncate(last + 1);
     return false;

@@ -84,9 +84,10 @@ struct WalkOptions {
 /// z_0 on the lens and, if the scene is met, z_1. The film point is drawn from the pixel's filter.
 /// Where the ray leaves the scene, z_1 is a vertex at infinity if there are emitters there, else z_0 stays alone.
 void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sampler& sampler,
-                    SubPath& z, RenderStats& stats);
+                    const TechniqueCounts& counts, SubPath& z, RenderStats& stats);
 /// y_0 on an emitter and, if the scene is met, y_1. False where there is no emitter to choose.
-bool start_light_path(const Scene& scene, Sampler& sampler, SubPath& y, RenderStats& stats);
+bool start_light_path(const Scene& scene, Sampler& sampler, const TechniqueCounts& counts,
+                      SubPath& y, RenderStats& stats);
 
 /// p_NE / p_L of y_0 for a next vertex along `w`.
 float next_event_ratio(const Vertex& y0, Vec3 w);

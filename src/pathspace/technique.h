@@ -95,11 +95,12 @@ struct TechniqueCounts {
     float gathers(int edges) const {
         return edges < min_pair_edges ? 0.0f : edges == 3 ? gather * short_pair_rate : gather;
     }
-    /// The same where x_m lies at `p`, for the weights: pairs of one vertex are not independent.
-    double gathers_at(Vec3 p, int edges) const {
+    /// The same for the weights, at an x_m of this level: pairs of one vertex are not independent.
+    double gathers_at(uint8_t pair_level, int edges) const {
         const double n = double(gathers(edges));
-        return density ? n * density->share(p) : n;
+        return density ? n * density->share(pair_level) : n;
     }
+    uint8_t pair_level(Vec3 p) const { return density ? density->level(p) : uint8_t(0); }
     /// Approximate probability that a pair is found whose dropped vertex has the area density `pdf` [ibid., eq. 24].
     double found(double pdf) const {
         const double p = double(disc) * pdf;

@@ -58,6 +58,7 @@ struct Vertex {
     MediumId medium = kVacuum;  ///< On the edge to the predecessor.
     Survival survival;          ///< Of the roulette before the walk left this vertex.
     uint8_t gloss = 0;          ///< Of the emitter or the material, see gloss.h.
+    uint8_t pair_level = 0;     ///< Of the density of partners, see PairDensity.
     const SceneShape* shape = nullptr;
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or on the surface.
     SurfaceLocation location;          ///< Of a surface; of an emitter's y_0 only `prim`.

@@ -53,7 +53,7 @@ std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::str
                 const uint64_t pixel = uint64_t(row) * scene.film().crop_width + x;
                 for (int i = 0; i < samples; ++i) {
                     sampler.start(uint32_t(i), pixel);
-                    start_eye_path(scene, film, pixel, sampler, z, stats);
+                    start_eye_path(scene, film, pixel, sampler, {}, z, stats);
                     if (z.size() < 2 || z[1].kind != Vertex::Kind::Surface) continue;
                     for (AovImage& image : images)
                         image.pixels[pixel] +=

@@ -94,13 +94,13 @@ protected:
     void trace(uint32_t index) {
         sampler.start(index, index % (kPixels * kPixels));
         const WalkOptions walk{6, 1000};
-        start_light_path(scene, sampler, y, stats);
+        start_light_path(scene, sampler, counts, y, stats);
         if (y.size() > 0) check_hit_lens(1);
         for (int s = 2; s <= y.size(); ++s) {
             extend<TransportMode::Importance>(scene, sampler, walk, counts, y, stats);
             check_hit_lens(s);
         }
-        start_eye_path(scene, film, index % (kPixels * kPixels), sampler, z, stats);
+        start_eye_path(scene, film, index % (kPixels * kPixels), sampler, counts, z, stats);
         while (z.size() >= 2 &&
                extend<TransportMode::Radiance>(scene, sampler, walk, counts, z, stats)) {
         }

@@ -75,9 +75,9 @@ protected:
             .hit = 1, .next_event = 1, .connect = 1, .splat = 64, .gather = 64};
         sampler.start(0, index);
         if (mode == TransportMode::Radiance)
-            start_eye_path(scene, film, index % 64, sampler, path, stats);
+            start_eye_path(scene, film, index % 64, sampler, counts, path, stats);
         else
-            start_light_path(scene, sampler, path, stats);
+            start_light_path(scene, sampler, counts, path, stats);
         // Roulette early, so that survival enters.
         while (path.size() >= 2 && extend<mode>(scene, sampler, {5, 2}, counts, path, stats)) {
         }
