@@ -250,7 +250,8 @@ struct WalkInputs {
         Sampler sampler(SamplerKind::Independent, 8);
         RenderStats stats;
         sampler.start(0, index);
-        start_eye_path(scene, film, index % film.geometry().pixel_count(), sampler, kCounts, path, stats);
+        start_eye_path(scene, film, index % film.geometry().pixel_count(), sampler, kCounts, path,
+                       stats);
         while (path.size() >= 2 &&
                extend<TransportMode::Radiance>(scene, sampler, kWalk, kCounts, path, stats)) {
         }

@@ -28,8 +28,8 @@ struct Gather {
         // Where most partners are not worth a look, z_{t-1} mostly looks for none. A search that finds n of them has a
         // second moment of n (n+1), and takes n+1 times as long as to find none.
         const float partners = std::max(1.0f, photons.density().partners(z.pair_level));
-        const float looks =
-            join_survival(worth.of_search(t) * brought * photons.mean_flux() * std::sqrt(partners), threshold);
+        const float looks = join_survival(
+            worth.of_search(t) * brought * photons.mean_flux() * std::sqrt(partners), threshold);
         if (!survives(looks, uint32_t(hash_combine(UINT32_MAX, uint64_t(t))))) return;
         const Vertex& last = work.z[t - 2];
         const uint8_t after = gloss(last, last.is_delta);

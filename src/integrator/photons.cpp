@@ -12,8 +12,8 @@ void Photons::trace(const PassContext& pass, const Bidirectional& paths,
                     const TechniqueCounts& counts, float radius, uint64_t max_bytes) {
     // A vertex is in a chunk, which may have as much to spare, among all, and in the grid, whose entries were a list. There
     // are up to four buckets for it, twice while the grid is built, and in bytes for the density.
-    constexpr uint64_t kVertexBytes =
-        3 * (sizeof(LightVertex) + sizeof(LightVertexPlace)) + 2 * sizeof(PointGrid::Entry) + 10 * sizeof(uint32_t);
+    constexpr uint64_t kVertexBytes = 3 * (sizeof(LightVertex) + sizeof(LightVertexPlace)) +
+                                      2 * sizeof(PointGrid::Entry) + 10 * sizeof(uint32_t);
     radius_ = radius;
     collector_.begin(pass, kVertexBytes, max_bytes);
     paths.trace_light_paths(pass, counts, pass.light_paths, collector_);
@@ -46,8 +46,8 @@ void Photons::index() {
         const float clamped = luminance(v.beta) * std::max(1.0f, kPi * sqr(radius_) * v.pdf_fwd);
         const uint32_t s = std::min(uint32_t(paths_.depth(i) + 1), kManyVertices);
         const uint32_t side = paths_.arrival_side(i).bits();
-        entries[blocks[block].begin + rank] = {
-            v.p, i, side << 16 | s << 8 | paths_.gloss_before(i), clamped};
+        entries[blocks[block].begin + rank] = {v.p, i, side << 16 | s << 8 | paths_.gloss_before(i),
+                                               clamped};
         blocks[block].flux += double(clamped);
     });
     double flux = 0;

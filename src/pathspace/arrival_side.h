@@ -24,7 +24,8 @@ public:
         const auto level = [](float x, int steps) {
             return unsigned(std::lround((x * 0.5f + 0.5f) * float(steps)));
         };
-        bits_ = uint16_t(unsigned(is_transmissive) << 15 | level(a, kStepsA) << 8 | level(b, kStepsB));
+        bits_ =
+            uint16_t(unsigned(is_transmissive) << 15 | level(a, kStepsA) << 8 | level(b, kStepsB));
     }
 
     bool is_transmissive() const { return bits_ >> 15; }

@@ -46,7 +46,8 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     if (q.strategy == Strategy::Merge) return n * others * light[m] * eye[m] * counts.disc;
     if (!drops(counts.pair_rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
     const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
-    return counts.gathers_at(counts.pair_level(place[m]), k) * others * kept * counts.found(dropped);
+    return counts.gathers_at(counts.pair_level(place[m]), k) * others * kept *
+           counts.found(dropped);
 }
 
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {

@@ -61,11 +61,11 @@ public:
             if (!passes(pdf(ray.d), stats)) return {};
             break;
         case Proposal::Region:
-            if (!in_region(ray.d, stats)) return {};
+            if (!in_region([&](Vec3 d) { return pdf(d); }, ray.d, stats)) return {};
             break;
         case Proposal::WholeRegion:
-            // Its mass is known, so that only what leaves the bound for it is a trial.
-            while (!in_region(ray.d, stats)) continue;
+            // The mass of the cosine is known, so that to draw from it is no trial yet.
+            while (!in_region([&](Vec3 d) { return cosine_pdf(d); }, ray.d, stats)) continue;
             if (!(pdf(ray.d) > 0)) return {};
             break;
         case Proposal::Parallel: {
@@ -199,7 +199,8 @@ private:
         mass_ = mass;
     }
     /// A direction of the region; false where thinning ends the trial.
-    bool in_region(Vec3& d, RenderStats& stats) {
+    template <class Pdf>
+    bool in_region(const Pdf& pdf, Vec3& d, RenderStats& stats) {
         const float u_cell = sampler_.next_1d();
         const auto choice = cells_->choose(u_cell, sampler_.next_2d());
         const RegionPoint point =
@@ -241,6 +242,7 @@ private:
         d = s->wi;
         return true;
     }
+    float cosine_pdf(Vec3 d) const { return std::max(0.0f, dot(d, *cosine_)) * kInvPi; }
     float pdf(Vec3 d) const {
         return from_emitter() ? e_.from.emitter->eval_emission(e_.from.ng, e_.from.uv, d).pdf_d
                               : e_.from.bsdf.eval(e_.from.wo, d, e_.mode).pdf;

@@ -78,7 +78,8 @@ public:
         const auto cell = [&](Vec2 lo, Vec2 size) -> Cell {
             const RegionPart part = region.part(lo, size);
             const float bound = part.cone.angle < kPi ? max_pdf(part.cone) * part.max_scale : kInf;
-            return {lo, size, bound, region.measure() * double(size.x) * double(size.y) * double(bound),
+            return {lo, size, bound,
+                    region.measure() * double(size.x) * double(size.y) * double(bound),
                     part.is_longer_in_x};
         };
         cells_[0] = cell({0, 0}, {1, 1});
@@ -87,8 +88,10 @@ public:
             if (!(mass_ > enough) || count_ == cells_.size()) return;
             Cell& whole = cells_[largest];
             Vec2 size = whole.size, step{};
-            if (whole.is_longer_in_x) step.x = size.x = size.x / 2;
-            else step.y = size.y = size.y / 2;
+            if (whole.is_longer_in_x)
+                step.x = size.x = size.x / 2;
+            else
+                step.y = size.y = size.y / 2;
             cells_[count_++] = cell(whole.lo + step, size);
             whole = cell(whole.lo, size);
         }

@@ -113,7 +113,8 @@ void start_eye_path(const Scene& scene, const Film& film, uint64_t pixel, Sample
     lens.p = lens.is_infinite ? -ray.d : ray.p;
 
     const Ray start{ray.p, ray.d, kInf};
-    if (append_surface(scene, sampler, z, start, Rgb(1), ray.pdf_dir, false, kVacuum, counts, stats))
+    if (append_surface(scene, sampler, z, start, Rgb(1), ray.pdf_dir, false, kVacuum, counts,
+                       stats))
         return;
     z.truncate(1);
     if (!scene.infinite_emitters().empty()) append_escape(z, ray.d, Rgb(1), ray.pdf_dir);

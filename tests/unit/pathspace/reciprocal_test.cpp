@@ -258,11 +258,12 @@ TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
     sampler.start(0, 0);
     sampler.seek(Stream::Auxiliary, 1);
     RenderStats stats;
-    const PairEvent event{wall,
-                          TransportMode::Radiance,
-                          {},
-                          {{0, 0, 0}, {0, 0, 1}, {{0, 0, 1}, false}, kRadius, 0.02f * float(kRadius)},
-                          TrialBound::Slab};
+    const PairEvent event{
+        wall,
+        TransportMode::Radiance,
+        {},
+        {{0, 0, 0}, {0, 0, 1}, {{0, 0, 1}, false}, kRadius, 0.02f * float(kRadius)},
+        TrialBound::Slab};
     Moments r;
     for (int i = 0; i < 40000; ++i)
         r.add(reciprocal_probability(scene, event, sampler, scratch, stats) * p_c);
@@ -270,6 +271,51 @@ TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
         << r.mean() << " ± " << std::sqrt(r.squared_error());
     EXPECT_LT(double(stats.trials) / 40000, 10) << "the ball's cone would need a hundred";
     EXPECT_EQ(stats.bounds_exceeded, 0u);
+}
+
+/// A wall, half of which lies below the floor's plane, but all above the horizon of a shading normal that leans to it.
+TEST(ReciprocalUnderALeaningNormal, EqualsTheIntegral) {
+    constexpr double kDistance = 2, kRadius = 0.4;
+    const Scene scene = test::build(
+        test::front_camera(8) + test::area_lamp() +
+        test::rectangle("<scale value=\"0.1\"/>", test::diffuse("0.5,0.5,0.5")) +
+        test::rectangle("<scale value=\"4\"/><rotate y=\"1\" angle=\"-90\"/><translate x=\"2\"/>",
+                        test::diffuse("0.5,0.5,0.5")));
+    SurfaceHit hit;
+    ASSERT_TRUE(scene.intersect({{0, 0, 0.5f}, {0, 0, -1}, kInf}, 0, hit));
+    const double leaning = std::sqrt(0.5);
+    hit.geometry.ns = {float(leaning), 0, float(leaning)};
+    ComponentArena arena;
+    Vertex floor, scratch;
+    floor.set_surface(*hit.shape, hit.location, hit.geometry, normalize(Vec3{0.2f, 0, 1}), arena);
+
+    double p_c = 0;
+    constexpr int kSteps = 1000;
+    for (int i = 0; i < kSteps; ++i)
+        for (int j = 0; j < kSteps; ++j) {
+            const double y = kRadius * ((i + 0.5) * 2 / kSteps - 1),
+                         z = kRadius * (j + 0.5) / kSteps;
+            if (y * y + z * z > sqr(kRadius)) continue;
+            const double dist2 = sqr(kDistance) + sqr(y) + sqr(z);
+            p_c += 2 * sqr(kRadius / kSteps) * leaning * (kDistance + z) * kDistance /
+                   (M_PI * sqr(dist2));
+        }
+    Sampler sampler(SamplerKind::Independent, 3);
+    sampler.start(0, 0);
+    sampler.seek(Stream::Auxiliary, 1);
+    RenderStats stats;
+    const Vec3 n{-1, 0, 0};
+    const PairEvent event{
+        floor,
+        TransportMode::Radiance,
+        {},
+        {{float(kDistance), 0, 0}, n, {n, false}, kRadius, 0.02f * float(kRadius)},
+        TrialBound::Slab};
+    Moments r;
+    for (int i = 0; i < 40000; ++i)
+        r.add(reciprocal_probability(scene, event, sampler, scratch, stats) * p_c);
+    EXPECT_GE(welch_p(r, Moments::exact(1), 0.002), 1e-4)
+        << r.mean() << " ± " << std::sqrt(r.squared_error());
 }
 
 INSTANTIATE_TEST_SUITE_P(Starts, Reciprocal, testing::ValuesIn(cases()),

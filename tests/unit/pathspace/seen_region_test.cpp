@@ -20,14 +20,15 @@ struct Viewer {
     float height, foot, half_height;
 };
 /// From straight above to almost in the plane, and in it.
-const Viewer kAbove[] = {{1, 0, 0.006f}, {0.4f, 0.2f, 0.006f}, {0.1f, 0.9f, 0.01f}, {0.03f, 0.1f, 0.01f}};
+const Viewer kAbove[] = {
+    {1, 0, 0.006f}, {0.4f, 0.2f, 0.006f}, {0.1f, 0.9f, 0.01f}, {0.03f, 0.1f, 0.01f}};
 const Viewer kAnywhere[] = {{1, 0, 0.006f},       {0.4f, 0.9f, 0.03f},    {0.01f, 0.1f, 0.006f},
                             {0.02f, 1.5f, 0.01f}, {0.002f, 0.5f, 0.006f}, {0, 0.2f, 0.01f}};
 
 SlabView view_of(const Viewer& v) {
     const Frame frame = Frame::from_normal(kNormal);
-    return {frame.s * (0.6f * v.foot) + frame.t * (0.8f * v.foot) - kNormal * v.height, kNormal, kRadius,
-            v.half_height};
+    return {frame.s * (0.6f * v.foot) + frame.t * (0.8f * v.foot) - kNormal * v.height, kNormal,
+            kRadius, v.half_height};
 }
 float cosine_pdf(Vec3 n, Vec3 d) {
     return std::max(0.0f, dot(n, d)) * kInvPi;
@@ -126,8 +127,10 @@ struct Lobe {
 
 template <class Region>
 void expect_bounded(const Region& region, const SlabView& view) {
-    const Lobe lobe{normalize(view.frame.to_world({view.center.x + 0.2f, view.center.y, view.height + 0.1f}))};
-    const BoundedCells cells(region, [&](const DirectionCone& c) { return lobe.max(c); }, 0);
+    const Lobe lobe{
+        normalize(view.frame.to_world({view.center.x + 0.2f, view.center.y, view.height + 0.1f}))};
+    const BoundedCells cells(
+        region, [&](const DirectionCone& c) { return lobe.max(c); }, 0);
     testing::Random random(4);
     const double mass = integral(region, lobe);
     EXPECT_GT(cells.mass(), mass * 0.999);
@@ -152,7 +155,8 @@ TEST(BoundedCells, BoundAndFollowTheDensity) {
 TEST(ArrivalSide, KeepsADirectionToADegree) {
     testing::Random random(5);
     for (int i = 0; i < 10000; ++i) {
-        const Vec3 n = normalize(Vec3{random.between(-1, 1), random.between(-1, 1), random.between(-1, 1)});
+        const Vec3 n =
+            normalize(Vec3{random.between(-1, 1), random.between(-1, 1), random.between(-1, 1)});
         const ArrivalSide side(n, i % 2);
         EXPECT_GT(dot(normalize(side.normal()), n), std::cos(0.025f));
         EXPECT_EQ(side.is_transmissive(), bool(i % 2));
