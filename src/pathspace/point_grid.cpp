@@ -1,6 +1,9 @@
 #include "pathspace/point_grid.h"
 
+#include <algorithm>
+
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 namespace etendue {
 
@@ -11,11 +14,11 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
     tbb::parallel_for(size_t(0), entries.size(), [&](size_t i) {
         bucket[i] = cells_.bucket_of(cells_.cell_of(entries[i].p));
     });
-    // Each part has some of the buckets, and looks at all entries in order.
-    constexpr uint32_t kParts = 8;
+    // Each part has some of the buckets, and looks at all entries in order, so that their number changes nothing.
+    const uint32_t parts = uint32_t(std::clamp(tbb::this_task_arena::max_concurrency(), 1, 8));
     const auto for_each_part = [&](const auto& use) {
-        tbb::parallel_for(uint32_t(0), kParts, [&](uint32_t part) {
-            const auto bound = [&](uint32_t i) { return uint32_t(uint64_t(buckets) * i / kParts); };
+        tbb::parallel_for(uint32_t(0), parts, [&](uint32_t part) {
+            const auto bound = [&](uint32_t i) { return uint32_t(uint64_t(buckets) * i / parts); };
             const uint32_t begin = bound(part), end = bound(part + 1);
             for (size_t i = 0; i < bucket.size(); ++i)
                 if (bucket[i] - begin < end - begin) use(i);
