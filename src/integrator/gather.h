@@ -53,7 +53,8 @@ struct Gather {
         photons.for_each_near(z.p, may_pair, [&](const Partner& y) {
             for (const bool eye : {true, false})
                 if (eye ? y.drops_eye : y.drops_light)
-                    join({Strategy::Gather, y.s, t, eye}, y, number(y, t) + eye, reciprocal);
+                    join({Strategy::Gather, y.s, t, eye}, y, near_eye, number(y, t) + eye,
+                         reciprocal);
         });
     }
 
@@ -85,17 +86,15 @@ private:
     }
 
     template <class Reciprocal>
-    void join(const Technique& q, const Partner& partner, uint32_t number,
-              const Reciprocal& reciprocal) const {
+    void join(const Technique& q, const Partner& partner, const Neighbourhood& near_eye,
+              uint32_t number, const Reciprocal& reciprocal) const {
         const SubPath& z = work.z;
         SubPath& y = work.pair;
         const LightPaths& light = photons.paths();
         const bool eye = q.drops_eye;
         light.restore_first(c.scene, partner.vertex, eye ? q.s : q.s - 1, work.is_observed, y);
-        const Vertex& last = z[q.t - 1];
-        const Neighbourhood kept =
-            eye ? near(y[q.s - 1], partner.side) : near(last, last.arrival_side());
-        if (eye && !kept.contains(last.p, last.arrival_side())) return;
+        const Neighbourhood kept = eye ? near(y[q.s - 1], partner.side) : near_eye;
+        if (eye && !kept.contains(near_eye.p, near_eye.side)) return;
         const auto j = join_gather(c.scene, y, q.s, z, q.t, eye, n);
         const float scale = std::fabs(z.film_weight) * c.splat_scale;
         if (partner.estimate > 0) {

@@ -22,12 +22,11 @@ public:
     PairDensity();
     /// From the light vertices of that pass; `radius`: of pairs.
     PairDensity(const PointGrid& vertices, float radius);
-    /// 1/(1 + ρ n) at `p`, to about 2 %: weights need it small in memory, not exact.
-    double share(Vec3 p) const { return share(level(p)); }
-    /// The same in two steps, of which vertices remember the first, that takes the time.
+    /// What is known at `p`, which vertices remember, since finding it takes the time.
     uint8_t level(Vec3 p) const {
         return levels_.empty() ? uint8_t(0) : levels_[cells_.bucket_of(cells_.cell_of(p))];
     }
+    /// 1/(1 + ρ n) to about 2 %: weights need it small in memory, not exact.
     double share(uint8_t level) const { return double(shares_[level]); }
     /// n, as exactly.
     float partners(uint8_t level) const { return (1 / shares_[level] - 1) / float(kCorrelation); }

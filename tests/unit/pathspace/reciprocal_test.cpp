@@ -228,6 +228,22 @@ TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
     EXPECT_EQ(stats.runaways, 0u);
 }
 
+constexpr int kEstimates = 40000;
+/// That the mean of r is 1/p_c.
+RenderStats expect_reciprocal(const Scene& scene, const PairEvent& event, double p_c) {
+    Sampler sampler(SamplerKind::Independent, 3);
+    sampler.start(0, 0);
+    sampler.seek(Stream::Auxiliary, 1);
+    RenderStats stats;
+    Vertex scratch;
+    Moments r;
+    for (int i = 0; i < kEstimates; ++i)
+        r.add(reciprocal_probability(scene, event, sampler, scratch, stats) * p_c);
+    EXPECT_GE(welch_p(r, Moments::exact(1), 0.002), 1e-4)
+        << r.mean() << " ± " << std::sqrt(r.squared_error());
+    return stats;
+}
+
 /// A floor seen from a wall, close above its plane. p_c = ∫ cosθ H / (π |v|³) over the disc, with cosθ = x / |v|.
 TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
     constexpr double kDistance = 1, H = 0.012, kRadius = 0.4;
@@ -240,7 +256,7 @@ TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
     SurfaceHit hit;
     ASSERT_TRUE(scene.intersect({{0, 0, float(H)}, {-1, 0, 0}, kInf}, 0, hit));
     ComponentArena arena;
-    Vertex wall, scratch;
+    Vertex wall;
     wall.set_surface(*hit.shape, hit.location, hit.geometry, {1, 0, 0}, arena);
     ASSERT_NEAR(double(wall.p.x), -kDistance, 1e-5);
 
@@ -254,22 +270,14 @@ TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
             const double dist2 = sqr(x + kDistance) + sqr(y) + sqr(H);
             p_c += sqr(2 * kRadius / kSteps) * (x + kDistance) * H / (M_PI * sqr(dist2));
         }
-    Sampler sampler(SamplerKind::Independent, 3);
-    sampler.start(0, 0);
-    sampler.seek(Stream::Auxiliary, 1);
-    RenderStats stats;
     const PairEvent event{
         wall,
         TransportMode::Radiance,
         {},
         {{0, 0, 0}, {0, 0, 1}, {{0, 0, 1}, false}, kRadius, 0.02f * float(kRadius)},
         TrialBound::Slab};
-    Moments r;
-    for (int i = 0; i < 40000; ++i)
-        r.add(reciprocal_probability(scene, event, sampler, scratch, stats) * p_c);
-    EXPECT_GE(welch_p(r, Moments::exact(1), 0.002), 1e-4)
-        << r.mean() << " ± " << std::sqrt(r.squared_error());
-    EXPECT_LT(double(stats.trials) / 40000, 10) << "the ball's cone would need a hundred";
+    const RenderStats stats = expect_reciprocal(scene, event, p_c);
+    EXPECT_LT(double(stats.trials) / kEstimates, 10) << "the ball's cone would need a hundred";
     EXPECT_EQ(stats.bounds_exceeded, 0u);
 }
 
@@ -286,7 +294,7 @@ TEST(ReciprocalUnderALeaningNormal, EqualsTheIntegral) {
     const double leaning = std::sqrt(0.5);
     hit.geometry.ns = {float(leaning), 0, float(leaning)};
     ComponentArena arena;
-    Vertex floor, scratch;
+    Vertex floor;
     floor.set_surface(*hit.shape, hit.location, hit.geometry, normalize(Vec3{0.2f, 0, 1}), arena);
 
     double p_c = 0;
@@ -300,10 +308,6 @@ TEST(ReciprocalUnderALeaningNormal, EqualsTheIntegral) {
             p_c += 2 * sqr(kRadius / kSteps) * leaning * (kDistance + z) * kDistance /
                    (M_PI * sqr(dist2));
         }
-    Sampler sampler(SamplerKind::Independent, 3);
-    sampler.start(0, 0);
-    sampler.seek(Stream::Auxiliary, 1);
-    RenderStats stats;
     const Vec3 n{-1, 0, 0};
     const PairEvent event{
         floor,
@@ -311,11 +315,7 @@ TEST(ReciprocalUnderALeaningNormal, EqualsTheIntegral) {
         {},
         {{float(kDistance), 0, 0}, n, {n, false}, kRadius, 0.02f * float(kRadius)},
         TrialBound::Slab};
-    Moments r;
-    for (int i = 0; i < 40000; ++i)
-        r.add(reciprocal_probability(scene, event, sampler, scratch, stats) * p_c);
-    EXPECT_GE(welch_p(r, Moments::exact(1), 0.002), 1e-4)
-        << r.mean() << " ± " << std::sqrt(r.squared_error());
+    expect_reciprocal(scene, event, p_c);
 }
 
 INSTANTIATE_TEST_SUITE_P(Starts, Reciprocal, testing::ValuesIn(cases()),
