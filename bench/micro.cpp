@@ -8,9 +8,9 @@
 
 #include "math/warp.h"
 #include "pathspace/join.h"
-#include "pathspace/light_paths.h"
 #include "pathspace/mis.h"
 #include "readers/mitsuba_xml.h"
+#include "reuse/light_vertex_cache.h"
 #include "scene/builder.h"
 #include "support.h"
 
@@ -212,11 +212,12 @@ void add_emitters(const Report& report, const Options& options, std::list<Emitte
         const Emitter& emitter = *in.scene.emitters().front();
         add(report, options, "emitter sample_direct " + name, [&](size_t i) {
             DirectSample d;
-            const bool lit = emitter.sample_direct(in.from[i], in.u[i], d);
+            const bool lit = emitter.sample_direct(in.from[i], {in.u[i].x, in.u[i].y}, d);
             return lit ? d.pdf : 0.0f;
         });
-        add(report, options, "emitter sample_emission " + name,
-            [&](size_t i) { return emitter.sample_emission(in.u[i], in.v[i]).pdf_d; });
+        add(report, options, "emitter sample_emission " + name, [&](size_t i) {
+            return emitter.sample_emission({in.u[i].x, in.u[i].y}, in.v[i]).pdf_d;
+        });
     }
 }
 
@@ -237,7 +238,8 @@ struct WalkInputs {
             SubPath light, eye;
             walk_light(index, light);
             walk_eye(index, eye);
-            if (light.size() < 4 || eye.size() < 4 || !light[2].may_connect || !eye[2].may_connect)
+            if (light.size() < 4 || eye.size() < 4 || !light[2].is_connectible ||
+                !eye[2].is_connectible)
                 continue;
             y.push_back(std::move(light));
             z.push_back(std::move(eye));
@@ -250,21 +252,15 @@ struct WalkInputs {
         Sampler sampler(SamplerKind::Independent, 8);
         RenderStats stats;
         sampler.start(0, index);
-        start_eye_path(scene, film, index % film.geometry().pixel_count(), sampler, kCounts, path,
-                       stats);
-        while (path.size() >= 2 &&
-               extend<TransportMode::Radiance>(scene, sampler, kWalk, kCounts, path, stats)) {
-        }
+        trace_eye_path({scene, kCounts, stats, kWalk}, film, index % film.geometry().pixel_count(),
+                       sampler, path);
         return path.size();
     }
     int walk_light(uint64_t index, SubPath& path) const {
         Sampler sampler(SamplerKind::Independent, 9);
         RenderStats stats;
         sampler.start(0, index);
-        if (!start_light_path(scene, sampler, kCounts, path, stats)) return 0;
-        while (path.size() >= 2 &&
-               extend<TransportMode::Importance>(scene, sampler, kWalk, kCounts, path, stats)) {
-        }
+        trace_light_path({scene, kCounts, stats, kWalk}, sampler, path);
         return path.size();
     }
 };

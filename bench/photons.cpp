@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 
 #include "compare/error_statistics.h"
-#include "integrator/photon_memory.h"
-#include "integrator/photons.h"
+#include "integrator/bidirectional.h"
+#include "reuse/light_vertex_grid.h"
 #include "support.h"
 
 namespace etendue::bench {
@@ -63,7 +63,8 @@ void add_passes(Renderer& renderer, uint64_t passes) {
 float own_radius(const Scene& scene, const IntegratorSpec& spec, uint64_t passes) {
     Renderer renderer(scene, settings_for(spec));
     add_passes(renderer, passes);
-    return std::sqrt(renderer.integrator().counts(scene, scene.film().pixel_count()).disc / kPi);
+    return std::sqrt(renderer.integrator().counts(scene, scene.film().pixel_count()).pairs.disc /
+                     kPi);
 }
 
 IntegratorParams params_of(const IntegratorSpec& spec) {
@@ -80,39 +81,49 @@ IntegratorParams params_of(const IntegratorSpec& spec) {
 class HalfOfThePasses final : public Integrator {
 public:
     HalfOfThePasses(const IntegratorSpec& spec, float radius)
-        : whole_(make_integrator(spec)), paths_(params_of(spec)),
-          memory_(photon_memory(params_of(spec))), radius_(radius) {}
+        : whole_(make_integrator(spec)), paths_(params_of(spec)), radius_(radius) {}
 
-    void begin_pass(const PassContext& pass) override {
+    void learn(const PassContext& pass) override {
+        whole_->learn(pass);
+        paths_.learn(pass);
+    }
+    void trace(const PassContext& pass) override {
         // Both kinds come after as many passes of the other: roulette knows the image of all.
         is_whole_ = (pass.index + 1) % 4 < 2;
         if (is_whole_) {
-            whole_->begin_pass(pass);
+            whole_->trace(pass);
         } else {
-            paths_.begin_pass(pass);
-            photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths), radius_, memory_);
+            cache_.begin(pass.chunks(pass.light_paths), 0, UINT64_MAX);
+            paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
+                                     cache_);
+            cache_.assemble();
+            grid_.build(cache_, radius_);
         }
         begin_of_samples_ = processor_seconds();
     }
     void sample(const SampleContext& c, Workspace& work) const override {
         if (is_whole_) return whole_->sample(c, work);
         const TechniqueCounts n = counts(c.scene, c.light_paths);
-        photons_.paths().restore(c.scene, c.pixel, work.y);
-        paths_.eye_path(c, n, work, [&](int t) {
-            paths_.add_next_event(c, n, t, work);
-            paths_.connect_to_own(c, n, t, work);
-            const auto only_count = [&](const Partner&) {
+        const SubPath &y = work.y, &z = work.z;
+        cache_.restore(c.scene, c.pixel, work.y);
+        paths_.trace_eye_path(c, n, work);
+        for (int t = 2; t <= z.size(); ++t) {
+            paths_.add_hits(c, n, t, work);
+            if (!paths_.is_joinable(z, t)) continue;
+            paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);
+            for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
+                paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);
+            const auto only_count = [&](const GatherCandidate&) -> std::optional<Chosen> {
                 ++work.stats.pairs;
-                return false;
+                return {};
             };
-            photons_.for_each_near(work.z[t - 1].p, only_count, [](const Partner&) {});
-            return Onward::ByAnyEvent;
-        });
+            grid_.for_each_near(z[t - 1].p, only_count, [](const GatherCandidate&, Chosen) {});
+        }
     }
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         return whole_->counts(scene, light_paths);
     }
-    bool traces_light_paths() const override { return true; }
+    uint64_t light_paths(const Scene& scene) const override { return whole_->light_paths(scene); }
     Estimator estimator() const override { return Estimator::Biased; }
 
     bool is_whole() const { return is_whole_; }
@@ -122,8 +133,8 @@ public:
 private:
     std::unique_ptr<Integrator> whole_;
     Bidirectional paths_;
-    Photons photons_;
-    uint64_t memory_;
+    LightVertexCache cache_;
+    LightVertexGrid grid_;
     float radius_;
     bool is_whole_ = true;
     double begin_of_samples_ = 0;
@@ -242,14 +253,14 @@ public:
     void trace(uint64_t light_paths) {
         const PassContext pass = context(light_paths);
         pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
-            paths_.light_path(c, counts(light_paths), work);
+            paths_.trace_light_path(c, counts(light_paths), work);
         });
     }
-    void keep(uint64_t light_paths, LightPathCollector& collector, LightPaths& kept) {
+    void keep(uint64_t light_paths, LightVertexCache& kept) {
         const PassContext pass = context(light_paths);
-        collector.begin(pass, sizeof(LightVertex), UINT64_MAX);
-        paths_.trace_light_paths(pass, counts(light_paths), light_paths, collector);
-        collector.assemble(kept);
+        kept.begin(pass.chunks(light_paths), 0, UINT64_MAX);
+        paths_.trace_light_paths(pass, counts(light_paths), light_paths, kept);
+        kept.assemble();
     }
     /// Eye vertices that would look for photons, in the order of a pass; of every eighth chunk.
     std::vector<Vec3> queries() {
@@ -260,11 +271,9 @@ public:
             if (pixel / kChunk % 8 != 0) continue;
             sampler_.start(0, pixel);
             SubPath& z = work_.z;
-            start_eye_path(scene_, film_, pixel, sampler_, n, z, work_.stats);
-            paths_.walk_eye_path(scene_, sampler_, n, z, work_.stats, 2, [&](int t) {
-                if (z[t - 1].may_connect) points.push_back(z[t - 1].p);
-                return Onward::ByAnyEvent;
-            });
+            trace_eye_path(paths_.eye_walk(scene_, n, work_.stats), film_, pixel, sampler_, z);
+            for (int t = 2; t <= z.size(); ++t)
+                if (z[t - 1].is_connectible) points.push_back(z[t - 1].p);
         }
         return points;
     }
@@ -276,7 +285,7 @@ private:
         TechniqueCounts n;
         n.hit = n.next_event = n.connect = 1;
         n.merge = float(light_paths);
-        n.disc = kPi * radius_ * radius_;
+        n.pairs.disc = kPi * radius_ * radius_;
         return n;
     }
     PassContext context(uint64_t light_paths) {
@@ -315,10 +324,10 @@ private:
 };
 
 /// The light vertices that eye vertices can find.
-std::vector<PointGrid::Entry> entries_of(const LightPaths& paths) {
+std::vector<PointGrid::Entry> entries_of(const LightVertexCache& paths) {
     std::vector<PointGrid::Entry> entries;
     for (uint32_t i = 0; i < paths.vertices().size(); ++i)
-        if (paths.vertices()[i].may_connect) entries.push_back({paths.vertices()[i].p, i});
+        if (paths.vertices()[i].is_connectible) entries.push_back({paths.vertices()[i].p, i});
     return entries;
 }
 
@@ -362,10 +371,9 @@ void measure_map(const Report& report, const Options& options, const Scene& scen
     const float radius = walks.radius();
 
     const double heap_before = heap_bytes();
-    LightPathCollector collector;
-    LightPaths paths;
+    LightVertexCache paths;
     PointGrid grid;
-    walks.keep(light_paths, collector, paths);
+    walks.keep(light_paths, paths);
     grid.build(entries_of(paths), radius);
     const double held = heap_bytes() - heap_before;
     const std::vector<PointGrid::Entry> entries = entries_of(paths);
@@ -379,7 +387,7 @@ void measure_map(const Report& report, const Options& options, const Scene& scen
     const auto runs = repeat(options.repeats, [&] {
         Run run;
         run.trace = processor_seconds_of(least, [&] { walks.trace(light_paths); });
-        run.keep = processor_seconds_of(least, [&] { walks.keep(light_paths, collector, paths); });
+        run.keep = processor_seconds_of(least, [&] { walks.keep(light_paths, paths); });
         run.build = processor_seconds_of(least, [&] { grid.build(entries, radius); });
         run.query = query_seconds(grid, queries, radius, least);
         return run;
@@ -445,9 +453,8 @@ void measure_growth(const Report& report, const Options& options, const Scene& s
 
     std::vector<PointGrid::Entry> entries;
     for (uint64_t light_paths = 1024; double(entries.size()) < most; light_paths *= 2) {
-        LightPathCollector collector;
-        LightPaths paths;
-        walks.keep(light_paths, collector, paths);
+        LightVertexCache paths;
+        walks.keep(light_paths, paths);
         entries = entries_of(paths);
     }
     PointGrid grid;

@@ -90,12 +90,13 @@ std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const 
                       .pdf_rev = cos_o * kInvPi};
 }
 
-/// As if `c` were chosen for certain.
-std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, float u_lobe,
-                                           Vec2 u, TransportMode mode) {
+/// The sample that `local_sample(wo)` makes of `c` in its frame, as if `c` were chosen for certain.
+template <class LocalSample>
+std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo,
+                                           TransportMode mode, const LocalSample& local_sample) {
     const Side side(ng, c, wo);
     if (!side.wo().is_consistent()) return {};
-    std::optional<BsdfSample> s = sample_lobe(c.lobe, side.wo().w, u_lobe, u);
+    std::optional<BsdfSample> s = local_sample(side.wo().w);
     if (!s) return {};
     const Vec3 local_wi = s->wi;
     s->wi = c.frame.to_world(local_wi);
@@ -104,6 +105,11 @@ std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3
     s->weight *= side.correction(i, s->eta, mode);
     s->pdf *= c.weight;
     s->pdf_rev *= c.weight;
+    if (s->is_delta) {
+        // δ(ω_o - T(ω_i)) = |dω_i/dω_o| δ(ω_i - T⁻¹(ω_o)), and η_o² cos θ_o dω_o = η_i² cos θ_i dω_i.
+        s->pdf_rev *= std::fabs(side.wo().w.z / (local_wi.z * sqr(s->eta)));
+        s->event = local_wi.z * side.wo().w.z < 0;
+    }
     return s;
 }
 
@@ -138,9 +144,15 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     }
     if (!chosen) return {};  // beyond the sum of the weights
     u_lobe = std::fmin(u_lobe / chosen->weight, kOneMinusEpsilon);
-    std::optional<BsdfSample> s = sample_component(ng_, *chosen, wo, u_lobe, u, mode);
+    std::optional<BsdfSample> s = sample_component(ng_, *chosen, wo, mode, [&](Vec3 local_wo) {
+        return sample_lobe(chosen->lobe, local_wo, u_lobe, u);
+    });
     const bool is_mixture = first_.next != nullptr;
-    if (!s || s->is_delta || !is_mixture) return s;
+    if (!s || !is_mixture) return s;
+    if (s->is_delta) {
+        for (const BsdfComponent* c = &first_; c != chosen; c = c->next) s->event += 2;
+        return s;
+    }
 
     // The other components sample the same direction: weight = Σ f / Σ pdf.
     BsdfEval sum{s->weight * s->pdf, s->pdf, s->pdf_rev, s->eta};
@@ -149,6 +161,24 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     s->weight = sum.f / sum.pdf;
     s->pdf = sum.pdf;
     s->pdf_rev = sum.pdf_rev;
+    return s;
+}
+
+std::optional<BsdfSample> Bsdf::sample_delta(Vec3 wo, uint8_t event, TransportMode mode) const {
+    const BsdfComponent* c = &first_;
+    for (int i = 0; i < event / 2 && c; ++i) c = c->next;
+    if (!c) return {};
+    std::optional<BsdfSample> s =
+        sample_component(ng_, *c, wo, mode, [&](Vec3 local_wo) -> std::optional<BsdfSample> {
+            return std::visit(
+                [&](const auto& lobe) -> std::optional<BsdfSample> {
+                    if constexpr (requires { lobe.delta_event(local_wo, true); })
+                        return lobe.delta_event(local_wo, event % 2 == 1);
+                    return {};
+                },
+                c->lobe);
+        });
+    if (s) s->event = event;
     return s;
 }
 

@@ -45,6 +45,10 @@ public:
     /// A direction with weight f̃·|wi·ng| / pdf; nothing where the walk ends.
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const;
 
+    /// The delta event of that number at `wo`, with the direction it has there: to follow a path whose vertices have moved.
+    /// Nothing where there is none. Numbers are those of BsdfSample::event: 2·(index of the component) + transmits.
+    std::optional<BsdfSample> sample_delta(Vec3 wo, uint8_t event, TransportMode mode) const;
+
     /// Bound of eval(wo, w).pdf over the directions w of a cone; kInf where none is known.
     float max_pdf(Vec3 wo, const DirectionCone& cone) const;
     /// Shading normal of a surface that is diffuse alone; its density is that of the cosine about it.

@@ -11,7 +11,10 @@ struct ConductorLobe {
 
     BsdfEval eval(Vec3 /*wo*/, Vec3 /*wi*/) const { return {}; }
     std::optional<BsdfSample> sample(Vec3 wo, float /*u_lobe*/, Vec2 /*u*/) const {
-        if (!(wo.z > 0)) return {};
+        return delta_event(wo, false);
+    }
+    std::optional<BsdfSample> delta_event(Vec3 wo, bool transmits) const {
+        if (!(wo.z > 0) || transmits) return {};
         return BsdfSample{.wi = reflect(wo),
                           .weight = reflectance * fresnel_conductor(wo.z, eta, k),
                           .pdf = 1,

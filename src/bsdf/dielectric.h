@@ -12,21 +12,14 @@ struct DielectricLobe {
     BsdfEval eval(Vec3 /*wo*/, Vec3 /*wi*/) const { return {}; }
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 /*u*/) const {
         if (wo.z == 0) return {};
-        // F is the same from both ends of a refracted path, and so is the choice by it.
         const DielectricFresnel fresnel = fresnel_dielectric(wo.z, eta);
-        if (u_lobe < fresnel.R)
-            return BsdfSample{.wi = reflect(wo),
-                              .weight = reflectance,
-                              .pdf = fresnel.R,
-                              .pdf_rev = fresnel.R,
-                              .is_delta = true};
-        const float T = 1 - fresnel.R;
-        return BsdfSample{.wi = normalize(refract(wo, fresnel)),
-                          .weight = transmittance,
-                          .pdf = T,
-                          .pdf_rev = T,
-                          .eta = fresnel.eta,
-                          .is_delta = true};
+        return delta_event(wo, fresnel, !(u_lobe < fresnel.R));
+    }
+    std::optional<BsdfSample> delta_event(Vec3 wo, bool transmits) const {
+        if (wo.z == 0) return {};
+        const DielectricFresnel fresnel = fresnel_dielectric(wo.z, eta);
+        if (!((transmits ? 1 - fresnel.R : fresnel.R) > 0)) return {};
+        return delta_event(wo, fresnel, transmits);
     }
     float max_pdf(Vec3 /*wo*/, const DirectionCone& /*c*/) const { return 0; }
     Rgb albedo_estimate() const {
@@ -36,6 +29,24 @@ struct DielectricLobe {
     bool has_smooth() const { return false; }
     static constexpr bool kUsesLobeChoice = true;
     bool has_delta() const { return true; }
+
+private:
+    /// F is the same from both ends of a refracted path, and so is the choice by it.
+    BsdfSample delta_event(Vec3 wo, const DielectricFresnel& fresnel, bool transmits) const {
+        if (!transmits)
+            return {.wi = reflect(wo),
+                    .weight = reflectance,
+                    .pdf = fresnel.R,
+                    .pdf_rev = fresnel.R,
+                    .is_delta = true};
+        const float T = 1 - fresnel.R;
+        return {.wi = normalize(refract(wo, fresnel)),
+                .weight = transmittance,
+                .pdf = T,
+                .pdf_rev = T,
+                .eta = fresnel.eta,
+                .is_delta = true};
+    }
 };
 
 }  // namespace etendue

@@ -28,10 +28,12 @@ struct BsdfSample {
     Vec3 wi;
     Rgb weight;  ///< f·|cos θ_i| / pdf in the convention of BsdfEval::f; for a delta event f / pmf.
     float pdf = 0;  ///< As BsdfEval; for a delta event its discrete probability.
-    float pdf_rev =
-        0;  ///< As BsdfEval; for a delta event the discrete probability of the reverse event.
+    /// As BsdfEval. For a delta event the discrete probability of the reverse event, times |dω_i/dω_o| (a lobe leaves that
+    /// factor to Bsdf): with it, densities of the two directions of a path refer to the same δ.
+    float pdf_rev = 0;
     float eta = 1;  ///< As BsdfEval.
     bool is_delta = false;
+    uint8_t event = 0;  ///< Of a delta event: which one, see Bsdf::sample_delta().
 };
 
 /// All directions within `angle` (radians, at most π) of `axis`.
@@ -60,6 +62,7 @@ inline std::optional<BsdfSample> make_sample(Vec3 wi, const BsdfEval& e) {
 //   Rgb albedo_estimate() const       rough hemispherical reflectance, for AOVs and heuristics
 //   float roughness() const           GGX-like α of the *sharpest smooth* lobe: 0 delta only … 1 diffuse
 //   bool has_smooth() const, has_delta() const
+//   std::optional<BsdfSample> delta_event(Vec3 wo, bool transmits) const       only where there are delta events
 //   bool kUsesLobeChoice              whether sample() reads u_lobe
 //   float max_pdf(Vec3 wo, const DirectionCone& c) const   bound of eval(wo, wi).pdf for wi in c; kInf if unknown
 // `wo` and `wi` are unit vectors in local coordinates, away from the surface. A reflecting-only lobe is black for

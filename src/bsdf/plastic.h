@@ -30,14 +30,15 @@ struct PlasticLobe {
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const {
         if (!(wo.z > 0)) return {};
         const float F = fresnel_dielectric(wo.z, eta).R, q = coat_probability(F, specular_share);
-        if (u_lobe < q)
-            return BsdfSample{.wi = reflect(wo),
-                              .weight = specular * (F / q),
-                              .pdf = q,
-                              .pdf_rev = q,
-                              .is_delta = true};
+        if (u_lobe < q) return reflected(wo, F, q);
         const Vec3 wi = sample_cosine_hemisphere(u);
         return make_sample(wi, eval(wo, wi));
+    }
+    std::optional<BsdfSample> delta_event(Vec3 wo, bool transmits) const {
+        if (!(wo.z > 0) || transmits) return {};
+        const float F = fresnel_dielectric(wo.z, eta).R, q = coat_probability(F, specular_share);
+        if (!(q > 0)) return {};
+        return reflected(wo, F, q);
     }
     float max_pdf(Vec3 wo, const DirectionCone& c) const {
         const float F = fresnel_dielectric(wo.z, eta).R, q = coat_probability(F, specular_share);
@@ -51,6 +52,15 @@ struct PlasticLobe {
     bool has_smooth() const { return true; }
     static constexpr bool kUsesLobeChoice = true;
     bool has_delta() const { return true; }
+
+private:
+    BsdfSample reflected(Vec3 wo, float F, float q) const {
+        return {.wi = reflect(wo),
+                .weight = specular * (F / q),
+                .pdf = q,
+                .pdf_rev = q,
+                .is_delta = true};
+    }
 };
 
 }  // namespace etendue

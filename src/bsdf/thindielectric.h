@@ -13,12 +13,16 @@ struct ThinDielectricLobe {
     BsdfEval eval(Vec3 /*wo*/, Vec3 /*wi*/) const { return {}; }
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 /*u*/) const {
         if (wo.z == 0) return {};
-        const float R = pane_reflectance(std::fabs(wo.z));
-        if (u_lobe < R)
-            return BsdfSample{
-                .wi = reflect(wo), .weight = reflectance, .pdf = R, .pdf_rev = R, .is_delta = true};
-        return BsdfSample{
-            .wi = -wo, .weight = transmittance, .pdf = 1 - R, .pdf_rev = 1 - R, .is_delta = true};
+        return delta_event(wo, !(u_lobe < pane_reflectance(std::fabs(wo.z))));
+    }
+    std::optional<BsdfSample> delta_event(Vec3 wo, bool transmits) const {
+        const float R = pane_reflectance(std::fabs(wo.z)), p = transmits ? 1 - R : R;
+        if (wo.z == 0 || !(p > 0)) return {};
+        return BsdfSample{.wi = transmits ? -wo : reflect(wo),
+                          .weight = transmits ? transmittance : reflectance,
+                          .pdf = p,
+                          .pdf_rev = p,
+                          .is_delta = true};
     }
     float max_pdf(Vec3 /*wo*/, const DirectionCone& /*c*/) const { return 0; }
     Rgb albedo_estimate() const { return lerp(pane_reflectance(1), transmittance, reflectance); }

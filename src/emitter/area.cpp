@@ -45,15 +45,18 @@ public:
             pdf_[i] = areas[i] > 0 ? float(choice_.pmf(uint32_t(i)) / areas[i]) : 0.0f;
     }
 
-    EmissionSample sample_emission(Vec2 u_y0, Vec2 u_d) const override {
+    EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const override {
         const ShapeSample s = sample_point(u_y0);
         const Vec3 local = sample_cosine_hemisphere(u_d);
         const Vec3 d = Frame::from_normal(s.ng).to_world(local);
         return {s.p,  s.ng,  d, radiance_.eval(s.uv), pdf_[s.prim], pdf_cosine_hemisphere(local.z),
                 s.uv, s.prim};
     }
+    Vec3 sample_direction(Vec3 ng, Vec2 u) const override {
+        return Frame::from_normal(ng).to_world(sample_cosine_hemisphere(u));
+    }
 
-    bool sample_direct(Vec3 from, Vec2 u, DirectSample& out) const override {
+    bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const override {
         const ShapeSample s = sample_point(u);
         const Vec3 v = s.p - from;
         const float dist2 = length2(v);
@@ -84,9 +87,9 @@ public:
     float max_pdf_d() const override { return kInvPi; }
 
 private:
-    ShapeSample sample_point(Vec2 u) const {
+    ShapeSample sample_point(FinePoint u) const {
         const auto choice = choice_.sample(u.x);
-        return shape_.sample(choice.index, {choice.u, u.y});
+        return shape_.sample(choice.index, {to_float(choice.u), to_float(u.y)});
     }
 
     const Shape& shape_;

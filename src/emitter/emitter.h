@@ -55,9 +55,10 @@ class Emitter {
 public:
     virtual ~Emitter() = default;
 
-    virtual EmissionSample sample_emission(Vec2 u_y0, Vec2 u_d) const = 0;
+    /// `u_y0` chooses among primitives or texels first, so that it has the bits to do so.
+    virtual EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const = 0;
     /// False where the emitter sends nothing to `from`.
-    virtual bool sample_direct(Vec3 from, Vec2 u, DirectSample& out) const = 0;
+    virtual bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const = 0;
     /// Emitted power in W (luminance), the measure by which emitters are chosen.
     virtual double power() const = 0;
 
@@ -71,6 +72,8 @@ public:
         float pdf_d;
     };
     virtual Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const = 0;
+    /// Finite emitters: a direction, of density eval_emission().pdf_d, from a point with the normal `ng`.
+    virtual Vec3 sample_direction(Vec3 ng, Vec2 u) const = 0;
 
     /// Bound of the density of directions from a point of a finite emitter; kInf where none is known.
     virtual float max_pdf_d() const { return kInf; }

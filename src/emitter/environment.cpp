@@ -41,7 +41,7 @@ public:
 private:
     // The square of the density: u runs over the cells' columns, v over height + 1 rows, of which the first and the last
     // are half as high on the image.
-    Sample sample_direction(Vec2 u) const override {
+    Sample sample_arrival(FinePoint u) const override {
         const auto s = distribution_.sample(u);
         Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};
         const Vec3 d = to_direction(uv);

@@ -5,16 +5,16 @@
 
 namespace etendue {
 
-EmissionSample InfiniteEmitter::sample_emission(Vec2 u_y0, Vec2 u_d) const {
-    const Sample s = sample_direction(u_y0);
+EmissionSample InfiniteEmitter::sample_emission(FinePoint u_y0, Vec2 u_d) const {
+    const Sample s = sample_arrival(u_y0);
     const Vec2 disk = sample_uniform_disk(u_d);
     const Frame frame = Frame::from_normal(s.d);
     const Vec3 p = center_ + (frame.s * disk.x + frame.t * disk.y + s.d) * radius_;
     return {p, -s.d, -s.d, s.L, s.pdf, pdf_disk_, {}, 0};
 }
 
-bool InfiniteEmitter::sample_direct(Vec3, Vec2 u, DirectSample& out) const {
-    const Sample s = sample_direction(u);
+bool InfiniteEmitter::sample_direct(Vec3, FinePoint u, DirectSample& out) const {
+    const Sample s = sample_arrival(u);
     // Rounding may take a direction into a cell of the environment without density.
     if (s.L.is_zero() || !(s.pdf > 0)) return false;
     out = {s.d, -s.d, s.d, kInf, s.L, s.pdf, s.pdf, pdf_disk_, {}, 0};
@@ -47,8 +47,8 @@ public:
     }
 
 private:
-    Sample sample_direction(Vec2 u) const override {
-        return {sample_uniform_sphere(u), L_, kUniformSpherePdf};
+    Sample sample_arrival(FinePoint u) const override {
+        return {sample_uniform_sphere(to_float(u)), L_, kUniformSpherePdf};
     }
     Rgb radiance(Vec3) const override { return L_; }
     float pdf_direction(Vec3) const override { return kUniformSpherePdf; }
@@ -65,7 +65,7 @@ public:
     bool is_delta() const override { return true; }
 
 private:
-    Sample sample_direction(Vec2) const override { return {d_, E_, 1}; }
+    Sample sample_arrival(FinePoint) const override { return {d_, E_, 1}; }
     Rgb radiance(Vec3) const override { return E_; }
     float pdf_direction(Vec3) const override { return 0; }
 

@@ -8,10 +8,12 @@ namespace etendue {
 /// An emitter of which every point is a direction. Light arriving from direction `d` travels along -d.
 class InfiniteEmitter : public Emitter {
 public:
-    EmissionSample sample_emission(Vec2 u_y0, Vec2 u_d) const final;
-    bool sample_direct(Vec3 from, Vec2 u, DirectSample& out) const final;
+    EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const final;
+    bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const final;
     EmitterHit eval_infinite(Vec3 d) const final;
     Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const final;
+    /// The direction of y_0 alone; what varies is the point of the bounding disc.
+    Vec3 sample_direction(Vec3 ng, Vec2) const final { return ng; }
     bool is_infinite() const final { return true; }
     Disc disc() const final { return {center_, radius_}; }
     void set_scene_bounds(Vec3 center, float radius) final;
@@ -23,7 +25,7 @@ protected:
         Rgb L;
         float pdf;
     };
-    virtual Sample sample_direction(Vec2 u) const = 0;
+    virtual Sample sample_arrival(FinePoint u) const = 0;
     virtual Rgb radiance(Vec3 d) const = 0;
     virtual float pdf_direction(Vec3 d) const = 0;
     float scene_radius() const { return radius_; }

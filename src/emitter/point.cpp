@@ -13,12 +13,12 @@ class PointEmitter : public Emitter {
 public:
     PointEmitter(Vec3 p, Rgb intensity) : p_(p), intensity_(intensity) {}
 
-    EmissionSample sample_emission(Vec2, Vec2 u_d) const override {
-        const Vec3 d = sample_direction(u_d);
+    EmissionSample sample_emission(FinePoint, Vec2 u_d) const override {
+        const Vec3 d = sample_direction({}, u_d);
         return {p_, d, d, intensity(d), 1, pdf_direction(d), {}, 0};
     }
 
-    bool sample_direct(Vec3 from, Vec2, DirectSample& out) const override {
+    bool sample_direct(Vec3 from, FinePoint, DirectSample& out) const override {
         const Vec3 v = p_ - from;
         const float dist2 = length2(v);
         if (!(dist2 > 0)) return false;
@@ -33,13 +33,13 @@ public:
     Emission eval_emission(Vec3, Vec2, Vec3 w) const override {
         return {intensity(w), pdf_direction(w)};
     }
+    Vec3 sample_direction(Vec3, Vec2 u) const override { return sample_uniform_sphere(u); }
     float max_pdf_d() const override { return kUniformSpherePdf; }
     double power() const override { return 4 * double(kPi) * luminance(intensity_); }
     bool is_delta() const override { return true; }
 
 protected:
     virtual Rgb intensity(Vec3) const { return intensity_; }
-    virtual Vec3 sample_direction(Vec2 u) const { return sample_uniform_sphere(u); }
     virtual float pdf_direction(Vec3) const { return kUniformSpherePdf; }
 
     Vec3 p_;
@@ -53,6 +53,9 @@ public:
           cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
           cos_cutoff_(std::cos(cutoff_)), cos_beam_(std::cos(beam_)) {}
 
+    Vec3 sample_direction(Vec3, Vec2 u) const override {
+        return frame_.to_world(sample_uniform_cone(u, cos_cutoff_));
+    }
     float max_pdf_d() const override { return pdf_uniform_cone(cos_cutoff_); }
     double power() const override {
         return 2 * double(kPi) * luminance(intensity_) *
@@ -65,9 +68,6 @@ private:
         if (c <= cos_cutoff_) return Rgb();
         if (c >= cos_beam_) return intensity_;
         return intensity_ * ((cutoff_ - std::acos(c)) / (cutoff_ - beam_));
-    }
-    Vec3 sample_direction(Vec2 u) const override {
-        return frame_.to_world(sample_uniform_cone(u, cos_cutoff_));
     }
     float pdf_direction(Vec3 d) const override {
         return dot(d, frame_.n) > cos_cutoff_ ? pdf_uniform_cone(cos_cutoff_) : 0.0f;

@@ -24,8 +24,8 @@ public:
     }
 
 private:
-    Sample sample_direction(Vec2 u) const override {
-        const Vec3 local = sample_uniform_cone(u, cos_max_);
+    Sample sample_arrival(FinePoint u) const override {
+        const Vec3 local = sample_uniform_cone(to_float(u), cos_max_);
         return {frame_.to_world(local), radiance_, pdf_uniform_cone(cos_max_)};
     }
     Rgb radiance(Vec3 d) const override { return is_inside(d) ? radiance_ : Rgb(); }

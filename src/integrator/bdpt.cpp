@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "integrator/bidirectional.h"
+#include "integrator/light_path_options.h"
 
 namespace etendue {
 namespace {
@@ -21,32 +22,42 @@ class BdptIntegrator final : public Integrator {
 public:
     explicit BdptIntegrator(const IntegratorParams& p)
         : paths_(p), uses_cache_(p.choice("connections", kUsesCache)),
-          given_draws_(p.integer("cache_draws", 0, 1024)), memory_(photon_memory(p)) {}
+          given_draws_(p.integer("cache_draws", 0, 1024)), light_(p) {}
 
-    void begin_pass(const PassContext& pass) override {
-        paths_.begin_pass(pass);
+    void learn(const PassContext& pass) override {
+        paths_.learn(pass);
+        if (uses_cache_ && draws_ == 0) choose_draws(pass);
+    }
+    void trace(const PassContext& pass) override {
         if (!uses_cache_) return;
-        if (draws_ == 0) choose_draws(pass);
-        collector_.begin(pass, kVertexBytes, memory_);
+        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                 collector_);
-        collector_.assemble(cache_);
+                                 cache_);
+        cache_.assemble();
         connectible_.clear();
         for (uint32_t i = 0; i < cache_.vertices().size(); ++i)
-            if (cache_.vertices()[i].may_connect) connectible_.push_back(i);
+            if (cache_.vertices()[i].is_connectible) connectible_.push_back(i);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
-        if (!uses_cache_) paths_.light_path(c, n, work);
-        paths_.eye_path(c, n, work, [&](int t) {
-            paths_.add_next_event(c, n, t, work);
-            if (uses_cache_)
+        const SubPath &y = work.y, &z = work.z;
+        if (!uses_cache_) paths_.trace_light_path(c, n, work);  // C(s,1), C(s,0)
+
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        paths_.trace_eye_path(c, n, work);
+        for (int t = 2; t <= z.size(); ++t) {
+            paths_.add_hits(c, n, t, work);  // C(0,t)
+            if (!paths_.is_joinable(z, t)) continue;
+            paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
+            const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
+            if (uses_cache_) {
                 connect_to_cache(c, n, t, work);
-            else
-                paths_.connect_to_own(c, n, t, work);
-            return Onward::ByAnyEvent;
-        });
+                continue;
+            }
+            for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
+                paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
+        }
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
@@ -54,7 +65,9 @@ public:
         if (uses_cache_) n.connect = count_;
         return n;
     }
-    bool traces_light_paths() const override { return true; }
+    uint64_t light_paths(const Scene& scene) const override {
+        return light_.count(scene, paths_.depth(), uses_cache_ ? kVertexBytes : 0);
+    }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
         if (!uses_cache_) return {};
@@ -73,9 +86,8 @@ private:
         std::vector<int> found(kPilotPaths);
         pass.for_each_other_path(kPilotPaths, [&](uint64_t i, Sampler& sampler, Workspace& work) {
             sampler.start(0, pixels + i);
-            const auto nothing = [](int) {};
-            paths_.walk_light_path(pass.scene, sampler, n, work.y, work.stats, nothing, nothing);
-            for (int s = 2; s <= work.y.size(); ++s) found[i] += work.y[s - 1].may_connect;
+            trace_light_path(paths_.light_walk(pass.scene, n, work.stats), sampler, work.y);
+            for (int s = 2; s <= work.y.size(); ++s) found[i] += work.y[s - 1].is_connectible;
         });
         double vertices = 0;
         for (const int v : found) vertices += double(v) / kPilotPaths;
@@ -83,39 +95,39 @@ private:
         count_ = vertices > 0 ? float(draws_ / vertices) : 1.0f;
     }
 
+    /// `draws_` of the connections of z_{t-1} to the cache.
     void connect_to_cache(const SampleContext& c, const TechniqueCounts& n, int t,
                           Workspace& work) const {
         if (connectible_.empty()) return;
-        const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
         const float factor =
             float(double(connectible_.size()) / (double(draws_) * double(c.light_paths)));
         for (int i = 0; i < draws_; ++i) {
-            c.sampler.seek(Stream::Selection, uint32_t(i) << 16 | uint32_t(t));
-            const double u = (i + c.sampler.next_1d_fine()) / draws_;
+            c.sampler.seek(Stream::Selection, join_number(0, t, uint32_t(i)));
+            const double u = stratum(i, draws_, c.sampler.next_1d_unstructured());
             const uint32_t vertex = connectible_[size_t(u * double(connectible_.size()))];
             const int s = cache_.depth(vertex) + 1;
             if (s + t - 1 > paths_.max_depth()) continue;
             cache_.restore_first(c.scene, vertex, s, work.is_observed, work.y);
-            paths_.add_drawn(c, join_connect(c.scene, work.y, s, work.z, t, n), factor, i, work);
+            paths_.add(c, join_connect(c.scene, work.y, s, work.z, t, n), work, factor,
+                       uint32_t(i) + 1);
         }
     }
 
-    /// A vertex is in a chunk and in the cache, and has a number among the connectible.
-    static constexpr uint64_t kVertexBytes = 2 * sizeof(LightVertex) + 2 * sizeof(uint32_t);
+    /// A vertex is in the cache, and has a number among the connectible.
+    static constexpr uint64_t kVertexBytes = LightVertexCache::kVertexBytes + 2 * sizeof(uint32_t);
     /// Before the pilot; not that of other methods.
     static constexpr float kUnknownCount = 0.5f;
 
     Bidirectional paths_;
     bool uses_cache_;
     int given_draws_;
-    uint64_t memory_;
+    LightPathOptions light_;
     int draws_ = 0;                ///< C; 0 before the first pass.
     float count_ = kUnknownCount;  ///< C·N_L/V̄
 
     // Of the pass.
-    LightPaths cache_;
+    LightVertexCache cache_;
     std::vector<uint32_t> connectible_;
-    LightPathCollector collector_;
 };
 
 }  // namespace
@@ -128,7 +140,7 @@ IntegratorEntry bdpt_entry() {
     params.push_back({"cache_draws", ParamKind::Int, "0",
                       "Connections of each eye vertex to the cache; 0: as many as a light path has "
                       "vertices."});
-    params.push_back(memory_param());
+    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     return {{"integrator", "bdpt",
              "Bidirectional path tracing with all connections and MIS. Unbiased.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {

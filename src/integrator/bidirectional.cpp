@@ -1,5 +1,6 @@
 #include "integrator/bidirectional.h"
 
+#include <cmath>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -27,35 +28,29 @@ Bidirectional::Bidirectional(const IntegratorParams& p)
         throw std::runtime_error(fmt::format("{}: roulette must lie in [0, 1]", p.integrator()));
 }
 
-void Bidirectional::light_path(const SampleContext& c, const TechniqueCounts& counts,
-                               Workspace& work) const {
+void Bidirectional::trace_light_path(const SampleContext& c, const TechniqueCounts& counts,
+                                     Workspace& work, const LearnedPlaces* learned) const {
     const PhaseTimer timer(work.stats, &PhaseSeconds::light_paths);
-    const auto splat = [&](int s) {
-        if (counts.splat > 0)
-            add_if_visible(c, join_splat(c.scene, work.y, s, c.sampler, counts), work);
-    };
-    const auto hit_lens = [&](int s) {
-        add_if_visible(c, join_hit_lens(c.scene, work.y, s, counts), work);
-    };
-    walk_light_path(c.scene, c.sampler, counts, work.y, work.stats, splat, hit_lens);
+    const WalkContext walk = light_walk(c.scene, counts, work.stats, learned);
+    SubPath& y = work.y;
+    const bool adds = c.pixel < c.light_paths;
+    Sampler sampler = c.sampler;
+    if (!adds) sampler.start(c.own_light_path());
+    if (!start_light_path(walk, sampler, y)) return;
+    for (int s = 1; s <= y.size() && s <= depth_.max_depth; ++s) {
+        if (adds && counts.splat > 0) add(c, join_splat(c.scene, y, s, sampler, counts), work);
+        if (s >= 2) extend<TransportMode::Importance>(walk, sampler, y);
+        if (adds) add(c, join_hit_lens(c.scene, y, s, counts), work);
+    }
 }
 
-void Bidirectional::add_next_event(const SampleContext& c, const TechniqueCounts& counts, int t,
-                                   Workspace& work) const {
-    if (counts.next_event > 0)
-        add_if_visible(c, join_next_event(c.scene, work.z, t, c.sampler, counts), work);
+void Bidirectional::trace_eye_path(const SampleContext& c, const TechniqueCounts& counts,
+                                   Workspace& work, const LearnedPlaces* learned) const {
+    etendue::trace_eye_path(eye_walk(c.scene, counts, work.stats, learned), c.film, c.pixel,
+                            c.sampler, work.z);
 }
 
-void Bidirectional::connect_to_own(const SampleContext& c, const TechniqueCounts& counts, int t,
-                                   Workspace& work) const {
-    if (!(counts.connect > 0)) return;
-    const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
-    const int longest = std::min(work.y.size(), depth_.max_depth + 1 - t);
-    for (int s = 2; s <= longest; ++s)
-        add_if_visible(c, join_connect(c.scene, work.y, s, work.z, t, counts), work);
-}
-
-void Bidirectional::begin_pass(const PassContext& pass) {
+void Bidirectional::learn(const PassContext& pass) {
     if (!is_optimised_ || pass.film.passes() < 2) return;
     // Of one pass, averaged over a window, since few passes know little of a pixel's variance.
     constexpr int kReach = 3;
@@ -91,15 +86,16 @@ float Bidirectional::threshold(const SampleContext& c, const Vec2* splat) const 
 }
 
 void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCounts& counts,
-                                      uint64_t kept, LightPathCollector& collector) const {
+                                      uint64_t kept, LightVertexCache& cache,
+                                      const LearnedPlaces* learned) const {
     pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
-        light_path(c, counts, work);
-        if (c.pixel < kept) collector.add(c.chunk, work.y);
+        trace_light_path(c, counts, work, learned);
+        if (c.pixel < kept) cache.add(c.chunk, work.y);
     });
 }
 
 std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, float scale,
-                                       uint32_t number, Workspace& work) const {
+                                       uint64_t number, Workspace& work) const {
     Rgb contribution = j.contribution;
     const bool is_splat = j.technique.t <= 1;
     if (is_splat) c.film.prefetch_splat(j.film);
@@ -107,7 +103,7 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
                                   threshold(c, is_splat ? &j.film : nullptr));
     if (q < 1) {
         c.sampler.seek(Stream::Roulette, number);
-        if (!(c.sampler.next_1d_unstructured() < q)) {
+        if (!(c.sampler.next_1d_unstructured() < double(q))) {
             ++work.stats.joins_skipped;
             return {};
         }
@@ -118,23 +114,13 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
     return contribution * Tr;
 }
 
-void Bidirectional::add(const SampleContext& c, const std::optional<Join>& j, float factor,
-                        uint32_t number, Workspace& work) const {
+void Bidirectional::add(const SampleContext& c, const std::optional<Join>& j, Workspace& work,
+                        float factor, uint32_t draw) const {
     if (!j) return;
     const float scale = j->technique.t <= 1 ? c.splat_scale : std::fabs(work.z.film_weight);
+    const uint64_t number = join_number(j->technique.s, j->technique.t, draw);
     if (const auto value = test(c, *j, scale * factor, number, work))
         c.sink.add(*j, *value * factor);
-}
-
-void Bidirectional::add_if_visible(const SampleContext& c, const std::optional<Join>& j,
-                                   Workspace& work) const {
-    if (j) add(c, j, 1, uint32_t(j->technique.s) << 16 | uint32_t(j->technique.t), work);
-}
-
-void Bidirectional::add_drawn(const SampleContext& c, const std::optional<Join>& j, float factor,
-                              int draw, Workspace& work) const {
-    // Beyond the numbers that s gives to other joins.
-    if (j) add(c, j, factor, (0x8000u + uint32_t(draw)) << 16 | uint32_t(j->technique.t), work);
 }
 
 }  // namespace etendue

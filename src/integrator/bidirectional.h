@@ -1,15 +1,10 @@
 #pragma once
-// What the bidirectional integrators share: both sub-paths with their joins, and the roulette before shadow rays.
+// What the bidirectional integrators share: both walks, and the roulette before shadow rays.
 
-#include <cmath>
-#include <optional>
-
-#include "integrator/light_path_collector.h"
+#include "integrator/integrator.h"
+#include "reuse/light_vertex_cache.h"
 
 namespace etendue {
-
-/// How an eye path goes on from a vertex.
-enum class Onward { ByAnyEvent, ByDeltaEvents, Ends };
 
 class Bidirectional {
 public:
@@ -27,91 +22,56 @@ public:
     }
 
     /// Sets the thresholds of efficiency-optimised roulette from what earlier passes brought.
-    void begin_pass(const PassContext& pass);
+    void learn(const PassContext& pass);
 
-    /// The light sub-path `y`; `before(s)` and `after(s)` are called for every y_{s-1} before and after the walk leaves it.
-    template <class Before, class After>
-    void walk_light_path(const Scene& scene, Sampler& sampler, const TechniqueCounts& counts,
-                         SubPath& y, RenderStats& stats, const Before& before,
-                         const After& after) const {
-        // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
-        const WalkOptions walk{depth_.max_depth + scene.sensor().has_finite_lens(),
-                               depth_.rr_depth};
-        if (!start_light_path(scene, sampler, counts, y, stats)) return;
-        for (int s = 1; s <= y.size() && s <= depth_.max_depth; ++s) {
-            before(s);
-            if (s >= 2) extend<TransportMode::Importance>(scene, sampler, walk, counts, y, stats);
-            after(s);
-        }
+    WalkContext eye_walk(const Scene& scene, const TechniqueCounts& counts, RenderStats& stats,
+                         const LearnedPlaces* learned = nullptr) const {
+        return {scene, counts, stats, depth_.walk(), learned};
     }
-    /// The light sub-path work.y, with its techniques t ≤ 1.
-    void light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
-
-    /// Goes on with the eye sub-path `z` from z_{t-1}, its last vertex so far. `at_vertex(t)` is called for it and every
-    /// later one, while it is the last, and returns an Onward.
-    template <class AtVertex>
-    void walk_eye_path(const Scene& scene, Sampler& sampler, const TechniqueCounts& counts,
-                       SubPath& z, RenderStats& stats, int t, const AtVertex& at_vertex) const {
-        for (; t <= z.size(); ++t) {
-            const Onward onward = at_vertex(t);
-            if (t > depth_.max_depth || onward == Onward::Ends) break;
-            extend<TransportMode::Radiance>(scene, sampler, depth_.walk(), counts, z, stats);
-            if (onward == Onward::ByDeltaEvents && !z[t - 1].is_delta) break;
-        }
+    /// The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
+    WalkContext light_walk(const Scene& scene, const TechniqueCounts& counts, RenderStats& stats,
+                           const LearnedPlaces* learned = nullptr) const {
+        return {scene,
+                counts,
+                stats,
+                {depth_.max_depth + scene.sensor().has_finite_lens(), depth_.rr_depth},
+                learned};
     }
 
-    /// The eye sub-path work.z with its hits. `join(t)` is called for every z_{t-1} that may be joined, while it is the
-    /// last, and returns an Onward.
-    template <class JoinVertex>
-    void eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                  const JoinVertex& join) const {
-        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        start_eye_path(c.scene, c.film, c.pixel, c.sampler, counts, work.z, work.stats);
-        go_on(c, counts, work, 2, join);
-    }
-    /// The same from z_{t-1} on, the last vertex so far.
-    template <class JoinVertex>
-    void go_on(const SampleContext& c, const TechniqueCounts& counts, Workspace& work, int t,
-               const JoinVertex& join) const {
-        const SubPath& z = work.z;
-        walk_eye_path(c.scene, c.sampler, counts, work.z, work.stats, t, [&](int last) {
-            if (counts.hit > 0)
-                for_each_hit(c.scene, z, last, counts,
-                             [&](const Join& j) { c.sink.add(j, j.contribution); });
-            return z[last - 1].may_connect && last <= depth_.max_depth ? join(last)
-                                                                       : Onward::ByAnyEvent;
-        });
-    }
-    /// One more vertex of the eye sub-path work.z, unless it ends.
-    void step(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const {
-        extend<TransportMode::Radiance>(c.scene, c.sampler, depth_.walk(), counts, work.z,
-                                        work.stats);
+    /// The light sub-path work.y of the light path c.own_light_path(). Its techniques C(s,1) and C(s,0) are added for the
+    /// first pixel that it belongs to.
+    void trace_light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
+                          const LearnedPlaces* learned = nullptr) const;
+    /// The eye sub-path work.z.
+    void trace_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
+                        const LearnedPlaces* learned = nullptr) const;
+    /// Whether z_{t-1} can be joined to a light sub-path, for some path that is not too long.
+    bool is_joinable(const SubPath& z, int t) const {
+        return z[t - 1].is_connectible && t <= depth_.max_depth;
     }
 
-    /// C(1,t) by next event.
-    void add_next_event(const SampleContext& c, const TechniqueCounts& counts, int t,
-                        Workspace& work) const;
-    /// Connects z_{t-1} to all vertices of work.y but y_0.
-    void connect_to_own(const SampleContext& c, const TechniqueCounts& counts, int t,
-                        Workspace& work) const;
-
-    /// Traces the light paths of the pass with their techniques t ≤ 1; the first `kept` go into `collector`, which has
-    /// begun.
+    /// Traces the light paths of the pass, with their techniques C(s,1) and C(s,0); the first `kept` go into `cache`, which
+    /// has begun.
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& counts, uint64_t kept,
-                           LightPathCollector& collector) const;
+                           LightVertexCache& cache, const LearnedPlaces* learned = nullptr) const;
 
-    /// Adds C(s,t), where there is one, times `factor`, if it is visible: one of several joins that z_{t-1} draws.
-    void add_drawn(const SampleContext& c, const std::optional<Join>& j, float factor, int draw,
-                   Workspace& work) const;
-
+    /// C(0,t).
+    void add_hits(const SampleContext& c, const TechniqueCounts& counts, int t,
+                  const Workspace& work) const {
+        if (counts.hit > 0)
+            for_each_hit(c.scene, work.z, t, counts,
+                         [&](const Join& j) { c.sink.add(j, j.contribution); });
+    }
+    /// Adds a join, where there is one and it passes test(). Where z_{t-1} draws several of one technique each is added
+    /// times `factor`, and `draw` (from 1 on) tells them apart.
+    void add(const SampleContext& c, const std::optional<Join>& join, Workspace& work,
+             float factor = 1, uint32_t draw = 0) const;
     /// What is left of a join's contribution after the roulette and the shadow ray; nothing where they end it. A unit of
     /// contribution adds `scale` to its pixel; `number` tells joins of one sample apart.
-    std::optional<Rgb> test(const SampleContext& c, const Join& join, float scale, uint32_t number,
+    std::optional<Rgb> test(const SampleContext& c, const Join& join, float scale, uint64_t number,
                             Workspace& work) const;
-    /// Adds a connection, where there is one and it passes test().
-    void add_if_visible(const SampleContext& c, const std::optional<Join>& j,
-                        Workspace& work) const;
 
+    const DepthOptions& depth() const { return depth_; }
     int max_depth() const { return depth_.max_depth; }
     /// Of join_survival(), for what is added to the own pixel.
     float threshold(const SampleContext& c) const { return threshold(c, nullptr); }
@@ -119,9 +79,6 @@ public:
 private:
     /// Of join_survival(); `splat`: where it is added, nullptr: to the own pixel.
     float threshold(const SampleContext& c, const Vec2* splat) const;
-    /// Adds the join, where there is one, times `factor`, unless test() ends it.
-    void add(const SampleContext& c, const std::optional<Join>& j, float factor, uint32_t number,
-             Workspace& work) const;
 
     DepthOptions depth_;
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.

@@ -2,83 +2,36 @@
 // Integrators: which sub-paths are traced, which techniques join them, how many samples each takes. Nothing else.
 
 #include <array>
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "description/params.h"
-#include "pathspace/join.h"
-#include "pathspace/sink.h"
+#include "pathspace/sample_context.h"
 
 namespace etendue {
 
 /// Statistical nature of an estimator; written into reports and images.
 enum class Estimator { Unbiased, Consistent, Biased };
 
-/// Buffers of one worker, reused from sample to sample.
-struct Workspace {
-    SubPath y, z;
-    SubPath pair;  ///< The other path of a pair of vertices.
-    Vertex scratch;
-    std::vector<float> masses;  ///< Of light vertices, seen from one eye vertex.
-    bool is_observed = false;   ///< Whole sub-paths are read, not only what joins need of them.
-    RenderStats stats;
-};
-
-/// One sample: the eye path of a pixel, the light path of the same index, or both.
-struct SampleContext {
-    const Scene& scene;
-    const Film& film;
-    uint64_t pixel;        ///< Index within the crop; also that of the light path.
-    uint64_t chunk;        ///< Part of the pass; its samples are taken in order by one thread.
-    uint64_t light_paths;  ///< N_L of the pass.
-    float splat_scale;     ///< 1 / N_L: what a splat is worth on the film.
-    Sampler& sampler;
-    ContributionSink& sink;
-
-    /// The same sample with other numbers, and contributions to `to`.
-    SampleContext with(Sampler& numbers, ContributionSink& to) const {
-        return {scene, film, pixel, chunk, light_paths, splat_scale, numbers, to};
-    }
-};
-
-/// What an integrator may do before the samples of a pass.
-struct PassContext {
-    const Scene& scene;
-    const Film& film;
-    uint32_t index;        ///< Of the pass, from 0.
-    uint64_t light_paths;  ///< N_L.
-    uint64_t pixels;
-    const RenderStats& so_far;  ///< Of all earlier passes; the same for any number of threads.
-    /// Calls `use(context, work)` for the samples 0 … count-1 in parallel. Only splats may be added.
-    using Use = std::function<void(const SampleContext&, Workspace&)>;
-    std::function<void(uint64_t count, const Use& use)> for_each_sample;
-    std::function<uint64_t(uint64_t count)> chunks;  ///< That so many samples are cut into.
-    /// Calls `task(i, sampler, work)` for i < count in parallel: paths that bring nothing to the film. The task starts the
-    /// sampler; paths from the number of pixels on have numbers of their own.
-    using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;
-    std::function<void(uint64_t count, const Task& task)> for_each_other_path;
-
-    void for_each_light_path(const Use& use) const { for_each_sample(light_paths, use); }
-};
-
 class Integrator {
 public:
     virtual ~Integrator() = default;
-    /// Called by one thread before the samples of each pass.
-    virtual void begin_pass(const PassContext&) {}
+    /// Learns from what earlier passes left: before pass 0, where there is nothing yet, and before passes 1, 2, 4, 8 …
+    /// What is learned holds until the next call, and from each call on random numbers are independent of earlier ones:
+    /// so no pass depends on its own numbers through what it has learned, and every pass has the right expectation.
+    virtual void learn(const PassContext&) {}
+    /// Whether learn() changes what later passes sample or weigh.
+    virtual bool is_learning() const { return false; }
+    /// Traces what the samples of the pass share. Called by one thread, before them.
+    virtual void trace(const PassContext&) {}
     /// Traces sample `context.pixel` and reports its contributions.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
     /// Samples of each strategy per eye sub-path, as the weights have it, where a pass traces `light_paths`.
     virtual TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const = 0;
-    /// Light paths per pixel in one pass: 0 or 1.
-    virtual bool traces_light_paths() const = 0;
-    /// Light paths of one pass over a film of so many pixels.
-    virtual uint64_t light_paths(uint64_t pixels) const {
-        return traces_light_paths() ? pixels : 0;
-    }
+    /// N_L, light paths of a pass; 0 where it traces none.
+    virtual uint64_t light_paths(const Scene& scene) const = 0;
     /// Whether contributions come with the sub-paths they were made of, so that `verify` can tell their paths.
     virtual bool keeps_paths() const { return true; }
     virtual Estimator estimator() const = 0;

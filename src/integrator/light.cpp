@@ -15,17 +15,19 @@ public:
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, c.light_paths);
         // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
-        const WalkOptions walk{depth_.max_depth + c.scene.sensor().has_finite_lens(),
-                               depth_.rr_depth};
+        const WalkContext walk{
+            c.scene,
+            counts,
+            work.stats,
+            {depth_.max_depth + c.scene.sensor().has_finite_lens(), depth_.rr_depth}};
         SubPath& y = work.y;
-        if (!start_light_path(c.scene, c.sampler, counts, y, work.stats)) return;
+        if (!start_light_path(walk, c.sampler, y)) return;
         for (int s = 1; s <= y.size(); ++s) {
             if (s > depth_.max_depth) break;
             if (const auto j = join_splat(c.scene, y, s, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add(*j, j->contribution * Tr);
-            if (s >= 2)
-                extend<TransportMode::Importance>(c.scene, c.sampler, walk, counts, y, work.stats);
+            if (s >= 2) extend<TransportMode::Importance>(walk, c.sampler, y);
             if (const auto j = join_hit_lens(c.scene, y, s, counts))
                 c.sink.add(*j, j->contribution);
         }
@@ -35,7 +37,7 @@ public:
         const float N = float(light_paths);
         return {.splat = N, .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
     }
-    bool traces_light_paths() const override { return true; }
+    uint64_t light_paths(const Scene& scene) const override { return scene.film().pixel_count(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:

@@ -15,9 +15,9 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, 0);
-        const WalkOptions walk = depth_.walk();
+        const WalkContext walk{c.scene, counts, work.stats, depth_.walk()};
         SubPath& z = work.z;
-        start_eye_path(c.scene, c.film, c.pixel, c.sampler, counts, z, work.stats);
+        start_eye_path(walk, c.film, c.pixel, c.sampler, z);
         for (int t = 2; t <= z.size(); ++t) {
             for_each_hit(c.scene, z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution); });
@@ -25,14 +25,14 @@ public:
             if (const auto j = join_next_event(c.scene, z, t, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add(*j, j->contribution * Tr);
-            extend<TransportMode::Radiance>(c.scene, c.sampler, walk, counts, z, work.stats);
+            extend<TransportMode::Radiance>(walk, c.sampler, z);
         }
     }
 
     TechniqueCounts counts(const Scene&, uint64_t /*light_paths*/) const override {
         return {.hit = 1, .next_event = 1};
     }
-    bool traces_light_paths() const override { return false; }
+    uint64_t light_paths(const Scene&) const override { return 0; }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:

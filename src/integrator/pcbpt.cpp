@@ -10,11 +10,14 @@
 #include "integrator/pcbpt.h"
 
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "integrator/bidirectional.h"
-#include "pathspace/importance_records.h"
-#include "pathspace/light_paths.h"
+#include "reuse/importance_records.h"
 
 namespace etendue {
 namespace {
@@ -31,6 +34,7 @@ class PcbptIntegrator final : public Integrator {
 public:
     explicit PcbptIntegrator(const IntegratorParams& p)
         : paths_(p), light_paths_(uint64_t(p.integer("light_paths", 1, 1 << 20))),
+          memory_(uint64_t(p.integer("memory", 1, 1 << 30)) << 20),
           given_connections_(p.number("connections", 0, 1024)),
           record_fraction_(p.number("record_fraction", 0, 1)),
           neighbours_(p.integer("neighbours", 1, VertexMixture::kMostParts)),
@@ -38,8 +42,8 @@ public:
           is_weighted_(p.choice("pmf", kIsWeighted)), uses_cache_(p.flag("cache")),
           direct_(p.choice("direct", kDirect)) {}
 
-    void begin_pass(const PassContext& pass) override {
-        paths_.begin_pass(pass);
+    void learn(const PassContext& pass) override { paths_.learn(pass); }
+    void trace(const PassContext& pass) override {
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
         trace_light_paths(pass, n);
         make_records(pass, n);
@@ -47,16 +51,24 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
-        paths_.eye_path(c, n, work, [&](int t) {
-            paths_.add_next_event(c, n, t, work);
-            if (vertices_.empty()) return Onward::ByAnyEvent;
-            const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
+        const SubPath& z = work.z;
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        paths_.trace_eye_path(c, n, work);
+        for (int t = 2; t <= z.size(); ++t) {
+            paths_.add_hits(c, n, t, work);  // C(0,t)
+            if (!paths_.is_joinable(z, t)) continue;
+            if (n.next_event > 0)
+                paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
+            if (vertices_.empty()) continue;
+            const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
             // Where K is no integer, one of its neighbours with the mean K.
-            c.sampler.seek(Stream::Selection, uint32_t(t));
-            const int draws = int(connections_ + c.sampler.next_1d_fine());
-            if (draws > 0) connect(c, n, t, draws, mixture(c.scene, n, t, work), work);
-            return Onward::ByAnyEvent;
-        });
+            c.sampler.seek(Stream::Selection, join_number(0, t));
+            const int draws = int(connections_ + c.sampler.next_1d_unstructured());
+            if (draws == 0) continue;
+            const VertexMixture q = mixture(c.scene, n, t, work);
+            for (int k = 0; k < draws; ++k)  // (1/K) Σ (1/M) w C(s,t) / pmf
+                connect(c, n, t, k, draws, q, work);
+        }
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
@@ -66,7 +78,7 @@ public:
         if (direct_ == Direct::Stored) n.next_event = 0;
         return n;
     }
-    bool traces_light_paths() const override { return true; }
+    uint64_t light_paths(const Scene& scene) const override { return scene.film().pixel_count(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
         return {{"connections", connections_},
@@ -81,15 +93,15 @@ private:
 
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
         const uint64_t M = kept(pass.light_paths);
-        collector_.begin(pass, sizeof(LightVertex), UINT64_MAX);
-        paths_.trace_light_paths(pass, n, M, collector_);
-        collector_.assemble(compact_);
+        compact_.begin(pass.chunks(pass.light_paths), kVertexBytes, memory_);
+        paths_.trace_light_paths(pass, n, M, compact_);
+        compact_.assemble();
         stored_.resize(M);
         vertices_.clear();
         for (uint32_t i = 0; i < M; ++i) {
             compact_.restore(pass.scene, i, stored_[i]);
             for (int s = direct_ == Direct::NextEvent ? 2 : 1; s <= stored_[i].size(); ++s)
-                if (stored_[i][s - 1].may_connect) vertices_.push_back({i, s});
+                if (stored_[i][s - 1].is_connectible) vertices_.push_back({i, s});
         }
     }
 
@@ -99,20 +111,22 @@ private:
         const auto count = uint64_t(std::ceil(record_fraction_ * double(pixels)));
         record_chunks_.resize(count);
         std::vector<std::pair<uint64_t, uint64_t>> found(count);  // eye vertices, shadow rays
+        std::atomic<uint64_t> bytes = 0;
         pass.for_each_other_path(count, [&](uint64_t i, Sampler& sampler, Workspace& work) {
             const PhaseTimer timer(work.stats, &PhaseSeconds::records);
             record_chunks_[i].clear();
             sampler.start(pass.index, pixels + i);
             const uint64_t before = work.stats.shadow_rays;
             const uint64_t pixel = low_discrepancy_pixel(g, pass.index * count + i);
-            start_eye_path(pass.scene, pass.film, pixel, sampler, n, work.z, work.stats);
-            paths_.walk_eye_path(pass.scene, sampler, n, work.z, work.stats, 2, [&](int t) {
-                if (!work.z[t - 1].may_connect) return Onward::ByAnyEvent;
+            trace_eye_path(paths_.eye_walk(pass.scene, n, work.stats), pass.film, pixel, sampler,
+                           work.z);
+            for (int t = 2; t <= work.z.size(); ++t) {
+                if (!work.z[t - 1].is_connectible) continue;
                 evaluate(pass.scene, n, t, work);
                 record_chunks_[i].add(work.z[t - 1], work.masses);
                 ++found[i].first;
-                return Onward::ByAnyEvent;
-            });
+                check_memory(bytes += 2 * sizeof(float) * vertices_.size());
+            }
             found[i].second = work.stats.shadow_rays - before;
         });
         records_.assemble(record_chunks_, uint32_t(vertices_.size()));
@@ -128,6 +142,14 @@ private:
         const double of_bdpt = vertices > 0 ? double(rays) / (M * double(vertices)) : 0.0;
         const double left = of_bdpt * (1 - double(record_fraction_) * M) - kRaysOfSearch;
         connections_ = std::max(kFewest, left / kRaysOfDraw);
+    }
+
+    void check_memory(uint64_t bytes_of_records) const {
+        if (bytes_of_records > memory_)
+            throw std::runtime_error(fmt::format(
+                "pcbpt: importance records of {} light vertices need more than {} MiB; give fewer "
+                "light_paths or a smaller record_fraction, or raise \"memory\"",
+                vertices_.size(), memory_ >> 20));
     }
 
     /// R2 sequence: multiples of the powers of the plastic number's inverse, modulo 1 [Roberts 2018].
@@ -161,21 +183,23 @@ private:
         return exact;
     }
 
-    /// `draws` of the connections of z_{t-1}: (1/K) Σ (1/M) w C / pmf.
-    void connect(const SampleContext& c, const TechniqueCounts& n, int t, int draws,
+    /// The k-th of `draws` connections of z_{t-1}.
+    void connect(const SampleContext& c, const TechniqueCounts& n, int t, int k, int draws,
                  const VertexMixture& mixture, Workspace& work) const {
+        c.sampler.seek(Stream::Selection, join_number(0, t, uint32_t(k) + 1));
+        const auto [index, pmf] =
+            mixture.sample(stratum(k, draws, c.sampler.next_1d_unstructured()));
+        const auto [path, s] = vertices_[index];
+        if (s + t - 1 > paths_.max_depth()) return;
+        if (work.is_observed) compact_.restore(c.scene, path, work.y);
         const double samples = connections_ * double(kept(c.light_paths));
-        for (int k = 0; k < draws; ++k) {
-            c.sampler.seek(Stream::Selection, uint32_t(k + 1) << 16 | uint32_t(t));
-            const auto [index, pmf] = mixture.sample((k + c.sampler.next_1d_fine()) / draws);
-            const auto [path, s] = vertices_[index];
-            if (s + t - 1 > paths_.max_depth()) continue;
-            if (work.is_observed) compact_.restore(c.scene, path, work.y);
-            paths_.add_drawn(c, join_connect(c.scene, stored_[path], s, work.z, t, n),
-                             float(1 / (samples * pmf)), k, work);
-        }
+        paths_.add(c, join_connect(c.scene, stored_[path], s, work.z, t, n), work,
+                   float(1 / (samples * pmf)), uint32_t(k) + 1);
     }
 
+    /// In the cache, and ready to be joined.
+    static constexpr uint64_t kVertexBytes =
+        LightVertexCache::kVertexBytes + 2 * sizeof(Vertex) + sizeof(uint32_t) + sizeof(int);
     /// K at least, where it is automatic.
     static constexpr double kFewest = 0.125;
     /// What a mixture takes to be found, and a draw from it with its join, in connections of bdpt.
@@ -187,7 +211,7 @@ private:
     };
 
     Bidirectional paths_;
-    uint64_t light_paths_;
+    uint64_t light_paths_, memory_;
     float given_connections_;
     float record_fraction_;
     int neighbours_;
@@ -197,11 +221,10 @@ private:
 
     // Of the pass.
     double connections_ = 0;  ///< K
-    LightPaths compact_;
+    LightVertexCache compact_;
     std::vector<SubPath> stored_;         ///< The M light paths, ready to be joined.
     std::vector<StoredVertex> vertices_;  ///< Their V connectible vertices.
     ImportanceRecords records_;
-    LightPathCollector collector_;
     std::vector<ImportanceRecords::Chunk> record_chunks_;
 };
 
@@ -211,6 +234,8 @@ IntegratorEntry pcbpt_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
     params.push_back({"light_paths", ParamKind::Int, "100",
                       "M: light paths of a pass whose vertices all eye vertices may connect to."});
+    params.push_back({"memory", ParamKind::Int, "6144",
+                      "Most that these paths, and the importance records, may each take, in MiB."});
     params.push_back({"connections", ParamKind::Float, "0",
                       "K: connections of each eye vertex, on average; 0: as many as bdpt has time "
                       "for, less that of the records, but at least 0.125."});

@@ -21,12 +21,25 @@ PhotonMapping::PhotonMapping(const IntegratorParams& p, bool next_event)
         throw std::runtime_error(fmt::format("{}: roughness must lie in [0, 1]", p.integrator()));
 }
 
-void PhotonMapping::add_next_event(const SampleContext& c, int t, bool ends,
-                                   Workspace& work) const {
+void PhotonMapping::add_direct(const SampleContext& c, int t, Workspace& work) const {
+    const SubPath& z = work.z;
+    paths_.add_hits(c, counts(), t, work);
+    if (!next_event_ || !paths_.is_joinable(z, t)) return;
     // No hit can follow the smooth event at which the path ends.
     const TechniqueCounts alone{.next_event = 1};
-    paths_.add_if_visible(
-        c, join_next_event(c.scene, work.z, t, c.sampler, ends ? alone : counts()), work);
+    paths_.add(c,
+               join_next_event(c.scene, z, t, c.sampler, is_diffuse(z[t - 1]) ? alone : counts()),
+               work);
+}
+
+bool PhotonMapping::walk_on(const WalkContext& walk, Sampler& sampler, SubPath& z,
+                            bool only_delta) const {
+    const int t = z.size();
+    if (only_delta && !z[t - 1].bsdf.has_delta()) return false;
+    if (!extend<TransportMode::Radiance>(walk, sampler, z)) return false;
+    if (!only_delta || z[t - 1].is_delta) return true;
+    z.truncate(t);
+    return false;
 }
 
 }  // namespace etendue

@@ -15,7 +15,7 @@ public:
     static std::vector<ParamInfo> params();
     PhotonMapping(const IntegratorParams& params, bool next_event);
 
-    void begin_pass(const PassContext& pass) { paths_.begin_pass(pass); }
+    void learn(const PassContext& pass) { paths_.learn(pass); }
 
     /// Samples of what is made without photons.
     TechniqueCounts counts() const { return {.hit = 1, .next_event = next_event_ ? 1.0f : 0.0f}; }
@@ -23,31 +23,21 @@ public:
     int shortest() const { return next_event_ ? 3 : 2; }
 
     bool is_diffuse(const Vertex& v) const { return v.bsdf.roughness() >= roughness_; }
-    /// Of an eye path, after photons have brought their light to a diffuse vertex.
-    static Onward after_photons(const Vertex& v) {
-        return v.bsdf.has_delta() ? Onward::ByDeltaEvents : Onward::Ends;
+    /// Whether z_{t-1} may be joined, and is diffuse enough.
+    bool takes_photons(const SubPath& z, int t) const {
+        return paths_.is_joinable(z, t) && is_diffuse(z[t - 1]);
     }
 
-    /// The eye path of c.pixel, whose steps draw their numbers from `of_walk`, with its hits and next events.
-    /// `add_photons(t, is_diffuse)` is called at every z_{t-1} that may be joined.
-    template <class AddPhotons>
-    void eye_path(const SampleContext& c, Sampler& of_walk, Workspace& work,
-                  const AddPhotons& add_photons) const {
-        const SampleContext walk = c.with(of_walk, c.sink);
-        paths_.eye_path(walk, counts(), work, [&](int t) {
-            const Vertex& v = work.z[t - 1];
-            const bool ends = is_diffuse(v);
-            if (next_event_) add_next_event(c, t, ends, work);
-            add_photons(t, ends);
-            return ends ? after_photons(v) : Onward::ByAnyEvent;
-        });
-    }
+    /// C(0,t), and C(1,t) where z_{t-1} may be joined.
+    void add_direct(const SampleContext& c, int t, Workspace& work) const;
+
+    /// One more vertex of the eye path z; where photons have brought the light of smooth events (`only_delta`), by a delta
+    /// event. False where the path ends.
+    bool walk_on(const WalkContext& walk, Sampler& sampler, SubPath& z, bool only_delta) const;
 
     const Bidirectional& paths() const { return paths_; }
 
 private:
-    void add_next_event(const SampleContext& c, int t, bool ends, Workspace& work) const;
-
     Bidirectional paths_;
     float roughness_;
     bool next_event_;

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "integrator/photon_mapping.h"
-#include "pathspace/photon_map.h"
+#include "reuse/photon_map.h"
 
 namespace etendue {
 

@@ -9,13 +9,12 @@
 #include "integrator/pm.h"
 
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
-#include "integrator/irradiance_cache.h"
-#include "integrator/photon_memory.h"
 #include "integrator/photon_source.h"
-#include "integrator/photons.h"
+#include "reuse/irradiance_cache.h"
 
 namespace etendue {
 namespace {
@@ -43,7 +42,8 @@ private:
 class PmIntegrator final : public Integrator {
 public:
     explicit PmIntegrator(const IntegratorParams& p)
-        : mapping_(p, true), source_(std::make_unique<TracedPhotons>(mapping_, photon_memory(p))),
+        : mapping_(p, true), source_(std::make_unique<TracedPhotons>(
+                                 mapping_, uint64_t(p.integer("memory", 1, 1 << 30)) << 20)),
           light_paths_(uint64_t(checked(p, "light_paths", 1, 1 << 30))),
           nearest_(checked(p, "nearest", 2, PhotonMap::kMostNeighbours)),
           gather_rays_(checked(p, "gather_rays", 0, 1 << 20)), radius_(p.number("radius")),
@@ -59,8 +59,8 @@ public:
             throw std::runtime_error("pm: an irradiance cache needs gather_rays");
     }
 
-    void begin_pass(const PassContext& pass) override {
-        mapping_.begin_pass(pass);
+    void learn(const PassContext& pass) override { mapping_.learn(pass); }
+    void trace(const PassContext& pass) override {
         pass_ = pass.index;
         max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();
         if (pass.index > 0 && !retrace_) return;
@@ -73,21 +73,19 @@ public:
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
+        const TechniqueCounts n = mapping_.counts();
+        const WalkContext walk = mapping_.paths().eye_walk(c.scene, n, work.stats);
+        SubPath& z = work.z;
         Sampler of_walk = c.sampler;
-        mapping_.eye_path(c, of_walk, work, [&](int t, bool is_diffuse) {
-            if (!is_diffuse) {
-                if (c.scene.has_delta_emitters())
-                    estimate(c, caustic_, t, 1, work.z, [](const MapPhoton& photon) {
-                        return photon.origin == MapPhoton::Origin::DeltaCaustic;
-                    });
-            } else if (gather_rays_ == 0) {
-                estimate(c, global_, t, 1, work.z,
-                         [](const MapPhoton& photon) { return photon.s > 2; });
-            } else {
-                estimate(c, caustic_, t, 1, work.z, [](const MapPhoton&) { return true; });
-                if (!add_cached(c, t, work.z)) final_gather(c, t, work);
-            }
-        });
+
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        start_eye_path(walk, c.film, c.pixel, of_walk, z);
+        for (int t = 2; t <= z.size(); ++t) {
+            mapping_.add_direct(c, t, work);  // C(0,t), C(1,t)
+            const bool is_diffuse = mapping_.takes_photons(z, t);
+            if (mapping_.paths().is_joinable(z, t)) add_photons(c, t, is_diffuse, work);  // M(s,t)
+            if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
+        }
     }
 
     TechniqueCounts counts(const Scene&, uint64_t light_paths) const override {
@@ -95,14 +93,29 @@ public:
         n.merge = float(light_paths);
         return n;
     }
-    bool traces_light_paths() const override { return true; }
-    uint64_t light_paths(uint64_t) const override { return light_paths_; }
+    uint64_t light_paths(const Scene&) const override { return light_paths_; }
     bool keeps_paths() const override { return false; }
     Estimator estimator() const override { return Estimator::Biased; }
 
     static constexpr float kDefaultRadius = 0.03f;
 
 private:
+    /// What photons bring to z_{t-1}: seen directly, or by gather rays.
+    void add_photons(const SampleContext& c, int t, bool is_diffuse, Workspace& work) const {
+        if (!is_diffuse) {
+            if (c.scene.has_delta_emitters())
+                estimate(c, caustic_, t, 1, work.z, [](const MapPhoton& photon) {
+                    return photon.origin == MapPhoton::Origin::DeltaCaustic;
+                });
+        } else if (gather_rays_ == 0) {
+            estimate(c, global_, t, 1, work.z,
+                     [](const MapPhoton& photon) { return photon.s > 2; });
+        } else {
+            estimate(c, caustic_, t, 1, work.z, [](const MapPhoton&) { return true; });
+            if (!add_cached(c, t, work.z)) final_gather(c, t, work);
+        }
+    }
+
     /// Density estimate at z_{t-1} from the photons that `use` accepts. Their surfaces may face another way: in a corner
     /// the photons of one wall stand for those that the disc of the other lacks.
     template <class Use>
@@ -122,16 +135,21 @@ private:
     /// What comes straight from emitters is that of next events, what comes from them over surfaces that are not diffuse
     /// that of the caustic map.
     void end_gather_ray(const SampleContext& c, int t, float scale, Workspace& work) const {
-        const SubPath& z = work.z;
-        mapping_.paths().go_on(c, {}, work, t, [&](int u) {
-            if (!mapping_.is_diffuse(z[u - 1])) return Onward::ByAnyEvent;
-            estimate(c, global_, u, scale, z, [](const MapPhoton&) { return true; });
-            return PhotonMapping::after_photons(z[u - 1]);
-        });
+        const TechniqueCounts none;
+        const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
+        SubPath& z = work.z;
+        for (int u = t; u <= z.size(); ++u) {
+            const bool is_diffuse = mapping_.takes_photons(z, u);
+            if (is_diffuse)
+                estimate(c, global_, u, scale, z, [](const MapPhoton&) { return true; });
+            if (!mapping_.walk_on(walk, c.sampler, z, is_diffuse)) break;
+        }
     }
 
     /// Light that reaches z_{t-1} from another diffuse surface.
     void final_gather(const SampleContext& c, int t, Workspace& work) const {
+        const TechniqueCounts none;
+        const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
         SubPath& z = work.z;
         const float eta2 = z.eta2;
         for (int ray = 0; ray < gather_rays_; ++ray) {
@@ -140,8 +158,8 @@ private:
             of_ray.start(pass_ * uint32_t(gather_rays_) + uint32_t(ray),
                          hash_combine(c.pixel, uint64_t(t)));
             const SampleContext gather = c.with(of_ray, c.sink);
-            mapping_.paths().step(gather, {}, work);
-            if (!z[t - 1].is_delta) end_gather_ray(gather, t + 1, 1 / float(gather_rays_), work);
+            if (extend<TransportMode::Radiance>(walk, of_ray, z) && !z[t - 1].is_delta)
+                end_gather_ray(gather, t + 1, 1 / float(gather_rays_), work);
             z.truncate(t);
             z.eta2 = eta2;
         }
@@ -165,14 +183,17 @@ private:
             for (auto& chunk : chunks) chunk.clear();
             pass.for_each_sample(pass.pixels, [&](const SampleContext& c, Workspace& work) {
                 if (c.pixel % width % spacing != 0 || c.pixel / width % spacing != 0) return;
-                mapping_.paths().eye_path(c, {}, work, [&](int t) {
-                    const Vertex& v = work.z[t - 1];
-                    if (!mapping_.is_diffuse(v)) return Onward::ByAnyEvent;
-                    const auto n = cache_normal(v);
-                    if (n && !cache_.find(v.p, *n))
+                const TechniqueCounts none;
+                const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
+                SubPath& z = work.z;
+                start_eye_path(walk, c.film, c.pixel, c.sampler, z);
+                for (int t = 2; t <= z.size(); ++t) {
+                    const bool is_diffuse = mapping_.takes_photons(z, t);
+                    const auto n = is_diffuse ? cache_normal(z[t - 1]) : std::nullopt;
+                    if (n && !cache_.find(z[t - 1].p, *n))
                         chunks[c.chunk].push_back(record(c, t, *n, work));
-                    return PhotonMapping::after_photons(v);
-                });
+                    if (!mapping_.walk_on(walk, c.sampler, z, is_diffuse)) break;
+                }
             });
             std::vector<IrradianceRecord> records;
             for (const auto& chunk : chunks)
@@ -183,7 +204,11 @@ private:
 
     /// Of the light of final_gather() at z_{t-1}.
     IrradianceRecord record(const SampleContext& c, int t, Vec3 n, Workspace& work) const {
+        const TechniqueCounts none;
+        const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
         SubPath& z = work.z;
+        // Radiance is asked for: that of the path's throughput 1 here.
+        const Rgb beta = std::exchange(z[t - 1].beta, Rgb(1));
         const float eta2 = z.eta2;
         Sampler of_cells = c.sampler, of_ray = c.sampler;
         of_cells.seek(Stream::Auxiliary, uint32_t(t));
@@ -194,14 +219,23 @@ private:
             RadianceSum sum;
             of_ray.start(ray++, hash_combine(c.pixel, uint64_t(t)));
             const SampleContext gather = c.with(of_ray, sum);
-            if (!look_along(c.scene, of_ray, d, Rgb(1), z, work.stats)) return {};
+            of_ray.seek(Stream::Eye, uint64_t(t) - 1);
+            const BsdfSample along{.wi = d, .weight = Rgb(1), .pdf = 1};
+            const bool found = append<TransportMode::Radiance>(walk, of_ray, along, z);
+            if (!found || z[t].is_infinite) {
+                z.truncate(t);
+                return {};
+            }
             const float distance = length(z[t].p - z[t - 1].p);
             end_gather_ray(gather, t + 1, 1, work);
             z.truncate(t);
             z.eta2 = eta2;
             return {sum.sum(), distance};
         };
-        return measure_irradiance(z[t - 1].p, n, cache_rays_, of_cells, radiance);
+        const IrradianceRecord r =
+            measure_irradiance(z[t - 1].p, n, cache_rays_, of_cells, radiance);
+        z[t - 1].beta = beta;
+        return r;
     }
 
     /// Adds what the cache knows of the light of final_gather(), if it does.
@@ -218,7 +252,7 @@ private:
                     .contribution = {},
                     .mis_weight = 1,
                     .film = z.film},
-                   v.beta * v.bsdf.eval(v.wo, *n, TransportMode::Radiance).f * *E);
+                   v.beta * v.eval(*n, TransportMode::Radiance).f * *E);
         return true;
     }
 
@@ -241,7 +275,7 @@ IntegratorEntry pm_entry() {
     std::vector<ParamInfo> params = PhotonMapping::params();
     params.push_back(
         {"light_paths", ParamKind::Int, "500000", "Light paths whose photons are kept."});
-    params.push_back(memory_param());
+    params.push_back({"memory", ParamKind::Int, "6144", "Most that the photons may take, in MiB."});
     params.push_back(
         {"retrace", ParamKind::Bool, "false",
          "Whether every pass traces photons of its own; else all use the first pass's."});

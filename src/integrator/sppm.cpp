@@ -9,9 +9,10 @@
 
 #include <stdexcept>
 
+#include "integrator/light_path_options.h"
 #include "integrator/photon_mapping.h"
-#include "integrator/photon_memory.h"
-#include "integrator/photons.h"
+#include "integrator/radius_params.h"
+#include "reuse/light_vertex_grid.h"
 
 namespace etendue {
 namespace {
@@ -23,69 +24,93 @@ class SppmIntegrator final : public Integrator {
 public:
     /// `eye_paths`: how many each pixel has; 0: new ones in every pass.
     SppmIntegrator(const IntegratorParams& p, int eye_paths)
-        : mapping_(p, p.flag("next_event")), radius_(p, kDefaultRadius), memory_(photon_memory(p)),
+        : mapping_(p, p.flag("next_event")), radius_params_(p, kDefaultRadius), light_(p),
           eye_paths_(uint32_t(eye_paths)) {}
 
-    void begin_pass(const PassContext& pass) override {
-        mapping_.begin_pass(pass);
-        photons_.trace(pass, mapping_.paths(), {}, radius_.radius(pass.scene, pass.index), memory_);
+    void learn(const PassContext& pass) override { mapping_.learn(pass); }
+    void trace(const PassContext& pass) override {
         pass_ = pass.index;
+        radius_ = radius_params_.schedule(pass.scene).radius(pass.index);
+        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
+        mapping_.paths().trace_light_paths(pass, {}, pass.light_paths, cache_);
+        cache_.assemble();
+        grid_.build(cache_, radius_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
+        const TechniqueCounts n = mapping_.counts();
+        const WalkContext walk = mapping_.paths().eye_walk(c.scene, n, work.stats);
         Sampler of_walk = c.sampler;
         if (eye_paths_ > 0) of_walk.start(pass_ % eye_paths_, c.pixel);
-        mapping_.eye_path(c, of_walk, work,
-                          [&](int t, bool is_diffuse) { merge(c, t, is_diffuse, work); });
+        SubPath& z = work.z;
+
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        start_eye_path(walk, c.film, c.pixel, of_walk, z);
+        for (int t = 2; t <= z.size(); ++t) {
+            mapping_.add_direct(c, t, work);  // C(0,t), C(1,t)
+            const bool is_diffuse = mapping_.takes_photons(z, t);
+            if (mapping_.paths().is_joinable(z, t)) merge(c, t, is_diffuse, work);  // M(s,t)
+            if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
+        }
     }
 
     TechniqueCounts counts(const Scene&, uint64_t light_paths) const override {
         TechniqueCounts n = mapping_.counts();
         n.merge = float(light_paths);
-        n.disc = disc();
+        n.pairs.disc = disc();
         return n;
     }
-    bool traces_light_paths() const override { return true; }
+    uint64_t light_paths(const Scene& scene) const override {
+        return light_.count(scene, mapping_.paths().depth(), kVertexBytes);
+    }
     Estimator estimator() const override {
-        return radius_.shrinks() ? Estimator::Consistent : Estimator::Biased;
+        return radius_params_.shrinks() ? Estimator::Consistent : Estimator::Biased;
     }
 
 private:
-    float disc() const { return kPi * sqr(photons_.radius()); }
+    float disc() const { return kPi * sqr(radius_); }
 
     void merge(const SampleContext& c, int t, bool is_diffuse, Workspace& work) const {
         if (!is_diffuse && !c.scene.has_delta_emitters()) return;
-        const LightPaths& light = photons_.paths();
-        const auto may_pair = [&](const Partner& y) {
-            return y.s >= mapping_.shortest() && y.s + t - 2 <= mapping_.paths().max_depth();
+        const int max_depth = mapping_.paths().max_depth();
+        const auto choose = [&](const GatherCandidate& y) -> std::optional<Chosen> {
+            if (y.s < mapping_.shortest() || y.s + t - 2 > max_depth) return {};
+            return Chosen{};
         };
-        photons_.for_each_near(work.z[t - 1].p, may_pair, [&](const Partner& y) {
-            const Photon photon = light.photon(y.vertex);
+        grid_.for_each_near(work.z[t - 1].p, choose, [&](const GatherCandidate& y, Chosen) {
+            const Photon photon = cache_.photon(y.vertex);
             if (!is_diffuse &&
-                !(photon.emitter->is_delta() && light.came_by_delta_events(y.vertex)))
+                !(photon.emitter->is_delta() && cache_.came_by_delta_events(y.vertex)))
                 return;
-            const auto j = join_photon(photon, work.z, t, disc());
-            if (!j) return;
-            if (work.is_observed) light.restore_first(c.scene, y.vertex, y.s, true, work.pair);
-            c.sink.add(*j, j->contribution * c.splat_scale);
+            const auto join = join_photon(photon, work.z, t, disc());
+            if (!join) return;
+            if (work.is_observed) cache_.restore_first(c.scene, y.vertex, y.s, true, work.pair);
+            c.sink.add(*join, join->contribution * c.splat_scale);
         });
     }
 
+    static constexpr uint64_t kVertexBytes =
+        LightVertexCache::kVertexBytes + LightVertexGrid::kVertexBytes;
+
     PhotonMapping mapping_;
-    RadiusSchedule radius_;
-    uint64_t memory_;
+    RadiusParams radius_params_;
+    LightPathOptions light_;
     uint32_t eye_paths_;
+
+    // Of the pass.
     uint32_t pass_ = 0;
-    Photons photons_;
+    float radius_ = 0;
+    LightVertexCache cache_;
+    LightVertexGrid grid_;
 };
 
 std::vector<ParamInfo> params() {
     std::vector<ParamInfo> params = PhotonMapping::params();
-    for (const ParamInfo& p : RadiusSchedule::params("Distance within which photons are merged in "
-                                                     "the first pass, in scene units; 0: 1 % of "
-                                                     "the radius of the scene's bounds."))
+    for (const ParamInfo& p : radius_params("Distance within which photons are merged in the first "
+                                            "pass, in scene units; 0: 1 % of the radius of the "
+                                            "scene's bounds."))
         params.push_back(p);
-    params.push_back(memory_param());
+    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back({"next_event", ParamKind::Bool, "true",
                       "Whether direct light comes by shadow rays; else by photons, and at glossy "
                       "surfaces by chance."});

@@ -9,8 +9,10 @@
 
 #include <stdexcept>
 
-#include "integrator/gather.h"
-#include "integrator/photon_memory.h"
+#include "integrator/bidirectional.h"
+#include "integrator/light_path_options.h"
+#include "integrator/radius_params.h"
+#include "reuse/gather.h"
 
 namespace etendue {
 namespace {
@@ -18,99 +20,143 @@ namespace {
 /// Of the scene's.
 constexpr float kDefaultRadius = 0.003f;
 
+/// Correlation of the pairs of one vertex, see PairDensity.
+constexpr double kCorrelation = 0.2;
+
 class VcmIntegrator final : public Integrator {
 public:
     explicit VcmIntegrator(const IntegratorParams& p)
-        : paths_(p), radius_(p, kDefaultRadius), connects_(p.flag("connections")),
-          merges_(p.flag("merges")), is_exact_(p.flag("exact")), memory_(photon_memory(p)) {
+        : paths_(p), radius_params_(p, kDefaultRadius), connects_(p.flag("connections")),
+          merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p) {
         if (!connects_ && !merges_)
             throw std::runtime_error("vcm: connections and merges cannot both be off");
         if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact needs merges");
     }
 
-    void begin_pass(const PassContext& pass) override {
-        paths_.begin_pass(pass);
-        worth_.begin_pass(pass.so_far);
-        const float radius = radius_.radius(pass.scene, pass.index);
-        photons_.trace(pass, paths_, counts(pass.scene, pass.light_paths, radius), radius, memory_);
+    void learn(const PassContext& pass) override {
+        paths_.learn(pass);
+        roulette_.learn(pass.so_far);
+        const float radius = radius_params_.schedule(pass.scene).radius(pass.index);
+        if (merges_ && pass.index > 0) density_ = PairDensity(grid_.points(), radius, kCorrelation);
+    }
+    bool is_learning() const override { return merges_; }
+
+    void trace(const PassContext& pass) override {
+        radius_ = radius_params_.schedule(pass.scene).radius(pass.index);
+        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
+        paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
+                                 cache_, &density_);
+        cache_.assemble();
+        if (merges_) grid_.build(cache_, radius_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
-        const TechniqueCounts n = counts(c.scene, c.light_paths, photons_.radius());
-        photons_.paths().restore(c.scene, c.pixel, work.y);
-        // q π d² p̃ for p_c [Qin et al. 2015, eq. 7], where q is the survival of the roulette before the dropped vertex.
-        const auto by_disc = [](const PairEvent& event, const Join& j, float) {
-            return 1 / double(event.from.survival.value() * j.found);
-        };
-        const Gather gather{c, paths_, photons_, worth_, n, 1, paths_.threshold(c), work};
-        paths_.eye_path(c, n, work, [&](int t) {
-            paths_.add_next_event(c, n, t, work);
-            paths_.connect_to_own(c, n, t, work);
-            if (merges_ && is_exact_) gather(t, by_disc);
-            if (merges_ && !is_exact_) merge(c, n, t, work);
-            return Onward::ByAnyEvent;
-        });
+        const TechniqueCounts n = counts(c.scene, c.light_paths);
+        const SubPath &y = work.y, &z = work.z;
+        if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
+
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        paths_.trace_eye_path(c, n, work, &density_);
+        for (int t = 2; t <= z.size(); ++t) {
+            paths_.add_hits(c, n, t, work);  // C(0,t)
+            if (!paths_.is_joinable(z, t)) continue;
+            if (connects_) {
+                paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
+                const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
+                for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
+                    paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
+            }
+            if (merges_) (is_exact_ ? gather(c, n, t, work) : merge(c, n, t, work));
+        }
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
-        return counts(scene, light_paths, photons_.radius());
-    }
-    bool traces_light_paths() const override { return true; }
-    Estimator estimator() const override {
-        return !merges_            ? Estimator::Unbiased
-               : radius_.shrinks() ? Estimator::Consistent
-                                   : Estimator::Biased;
-    }
-
-private:
-    TechniqueCounts counts(const Scene& scene, uint64_t light_paths, float radius) const {
-        const float N = float(light_paths);
         TechniqueCounts n;
         n.hit = 1;
-        if (connects_) {
-            n.next_event = n.connect = 1;
-            n.splat = N;
-            n.hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f;
-        }
+        if (connects_) n = Bidirectional::counts(scene, light_paths);
         if (merges_) {
-            (is_exact_ ? n.gather : n.merge) = N;
-            n.disc = kPi * radius * radius;
-            n.clamps_disc = false;
+            (is_exact_ ? n.gather : n.merge) = float(light_paths);
+            n.pairs.disc = kPi * sqr(radius_);
+            n.pairs.clamps = false;
         }
         return n;
     }
+    uint64_t light_paths(const Scene& scene) const override {
+        return light_.count(scene, paths_.depth(), kVertexBytes);
+    }
+    Estimator estimator() const override {
+        return !merges_                   ? Estimator::Unbiased
+               : radius_params_.shrinks() ? Estimator::Consistent
+                                          : Estimator::Biased;
+    }
 
+private:
+    /// M(s,t) with the light vertices near z_{t-1}.
     void merge(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
-        const ArrivalSide side = work.z[t - 1].arrival_side();
-        const auto may_pair = [&](const Partner& y) {
-            return y.s + t - 2 <= paths_.max_depth() && side.admits(y.side);
+        const Vertex& z = work.z[t - 1];
+        const ArrivalSide side = arrival_side(z);
+        const auto choose = [&](const GatherCandidate& y) -> std::optional<Chosen> {
+            if (y.s + t - 2 > paths_.max_depth() || !side.admits(y.side)) return {};
+            return Chosen{};
         };
-        photons_.for_each_near(work.z[t - 1].p, may_pair, [&](const Partner& y) {
-            photons_.paths().restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair);
-            const auto j = join_merge(work.pair, y.s, work.z, t, n);
-            if (!j) return;
-            ++work.stats.pairs;
-            c.sink.add(*j, j->contribution * c.splat_scale);
+        grid_.for_each_near(z.p, choose, [&](const GatherCandidate& y, Chosen) {
+            cache_.restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair);
+            const auto join = join_merge(work.pair, y.s, work.z, t, n);
+            if (!join) return;
+            work.stats.count_pair(1);
+            c.sink.add(*join, join->contribution * c.splat_scale);
         });
     }
 
+    /// U(s,t) with q π d² p̃ for p_c, where q is the survival of the roulette before the dropped vertex
+    /// [Qin et al. 2015, eq. 7].
+    void gather(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
+        const GatherSearch search{
+            c,   n, cache_, grid_, density_, roulette_, paths_.max_depth(), 1, paths_.threshold(c),
+            work};
+        search.for_each_pair(t, [&](const GatherPair& pair) {
+            const auto& [strategy, s, t_, drops_eye] = pair.technique;
+            const auto join = join_gather(c.scene, work.pair, s, work.z, t_, drops_eye, n);
+            search.observe(pair, join);
+            if (!join) return;
+            const PairEvent event = pair.event(work.pair, work.z);
+            const float r = 1 / (event.from.survival.value() * join->pair_probability);
+            const auto value =
+                paths_.test(c, *join, search.scale() * r / pair.rate, pair.number, work);
+            if (!value) return;
+            ++work.stats.visible_pairs;
+            c.sink.add(*join, *value * (r * c.splat_scale / pair.rate));
+        });
+    }
+
+    static constexpr uint64_t kVertexBytes =
+        LightVertexCache::kVertexBytes + LightVertexGrid::kVertexBytes;
+
     Bidirectional paths_;
-    RadiusSchedule radius_;
+    RadiusParams radius_params_;
     bool connects_, merges_, is_exact_;
-    uint64_t memory_;
-    Photons photons_;
-    PairWorth worth_;
+    LightPathOptions light_;
+
+    // Learned.
+    PairDensity density_;
+    GatherRoulette roulette_;
+
+    // Of the pass.
+    float radius_ = 0;
+    LightVertexCache cache_;
+    LightVertexGrid grid_;
 };
 
 }  // namespace
 
 IntegratorEntry vcm_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    for (const ParamInfo& p : RadiusSchedule::params("Distance within which vertices are merged in "
-                                                     "the first pass, in scene units; 0: 0.3 % "
-                                                     "of the radius of the scene's bounds."))
+    for (const ParamInfo& p :
+         radius_params("Distance within which vertices are merged in the first "
+                       "pass, in scene units; 0: 0.3 % of the radius of the "
+                       "scene's bounds."))
         params.push_back(p);
-    params.push_back(memory_param());
+    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back({"connections", ParamKind::Bool, "true",
                       "Whether sub-paths are connected, to emitters and the lens too."});
     params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged."});

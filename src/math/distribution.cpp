@@ -3,6 +3,11 @@
 #include <algorithm>
 
 namespace etendue {
+namespace {
+
+constexpr double kBelowOne = 0x1.fffffffffffffp-1;
+
+}  // namespace
 
 AliasTable::AliasTable(std::span<const double> weights) {
     for (double w : weights) total_ += w;
@@ -19,7 +24,7 @@ AliasTable::AliasTable(std::span<const double> weights) {
     while (!small.empty() && !large.empty()) {
         const uint32_t s = small.back(), l = large.back();
         small.pop_back();
-        cells_[s].keep = float(scaled[s]);
+        cells_[s].keep = scaled[s];
         cells_[s].alias = l;
         scaled[l] -= 1 - scaled[s];
         if (scaled[l] < 1) {
@@ -39,13 +44,13 @@ AliasTable::AliasTable(std::span<const double> weights) {
     }
 }
 
-AliasTable::Draw AliasTable::sample(float u) const {
-    const double scaled = double(u) * double(cells_.size());
+AliasTable::Draw AliasTable::sample(double u) const {
+    const double scaled = u * double(cells_.size());
     const uint32_t i = std::min(uint32_t(scaled), uint32_t(cells_.size() - 1));
-    const float f = float(std::min(scaled - i, 1.0 - 0x1p-25));
+    const double f = std::min(scaled - i, kBelowOne);
     const Cell& c = cells_[i];
-    if (f < c.keep) return {i, c.pmf, std::min(f / c.keep, kOneMinusEpsilon)};
-    return {c.alias, cells_[c.alias].pmf, std::min((f - c.keep) / (1 - c.keep), kOneMinusEpsilon)};
+    if (f < c.keep) return {i, c.pmf, std::min(f / c.keep, kBelowOne)};
+    return {c.alias, cells_[c.alias].pmf, std::min((f - c.keep) / (1 - c.keep), kBelowOne)};
 }
 
 namespace {
@@ -73,17 +78,17 @@ PiecewiseConstant1D::PiecewiseConstant1D(std::span<const float> values)
     for (size_t i = 0; i < values_.size(); ++i) sum[i + 1] = sum[i] + values_[i] / n;
     integral_ = sum.back();
     for (size_t i = 0; i < sum.size(); ++i)
-        cdf_[i] = float(integral_ > 0 ? sum[i] / integral_ : double(i) / n);
+        cdf_[i] = integral_ > 0 ? sum[i] / integral_ : double(i) / n;
     cdf_.back() = 1;
     for (float& v : values_) v = integral_ > 0 ? float(v / integral_) : 1.0f;
 }
 
-PiecewiseConstant1D::Sample PiecewiseConstant1D::sample(float u) const {
+PiecewiseConstant1D::Sample PiecewiseConstant1D::sample(double u) const {
     // First cell whose upper bound exceeds u; cells of zero width cannot be chosen.
     const auto it = std::upper_bound(cdf_.begin() + 1, cdf_.end() - 1, u);
     const int i = int(it - cdf_.begin()) - 1;
-    const float width = cdf_[i + 1] - cdf_[i];
-    const float f = width > 0 ? std::min((u - cdf_[i]) / width, kOneMinusEpsilon) : 0.5f;
+    const double width = cdf_[i + 1] - cdf_[i];
+    const float f = width > 0 ? std::min(float((u - cdf_[i]) / width), kOneMinusEpsilon) : 0.5f;
     return {point_in_cell(i, f, size()), values_[i], i};
 }
 
@@ -100,7 +105,7 @@ PiecewiseConstant2D::PiecewiseConstant2D(std::span<const float> values, int widt
     marginal_ = PiecewiseConstant1D(sums);
 }
 
-PiecewiseConstant2D::Sample PiecewiseConstant2D::sample(Vec2 u) const {
+PiecewiseConstant2D::Sample PiecewiseConstant2D::sample(FinePoint u) const {
     const auto y = marginal_.sample(u.y);
     const auto x = rows_[y.cell].sample(u.x);
     return {{x.x, y.x}, x.pdf * y.pdf};

@@ -1,6 +1,7 @@
 #pragma once
 // Tabulated distributions: alias table over indices, piecewise-constant densities in one and two dimensions.
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -8,6 +9,11 @@
 #include "math/vec.h"
 
 namespace etendue {
+
+/// The point of the i-th of n equal parts of [0, 1), i + u into them, below 1 too.
+inline double stratum(int i, int n, double u) {
+    return std::fmin((double(i) + u) / double(n), 0x1.fffffffffffffp-1);
+}
 
 /// Draws an index with probability proportional to its weight in constant time [Walker 1977; Vose 1991].
 class AliasTable {
@@ -19,9 +25,11 @@ public:
     struct Draw {
         uint32_t index;
         float pmf;
-        float u;  ///< `u` rescaled to [0, 1), to be used again.
+        double
+            u;  ///< `u` rescaled to [0, 1), to be used again; it has lost some log2(size() / keep) of its bits.
     };
-    Draw sample(float u) const;
+    /// With 53 bits of `u` the frequency of an index of probability p is right to 2^-53 size() / p, relative.
+    Draw sample(double u) const;
     float pmf(uint32_t i) const { return cells_[i].pmf; }
     double total() const { return total_; }
     size_t size() const { return cells_.size(); }
@@ -29,7 +37,7 @@ public:
 
 private:
     struct Cell {
-        float keep;  ///< Probability that the cell's own index is taken.
+        double keep;  ///< Probability that the cell's own index is taken.
         uint32_t alias;
         float pmf;
     };
@@ -47,13 +55,14 @@ public:
         float x, pdf;
         int cell;
     };
-    Sample sample(float u) const;
+    Sample sample(double u) const;
     float pdf(float x) const;
     double integral() const { return integral_; }
     int size() const { return int(values_.size()); }
 
 private:
-    std::vector<float> values_, cdf_;
+    std::vector<float> values_;
+    std::vector<double> cdf_;
     double integral_ = 0;
 };
 
@@ -66,7 +75,7 @@ public:
         Vec2 uv;
         float pdf;
     };
-    Sample sample(Vec2 u) const;
+    Sample sample(FinePoint u) const;
     float pdf(Vec2 uv) const;
     double integral() const { return marginal_.integral(); }
 

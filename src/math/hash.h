@@ -26,6 +26,10 @@ constexpr uint64_t reverse_bits(uint64_t x) {
 constexpr uint32_t reverse_bits(uint32_t x) {
     return uint32_t(reverse_bits(uint64_t{x}) >> 32);
 }
+/// Uniform in [0, 1) with 53 bits.
+constexpr double to_unit_double(uint64_t bits) {
+    return double(bits >> 11) * 0x1p-53;
+}
 /// Uniform in [0, 1) with 24 bits.
 constexpr float to_unit_float(uint32_t bits) {
     return float(bits >> 8) * 0x1p-24f;

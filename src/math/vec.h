@@ -25,6 +25,18 @@ struct Vec2 {
     friend constexpr Vec2 operator*(Vec2 a, float s) { return {a.x * s, a.y * s}; }
 };
 
+/// A point of the unit square with 53 bits a coordinate, for choices among many that leave numbers over.
+struct FinePoint {
+    double x = 0, y = 0;
+};
+/// A number of [0, 1) as float, below one too.
+inline float to_float(double u) {
+    return std::fmin(float(u), kOneMinusEpsilon);
+}
+inline Vec2 to_float(FinePoint u) {
+    return {to_float(u.x), to_float(u.y)};
+}
+
 struct Vec3 {
     float x = 0, y = 0, z = 0;
 

@@ -39,9 +39,9 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     if (counts.uses_light_paths()) {
         const double rev_prev =
             v.is_infinite ? to_area(e.pdf_d, v, z[last - 1]) : e.pdf_d * v.to_predecessor;
-        double inner = bracket<Side::Eye>(z, last - 1, z[last - 1].is_delta, rev_prev,
-                                          gloss_of_emitter(emitter.is_area()), last, counts) +
-                       stored_sum<Side::Eye>(z, last, last, counts);
+        double inner = squares_at<Side::Eye>(z, last - 1, z[last - 1].is_delta, rev_prev,
+                                             gloss_of_emitter(emitter.is_area()), last, counts) +
+                       sum_below<Side::Eye>(z, last, last, counts);
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
         // Two ends at infinity cannot be connected.
         if (last == 1 && !(v.is_infinite && z[0].is_infinite)) inner += sqr(double(counts.splat));
@@ -59,12 +59,13 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                                     const TechniqueCounts& counts) {
     const int last = t - 1;
     const Vertex& v = z[last];
-    if (!v.may_connect || !scene.has_emitters()) return {};
+    if (!v.is_connectible || !scene.has_emitters()) return {};
     sampler.seek(Stream::Connection, uint32_t(last));
-    const Emitter& emitter = scene.sample_emitter(sampler.next_1d_if(scene.has_emitter_choice()));
+    const Emitter& emitter =
+        scene.sample_emitter(sampler.next_1d_fine_if(scene.has_emitter_choice()));
     DirectSample d;
-    if (!emitter.sample_direct(v.p, sampler.next_2d(), d)) return {};
-    const BsdfEval f = v.bsdf.eval(v.wo, d.wi, TransportMode::Radiance);
+    if (!emitter.sample_direct(v.p, sampler.next_2d_fine(), d)) return {};
+    const BsdfEval f = v.eval(d.wi, TransportMode::Radiance);
     if (f.f.is_zero()) return {};
 
     // |cos θ_0| / d² of a surface, 1 / d² of a point, 1 at infinity.
@@ -115,26 +116,19 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
                             const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
     const Vertex& b = z[t - 1];
-    if (!a.may_connect || !b.may_connect) return {};
+    if (!a.is_connectible || !b.is_connectible) return {};
     const Vec3 d = a.is_infinite ? -a.p : b.p - a.p;
     const float dist2 = length2(d);
     if (!(dist2 > 0)) return {};
     const float inv_dist = 1 / std::sqrt(dist2), inv_dist2 = a.is_infinite ? 1.0f : sqr(inv_dist);
     Edge edge;
     edge.w = d * inv_dist;
-    const BsdfEval fb = b.bsdf.eval(b.wo, -edge.w, TransportMode::Radiance);
+    const BsdfEval fb = b.eval(-edge.w, TransportMode::Radiance);
     if (fb.f.is_zero()) return {};
-    BsdfEval fa;
-    double squares = sqr(double(counts.connect));
-    if (s == 1) {
-        const Emitter::Emission e = a.emitter->eval_emission(a.ng, a.uv, edge.w);
-        fa.f = e.Le_cos;
-        fa.pdf = e.pdf_d;
-        squares = emission_squares(double(next_event_ratio(a, edge.w)), counts);
-    } else {
-        fa = a.bsdf.eval(a.wo, edge.w, TransportMode::Importance);
-    }
+    const BsdfEval fa = a.eval(edge.w, TransportMode::Importance);
     if (fa.f.is_zero()) return {};
+    const double squares = s == 1 ? emission_squares(double(next_event_ratio(a, edge.w)), counts)
+                                  : sqr(double(counts.connect));
     edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
     if (scene.has_media() && !a.is_infinite)
         edge.contribution *= edge_attenuation(scene, a, b, edge.w, dist2 * inv_dist);
@@ -185,10 +179,11 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     const auto edge = connect(scene, y, drops_eye ? s : s - 1, z, drops_eye ? t - 1 : t, counts);
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
-    const double found = counts.found(drops_eye ? edge->rev_a : edge->rev_b);
-    const double count = counts.gathers_at((drops_eye ? y[s - 1] : z[t - 1]).pair_level, s + t - 2);
-    Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * found, y, a, z, b);
-    join.found = float(found);
+    const double probability = counts.pairs.probability(drops_eye ? edge->rev_a : edge->rev_b);
+    const double count =
+        counts.weighed_gathers((drops_eye ? y[s - 1] : z[t - 1]).pair_level, s + t - 2);
+    Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * probability, y, a, z, b);
+    join.pair_probability = float(probability);
     return join;
 }
 
@@ -206,8 +201,8 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
                                const TechniqueCounts& counts) {
     const Vertex &a = y[s - 1], &b = z[t - 1];
     const int edges = s + t - 2;
-    if (edges < counts.min_pair_edges) return {};
-    const BsdfEval f = b.bsdf.eval(b.wo, a.wo, TransportMode::Radiance);
+    if (edges < counts.pairs.min_edges) return {};
+    const BsdfEval f = b.eval(a.wo, TransportMode::Radiance);
     if (f.f.is_zero()) return {};
     // Relative to the split after x_m, which has p_L(x_m) but not p_E(x_m).
     const double total =
@@ -215,11 +210,13 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
         outward_sum<Side::Light>(y, s - 1, false, {b.pdf_fwd, f.pdf * a.to_predecessor, 0, edges},
                                  counts) +
         sqr(f.pdf_rev * b.to_predecessor / z[t - 2].pdf_fwd) *
-            (bracket<Side::Eye>(z, t - 2, z[t - 2].is_delta, 0, 0, edges, counts) + b.weight_sum);
-    const double np = double(counts.merge) * counts.disc * b.pdf_fwd;
+            (squares_at<Side::Eye>(z, t - 2, z[t - 2].is_delta, 0, 0, edges, counts) +
+             b.weight_sum);
+    const double np =
+        counts.weighed_merges(a.pair_level) * double(counts.pairs.disc) * double(b.pdf_fwd);
     return Join{.technique = {Strategy::Merge, s, t},
                 .emitter = y[0].emitter,
-                .contribution = density_estimate(a.beta, a.wo, f, b, counts.disc),
+                .contribution = density_estimate(a.beta, a.wo, f, b, counts.pairs.disc),
                 .mis_weight = float(sqr(np) / total),
                 .film = z.film,
                 .needs_test = false};
@@ -227,7 +224,7 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
 
 std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, float disc) {
     const Vertex& b = z[t - 1];
-    const BsdfEval f = b.bsdf.eval(b.wo, photon.wi, TransportMode::Radiance);
+    const BsdfEval f = b.eval(photon.wi, TransportMode::Radiance);
     if (f.f.is_zero()) return {};
     return Join{.technique = {Strategy::Merge, photon.s, t},
                 .emitter = photon.emitter,
@@ -240,8 +237,8 @@ std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, f
 std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler,
                                const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
-    if (!a.may_connect) return {};
-    sampler.seek(Stream::Connection, uint32_t(s) + 0x8000u);
+    if (!a.is_connectible) return {};
+    sampler.seek(Stream::Connection, uint64_t(s) + 0x8000u);
     const Sensor& sensor = scene.sensor();
     if (a.is_infinite && sensor.is_orthographic()) return {};
     const auto lens = sensor.sample_connection(a.p, a.is_infinite, sampler.next_2d());
@@ -253,14 +250,7 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
     const Vec3 w = a.is_infinite ? -a.p : sensor.is_orthographic() ? -lens->ng : edge * inv_dist;
     const float inv_dist2 = sqr(inv_dist);
 
-    BsdfEval f;
-    if (s == 1) {
-        const Emitter::Emission e = a.emitter->eval_emission(a.ng, a.uv, w);
-        f.f = e.Le_cos;
-        f.pdf = e.pdf_d;
-    } else {
-        f = a.bsdf.eval(a.wo, w, TransportMode::Importance);
-    }
+    const BsdfEval f = a.eval(w, TransportMode::Importance);
     if (f.f.is_zero()) return {};
     Rgb C = a.beta * f.f * (lens->We_cos / lens->pdf_pos * inv_dist2);
     const MediumId medium = a.medium_toward(w);
@@ -301,7 +291,7 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
     const Rgb C = flight.beta * (lens->We_cos / cos_lens) *
                   scene.attenuation(flight.medium, length(lens->p - origin));
 
-    const double p_fwd = a.is_delta ? flight.pdf_sa : flight.pdf_sa * cos_lens / dist2;
+    const double p_fwd = double(flight.pdf_sa) * double(cos_lens / dist2);
     const double p_lens = lens->pdf_pos / p_fwd;
     const double rev_last = lens->pdf_dir * (a.has_cosine ? abs_dot(a.ng, flight.d) : 1.0f) / dist2;
     double others =

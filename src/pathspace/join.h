@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "pathspace/photon.h"
-#include "pathspace/subpath.h"
+#include "pathspace/walk.h"
 
 namespace etendue {
 
@@ -18,8 +18,8 @@ struct Join {
     /// The edge that the join adds; b is a direction where `to_infinity`. A hit adds none.
     Vec3 a{}, ng_a{}, b{}, ng_b{};
     bool to_infinity = false;
-    float found =
-        1;  ///< Of a gather: the disc's approximation π d² p of p_c [Qin et al. 2015, eq. 7].
+    /// Of a gather: the disc's approximation π d² p of p_c, clamped as in the weights [Qin et al. 2015, eq. 7 and 24].
+    float pair_probability = 1;
     bool needs_test = true;
 };
 

@@ -52,26 +52,27 @@ inline double split_squares(const SubPath& v, int i, bool delta, const Technique
 /// densities of all others. A gather leaves the dropped vertex's density out and has the probability of its disc
 /// instead. `rev`: density of v[i] from the other side; `inward`: gloss of the vertex beyond v[i].
 template <Side side>
-inline double squared_pair_count(const SubPath& v, int i, double rev, uint8_t inward, int edges,
-                                 const TechniqueCounts& n) {
-    if (i == 0 || !v[i].may_connect || edges < n.min_pair_edges) return 0;
+inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, int edges,
+                           const TechniqueCounts& n) {
+    if (i == 0 || !v[i].is_connectible || edges < n.pairs.min_edges) return 0;
     const double fwd = v[i].pdf_fwd;
-    if (n.merge > 0) return sqr(double(n.merge) * n.disc * fwd);
+    if (n.merge > 0) return sqr(n.weighed_merges(v[i].pair_level) * double(n.pairs.disc) * fwd);
     constexpr bool eye = side == Side::Eye;
     const uint8_t outward = gloss(v[i - 1], v[i - 1].is_delta);
     const uint8_t before = eye ? inward : outward, after = eye ? outward : inward;
     double sum = 0;
-    if (drops(n.pair_rule, eye, before, after)) sum += sqr(n.found(fwd));
-    if (rev > 0 && drops(n.pair_rule, !eye, before, after)) sum += sqr(n.found(rev) * (fwd / rev));
-    return sum > 0 ? sum * sqr(n.gathers_at(v[i].pair_level, edges)) : 0;
+    if (drops(n.pairs.rule, eye, before, after)) sum += sqr(n.pairs.probability(fwd));
+    if (rev > 0 && drops(n.pairs.rule, !eye, before, after))
+        sum += sqr(n.pairs.probability(rev) * (fwd / rev));
+    return sum > 0 ? sum * sqr(n.weighed_gathers(v[i].pair_level, edges)) : 0;
 }
 
 /// b_i of a sub-path. `delta`, `rev`, `inward` as above; `edges`: length of the path, or any larger number.
 template <Side side>
-inline double bracket(const SubPath& v, int i, bool delta, double rev, uint8_t inward, int edges,
-                      const TechniqueCounts& n) {
+inline double squares_at(const SubPath& v, int i, bool delta, double rev, uint8_t inward, int edges,
+                         const TechniqueCounts& n) {
     double b = split_squares<side>(v, i, delta, n);
-    if (n.disc > 0 && !delta) b += squared_pair_count<side>(v, i, rev, inward, edges, n);
+    if (n.uses_pairs() && !delta) b += pair_squares<side>(v, i, rev, inward, edges, n);
     return b;
 }
 
@@ -86,11 +87,11 @@ struct Across {
 template <Side side>
 inline double outward_sum(const SubPath& v, int last, bool last_is_delta, const Across& a,
                           const TechniqueCounts& n) {
-    double inner = bracket<side>(v, last, last_is_delta, a.rev_last, a.gloss, a.edges, n);
+    double inner = squares_at<side>(v, last, last_is_delta, a.rev_last, a.gloss, a.edges, n);
     if (last >= 1) {
         const uint8_t inward = gloss(v[last], last_is_delta);
         const double prev =
-            bracket<side>(v, last - 1, v[last - 1].is_delta, a.rev_prev, inward, a.edges, n) +
+            squares_at<side>(v, last - 1, v[last - 1].is_delta, a.rev_prev, inward, a.edges, n) +
             v[last].weight_sum;
         inner += sqr(a.rev_prev / v[last - 1].pdf_fwd) * prev;
     }
@@ -104,13 +105,13 @@ inline double level_sum(const SubPath& v, int i, double below, const TechniqueCo
     const double rev = v[i].pdf_rev;
     const uint8_t inward = gloss(v[i + 1], v[i + 1].is_delta);
     return sqr(rev / v[i].pdf_fwd) *
-           (bracket<side>(v, i, v[i].is_delta, rev, inward, edges, n) + below);
+           (squares_at<side>(v, i, v[i].is_delta, rev, inward, edges, n) + below);
 }
-/// v[last].weight_sum of a path of so many edges. What was stored is that of longer paths than three edges, the one
-/// length with a rate of its own.
+/// v[last].weight_sum for a path of so many edges. The stored one is for paths of more than three edges, the one length
+/// with a rate of its own.
 template <Side side>
-inline double stored_sum(const SubPath& v, int last, int edges, const TechniqueCounts& n) {
-    if (edges != 3 || last != 3 || n.short_pair_rate == 1) return v[last].weight_sum;
+inline double sum_below(const SubPath& v, int last, int edges, const TechniqueCounts& n) {
+    if (edges != 3 || last != 3 || n.pairs.short_rate == 1) return v[last].weight_sum;
     return level_sum<side>(v, 1, v[2].weight_sum, n, edges);
 }
 

@@ -39,15 +39,17 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     const double n = counts.of(q);
     if (!(n > 0)) return 0;
     if (!is_pair(q.strategy)) return n * density(q);
-    if (m < 1 || m >= k || k < counts.min_pair_edges || is_delta[m]) return 0;
+    if (m < 1 || m >= k || k < counts.pairs.min_edges || is_delta[m]) return 0;
     double others = 1;  // of all vertices but x_m
     for (int i = 0; i < m; ++i) others *= light[i];
     for (int i = m + 1; i <= k; ++i) others *= eye[i];
-    if (q.strategy == Strategy::Merge) return n * others * light[m] * eye[m] * counts.disc;
-    if (!drops(counts.pair_rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
+    if (q.strategy == Strategy::Merge)
+        return counts.weighed_merges(pair_level[m]) * others * light[m] * eye[m] *
+               counts.pairs.disc;
+    if (!drops(counts.pairs.rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
     const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
-    return counts.gathers_at(counts.pair_level(place[m]), k) * others * kept *
-           counts.found(dropped);
+    return counts.weighed_gathers(pair_level[m], k) * others * kept *
+           counts.pairs.probability(dropped);
 }
 
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {
@@ -80,7 +82,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.light.assign(size_t(n), 1);
     p.eye.assign(size_t(n), 1);
     p.is_delta = delta;
-    for (int i = 0; i < n; ++i) p.place.push_back(x[size_t(i)]->p);
+    for (int i = 0; i < n; ++i) p.pair_level.push_back(x[size_t(i)]->pair_level);
     for (int i = 0; i < n; ++i)
         p.gloss.push_back(i == 0 ? gloss_of_emitter(x[0]->emitter->is_area())
                                  : gloss(*x[i], delta[size_t(i)]));
@@ -112,13 +114,25 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
 
     for (int i = 1; i < k; ++i) {
         const Vec3 to_light = direction(*x[i], *x[i - 1]), to_eye = direction(*x[i], *x[i + 1]);
-        if (delta[i]) continue;
-        const BsdfEval from_light = x[i]->bsdf.eval(to_light, to_eye, TransportMode::Importance);
-        const BsdfEval from_eye = x[i]->bsdf.eval(to_eye, to_light, TransportMode::Radiance);
-        p.light[i + 1] = to_area(from_light.pdf, *x[i], *x[i + 1]);
-        p.eye[i - 1] = to_area(from_eye.pdf, *x[i], *x[i - 1]);
+        Rgb f;
+        float pdf_light = 0, pdf_eye = 0;  // in solid angle
+        if (delta[i]) {
+            const auto event =
+                x[i]->bsdf.sample_delta(to_light, x[i]->event, TransportMode::Importance);
+            if (event) {
+                f = event->weight * event->pdf;
+                pdf_light = event->pdf, pdf_eye = event->pdf_rev;
+            }
+        } else {
+            const BsdfEval e = x[i]->bsdf.eval(to_light, to_eye, TransportMode::Importance);
+            f = e.f;
+            pdf_light = e.pdf;
+            pdf_eye = x[i]->bsdf.eval(to_eye, to_light, TransportMode::Radiance).pdf;
+        }
+        p.light[i + 1] = to_area(pdf_light, *x[i], *x[i + 1]);
+        p.eye[i - 1] = to_area(pdf_eye, *x[i], *x[i - 1]);
         // f̃·|cos| toward the eye; the other cosines follow as the loop goes on: each edge is G = |cos||cos| / d².
-        v.f *= from_light.f * float(inverse_square(*x[i - 1], *x[i]) * abs_dot(x[i]->ng, to_light));
+        v.f *= f * float(inverse_square(*x[i - 1], *x[i]) * abs_dot(x[i]->ng, to_light));
     }
     v.f *= float(inverse_square(*x[k - 1], *x[k]));
     return v;

@@ -13,10 +13,10 @@ namespace etendue {
 /// Densities of every vertex of a full path x_0 (emitter) … x_k (lens), from either side, in the conventions of Vertex.
 struct PathPdfs {
     std::vector<double> light, eye;
-    std::vector<bool> is_delta;  ///< Events.
-    std::vector<uint8_t> gloss;  ///< See gloss.h.
-    std::vector<Vec3> place;
-    double next_event = 0;  ///< p_NE(x_0) as chosen for x_1.
+    std::vector<bool> is_delta;       ///< Events.
+    std::vector<uint8_t> gloss;       ///< See gloss.h.
+    std::vector<uint8_t> pair_level;  ///< See Vertex.
+    double next_event = 0;            ///< p_NE(x_0) as chosen for x_1.
     bool can_hit_emitter = true;
     bool can_connect_ends = true;  ///< Not both are at infinity.
 
@@ -37,7 +37,8 @@ std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath&
                                          const Vertex* lens_point = nullptr);
 
 /// Measurement contribution f(x̄), without visibility and attenuation, and the densities. Events at the vertices of
-/// `delta` (one flag a vertex) are delta events: their BSDF and densities are taken as 1, as both cancel.
+/// `delta` (one flag a vertex) are the delta events Vertex::event; f and all densities leave out the factor δ of the
+/// direction toward the eye given that toward the light, which they share.
 struct PathValue {
     Rgb f;
     PathPdfs pdfs;

@@ -2,10 +2,9 @@
 // Techniques: the ways in which a full path x_0 … x_k (x_0 on the emitter, x_k on the lens) can be put together from s
 // light vertices and t eye vertices.
 
+#include <array>
 #include <cstdint>
 #include <limits>
-
-#include "pathspace/pair_density.h"
 
 namespace etendue {
 
@@ -72,39 +71,56 @@ struct PathSelection {
     bool has_all_lengths() const { return shortest <= 1 && longest == kNoLimit; }
 };
 
+/// How light and eye vertices near each other form pairs.
+struct PairModel {
+    float disc = 0;        ///< π d², the area in which a pair's partner is sought.
+    int min_edges = 2;     ///< Shorter paths are not made from pairs.
+    float short_rate = 1;  ///< Share of the gathers that are made of paths of three edges.
+    PairRule rule = PairRule::Gloss;
+    bool clamps = true;  ///< Weights know that no probability exceeds 1 [Qin et al. 2015, eq. 24].
+
+    /// Approximate probability that a pair is found whose dropped vertex has the area density `pdf` [ibid., eq. 24].
+    double probability(double pdf) const {
+        const double p = double(disc) * pdf;
+        return clamps && p > 1 ? 1 : p;
+    }
+
+    friend bool operator==(const PairModel&, const PairModel&) = default;
+};
+
+extern const std::array<float, 256> kPairShares;
+/// The pairs of one vertex share its eye path, so that weights count only a share of them: 2^(-level/16), where the vertex
+/// has the level (Vertex::pair_level).
+inline double pair_share(uint8_t level) {
+    return double(kPairShares[level]);
+}
+/// The level whose share is nearest to `share`, in (0, 1].
+uint8_t pair_level_of_share(double share);
+
 /// How many samples of each strategy an algorithm takes per eye sub-path, 0 for those it does not run. Eye densities are
 /// per pixel, so one eye path a pixel counts 1 and whatever reaches any pixel counts N_L, the number of light paths.
 struct TechniqueCounts {
     float hit = 0, next_event = 0, connect = 0, splat = 0, hit_lens = 0;
     float connect_emission = 0;   ///< C(1,t) with y_0 as light paths sample it, Strategy::Connect.
     float merge = 0, gather = 0;  ///< Of each inner vertex of the path; one of the two is 0.
-    float disc = 0;               ///< π d², the area in which a pair's partner is sought.
-    int min_pair_edges = 2;       ///< Shorter paths are not made from pairs.
-    float short_pair_rate = 1;    ///< Share of the gathers that are made of paths of three edges.
-    PairRule pair_rule = PairRule::Gloss;
-    bool clamps_disc = true;  ///< Weights know that no probability exceeds 1 [ibid., eq. 24].
-    const PairDensity* density =
-        nullptr;  ///< Of the partners that a gather has; nullptr: as if it had one.
+    PairModel pairs{};
 
     friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
     bool uses_light_paths() const {
         return connect > 0 || connect_emission > 0 || splat > 0 || hit_lens > 0 || merge > 0 ||
                gather > 0;
     }
-    /// Samples of each pair of a path of so many edges.
+    bool uses_pairs() const { return merge > 0 || gather > 0; }
+    /// Gathers of each pair of a path of so many edges.
     float gathers(int edges) const {
-        return edges < min_pair_edges ? 0.0f : edges == 3 ? gather * short_pair_rate : gather;
+        return edges < pairs.min_edges ? 0.0f : edges == 3 ? gather * pairs.short_rate : gather;
     }
-    /// The same for the weights, at an x_m of this level: pairs of one vertex are not independent.
-    double gathers_at(uint8_t pair_level, int edges) const {
-        const double n = double(gathers(edges));
-        return density ? n * density->share(pair_level) : n;
+    /// What the weights count for the gathers, or the merges, at an x_m of this level.
+    double weighed_gathers(uint8_t pair_level, int edges) const {
+        return double(gathers(edges)) * pair_share(pair_level);
     }
-    uint8_t pair_level(Vec3 p) const { return density ? density->level(p) : uint8_t(0); }
-    /// Approximate probability that a pair is found whose dropped vertex has the area density `pdf` [ibid., eq. 24].
-    double found(double pdf) const {
-        const double p = double(disc) * pdf;
-        return clamps_disc && p > 1 ? 1 : p;
+    double weighed_merges(uint8_t pair_level) const {
+        return double(merge) * pair_share(pair_level);
     }
     float of(const Technique& q) const {
         switch (q.strategy) {

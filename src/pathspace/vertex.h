@@ -7,7 +7,6 @@
 
 #include "bsdf/material.h"
 #include "emitter/emitter.h"
-#include "pathspace/arrival_side.h"
 #include "pathspace/gloss.h"
 #include "scene/scene.h"
 
@@ -40,8 +39,9 @@ struct Vertex {
         ng;  ///< Unit geometric normal; zero-cosine points (point lights) have the direction of the walk.
     Vec3 wo;   ///< Toward the predecessor; unused at the first vertex.
     Rgb beta;  ///< Throughput up to, not including, scattering here.
-    float pdf_fwd =
-        0;  ///< Area density as sampled from the predecessor; discrete after a delta event.
+    /// Area density as sampled from the predecessor. After a delta event it is the event's probability times |cos θ|/d²: the
+    /// factor δ is left out, which the density from the other side has too (see BsdfSample::pdf_rev).
+    float pdf_fwd = 0;
     /// Solid angle at this vertex over area at the predecessor: |cos θ|/d² there, 1 where it is at infinity.
     float to_predecessor = 0;
     float pdf_rev =
@@ -51,14 +51,15 @@ struct Vertex {
     /// p_NE / p_L of an emitter vertex y_0 seen from here (stored at y_1); see mis.h.
     float next_event_ratio = 1;
     Kind kind = Kind::Surface;
-    bool is_delta = false;      ///< The walk left this vertex by a delta event.
-    bool is_infinite = false;   ///< At infinity; p is a direction.
-    bool has_cosine = true;     ///< A surface: |cos θ| belongs to G here.
-    bool may_connect = false;   ///< Has a smooth lobe, or is an end point.
-    MediumId medium = kVacuum;  ///< On the edge to the predecessor.
-    Survival survival;          ///< Of the roulette before the walk left this vertex.
-    uint8_t gloss = 0;          ///< Of the emitter or the material, see gloss.h.
-    uint8_t pair_level = 0;     ///< Of the density of partners, see PairDensity.
+    bool is_delta = false;        ///< The walk left this vertex by a delta event.
+    bool is_infinite = false;     ///< At infinity; p is a direction.
+    bool has_cosine = true;       ///< A surface: |cos θ| belongs to G here.
+    bool is_connectible = false;  ///< Has a smooth lobe, or is an end point.
+    MediumId medium = kVacuum;    ///< On the edge to the predecessor.
+    Survival survival;            ///< Of the roulette before the walk left this vertex.
+    uint8_t gloss = 0;            ///< Of the emitter or the material, see gloss.h.
+    uint8_t pair_level = 0;       ///< Of pair_share(): how far weights believe in pairs here.
+    uint8_t event = 0;            ///< Of a delta event, see Bsdf::sample_delta().
     const SceneShape* shape = nullptr;
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or on the surface.
     SurfaceLocation location;          ///< Of a surface; of an emitter's y_0 only `prim`.
@@ -77,13 +78,33 @@ struct Vertex {
         location = at;
         uv = g.uv;
         on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo}, arena, bsdf);
-        may_connect = bsdf.has_smooth();
+        is_connectible = bsdf.has_smooth();
         gloss = gloss_of_roughness(bsdf.roughness());
     }
 
-    /// Of a point of a surface.
-    ArrivalSide arrival_side() const {
-        return {dot(ng, wo) < 0 ? -ng : ng, shape->material->is_transmissive()};
+    /// A direction in which a walk in `mode` leaves, with weight f̃·|cos θ| / pdf (of emission: L_e |cos θ| / pdf) and both
+    /// densities. Nothing where the walk ends. Not for emitters at infinity, whose direction is fixed.
+    std::optional<BsdfSample> sample(float u_lobe, Vec2 u, TransportMode mode) const {
+        if (kind != Kind::Emitter) return bsdf.sample(wo, u_lobe, u, mode);
+        const Vec3 w = emitter->sample_direction(ng, u);
+        const Emitter::Emission e = emitter->eval_emission(ng, uv, w);
+        if (!(e.pdf_d > 0)) return {};
+        return BsdfSample{.wi = w, .weight = e.Le_cos * (1 / e.pdf_d), .pdf = e.pdf_d};
+    }
+    /// f̃·|cos θ| (of emission L_e |cos θ|) toward `w`, and the densities of sample(); its smooth part.
+    BsdfEval eval(Vec3 w, TransportMode mode) const {
+        if (kind != Kind::Emitter) return bsdf.eval(wo, w, mode);
+        const Emitter::Emission e = emitter->eval_emission(ng, uv, w);
+        return {.f = e.Le_cos, .pdf = e.pdf_d};
+    }
+    /// Bound of eval(w).pdf over the directions of a cone; kInf where none is known.
+    float max_pdf(const DirectionCone& cone) const {
+        return kind == Kind::Emitter ? emitter->max_pdf_d() : bsdf.max_pdf(wo, cone);
+    }
+    /// The normal about which a density cos θ/π of directions lies, where it is of that kind.
+    std::optional<Vec3> cosine_normal() const {
+        if (kind != Kind::Emitter) return bsdf.diffuse_normal();
+        return emitter->is_area() ? std::optional(ng) : std::nullopt;
     }
 
     /// Medium on the edge that leaves along `w`.
@@ -98,8 +119,8 @@ struct Flight {
     Vec3 o, d;
     float length = kInf;  ///< Distance to what it met.
     Rgb beta;  ///< Throughput along it: that of the vertex it left, times scattering over density.
-    float pdf_sa =
-        0;  ///< Density of d; discrete for a delta event; 0: the last step traced no ray.
+    /// Density of d, of a delta event its probability; 0: the last step traced no ray.
+    float pdf_sa = 0;
     MediumId medium = kVacuum;
 };
 
@@ -110,8 +131,14 @@ struct SubPath {
     float film_weight =
         1;  ///< Factor of the reconstruction filter, for contributions to the own pixel.
     Flight flight;
-    Vec2 u_emission;  ///< The numbers from which y_0 was made.
-    float eta2 = 1;   ///< Product of η² over the refractions of an eye sub-path.
+    float eta2 = 1;  ///< Product of η² over the refractions of an eye sub-path.
+
+    SubPath() = default;
+    /// Copies would read BSDFs from the arena of the original.
+    SubPath(const SubPath&) = delete;
+    SubPath& operator=(const SubPath&) = delete;
+    SubPath(SubPath&&) = default;
+    SubPath& operator=(SubPath&&) = default;
 
     int size() const { return size_; }
     const Vertex& operator[](int i) const { return store_[size_t(i)]; }
@@ -123,7 +150,7 @@ struct SubPath {
         v.pdf_rev = 0;
         v.weight_sum = 0;
         v.next_event_ratio = 1;
-        v.is_delta = v.is_infinite = v.may_connect = false;
+        v.is_delta = v.is_infinite = v.is_connectible = false;
         v.has_cosine = true;
         v.medium = kVacuum;
         v.survival = {};

@@ -3,7 +3,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "pathspace/subpath.h"
+#include "pathspace/walk.h"
 
 namespace etendue {
 namespace {
@@ -48,12 +48,14 @@ std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::str
         tbb::parallel_for(0, scene.film().crop_height, [&](int row) {
             SubPath z;
             RenderStats stats;
+            const TechniqueCounts counts;
+            const WalkContext walk{scene, counts, stats, {}};
             Sampler sampler(SamplerKind::Sobol, seed);
             for (int x = 0; x < scene.film().crop_width; ++x) {
                 const uint64_t pixel = uint64_t(row) * scene.film().crop_width + x;
                 for (int i = 0; i < samples; ++i) {
                     sampler.start(uint32_t(i), pixel);
-                    start_eye_path(scene, film, pixel, sampler, {}, z, stats);
+                    start_eye_path(walk, film, pixel, sampler, z);
                     if (z.size() < 2 || z[1].kind != Vertex::Kind::Surface) continue;
                     for (AovImage& image : images)
                         image.pixels[pixel] +=

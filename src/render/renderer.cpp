@@ -1,6 +1,7 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <bit>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -14,6 +15,16 @@ namespace {
 
 /// Samples in a chunk of parallel work; fixed, whatever the number of threads.
 constexpr uint64_t kChunk = 256;
+
+/// Integrators learn before passes 0, 1, 2, 4, 8 …
+struct LearningStep {
+    uint32_t number;  ///< Of the step that the pass belongs to.
+    uint32_t pass;    ///< Number of the pass since then.
+
+    static LearningStep of(uint32_t pass) {
+        return {uint32_t(std::bit_width(pass)), pass == 0 ? 0 : pass - std::bit_floor(pass)};
+    }
+};
 
 /// The sink of a rendering: the film, and who else wants to know.
 class FilmSink final : public ContributionSink {
@@ -106,6 +117,7 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
                    std::unique_ptr<Integrator> integrator)
     : scene_(scene), settings_(settings), integrator_(std::move(integrator)),
       film_(scene.film(), scene.filter()), workers_(std::make_unique<Workers>(settings.threads)) {
+    light_paths_ = integrator_->light_paths(scene);
     if (settings.technique_depth > 0)
         techniques_ = std::make_unique<TechniqueImages>(scene.film(), scene.filter(),
                                                         settings.technique_depth);
@@ -115,20 +127,25 @@ Renderer::~Renderer() = default;
 
 void Renderer::pass(uint32_t index) {
     const uint64_t pixels = scene_.film().pixel_count();
-    const uint64_t light_paths = integrator_->light_paths(pixels);
+    const uint64_t light_paths = light_paths_;
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     film_.begin_pass(light_paths);
+    const LearningStep step = LearningStep::of(index);
+    const uint64_t seed = integrator_->is_learning() && step.number > 0
+                              ? hash_combine(settings_.seed, step.number)
+                              : settings_.seed;
+    const uint32_t sampler_pass = integrator_->is_learning() ? step.pass : index;
     const auto chunks = [](uint64_t samples) { return (samples + kChunk - 1) / kChunk; };
     // Calls use(context, work, sink) for the samples 0 … count-1 of the pass.
     const auto for_each_sample = [&](uint64_t count, const auto& use) {
         tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
             Workspace& work = workers_->spaces.local();
             work.is_observed = settings_.observer != nullptr;
-            Sampler sampler(settings_.sampler, settings_.seed);
+            Sampler sampler(settings_.sampler, seed);
             FilmSink sink(film_, techniques_.get(), settings_, splat_scale, work);
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
-                sampler.start(index, pixel);
+                sampler.start(sampler_pass, pixel);
                 work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
                 use(SampleContext{scene_, film_, pixel, chunk, light_paths, splat_scale, sampler,
                                   sink},
@@ -137,28 +154,31 @@ void Renderer::pass(uint32_t index) {
         });
     };
     workers_->arena.execute([&] {
-        integrator_->begin_pass(
-            {.scene = scene_,
-             .film = film_,
-             .index = index,
-             .light_paths = light_paths,
-             .pixels = pixels,
-             .so_far = stats_,
-             .for_each_sample =
-                 [&](uint64_t count, const PassContext::Use& use) {
-                     for_each_sample(count, [&](const SampleContext& c, Workspace& work,
-                                                FilmSink&) { use(c, work); });
-                 },
-             .chunks = chunks,
-             .for_each_other_path =
-                 [&](uint64_t count, const PassContext::Task& task) {
-                     tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
-                         Sampler sampler(settings_.sampler, settings_.seed);
-                         Workspace& work = workers_->spaces.local();
-                         work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
-                         task(i, sampler, work);
-                     });
-                 }});
+        const PassContext context{
+            .scene = scene_,
+            .film = film_,
+            .index = index,
+            .light_paths = light_paths,
+            .pixels = pixels,
+            .so_far = stats_,
+            .for_each_sample =
+                [&](uint64_t count, const PassContext::Use& use) {
+                    for_each_sample(count, [&](const SampleContext& c, Workspace& work, FilmSink&) {
+                        use(c, work);
+                    });
+                },
+            .chunks = chunks,
+            .for_each_other_path =
+                [&](uint64_t count, const PassContext::Task& task) {
+                    tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                        Sampler sampler(settings_.sampler, seed);
+                        Workspace& work = workers_->spaces.local();
+                        work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
+                        task(i, sampler, work);
+                    });
+                }};
+        if (step.pass == 0) integrator_->learn(context);
+        integrator_->trace(context);
         for_each_sample(pixels, [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
             sink.begin(c.pixel);
             integrator_->sample(c, work);

@@ -78,6 +78,7 @@ private:
     const Scene& scene_;
     RenderSettings settings_;
     std::unique_ptr<Integrator> integrator_;
+    uint64_t light_paths_;  ///< Of a pass.
     Film film_;
     std::unique_ptr<TechniqueImages> techniques_;
     struct Workers;

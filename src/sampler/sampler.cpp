@@ -40,18 +40,18 @@ constexpr uint32_t second_reversed(uint32_t i) {
 
 }  // namespace
 
-float Sampler::next_1d_structured() {
-    if (kind_ == SamplerKind::PrimarySample) return source_->value(stream_, vertex_, slot_++);
+uint32_t Sampler::next_bits_structured() {
+    if (kind_ == SamplerKind::PrimarySample) return source_->bits(stream_, vertex_, slot_++);
     const uint64_t seed = bits(path_key_);
     const uint32_t index = reverse_bits(scramble_reversed(pass_reversed_, uint32_t(seed)));
-    return to_unit_float(reverse_bits(scramble_reversed(index, uint32_t(mix64(seed)))));
+    return reverse_bits(scramble_reversed(index, uint32_t(mix64(seed))));
 }
 
-Vec2 Sampler::next_2d_structured() {
+Sampler::Vec2Bits Sampler::next_2d_structured() {
     if (kind_ == SamplerKind::PrimarySample) {
         const uint32_t slot = slot_;
         slot_ += 2;
-        return {source_->value(stream_, vertex_, slot), source_->value(stream_, vertex_, slot + 1)};
+        return {source_->bits(stream_, vertex_, slot), source_->bits(stream_, vertex_, slot + 1)};
     }
     // Each pair of dimensions is the same two-dimensional sequence over the passes, with an order
     // and a scrambling of its own.
@@ -60,7 +60,7 @@ Vec2 Sampler::next_2d_structured() {
     const uint32_t x = scramble_reversed(index, uint32_t(scramble));
     const uint32_t y = scramble_reversed(second_reversed(index), uint32_t(scramble >> 32));
     const uint64_t both = reverse_bits(uint64_t{y} << 32 | x);
-    return {to_unit_float(uint32_t(both >> 32)), to_unit_float(uint32_t(both))};
+    return {uint32_t(both >> 32), uint32_t(both)};
 }
 
 }  // namespace etendue

@@ -72,7 +72,7 @@ public:
     }
 
     /// Emitter drawn by power. `u` is not read where there is but one.
-    const Emitter& sample_emitter(float u) const {
+    const Emitter& sample_emitter(double u) const {
         return *emitters_[emitters_.size() == 1 ? 0u : selection_.sample(u).index];
     }
     bool has_emitters() const { return !selection_.empty(); }

@@ -156,8 +156,7 @@ Series Runner::render(const IntegratorSpec& spec, uint64_t stream) const {
         throw std::runtime_error(fmt::format(
             "{} cannot be verified: its photons do not keep their paths; use compare", spec.name));
     Series series;
-    series.counts =
-        integrator->counts(scene_, integrator->light_paths(scene_.film().pixel_count()));
+    series.counts = integrator->counts(scene_, integrator->light_paths(scene_));
     series.estimator = integrator->estimator();
     series.spp = choose_spp(spec, stream);
     series.runs.resize(size_t(options_.runs));
@@ -365,7 +364,7 @@ TechniqueReport compare_technique(const Technique& q, const Series& method,
         Tally alone, expected;
     };
     const auto times_made = [&](const PathClass& c) {
-        return double(etendue::times_made(q, c, method.counts.pair_rule));
+        return double(etendue::times_made(q, c, method.counts.pairs.rule));
     };
     std::map<PathClass, Found> found;
     double length_total = 0;

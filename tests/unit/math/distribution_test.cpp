@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <vector>
 
 #include "chi2.h"
@@ -31,6 +32,10 @@ const std::vector<std::vector<double>> kWeights = {
     {1e-9, 1, 1e9, 3e8},
     {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 10},
 };
+
+FinePoint fine(Vec2 u) {
+    return {double(u.x), double(u.y)};
+}
 
 TEST(AliasTable, DrawsInProportionToTheWeights) {
     Random random(1);
@@ -67,6 +72,36 @@ TEST(AliasTable, SharesAreExactOverAllInputs) {
         EXPECT_NEAR(counts[i] / double(kInputs), table.pmf(i), 100.0 / kInputs);
 }
 
+/// Of two indices, one very rare: the numbers that choose it are as many as its probability says.
+TEST(AliasTable, RareIndicesAreChosenAsOftenAsTheirProbabilitySays) {
+    for (const double rare : {1e-7, 2.5e-8, 1e-11}) {
+        const std::vector<double> weights{1, rare};
+        const AliasTable table(weights);
+        // The rare index has one interval of numbers; its ends are found by bisection from a point inside.
+        const double inside = 0.5 + 0.25 * table.pmf(1);
+        ASSERT_EQ(table.sample(inside).index, 1u);
+        double low = 0.25, high = 0.75, begin = inside, end = inside;
+        for (int i = 0; i < 80; ++i) {
+            const double a = 0.5 * (low + begin), b = 0.5 * (end + high);
+            (table.sample(a).index == 1 ? begin : low) = a;
+            (table.sample(b).index == 1 ? end : high) = b;
+        }
+        EXPECT_NEAR((end - begin) / (rare / (1 + rare)), 1, 1e-3) << rare;
+    }
+}
+
+/// A number that has chosen among a million still places a point finely.
+TEST(AliasTable, TheRestOfANumberIsFine) {
+    const AliasTable table(std::vector<double>(1000000, 1.0));
+    Random random(3);
+    std::set<float> rests;
+    for (int i = 0; i < 1000; ++i) {
+        const double u = to_unit_double(random.bits());
+        rests.insert(to_float(table.sample(u).u));
+    }
+    EXPECT_GT(rests.size(), 990u);
+}
+
 TEST(AliasTable, TheNumberCanBeUsedAgain) {
     const AliasTable table(kWeights[2]);
     Random random(2);
@@ -88,7 +123,7 @@ TEST(AliasTable, TheNumberCanBeUsedAgain) {
 TEST(AliasTable, ExtremeNumbers) {
     for (const auto& weights : kWeights) {
         const AliasTable table(weights);
-        for (const float u : {0.0f, 0x1p-24f, 0.5f, kOneMinusEpsilon}) {
+        for (const double u : {0.0, 0x1p-53, 0x1p-24, 0.5, 1 - 0x1p-53}) {
             const auto draw = table.sample(u);
             ASSERT_LT(draw.index, weights.size());
             EXPECT_GT(weights[draw.index], 0);
@@ -153,7 +188,7 @@ TEST(PiecewiseConstant1D, PositionAndDensityAgree) {
 TEST(PiecewiseConstant1D, ExtremeNumbers) {
     for (const auto& values : kDensities) {
         const PiecewiseConstant1D d(values);
-        for (const float u : {0.0f, 0x1p-24f, kOneMinusEpsilon}) {
+        for (const double u : {0.0, 0x1p-24, 1 - 0x1p-53}) {
             const auto s = d.sample(u);
             EXPECT_GT(values[size_t(s.cell)], 0);
             EXPECT_GE(s.x, 0);
@@ -190,7 +225,7 @@ TEST(PiecewiseConstant2D, SamplesFollowTheDensity) {
     Random random(5);
     Chi2Grid grid(0, 1, kWidth, 0, 1, kHeight);
     for (int i = 0; i < kDraws; ++i) {
-        const auto s = d.sample(random.next_2d());
+        const auto s = d.sample(fine(random.next_2d()));
         ASSERT_EQ(d.pdf(s.uv), s.pdf);
         ASSERT_GT(s.pdf, 0);
         grid.add(s.uv.x, s.uv.y);
@@ -210,7 +245,7 @@ TEST(PiecewiseConstant2D, PositionAndDensityAgreeInLargeImages) {
     Random random(6);
     int disagreements = 0;
     for (int i = 0; i < kDraws; ++i) {
-        const auto s = d.sample(random.next_2d());
+        const auto s = d.sample(fine(random.next_2d()));
         disagreements += d.pdf(s.uv) != s.pdf;
     }
     EXPECT_EQ(disagreements, 0);

@@ -1,13 +1,12 @@
 // Joins and weights against the slow definitions, on random paths of scenes with all kinds of events.
 
+#include <algorithm>
 #include <map>
 
 #include <gtest/gtest.h>
 
 #include "path_ends.h"
 #include "pathspace/path_pdfs.h"
-#include "pathspace/point_grid.h"
-#include "random.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -18,6 +17,7 @@ constexpr int kPixels = 8;
 struct Case {
     const char* name;
     std::string xml;
+    bool has_delta = false;  ///< Smooth glass and coats.
 };
 
 std::vector<Case> cases() {
@@ -25,9 +25,18 @@ std::vector<Case> cases() {
     const std::string spheres =
         sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) + sphere("0.4,-0.65,0.3", "0.3", kRoughGlass);
     return {
-        {"mixed", mixed_room(front_camera(kPixels))},
-        {"thinlens", mixed_room(lens_camera(kPixels))},
-        {"orthographic", mixed_room(sensor("0,0,3.4", "0,0,0", kPixels, "", "", "orthographic"))},
+        {"mixed", mixed_room(front_camera(kPixels)), true},
+        {"thinlens", mixed_room(lens_camera(kPixels)), true},
+        {"orthographic", mixed_room(sensor("0,0,3.4", "0,0,0", kPixels, "", "", "orthographic")),
+         true},
+        // Paths that end inside glass: their refractions do not undo each other.
+        {"inside_glass",
+         front_camera(kPixels) + room() + area_lamp() + sphere("0,-0.2,0.2", "0.7", kGlass) +
+             sphere(
+                 "0.1,-0.1,0.2", "0.3",
+                 diffuse("0.5,0.6,0.5") +
+                     "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter>"),
+         true},
         {"point",
          front_camera(kPixels) + room() + spheres +
              "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0\"/></emitter>"},
@@ -46,12 +55,22 @@ std::vector<Case> cases() {
         {"several",
          mixed_room(front_camera(kPixels)) +
              "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>" +
-             "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>"},
+             "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>",
+         true},
     };
 }
 
 /// What there is besides the connections of bidirectional path tracing; Variants: of the choices of gathers.
 enum class Extra { None, Merges, Gathers, Variants, Stored };
+
+/// Shares of pairs between 1 and about 1/20, from cell to cell.
+struct RandomLevels final : LearnedPlaces {
+    uint8_t pair_level(Vec3 p) const override {
+        uint64_t key = 0;
+        for (int i = 0; i < 3; ++i) key = hash_combine(key, uint64_t(std::floor(p[i] * 4)));
+        return uint8_t(key % 70);
+    }
+};
 
 class Joins : public ::testing::TestWithParam<std::tuple<Case, Extra>> {
 protected:
@@ -70,56 +89,43 @@ protected:
         } else if (extra() != Extra::None) {
             (extra() == Extra::Merges ? counts.merge : counts.gather) = N;
             // Large enough for the clamp of gathers to matter now and then.
-            counts.disc = 0.3f;
-            counts.min_pair_edges = extra() == Extra::Merges ? 2 : 3;
+            counts.pairs.disc = 0.3f;
+            counts.pairs.min_edges = extra() == Extra::Merges ? 2 : 3;
             if (extra() == Extra::Variants) {
-                counts.pair_rule = PairRule::Both;
-                counts.clamps_disc = false;
-                counts.short_pair_rate = 0.3f;
-                // Shares between 1 and about 1/20, from cell to cell.
-                std::vector<PointGrid::Entry> points;
-                testing::Random random(11);
-                for (int i = 0; i < 12000; ++i) points.push_back({random.in_cube() * 2, 0});
-                PointGrid grid;
-                grid.build(points, 0.3f);
-                density = PairDensity(grid, 0.3f);
-                counts.density = &density;
+                counts.pairs.rule = PairRule::Both;
+                counts.pairs.clamps = false;
+                counts.pairs.short_rate = 0.3f;
             }
         }
     }
 
     static Extra extra() { return std::get<Extra>(GetParam()); }
+    const LearnedPlaces* learned() const {
+        return extra() == Extra::Merges || extra() == Extra::Variants ? &levels : nullptr;
+    }
 
     /// Both sub-paths of sample `index`, without roulette.
     void trace(uint32_t index) {
         sampler.start(index, index % (kPixels * kPixels));
-        const WalkOptions walk{6, 1000};
-        start_light_path(scene, sampler, counts, y, stats);
+        const WalkContext walk{scene, counts, stats, {6, 1000}, learned()};
+        start_light_path(walk, sampler, y);
         if (y.size() > 0) check_hit_lens(1);
         for (int s = 2; s <= y.size(); ++s) {
-            extend<TransportMode::Importance>(scene, sampler, walk, counts, y, stats);
+            extend<TransportMode::Importance>(walk, sampler, y);
             check_hit_lens(s);
         }
-        start_eye_path(scene, film, index % (kPixels * kPixels), sampler, counts, z, stats);
-        while (z.size() >= 2 &&
-               extend<TransportMode::Radiance>(scene, sampler, walk, counts, z, stats)) {
-        }
+        trace_eye_path(walk, film, index % (kPixels * kPixels), sampler, z);
     }
 
     /// Compares a join with the path's own definition. End points of the join are connectible by any other event too.
     void check(const Join& join, const std::vector<const Vertex*>& x, double p_sampled) {
-        const int n = int(x.size());
-        std::vector<bool> delta(x.size(), false);
-        for (int i = 0; i < n; ++i) {
-            const bool is_end = i == join.technique.s - 1 || i == join.technique.s;
-            delta[size_t(i)] = !is_end && x[size_t(i)]->is_delta;
-        }
-        for (bool d : delta)
-            if (d) return;  // densities of delta events are checked by the weights' agreement below
+        const int s = join.technique.s;
+        const auto delta = delta_events(x, s - 1, s);
         const PathValue value = evaluate_path(scene, x, delta);
         const double p = value.pdfs.density(join.technique);
         ASSERT_GT(p, 0);
-        Tally& tally = tallies[join.technique.strategy];
+        p_sampled *= eye_jacobian(x, delta, s + 1);
+        Tally& tally = tally_of(join.technique.strategy, delta);
         tally.add(p_sampled / p, 1);
         for (int c = 0; c < 3; ++c)
             if (value.f[c] > 0) tally.add(join.contribution[c] * p / value.f[c], 1);
@@ -127,10 +133,34 @@ protected:
         ++checked;
     }
 
+    /// δ of the direction toward the light over that of the direction toward the eye, which evaluate_path() refers to, at a
+    /// delta event of an eye sub-path.
+    static double eye_jacobian(const Vertex& z) {
+        const auto to_light = z.bsdf.sample_delta(z.wo, z.event, TransportMode::Radiance);
+        const auto to_eye = z.bsdf.sample_delta(to_light->wi, z.event, TransportMode::Importance);
+        EXPECT_NEAR(dot(to_eye->wi, z.wo), 1, 1e-4) << "the event is not its own reverse";
+        return double(to_eye->pdf_rev) / double(to_light->pdf);
+    }
+    /// The product of them over the delta events from x_begin on.
+    static double eye_jacobian(const std::vector<const Vertex*>& x, const std::vector<bool>& delta,
+                               int begin) {
+        double product = 1;
+        for (size_t i = size_t(begin); i < x.size(); ++i)
+            if (delta[i]) product *= eye_jacobian(*x[i]);
+        return product;
+    }
+    /// Which events of the walks are delta events; those at x_a and x_b, where the path was joined, are not.
+    static std::vector<bool> delta_events(const std::vector<const Vertex*>& x, int a, int b) {
+        std::vector<bool> delta(x.size());
+        for (int i = 0; i < int(x.size()); ++i)
+            delta[size_t(i)] = i != a && i != b && x[size_t(i)]->is_delta;
+        return delta;
+    }
+
     /// The last ray of y, which left y_{s-1}, where it meets the lens.
     void check_hit_lens(int s) {
         const auto j = join_hit_lens(scene, y, s, counts);
-        if (!j || y[s - 1].is_delta) return;
+        if (!j) return;
         const Vertex& a = y[s - 1];
         const Vec3 o = a.is_infinite ? y.flight.o : a.p;
         const auto sample = scene.sensor().hit_lens(o, y.flight.d, kInf);
@@ -147,9 +177,9 @@ protected:
 
     /// Any two vertices taken for a pair: contribution and weight are those of the path without the dropped one.
     void check_gather(int s, int t) {
-        if (!y[s - 1].may_connect || !z[t - 1].may_connect) return;
+        if (!y[s - 1].is_connectible || !z[t - 1].is_connectible) return;
         for (const bool eye : {true, false})
-            if (drops(counts.pair_rule, eye, gloss(y[s - 2], y[s - 2].is_delta),
+            if (drops(counts.pairs.rule, eye, gloss(y[s - 2], y[s - 2].is_delta),
                       gloss(z[t - 2], z[t - 2].is_delta)))
                 check_gather(s, t, eye);
     }
@@ -157,15 +187,13 @@ protected:
         const auto j = join_gather(scene, y, s, z, t, drops_eye, counts);
         if (!j) return;
         const auto x = path_vertices(y, drops_eye ? s : s - 1, z, drops_eye ? t - 1 : t);
-        const int n = int(x.size()), m = s - 1;
-        for (int i = 0; i < n; ++i) {
-            const bool is_end = drops_eye ? i == m || i == m + 1 : i == m || i == m - 1;
-            if (!is_end && x[size_t(i)]->is_delta) return;
-        }
-        const PathValue value = evaluate_path(scene, x, std::vector<bool>(x.size(), false));
-        const double p =
-            density_of(y, drops_eye ? s : s - 1) * density_of(z, drops_eye ? t - 1 : t);
-        Tally& tally = tallies[Strategy::Gather];
+        const int m = s - 1;
+        const auto delta = delta_events(x, m, drops_eye ? m + 1 : m - 1);
+        const PathValue value = evaluate_path(scene, x, delta);
+        const double p = density_of(y, drops_eye ? s : s - 1) *
+                         density_of(z, drops_eye ? t - 1 : t) *
+                         eye_jacobian(x, delta, drops_eye ? s : s - 1);
+        Tally& tally = tally_of(Strategy::Gather, delta);
         for (int c = 0; c < 3; ++c)
             if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);
         tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
@@ -174,7 +202,7 @@ protected:
     /// z_{t-1} as if the light path had found it too, from y_{s-2}: where the two coincide a merge is its definition.
     void check_merge(int s, int t) {
         const Vertex &b = z[t - 1], &from = y[s - 2];
-        if (!b.may_connect || !from.may_connect) return;
+        if (!b.is_connectible || !from.is_connectible) return;
         SubPath merged;
         for (int i = 0; i < s - 1; ++i) merged.append() = y[i];
         merged[s - 2].is_delta = false;
@@ -182,14 +210,14 @@ protected:
         a = b;
         a.wo = from.is_infinite ? from.p : normalize(from.p - b.p);
         if (s == 2) {
-            const Emitter::Emission e = from.emitter->eval_emission(from.ng, from.uv, -a.wo);
-            if (e.Le_cos.is_zero()) return;
-            a.beta = from.beta * e.Le_cos / e.pdf_d;
-            a.pdf_fwd = to_area(e.pdf_d, from, b);
+            const BsdfEval e = from.eval(-a.wo, TransportMode::Importance);
+            if (e.f.is_zero()) return;
+            a.beta = from.beta * e.f / e.pdf;
+            a.pdf_fwd = to_area(e.pdf, from, b);
             a.next_event_ratio = next_event_ratio(from, -a.wo);
             a.weight_sum = 0;
         } else {
-            const BsdfEval f = from.bsdf.eval(from.wo, -a.wo, TransportMode::Importance);
+            const BsdfEval f = from.eval(-a.wo, TransportMode::Importance);
             if (f.f.is_zero()) return;
             a.beta = from.beta * f.f / f.pdf;
             a.pdf_fwd = to_area(f.pdf, from, b);
@@ -202,16 +230,17 @@ protected:
         const auto j = join_merge(merged, s, z, t, counts);
         if (!j) return;
         const auto x = path_vertices(merged, s, z, t - 1);
-        for (size_t i = 0; i < x.size(); ++i)
-            if (i != size_t(s - 1) && x[i]->is_delta) return;
-        const PathValue value = evaluate_path(scene, x, std::vector<bool>(x.size(), false));
-        const double p = density_of(merged, s) * density_of(z, t) * double(counts.disc);
-        Tally& tally = tallies[Strategy::Merge];
+        const auto delta = delta_events(x, s - 1, s - 1);
+        const PathValue value = evaluate_path(scene, x, delta);
+        const double p = density_of(merged, s) * density_of(z, t) * double(counts.pairs.disc) *
+                         eye_jacobian(x, delta, s);
+        Tally& tally = tally_of(Strategy::Merge, delta);
         for (int c = 0; c < 3; ++c)
             if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);
         tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
         // The same flux without its path.
-        const auto alone = join_photon({a.p, a.wo, a.beta, y[0].emitter, s}, z, t, counts.disc);
+        const auto alone =
+            join_photon({a.p, a.wo, a.beta, y[0].emitter, s}, z, t, counts.pairs.disc);
         EXPECT_EQ(alone->contribution.g, j->contribution.g);
     }
 
@@ -225,6 +254,11 @@ protected:
         }
     };
 
+    Tally& tally_of(Strategy strategy, const std::vector<bool>& delta) {
+        const bool has_delta = std::count(delta.begin(), delta.end(), true) > 0;
+        return has_delta ? delta_tallies[strategy] : tallies[strategy];
+    }
+
     static double density_of(const SubPath& path, int count) {
         double p = 1;
         for (int i = 0; i < count; ++i) p *= path[i].pdf_fwd;
@@ -235,10 +269,11 @@ protected:
     Film film;
     Sampler sampler;
     TechniqueCounts counts;
-    PairDensity density;
+    RandomLevels levels;
     SubPath y, z;
     RenderStats stats;
-    std::map<Strategy, Tally> tallies;
+    std::map<Strategy, Tally> tallies,
+        delta_tallies;  ///< Of paths without delta events, and with some.
     int checked = 0;
 };
 
@@ -284,6 +319,13 @@ TEST_P(Joins, EqualTheDefinition) {
     for (const auto& [strategy, tally] : tallies)
         EXPECT_LT(tally.deviating, 0.03 * tally.compared)
             << "strategy " << int(strategy) << ", " << tally.compared << " comparisons";
+    if (std::get<Case>(GetParam()).has_delta) {
+        EXPECT_GE(delta_tallies.size(), 3u);
+    }
+    for (const auto& [strategy, tally] : delta_tallies)
+        EXPECT_LT(tally.deviating, 0.03 * tally.compared)
+            << "with delta events: strategy " << int(strategy) << ", " << tally.compared
+            << " comparisons";
 }
 
 /// With delta events the stored discrete probabilities enter; then the weights of all techniques that can make a path,
@@ -293,7 +335,7 @@ TEST_P(Joins, StoredSumsEqualTheExplicitSum) {
     for (uint32_t index = 0; index < 2000; ++index) {
         trace(index);
         for (int t = 2; t <= z.size(); ++t) {
-            if (z[t - 1].kind != Vertex::Kind::Surface || !z[t - 1].may_connect) continue;
+            if (z[t - 1].kind != Vertex::Kind::Surface || !z[t - 1].is_connectible) continue;
             for (int s = 2; s <= y.size(); ++s) {
                 const auto j = join_connect(scene, y, s, z, t, counts);
                 if (!j) continue;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -149,6 +150,33 @@ TEST_P(EverySampler, EveryCoordinateOfTheAddressCounts) {
     EXPECT_NE(pair_at(GetParam(), {.seed = 2}), here);
 }
 
+/// Joins are numbered by s, t and more, gathers by light vertices of 32 bits: addresses far beyond 2^24.
+TEST_P(EverySampler, LargeNumbersOfVerticesDoNotCollide) {
+    std::set<double> numbers;
+    size_t count = 0;
+    for (const Stream stream : {Stream::Eye, Stream::Light, Stream::Roulette, Stream::Selection})
+        for (const uint64_t high : {0ull, 1ull, 2ull, 0x80ull, 0x8001ull, 0x1000000001ull})
+            for (uint64_t low = 8; low < 40; ++low) {
+                Sampler s(GetParam(), 3);
+                s.start(0, 5);
+                s.seek(stream, high << 24 | low);
+                for (int slot = 0; slot < 4; ++slot, ++count) numbers.insert(s.next_1d_fine());
+            }
+    EXPECT_EQ(numbers.size(), count);
+}
+
+TEST(JoinNumber, IsDistinct) {
+    std::set<uint64_t> numbers;
+    size_t count = 0;
+    for (const int s : {0, 1, 2, 255, 256, 65535})
+        for (const int t : {1, 2, 65535, 65536, (1 << 21) - 1})
+            for (const uint32_t draw : {0u, 1u, 2u, (1u << 21) - 1}) {
+                numbers.insert(join_number(s, t, draw));
+                ++count;
+            }
+    EXPECT_EQ(numbers.size(), count);
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, EverySampler,
                          ::testing::Values(SamplerKind::Independent, SamplerKind::Sobol),
                          [](const auto& kind) {
@@ -248,11 +276,11 @@ TEST(Sobol, ErrorFallsFasterThanThatOfIndependentNumbers) {
 
 class RecordingSource final : public PrimarySource {
 public:
-    float value(Stream stream, uint32_t vertex, uint32_t slot) override {
+    uint32_t bits(Stream stream, uint64_t vertex, uint32_t slot) override {
         asked.emplace_back(stream, vertex, slot);
-        return 0.25f;
+        return 1u << 30;
     }
-    std::vector<std::tuple<Stream, uint32_t, uint32_t>> asked;
+    std::vector<std::tuple<Stream, uint64_t, uint32_t>> asked;
 };
 
 TEST(PrimarySample, NumbersComeFromTheSourceByAddress) {
@@ -266,7 +294,7 @@ TEST(PrimarySample, NumbersComeFromTheSourceByAddress) {
     s.next_1d();
     s.seek(Stream::Eye, 5);
     s.next_1d();
-    const std::vector<std::tuple<Stream, uint32_t, uint32_t>> expected = {{Stream::Light, 2, 0},
+    const std::vector<std::tuple<Stream, uint64_t, uint32_t>> expected = {{Stream::Light, 2, 0},
                                                                           {Stream::Light, 2, 1},
                                                                           {Stream::Light, 2, 2},
                                                                           {Stream::Light, 2, 3},

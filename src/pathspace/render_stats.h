@@ -1,0 +1,86 @@
+#pragma once
+// What a rendering counts: by worker, added up at the end of a pass.
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+
+namespace etendue {
+
+/// Where the time of samples goes, seconds on one thread. Only every kTimedSamples-th sample is timed.
+struct PhaseSeconds {
+    double light_paths = 0;  ///< With their techniques t ≤ 1.
+    double eye_paths = 0;    ///< With all that follows.
+    double connections = 0;  ///< To light vertices, their choice included.
+    double records = 0;      ///< Importance records.
+
+    PhaseSeconds& operator+=(const PhaseSeconds& o) {
+        light_paths += o.light_paths, eye_paths += o.eye_paths;
+        connections += o.connections, records += o.records;
+        return *this;
+    }
+};
+
+/// Counters of one worker; merged at the end of a pass.
+struct RenderStats {
+    static constexpr int kTimedSamples = 8;
+    PhaseSeconds phases;
+    bool is_timed = false;  ///< The sample at hand.
+    uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
+    uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
+    uint64_t joins_skipped = 0;  ///< By roulette, before their shadow ray.
+    uint64_t pairs = 0;          ///< Merged, or found by the searches of gathers.
+    /// The same as if roulette had ended no search, in units of 1/256.
+    uint64_t expected_pairs = 0;
+    uint64_t visible_pairs = 0;           ///< Gathered, and joined without obstacle.
+    uint64_t trials = 0, trial_rays = 0;  ///< Of all visible pairs.
+    /// Visible pairs by trials: 1, 2, 3–4, 5–8, … The share of those with 1 is 1 - Var(r)/E(r)².
+    std::array<uint64_t, 24> pairs_by_trials{};
+    std::array<uint64_t, 6> second_moments{};  ///< See GatherWeightScale.
+    struct PairJoins {
+        uint64_t count = 0, squares = 0;
+    };
+    static constexpr int kPairLengths = 8;
+    std::array<PairJoins, kPairLengths * kPairLengths> pair_joins{};  ///< See GatherRoulette.
+    uint64_t bounds_exceeded = 0;  ///< Densities above their bound: must stay 0.
+    uint64_t runaways = 0;         ///< Pairs given up after too many trials: must stay 0.
+    uint64_t rejected = 0;         ///< Contributions that were not finite or negative.
+
+    /// A pair found by a search that roulette let pass with this probability.
+    void count_pair(float search_survival) {
+        ++pairs;
+        expected_pairs += uint64_t(std::lround(256 / std::max(search_survival, 1e-6f)));
+    }
+    void count_trials(uint64_t n) {
+        ++pairs_by_trials[std::min<size_t>(size_t(std::bit_width(n - 1)),
+                                           pairs_by_trials.size() - 1)];
+    }
+    RenderStats& operator+=(const RenderStats& o);
+    uint64_t rays() const { return walk_rays + shadow_rays + trial_rays; }
+};
+
+/// Adds the time until its end to a phase, where the sample is timed.
+class PhaseTimer {
+public:
+    PhaseTimer(RenderStats& stats, double PhaseSeconds::*phase)
+        : seconds_(stats.is_timed ? &(stats.phases.*phase) : nullptr) {
+        if (seconds_) begin_ = Clock::now();
+    }
+    ~PhaseTimer() {
+        if (seconds_)
+            *seconds_ += RenderStats::kTimedSamples *
+                         std::chrono::duration<double>(Clock::now() - begin_).count();
+    }
+    PhaseTimer(const PhaseTimer&) = delete;
+    PhaseTimer& operator=(const PhaseTimer&) = delete;
+
+private:
+    using Clock = std::chrono::steady_clock;
+    double* seconds_;
+    Clock::time_point begin_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,194 @@
+#include "pathspace/walk.h"
+
+#include <algorithm>
+
+namespace etendue {
+namespace {
+
+/// Survival of Russian roulette at the last vertex: how much throughput is left of what it was at the first scattering
+/// vertex. η² of refractions is taken out, since it comes back when the path leaves the glass.
+Survival survival(const SubPath& path) {
+    const float left = path[path.size() - 1].beta.max() * path.eta2 / path[1].beta.max();
+    return Survival(left > 0 ? std::min(0.95f, left) : 0x1p-16f);
+}
+
+/// What became of a ray.
+enum class Met { Surface, Nothing, SurfaceEdgeOn };
+
+/// Traces from the last vertex and appends the surface that is met, with throughput `beta` and density `pdf_sa` of the
+/// direction (of a delta event its probability).
+Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, const Ray& ray,
+                   Rgb beta, float pdf_sa, MediumId medium) {
+    const Scene& scene = walk.scene;
+    ++walk.stats.walk_rays;
+    SurfaceHit hit;
+    const float u = sampler.next_1d_if(scene.has_masks());
+    path.flight = {ray.o, ray.d, kInf, beta, pdf_sa, medium};
+    if (!scene.intersect(ray, u, hit)) return Met::Nothing;
+    path.flight.length = hit.t;
+    ++walk.stats.vertices;
+    Vertex& v = path.append();
+    v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
+    v.medium = medium;
+    v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
+    v.beta = medium == kVacuum ? beta : beta * scene.attenuation(medium, hit.t);
+    // hit.t is short of the distance by the offset of the ray's origin; densities are of the points themselves.
+    const Vertex& previous = path[path.size() - 2];
+    const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
+    v.pdf_fwd = pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
+    v.to_predecessor = previous.has_cosine && !previous.is_infinite
+                           ? abs_dot(previous.ng, ray.d) * inv_dist2
+                           : inv_dist2;
+    if (v.pdf_fwd > 0) return Met::Surface;
+    path.truncate(path.size() - 1);
+    return Met::SurfaceEdgeOn;
+}
+
+/// The end of an eye path that left the scene: a vertex at infinity, on all emitters there at once.
+void append_escape(SubPath& path, Vec3 d, Rgb beta, float pdf) {
+    Vertex& v = path.append();
+    v.kind = Vertex::Kind::Emitter;
+    v.is_infinite = true;
+    v.p = d;
+    v.ng = -d;
+    v.wo = -d;
+    v.beta = beta;
+    v.pdf_fwd = pdf;
+}
+
+}  // namespace
+
+float next_event_ratio(const Vertex& y0, Vec3 w) {
+    const EmitterHit e = y0.is_infinite
+                             ? y0.emitter->eval_infinite(y0.p)
+                             : y0.emitter->eval_surface(y0.ng, y0.uv, y0.location.prim, w);
+    return e.pdf_y0 > 0 ? e.pdf / e.pdf_y0 : 1.0f;
+}
+
+void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, Sampler& sampler,
+                    SubPath& z) {
+    sampler.seek(Stream::Eye, 0);
+    const Film::PixelSample at = film.sample_pixel(pixel, sampler.next_2d());
+    start_eye_path(walk, at, sampler.next_2d(), sampler, z);
+}
+
+void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
+                    Sampler& sampler, SubPath& z) {
+    const Sensor& sensor = walk.scene.sensor();
+    ++walk.stats.eye_paths;
+    z.clear();
+    z.film = at.point;
+    z.film_weight = at.weight;
+    const SensorRay ray = sensor.sample_ray(z.film, u_lens);
+
+    Vertex& lens = z.append();
+    lens.kind = Vertex::Kind::Sensor;
+    lens.ng = ray.ng;
+    lens.pdf_fwd = ray.pdf_pos;
+    lens.beta = Rgb(1 / ray.pdf_pos);
+    lens.is_connectible = true;
+    lens.is_infinite = sensor.is_orthographic();
+    lens.p = lens.is_infinite ? -ray.d : ray.p;
+
+    const Ray start{ray.p, ray.d, kInf};
+    const Met met = append_surface(walk, sampler, z, start, Rgb(1), ray.pdf_dir, kVacuum);
+    if (met == Met::Nothing && !walk.scene.infinite_emitters().empty())
+        append_escape(z, ray.d, Rgb(1), ray.pdf_dir);
+}
+
+bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
+    const Scene& scene = walk.scene;
+    y.clear();
+    if (!scene.has_emitters()) return false;
+    ++walk.stats.light_paths;
+    sampler.seek(Stream::Light, 0);
+    const Emitter& emitter =
+        scene.sample_emitter(sampler.next_1d_fine_if(scene.has_emitter_choice()));
+    const FinePoint u_y0 = sampler.next_2d_fine();
+    const EmissionSample e = emitter.sample_emission(u_y0, sampler.next_2d());
+    if (!(e.pdf_y0 > 0)) return false;
+
+    Vertex& y0 = y.append();
+    y0.kind = Vertex::Kind::Emitter;
+    y0.emitter = &emitter;
+    y0.is_infinite = emitter.is_infinite();
+    y0.has_cosine = emitter.is_area();
+    y0.p = y0.is_infinite ? -e.d : e.p;
+    y0.ng = e.ng;
+    y0.uv = e.uv;
+    y0.location.prim = e.prim;
+    y0.is_connectible = true;
+    y0.gloss = gloss_of_emitter(emitter.is_area());
+    y0.pdf_fwd = emitter.selection_pmf * e.pdf_y0;
+    y0.beta = Rgb(1 / y0.pdf_fwd);
+
+    if (!(e.pdf_d > 0)) return true;
+    const Vec3 origin = y0.has_cosine ? offset_origin(e.p, e.ng, e.d) : e.p;
+    const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
+    const Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
+    if (append_surface(walk, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, kVacuum) ==
+        Met::Surface)
+        y[1].next_event_ratio = next_event_ratio(y[0], e.d);
+    return true;
+}
+
+template <TransportMode mode>
+std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sampler,
+                                            SubPath& path) {
+    const int last = path.size() - 1;
+    path.flight.pdf_sa = 0;
+    if (last + 1 >= walk.options.max_vertices) return {};
+    Vertex& v = path[last];
+    if (v.kind != Vertex::Kind::Surface) return {};
+    sampler.seek(mode == TransportMode::Radiance ? Stream::Eye : Stream::Light, uint64_t(last));
+    const float u_lobe = sampler.next_1d_if(v.bsdf.uses_lobe_choice());
+    const Vec2 u_direction = sampler.next_2d();
+    const bool has_roulette = last >= walk.options.rr_depth;
+    const float u_roulette = sampler.next_1d_if(has_roulette);
+    if (has_roulette) {
+        v.survival = survival(path);
+        if (!(u_roulette < v.survival.value())) return {};
+    }
+    return v.sample(u_lobe, u_direction, mode);
+}
+
+template <TransportMode mode>
+bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubPath& path) {
+    constexpr bool eye = mode == TransportMode::Radiance;
+    const int last = path.size() - 1;
+    Vertex& v = path[last];
+    v.is_delta = s.is_delta;
+    v.event = s.event;
+    if (last >= 1) path[last - 1].pdf_rev = s.pdf_rev * v.to_predecessor;
+    if (eye) path.eta2 *= sqr(s.eta);
+
+    const Rgb beta = v.beta * s.weight * (1 / v.survival.value());
+    const MediumId medium = v.medium_toward(s.wi);
+    const Ray ray{offset_origin(v.p, v.ng, s.wi), s.wi, kInf};
+    const Met met = append_surface(walk, sampler, path, ray, beta, s.pdf, medium);
+    if (met == Met::Surface) return true;
+    if (!eye || met == Met::SurfaceEdgeOn || walk.scene.infinite_emitters().empty()) return false;
+    append_escape(path, s.wi, beta, s.pdf);
+    return true;
+}
+
+template <TransportMode mode>
+void close(const WalkContext& walk, SubPath& path) {
+    constexpr Side side = mode == TransportMode::Radiance ? Side::Eye : Side::Light;
+    const int last = path.size() - 1;
+    if (last < 2) return;
+    // Level last-2 became known with this vertex; the levels below it were stored at its predecessor.
+    path[last].weight_sum = level_sum<side>(path, last - 2, path[last - 1].weight_sum, walk.counts);
+}
+
+constexpr auto kRadiance = TransportMode::Radiance, kImportance = TransportMode::Importance;
+template std::optional<BsdfSample> sample_scattering<kRadiance>(const WalkContext&, Sampler&,
+                                                                SubPath&);
+template std::optional<BsdfSample> sample_scattering<kImportance>(const WalkContext&, Sampler&,
+                                                                  SubPath&);
+template bool append<kRadiance>(const WalkContext&, Sampler&, const BsdfSample&, SubPath&);
+template bool append<kImportance>(const WalkContext&, Sampler&, const BsdfSample&, SubPath&);
+template void close<kRadiance>(const WalkContext&, SubPath&);
+template void close<kImportance>(const WalkContext&, SubPath&);
+
+}  // namespace etendue

@@ -1,0 +1,63 @@
+#pragma once
+// From which side of a surface a walk came, in 16 bits.
+
+#include <cmath>
+#include <cstdint>
+
+#include "pathspace/vertex.h"
+
+namespace etendue {
+
+/// The normal on that side, to about a degree, and whether light passes through the surface.
+class ArrivalSide {
+public:
+    ArrivalSide() = default;
+    ArrivalSide(Vec3 normal, bool is_transmissive) {
+        // On the octahedron |x| + |y| + |z| = 1, whose lower half is folded over the upper one [Meyer et al. 2010].
+        const float scale = 1 / (std::fabs(normal.x) + std::fabs(normal.y) + std::fabs(normal.z));
+        float a = normal.x * scale, b = normal.y * scale;
+        if (normal.z < 0) {
+            const float fold = 1 - std::fabs(b);
+            b = std::copysign(1 - std::fabs(a), b);
+            a = std::copysign(fold, a);
+        }
+        const auto level = [](float x, int steps) {
+            return unsigned(std::lround((x * 0.5f + 0.5f) * float(steps)));
+        };
+        bits_ =
+            uint16_t(unsigned(is_transmissive) << 15 | level(a, kStepsA) << 8 | level(b, kStepsB));
+    }
+
+    bool is_transmissive() const { return bits_ >> 15; }
+    /// Not of unit length.
+    Vec3 normal() const {
+        const float a = float(bits_ >> 8 & 0x7f) * (2.0f / kStepsA) - 1,
+                    b = float(bits_ & 0xff) * (2.0f / kStepsB) - 1;
+        const float z = 1 - std::fabs(a) - std::fabs(b);
+        if (z >= 0) return {a, b, z};
+        return {std::copysign(1 - std::fabs(b), a), std::copysign(1 - std::fabs(a), b), z};
+    }
+    /// Whether what arrived on `other`, close by, may go on from here: not where the two are two sides of a wall.
+    bool admits(ArrivalSide other) const {
+        return is_transmissive() || dot(normal(), other.normal()) > 0;
+    }
+
+    uint16_t bits() const { return bits_; }
+    static ArrivalSide from_bits(unsigned bits) {
+        ArrivalSide side;
+        side.bits_ = uint16_t(bits);
+        return side;
+    }
+
+private:
+    static constexpr int kStepsA = 126, kStepsB = 254;  // even, so that the axes are exact
+
+    uint16_t bits_ = 0;
+};
+
+/// Of a point of a surface.
+inline ArrivalSide arrival_side(const Vertex& v) {
+    return {dot(v.ng, v.wo) < 0 ? -v.ng : v.ng, v.shape->material->is_transmissive()};
+}
+
+}  // namespace etendue

@@ -1,0 +1,137 @@
+#pragma once
+// The search for the pairs of an eye vertex, and the roulette that most of them end by [Qin et al. 2015].
+
+#include "pathspace/sample_context.h"
+#include "reuse/gather_roulette.h"
+#include "reuse/light_vertex_grid.h"
+#include "reuse/pair_density.h"
+#include "reuse/reciprocal.h"
+
+namespace etendue {
+
+/// A pair of y_{s-1} and z_{t-1}, one of which is dropped.
+struct GatherPair {
+    Technique technique;
+    Neighbourhood kept;  ///< Of the vertex that stays.
+    uint64_t number;     ///< Of the random numbers that belong to it.
+    float estimate;      ///< Of what its join adds to the pixel, for GatherRoulette.
+    float survival;      ///< Of all roulette so far.
+    float rate;          ///< The same, times the share of such pairs that is used at all.
+
+    /// What the dropped vertex was sampled from, by the walks y and z.
+    PairEvent event(const SubPath& y, const SubPath& z) const {
+        if (technique.drops_eye) return {z[technique.t - 2], TransportMode::Radiance, kept};
+        return {y[technique.s - 2], TransportMode::Importance, kept};
+    }
+};
+
+/// The search of one eye path, work.z, among the light vertices of a pass.
+struct GatherSearch {
+    const SampleContext& c;
+    const TechniqueCounts& n;
+    const LightVertexCache& cache;
+    const LightVertexGrid& grid;
+    const PairDensity& density;
+    const GatherRoulette& roulette;
+    int max_depth;    ///< Edges of the longest path.
+    float flatness;   ///< Half the height of a neighbourhood over its radius.
+    float threshold;  ///< Of join_survival(), for what is added to the own pixel.
+    Workspace& work;
+
+    /// Calls use(pair) for the pairs of z_{t-1}, with y_0 … y_{s-1} in work.pair as far as the join reads them.
+    template <class Use>
+    void for_each_pair(int t, const Use& use) const {
+        const float reflected = reflected_flux(t);
+        const Vertex& z = work.z[t - 1];
+        // Where most pairs contribute little, z_{t-1} mostly looks for none. A search that finds n of them has a second moment
+        // of n (n+1), and takes n+1 times as long as to find none.
+        const float partners = std::max(1.0f, density.partners(z.pair_level));
+        const float search_survival = join_survival(
+            roulette.of_search(t) * reflected * grid.mean_flux() * std::sqrt(partners), threshold);
+        if (!survives(search_survival, pair_number(0, t, kSearch))) return;
+        const Vertex& last = work.z[t - 2];
+        const uint8_t after = gloss(last, last.is_delta);
+        const Neighbourhood near_eye = near(z, arrival_side(z));
+
+        struct Choice {
+            float estimate, survival, rate;
+            bool drops_eye, drops_light;
+        };
+        const auto choose = [&](const GatherCandidate& y) -> std::optional<Choice> {
+            const int edges = y.s + t - 2;
+            if (edges > max_depth || !(n.gathers(edges) > 0)) return {};
+            Choice choice;
+            choice.drops_eye =
+                drops(n.pairs.rule, true, y.gloss_before, after) && y.side.admits(near_eye.side);
+            choice.drops_light =
+                drops(n.pairs.rule, false, y.gloss_before, after) && near_eye.contains(y.p, y.side);
+            if (!choice.drops_eye && !choice.drops_light) return {};
+            work.stats.count_pair(search_survival);
+            choice.estimate = reflected * y.flux;
+            const float share = n.gathers(edges) / n.gather;
+            choice.rate =
+                std::min(share * join_survival(roulette.of(y.s, t) * choice.estimate, threshold),
+                         search_survival);
+            choice.survival = choice.rate / share;
+            if (!survives(choice.rate / search_survival, pair_number(y.vertex, t, kLook)))
+                return {};
+            return choice;
+        };
+        grid.for_each_near(z.p, choose, [&](const GatherCandidate& y, const Choice& choice) {
+            for (const bool eye : {true, false}) {
+                if (!(eye ? choice.drops_eye : choice.drops_light)) continue;
+                cache.restore_first(c.scene, y.vertex, eye ? y.s : y.s - 1, work.is_observed,
+                                    work.pair);
+                const Neighbourhood kept = eye ? near(work.pair[y.s - 1], y.side) : near_eye;
+                if (eye && !kept.contains(near_eye.p, near_eye.side)) continue;
+                use(GatherPair{.technique = {Strategy::Gather, y.s, t, eye},
+                               .kept = kept,
+                               .number = pair_number(y.vertex, t, eye ? kDropsEye : kDropsLight),
+                               .estimate = choice.estimate,
+                               .survival = choice.survival,
+                               .rate = choice.rate});
+            }
+        });
+    }
+
+    /// What a unit of contribution of a gather adds to the pixel, r and roulette left out.
+    float scale() const { return std::fabs(work.z.film_weight) * c.splat_scale; }
+
+    /// Tells the roulette what the join of a pair contributes, or that there is none.
+    void observe(const GatherPair& pair, const std::optional<Join>& join) const {
+        if (!(pair.estimate > 0)) return;
+        const float value = join ? luminance(join->contribution) * join->mis_weight * scale() /
+                                       join->pair_probability
+                                 : 0;
+        GatherRoulette::observe(pair.technique.s, pair.technique.t, value / pair.estimate,
+                                work.stats);
+    }
+
+private:
+    enum Use : uint64_t { kDropsEye, kDropsLight, kLook, kSearch };
+    /// Distinct for distinct arguments with t < 2^22, and from join_number().
+    static uint64_t pair_number(uint32_t vertex, int t, Use use) {
+        return uint64_t(1) << 60 | uint64_t(vertex) << 24 | uint64_t(uint32_t(t)) << 2 | use;
+    }
+    bool survives(float q, uint64_t number) const {
+        if (!(q < 1)) return true;
+        c.sampler.seek(Stream::Roulette, number);
+        return c.sampler.next_1d_unstructured() < double(q);
+    }
+    Neighbourhood near(const Vertex& kept, ArrivalSide side) const {
+        return {kept.p, kept.ng, side, grid.radius(), flatness * grid.radius()};
+    }
+
+    /// What a pair at z_{t-1} adds to its pixel for each unit of flux, as far as roulette knows before it looks up the
+    /// light path: as a merge does on a diffuse surface, or on one as bright as the highlight of a glossy one.
+    float reflected_flux(int t) const {
+        const Vertex& z = work.z[t - 1];
+        const float roughness = 1 - float(z.gloss) / kSharpestGloss;
+        const float highlight = std::max(1.0f, 0.25f / sqr(roughness));
+        const float clamped = std::max(1.0f, n.pairs.disc * z.pdf_fwd);
+        return highlight * clamped * luminance(z.beta) * std::fabs(work.z.film_weight) *
+               c.splat_scale / (kPi * n.pairs.disc);
+    }
+};
+
+}  // namespace etendue

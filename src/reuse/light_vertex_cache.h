@@ -1,0 +1,106 @@
+#pragma once
+// The light sub-paths of a pass, kept for merges, gathers and connections from any eye path.
+
+#include <atomic>
+#include <span>
+#include <vector>
+
+#include "pathspace/photon.h"
+#include "reuse/arrival_side.h"
+
+namespace etendue {
+
+/// y_i, i ≥ 1, in one cache line. Direction and geometry follow from its place and its predecessor's.
+struct LightVertex {
+    Vec3 p;
+    Rgb beta;
+    SurfaceLocation location;
+    float pdf_fwd, to_predecessor;  ///< As in Vertex.
+    float
+        root_of_weight_sum;  ///< √Vertex::weight_sum: the sum itself may be too large for a float.
+    uint32_t path : 30, is_delta : 1, is_connectible : 1;
+    MediumId medium;
+    uint16_t survival_steps : 10, gloss : 6;
+};
+static_assert(sizeof(LightVertex) == 64);
+
+/// What else there is of y_i, as in Vertex.
+struct LightVertexPlace {
+    ArrivalSide side;
+    uint8_t pair_level;
+};
+
+class LightVertexCache {
+public:
+    /// Begins the collection of a pass's light paths, in so many chunks. `vertex_bytes`: what the caller will use for each
+    /// vertex, here and in structures of its own; `max_bytes`: the most of that.
+    void begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes);
+    /// Keeps the next path of a chunk; each chunk belongs to one thread at a time. Throws std::runtime_error where the
+    /// paths need more than they may.
+    void add(uint64_t chunk, const SubPath& y);
+    /// Ends the collection: paths are in the order of chunks, whichever threads made them.
+    void assemble();
+
+    std::span<const LightVertex> vertices() const { return vertices_; }
+    ArrivalSide arrival_side(uint32_t vertex) const { return places_[vertex].side; }
+    /// Number of paths.
+    size_t size() const { return heads_.size(); }
+    size_t memory_bytes() const;
+
+    /// The whole path `index` as it was walked.
+    void restore(const Scene& scene, uint64_t index, SubPath& y) const;
+    /// Hints that `vertex` will be read soon; then, that its path will be.
+    void prefetch(uint32_t vertex) const { __builtin_prefetch(&vertices_[vertex]); }
+    void prefetch_head(uint32_t vertex) const {
+        __builtin_prefetch(&heads_[vertices_[vertex].path]);
+    }
+
+    /// i of the vertex y_i.
+    int depth(uint32_t vertex) const {
+        return int(vertex - heads_[vertices_[vertex].path].begin) + 1;
+    }
+    /// The gloss of y_{i-1}, or of its event, for the vertex y_i.
+    uint8_t gloss_before(uint32_t vertex) const;
+    /// The first `size` vertices of the path that `vertex` is on; of them only what joins with the last one read: y_0
+    /// and the last three; all of them, without the earlier BSDFs, if `whole`.
+    void restore_first(const Scene& scene, uint32_t vertex, int size, bool whole, SubPath& y) const;
+
+    /// What arrives at `vertex`.
+    Photon photon(uint32_t vertex) const;
+    /// Whether all scattering before `vertex` was by delta events.
+    bool came_by_delta_events(uint32_t vertex) const;
+
+    /// Bytes of a vertex in a chunk, which may have as much to spare, and among all.
+    static constexpr uint64_t kVertexBytes = 3 * (sizeof(LightVertex) + sizeof(LightVertexPlace));
+
+private:
+    /// y_0 and the range of the others.
+    struct Head {
+        const Emitter* emitter = nullptr;  ///< nullptr: the path has no vertex at all.
+        Vec3 p, ng;
+        Vec2 uv;
+        uint32_t prim = 0;
+        float pdf_fwd = 0, next_event_ratio = 1;
+        Rgb beta;
+        uint32_t begin = 0, end = 0;
+    };
+    /// What one chunk of a pass's paths leaves.
+    struct Chunk {
+        std::vector<Head> heads;
+        std::vector<LightVertex> vertices;
+        std::vector<LightVertexPlace> places;
+    };
+
+    void restore_head(uint64_t index, SubPath& y) const;
+    void restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, SubPath& y, int i) const;
+
+    std::vector<Chunk> chunks_;
+    uint64_t vertex_bytes_ = 0, max_bytes_ = 0;
+    std::atomic<uint64_t> taken_bytes_ = 0;
+
+    std::vector<Head> heads_;
+    std::vector<LightVertex> vertices_;
+    std::vector<LightVertexPlace> places_;
+};
+
+}  // namespace etendue

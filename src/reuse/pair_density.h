@@ -1,0 +1,41 @@
+#pragma once
+// How many partners a vertex has, for the weights.
+
+#include <vector>
+
+#include "pathspace/walk.h"
+#include "reuse/cell_hash.h"
+
+namespace etendue {
+
+class PointGrid;
+
+/// All pairs of one eye vertex share its eye path. If the errors of n of them have a correlation ρ they are worth
+/// n/(1 + ρ n), and where N_L light paths leave n partners about a vertex, its pairs count N_L/(1 + ρ n) in the weights.
+/// (At ρ = 1 that is 1/n_eff = 1/N_L + n/N_L: the variance of independent pairs, and that of the vertex alone. Compare the
+/// upper bound of [Popov et al. 2015, §5] and [Grittmann et al. 2021].)
+///
+/// n comes from an earlier pass, so that it is a function of the place alone and weights still sum to one.
+class PairDensity final : public LearnedPlaces {
+public:
+    /// All partners count.
+    PairDensity() = default;
+    /// From the light vertices of that pass; `radius`: of pairs; `correlation`: ρ.
+    PairDensity(const PointGrid& vertices, float radius, double correlation);
+
+    /// Of 1/(1 + ρ n) at `p`, to about 2 %: weights need it small in memory, not exact.
+    uint8_t pair_level(Vec3 p) const override {
+        return levels_.empty() ? uint8_t(0) : levels_[cells_.bucket_of(cells_.cell_of(p))];
+    }
+    /// n, as exactly.
+    float partners(uint8_t level) const {
+        return correlation_ > 0 ? float((1 / pair_share(level) - 1) / correlation_) : 0.0f;
+    }
+
+private:
+    CellHash cells_;
+    std::vector<uint8_t> levels_;  ///< Of the buckets of cells.
+    double correlation_ = 0;
+};
+
+}  // namespace etendue

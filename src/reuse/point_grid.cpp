@@ -1,0 +1,44 @@
+#include "reuse/point_grid.h"
+
+#include <algorithm>
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+namespace etendue {
+
+void PointGrid::build(std::span<const Entry> entries, float radius) {
+    cells_ = CellHash(entries.size(), radius);
+    const uint32_t buckets = cells_.buckets();
+    std::vector<uint32_t> bucket(entries.size());
+    tbb::parallel_for(size_t(0), entries.size(), [&](size_t i) {
+        bucket[i] = cells_.bucket_of(cells_.cell_of(entries[i].p));
+    });
+    // Each part has some of the buckets, and looks at all entries in order, so that their number changes nothing.
+    const uint32_t parts = uint32_t(std::clamp(tbb::this_task_arena::max_concurrency(), 1, 8));
+    const auto for_each_part = [&](const auto& use) {
+        tbb::parallel_for(uint32_t(0), parts, [&](uint32_t part) {
+            const auto bound = [&](uint32_t i) { return uint32_t(uint64_t(buckets) * i / parts); };
+            const uint32_t begin = bound(part), end = bound(part + 1);
+            for (size_t i = 0; i < bucket.size(); ++i)
+                if (bucket[i] - begin < end - begin) use(i);
+        });
+    };
+    begins_.assign(size_t(buckets) + 1, 0);
+    for_each_part([&](size_t i) { ++begins_[bucket[i] + 1]; });
+    for (size_t b = 0; b < buckets; ++b) begins_[b + 1] += begins_[b];
+    entries_.resize(entries.size());
+    std::vector<uint32_t> next(begins_.begin(), begins_.end() - 1);
+    for_each_part([&](size_t i) { entries_[next[bucket[i]]++] = entries[i]; });
+}
+
+size_t PointGrid::candidates(Vec3 p) const {
+    if (entries_.empty()) return 0;
+    const CellHash::Cell lowest = cells_.lowest_cell(p);
+    size_t count = 0;
+    for (int corner = 0; corner < 8; ++corner)
+        count += points_in(cells_.bucket_of(lowest.neighbour(corner)));
+    return count;
+}
+
+}  // namespace etendue

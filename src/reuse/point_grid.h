@@ -1,0 +1,65 @@
+#pragma once
+// Points within a distance of another: a hashed grid, built by counting.
+
+#include <span>
+#include <vector>
+
+#include "reuse/cell_hash.h"
+
+namespace etendue {
+
+class PointGrid {
+public:
+    /// A point, the caller's number for it, and what the caller wants to know of it before looking that up.
+    struct Entry {
+        Vec3 p;
+        uint32_t index;
+        uint32_t tag = 0;
+        float weight = 0;
+    };
+
+    /// For queries of up to `radius`. The order of the entries decides that of the answers.
+    void build(std::span<const Entry> entries, float radius);
+    const CellHash& cells() const { return cells_; }
+    /// Of all cells that share the bucket.
+    uint32_t points_in(uint32_t bucket) const { return begins_[bucket + 1] - begins_[bucket]; }
+
+    /// Calls use(entry) for every point nearer to `p` than `radius`, at most that of build().
+    template <class Use>
+    void for_each_near(Vec3 p, float radius, const Use& use) const {
+        if (entries_.empty()) return;
+        const CellHash::Cell lowest = cells_.lowest_cell(p);
+        const float radius2 = radius * radius;
+        // All eight at a time, since what takes the time is waiting for memory.
+        CellHash::Cell cells[8];
+        uint32_t begin[8], end[8];
+        for (int corner = 0; corner < 8; ++corner) {
+            cells[corner] = lowest.neighbour(corner);
+            begin[corner] = cells_.bucket_of(cells[corner]);
+            __builtin_prefetch(&begins_[begin[corner]]);
+        }
+        for (int corner = 0; corner < 8; ++corner) {
+            const uint32_t bucket = begin[corner];
+            begin[corner] = begins_[bucket], end[corner] = begins_[bucket + 1];
+            if (begin[corner] < end[corner]) __builtin_prefetch(&entries_[begin[corner]]);
+        }
+        for (int corner = 0; corner < 8; ++corner)
+            for (uint32_t i = begin[corner]; i < end[corner]; ++i) {
+                const Entry& e = entries_[i];
+                // Other cells may share the bucket.
+                if (length2(e.p - p) < radius2 && cells_.cell_of(e.p) == cells[corner]) use(e);
+            }
+    }
+    /// Entries that for_each_near() looks at.
+    size_t candidates(Vec3 p) const;
+    size_t memory_bytes() const {
+        return entries_.capacity() * sizeof(Entry) + begins_.capacity() * sizeof(uint32_t);
+    }
+
+private:
+    CellHash cells_;
+    std::vector<Entry> entries_;    ///< Sorted by bucket.
+    std::vector<uint32_t> begins_;  ///< Of each bucket in the entries; one more than there are.
+};
+
+}  // namespace etendue

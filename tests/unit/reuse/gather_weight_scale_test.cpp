@@ -1,0 +1,45 @@
+// How far gathers are believed in, where it is known how many there are.
+
+#include "reuse/gather_weight_scale.h"
+
+#include <gtest/gtest.h>
+
+namespace etendue {
+namespace {
+
+/// What is chosen after pairs that are found with a `covered` part of the disc's probability, the weight of a gather being
+/// `weight` for the count with which it begins.
+float chosen(double covered, double weight) {
+    constexpr double kFound = 0.01;
+    RenderStats stats;
+    const GatherWeightScale first;
+    first.observe(1, weight, kFound, 1 / (covered * kFound), 1, stats);
+    GatherWeightScale next;
+    next.learn(stats);
+    return next.value();
+}
+
+TEST(GatherWeightScale, BeginsWithOneHalf) {
+    GatherWeightScale count;
+    count.learn({});
+    EXPECT_EQ(count.value(), 0.5f);
+}
+
+/// The second moment w²/κ + (1-w)²/ρ of a gather that covers the part κ of its disc, and of others with the density ρ, is
+/// least for odds κ/ρ of the gather. Here ρ = 1, so that its odds are c².
+TEST(GatherWeightScale, FollowsTheLeastSecondMoment) {
+    const double odds_at_half = 0.25;
+    EXPECT_EQ(chosen(1, odds_at_half / (1 + odds_at_half)), 1);
+    // √0.1 lies between 1/2 and 1/4, whose moments hardly differ; √0.02 between 1/4 and 1/8.
+    EXPECT_EQ(chosen(0.1, odds_at_half / (1 + odds_at_half)), 0.5f);
+    EXPECT_EQ(chosen(0.02, odds_at_half / (1 + odds_at_half)), 0.25f);
+}
+
+TEST(GatherWeightScale, LeavesOutWhatNothingElseMakes) {
+    RenderStats stats;
+    GatherWeightScale().observe(1, 1, 0.01, 100, 1, stats);
+    for (const uint64_t m : stats.second_moments) EXPECT_EQ(m, 0u);
+}
+
+}  // namespace
+}  // namespace etendue

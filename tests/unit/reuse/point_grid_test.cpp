@@ -1,0 +1,60 @@
+#include "reuse/point_grid.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "random.h"
+
+namespace etendue {
+namespace {
+
+using testing::Random;
+
+constexpr float kRadius = 0.1f;
+
+std::vector<PointGrid::Entry> points(int count, uint64_t seed) {
+    Random random(seed);
+    std::vector<PointGrid::Entry> entries;
+    for (int i = 0; i < count; ++i) entries.push_back({random.in_cube(), uint32_t(i)});
+    return entries;
+}
+
+/// Few points have fewer buckets than a ball meets cells; none must be found twice.
+TEST(PointGrid, FindsWhatALoopFinds) {
+    PointGrid grid;
+    for (int count : {0, 1, 3, 5000}) {
+        const auto entries = points(count, 1);
+        grid.build(entries, kRadius);
+        size_t found_in_all = 0;
+        for (float radius : {kRadius, 0.5f * kRadius})
+            for (const auto& query : points(300, 2)) {
+                std::vector<uint32_t> found, expected;
+                grid.for_each_near(query.p, radius,
+                                   [&](const PointGrid::Entry& e) { found.push_back(e.index); });
+                for (const auto& e : entries)
+                    if (length2(e.p - query.p) < radius * radius) expected.push_back(e.index);
+                std::sort(found.begin(), found.end());
+                EXPECT_EQ(found, expected);
+                EXPECT_GE(grid.candidates(query.p), found.size());
+                found_in_all += found.size();
+            }
+        EXPECT_EQ(found_in_all > 500, count == 5000);
+    }
+}
+
+TEST(PointGrid, LooksAtFewThatAreFar) {
+    PointGrid grid;
+    grid.build(points(20000, 1), kRadius);
+    double candidates = 0, found = 0;
+    for (const auto& query : points(2000, 2)) {
+        candidates += double(grid.candidates(query.p));
+        grid.for_each_near(query.p, kRadius, [&](const PointGrid::Entry&) { ++found; });
+    }
+    // Eight cells have 15.3 times the volume of the ball; other cells share their buckets.
+    EXPECT_GT(candidates, 10 * found);
+    EXPECT_LT(candidates, 25 * found);
+}
+
+}  // namespace
+}  // namespace etendue
