@@ -44,6 +44,16 @@ struct SampleContext {
     }
 };
 
+/// What is known before a pass: the scene and what the finished passes left.
+struct LearnContext {
+    const Scene& scene;
+    const Film& film;
+    uint32_t index;        ///< Of the pass that will be traced, from 0.
+    uint64_t light_paths;  ///< N_L of that pass.
+    uint64_t pixels;
+    const RenderStats& so_far;  ///< Of all finished passes; the same for any number of threads.
+};
+
 /// What an integrator may do before the samples of a pass.
 struct PassContext {
     const Scene& scene;
@@ -67,7 +77,10 @@ struct PassContext {
 class Integrator {
 public:
     virtual ~Integrator() = default;
-    /// Called by one thread before the samples of each pass.
+    /// Takes over what finished passes tell. Called by one thread, once for each pass, before its begin_pass(): a pass that
+    /// was dropped and is traced again is begun twice, but learned for once.
+    virtual void learn(const LearnContext&) {}
+    /// Called by one thread before the samples of each pass. What it throws, and what samples throw, drops the pass.
     virtual void begin_pass(const PassContext&) {}
     /// Traces sample `context.pixel` and reports its contributions.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
