@@ -83,9 +83,13 @@ public:
     HalfOfThePasses(const IntegratorSpec& spec, float radius)
         : whole_(make_integrator(spec)), paths_(params_of(spec)), radius_(radius) {}
 
-    void learn(const PassContext& pass) override {
+    void learn(const LearnContext& pass) override {
         whole_->learn(pass);
         paths_.learn(pass);
+    }
+    std::unique_ptr<PassSums> make_sums() const override { return whole_->make_sums(); }
+    void collect(std::span<const std::unique_ptr<PassSums>> workers) override {
+        whole_->collect(workers);
     }
     void trace(const PassContext& pass) override {
         // Both kinds come after as many passes of the other: roulette knows the image of all.
@@ -294,7 +298,6 @@ private:
                 .index = 0,
                 .light_paths = light_paths,
                 .pixels = scene_.film().pixel_count(),
-                .so_far = nothing_so_far_,
                 .for_each_sample =
                     [this, light_paths](uint64_t count, const PassContext::Use& use) {
                         for (uint64_t i = 0; i < count; ++i) {
@@ -320,7 +323,6 @@ private:
     Sampler sampler_{SamplerKind::Sobol, 0};
     NoSink sink_;
     Workspace work_;
-    const RenderStats nothing_so_far_;
 };
 
 /// The light vertices that eye vertices can find.

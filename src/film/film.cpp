@@ -1,78 +1,19 @@
 #include "film/film.h"
 
-#include <tuple>
-
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
+#include "film/parallel_chunks.h"
 #include "math/statistics.h"
 
 namespace etendue {
-namespace {
 
-/// Pixels in a chunk of parallel work; fixed, so that sums over chunks do not depend on the threads.
-constexpr uint64_t kChunk = 4096;
-
-template <class Body>
-void for_chunks(uint64_t count, const Body& body) {
-    tbb::parallel_for(uint64_t(0), (count + kChunk - 1) / kChunk, [&](uint64_t chunk) {
-        body(chunk, chunk * kChunk, std::min(count, (chunk + 1) * kChunk));
-    });
-}
-
-}  // namespace
-
-SplatBuffer::SplatBuffer(uint64_t pixels) : sums_(pixels * 3) {}
-
-void SplatBuffer::add(uint64_t pixel, Rgb value) {
-    if (std::max({std::fabs(value.r), std::fabs(value.g), std::fabs(value.b)}) > kLarge) {
-        const std::scoped_lock lock(large_mutex_);
-        large_.push_back({pixel, value});
-        return;
-    }
-    for (int c = 0; c < 3; ++c)
-        if (const int64_t v = int64_t(double(value[c]) * kScale))
-            sums_[pixel * 3 + c].fetch_add(v, std::memory_order_relaxed);
-}
-
-void SplatBuffer::fold_into(std::span<Rgb> sums) {
-    for_chunks(sums.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
-        for (uint64_t i = begin; i < end; ++i)
-            for (int c = 0; c < 3; ++c) {
-                std::atomic<int64_t>& s = sums_[i * 3 + c];
-                sums[i][c] += float(double(s.load(std::memory_order_relaxed)) / kScale);
-                s.store(0, std::memory_order_relaxed);
-            }
-    });
-    std::sort(large_.begin(), large_.end(), [](const Large& a, const Large& b) {
-        return std::tie(a.pixel, a.value.r, a.value.g, a.value.b) <
-               std::tie(b.pixel, b.value.r, b.value.g, b.value.b);
-    });
-    for (const Large& l : large_) sums[l.pixel] += l.value;
-    large_.clear();
-}
-
-Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter)
-    : geometry_(geometry), filter_(filter), eye_(geometry.pixel_count()),
+Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
+           double typical_radiance)
+    : geometry_(geometry), filter_(filter), pass_(geometry_, filter_, typical_radiance),
       moments_(geometry.pixel_count()), expected_(geometry.pixel_count()),
       previous_(geometry.pixel_count()) {}
 
-void Film::add_splat(Vec2 point, Rgb value) {
-    if (!is_finite(value)) {
-        rejected_.fetch_add(1, std::memory_order_relaxed);
-        return;
-    }
-    value *= splat_scale_;
-    for_each_pixel(geometry_, filter_, point,
-                   [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); });
-}
-
 void Film::begin_pass(uint64_t light_paths) {
-    if (light_paths > 0 && !splats_) {
-        splats_ = std::make_unique<SplatBuffer>(geometry_.pixel_count());
-        average_blocks();
-    }
-    splat_scale_ = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
+    pass_.begin(light_paths);
+    if (pass_.has_splats() && expected_blocks_.empty()) average_blocks();
 }
 
 void Film::average_blocks() {
@@ -89,20 +30,22 @@ void Film::average_blocks() {
 }
 
 void Film::end_pass() {
-    if (splats_) splats_->fold_into(eye_);
-    const uint64_t n = geometry_.pixel_count();
+    fold(pass_.finish());
+    rejected_ += pass_.rejected();
+    pass_.clear();
+}
+
+void Film::fold(std::span<const Rgb> pass) {
+    const uint64_t n = geometry_.pixel_count(), chunks = film_chunks(n);
     const bool second = passes_ % 2 == 1;
-    ++passes_;
-    const uint64_t chunks = (n + kChunk - 1) / kChunk;
+    // All memory is taken before anything changes, so that what fails leaves the totals as they were.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks);
-    for_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    for (std::vector<double>* list : {&pass_means_, &pair_errors_})
+        if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);
+    ++passes_;
+    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
-            Rgb v = eye_[i];
-            eye_[i] = Rgb();
-            if (!is_finite(v)) {
-                rejected_.fetch_add(1, std::memory_order_relaxed);
-                v = Rgb();
-            }
+            const Rgb v = pass[i];
             Moments& m = moments_[i];
             for (int c = 0; c < 3; ++c) {
                 m.sum[c] += v[c];
@@ -113,26 +56,22 @@ void Film::end_pass() {
             expected_[i] =
                 luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / float(passes_);
             total[chunk] += expected_[i];
-            if (!second)
-                previous_[i] = y;
-            else
-                previous_[i] = sqr(previous_[i] - y);
+            previous_[i] = second ? previous_[i] - y : y;
         }
     });
     double sum = 0, mean = 0;
     for (uint64_t c = 0; c < chunks; ++c) sum += luminance_sum[c], mean += total[c];
     pass_means_.push_back(sum / double(n));
     mean /= double(n);
-    for_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
             // Half the squared difference of two passes estimates the variance of one, whatever they share within.
-            if (second)
-                pair_sum[chunk] +=
-                    0.5 * previous_[i] / (sqr(double(expected_[i])) + 0.01 * mean * mean + 1e-30);
+            const double scale2 = sqr(double(expected_[i])) + 0.01 * mean * mean;
+            if (second && scale2 > 0) pair_sum[chunk] += 0.5 * sqr(double(previous_[i])) / scale2;
             expected_[i] = std::max(expected_[i], float(0.1 * mean));
         }
     });
-    if (splats_) average_blocks();
+    if (pass_.has_splats()) average_blocks();
     if (!second) return;
     double pair = 0;
     for (double p : pair_sum) pair += p;

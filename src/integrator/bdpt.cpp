@@ -24,12 +24,10 @@ public:
         : paths_(p), uses_cache_(p.choice("connections", kUsesCache)),
           given_draws_(p.integer("cache_draws", 0, 1024)), light_(p) {}
 
-    void learn(const PassContext& pass) override {
-        paths_.learn(pass);
-        if (uses_cache_ && draws_ == 0) choose_draws(pass);
-    }
+    void learn(const LearnContext& pass) override { paths_.learn(pass); }
     void trace(const PassContext& pass) override {
         if (!uses_cache_) return;
+        if (draws_ == 0) choose_draws(pass);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_);

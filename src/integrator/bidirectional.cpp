@@ -50,7 +50,7 @@ void Bidirectional::trace_eye_path(const SampleContext& c, const TechniqueCounts
                             c.sampler, work.z);
 }
 
-void Bidirectional::learn(const PassContext& pass) {
+void Bidirectional::learn(const LearnContext& pass) {
     if (!is_optimised_ || pass.film.passes() < 2) return;
     // Of one pass, averaged over a window, since few passes know little of a pixel's variance.
     constexpr int kReach = 3;

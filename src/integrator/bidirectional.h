@@ -22,7 +22,7 @@ public:
     }
 
     /// Sets the thresholds of efficiency-optimised roulette from what earlier passes brought.
-    void learn(const PassContext& pass);
+    void learn(const LearnContext& pass);
 
     WalkContext eye_walk(const Scene& scene, const TechniqueCounts& counts, RenderStats& stats,
                          const LearnedPlaces* learned = nullptr) const {

@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,11 +22,18 @@ public:
     /// Learns from what earlier passes left: before pass 0, where there is nothing yet, and before passes 1, 2, 4, 8 …
     /// What is learned holds until the next call, and from each call on random numbers are independent of earlier ones:
     /// so no pass depends on its own numbers through what it has learned, and every pass has the right expectation.
-    virtual void learn(const PassContext&) {}
+    virtual void learn(const LearnContext&) {}
     /// Whether learn() changes what later passes sample or weigh.
     virtual bool is_learning() const { return false; }
-    /// Traces what the samples of the pass share. Called by one thread, before them.
+    /// Traces what the samples of the pass share. Called by one thread, before them. What it throws, and what samples throw,
+    /// drops the pass.
     virtual void trace(const PassContext&) {}
+
+    /// What a worker adds up for learn() during a pass (Workspace::sums); nullptr where nothing is.
+    virtual std::unique_ptr<PassSums> make_sums() const { return nullptr; }
+    /// Takes over all workers' sums of a finished pass.
+    virtual void collect(std::span<const std::unique_ptr<PassSums>>) {}
+
     /// Traces sample `context.pixel` and reports its contributions.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
     /// Samples of each strategy per eye sub-path, as the weights have it, where a pass traces `light_paths`.

@@ -42,7 +42,7 @@ public:
           is_weighted_(p.choice("pmf", kIsWeighted)), uses_cache_(p.flag("cache")),
           direct_(p.choice("direct", kDirect)) {}
 
-    void learn(const PassContext& pass) override { paths_.learn(pass); }
+    void learn(const LearnContext& pass) override { paths_.learn(pass); }
     void trace(const PassContext& pass) override {
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
         trace_light_paths(pass, n);

@@ -15,7 +15,7 @@ public:
     static std::vector<ParamInfo> params();
     PhotonMapping(const IntegratorParams& params, bool next_event);
 
-    void learn(const PassContext& pass) { paths_.learn(pass); }
+    void learn(const LearnContext& pass) { paths_.learn(pass); }
 
     /// Samples of what is made without photons.
     TechniqueCounts counts() const { return {.hit = 1, .next_event = next_event_ ? 1.0f : 0.0f}; }

@@ -59,7 +59,7 @@ public:
             throw std::runtime_error("pm: an irradiance cache needs gather_rays");
     }
 
-    void learn(const PassContext& pass) override { mapping_.learn(pass); }
+    void learn(const LearnContext& pass) override { mapping_.learn(pass); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();

@@ -27,7 +27,7 @@ public:
         : mapping_(p, p.flag("next_event")), radius_params_(p, kDefaultRadius), light_(p),
           eye_paths_(uint32_t(eye_paths)) {}
 
-    void learn(const PassContext& pass) override { mapping_.learn(pass); }
+    void learn(const LearnContext& pass) override { mapping_.learn(pass); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         radius_ = radius_params_.schedule(pass.scene).radius(pass.index);

@@ -57,16 +57,20 @@ public:
                 fmt::format("{}: short_rate must lie in [0, 1]", p.integrator()));
     }
 
-    void learn(const PassContext& pass) override {
+    void learn(const LearnContext& pass) override {
         paths_.learn(pass);
-        if (connects_) weight_scale_.learn(pass.so_far);
-        roulette_.learn(pass.so_far);
+        if (connects_) weight_scale_.learn(gathers_);
+        roulette_.learn(gathers_);
         choose_radius(pass);
         // The first pass's weights know of no density, so that what is learned from it is of no use for the scale.
         learns_weight_scale_ = connects_ && pass.index > 0;
         if (pass.index > 0) density_ = PairDensity(grid_.points(), radius_, kCorrelation);
     }
     bool is_learning() const override { return true; }
+    std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }
+    void collect(std::span<const std::unique_ptr<PassSums>> workers) override {
+        gathers_.add(workers);
+    }
 
     void trace(const PassContext& pass) override {
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
@@ -160,19 +164,19 @@ private:
         if (!(pixel > 0)) return;
         weight_scale_.observe(double(luminance(join.contribution) * scale / pixel),
                               double(join.mis_weight), double(join.pair_probability), r, seen,
-                              work.stats);
+                              GatherSums::of(work));
     }
 
     /// Such that an eye path finds kPairs pairs, as far as the passes since the last choice tell.
-    void choose_radius(const PassContext& pass) {
+    void choose_radius(const LearnContext& pass) {
         if (given_radius_ > 0) {
             radius_ = given_radius_;
             return;
         }
         const float size = pass.scene.bounds().radius(), largest = kLargest * size;
-        const double pairs = double(pass.so_far.expected_pairs - pairs_so_far_) / 256,
+        const double pairs = gathers_.expected_pairs - pairs_so_far_,
                      paths = double(pass.so_far.eye_paths - eye_paths_so_far_);
-        pairs_so_far_ = pass.so_far.expected_pairs;
+        pairs_so_far_ = gathers_.expected_pairs;
         eye_paths_so_far_ = pass.so_far.eye_paths;
         const float wanted =
             pass.index == 0
@@ -196,7 +200,9 @@ private:
 
     // Learned.
     float radius_ = 0;
-    uint64_t pairs_so_far_ = 0, eye_paths_so_far_ = 0;  ///< When the radius was chosen.
+    GatherTotals gathers_;
+    double pairs_so_far_ = 0;  ///< When the radius was chosen.
+    uint64_t eye_paths_so_far_ = 0;
     bool learns_weight_scale_ = false;
     PairDensity density_;
     GatherWeightScale weight_scale_;

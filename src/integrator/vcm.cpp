@@ -33,13 +33,17 @@ public:
         if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact needs merges");
     }
 
-    void learn(const PassContext& pass) override {
+    void learn(const LearnContext& pass) override {
         paths_.learn(pass);
-        roulette_.learn(pass.so_far);
+        roulette_.learn(gathers_);
         const float radius = radius_params_.schedule(pass.scene).radius(pass.index);
         if (merges_ && pass.index > 0) density_ = PairDensity(grid_.points(), radius, kCorrelation);
     }
     bool is_learning() const override { return merges_; }
+    std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }
+    void collect(std::span<const std::unique_ptr<PassSums>> workers) override {
+        gathers_.add(workers);
+    }
 
     void trace(const PassContext& pass) override {
         radius_ = radius_params_.schedule(pass.scene).radius(pass.index);
@@ -103,7 +107,7 @@ private:
             cache_.restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair);
             const auto join = join_merge(work.pair, y.s, work.z, t, n);
             if (!join) return;
-            work.stats.count_pair(1);
+            ++work.stats.pairs;
             c.sink.add(*join, join->contribution * c.splat_scale);
         });
     }
@@ -138,6 +142,7 @@ private:
     LightPathOptions light_;
 
     // Learned.
+    GatherTotals gathers_;
     PairDensity density_;
     GatherRoulette roulette_;
 

@@ -12,16 +12,10 @@ RenderStats& RenderStats::operator+=(const RenderStats& o) {
     visible += o.visible;
     joins_skipped += o.joins_skipped;
     pairs += o.pairs;
-    expected_pairs += o.expected_pairs;
     visible_pairs += o.visible_pairs;
     trials += o.trials;
     trial_rays += o.trial_rays;
     for (size_t i = 0; i < pairs_by_trials.size(); ++i) pairs_by_trials[i] += o.pairs_by_trials[i];
-    for (size_t i = 0; i < second_moments.size(); ++i) second_moments[i] += o.second_moments[i];
-    for (size_t i = 0; i < pair_joins.size(); ++i) {
-        pair_joins[i].count += o.pair_joins[i].count;
-        pair_joins[i].squares += o.pair_joins[i].squares;
-    }
     bounds_exceeded += o.bounds_exceeded;
     runaways += o.runaways;
     rejected += o.rejected;

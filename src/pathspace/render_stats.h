@@ -31,29 +31,16 @@ struct RenderStats {
     bool is_timed = false;  ///< The sample at hand.
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
     uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
-    uint64_t joins_skipped = 0;  ///< By roulette, before their shadow ray.
-    uint64_t pairs = 0;          ///< Merged, or found by the searches of gathers.
-    /// The same as if roulette had ended no search, in units of 1/256.
-    uint64_t expected_pairs = 0;
+    uint64_t joins_skipped = 0;           ///< By roulette, before their shadow ray.
+    uint64_t pairs = 0;                   ///< Merged, or found by the searches of gathers.
     uint64_t visible_pairs = 0;           ///< Gathered, and joined without obstacle.
     uint64_t trials = 0, trial_rays = 0;  ///< Of all visible pairs.
     /// Visible pairs by trials: 1, 2, 3–4, 5–8, … The share of those with 1 is 1 - Var(r)/E(r)².
     std::array<uint64_t, 24> pairs_by_trials{};
-    std::array<uint64_t, 6> second_moments{};  ///< See GatherWeightScale.
-    struct PairJoins {
-        uint64_t count = 0, squares = 0;
-    };
-    static constexpr int kPairLengths = 8;
-    std::array<PairJoins, kPairLengths * kPairLengths> pair_joins{};  ///< See GatherRoulette.
     uint64_t bounds_exceeded = 0;  ///< Densities above their bound: must stay 0.
     uint64_t runaways = 0;         ///< Pairs given up after too many trials: must stay 0.
     uint64_t rejected = 0;         ///< Contributions that were not finite or negative.
 
-    /// A pair found by a search that roulette let pass with this probability.
-    void count_pair(float search_survival) {
-        ++pairs;
-        expected_pairs += uint64_t(std::lround(256 / std::max(search_survival, 1e-6f)));
-    }
     void count_trials(uint64_t n) {
         ++pairs_by_trials[std::min<size_t>(size_t(std::bit_width(n - 1)),
                                            pairs_by_trials.size() - 1)];

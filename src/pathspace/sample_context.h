@@ -2,11 +2,18 @@
 // What a sample, and a pass of samples, is made of: sub-paths, random numbers, and where contributions go.
 
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "pathspace/sink.h"
 
 namespace etendue {
+
+/// What an integrator adds up during a pass, for later ones: whole numbers, since workers add in no fixed order.
+class PassSums {
+public:
+    virtual ~PassSums() = default;
+};
 
 /// Buffers of one worker, reused from sample to sample.
 struct Workspace {
@@ -16,6 +23,7 @@ struct Workspace {
     std::vector<float> masses;  ///< Of light vertices, seen from one eye vertex.
     bool is_observed = false;   ///< Whole sub-paths are read, not only what joins need of them.
     RenderStats stats;
+    std::unique_ptr<PassSums> sums;  ///< Of the integrator's kind.
 };
 
 /// One sample: the eye path of a pixel, a light path, or both.
@@ -38,6 +46,15 @@ struct SampleContext {
     }
 };
 
+/// What is known before a pass: the scene, and what the finished passes left.
+struct LearnContext {
+    const Scene& scene;
+    const Film& film;
+    uint32_t index;             ///< Of the pass that will be traced, from 0.
+    uint64_t light_paths;       ///< N_L of that pass.
+    const RenderStats& so_far;  ///< Of all finished passes; the same for any number of threads.
+};
+
 /// What an integrator may do before the samples of a pass.
 struct PassContext {
     const Scene& scene;
@@ -45,7 +62,6 @@ struct PassContext {
     uint32_t index;        ///< Of the pass, from 0.
     uint64_t light_paths;  ///< N_L.
     uint64_t pixels;
-    const RenderStats& so_far;  ///< Of all earlier passes; the same for any number of threads.
     /// Calls `use(context, work)` for the samples 0 … count-1 in parallel. Only splats may be added.
     using Use = std::function<void(const SampleContext&, Workspace&)>;
     std::function<void(uint64_t count, const Use& use)> for_each_sample;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -99,13 +100,52 @@ const char* to_string(Estimator estimator) {
     return "";
 }
 
+namespace {
+
+/// Radiance in the scene, to an order of magnitude or three: as if all emitted power left its bounding sphere evenly.
+/// Like the image, it is proportional to the emitters.
+double typical_radiance(const Scene& scene) {
+    double power = 0;
+    for (const auto& emitter : scene.emitters()) power += emitter->power();
+    const double radius = scene.bounds().is_empty() ? 0 : double(scene.bounds().radius());
+    return radius > 0 ? power / (4 * sqr(double(kPi) * radius)) : power;
+}
+
+/// TBB runs as many threads as the hardware has, in all arenas together, unless more are allowed. The limit is that of the
+/// whole process and the least that anybody sets, so it is only ever raised, to a number with room for other renderers.
+std::unique_ptr<tbb::global_control> allow_threads(int threads) {
+    constexpr auto kLimit = tbb::global_control::max_allowed_parallelism;
+    constexpr size_t kRoom = 256;
+    if (size_t(std::max(threads, 0)) <= tbb::global_control::active_value(kLimit)) return nullptr;
+    return std::make_unique<tbb::global_control>(kLimit, std::max(size_t(threads), kRoom));
+}
+
+/// Ends a pass that is to be dropped.
+struct PassDropped {};
+
+}  // namespace
+
 struct Renderer::Workers {
     explicit Workers(int threads)
-        : limit(tbb::global_control::max_allowed_parallelism,
-                size_t(threads > 0 ? threads : tbb::this_task_arena::max_concurrency())),
+        : allowed(allow_threads(threads)),
           arena(threads > 0 ? threads : tbb::task_arena::automatic) {}
 
-    tbb::global_control limit;
+    /// The sum of all workers' statistics, which begin anew.
+    RenderStats take_stats() {
+        RenderStats sum;
+        for (Workspace& w : spaces) sum += std::exchange(w.stats, {});
+        return sum;
+    }
+
+    /// Every worker's sums for the integrator, which begin anew.
+    std::vector<std::unique_ptr<PassSums>> take_sums() {
+        std::vector<std::unique_ptr<PassSums>> taken;
+        for (Workspace& w : spaces)
+            if (w.sums) taken.push_back(std::move(w.sums));
+        return taken;
+    }
+
+    std::unique_ptr<tbb::global_control> allowed;
     tbb::task_arena arena;
     tbb::enumerable_thread_specific<Workspace> spaces;
 };
@@ -116,36 +156,61 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings)
 Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
                    std::unique_ptr<Integrator> integrator)
     : scene_(scene), settings_(settings), integrator_(std::move(integrator)),
-      film_(scene.film(), scene.filter()), workers_(std::make_unique<Workers>(settings.threads)) {
+      film_(scene.film(), scene.filter(), typical_radiance(scene)),
+      workers_(std::make_unique<Workers>(settings.threads)) {
     light_paths_ = integrator_->light_paths(scene);
     if (settings.technique_depth > 0)
-        techniques_ = std::make_unique<TechniqueImages>(scene.film(), scene.filter(),
-                                                        settings.technique_depth);
+        techniques_ = std::make_unique<TechniqueImages>(
+            scene.film(), scene.filter(), settings.technique_depth, typical_radiance(scene));
 }
 
 Renderer::~Renderer() = default;
 
-void Renderer::pass(uint32_t index) {
-    const uint64_t pixels = scene_.film().pixel_count();
-    const uint64_t light_paths = light_paths_;
+void Renderer::pass(const std::atomic<bool>& drop) {
+    try {
+        workers_->arena.execute([&] { trace_pass(drop); });
+    } catch (...) {
+        workers_->arena.execute([&] {
+            film_.drop_pass();
+            if (techniques_) techniques_->drop_pass();
+        });
+        workers_->take_stats();
+        workers_->take_sums();
+        throw;
+    }
+    stats_ += workers_->take_stats();
+    integrator_->collect(workers_->take_sums());
+}
+
+void Renderer::trace_pass(const std::atomic<bool>& drop) {
+    const auto index = uint32_t(film_.passes());
+    const uint64_t pixels = scene_.film().pixel_count(), light_paths = light_paths_;
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     film_.begin_pass(light_paths);
-    const LearningStep step = LearningStep::of(index);
-    const uint64_t seed = integrator_->is_learning() && step.number > 0
-                              ? hash_combine(settings_.seed, step.number)
-                              : settings_.seed;
-    const uint32_t sampler_pass = integrator_->is_learning() ? step.pass : index;
+    const LearningStep step =
+        integrator_->is_learning() ? LearningStep::of(index) : LearningStep{0, index};
+    const uint64_t seed =
+        step.number > 0 ? hash_combine(settings_.seed, step.number) : settings_.seed;
+    const auto go_on = [&] {
+        if (drop.load(std::memory_order_relaxed)) throw PassDropped();
+    };
+    const auto workspace = [&]() -> Workspace& {
+        Workspace& work = workers_->spaces.local();
+        work.is_observed = settings_.observer != nullptr;
+        if (!work.sums) work.sums = integrator_->make_sums();
+        return work;
+    };
     const auto chunks = [](uint64_t samples) { return (samples + kChunk - 1) / kChunk; };
     // Calls use(context, work, sink) for the samples 0 … count-1 of the pass.
     const auto for_each_sample = [&](uint64_t count, const auto& use) {
         tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
-            Workspace& work = workers_->spaces.local();
-            work.is_observed = settings_.observer != nullptr;
+            go_on();
+            Workspace& work = workspace();
             Sampler sampler(settings_.sampler, seed);
             FilmSink sink(film_, techniques_.get(), settings_, splat_scale, work);
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
-                sampler.start(sampler_pass, pixel);
+                sampler.start(step.pass, pixel);
                 work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
                 use(SampleContext{scene_, film_, pixel, chunk, light_paths, splat_scale, sampler,
                                   sink},
@@ -153,40 +218,44 @@ void Renderer::pass(uint32_t index) {
             }
         });
     };
-    workers_->arena.execute([&] {
-        const PassContext context{
-            .scene = scene_,
-            .film = film_,
-            .index = index,
-            .light_paths = light_paths,
-            .pixels = pixels,
-            .so_far = stats_,
-            .for_each_sample =
-                [&](uint64_t count, const PassContext::Use& use) {
-                    for_each_sample(count, [&](const SampleContext& c, Workspace& work, FilmSink&) {
-                        use(c, work);
-                    });
-                },
-            .chunks = chunks,
-            .for_each_other_path =
-                [&](uint64_t count, const PassContext::Task& task) {
-                    tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
-                        Sampler sampler(settings_.sampler, seed);
-                        Workspace& work = workers_->spaces.local();
-                        work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
-                        task(i, sampler, work);
-                    });
-                }};
-        if (step.pass == 0) integrator_->learn(context);
-        integrator_->trace(context);
-        for_each_sample(pixels, [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
-            sink.begin(c.pixel);
-            integrator_->sample(c, work);
-            sink.end();
-        });
-        film_.end_pass();
-        if (techniques_) techniques_->end_pass();
+    // A pass that was dropped and is traced again is learned for once.
+    if (learned_passes_ == index) {
+        if (LearningStep::of(index).pass == 0)
+            integrator_->learn({.scene = scene_,
+                                .film = film_,
+                                .index = index,
+                                .light_paths = light_paths,
+                                .so_far = stats_});
+        ++learned_passes_;
+    }
+    integrator_->trace({.scene = scene_,
+                        .film = film_,
+                        .index = index,
+                        .light_paths = light_paths,
+                        .pixels = pixels,
+                        .for_each_sample =
+                            [&](uint64_t count, const PassContext::Use& use) {
+                                for_each_sample(count, [&](const SampleContext& c, Workspace& work,
+                                                           FilmSink&) { use(c, work); });
+                            },
+                        .chunks = chunks,
+                        .for_each_other_path =
+                            [&](uint64_t count, const PassContext::Task& task) {
+                                tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                                    go_on();
+                                    Sampler sampler(settings_.sampler, seed);
+                                    Workspace& work = workspace();
+                                    work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
+                                    task(i, sampler, work);
+                                });
+                            }});
+    for_each_sample(pixels, [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
+        sink.begin(c.pixel);
+        integrator_->sample(c, work);
+        sink.end();
     });
+    film_.end_pass();
+    if (techniques_) techniques_->end_pass();
 }
 
 std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
@@ -203,16 +272,18 @@ std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
 
 StopReason Renderer::run(const RenderLimits& limits,
                          const std::function<void(const Progress&)>& progress,
-                         const std::atomic<bool>& interrupted) {
+                         const std::atomic<bool>& interrupted, const std::atomic<bool>& drop) {
     using Clock = std::chrono::steady_clock;
     const auto begin = Clock::now();
     const double before = seconds_;
     if (const auto reason = reached(limits, film_.error())) return *reason;
     while (true) {
-        pass(uint32_t(film_.passes()));
+        try {
+            pass(drop);
+        } catch (const PassDropped&) {
+            return StopReason::Interrupted;
+        }
         seconds_ = before + std::chrono::duration<double>(Clock::now() - begin).count();
-        stats_ = RenderStats();
-        for (const Workspace& w : workers_->spaces) stats_ += w.stats;
 
         Progress now{film_.passes(), seconds_, {}, double(stats_.rays()) / seconds_, film_.error()};
         if (limits.spp) now.fraction = double(now.passes) / double(*limits.spp);

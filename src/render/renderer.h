@@ -25,7 +25,7 @@ struct RenderSettings : RenderLimits {
     IntegratorSpec integrator{"path", {}};
     SamplerKind sampler = SamplerKind::Independent;
     uint64_t seed = 0;
-    int threads = 0;  ///< 0: all.
+    int threads = 0;  ///< 0: all. Each renderer has its own, whatever others have.
     /// Technique images up to this many edges; 0 for none.
     int technique_depth = 0;
     PathSelection shown;                       ///< Others are made, but do not reach the image.
@@ -34,7 +34,7 @@ struct RenderSettings : RenderLimits {
 
 struct Progress {
     uint64_t passes;
-    double seconds;                  ///< Spent in run().
+    double seconds;                  ///< As Renderer::seconds().
     std::optional<double> fraction;  ///< Of the work, where that can be told.
     double rays_per_second;
     ErrorEstimate error;
@@ -54,25 +54,33 @@ public:
              std::unique_ptr<Integrator> integrator);
     ~Renderer();
 
-    /// Renders until a limit is reached or `interrupted` is set; the pass in flight is always finished. `progress` is
-    /// called after every pass, from the calling thread.
+    /// Renders until a limit is reached or `interrupted` is set; the pass in flight is then finished, unless `drop` is set
+    /// too. `progress` is called after every pass, from the calling thread.
+    ///
+    /// A pass is dropped where `drop` is set, and where anything in it throws, which goes on to the caller: film, technique
+    /// images and statistics are then as after the pass before.
     StopReason run(const std::function<void(const Progress&)>& progress,
-                   const std::atomic<bool>& interrupted) {
-        return run(settings_, progress, interrupted);
+                   const std::atomic<bool>& interrupted,
+                   const std::atomic<bool>& drop = kNeverDrop) {
+        return run(settings_, progress, interrupted, drop);
     }
     /// The same up to other limits. Limits count from the first pass on, and what is rendered in several calls is what
     /// one call renders: a renderer goes on where it stopped.
     StopReason run(const RenderLimits& limits, const std::function<void(const Progress&)>& progress,
-                   const std::atomic<bool>& interrupted);
+                   const std::atomic<bool>& interrupted,
+                   const std::atomic<bool>& drop = kNeverDrop);
 
     const Film& film() const { return film_; }
     const Integrator& integrator() const { return *integrator_; }
-    const RenderStats& stats() const { return stats_; }
-    double seconds() const { return seconds_; }  ///< Spent in run().
+    const RenderStats& stats() const { return stats_; }  ///< Of the finished passes.
+    double seconds() const { return seconds_; }          ///< Spent in run() on them.
     const TechniqueImages* techniques() const { return techniques_.get(); }
 
 private:
-    void pass(uint32_t index);
+    static inline const std::atomic<bool> kNeverDrop{false};
+
+    void pass(const std::atomic<bool>& drop);
+    void trace_pass(const std::atomic<bool>& drop);
     std::optional<StopReason> reached(const RenderLimits& limits, const ErrorEstimate& error) const;
 
     const Scene& scene_;
@@ -83,6 +91,7 @@ private:
     std::unique_ptr<TechniqueImages> techniques_;
     struct Workers;
     std::unique_ptr<Workers> workers_;
+    uint64_t learned_passes_ = 0;  ///< That the integrator has learned for.
     RenderStats stats_;
     double seconds_ = 0;
 };

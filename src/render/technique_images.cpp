@@ -14,24 +14,24 @@ size_t triangle_index(const Technique& q) {
 }  // namespace
 
 struct TechniqueImages::Layer {
-    Layer(const Technique& q, uint64_t pixels)
-        : technique(q), pass_weighted(pixels), pass_unweighted(pixels), weighted(pixels),
-          unweighted(pixels) {}
+    Layer(const Technique& q, uint64_t pixels, double typical_radiance)
+        : technique(q), pass_weighted(pixels, typical_radiance),
+          pass_unweighted(pixels, typical_radiance), weighted(pixels), unweighted(pixels) {}
 
     Technique technique;
+    bool is_folded = false;  ///< Some finished pass had it.
     SplatBuffer pass_weighted, pass_unweighted;
     std::vector<Rgb> weighted, unweighted;
 };
 
 TechniqueImages::TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter,
-                                 int max_edges)
-    : geometry_(geometry), filter_(filter), max_edges_(max_edges) {
+                                 int max_edges, double typical_radiance)
+    : geometry_(geometry), filter_(filter), max_edges_(max_edges),
+      typical_radiance_(typical_radiance) {
     layers_ = std::vector<std::atomic<Layer*>>(triangle_index({Strategy::Hit, 0, max_edges + 2}));
 }
 
-TechniqueImages::~TechniqueImages() {
-    for (auto& l : layers_) delete l.load();
-}
+TechniqueImages::~TechniqueImages() = default;
 
 size_t TechniqueImages::memory_bytes(uint64_t pixels, int max_edges) {
     const size_t layers = triangle_index({Strategy::Hit, 0, max_edges + 2}) / 2;
@@ -44,8 +44,10 @@ TechniqueImages::Layer* TechniqueImages::layer(const Technique& q) {
     Layer* found = place.load(std::memory_order_acquire);
     if (found) return found;
     const std::lock_guard lock(creation_);
-    if (!place.load())
-        place.store(new Layer(q, geometry_.pixel_count()), std::memory_order_release);
+    if (!place.load()) {
+        owned_.push_back(std::make_unique<Layer>(q, geometry_.pixel_count(), typical_radiance_));
+        place.store(owned_.back().get(), std::memory_order_release);
+    }
     return place.load();
 }
 
@@ -69,10 +71,17 @@ void TechniqueImages::add_splat(Vec2 film, const Technique& q, Rgb contribution,
 
 void TechniqueImages::end_pass() {
     ++passes_;
-    for (Layer* l : layers_) {
-        if (!l) continue;
+    for (const auto& l : owned_) {
         l->pass_weighted.fold_into(l->weighted);
         l->pass_unweighted.fold_into(l->unweighted);
+        l->is_folded = true;
+    }
+}
+
+void TechniqueImages::drop_pass() {
+    for (const auto& l : owned_) {
+        l->pass_weighted.clear();
+        l->pass_unweighted.clear();
     }
 }
 
@@ -80,7 +89,7 @@ std::vector<TechniqueImages::Entry> TechniqueImages::images() const {
     std::vector<Entry> out;
     const float scale = passes_ > 0 ? 1 / float(passes_) : 0.0f;
     for (const Layer* l : layers_) {
-        if (!l) continue;
+        if (!l || !l->is_folded) continue;
         Entry e{l->technique, l->weighted, l->unweighted};
         for (Rgb& c : e.weighted) c *= scale;
         for (Rgb& c : e.unweighted) c *= scale;

@@ -2,6 +2,7 @@
 // One image per technique, weighted and unweighted: Veach's pyramid.
 
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <vector>
 
@@ -12,15 +13,17 @@ namespace etendue {
 
 class TechniqueImages {
 public:
-    /// For paths of at most `max_edges` edges.
-    TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter,
-                    int max_edges);
+    /// For paths of at most `max_edges` edges; `typical_radiance` as for the film.
+    TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter, int max_edges,
+                    double typical_radiance = 1);
     ~TechniqueImages();
 
     void add_eye(uint64_t pixel, const Technique& technique, Rgb contribution, float mis_weight);
     void add_splat(Vec2 film, const Technique& technique, Rgb contribution, float mis_weight,
                    float scale);
     void end_pass();
+    /// Forgets what was added since the last end_pass().
+    void drop_pass();
 
     struct Entry {
         Technique technique;
@@ -39,8 +42,10 @@ private:
     FilmGeometry geometry_;
     const ReconstructionFilter& filter_;
     int max_edges_;
+    double typical_radiance_;
     uint64_t passes_ = 0;
     std::vector<std::atomic<Layer*>> layers_;  ///< By number of vertices, then s, then pairs.
+    std::vector<std::unique_ptr<Layer>> owned_;
     std::mutex creation_;
 };
 

@@ -66,7 +66,9 @@ struct GatherSearch {
             choice.drops_light =
                 drops(n.pairs.rule, false, y.gloss_before, after) && near_eye.contains(y.p, y.side);
             if (!choice.drops_eye && !choice.drops_light) return {};
-            work.stats.count_pair(search_survival);
+            ++work.stats.pairs;
+            GatherSums::of(work).expected_pairs +=
+                uint64_t(std::lround(256 / std::max(search_survival, 1e-6f)));
             choice.estimate = reflected * y.flux;
             const float share = n.gathers(edges) / n.gather;
             choice.rate =
@@ -104,7 +106,7 @@ struct GatherSearch {
                                        join->pair_probability
                                  : 0;
         GatherRoulette::observe(pair.technique.s, pair.technique.t, value / pair.estimate,
-                                work.stats);
+                                GatherSums::of(work));
     }
 
 private:

@@ -1,38 +1,36 @@
 #pragma once
-// What a pair is worth, before its light path is looked up.
+// How likely a pair is to survive the roulette before its light path is looked up.
 
-#include <array>
+#include <algorithm>
 
-#include "math/vec.h"
-#include "pathspace/render_stats.h"
+#include "reuse/gather_sums.h"
 
 namespace etendue {
 
-/// Russian roulette before a look at a pair estimates what its join will add to the pixel from the light vertex's flux and
-/// the eye path's throughput alone. How far off that is differs with the lengths of the two sub-paths, since the
-/// weight of a gather does. So joins of earlier passes tell the root mean square of what they brought over the estimate,
-/// by s and t: the survival with the least variance for its cost is proportional to it.
+/// The roulette estimates what the join of a pair will add to the pixel from the light vertex's flux and the eye path's
+/// throughput alone. The error of that estimate depends on the lengths of the two sub-paths, since the weight of a gather
+/// does. So joins of earlier passes tell the root mean square of the ratio of their contribution to the estimate, by s
+/// and t: the survival with the least variance for its cost is proportional to it.
 class GatherRoulette {
 public:
-    /// From what passes before left; as if joins brought 1/8 of the estimate where they left nothing.
-    void learn(const RenderStats& so_far);
-    /// Factor of the estimate for a look at the pair of y_{s-1} and z_{t-1}.
-    float of(int s, int t) const { return values_[index(s, t)]; }
-    /// Of the search for partners of z_{t-1}, which may find several.
-    float of_search(int t) const { return searches_[column(t)]; }
+    /// From the sums of earlier passes; as if the ratio were 1/8 where there are none.
+    void learn(const GatherTotals& totals);
+    /// Factor of the estimate for the pair of y_{s-1} and z_{t-1}.
+    float of(int s, int t) const { return factors_[index(s, t)]; }
+    /// Of the search for the pairs of z_{t-1}, which may find several.
+    float of_search(int t) const { return search_factors_[column(t)]; }
 
-    /// A join that brought so many times the estimate: 0 where it failed, and no number, which counts as 0, where its pair
-    /// could not have been found.
-    static void observe(int s, int t, float brought, RenderStats& stats);
+    /// Records the ratio of a join's contribution to its estimate: 0 where the join failed; NaN counts as 0.
+    static void observe(int s, int t, float ratio, GatherSums& sums);
 
 private:
-    static constexpr int kLengths = RenderStats::kPairLengths;
-    /// Sub-paths of this many vertices and of more are alike.
-    static size_t column(int length) { return size_t(std::min(length - 2, kLengths - 1)); }
-    static size_t index(int s, int t) { return column(s) * kLengths + column(t); }
+    static size_t column(int length) {
+        return size_t(std::min(length - 2, int(kGatherLengths) - 1));
+    }
+    static size_t index(int s, int t) { return column(s) * kGatherLengths + column(t); }
 
-    std::array<float, size_t(kLengths) * kLengths> values_{};
-    std::array<float, kLengths> searches_{};
+    std::array<float, kGatherLengths * kGatherLengths> factors_{};
+    std::array<float, kGatherLengths> search_factors_{};
 };
 
 }  // namespace etendue

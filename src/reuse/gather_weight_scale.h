@@ -1,8 +1,7 @@
 #pragma once
-// How many gathers the weights believe in.
+// How much weights count a gather.
 
-#include "math/vec.h"
-#include "pathspace/render_stats.h"
+#include "reuse/gather_sums.h"
 
 namespace etendue {
 
@@ -14,15 +13,15 @@ namespace etendue {
 /// one. Pairs and their r of earlier passes estimate it, so that an image keeps the right expectation.
 class GatherWeightScale {
 public:
-    /// Chooses c, from what passes before left: the largest with nearly the least moment; 1/2 where they left nothing.
-    void learn(const RenderStats& so_far);
+    /// Chooses c from the sums of earlier passes: the largest with nearly the least moment; 1/2 where there are none.
+    void learn(const GatherTotals& totals);
     /// c.
     float value() const { return of(choice_); }
 
     /// One visible pair. `luminance`: what it would add to its pixel, over the pixel's, with weight 1, r = 1 and
     /// `weight` given for the present c; `seen`: the inverse of the probability that roulette let it be seen.
     void observe(double luminance, double weight, double pair_probability, double r, double seen,
-                 RenderStats& stats) const;
+                 GatherSums& sums) const;
 
 private:
     static float of(int choice) { return 1.0f / float(1 << choice); }

@@ -11,11 +11,15 @@ namespace {
 /// `weight` for the count with which it begins.
 float chosen(double covered, double weight) {
     constexpr double kFound = 0.01;
-    RenderStats stats;
+    GatherSums stats;
     const GatherWeightScale first;
     first.observe(1, weight, kFound, 1 / (covered * kFound), 1, stats);
     GatherWeightScale next;
-    next.learn(stats);
+    std::vector<std::unique_ptr<PassSums>> workers;
+    workers.push_back(std::make_unique<GatherSums>(stats));
+    GatherTotals totals;
+    totals.add(workers);
+    next.learn(totals);
     return next.value();
 }
 
@@ -36,7 +40,7 @@ TEST(GatherWeightScale, FollowsTheLeastSecondMoment) {
 }
 
 TEST(GatherWeightScale, LeavesOutWhatNothingElseMakes) {
-    RenderStats stats;
+    GatherSums stats;
     GatherWeightScale().observe(1, 1, 0.01, 100, 1, stats);
     for (const uint64_t m : stats.second_moments) EXPECT_EQ(m, 0u);
 }

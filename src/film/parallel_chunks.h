@@ -1,0 +1,25 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include <tbb/parallel_for.h>
+
+namespace etendue {
+
+/// Pixels in a chunk of parallel work on the film; fixed, so that sums over chunks do not depend on the threads.
+inline constexpr uint64_t kFilmChunk = 4096;
+
+inline uint64_t film_chunks(uint64_t count) {
+    return (count + kFilmChunk - 1) / kFilmChunk;
+}
+
+/// Calls `body(chunk, begin, end)` for the chunks of [0, count) in parallel.
+template <class Body>
+void for_film_chunks(uint64_t count, const Body& body) {
+    tbb::parallel_for(uint64_t(0), film_chunks(count), [&](uint64_t chunk) {
+        body(chunk, chunk * kFilmChunk, std::min(count, (chunk + 1) * kFilmChunk));
+    });
+}
+
+}  // namespace etendue

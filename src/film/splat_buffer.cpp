@@ -1,0 +1,95 @@
+#include "film/splat_buffer.h"
+
+#include <algorithm>
+
+#include "film/parallel_chunks.h"
+
+namespace etendue {
+namespace {
+
+/// Binary exponent of the unit. No float has bits below 2^-149.
+int unit_exponent(double typical_radiance) {
+    constexpr int kBits = 40;
+    if (!(typical_radiance > 0) || !std::isfinite(typical_radiance)) return -kBits;
+    return std::clamp(std::ilogb(typical_radiance) - kBits, -149, 127);
+}
+
+/// What is in a cell that no other thread is at; it becomes 0.
+int64_t empty(std::atomic<int64_t>& cell) {
+    const int64_t n = cell.load(std::memory_order_relaxed);
+    cell.store(0, std::memory_order_relaxed);
+    return n;
+}
+
+}  // namespace
+
+SplatBuffer::SplatBuffer(uint64_t pixels, double typical_radiance)
+    : unit_(std::ldexp(1.0, unit_exponent(typical_radiance))), units_per_radiance_(1 / unit_),
+      lowest_(pixels * 3) {}
+
+void SplatBuffer::add_large(uint64_t cell, double units) {
+    if (!std::isfinite(units)) return;
+    // A float has 24 bits. The last of them is that of 2^(26·digit) units or above it.
+    const int digit = (std::ilogb(units) - 23) / kDigitBits;
+    add(size_t(digit), cell, int64_t(std::ldexp(units, -kDigitBits * digit)));
+}
+
+void SplatBuffer::carry(size_t digit, uint64_t cell, Cell& from) {
+    // Another thread may have been here before; then there is little to take.
+    const int64_t taken = from.exchange(0, std::memory_order_relaxed);
+    const int64_t passed = taken >> kDigitBits;
+    add(digit, cell, taken - (passed << kDigitBits));
+    if (passed != 0) add(digit + 1, cell, passed);
+}
+
+SplatBuffer::Cell* SplatBuffer::higher(size_t digit) {
+    if (Cell* cells = higher_[digit].load(std::memory_order_acquire)) return cells;
+    const std::scoped_lock lock(making_);
+    if (!owned_[digit]) {
+        owned_[digit] = std::make_unique<Cell[]>(lowest_.size());
+        higher_[digit].store(owned_[digit].get(), std::memory_order_release);
+    }
+    return owned_[digit].get();
+}
+
+double SplatBuffer::take(uint64_t cell, size_t digits) {
+    // Carried on until all digits but the last lie in [0, 2^26), which they do in one way only.
+    constexpr int64_t kMask = (int64_t(1) << kDigitBits) - 1;
+    std::array<int64_t, kDigits> sum{};
+    int64_t passed = 0;
+    for (size_t j = 0; j < digits; ++j) {
+        if (Cell* cells = j == 0 ? lowest_.data() : owned_[j].get()) passed += empty(cells[cell]);
+        sum[j] = j + 1 < digits ? passed & kMask : passed;
+        passed >>= kDigitBits;
+    }
+    double units = 0;
+    for (size_t j = digits; j-- > 0;) units = units * (int64_t(1) << kDigitBits) + double(sum[j]);
+    return units;
+}
+
+void SplatBuffer::fold_into(std::span<Rgb> sums) {
+    size_t digits = kDigits;
+    while (digits > 1 && !owned_[digits - 1]) --digits;
+    for_film_chunks(sums.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+        for (uint64_t i = begin; i < end; ++i)
+            for (int c = 0; c < 3; ++c) {
+                const uint64_t cell = i * 3 + uint64_t(c);
+                const double units =
+                    digits == 1 ? double(empty(lowest_[cell])) : take(cell, digits);
+                sums[i][c] += float(units * unit_);
+            }
+    });
+}
+
+void SplatBuffer::clear() {
+    const auto clear = [&](Cell* cells) {
+        for_film_chunks(lowest_.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+            for (uint64_t i = begin; i < end; ++i) cells[i].store(0, std::memory_order_relaxed);
+        });
+    };
+    clear(lowest_.data());
+    for (const auto& cells : owned_)
+        if (cells) clear(cells.get());
+}
+
+}  // namespace etendue

@@ -1,0 +1,74 @@
+#pragma once
+// Sums of splats, which come from any thread in any order.
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "color/rgb.h"
+
+namespace etendue {
+
+/// One pass's splats, summed in integers, so that the result does not depend on the order of the additions.
+///
+/// A sum has digits in base 2^26, each in 64 bits: digit j counts multiples of unit·2^(26j), where the unit is a power of
+/// two, 2^-40 of a typical radiance. A value below 2^50 units is rounded to the nearest unit and added to digit 0; a
+/// larger one is added to the digit that holds all its bits. A digit that comes near the end of its 64 bits passes most
+/// of what it has to the next. So no value is too large, and no sum wraps. Digits above 0 are made when one is needed.
+class SplatBuffer {
+public:
+    /// Values may have any size; the precision of small ones is relative to `typical_radiance`.
+    SplatBuffer(uint64_t pixels, double typical_radiance);
+
+    /// Thread-safe. A value that is not finite is left out; the caller reports it.
+    void add(uint64_t pixel, Rgb value) {
+        for (int c = 0; c < 3; ++c) {
+            const double units = double(value[c]) * units_per_radiance_;
+            if (!(std::fabs(units) < kLarge)) [[unlikely]]
+                add_large(pixel * 3 + uint64_t(c), units);
+            else if (const int64_t n = std::llrint(units))
+                add(0, pixel * 3 + uint64_t(c), n);
+        }
+    }
+    void prefetch(uint64_t pixel) const { __builtin_prefetch(&lowest_[pixel * 3], 1); }
+    /// Adds every sum to `sums`, rounded once, and clears the buffer.
+    void fold_into(std::span<Rgb> sums);
+    void clear();
+
+private:
+    using Cell = std::atomic<int64_t>;
+
+    static constexpr int kDigitBits = 26;
+    /// Enough for the largest float over the smallest: 2^128/2^-149 = 2^277 = 2^(26·9 + 43).
+    static constexpr size_t kDigits = 11;
+    /// Units up to which a value goes to digit 0. A digit's cell never leaves (-2^63, 2^63): it stays below kFull but for
+    /// what up to 2^12 threads add before they pass it on, 2^50 each.
+    static constexpr double kLarge = 0x1p50;
+    static constexpr int64_t kFull = int64_t(1) << 61;
+
+    void add(size_t digit, uint64_t cell, int64_t n) {
+        Cell& at = digit == 0 ? lowest_[cell] : higher(digit)[cell];
+        const int64_t sum = at.fetch_add(n, std::memory_order_relaxed) + n;
+        if (sum >= kFull || sum <= -kFull) [[unlikely]]
+            carry(digit, cell, at);
+    }
+    void add_large(uint64_t cell, double units);
+    void carry(size_t digit, uint64_t cell, Cell& from);
+    /// The cells of a digit above 0; made if there are none.
+    Cell* higher(size_t digit);
+    /// The sum in units, rounded once; the cell becomes 0.
+    double take(uint64_t cell, size_t digits);
+
+    double unit_, units_per_radiance_;
+    std::vector<Cell> lowest_;
+    std::array<std::unique_ptr<Cell[]>, kDigits> owned_;
+    std::array<std::atomic<Cell*>, kDigits> higher_{};
+    std::mutex making_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,62 @@
+#pragma once
+// What the gathers of a pass tell later ones.
+
+#include <array>
+#include <memory>
+#include <span>
+
+#include "pathspace/sample_context.h"
+
+namespace etendue {
+
+/// Candidates of the scale c of gathers' weights, see GatherWeightScale.
+inline constexpr size_t kWeightScales = 6;
+/// Sub-paths of this many vertices, and of more, are alike to GatherRoulette.
+inline constexpr size_t kGatherLengths = 8;
+
+/// One worker's sums of a pass, in whole numbers.
+struct GatherSums final : PassSums {
+    std::array<uint64_t, kWeightScales> second_moments{};
+    struct Joins {
+        uint64_t count = 0, squares = 0;
+    };
+    std::array<Joins, kGatherLengths * kGatherLengths> joins{};
+    /// Pairs that would have been found if roulette had ended no search, in units of 1/256.
+    uint64_t expected_pairs = 0;
+
+    static GatherSums& of(Workspace& work) { return static_cast<GatherSums&>(*work.sums); }
+
+    void add(const GatherSums& o) {
+        for (size_t i = 0; i < second_moments.size(); ++i) second_moments[i] += o.second_moments[i];
+        for (size_t i = 0; i < joins.size(); ++i) {
+            joins[i].count += o.joins[i].count;
+            joins[i].squares += o.joins[i].squares;
+        }
+        expected_pairs += o.expected_pairs;
+    }
+};
+
+/// Of all finished passes.
+struct GatherTotals {
+    std::array<double, kWeightScales> second_moments{};
+    struct Joins {
+        double count = 0, squares = 0;
+    };
+    std::array<Joins, kGatherLengths * kGatherLengths> joins{};
+    double expected_pairs = 0;
+
+    /// Adds a pass. Its workers are added up in whole numbers first, so that their order does not matter.
+    void add(std::span<const std::unique_ptr<PassSums>> workers) {
+        GatherSums pass;
+        for (const auto& w : workers) pass.add(static_cast<const GatherSums&>(*w));
+        for (size_t i = 0; i < second_moments.size(); ++i)
+            second_moments[i] += double(pass.second_moments[i]);
+        for (size_t i = 0; i < joins.size(); ++i) {
+            joins[i].count += double(pass.joins[i].count);
+            joins[i].squares += double(pass.joins[i].squares);
+        }
+        expected_pairs += double(pass.expected_pairs) / 256;
+    }
+};
+
+}  // namespace etendue
