@@ -21,7 +21,7 @@ TEST(Environment, EverySampleHasADensity) {
         const auto environment = make_environment(kWidth, height, pixels, Transform());
         int sampled = 0;
         for (int i = 0; i < kSamples; ++i) {
-            const FinePoint u{double(random.next_1d()), 1 - double(1 + i % 8) * 0x1p-53};
+            const FinePoint u{double(random.next_1d()), 1 - double(1 + i % 8) * 0x1p-24};
             DirectSample d;
             if (!environment->sample_direct({}, u, d)) continue;
             ++sampled;
