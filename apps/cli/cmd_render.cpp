@@ -1,9 +1,12 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <new>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -27,10 +30,20 @@ struct RenderCommand {
     std::vector<std::string> aovs;
     uint64_t seed = 0, spp = 0;
     double seconds = 0, error = 0;
+    unsigned grace = 20;
     int threads = 0, technique_depth = 6;
     bool quiet = false;
 
     void run() const;
+
+private:
+    RenderSettings settings_for(const Scene& scene) const;
+    /// Before the scene is read.
+    void check_options() const;
+    /// Before anything is rendered; makes missing folders.
+    void check_outputs() const;
+    void write_outputs(const Renderer& renderer, const Scene& scene,
+                       const nlohmann::json& report) const;
 };
 
 std::string format_seconds(double s) {
@@ -71,8 +84,45 @@ private:
     double last_ = 0;
 };
 
+/// How the passes went, one by one.
+struct PassLog {
+    std::vector<double> seconds;
+    std::vector<uint64_t> pairs;
+
+    void add(double seconds_so_far, uint64_t pairs_so_far) {
+        seconds.push_back(seconds_so_far - seconds_before_);
+        pairs.push_back(pairs_so_far - pairs_before_);
+        seconds_before_ = seconds_so_far;
+        pairs_before_ = pairs_so_far;
+    }
+
+private:
+    double seconds_before_ = 0;
+    uint64_t pairs_before_ = 0;
+};
+
+/// What the image lacks, or may.
+std::vector<std::string> warnings(const Renderer& r) {
+    std::vector<std::string> all;
+    const RenderStats& s = r.stats();
+    if (const uint64_t n = s.rejected + r.film().rejected(); n > 0)
+        all.push_back(fmt::format("{} contributions were not finite and were left out", n));
+    if (s.runaways > 0)
+        all.push_back(
+            fmt::format("{} pairs of vertices were given up after too many trials: their light is "
+                        "missing, and the image is darker than it should be",
+                        s.runaways));
+    if (s.bounds_exceeded > 0)
+        all.push_back(fmt::format(
+            "{} trials met a density above the bound that was assumed: the image may be biased "
+            "there; please report the scene",
+            s.bounds_exceeded));
+    return all;
+}
+
+/// `stopped_by`: a StopReason, or "failure".
 nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
-                       StopReason reason) {
+                       const std::string& stopped_by, const PassLog& log) {
     const RenderStats& s = r.stats();
     const ErrorEstimate e = r.film().error();
     const Film::MeanEstimate mean = r.film().mean_luminance();
@@ -85,7 +135,7 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"height", scene.film().crop_height},
         {"spp", r.film().passes()},
         {"seconds", r.seconds()},
-        {"stopped_by", to_string(reason)},
+        {"stopped_by", stopped_by},
         {"samples_per_second",
          double(r.film().passes()) * double(scene.film().pixel_count()) / r.seconds()},
         {"rays_per_second", double(s.rays()) / r.seconds()},
@@ -103,8 +153,11 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"light_paths", s.light_paths},
         {"vertices", s.vertices},
         {"rejected_contributions", s.rejected + r.film().rejected()},
+        {"warnings", warnings(r)},
         {"mean_luminance", mean.mean},
         {"mean_luminance_standard_error", mean.standard_error},
+        {"pass_seconds", log.seconds},
+        {"pass_pairs", log.pairs},
     };
     const PhaseSeconds& p = s.phases;
     j["phase_seconds"] = {{"light_paths", p.light_paths},
@@ -139,17 +192,29 @@ void write_techniques(const Renderer& r, const Scene& scene, const std::string& 
     }
 }
 
-void RenderCommand::run() const {
+/// Throws where the file could not be written.
+void check_writable(const std::string& path) {
+    const PendingFile file(path);
+    errno = 0;
+    if (!std::ofstream(file.temporary())) file.fail(std::generic_category().message(errno));
+}
+
+void RenderCommand::check_options() const {
     check_image_extension(output);
-    check_aovs(aovs);
     const auto folder = std::filesystem::path(output).parent_path();
     if (!folder.empty() && std::filesystem::exists(folder) &&
         !std::filesystem::is_directory(folder))
         throw std::runtime_error(fmt::format("{}: {} is not a folder", output, folder.string()));
+    check_aovs(aovs);
+}
 
-    const Scene s = load_scene(scene);
-    for (const std::string& w : s.warnings()) fmt::print(stderr, "warning: {}\n", w);
+void RenderCommand::check_outputs() const {
+    check_writable(output);
+    if (!stats.empty()) check_writable(stats);
+    if (!techniques.empty()) check_writable(techniques + "/length01_s00_t02_weighted.exr");
+}
 
+RenderSettings RenderCommand::settings_for(const Scene& s) const {
     RenderSettings settings;
     settings.integrator = choose_integrator(s, integrator);
     settings.sampler = parse_sampler(sampler);
@@ -160,44 +225,20 @@ void RenderCommand::run() const {
     if (error > 0) settings.error = error;
     if (!settings.spp && !settings.seconds && !settings.error)
         settings.spp = s.defaults().spp > 0 ? uint64_t(s.defaults().spp) : 64;
-    if (!techniques.empty()) {
-        settings.technique_depth = technique_depth;
-        if (!quiet)
-            fmt::print(
-                stderr, "technique images of paths up to {} edges: {:.0f} MiB\n", technique_depth,
-                double(TechniqueImages::memory_bytes(s.film().pixel_count(), technique_depth)) /
-                    (1 << 20));
-    }
+    if (!techniques.empty()) settings.technique_depth = technique_depth;
+    return settings;
+}
 
-    Renderer renderer(s, settings);
-    const std::atomic<bool>& interrupted = catch_interrupts();
-    std::unique_ptr<Preview> viewer;
-    if (!preview.empty())
-        viewer =
-            std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
+std::unique_ptr<Renderer> make_renderer(const Scene& s, const RenderSettings& settings) try {
+    return std::make_unique<Renderer>(s, settings);
+} catch (const std::bad_alloc&) {
+    throw std::runtime_error(
+        fmt::format("not enough memory for an image of {} x {} pixels; render it in crops (--crop)",
+                    s.film().crop_width, s.film().crop_height));
+}
 
-    StopReason reason;
-    std::vector<double> pass_seconds;
-    std::vector<uint64_t> pass_pairs;
-    double seconds_before = 0;
-    uint64_t pairs_before = 0;
-    {
-        ProgressLine line(quiet);
-        reason = renderer.run(
-            [&](const Progress& p) {
-                line.show(p);
-                pass_seconds.push_back(p.seconds - seconds_before);
-                pass_pairs.push_back(renderer.stats().pairs - pairs_before);
-                seconds_before = p.seconds;
-                pairs_before = renderer.stats().pairs;
-                if (viewer) viewer->update(renderer.film(), p.seconds);
-            },
-            interrupted);
-    }
-
-    nlohmann::json report = to_json(renderer, s, settings, reason);
-    report["pass_seconds"] = pass_seconds;
-    report["pass_pairs"] = pass_pairs;
+void RenderCommand::write_outputs(const Renderer& renderer, const Scene& s,
+                                  const nlohmann::json& report) const {
     Image image = rgb_image(s.film().crop_width, s.film().crop_height, renderer.film().image());
     for (const auto& [key, value] : report.items())
         if (value.is_string())
@@ -212,20 +253,66 @@ void RenderCommand::run() const {
     write_image(output, image);
     if (!techniques.empty()) write_techniques(renderer, s, techniques);
     if (!stats.empty()) write_file_atomically(stats, report.dump(2) + "\n");
+}
 
-    if (!quiet) {
-        const ErrorEstimate e = renderer.film().error();
-        fmt::print(stderr, "{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output,
-                   renderer.film().passes(), format_seconds(renderer.seconds()),
-                   report["samples_per_second"].get<double>() * 1e-6,
-                   report["rays_per_second"].get<double>() * 1e-6,
-                   e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})",
-                                         e.relative_rms, e.low, e.high)
-                           : "");
-        if (const auto bad = report["rejected_contributions"].get<uint64_t>(); bad > 0)
-            fmt::print(stderr, "warning: {} contributions were not finite and were left out\n",
-                       bad);
+void RenderCommand::run() const {
+    check_options();
+    const Scene s = load_scene(scene);
+    for (const std::string& w : s.warnings()) fmt::print(stderr, "warning: {}\n", w);
+    const RenderSettings settings = settings_for(s);
+    if (settings.technique_depth > 0 && !quiet)
+        fmt::print(stderr, "technique images of paths up to {} edges: {:.0f} MiB\n",
+                   technique_depth,
+                   double(TechniqueImages::memory_bytes(s.film().pixel_count(), technique_depth)) /
+                       (1 << 20));
+    const std::unique_ptr<Renderer> owned = make_renderer(s, settings);
+    Renderer& renderer = *owned;
+    check_outputs();
+
+    const Interrupts interrupts = catch_interrupts(grace);
+    std::unique_ptr<Preview> viewer;
+    if (!preview.empty())
+        viewer =
+            std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
+
+    PassLog log;
+    std::string stopped_by, failure;
+    try {
+        ProgressLine line(quiet);
+        stopped_by = to_string(renderer.run(
+            [&](const Progress& p) {
+                line.show(p);
+                log.add(p.seconds, renderer.stats().pairs);
+                if (viewer) viewer->update(renderer.film(), p.seconds);
+            },
+            interrupts.stop, interrupts.drop));
+    } catch (const std::exception& e) {
+        // The passes before this one are whole.
+        if (renderer.film().passes() == 0) throw;
+        stopped_by = "failure";
+        failure = dynamic_cast<const std::bad_alloc*>(&e) ? "not enough memory" : e.what();
     }
+    const uint64_t passes = renderer.film().passes();
+    if (passes == 0) throw std::runtime_error("interrupted in the first pass: nothing was written");
+
+    nlohmann::json report = to_json(renderer, s, settings, stopped_by, log);
+    if (!failure.empty()) report["failure"] = failure;
+    write_outputs(renderer, s, report);
+
+    for (const std::string& w : warnings(renderer)) fmt::print(stderr, "warning: {}\n", w);
+    if (!failure.empty())
+        throw std::runtime_error(
+            fmt::format("pass {} failed: {}; {} is the image of the {} before it", passes + 1,
+                        failure, output, passes == 1 ? "one" : fmt::format("{} passes", passes)));
+    if (quiet) return;
+    const ErrorEstimate e = renderer.film().error();
+    fmt::print(stderr, "{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output, passes,
+               format_seconds(renderer.seconds()),
+               report["samples_per_second"].get<double>() * 1e-6,
+               report["rays_per_second"].get<double>() * 1e-6,
+               e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})",
+                                     e.relative_rms, e.low, e.high)
+                       : "");
 }
 
 }  // namespace
@@ -244,6 +331,11 @@ void add_render_command(CLI::App& app) {
         ->check(CLI::PositiveNumber);
     c.add_option("--error", command->error, "Stop at this relative RMS error of the image")
         ->check(CLI::PositiveNumber);
+    c.add_option("--grace", command->grace,
+                 "Seconds that the pass in flight may go on after Ctrl-C or SIGTERM; then it is "
+                 "dropped")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
     c.add_option("--sampler", command->sampler,
                  "independent or sobol; with sobol the error estimate is an upper one")

@@ -391,13 +391,20 @@ private:
         }
         if (options_.crop) {
             const auto [x, y, w, h] = *options_.crop;
-            if (x < 0 || y < 0 || w < 1 || h < 1 || x + w > film.width || y + h > film.height)
+            if (x < 0 || y < 0 || w < 1 || h < 1 || w > film.width - x || h > film.height - y)
                 throw SceneError(
                     sensor.where(),
                     fmt::format("the crop {},{},{},{} does not lie within the image of {}x{}", x, y,
                                 w, h, film.width, film.height));
             film.crop_x = x, film.crop_y = y, film.crop_width = w, film.crop_height = h;
         }
+        // Light paths are numbered with 30 bits.
+        if (film.pixel_count() > uint64_t(1) << 30)
+            throw SceneError(
+                sensor.where(),
+                fmt::format("an image of {} x {} pixels is too large: at most 2^30 are "
+                            "rendered at once; render it in crops",
+                            film.crop_width, film.crop_height));
     }
 
     void count() {

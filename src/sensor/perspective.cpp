@@ -7,7 +7,9 @@
 
 #include "sensor/perspective.h"
 
+#include <charconv>
 #include <cmath>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -143,10 +145,11 @@ void set_field_of_view(const Params& params, PerspectiveCamera& camera) {
     if (!params.has("fov")) {
         // A 35 mm film's diagonal of 43.27 mm is kept, whatever the aspect ratio.
         const std::string text = focal.empty() ? "50mm" : focal;
-        char* end = nullptr;
-        const double mm = std::strtod(text.c_str(), &end);
-        if (end == text.c_str() || (std::string(end) != "mm" && std::string(end) != "") ||
-            !(mm > 0) || !std::isfinite(mm))
+        double mm = 0;
+        const char* const text_end = text.data() + text.size();
+        const auto [end, error] = std::from_chars(text.data(), text_end, mm);
+        const std::string_view unit(end, size_t(text_end - end));
+        if (error != std::errc() || (unit != "mm" && unit != "") || !(mm > 0) || !std::isfinite(mm))
             params.fail(
                 "focal_length",
                 fmt::format("focal_length is \"{}\", but must be a length in mm, like \"50mm\"",

@@ -47,6 +47,14 @@ public:
         _exit(127);
     }
     void interrupt() const { kill(pid_, SIGINT); }
+    /// Whether it has a handler of SIGINT by now.
+    bool catches_interrupts() const {
+        const std::string status = read_text("/proc/" + std::to_string(pid_) + "/status");
+        const std::string mark = "SigCgt:\t";
+        const size_t at = status.find(mark);
+        return at != std::string::npos &&
+               (std::stoull(status.substr(at + mark.size(), 16), nullptr, 16) >> (SIGINT - 1) & 1);
+    }
     /// What it has said so far on its standard error.
     std::string errors() const { return read_text(err_); }
 

@@ -1,0 +1,200 @@
+// `render` where something goes wrong: files that cannot be written, passes that fail, interrupts.
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "image/image_io.h"
+#include "run_program.h"
+
+namespace etendue::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+class RenderTest : public ::testing::Test {
+protected:
+    RenderTest() { std::ofstream(image) << kEarlier; }
+
+    Program start(const std::vector<std::string>& arguments) const {
+        std::vector<std::string> all = {"render", scene,     "-o",           image,  "--stats",
+                                        stats,    "--quiet", "--resolution", "16x16"};
+        for (const std::string& a : arguments) {
+            // The last of several counts for no option, so that these are replaced.
+            const auto given = std::find(all.begin(), all.end(), a);
+            if (given != all.end() && a.starts_with("-"))
+                all.erase(given, given + 1 + (a != "--quiet"));
+        }
+        all.insert(all.end(), arguments.begin(), arguments.end());
+        return Program(ETENDUE_PROGRAM, all, folder.path());
+    }
+    ProgramResult run(const std::vector<std::string>& arguments) const {
+        return start(arguments).wait();
+    }
+    nlohmann::json report() const { return nlohmann::json::parse(read_text(stats)); }
+    bool has_earlier_image() const { return read_text(image) == kEarlier; }
+
+    static constexpr const char* kEarlier = "an earlier picture";
+    TemporaryFolder folder;
+    std::string scene = fs::path(ETENDUE_SOURCE_DIR) / "scenes/cornell.xml";
+    std::string image = folder.path() / "image.exr", stats = folder.path() / "stats.json";
+};
+
+TEST_F(RenderTest, NoticesUnwritableFilesBeforeItRenders) {
+    const std::string file = folder.path() / "file";
+    std::ofstream(file) << "not a folder";
+    fs::create_directory(folder.path() / "folder.json");
+    for (const auto& [option, path] : std::vector<std::pair<std::string, std::string>>{
+             {"-o", "/proc/a.exr"},
+             {"-o", file + "/a.exr"},
+             {"--stats", "/proc/a.json"},
+             {"--stats", file + "/a.json"},
+             {"--stats", folder.path() / "folder.json"},
+             {"--techniques", "/proc/techniques"},
+             {"--techniques", file}}) {
+        SCOPED_TRACE(option + " " + path);
+        const auto begin = Clock::now();
+        const ProgramResult r = run({"--time", "5", option, path});
+        EXPECT_LT(Clock::now() - begin, std::chrono::seconds(4));
+        EXPECT_EQ(r.status, 1);
+        EXPECT_NE(r.errors.find(path), std::string::npos) << r.errors;
+        EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
+        EXPECT_TRUE(has_earlier_image());
+    }
+}
+
+TEST_F(RenderTest, LeavesNoTraceOfWhatItChecked) {
+    ASSERT_EQ(run({"--spp", "1", "--techniques", folder.path() / "new/techniques"}).status, 0);
+    for (const auto& entry : fs::recursive_directory_iterator(folder.path()))
+        EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path();
+    EXPECT_TRUE(report()["warnings"].empty());
+}
+
+TEST_F(RenderTest, RefusesCropsAndSizesThatCannotBe) {
+    for (const auto& [arguments, message] :
+         std::vector<std::pair<std::vector<std::string>, std::string>>{
+             {{"--crop", "2147483647,0,1,1"}, "does not lie within"},
+             {{"--crop", "0,2147483647,4,4"}, "does not lie within"},
+             {{"--crop", "8,8,2147483647,2147483647"}, "does not lie within"},
+             {{"--resolution", "65536x65536"}, "too large"},
+             {{"--resolution", "65537x2"}, "--resolution"}}) {
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.signal, 0);
+        EXPECT_EQ(r.status, 1);
+        EXPECT_NE(r.errors.find(message), std::string::npos) << r.errors;
+        EXPECT_TRUE(has_earlier_image());
+    }
+}
+
+/// A limit of memory that pass 0 holds but not every pass.
+TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
+    const auto vcm = [&](int width, int spp, int seed) {
+        std::ofstream(image) << kEarlier;
+        return run({"-i", "vcm:memory=1", "--spp", std::to_string(spp), "--seed",
+                    std::to_string(seed), "--resolution", fmt::format("{}x16", width)});
+    };
+    int fits = 4, fails = 1024;
+    while (fails - fits > 1) {
+        const int width = (fits + fails) / 2;
+        (vcm(width, 1, 0).status == 0 ? fits : fails) = width;
+    }
+    // In the first pass: nothing is written.
+    const ProgramResult first = vcm(fails, 4, 0);
+    EXPECT_EQ(first.status, 1);
+    EXPECT_TRUE(has_earlier_image());
+    EXPECT_NE(first.errors.find("need more than 1 MiB"), std::string::npos) << first.errors;
+
+    for (int seed = 0; seed < 20; ++seed) {
+        const ProgramResult r = vcm(fits, 100, seed);
+        if (r.status == 0 || has_earlier_image()) continue;
+        EXPECT_EQ(r.status, 1);
+        EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
+        EXPECT_NE(r.errors.find("need more than 1 MiB"), std::string::npos) << r.errors;
+        EXPECT_NE(r.errors.find(image), std::string::npos) << r.errors;
+        const nlohmann::json j = report();
+        const int passes = j["spp"];
+        EXPECT_GT(passes, 0);
+        EXPECT_LT(passes, 100);
+        EXPECT_NE(r.errors.find(fmt::format("pass {} failed", passes + 1)), std::string::npos)
+            << r.errors;
+        EXPECT_EQ(j["stopped_by"], "failure");
+        EXPECT_NE(j["failure"].get<std::string>().find("MiB"), std::string::npos);
+        EXPECT_EQ(j["pass_seconds"].size(), size_t(passes));
+        // It is the image of so many passes.
+        const std::vector<float> pixels = read_image(image).data;
+        ASSERT_EQ(vcm(fits, passes, seed).status, 0);
+        EXPECT_EQ(read_image(image).data, pixels);
+        return;
+    }
+    FAIL() << "no pass failed at a width of " << fits;
+}
+
+/// Passes of seconds, on one thread.
+class InterruptTest : public RenderTest {
+protected:
+    Program start_long(const std::vector<std::string>& more = {}) const {
+        std::vector<std::string> all = {"-i",        "bdpt", "--resolution", "900x700",
+                                        "--threads", "1",    "--time",       "600"};
+        all.insert(all.end(), more.begin(), more.end());
+        return start(all);
+    }
+    static void wait(double seconds) {
+        std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    }
+    static void wait_for_start(const Program& program) {
+        for (int i = 0; i < 3000 && !program.catches_interrupts(); ++i) wait(0.01);
+    }
+};
+
+TEST_F(InterruptTest, TheSecondDropsThePassInFlight) {
+    const Program program = start_long();
+    wait_for_start(program);
+    program.interrupt();
+    wait(0.2);
+    const auto begin = Clock::now();
+    program.interrupt();
+    const ProgramResult r = program.wait();
+    EXPECT_LT(Clock::now() - begin, std::chrono::seconds(2));
+    EXPECT_EQ(r.status, 1);
+    EXPECT_NE(r.errors.find("interrupted in the first pass"), std::string::npos) << r.errors;
+    EXPECT_TRUE(has_earlier_image());
+}
+
+TEST_F(InterruptTest, ThePassIsDroppedAfterTheGrace) {
+    const Program program = start_long({"--grace", "1"});
+    wait_for_start(program);
+    const auto begin = Clock::now();
+    program.interrupt();
+    const ProgramResult r = program.wait();
+    EXPECT_LT(Clock::now() - begin, std::chrono::seconds(3));
+    EXPECT_EQ(r.status, 1);
+    EXPECT_NE(r.errors.find("interrupted in the first pass"), std::string::npos) << r.errors;
+}
+
+TEST_F(InterruptTest, ThePassesBeforeTheDroppedOneAreWritten) {
+    const Program program = start({"-i", "bdpt", "--resolution", "300x200", "--threads", "1",
+                                   "--time", "600", "--grace", "0"});
+    // A pass and more: each takes part of a second.
+    wait_for_start(program);
+    wait(4);
+    program.interrupt();
+    const ProgramResult r = program.wait();
+    EXPECT_EQ(r.status, 0) << r.errors;
+    const nlohmann::json j = report();
+    EXPECT_EQ(j["stopped_by"], "interrupted");
+    const int passes = j["spp"];
+    const std::vector<float> pixels = read_image(image).data;
+    ASSERT_EQ(
+        run({"-i", "bdpt", "--resolution", "300x200", "--spp", std::to_string(passes)}).status, 0);
+    EXPECT_EQ(read_image(image).data, pixels) << passes;
+    EXPECT_EQ(report()["walk_rays"], j["walk_rays"]);
+}
+
+}  // namespace
+}  // namespace etendue::test

@@ -1,0 +1,260 @@
+#include "film/film.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "math/statistics.h"
+
+namespace etendue {
+namespace {
+
+constexpr FilmGeometry kGeometry{20, 10, 0, 0, 20, 10};
+
+/// Passes of random values: eye contributions, and splats of `light_paths` paths where there are any.
+class Passes {
+public:
+    explicit Passes(Film& film) : film_(film) {}
+
+    /// One pass, not ended.
+    void begin(uint64_t light_paths = 0) {
+        film_.begin_pass(light_paths);
+        std::exponential_distribution<float> value(1);
+        std::uniform_real_distribution<float> point(-2, 22);
+        for (uint64_t i = 0; i < film_.geometry().pixel_count(); ++i)
+            film_.add_eye(i, {value(random_), value(random_) * float(i), 0});
+        for (uint64_t i = 0; i < light_paths; ++i)
+            film_.add_splat({point(random_), point(random_)}, Rgb(value(random_)));
+    }
+    void add(uint64_t light_paths = 0) {
+        begin(light_paths);
+        film_.end_pass();
+    }
+
+private:
+    Film& film_;
+    std::mt19937 random_{1};
+};
+
+/// Everything that can be read of the totals.
+struct Totals {
+    std::vector<Rgb> image, variance;
+    std::vector<float> expected, expected_blocks;
+    ErrorEstimate error;
+    Film::MeanEstimate mean;
+    uint64_t passes, rejected;
+
+    explicit Totals(const Film& f, bool has_splats)
+        : image(f.image()), variance(f.variance()), error(f.error()), mean(f.mean_luminance()),
+          passes(f.passes()), rejected(f.rejected()) {
+        for (uint64_t i = 0; i < f.geometry().pixel_count(); ++i) {
+            expected.push_back(f.expected_luminance(i));
+            if (has_splats)
+                expected_blocks.push_back(f.expected_luminance(f.geometry().pixel_center(i)));
+        }
+    }
+    void expect_same_bits(const Totals& o) const {
+        for (size_t i = 0; i < image.size(); ++i)
+            for (int c = 0; c < 3; ++c) {
+                ASSERT_EQ(image[i][c], o.image[i][c]) << i;
+                ASSERT_EQ(variance[i][c], o.variance[i][c]) << i;
+            }
+        EXPECT_EQ(expected, o.expected);
+        EXPECT_EQ(expected_blocks, o.expected_blocks);
+        EXPECT_EQ(error.relative_rms, o.error.relative_rms);
+        EXPECT_EQ(error.low, o.error.low);
+        EXPECT_EQ(error.high, o.error.high);
+        EXPECT_EQ(mean.mean, o.mean.mean);
+        EXPECT_EQ(mean.standard_error, o.mean.standard_error);
+        EXPECT_EQ(passes, o.passes);
+        EXPECT_EQ(rejected, o.rejected);
+    }
+};
+
+TEST(FilmGeometry, FindsThePixelNearestToAnyPoint) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    const FilmGeometry g{40, 30, 7, 5, 10, 8};
+    EXPECT_EQ(g.pixel_at({7.0f, 5.0f}), 0u);
+    EXPECT_EQ(g.pixel_at({7.99f, 5.99f}), 0u);
+    EXPECT_EQ(g.pixel_at({8.0f, 6.0f}), 11u);
+    EXPECT_EQ(g.pixel_at({16.99f, 12.99f}), 79u);
+    for (const float far : {-0.5f, 4.9f, -3e9f, -1e30f, -kInfinity, std::nanf("")})
+        EXPECT_EQ(g.pixel_at({far, far}), 0u) << far;
+    for (const float far : {17.0f, 1e4f, 3e9f, 1e30f, kInfinity})
+        EXPECT_EQ(g.pixel_at({far, far}), 79u) << far;
+    for (uint64_t i = 0; i < g.pixel_count(); ++i) EXPECT_EQ(g.pixel_at(g.pixel_center(i)), i);
+}
+
+TEST(FilmGeometry, VisitsThePixelsThatAFilterReaches) {
+    const FilmGeometry g{40, 30, 7, 5, 10, 8};
+    const auto visited = [&](Vec2 point, const ReconstructionFilter& filter) {
+        std::vector<uint64_t> all;
+        for_each_pixel(g, filter, point, [&](uint64_t i, float h) {
+            EXPECT_NE(h, 0);
+            all.push_back(i);
+        });
+        return all;
+    };
+    const auto box = ReconstructionFilter::box();
+    const ReconstructionFilter wide("wide", 1.5f, [](double, double, double) { return 1.0; });
+    EXPECT_EQ(visited({8.5f, 6.5f}, box), (std::vector<uint64_t>{11}));
+    EXPECT_EQ(visited({8.5f, 6.5f}, wide),
+              (std::vector<uint64_t>{0, 1, 2, 10, 11, 12, 20, 21, 22}));
+    EXPECT_EQ(visited({6.5f, 4.5f}, wide), (std::vector<uint64_t>{0}));
+    EXPECT_EQ(visited({16.9f, 12.9f}, box), (std::vector<uint64_t>{79}));
+    for (const float far : {-3e9f, -1e30f, -100.0f, -1.5f, 40.0f, 3e9f, 1e30f, std::nanf("")})
+        EXPECT_EQ(visited({far, far}, wide), std::vector<uint64_t>()) << far;
+}
+
+TEST(Film, ImageAndVarianceAreThoseOfThePasses) {
+    Film film(kGeometry, ReconstructionFilter::box());
+    EXPECT_EQ(film.variance()[3].r, 0);
+    std::vector<Moments> red(kGeometry.pixel_count()), green(kGeometry.pixel_count());
+    Moments whole;
+    std::mt19937 random(4);
+    std::exponential_distribution<float> value(1);
+    for (int pass = 0; pass < 9; ++pass) {
+        film.begin_pass(0);
+        double mean = 0;
+        for (uint64_t i = 0; i < kGeometry.pixel_count(); ++i) {
+            // In two parts, as an eye path adds what it finds.
+            const Rgb a{value(random), 1, 0}, b{0, value(random), 0};
+            film.add_eye(i, a);
+            film.add_eye(i, b);
+            red[i].add(a.r);
+            green[i].add(a.g + b.g);
+            mean += luminance(a + b) / double(kGeometry.pixel_count());
+        }
+        film.end_pass();
+        whole.add(mean);
+    }
+    const std::vector<Rgb> image = film.image(), variance = film.variance();
+    for (uint64_t i = 0; i < kGeometry.pixel_count(); ++i) {
+        EXPECT_NEAR(image[i].r, red[i].mean(), 1e-6);
+        EXPECT_NEAR(image[i].g, green[i].mean(), 1e-6);
+        EXPECT_NEAR(variance[i].r, red[i].squared_error(), 1e-5);
+        EXPECT_NEAR(variance[i].g, green[i].squared_error(), 1e-5);
+        EXPECT_EQ(variance[i].b, 0);
+    }
+    EXPECT_EQ(film.passes(), 9u);
+    EXPECT_NEAR(film.mean_luminance().mean, whole.mean(), 1e-6);
+    EXPECT_NEAR(film.mean_luminance().standard_error, std::sqrt(whole.squared_error()), 1e-6);
+}
+
+/// Pixels of one expectation and known variance, so that the relative error is known.
+TEST(Film, ErrorIsThatOfTheMean) {
+    Film film({100, 100, 0, 0, 100, 100}, ReconstructionFilter::box());
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> value(0, 2);
+    constexpr int kPasses = 64;
+    for (int pass = 0; pass < kPasses; ++pass) {
+        EXPECT_EQ(film.error().valid, pass >= 10) << pass;
+        film.begin_pass(0);
+        for (uint64_t i = 0; i < 10000; ++i) film.add_eye(i, Rgb(value(random)));
+        film.end_pass();
+    }
+    // Variance 1/3 of a pass; I = 1. Noise of I² in the first passes adds a little.
+    const double expected = std::sqrt(1.0 / 3 / kPasses / 1.01);
+    EXPECT_NEAR(film.error().relative_rms, expected, 0.03 * expected);
+    EXPECT_LT(film.error().low, film.error().relative_rms);
+    EXPECT_GT(film.error().high, film.error().relative_rms);
+}
+
+TEST(Film, BlackPassesHaveNoError) {
+    Film film(kGeometry, ReconstructionFilter::box());
+    for (int pass = 0; pass < 10; ++pass) {
+        film.begin_pass(0);
+        film.end_pass();
+    }
+    EXPECT_TRUE(film.error().valid);
+    EXPECT_EQ(film.error().relative_rms, 0);
+}
+
+/// A square of luminances would leave the range of a float.
+TEST(Film, ErrorDoesNotDependOnTheUnitOfRadiance) {
+    double expected = 0;
+    for (const float unit : {1.0f, 0x1p-70f, 0x1p70f}) {
+        Film film(kGeometry, ReconstructionFilter::box(), unit);
+        std::mt19937 random(6);
+        std::exponential_distribution<float> value(1);
+        for (int pass = 0; pass < 12; ++pass) {
+            film.begin_pass(0);
+            for (uint64_t i = 0; i < kGeometry.pixel_count(); ++i)
+                film.add_eye(i, Rgb(value(random) * unit));
+            film.end_pass();
+        }
+        if (unit == 1) expected = film.error().relative_rms;
+        EXPECT_GT(expected, 0);
+        EXPECT_EQ(film.error().relative_rms, expected) << unit;
+    }
+}
+
+TEST(Film, SplatsAreMeansOverTheLightPaths) {
+    Film film(kGeometry, ReconstructionFilter::box());
+    film.begin_pass(50);
+    for (int i = 0; i < 100; ++i) film.add_splat({3.5f, 2.5f}, {2, 4, 0});
+    film.end_pass();
+    EXPECT_FLOAT_EQ(film.image()[2 * 20 + 3].r, 4);
+    EXPECT_FLOAT_EQ(film.image()[2 * 20 + 3].g, 8);
+    EXPECT_EQ(film.image()[0].r, 0);
+}
+
+TEST(Film, CountsWhatIsNotFinite) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    Film film(kGeometry, ReconstructionFilter::box());
+    film.begin_pass(1);
+    film.add_splat({3.5f, 2.5f}, {2, kInfinity, 0});
+    film.add_eye(7, {std::nanf(""), 1, 1});
+    film.add_eye(8, Rgb(1));
+    EXPECT_EQ(film.rejected(), 0u) << "the pass is not finished";
+    film.end_pass();
+    EXPECT_EQ(film.rejected(), 2u);
+    EXPECT_EQ(film.image()[7].g, 0);
+    EXPECT_EQ(film.image()[8].g, 1);
+    film.begin_pass(1);
+    film.end_pass();
+    EXPECT_EQ(film.rejected(), 2u);
+}
+
+TEST(Film, ADroppedPassLeavesNothing) {
+    for (const uint64_t light_paths : {0u, 1000u}) {
+        Film film(kGeometry, ReconstructionFilter::box());
+        Passes passes(film);
+        for (const int more : {1, 1, 8}) {  // one pass, a pair, enough for an error
+            for (int i = 0; i < more; ++i) passes.add(light_paths);
+            const Totals before(film, light_paths > 0);
+            passes.begin(light_paths);
+            film.add_eye(3, Rgb(std::nanf("")));
+            if (light_paths > 0) {
+                film.add_splat({1.5f, 1.5f}, Rgb(1e20f));
+                film.add_splat({1.5f, 1.5f}, Rgb(std::nanf("")));
+            }
+            Totals(film, light_paths > 0).expect_same_bits(before);
+            film.drop_pass();
+            Totals(film, light_paths > 0).expect_same_bits(before);
+        }
+    }
+}
+
+TEST(Film, PassesAfterADroppedOneAreAsWithoutIt) {
+    const auto totals = [](bool drops) {
+        Film film(kGeometry, ReconstructionFilter::box());
+        Passes passes(film);
+        Passes other(film);
+        for (int i = 0; i < 11; ++i) {
+            if (drops && i % 3 == 0) {
+                other.begin(500);
+                film.add_splat({1.5f, 1.5f}, Rgb(1e20f));
+                film.drop_pass();
+            }
+            passes.add(500);
+        }
+        return Totals(film, true);
+    };
+    totals(true).expect_same_bits(totals(false));
+}
+
+}  // namespace
+}  // namespace etendue

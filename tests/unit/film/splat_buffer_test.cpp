@@ -1,0 +1,152 @@
+#include "film/splat_buffer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+namespace etendue {
+namespace {
+
+/// The buffer's sums, each of them red.
+std::vector<float> folded(SplatBuffer& buffer, size_t pixels) {
+    std::vector<Rgb> sums(pixels);
+    buffer.fold_into(sums);
+    std::vector<float> red;
+    for (const Rgb& s : sums) red.push_back(s.r);
+    return red;
+}
+float sum_of(const std::vector<float>& values, double typical_radiance = 1) {
+    SplatBuffer buffer(1, typical_radiance);
+    for (const float v : values) buffer.add(0, Rgb(v));
+    return folded(buffer, 1)[0];
+}
+
+TEST(SplatBuffer, AddsToWhatIsThereAndIsEmptyAfterwards) {
+    SplatBuffer buffer(3, 1);
+    buffer.add(1, {0.25f, -2, 8});
+    buffer.add(1, {0.5f, 1, 0});
+    std::vector<Rgb> sums(3, Rgb(1));
+    buffer.fold_into(sums);
+    EXPECT_EQ(sums[1].r, 1.75f);
+    EXPECT_EQ(sums[1].g, 0);
+    EXPECT_EQ(sums[1].b, 9);
+    EXPECT_EQ(sums[0].r, 1);
+    EXPECT_EQ(sums[2].b, 1);
+    EXPECT_EQ(folded(buffer, 3), std::vector<float>(3));
+}
+
+TEST(SplatBuffer, RoundsToTheNearestUnit) {
+    // The unit is 2^-40. Cut off instead of rounded, a million values lose half a unit each.
+    constexpr float kUnit = 0x1p-40f;
+    EXPECT_EQ(sum_of({0.6f * kUnit}), kUnit);
+    EXPECT_EQ(sum_of({-0.6f * kUnit}), -kUnit);
+    EXPECT_EQ(sum_of({0.4f * kUnit}), 0);
+    std::mt19937 random(1);
+    std::uniform_real_distribution<float> values(0, 16 * kUnit);
+    std::vector<float> many(1'000'000);
+    double sum = 0;
+    for (float& v : many) sum += v = values(random);
+    // Four standard errors of a rounding error of variance 1/12.
+    EXPECT_NEAR(sum_of(many) / kUnit, sum / kUnit, 4 * std::sqrt(1e6 / 12) + 1);
+}
+
+TEST(SplatBuffer, IsAsPreciseForDimAndBrightScenes) {
+    std::mt19937 random(2);
+    std::vector<float> values(1000);
+    for (float& v : values) v = std::exp2(std::uniform_real_distribution<float>(-30, 5)(random));
+    const float expected = sum_of(values);
+    for (const int exponent : {-60, -9, 1, 60}) {
+        std::vector<float> scaled = values;
+        for (float& v : scaled) v = std::ldexp(v, exponent);
+        EXPECT_EQ(sum_of(scaled, std::ldexp(1.0, exponent)), std::ldexp(expected, exponent));
+        // Anything up to twice as much has the same unit.
+        EXPECT_EQ(sum_of(scaled, std::ldexp(1.99, exponent)), std::ldexp(expected, exponent));
+    }
+}
+
+TEST(SplatBuffer, AnyFloatIsSummedWithoutError) {
+    constexpr float kMax = std::numeric_limits<float>::max();
+    for (const double typical : {1e-45, 1e-9, 1.0, 1e30})
+        for (const float v : {1.0f, 1023.0f, 1024.0f, 1025.0f, 1e8f, 1e20f, kMax}) {
+            if (double(v) < typical) continue;
+            EXPECT_EQ(sum_of({v}, typical), v) << typical;
+            EXPECT_EQ(sum_of({-v}, typical), -v) << typical;
+            EXPECT_EQ(sum_of({v, 1, -v}, typical), typical < 1e10 ? 1.0f : 0.0f) << v << typical;
+        }
+    EXPECT_EQ(sum_of({1}, 0), 1) << "a scene without light";
+}
+
+/// As much as 2^63 units of digit 0, and more: the sum must not wrap.
+TEST(SplatBuffer, DoesNotWrap) {
+    std::vector<float> sums;
+    for (const float sign : {1.0f, -1.0f}) {
+        SplatBuffer buffer(1, 1);
+        // 2^22 values of nearly 2^50 units.
+        for (int i = 0; i < 1 << 22; ++i) buffer.add(0, {sign * 1023.5f, 0, 0});
+        EXPECT_EQ(folded(buffer, 1)[0], sign * 1023.5f * 0x1p22f);
+    }
+}
+
+TEST(SplatBuffer, RadianceOf1e8OnOnePixelDoesNotWrap) {
+    SplatBuffer buffer(1, 1);
+    for (int i = 0; i < 1 << 20; ++i) buffer.add(0, {1e8f, 100, 1e12f});
+    std::vector<Rgb> sum(1);
+    buffer.fold_into(sum);
+    EXPECT_EQ(sum[0].r, 1e8f * 0x1p20f);
+    EXPECT_EQ(sum[0].g, 100 * 0x1p20f);
+    EXPECT_EQ(sum[0].b, 1e12f * 0x1p20f);
+}
+
+/// Values of all sizes and both signs, in many orders and from several threads.
+TEST(SplatBuffer, DoesNotDependOnTheOrder) {
+    constexpr size_t kPixels = 3;
+    std::mt19937 random(3);
+    std::vector<std::pair<uint64_t, float>> values;
+    for (int i = 0; i < 20000; ++i) {
+        const float size = i % 4 == 0
+                               ? 1000.0f
+                               : std::exp2(std::uniform_real_distribution<float>(-45, 100)(random));
+        // The first pixel's sum is far beyond digit 0, the second's mostly cancels.
+        const float sign = i % kPixels == 1 && i % 2 == 1 ? -1.0f : 1.0f;
+        values.emplace_back(uint64_t(i) % kPixels, sign * size);
+    }
+    const auto sums = [&](int threads) {
+        SplatBuffer buffer(kPixels, 1);
+        std::vector<std::thread> workers;
+        for (int t = 0; t < threads; ++t)
+            workers.emplace_back([&, t] {
+                for (int repeat = 0; repeat < 60; ++repeat)
+                    for (size_t i = size_t(t); i < values.size(); i += size_t(threads))
+                        buffer.add(values[i].first, Rgb(values[i].second));
+            });
+        for (std::thread& w : workers) w.join();
+        return folded(buffer, kPixels);
+    };
+    const std::vector<float> expected = sums(1);
+    for (const int threads : {1, 2, 7}) {
+        std::shuffle(values.begin(), values.end(), random);
+        EXPECT_EQ(sums(threads), expected) << threads;
+    }
+}
+
+TEST(SplatBuffer, ForgetsWhatIsCleared) {
+    SplatBuffer buffer(2, 1);
+    buffer.add(0, Rgb(3));
+    buffer.add(1, Rgb(1e9f));
+    buffer.add(1, Rgb(1e25f));
+    buffer.clear();
+    buffer.add(1, Rgb(0.5f));
+    EXPECT_EQ(folded(buffer, 2), (std::vector<float>{0, 0.5f}));
+}
+
+TEST(SplatBuffer, LeavesOutWhatIsNotFinite) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    EXPECT_EQ(sum_of({1, kInfinity, -kInfinity, std::nanf("")}), 1);
+}
+
+}  // namespace
+}  // namespace etendue

@@ -1,0 +1,194 @@
+// Passes that fail or are dropped leave nothing behind, and the rendering can go on.
+
+#include <functional>
+#include <span>
+
+#include <gtest/gtest.h>
+
+#include "render/renderer.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+/// Another integrator, with something done at moments of its passes.
+class Disturbed final : public Integrator {
+public:
+    struct Hooks {
+        std::function<void(uint32_t pass)> trace = [](uint32_t) {}, end_of_trace = [](uint32_t) {};
+        std::function<void(uint32_t pass, uint64_t pixel)> sample = [](uint32_t, uint64_t) {};
+    };
+    Disturbed(const std::string& name, Hooks& hooks)
+        : inner_(make_integrator(IntegratorSpec::parse(name))), hooks_(hooks) {}
+
+    void learn(const LearnContext& context) override {
+        EXPECT_EQ(context.index, context.film.passes());
+        learned_.push_back(context.index);
+        inner_->learn(context);
+    }
+    bool is_learning() const override { return inner_->is_learning(); }
+    void trace(const PassContext& pass) override {
+        pass_ = pass.index;
+        hooks_.trace(pass_);
+        inner_->trace(pass);
+        hooks_.end_of_trace(pass_);
+    }
+    std::unique_ptr<PassSums> make_sums() const override { return inner_->make_sums(); }
+    void collect(std::span<const std::unique_ptr<PassSums>> sums) override {
+        inner_->collect(sums);
+    }
+    void sample(const SampleContext& context, Workspace& work) const override {
+        hooks_.sample(pass_, context.pixel);
+        inner_->sample(context, work);
+    }
+    TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
+        return inner_->counts(scene, light_paths);
+    }
+    uint64_t light_paths(const Scene& scene) const override { return inner_->light_paths(scene); }
+    Estimator estimator() const override { return inner_->estimator(); }
+    const std::vector<uint32_t>& learned() const { return learned_; }
+
+private:
+    std::unique_ptr<Integrator> inner_;
+    Hooks& hooks_;
+    uint32_t pass_ = 0;
+    std::vector<uint32_t> learned_;
+};
+
+class DropPass : public ::testing::TestWithParam<const char*> {
+protected:
+    DropPass() : scene(build(mixed_room(lens_camera(24)))) {
+        settings.sampler = SamplerKind::Sobol;
+        settings.technique_depth = 4;
+        settings.threads = 2;
+        settings.spp = 5;
+    }
+    Renderer renderer() {
+        return {scene, settings, std::make_unique<Disturbed>(GetParam(), hooks)};
+    }
+    StopReason run(Renderer& r) {
+        return r.run([](const Progress&) {}, interrupted, drop);
+    }
+    /// Of `passes` passes that nothing disturbs.
+    void expect_as_undisturbed(const Renderer& r, uint64_t passes) {
+        Disturbed::Hooks none;
+        RenderSettings s = settings;
+        s.spp = passes;
+        Renderer other(scene, s, std::make_unique<Disturbed>(GetParam(), none));
+        other.run([](const Progress&) {}, std::atomic<bool>{false});
+        EXPECT_EQ(r.film().passes(), passes);
+        expect_same_bits(r.film().image(), other.film().image());
+        expect_same_bits(r.film().variance(), other.film().variance());
+        EXPECT_EQ(r.film().mean_luminance().mean, other.film().mean_luminance().mean);
+        EXPECT_EQ(r.stats().rays(), other.stats().rays());
+        EXPECT_EQ(r.stats().eye_paths, other.stats().eye_paths);
+        EXPECT_EQ(r.stats().light_paths, other.stats().light_paths);
+        EXPECT_EQ(r.stats().joins_skipped, other.stats().joins_skipped);
+        const auto layers = r.techniques()->images(), others = other.techniques()->images();
+        ASSERT_EQ(layers.size(), others.size());
+        for (size_t i = 0; i < layers.size(); ++i) {
+            EXPECT_EQ(layers[i].technique, others[i].technique);
+            expect_same_bits(layers[i].weighted, others[i].weighted);
+            expect_same_bits(layers[i].unweighted, others[i].unweighted);
+        }
+    }
+    static void expect_same_bits(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+        ASSERT_EQ(a.size(), b.size());
+        for (size_t i = 0; i < a.size(); ++i)
+            for (int c = 0; c < 3; ++c) ASSERT_EQ(a[i][c], b[i][c]) << i;
+    }
+
+    Scene scene;
+    RenderSettings settings;
+    Disturbed::Hooks hooks;
+    std::atomic<bool> interrupted{false}, drop{false};
+};
+
+TEST_P(DropPass, WhereASampleThrows) {
+    hooks.sample = [](uint32_t pass, uint64_t pixel) {
+        if (pass == 3 && pixel == 300) throw std::runtime_error("a bad sample");
+    };
+    Renderer r = renderer();
+    EXPECT_THROW(run(r), std::runtime_error);
+    expect_as_undisturbed(r, 3);
+    EXPECT_THROW(run(r), std::runtime_error);
+    expect_as_undisturbed(r, 3);
+    hooks.sample = [](uint32_t, uint64_t) {};
+    EXPECT_EQ(run(r), StopReason::Samples);
+    expect_as_undisturbed(r, 5);
+}
+
+TEST_P(DropPass, WhereAPassCannotBegin) {
+    for (auto* moment : {&hooks.trace, &hooks.end_of_trace}) {
+        *moment = [](uint32_t pass) {
+            if (pass == 2) throw std::bad_alloc();
+        };
+        Renderer r = renderer();
+        EXPECT_THROW(run(r), std::bad_alloc);
+        expect_as_undisturbed(r, 2);
+        *moment = [](uint32_t) {};
+        EXPECT_EQ(run(r), StopReason::Samples);
+        expect_as_undisturbed(r, 5);
+    }
+}
+
+TEST_P(DropPass, WhereTheFirstPassFails) {
+    hooks.sample = [](uint32_t, uint64_t pixel) {
+        if (pixel == 500) throw std::runtime_error("a bad sample");
+    };
+    Renderer r = renderer();
+    EXPECT_THROW(run(r), std::runtime_error);
+    EXPECT_EQ(r.film().passes(), 0u);
+    EXPECT_EQ(r.stats().rays(), 0u);
+    EXPECT_EQ(r.seconds(), 0);
+    EXPECT_TRUE(r.techniques()->images().empty());
+    hooks.sample = [](uint32_t, uint64_t) {};
+    run(r);
+    expect_as_undisturbed(r, 5);
+}
+
+TEST_P(DropPass, WhereTheCallerAsksForIt) {
+    std::atomic<uint64_t> samples_after{0};
+    hooks.sample = [&](uint32_t pass, uint64_t) {
+        if (drop.load()) ++samples_after;
+        if (pass == 3) interrupted = drop = true;
+    };
+    Renderer r = renderer();
+    EXPECT_EQ(run(r), StopReason::Interrupted);
+    // Chunks in flight end, no others begin.
+    EXPECT_LE(samples_after, 2 * 256u);
+    expect_as_undisturbed(r, 3);
+    const double seconds = r.seconds();
+    hooks.sample = [](uint32_t, uint64_t) {};
+    EXPECT_EQ(run(r), StopReason::Interrupted) << "still";
+    EXPECT_EQ(r.seconds(), seconds);
+    interrupted = drop = false;
+    EXPECT_EQ(run(r), StopReason::Samples);
+    expect_as_undisturbed(r, 5);
+}
+
+TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
+    hooks.sample = [](uint32_t pass, uint64_t pixel) {
+        if (pass == 2 && pixel == 300) throw std::runtime_error("a bad sample");
+    };
+    auto integrator = std::make_unique<Disturbed>(GetParam(), hooks);
+    const Disturbed& disturbed = *integrator;
+    Renderer r(scene, settings, std::move(integrator));
+    EXPECT_THROW(run(r), std::runtime_error);
+    EXPECT_THROW(run(r), std::runtime_error);
+    EXPECT_EQ(disturbed.learned(), (std::vector<uint32_t>{0, 1, 2}));
+    hooks.sample = [](uint32_t, uint64_t) {};
+    run(r);
+    EXPECT_EQ(disturbed.learned(), (std::vector<uint32_t>{0, 1, 2, 4}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, DropPass,
+                         ::testing::Values("path", "light", "bdpt", "vcm:radius=0.3", "upg+bdpt",
+                                           "sppm", "pcbpt"),
+                         [](const auto& p) {
+                             const std::string name = p.param;
+                             return name.substr(0, name.find_first_of(":+"));
+                         });
+
+}  // namespace
+}  // namespace etendue::test

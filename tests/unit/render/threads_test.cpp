@@ -1,0 +1,80 @@
+// Every renderer has as many threads as it was given, whatever others in the same process have.
+
+#include <condition_variable>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "render/renderer.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+/// What the threads of one rendering do. Its first samples wait until so many threads are there at once.
+class Meeting {
+public:
+    explicit Meeting(size_t wanted) : wanted_(wanted) {}
+
+    void attend() {
+        std::unique_lock lock(mutex_);
+        if (!threads_.insert(std::this_thread::get_id()).second) return;
+        changed_.notify_all();
+        changed_.wait_for(lock, std::chrono::seconds(5),
+                          [&] { return threads_.size() >= wanted_; });
+    }
+    size_t threads() const { return threads_.size(); }
+
+private:
+    size_t wanted_;
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::set<std::thread::id> threads_;
+};
+
+class MeetingIntegrator final : public Integrator {
+public:
+    explicit MeetingIntegrator(Meeting& meeting) : meeting_(meeting) {}
+    void sample(const SampleContext& c, Workspace&) const override {
+        if (c.pixel % 256 == 0) meeting_.attend();  // once a chunk
+    }
+    TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
+    uint64_t light_paths(const Scene&) const override { return 0; }
+    Estimator estimator() const override { return Estimator::Unbiased; }
+
+private:
+    Meeting& meeting_;
+};
+
+/// Threads that a rendering had at once, and in all.
+size_t threads_of_rendering(const Scene& scene, int threads) {
+    Meeting meeting{size_t(threads)};
+    RenderSettings settings;
+    settings.threads = threads;
+    settings.spp = 1;
+    Renderer renderer(scene, settings, std::make_unique<MeetingIntegrator>(meeting));
+    const std::atomic<bool> interrupted{false};
+    renderer.run([](const Progress&) {}, interrupted);
+    return meeting.threads();
+}
+
+TEST(Threads, AreAsManyAsAskedFor) {
+    const Scene scene = build(front_camera(64) + room() + area_lamp());
+    for (const int threads : {1, 2, 7, 3}) EXPECT_EQ(threads_of_rendering(scene, threads), threads);
+}
+
+TEST(Threads, OfSeveralRenderersAtOnceAreTheirOwn) {
+    const Scene scene = build(front_camera(64) + room() + area_lamp());
+    const std::vector<int> wanted = {7, 2, 1, 5};
+    std::vector<size_t> had(wanted.size());
+    std::vector<std::thread> callers;
+    for (size_t i = 0; i < wanted.size(); ++i)
+        callers.emplace_back([&, i] { had[i] = threads_of_rendering(scene, wanted[i]); });
+    for (std::thread& c : callers) c.join();
+    for (size_t i = 0; i < wanted.size(); ++i) EXPECT_EQ(had[i], wanted[i]) << i;
+}
+
+}  // namespace
+}  // namespace etendue::test
