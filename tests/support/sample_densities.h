@@ -5,7 +5,8 @@
 // Samples of two techniques i, j that make the same paths, of densities n_i p_i and n_j p_j, satisfy for every cell B
 //     E[ Σ_{x ~ i, x ∈ B} n_j p_j / (n_i p_i + n_j p_j) ] = ∫_B n_i p_i · n_j p_j / (n_i p_i + n_j p_j) dx
 //                                                         = E[ Σ_{x ~ j, x ∈ B} n_i p_i / (n_i p_i + n_j p_j) ],
-// summands at most 1. Here j are the next events of `path`, its hits for paths of one edge, and B are tiles of the film.
+// summands at most 1. Here j are the next events of `path`, its hits where no next event can make the path, and B are tiles
+// of the film.
 
 #include <array>
 #include <map>
@@ -27,7 +28,7 @@ struct DensityTest {
     bool deviates;
 };
 
-/// Counts the samples of one rendering; scenes without delta events, with one emitter.
+/// Counts the samples of one rendering.
 class SampleCounter final : public ContributionObserver {
 public:
     static constexpr int kTiles = 2, kLongest = 4;
@@ -36,8 +37,10 @@ public:
     SampleCounter(const Scene& scene, const TechniqueCounts& own, const TechniqueCounts& others)
         : scene_(scene), own_(own), others_(others) {}
 
-    static Technique reference_technique(int edges) {
-        return edges == 1 ? connection_technique(0, 2) : connection_technique(1, edges);
+    static Technique reference_technique(const PathPdfs& pdfs) {
+        const int n = pdfs.vertices();
+        const Technique next_event = connection_technique(1, n - 1);
+        return n > 2 && pdfs.density(next_event) > 0 ? next_event : connection_technique(0, n);
     }
 
     void observe(const Join& join, Rgb, float, uint64_t, const Workspace& paths) override {
@@ -59,7 +62,10 @@ public:
         } else {
             x = path_vertices(paths.y, q.s, paths.z, q.t);
         }
-        const PathPdfs pdfs = evaluate_path(scene_, x, std::vector<bool>(x.size(), false)).pdfs;
+        std::vector<bool> delta(x.size());
+        for (int i = 1; i + 1 < n; ++i)
+            delta[size_t(i)] = i != q.s - 1 && i != q.s && x[size_t(i)]->is_delta;
+        const PathPdfs pdfs = evaluate_path(scene_, x, delta).pdfs;
         ++weights_;
         wrong_weights_ += !(std::fabs(mis_weight(pdfs, q, own_) - double(join.mis_weight)) < 2e-3);
         const double own = double(own_.of(q)) * pdfs.density(q);
@@ -69,8 +75,9 @@ public:
             cells_[{n, s}][cell] += other / (own + other);
         };
         // As a sample of its own technique, and as one of those that all others are compared with.
-        add(q.s, reference_technique(n - 1), others_);
-        if (q == reference_technique(n - 1))
+        const Technique reference = reference_technique(pdfs);
+        add(q.s, reference, others_);
+        if (q == reference)
             for (int s = 0; s < n; ++s)
                 add(kAsReference + s, connection_technique(s, n - s), others_);
     }
