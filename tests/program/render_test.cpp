@@ -94,15 +94,15 @@ TEST_F(RenderTest, RefusesCropsAndSizesThatCannotBe) {
 
 /// A limit of memory that pass 0 holds but not every pass.
 TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
-    const auto vcm = [&](int width, int spp, int seed) {
+    const auto vcm = [&](int light_paths, int spp, int seed) {
         std::ofstream(image) << kEarlier;
-        return run({"-i", "vcm:memory=1", "--spp", std::to_string(spp), "--seed",
-                    std::to_string(seed), "--resolution", fmt::format("{}x16", width)});
+        return run({"-i", fmt::format("vcm:memory=1,light_paths={}", light_paths), "--spp",
+                    std::to_string(spp), "--seed", std::to_string(seed), "--resolution", "32x16"});
     };
-    int fits = 4, fails = 1024;
+    int fits = 1, fails = 1 << 16;
     while (fails - fits > 1) {
-        const int width = (fits + fails) / 2;
-        (vcm(width, 1, 0).status == 0 ? fits : fails) = width;
+        const int light_paths = (fits + fails) / 2;
+        (vcm(light_paths, 1, 0).status == 0 ? fits : fails) = light_paths;
     }
     // In the first pass: nothing is written.
     const ProgramResult first = vcm(fails, 4, 0);
@@ -132,7 +132,7 @@ TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
         EXPECT_EQ(read_image(image).data, pixels);
         return;
     }
-    FAIL() << "no pass failed at a width of " << fits;
+    FAIL() << "no pass failed with light_paths=" << fits;
 }
 
 /// Passes of seconds, on one thread.
