@@ -19,7 +19,7 @@ enum class Estimator { Unbiased, Consistent, Biased };
 class Integrator {
 public:
     virtual ~Integrator() = default;
-    /// Learns from what earlier passes left: before pass 0, where there is nothing yet, and before passes 1, 2, 4, 8 …
+    /// Learns from what earlier passes left: before pass 0, where there is nothing yet, and before passes 1, 4, 16, 64 …
     /// What is learned holds until the next call, and from each call on random numbers are independent of earlier ones:
     /// so no pass depends on its own numbers through what it has learned, and every pass has the right expectation.
     virtual void learn(const LearnContext&) {}

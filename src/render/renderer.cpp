@@ -17,13 +17,16 @@ namespace {
 /// Samples in a chunk of parallel work; fixed, whatever the number of threads.
 constexpr uint64_t kChunk = 256;
 
-/// Integrators learn before passes 0, 1, 2, 4, 8 …
+/// Integrators learn before passes 0, 1, 4, 16, 64 …
 struct LearningStep {
     uint32_t number;  ///< Of the step that the pass belongs to.
     uint32_t pass;    ///< Number of the pass since then.
 
     static LearningStep of(uint32_t pass) {
-        return {uint32_t(std::bit_width(pass)), pass == 0 ? 0 : pass - std::bit_floor(pass)};
+        if (pass == 0) return {0, 0};
+        // Since the greatest power of four that is not above `pass`.
+        const uint32_t step = uint32_t(std::bit_width(pass) + 1) / 2;
+        return {step, pass - (uint32_t(1) << (2 * step - 2))};
     }
 };
 

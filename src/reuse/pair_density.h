@@ -18,14 +18,14 @@ class PointGrid;
 /// n comes from an earlier pass, so that it is a function of the place alone and weights still sum to one.
 class PairDensity final : public LearnedPlaces {
 public:
-    /// All partners count.
+    /// Nothing is known yet: pairs count next to nothing, so that a first pass leaves them what no other technique makes.
     PairDensity() = default;
     /// From the light vertices of that pass; `radius`: of pairs; `correlation`: ρ.
     PairDensity(const PointGrid& vertices, float radius, double correlation);
 
     /// Of 1/(1 + ρ n) at `p`, to about 2 %: weights need it small in memory, not exact.
     uint8_t pair_level(Vec3 p) const override {
-        return levels_.empty() ? uint8_t(0) : levels_[cells_.bucket_of(cells_.cell_of(p))];
+        return levels_.empty() ? uint8_t(255) : levels_[cells_.bucket_of(cells_.cell_of(p))];
     }
     /// n, as exactly.
     float partners(uint8_t level) const {
