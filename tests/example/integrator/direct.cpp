@@ -13,21 +13,20 @@ public:
         : counts_{.hit = 1, .next_event = next_event ? 1.0f : 0.0f} {}
 
     void sample(const SampleContext& c, Workspace& work) const override {
+        const WalkContext walk{c.scene, counts_, work.stats, {.max_vertices = 3}};
         SubPath& z = work.z;
-        start_eye_path(c.scene, c.film, c.pixel, c.sampler, counts_, z, work.stats);
+        start_eye_path(walk, c.film, c.pixel, c.sampler, z);
         if (z.size() < 2) return;
         add_hits(c, z, 2);
         if (counts_.next_event > 0)
             if (const auto j = join_next_event(c.scene, z, 2, c.sampler, counts_))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add(*j, j->contribution * Tr);
-        if (extend<TransportMode::Radiance>(c.scene, c.sampler, {.max_vertices = 3}, counts_, z,
-                                            work.stats))
-            add_hits(c, z, 3);
+        if (extend<TransportMode::Radiance>(walk, c.sampler, z)) add_hits(c, z, 3);
     }
 
     TechniqueCounts counts(const Scene&, uint64_t) const override { return counts_; }
-    bool traces_light_paths() const override { return false; }
+    uint64_t light_paths(const Scene&) const override { return 0; }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:

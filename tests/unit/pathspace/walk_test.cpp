@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pathspace/subpath.h"
+#include "pathspace/walk.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -19,12 +19,11 @@ struct Walks : ::testing::Test {
     void walk(uint32_t index, const WalkOptions& options, SubPath& path) {
         Sampler sampler(SamplerKind::Independent, 3);
         sampler.start(index, index % 64);
+        const WalkContext context{scene, counts, stats, options};
         if (mode == TransportMode::Radiance)
-            start_eye_path(scene, film, index % 64, sampler, counts, path, stats);
+            trace_eye_path(context, film, index % 64, sampler, path);
         else
-            start_light_path(scene, sampler, counts, path, stats);
-        while (path.size() >= 2 && extend<mode>(scene, sampler, options, counts, path, stats)) {
-        }
+            trace_light_path(context, sampler, path);
     }
 
     template <TransportMode mode>

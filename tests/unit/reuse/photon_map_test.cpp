@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pathspace/photon_map.h"
 #include "random.h"
+#include "reuse/photon_map.h"
 
 namespace etendue {
 namespace {
