@@ -124,7 +124,7 @@ TEST_F(KeptLightPaths, AreRestored) {
         if (HasFailure()) return;
     }
     EXPECT_EQ(vertex, kept.vertices().size());
-    EXPECT_GT(vertex, 2 * kPaths);
+    EXPECT_GT(vertex, kPaths);
 }
 
 TEST_F(KeptLightPaths, AreRestoredUpToAVertex) {
