@@ -9,16 +9,15 @@ const char* __asan_default_options();
 /// Tasks of TBB are handed from thread to thread inside libtbb, whose order the sanitizer cannot see. What precedes and
 /// follows a loop it is told (tsan/tbb/parallel_for.h); what is left are accesses by TBB's own inline functions, which call
 /// no code of ours (fold_tree) or of which only the innermost frame counts, and atomics of the types that only TBB uses.
-/// Embree builds its trees on threads of its own, and uses the program's copy of string::compare().
+/// Embree builds its trees on threads of its own, which call back for bounds and memory and use the program's copies of
+/// standard functions.
 const char* __tsan_default_suppressions() {
     return "race_top:/oneapi/tbb/\n"
            "race_top:std::__atomic_base<bool>\n"
            "race_top:std::__atomic_base<int>\n"
            "race_top:>::__atomic_base(\n"
            "race:fold_tree\n"
-           "race:bounds_callback\n"
-           "race_top:std::__cxx11::basic_string<char, std::char_traits<char>, std::allocator<char> "
-           ">::compare(char const*)\n"
+           "race:libembree3.so\n"
            "called_from_lib:libtbb.so\n"
            "called_from_lib:libembree3.so\n";
 }
