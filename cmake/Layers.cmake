@@ -13,6 +13,10 @@ target_compile_options(etendue_options INTERFACE
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     # GCC 12 fires these in inlined code of optionals, variants and strings where nothing is wrong (GCC bug 105329).
     target_compile_options(etendue_options INTERFACE -Wno-maybe-uninitialized -Wno-restrict)
+    if(ETENDUE_PCH)
+        # With precompiled headers it does not see that the code is the standard library's (GCC bug 105651).
+        target_compile_options(etendue_options INTERFACE -Wno-array-bounds -Wno-stringop-overflow)
+    endif()
 endif()
 if(ETENDUE_ARCH)
     target_compile_options(etendue_options INTERFACE -march=${ETENDUE_ARCH})
@@ -21,7 +25,28 @@ if(ETENDUE_SANITIZE)
     target_compile_options(etendue_options INTERFACE
         -fsanitize=${ETENDUE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
     target_link_options(etendue_options INTERFACE -fsanitize=${ETENDUE_SANITIZE})
+    if(ETENDUE_SANITIZE STREQUAL "thread")
+        # GCC warns of fences, which are in TBB's headers.
+        target_include_directories(etendue_options BEFORE INTERFACE ${PROJECT_SOURCE_DIR}/tests/support/tsan)
+        target_compile_options(etendue_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>)
+    endif()
 endif()
+
+# Standard headers that most sources include, parsed once for all layers. A source must include what it uses all the same:
+# the preset `clang` goes without.
+set(ETENDUE_COMMON_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <map> <memory> <optional> <span> <string>
+    <string_view> <utility> <variant> <vector>)
+function(etendue_precompiled_headers target)
+    if(NOT ETENDUE_PCH)
+        return()
+    endif()
+    target_precompile_headers(${target} ${ARGN})
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+        target_compile_options(${target} PRIVATE -fpch-preprocess)  # for ccache
+    else()
+        target_compile_options(${target} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
+    endif()
+endfunction()
 
 # etendue_layer(NAME [DEPENDS layers or targets...]): every *.cpp of the folder.
 function(etendue_layer name)
@@ -34,6 +59,13 @@ function(etendue_layer name)
         add_library(${name} STATIC ${sources})
         target_include_directories(${name} PUBLIC ${include})
         target_link_libraries(${name} PUBLIC etendue_options ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE})
+        get_property(first GLOBAL PROPERTY etendue_first_layer)
+        if(first)
+            etendue_precompiled_headers(${name} REUSE_FROM ${first})
+        else()
+            etendue_precompiled_headers(${name} PRIVATE ${ETENDUE_COMMON_HEADERS})
+            set_property(GLOBAL PROPERTY etendue_first_layer ${name})
+        endif()
     else()
         add_library(${name} INTERFACE)
         target_include_directories(${name} INTERFACE ${include})

@@ -210,8 +210,79 @@ TEST_P(OverFloor, SphereLamp) {
         0.03);
 }
 
+/// A strong light, and one of a hundredth of its power beside the view, so near to the floor that it shows.
+TEST_P(OverFloor, PointLightsOfUnequalPower) {
+    const auto light = [](const char* position, const char* intensity) {
+        return fmt::format("<emitter type=\"point\"><point name=\"position\" value=\"{}\"/><rgb "
+                           "name=\"intensity\" value=\"{}\"/></emitter>",
+                           position, intensity);
+    };
+    const Scene scene =
+        build(camera_above(GetParam(), 1) + floor_of(kFloor) + light("0.3,-0.2,2.3", "3,2,1") +
+              light("-1.1,0.3,0.5", "0.03,0.02,0.01"));
+    expect_image(
+        scene, {"path", "light", "bdpt"}, 8192,
+        [&](float x, float y) {
+            const auto irradiance = [&](Vec3 from) {
+                const Vec3 v = from - on_plane(1, x, y);
+                return v.z / std::pow(length(v), 3.0f);
+            };
+            return kFloor * Rgb(3, 2, 1) *
+                   ((irradiance({0.3f, -0.2f, 2.3f}) + 0.01f * irradiance({-1.1f, 0.3f, 0.5f})) /
+                    kPi);
+        },
+        0.04);
+}
+
 INSTANTIATE_TEST_SUITE_P(Cameras, OverFloor,
                          ::testing::Values("perspective", "orthographic", "thinlens"),
+                         [](const auto& p) { return std::string(p.param); });
+
+// ---- Other units: the scene far from the origin, radiance far from 1.
+
+class InOtherUnits : public ::testing::TestWithParam<const char*> {};
+
+/// The same picture 10⁴ units away, where positions are known to 0.001.
+TEST_P(InOtherUnits, FarFromTheOrigin) {
+    const auto moved = [](float x, float y, float z) {
+        return fmt::format("{},{},{}", 10000 + x, -20000 + y, 5000 + z);
+    };
+    const Scene scene = build(
+        fmt::format(
+            "<sensor type=\"perspective\"><float name=\"fov\" value=\"53.1301\"/><transform "
+            "name=\"to_world\"><lookat origin=\"{}\" target=\"{}\" up=\"0,1,0\"/></transform>"
+            "<film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer "
+            "name=\"height\" value=\"8\"/><rfilter type=\"box\"/></film></sensor>",
+            moved(0, 0, 2), moved(0, 0, 0)) +
+        rectangle("<scale value=\"4\"/><translate x=\"10000\" y=\"-20000\" z=\"5000\"/>",
+                  lambert(kFloor)) +
+        sphere(moved(0.5f, 0.25f, 3), "0.5",
+               lambert(Rgb(0)) +
+                   "<emitter type=\"area\"><rgb name=\"radiance\" value=\"30,20,10\"/></emitter>"));
+    expect_image(
+        scene, {GetParam()}, 8192,
+        [&](float x, float y) {
+            const Vec3 v = Vec3{0.5f, 0.25f, 3} - on_plane(1, x, y);
+            return kFloor * Rgb(30, 20, 10) * (0.25f * v.z / std::pow(length(v), 3.0f));
+        },
+        0.03);
+}
+
+TEST_P(InOtherUnits, RadianceFarFromOne) {
+    for (const float unit : {1e-6f, 1e6f}) {
+        SCOPED_TRACE(unit);
+        const Scene scene = build(camera_above("perspective", 1) + floor_of(kFloor) +
+                                  "<emitter type=\"directional\"><vector name=\"direction\" "
+                                  "value=\"0.3,0.4,-1\"/>" +
+                                  rgb("irradiance", Rgb(3, 2, 1) * unit) + "</emitter>");
+        expect_image(
+            scene, {GetParam()}, 2048,
+            [&](float, float) { return kFloor * Rgb(3, 2, 1) * (unit / (std::sqrt(1.25f) * kPi)); },
+            0.04);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, InOtherUnits, ::testing::Values("path", "light", "bdpt"),
                          [](const auto& p) { return std::string(p.param); });
 
 // ---- Environments.

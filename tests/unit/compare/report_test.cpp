@@ -2,6 +2,8 @@
 
 #include "compare/report.h"
 
+#include <sys/mman.h>
+
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -113,29 +115,39 @@ TEST(Plot, DrawsWhatALogarithmShows) {
     EXPECT_EQ(circles, 2u);
 }
 
+/// Memory that the system gives and takes back at once, unlike an allocator, above all that of a sanitizer.
+class Pages {
+public:
+    explicit Pages(size_t bytes)
+        : bytes_(bytes), begin_(mmap(nullptr, bytes, PROT_READ | PROT_WRITE,
+                                     MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0)) {
+        EXPECT_NE(begin_, MAP_FAILED);
+    }
+    ~Pages() { munmap(begin_, bytes_); }
+    Pages(const Pages&) = delete;
+    Pages& operator=(const Pages&) = delete;
+
+private:
+    size_t bytes_;
+    void* begin_;
+};
+
 TEST(MemoryMeter, CountsWhatBecomesResidentInItsTurns) {
     constexpr size_t kMiB = 1 << 20;
     if (resident_bytes() == 0) GTEST_SKIP() << "this system does not tell";
     MemoryMeter one, other;
     one.begin();
-    std::vector<char> kept(32 * kMiB, 1);
-    {
-        const std::vector<char> passing(64 * kMiB, 1);
-        EXPECT_EQ(passing.back(), 1);
-    }
+    const Pages kept(32 * kMiB);
+    { const Pages passing(64 * kMiB); }
     one.end();
     other.begin();
-    std::vector<char> more(16 * kMiB, 1);
+    const Pages more(16 * kMiB);
     other.end();
     one.begin();
-    {
-        const std::vector<char> passing(80 * kMiB, 1);
-        EXPECT_EQ(passing.back(), 1);
-    }
+    { const Pages passing(80 * kMiB); }
     one.end();
     EXPECT_NEAR(double(one.peak_bytes()) / kMiB, 32 + 80, 4);
     EXPECT_NEAR(double(other.peak_bytes()) / kMiB, 16, 4);
-    EXPECT_EQ(kept.back() + more.back(), 2);
 }
 
 TEST(FileStem, KeepsWhatFileNamesMayHave) {

@@ -1,0 +1,68 @@
+// Russian roulette of walks: who survives has the throughput of the walk without it over the probability of surviving.
+
+#include <gtest/gtest.h>
+
+#include "pathspace/walk.h"
+#include "test_scenes.h"
+
+namespace etendue {
+namespace {
+
+struct Walks : ::testing::Test {
+    const Scene scene = test::build(test::mixed_room(test::front_camera(8)));
+    const Film film{scene.film(), scene.filter()};
+    const TechniqueCounts counts{.hit = 1, .next_event = 1, .connect = 1, .splat = 64};
+    RenderStats stats;
+
+    /// A sub-path of the same numbers with any options.
+    template <TransportMode mode>
+    void walk(uint32_t index, const WalkOptions& options, SubPath& path) {
+        Sampler sampler(SamplerKind::Independent, 3);
+        sampler.start(index, index % 64);
+        const WalkContext context{scene, counts, stats, options};
+        if (mode == TransportMode::Radiance)
+            trace_eye_path(context, film, index % 64, sampler, path);
+        else
+            trace_light_path(context, sampler, path);
+    }
+
+    template <TransportMode mode>
+    void expect_expected_throughput() {
+        constexpr int kFirst = 2, kVertices = 7;
+        double survived = 0, expected = 0, variance = 0;
+        SubPath with, without;
+        for (uint32_t index = 0; index < 20000; ++index) {
+            walk<mode>(index, {kVertices, kFirst}, with);
+            walk<mode>(index, {kVertices, 1000}, without);
+            ASSERT_LE(with.size(), without.size());
+            double q = 1;
+            for (int i = 0; i < with.size(); ++i) {
+                const Rgb a = with[i].beta, b = without[i].beta;
+                for (int c = 0; c < 3; ++c)
+                    ASSERT_NEAR(a[c] * q, b[c], 1e-4 * std::fabs(b[c])) << "vertex " << i;
+                if (i < kFirst || with[i].kind != Vertex::Kind::Surface) continue;
+                q *= double(with[i].survival.value());
+                // Who ends here ends by roulette where the walk without it goes on.
+                if (i + 1 == without.size()) continue;
+                const double survival = double(with[i].survival.value());
+                survived += i + 1 < with.size();
+                expected += survival;
+                variance += survival * (1 - survival);
+            }
+        }
+        EXPECT_GT(variance, 1000) << "roulette hardly plays";
+        EXPECT_LT(std::fabs(survived - expected), 4 * std::sqrt(variance))
+            << survived << " survived, expected " << expected;
+    }
+};
+
+TEST_F(Walks, RouletteKeepsTheExpectedThroughputOfEyePaths) {
+    expect_expected_throughput<TransportMode::Radiance>();
+}
+
+TEST_F(Walks, RouletteKeepsTheExpectedThroughputOfLightPaths) {
+    expect_expected_throughput<TransportMode::Importance>();
+}
+
+}  // namespace
+}  // namespace etendue

@@ -1,0 +1,145 @@
+// Light paths that are kept are those that were walked.
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "pathspace/walk.h"
+#include "reuse/light_vertex_cache.h"
+#include "test_scenes.h"
+
+namespace etendue {
+namespace {
+
+constexpr uint32_t kPaths = 600, kChunks = 7;
+
+class KeptLightPaths : public ::testing::Test {
+protected:
+    KeptLightPaths() {
+        kept.begin(kChunks, LightVertexCache::kVertexBytes, uint64_t(1) << 30);
+        for (uint32_t chunk = 0; chunk < kChunks; ++chunk)
+            for (uint32_t i = first(chunk); i < first(chunk + 1); ++i) {
+                walk(i);
+                kept.add(chunk, y);
+            }
+        kept.assemble();
+    }
+    static uint32_t first(uint32_t chunk) { return chunk * kPaths / kChunks; }
+
+    /// Light path `index` into `y`, the same each time.
+    void walk(uint32_t index) {
+        sampler.start(0, index);
+        trace_light_path({scene, counts, stats, {8, 3}}, sampler, y);
+    }
+
+    /// The walk's ray leaves the predecessor at an offset, see offset_origin(); what is restored looks at the point itself.
+    static float direction_error(const SubPath& path, int i) {
+        if (path[i - 1].is_infinite) return 1e-6f;
+        const Vec3 p = path[i - 1].p;
+        const float offset =
+            0x1p-16f * std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), 0x1p-6f});
+        return 1e-6f + offset / length(path[i].p - p);
+    }
+
+    /// What joins with vertex i read of it and of those before.
+    static void expect_same(const SubPath& a, const SubPath& b, int i, bool has_bsdf) {
+        SCOPED_TRACE(::testing::Message() << "vertex " << i);
+        const Vertex &v = a[i], &w = b[i];
+        EXPECT_EQ(v.kind, w.kind);
+        for (int axis = 0; axis < 3; ++axis) {
+            EXPECT_EQ(v.p[axis], w.p[axis]);
+            EXPECT_EQ(v.beta[axis], w.beta[axis]);
+        }
+        EXPECT_EQ(v.pdf_fwd, w.pdf_fwd);
+        EXPECT_EQ(v.is_infinite, w.is_infinite);
+        EXPECT_EQ(v.has_cosine, w.has_cosine);
+        EXPECT_EQ(v.is_connectible, w.is_connectible);
+        EXPECT_EQ(v.is_delta, w.is_delta);
+        EXPECT_EQ(v.gloss, w.gloss);
+        EXPECT_EQ(v.medium, w.medium);
+        EXPECT_EQ(v.survival.steps(), w.survival.steps());
+        if (i == 0) {
+            EXPECT_EQ(v.emitter, w.emitter);
+            for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(v.ng[axis], w.ng[axis]);
+            return;
+        }
+        EXPECT_EQ(v.to_predecessor, w.to_predecessor);
+        EXPECT_NEAR(v.weight_sum, w.weight_sum, 1e-6 * v.weight_sum);
+        EXPECT_EQ(v.pair_level, w.pair_level);
+        if (i == 1) {
+            EXPECT_EQ(v.next_event_ratio, w.next_event_ratio);
+        }
+        if (!has_bsdf) return;
+        EXPECT_EQ(v.shape, w.shape);
+        EXPECT_EQ(v.emitter, w.emitter);
+        const float error = direction_error(a, i);
+        for (int axis = 0; axis < 3; ++axis) {
+            EXPECT_EQ(v.ng[axis], w.ng[axis]);
+            EXPECT_NEAR(v.wo[axis], w.wo[axis], error);
+        }
+        const Vec3 wi = normalize(v.ng + Vec3{0.3f, -0.2f, 0.1f});
+        const BsdfEval f = v.eval(wi, TransportMode::Importance),
+                       g = w.eval(wi, TransportMode::Importance);
+        EXPECT_NEAR(f.pdf, g.pdf, 1e-6f + (1e-4f + 100 * error) * f.pdf);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(f.f[c], g.f[c], 1e-6f + (1e-4f + 100 * error) * f.f[c]);
+    }
+
+    const Scene scene = test::build(
+        test::mixed_room(test::front_camera(8)) +
+        "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>"
+        "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>");
+    const TechniqueCounts counts{.hit = 1, .next_event = 1, .connect = 1, .splat = 64};
+    Sampler sampler{SamplerKind::Independent, 9};
+    RenderStats stats;
+    SubPath y, restored;
+    LightVertexCache kept;
+};
+
+TEST_F(KeptLightPaths, AreRestored) {
+    ASSERT_EQ(kept.size(), kPaths);
+    uint32_t vertex = 0;
+    for (uint32_t path = 0; path < kPaths; ++path) {
+        SCOPED_TRACE(::testing::Message() << "path " << path);
+        walk(path);
+        kept.restore(scene, path, restored);
+        ASSERT_EQ(restored.size(), y.size());
+        for (int i = 0; i < y.size(); ++i) expect_same(y, restored, i, true);
+        for (int i = 1; i < y.size(); ++i, ++vertex) {
+            EXPECT_EQ(kept.vertices()[vertex].path, path);
+            EXPECT_EQ(kept.depth(vertex), i);
+            const Photon photon = kept.photon(vertex);
+            EXPECT_EQ(photon.s, i + 1);
+            EXPECT_EQ(photon.emitter, y[0].emitter);
+            for (int axis = 0; axis < 3; ++axis) {
+                EXPECT_EQ(photon.p[axis], y[i].p[axis]);
+                EXPECT_EQ(photon.power[axis], y[i].beta[axis]);
+                EXPECT_NEAR(photon.wi[axis], y[i].wo[axis], direction_error(y, i));
+            }
+            bool by_delta_events = true;
+            for (int j = 1; j < i; ++j) by_delta_events &= y[j].is_delta;
+            EXPECT_EQ(kept.came_by_delta_events(vertex), by_delta_events);
+        }
+        if (HasFailure()) return;
+    }
+    EXPECT_EQ(vertex, kept.vertices().size());
+    EXPECT_GT(vertex, kPaths);
+}
+
+TEST_F(KeptLightPaths, AreRestoredUpToAVertex) {
+    for (uint32_t vertex = 0; vertex < kept.vertices().size(); ++vertex)
+        for (const bool whole : {false, true}) {
+            const int size = kept.depth(vertex) + 1;
+            SCOPED_TRACE(::testing::Message() << "vertex " << vertex << ", whole: " << whole);
+            walk(kept.vertices()[vertex].path);
+            kept.restore_first(scene, vertex, size, whole, restored);
+            ASSERT_EQ(restored.size(), size);
+            for (int i = 0; i < size; ++i)
+                if (i == 0 || whole || i >= size - 3) expect_same(y, restored, i, i == size - 1);
+            if (HasFailure()) return;
+        }
+}
+
+}  // namespace
+}  // namespace etendue

@@ -1,0 +1,64 @@
+// The nearest photons against a search through all of them.
+
+#include <algorithm>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "random.h"
+#include "reuse/photon_map.h"
+
+namespace etendue {
+namespace {
+
+std::vector<MapPhoton> random_photons(size_t count) {
+    testing::Random random(5);
+    std::vector<MapPhoton> photons(count);
+    for (MapPhoton& p : photons) p.p = random.in_cube();
+    return photons;
+}
+
+TEST(PhotonMap, FindsTheNearest) {
+    PhotonMap map;
+    map.build(random_photons(3000));
+    testing::Random random(6);
+    for (const int count : {1, 2, 7, 64, PhotonMap::kMostNeighbours})
+        for (const float radius : {0.02f, 0.2f, 0.7f, 10.0f})
+            for (int query = 0; query < 20; ++query) {
+                SCOPED_TRACE(::testing::Message() << count << " within " << radius);
+                const Vec3 p = random.in_cube() * 1.2f;
+                const auto distance2 = [&](uint32_t i) { return length2(map.photons()[i].p - p); };
+                std::vector<uint32_t> all(map.photons().size());
+                std::iota(all.begin(), all.end(), 0u);
+                std::ranges::sort(all, {}, distance2);
+                const auto within = std::ranges::count_if(
+                    all, [&](uint32_t i) { return distance2(i) < radius * radius; });
+                const bool is_full = within >= count;
+                const size_t expected = size_t(is_full ? count - 1 : within);
+                const float expected_disc =
+                    kPi * (is_full ? distance2(all[expected]) : radius * radius);
+
+                PhotonMap::Neighbours found;
+                map.find(p, count, radius, found);
+                ASSERT_EQ(size_t(found.count), expected);
+                std::sort(found.index.begin(), found.index.begin() + found.count);
+                std::sort(all.begin(), all.begin() + ptrdiff_t(expected));
+                EXPECT_TRUE(std::equal(all.begin(), all.begin() + ptrdiff_t(expected),
+                                       found.index.begin()));
+                EXPECT_NEAR(found.disc, expected_disc, 1e-5f * expected_disc);
+            }
+}
+
+TEST(PhotonMap, FindsNothingInNothing) {
+    PhotonMap map;
+    PhotonMap::Neighbours found;
+    map.find({}, 8, 1, found);
+    EXPECT_EQ(found.count, 0);
+    map.build({});
+    map.find({}, 8, 1, found);
+    EXPECT_EQ(found.count, 0);
+    EXPECT_FLOAT_EQ(found.disc, kPi);
+}
+
+}  // namespace
+}  // namespace etendue
