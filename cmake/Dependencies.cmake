@@ -1,13 +1,14 @@
 find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(fmt REQUIRED)
-find_package(spdlog REQUIRED)
 find_package(pugixml REQUIRED)
 find_package(OpenImageIO REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(nanoflann REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_package(nanoflann REQUIRED)
+find_package(Imath REQUIRED)
+find_package(Boost REQUIRED)  # Math, headers alone
+find_path(XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
 
 # Embree 3.13 is what Debian 12 has; the code also compiles against 4.
 find_package(embree 4 QUIET)

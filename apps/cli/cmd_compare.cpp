@@ -14,6 +14,7 @@
 #include "compare/comparison.h"
 #include "compare/report.h"
 #include "interrupt.h"
+#include "number_checks.h"
 #include "path_lengths.h"
 #include "scene_options.h"
 
@@ -181,7 +182,8 @@ void CompareCommand::run() const {
                         "contain the difference\n",
                         m.name, max_depth(m.integrator), max_depth(how.integrator));
             reference = make_reference(
-                scene, {how, kept_references, scene_fingerprint(description)},
+                scene,
+                {how, kept_references, scene_fingerprint(description), program_fingerprint()},
                 [&](const Progress& p) {
                     status.show(fmt::format("{}: reference, {} spp, {:.1f} s", scenes[i], p.passes,
                                             p.seconds));
@@ -213,9 +215,9 @@ void add_compare_command(CLI::App& app) {
                  "Integrators with parameters: path 'bdpt:max_depth=8'; the first is the yardstick")
         ->required();
     c.add_option("--time", command->seconds, "Seconds that each method renders")
-        ->check(CLI::PositiveNumber);
+        ->check(must_be_above_0);
     c.add_option("--spp", command->spp, "Samples per pixel of each method, instead of --time")
-        ->check(CLI::PositiveNumber);
+        ->check(must_be_above_0);
     c.add_option("--runs", command->runs, "Independent runs, with seeds that count on")
         ->capture_default_str()
         ->check(CLI::Range(1, 10000));
@@ -230,10 +232,10 @@ void add_compare_command(CLI::App& app) {
     c.add_option("--reference", command->references, "Images to judge by, one a scene");
     c.add_option("--reference-time", command->reference_seconds,
                  "Seconds to render the reference (default: 10 times --time)")
-        ->check(CLI::PositiveNumber);
+        ->check(must_be_above_0);
     c.add_option("--reference-spp", command->reference_spp,
                  "Samples per pixel of the reference (default: 16 times --spp)")
-        ->check(CLI::PositiveNumber);
+        ->check(must_be_above_0);
     c.add_option("--reference-method", command->reference_method,
                  "Integrator of the reference (default: bdpt)");
     c.add_option("--references", command->kept_references, "Folder where references are kept")

@@ -16,6 +16,7 @@
 #include "image/atomic_file.h"
 #include "image/image_io.h"
 #include "interrupt.h"
+#include "number_checks.h"
 #include "preview.h"
 #include "render/aov.h"
 #include "render/renderer.h"
@@ -326,11 +327,11 @@ void add_render_command(CLI::App& app) {
     c.add_option(
         "-i,--integrator", command->integrator,
         "Integrator with parameters: bdpt or bdpt:max_depth=12,rr_depth=5 (default: the scene's)");
-    c.add_option("--spp", command->spp, "Samples per pixel")->check(CLI::PositiveNumber);
+    c.add_option("--spp", command->spp, "Samples per pixel")->check(must_be_above_0);
     c.add_option("--time", command->seconds, "Seconds to render, within one pass")
-        ->check(CLI::PositiveNumber);
+        ->check(must_be_above_0);
     c.add_option("--error", command->error, "Stop at this relative RMS error of the image")
-        ->check(CLI::PositiveNumber);
+        ->check(must_be_above_0);
     c.add_option("--grace", command->grace,
                  "Seconds that the pass in flight may go on after Ctrl-C or SIGTERM; then it is "
                  "dropped")

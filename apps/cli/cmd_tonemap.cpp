@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "image/image_io.h"
 #include "image/tonemap.h"
+#include "number_checks.h"
 
 namespace etendue {
 namespace {
@@ -39,7 +40,7 @@ void add_tonemap_command(CLI::App& app) {
     c.add_option("--white", command->mapping.white,
                  "Luminance that becomes white under reinhard; 0: the image's largest")
         ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
+        ->check(must_be_at_least_0);
     c.add_option("--layer", command->layer, "Take this layer, e.g. albedo, instead of the picture");
     c.callback([command] { command->run(); });
 }

@@ -11,6 +11,7 @@
 #include "commands.h"
 #include "image/atomic_file.h"
 #include "image/image_io.h"
+#include "number_checks.h"
 #include "path_lengths.h"
 #include "scene_options.h"
 #include "verify/verify.h"
@@ -281,10 +282,10 @@ void add_verify_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(1e-9, 0.5));
     auto* spp = c.add_option("--spp", command->spp, "Samples per pixel of each run")
-                    ->check(CLI::PositiveNumber);
+                    ->check(must_be_above_0);
     c.add_option("--time", command->options.seconds, "Seconds for all runs of one method")
         ->capture_default_str()
-        ->check(CLI::PositiveNumber)
+        ->check(must_be_above_0)
         ->excludes(spp);
     auto* against = c.add_option("--against", command->against, "Method to compare with")
                         ->capture_default_str();

@@ -71,7 +71,7 @@ ObserverRow observer_at(double nm) {
 }
 
 /// ∫ S(λ) (x̄, ȳ, z̄)(λ) dλ / ∫ ȳ(λ) dλ in sRGB, both integrals weighted by the illuminant.
-/// `spectrum` is called with ascending wavelengths in nm.
+/// Components outside the gamut are negative. `spectrum` is called with ascending wavelengths in nm.
 template <class Spectrum>
 Rgb integrate(Illuminant illuminant, Spectrum spectrum) {
     double X = 0, Y = 0, Z = 0, white = 0;
@@ -84,8 +84,23 @@ Rgb integrate(Illuminant illuminant, Spectrum spectrum) {
         Z += s * o.z;
         white += light * o.y;
     }
-    const Rgb c = xyz_to_rgb(X / white, Y / white, Z / white);
+    return xyz_to_rgb(X / white, Y / white, Z / white);
+}
+
+Rgb clipped(Rgb c) {
     return {std::max(c.r, 0.0f), std::max(c.g, 0.0f), std::max(c.b, 0.0f)};
+}
+
+Rgb unclipped_rgb(std::span<const double> wavelengths_nm, std::span<const double> values,
+                  Illuminant illuminant) {
+    size_t next = 0;  // first knot beyond the current wavelength
+    return integrate(illuminant, [&](double nm) {
+        while (next < wavelengths_nm.size() && wavelengths_nm[next] <= nm) ++next;
+        if (next == 0 || next == wavelengths_nm.size()) return 0.0;
+        const double left = wavelengths_nm[next - 1];
+        const double t = (nm - left) / (wavelengths_nm[next] - left);
+        return std::lerp(values[next - 1], values[next], t);
+    });
 }
 
 }  // namespace
@@ -99,26 +114,30 @@ Rgb xyz_to_rgb(double X, double Y, double Z) {
 
 Rgb spectrum_to_rgb(std::span<const double> wavelengths_nm, std::span<const double> values,
                     Illuminant illuminant) {
-    size_t next = 0;  // first knot beyond the current wavelength
-    return integrate(illuminant, [&](double nm) {
-        while (next < wavelengths_nm.size() && wavelengths_nm[next] <= nm) ++next;
-        if (next == 0 || next == wavelengths_nm.size()) return 0.0;
-        const double left = wavelengths_nm[next - 1];
-        const double t = (nm - left) / (wavelengths_nm[next] - left);
-        return std::lerp(values[next - 1], values[next], t);
-    });
+    return clipped(unclipped_rgb(wavelengths_nm, values, illuminant));
+}
+
+std::vector<Rgb> spectrum_weights(std::span<const double> wavelengths_nm, Illuminant illuminant) {
+    std::vector<Rgb> weights;
+    std::vector<double> values(wavelengths_nm.size());
+    for (double& v : values) {
+        v = 1;
+        weights.push_back(unclipped_rgb(wavelengths_nm, values, illuminant));
+        v = 0;
+    }
+    return weights;
 }
 
 Rgb blackbody_rgb(double kelvin) {
     // B_λ = 2 h c² / (λ⁵ (exp(h c / (λ k T)) - 1)), exact SI constants.
     constexpr double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
     constexpr double kMetresPerNm = 1e-9;
-    return integrate(Illuminant::EqualEnergy, [&](double nm) {
+    return clipped(integrate(Illuminant::EqualEnergy, [&](double nm) {
         const double lambda = nm * kMetresPerNm;
         const double radiance =
             2 * h * c * c / (std::pow(lambda, 5) * std::expm1(h * c / (lambda * k * kelvin)));
         return radiance * kMetresPerNm;
-    });
+    }));
 }
 
 }  // namespace etendue

@@ -2,6 +2,7 @@
 // Spectra to linear sRGB: CIE 1931 standard observer, sRGB primaries, no chromatic adaptation.
 
 #include <span>
+#include <vector>
 
 #include "color/rgb.h"
 
@@ -20,6 +21,10 @@ enum class Illuminant { EqualEnergy, D65 };
 /// the gamut become zero.
 Rgb spectrum_to_rgb(std::span<const double> wavelengths_nm, std::span<const double> values,
                     Illuminant illuminant = Illuminant::EqualEnergy);
+
+/// By how much each sample of a spectrum adds to its colour: spectrum_to_rgb() without the clipping.
+std::vector<Rgb> spectrum_weights(std::span<const double> wavelengths_nm,
+                                  Illuminant illuminant = Illuminant::EqualEnergy);
 
 /// Radiance of a black body at the given temperature, in W m⁻² sr⁻¹ nm⁻¹ (Planck's law).
 Rgb blackbody_rgb(double kelvin);

@@ -155,15 +155,22 @@ void check_methods(const std::vector<MethodSpec>& methods) {
 
 void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& methods,
                        const IntegratorSpec& reference) {
-    const auto counts = [&](const IntegratorSpec& spec) {
-        return make_integrator(spec)->counts(scene, scene.film().pixel_count());
+    // Weights of pairs follow what was learned, so that no two renderings have the same: they have no fixed counts.
+    const auto fixed_counts = [&](const IntegratorSpec& spec) -> std::optional<TechniqueCounts> {
+        const auto integrator = make_integrator(spec);
+        const TechniqueCounts counts = integrator->counts(scene, scene.film().pixel_count());
+        const bool learns = counts.gather > 0 || (counts.merge > 0 && counts.connect > 0);
+        return learns ? std::nullopt : std::optional(counts);
     };
-    for (const MethodSpec& m : methods)
-        if (!(counts(m.integrator) == counts(reference)))
+    const auto judge = fixed_counts(reference);
+    for (const MethodSpec& m : methods) {
+        const auto own = fixed_counts(m.integrator);
+        if (!own || !judge || !(*own == *judge))
             throw std::runtime_error(fmt::format(
                 "--paths inner: \"{}\" weighs its techniques otherwise than \"{}\", by which it is "
                 "judged; their inner paths do not have the same mean",
                 m.name, reference.to_string()));
+    }
 }
 
 std::vector<Turn> schedule(const RenderLimits& limits) {

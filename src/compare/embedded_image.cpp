@@ -5,6 +5,8 @@
 
 #include "image/image.h"
 
+#include <OpenImageIO/strutil.h>
+
 namespace etendue {
 namespace {
 
@@ -13,7 +15,7 @@ constexpr float kMaxHalf = 65504;
 /// Halves whose two lowest bits are zero: they are noise to the eye and to deflate.
 uint16_t short_half(float v) {
     if (std::isfinite(v)) v = std::clamp(v, -kMaxHalf, kMaxHalf);
-    const uint16_t bits = to_half(v).bits;
+    const uint16_t bits = Half(v).bits();
     const auto rounded = uint16_t((bits + 2) & ~3);
     constexpr uint16_t kLargest = 0x7bfc;
     const bool overflows = std::isfinite(v) && (rounded & 0x7fff) > kLargest;
@@ -27,17 +29,7 @@ std::string png_data_uri(const std::string& png) {
 }  // namespace
 
 std::string base64(std::string_view bytes) {
-    constexpr const char* kDigits =
-        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string out;
-    out.reserve((bytes.size() + 2) / 3 * 4);
-    for (size_t i = 0; i < bytes.size(); i += 3) {
-        const size_t n = std::min<size_t>(3, bytes.size() - i);
-        uint32_t group = 0;
-        for (size_t k = 0; k < 3; ++k) group = group << 8 | (k < n ? uint8_t(bytes[i + k]) : 0u);
-        for (size_t k = 0; k < 4; ++k) out += k <= n ? kDigits[group >> (18 - 6 * k) & 63] : '=';
-    }
-    return out;
+    return OIIO::Strutil::base64_encode({bytes.data(), bytes.size()});
 }
 
 std::string radiance_data_uri(int width, int height, std::span<const Rgb> pixels) {

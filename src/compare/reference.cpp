@@ -1,5 +1,6 @@
 #include "compare/reference.h"
 
+#include <bit>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -8,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "image/image_io.h"
-#include "math/hash.h"
+#include "math/content_hash.h"
 
 namespace etendue {
 namespace {
@@ -16,25 +17,46 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Raised when references that are kept can no longer be used.
-constexpr uint64_t kFormat = 1;
+constexpr uint64_t kFormat = 2;
 /// Far from the seeds that people give, so that no method shares the reference's random numbers.
 constexpr uint64_t kSeed = 0x7265666572656e63;
 
-uint64_t hash_bytes(uint64_t hash, std::string_view bytes) {
-    hash = hash_combine(hash, bytes.size());
-    while (!bytes.empty()) {
-        uint64_t word = 0;
-        const size_t n = std::min(bytes.size(), sizeof word);
-        std::copy_n(bytes.data(), n, reinterpret_cast<char*>(&word));
-        hash = hash_combine(hash, word);
-        bytes.remove_prefix(n);
-    }
-    return hash;
+std::string contents_of(const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
 }
 
-uint64_t hash_file(uint64_t hash, const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    return hash_bytes(hash, std::string(std::istreambuf_iterator<char>(in), {}));
+/// Adds the value of a parameter, to the last bit.
+struct AddValue {
+    ContentHash& hash;
+
+    void operator()(bool v) const { hash.add(uint64_t(v)); }
+    void operator()(int64_t v) const { hash.add(uint64_t(v)); }
+    void operator()(double v) const { hash.add(std::bit_cast<uint64_t>(v)); }
+    void operator()(const std::string& v) const { hash.add(v); }
+    void operator()(Vec3 v) const { add({v.x, v.y, v.z}); }
+    void operator()(Rgb v) const { add({v.r, v.g, v.b}); }
+    void operator()(const Transform& v) const {
+        for (const auto& row : v.matrix())
+            for (const double x : row) (*this)(x);
+    }
+
+private:
+    void add(std::initializer_list<float> values) const {
+        for (const float x : values) hash.add(uint64_t(std::bit_cast<uint32_t>(x)));
+    }
+};
+
+/// Adds the contents of the file that the scene names so, if there is one.
+void add_file(ContentHash& hash, const SceneDescription& description, const std::string& name) {
+    if (name.empty()) return;
+    for (const std::string& folder : description.search_paths) {
+        const fs::path path = fs::path(folder) / name;
+        std::error_code ignored;
+        if (!fs::is_regular_file(path, ignored)) continue;
+        hash.add(contents_of(path));
+        return;
+    }
 }
 
 double number(const Image& image, const std::string& name) {
@@ -68,16 +90,16 @@ void add_standard_error(Reference& r, const std::vector<Rgb>& variance) {
 }
 
 std::string cache_file(const FilmGeometry& film, const ReferenceSettings& settings) {
-    uint64_t hash = hash_combine(kFormat, settings.fingerprint);
+    ContentHash hash;
+    hash.add(kFormat).add(settings.scene).add(settings.program);
     for (int v : {film.width, film.height, film.crop_x, film.crop_y, film.crop_width,
                   film.crop_height, int(settings.render.sampler)})
-        hash = hash_combine(hash, uint64_t(v));
-    hash = hash_bytes(hash, settings.render.integrator.to_string());
+        hash.add(uint64_t(v));
+    hash.add(settings.render.integrator.to_string());
     const PathSelection& shown = settings.render.shown;
-    if (shown.inner_only) hash = hash_bytes(hash, "inner");
-    if (!shown.has_all_lengths())
-        hash = hash_bytes(hash, fmt::format("{}..{}", shown.shortest, shown.longest));
-    return (fs::path(settings.folder) / fmt::format("reference-{:016x}.exr", hash)).string();
+    hash.add(uint64_t(shown.inner_only)).add(uint64_t(shown.shortest)).add(uint64_t(shown.longest));
+    return (fs::path(settings.folder) / fmt::format("reference-{:016x}.exr", hash.value()))
+        .string();
 }
 
 bool is_long_enough(const Reference& r, const RenderLimits& limits) {
@@ -161,21 +183,25 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
 }
 
 uint64_t scene_fingerprint(const SceneDescription& description) {
-    // The description rounds transforms for its readers; the file itself does not.
-    uint64_t hash = hash_file(hash_bytes(0, dump(description)), description.file);
-    for (const SceneObject& object : description.objects)
+    ContentHash hash;
+    for (const int root : description.roots) hash.add(uint64_t(root));
+    for (const SceneObject& object : description.objects) {
+        hash.add(object.category).add(object.type).add(object.id);
+        hash.add(uint64_t(object.params.size())).add(uint64_t(object.children.size()));
         for (const Param& p : object.params) {
-            const std::string* name = std::get_if<std::string>(&p.value);
-            if (!name || name->empty()) continue;
-            for (const std::string& folder : description.search_paths) {
-                const fs::path path = fs::path(folder) / *name;
-                std::error_code ignored;
-                if (!fs::is_regular_file(path, ignored)) continue;
-                hash = hash_file(hash, path);
-                break;
-            }
+            hash.add(p.name).add(uint64_t(p.value.index()));
+            std::visit(AddValue{hash}, p.value);
+            if (const auto* name = std::get_if<std::string>(&p.value))
+                add_file(hash, description, *name);
         }
-    return hash;
+        for (const SceneObject::Child& c : object.children)
+            hash.add(c.name).add(uint64_t(c.object));
+    }
+    return hash.value();
+}
+
+uint64_t program_fingerprint() {
+    return ContentHash().add(contents_of("/proc/self/exe")).value();
 }
 
 }  // namespace etendue

@@ -41,14 +41,19 @@ Reference read_reference(const std::string& file, const FilmGeometry& geometry);
 struct ReferenceSettings {
     RenderSettings render;  ///< Seeds are chosen here.
     std::string folder;     ///< Where references are kept, named by what they show.
-    uint64_t fingerprint;   ///< Of the scene, see scene_fingerprint().
+    uint64_t scene;         ///< See scene_fingerprint().
+    uint64_t program;       ///< See program_fingerprint().
 };
-/// The one that is kept, if it was rendered for at least as long, else a new one; none where `interrupted` was set.
+/// The one that is kept, if the same program rendered it from the same scene with the same settings for at least as long,
+/// else a new one; none where `interrupted` was set.
 std::optional<Reference> make_reference(const Scene& scene, const ReferenceSettings& settings,
                                         const std::function<void(const Progress&)>& progress,
                                         const std::atomic<bool>& interrupted);
 
-/// Hash of all that the scene's files say: the description with its parameters, and the bytes of every file it names.
+/// Hash of all that the scene's files say: the description, to the last bit, whatever files it was read from; and the
+/// bytes of every mesh, texture and other file that it names.
 uint64_t scene_fingerprint(const SceneDescription& description);
+/// Hash of the running program: another build of it renders another image.
+uint64_t program_fingerprint();
 
 }  // namespace etendue

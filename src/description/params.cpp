@@ -83,6 +83,9 @@ float Params::number(std::string_view name, float fallback, float lo, float hi) 
         v = double(std::get<int64_t>(p->value));
     else if (const double* d = get<double>(name, "float"))
         v = *d;
+    if (p && std::isfinite(v) && !std::isfinite(float(v)))
+        fail(name, fmt::format("parameter \"{}\" is {}, which is out of range for single precision",
+                               name, v));
     if (p && !(std::isfinite(v) && v >= lo && v <= hi))
         fail(name, std::isinf(lo) && std::isinf(hi)
                        ? fmt::format("parameter \"{}\" is {}, but must be finite", name, v)

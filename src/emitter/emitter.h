@@ -3,6 +3,7 @@
 // of choosing it. Finite emitters have points with area densities; emitters at infinity have directions with
 // solid-angle densities, and their light starts on the scene's bounding disc [Veach 1997, §8.2; path-space notes].
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -94,6 +95,8 @@ public:
 
     /// Probability that the scene chooses this emitter, for emission and for next event estimation.
     float selection_pmf = 0;
+    /// Where its light starts, as the scene counts media; none where it is negative.
+    int16_t medium = -1;
 };
 
 /// What the makers need besides parameters.

@@ -1,52 +1,71 @@
 // Daylight: `sky`, `sun` and both as `sunsky`, from the model of sky_model.h. The sky is tabulated as an environment
-// image; the sun is a uniform disc of directions, sampled by itself.
+// image; the sun is a disc of directions, sampled by itself.
 
 #include <cmath>
+#include <optional>
 
 #include "emitter/environment.h"
 #include "emitter/sky_model.h"
 #include "math/frame.h"
-#include "math/warp.h"
 
 namespace etendue {
 namespace {
 
-/// Uniform radiance within a cone of directions.
+/// A disc of directions, sampled uniformly. An angle of half a degree needs more than the digits of its cosine.
 class SunEmitter final : public InfiniteEmitter {
 public:
-    SunEmitter(Vec3 toward, float angular_radius, Rgb radiance)
-        : frame_(Frame::from_normal(toward)), cos_max_(std::cos(angular_radius)),
-          radiance_(radiance) {}
+    /// `limb` where the disc is darker toward its rim and toward the horizon: else its radiance is that of its middle.
+    SunEmitter(Vec3 toward, Vec3 up, double angular_radius, Rgb radiance,
+               std::optional<SunModel> limb, Rgb scale)
+        : frame_(Frame::from_normal(toward)), up_(up), sin2_(sqr(std::sin(angular_radius))),
+          one_minus_cos_(2 * sqr(std::sin(angular_radius / 2))),
+          pdf_(float(1 / (2 * M_PI * one_minus_cos_))), radiance_(radiance), limb_(std::move(limb)),
+          scale_(scale) {}
 
     double power() const override {
-        return double(kPi) * sqr(double(scene_radius())) * luminance(radiance_) /
-               pdf_uniform_cone(cos_max_);
+        return M_PI * sqr(double(scene_radius())) * double(luminance(radiance_)) / double(pdf_);
     }
 
 private:
     Sample sample_arrival(FinePoint u) const override {
-        const Vec3 local = sample_uniform_cone(to_float(u), cos_max_);
-        return {frame_.to_world(local), radiance_, pdf_uniform_cone(cos_max_)};
+        const double h = one_minus_cos_ * u.x, sine = std::sqrt(h * (2 - h)), phi = 2 * M_PI * u.y;
+        const Vec3 d = frame_.to_world(
+            {float(sine * std::cos(phi)), float(sine * std::sin(phi)), float(1 - h)});
+        return {d, seen(d), pdf_};
     }
-    Rgb radiance(Vec3 d) const override { return is_inside(d) ? radiance_ : Rgb(); }
-    float pdf_direction(Vec3 d) const override {
-        return is_inside(d) ? pdf_uniform_cone(cos_max_) : 0.0f;
-    }
-    /// By the distance to the axis: the cosine alone has too few digits for half a degree.
-    bool is_inside(Vec3 d) const {
-        return dot(d, frame_.n) > 0 && length2(cross(d, frame_.n)) <= 1 - sqr(cos_max_);
+    Rgb radiance(Vec3 d) const override { return is_inside(d) ? seen(d) : Rgb(); }
+    float pdf_direction(Vec3 d) const override { return is_inside(d) ? pdf_ : 0.0f; }
+
+    double sin2_to_axis(Vec3 d) const { return double(length2(cross(d, frame_.n))); }
+    bool is_inside(Vec3 d) const { return dot(d, frame_.n) > 0 && sin2_to_axis(d) <= sin2_; }
+
+    Rgb seen(Vec3 d) const {
+        if (!limb_) return radiance_;
+        const double elevation = std::asin(std::clamp(double(dot(d, up_)), -1.0, 1.0));
+        const double cos_psi = std::sqrt(std::max(0.0, 1 - sin2_to_axis(d) / sin2_));
+        return limb_->radiance(elevation, cos_psi) * scale_;
     }
 
     Frame frame_;
-    float cos_max_;
-    Rgb radiance_;
+    Vec3 up_;
+    double sin2_, one_minus_cos_;
+    float pdf_;
+    Rgb radiance_;  ///< Its mean.
+    std::optional<SunModel> limb_;
+    Rgb scale_;
 };
+
+/// From east (x), up (y) and south (z), as sun_direction() and environments have them, to Mitsuba 3's south, west and up.
+const Transform kFromYUp(Transform::Matrix{
+    {{0, 0, 1, 0}, {-1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 0, 1}}});
 
 std::vector<ParamInfo> params() {
     return {
-        {"turbidity", ParamKind::Float, "3", "Haze: 1 (clear, taken as 2 for the sky) to 10."},
+        {"turbidity", ParamKind::Float, "3", "Haze: 1 (clear) to 10."},
         {"sun_direction", ParamKind::Vector, "",
-         "Toward the sun, before to_world; instead of time and place."},
+         "Toward the sun, in world space; instead of time and place. Below the horizon it is "
+         "night: "
+         "all is black."},
         {"year", ParamKind::Int, "2010", "Date of the sun's position."},
         {"month", ParamKind::Int, "7", "1 to 12."},
         {"day", ParamKind::Int, "10", "1 to 31."},
@@ -59,20 +78,37 @@ std::vector<ParamInfo> params() {
         {"scale", ParamKind::Float, "1", "Factor of all radiance."},
         {"sky_scale", ParamKind::Float, "1", "Factor of the sky's radiance."},
         {"sun_scale", ParamKind::Float, "1", "Factor of the sun's radiance."},
-        {"sun_radius_scale", ParamKind::Float, "1",
-         "Factor of the sun's angular radius; its power stays."},
+        {"sun_aperture", ParamKind::Float, "0.5358",
+         "Angle that the sun's disc subtends, degrees; its power stays."},
+        {"sun_radius_scale", ParamKind::Float, "1", "The same as a factor of 0.5358."},
         {"resolution", ParamKind::Int, "512", "Rows of the table of the sky."},
-        {"albedo", ParamKind::Rgb, "", "Accepted; the model has no ground."},
-        {"to_world", ParamKind::Transform, "identity", "Rotation; up is +y, east +x, north -z."},
+        {"albedo", ParamKind::Rgb, "0.3", "Of the ground, 0 to 1; it lights the sky."},
+        {"complex_sun", ParamKind::Bool, "false",
+         "The sun is darker toward its rim; else it has its mean radiance everywhere."},
+        {"to_world", ParamKind::Transform, "identity",
+         "Rotation; up is +z, south +x, west +y. In files of Mitsuba 0.6 up is +y, east +x, south "
+         "+z."},
     };
 }
 
-SkyModel read_model(const Params& p) {
-    const float turbidity = p.number("turbidity", 3, 1, 10);
+/// What the parameters say.
+struct Daylight {
+    Transform to_world;  ///< From y up.
+    Vec3 sun;            ///< Unit vector, y being up.
+    float turbidity;
+
+    bool is_day() const { return sun.y >= 0; }
+};
+
+Daylight read_daylight(const Params& p) {
+    Daylight out;
+    out.to_world = p.transform("to_world") * kFromYUp;
+    out.turbidity = p.number("turbidity", 3, 1, 10);
     if (p.has("sun_direction")) {
-        const Vec3 d = p.vector("sun_direction", {});
+        const Vec3 d = out.to_world.inverse().vector(p.vector("sun_direction", {}));
         if (!(length2(d) > 0)) p.fail("sun_direction", "the direction must not be zero");
-        return SkyModel(normalize(d), turbidity);
+        out.sun = normalize(d);
+        return out;
     }
     SunTime t;
     t.year = int(p.integer("year", t.year, 1901, 2199));
@@ -84,12 +120,20 @@ SkyModel read_model(const Params& p) {
     t.latitude = p.number("latitude", float(t.latitude), -90, 90);
     t.longitude = p.number("longitude", float(t.longitude), -180, 180);
     t.timezone = p.number("timezone", float(t.timezone), -14, 14);
-    return SkyModel(sun_direction(t), turbidity);
+    out.sun = sun_direction(t);
+    return out;
 }
 
-std::unique_ptr<Emitter> make_sky(const Params& p, const SkyModel& model) {
+Rgb read_albedo(const Params& p) {
+    const Rgb albedo = p.rgb("albedo", Rgb(0.3f));
+    if (albedo.max() > 1) p.fail("albedo", "an albedo must be at most 1");
+    return albedo;
+}
+
+std::unique_ptr<Emitter> make_sky(const Params& p, const Daylight& day) {
     const int height = int(p.integer("resolution", 512, 16, 8192)), width = 2 * height;
     const float scale = p.number("scale", 1, 0) * p.number("sky_scale", 1, 0);
+    const SkyModel model(day.sun, day.turbidity, read_albedo(p));
     std::vector<Rgb> pixels(size_t(width) * height);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
@@ -97,36 +141,51 @@ std::unique_ptr<Emitter> make_sky(const Params& p, const SkyModel& model) {
                         phi = 2 * kPi * (float(x) + 0.5f) / float(width);
             const Vec3 d{std::sin(phi) * std::sin(theta), std::cos(theta),
                          -std::cos(phi) * std::sin(theta)};
-            pixels[size_t(y) * width + x] = model.sky_radiance(d) * scale;
+            pixels[size_t(y) * width + x] = model.radiance(d) * scale;
         }
-    return make_environment(width, height, std::move(pixels), p.transform("to_world"));
+    return make_environment(width, height, std::move(pixels), day.to_world);
 }
 
-std::unique_ptr<Emitter> make_sun(const Params& p, const SkyModel& model) {
-    const float radius_scale = p.number("sun_radius_scale", 1, 0.01f, 100);
-    const float scale = p.number("scale", 1, 0) * p.number("sun_scale", 1, 0) / sqr(radius_scale);
-    const Vec3 toward = normalize(p.transform("to_world").vector(model.sun_direction()));
-    return std::make_unique<SunEmitter>(toward, kSunAngularRadius * radius_scale,
-                                        model.sun_radiance() * scale);
+/// The sun's aperture over that of nature.
+double read_aperture(const Params& p) {
+    if (p.has("sun_aperture") && p.has("sun_radius_scale"))
+        p.fail("sun_radius_scale", "give either sun_aperture or sun_radius_scale, not both");
+    return p.has("sun_aperture") ? double(p.number("sun_aperture", 0, 1e-3f, 179)) / kSunAperture
+                                 : double(p.number("sun_radius_scale", 1, 0.01f, 100));
+}
+
+std::unique_ptr<Emitter> make_sun(const Params& p, const Daylight& day) {
+    constexpr double kDegree = M_PI / 180;
+    const double natural = kSunAperture / 2 * kDegree, radius = natural * read_aperture(p);
+    // The power stays, whatever the aperture.
+    const double share = sqr(std::sin(natural / 2) / std::sin(radius / 2));
+    const Rgb scale(p.number("scale", 1, 0) * p.number("sun_scale", 1, 0) * float(share));
+    const Vec3 toward = normalize(day.to_world.vector(day.sun)),
+               up = normalize(day.to_world.vector({0, 1, 0}));
+    const SunModel model(day.turbidity);
+    const Rgb mean = model.mean_radiance(std::asin(std::clamp(double(day.sun.y), -1.0, 1.0)));
+    return std::make_unique<SunEmitter>(
+        toward, up, radius, mean * scale,
+        p.flag("complex_sun", false) ? std::optional(model) : std::nullopt, scale);
 }
 
 }  // namespace
 
 EmitterEntry sky_entry() {
-    return {{"emitter", "sky", "Clear sky without the sun [Preetham et al. 1999].", params()},
+    return {{"emitter", "sky", "Clear sky without the sun [Hosek & Wilkie 2012].", params()},
             [](const Params& p, EmitterContext&) {
                 std::vector<std::unique_ptr<Emitter>> made;
-                made.push_back(make_sky(p, read_model(p)));
+                made.push_back(make_sky(p, read_daylight(p)));
                 return made;
             }};
 }
 
 EmitterEntry sun_entry() {
-    return {{"emitter", "sun", "The sun's disc through a clear atmosphere [Preetham et al. 1999].",
+    return {{"emitter", "sun", "The sun's disc through a clear atmosphere [Hosek & Wilkie 2013].",
              params()},
             [](const Params& p, EmitterContext&) {
                 std::vector<std::unique_ptr<Emitter>> made;
-                made.push_back(make_sun(p, read_model(p)));
+                made.push_back(make_sun(p, read_daylight(p)));
                 return made;
             }};
 }
@@ -134,10 +193,10 @@ EmitterEntry sun_entry() {
 EmitterEntry sunsky_entry() {
     return {{"emitter", "sunsky", "sun and sky together.", params()},
             [](const Params& p, EmitterContext&) {
-                const SkyModel model = read_model(p);
+                const Daylight day = read_daylight(p);
                 std::vector<std::unique_ptr<Emitter>> made;
-                made.push_back(make_sky(p, model));
-                if (!model.sun_radiance().is_zero()) made.push_back(make_sun(p, model));
+                made.push_back(make_sky(p, day));
+                if (day.is_day()) made.push_back(make_sun(p, day));
                 return made;
             }};
 }

@@ -1,129 +1,146 @@
 #include "emitter/sky_model.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <numbers>
 
 #include "color/spectrum.h"
+#include "emitter/hosek_wilkie_data.h"
 
 namespace etendue {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kPiD = std::numbers::pi, kDegree = kPiD / 180;
 
-/// Luminance in cd/m² of a spectrum whose Y (as spectrum_to_rgb() normalises it) is 1: the luminous
-/// efficacy of 683 lm/W times ∫ ȳ(λ) dλ in nm.
-constexpr double kLuminanceOfUnitY = 683.002 * 106.857;
+/// A position between the turbidities 1, 2, ... 10 of the tables.
+struct TurbidityLevel {
+    int below;
+    double fraction;
 
-double zenith_luminance_kcd(double T, double theta_s) {
-    const double chi = (4.0 / 9 - T / 120) * (std::numbers::pi - 2 * theta_s);
-    return (4.0453 * T - 4.9710) * std::tan(chi) - 0.2155 * T + 2.4192;
-}
-
-/// Coefficients of T² θ³ ... T⁰ θ⁰ of the chromaticity at the zenith [Preetham et al. 1999, A.2].
-using ZenithFit = double[3][4];
-constexpr ZenithFit kZenithX = {{0.00166, -0.00375, 0.00209, 0},
-                                {-0.02903, 0.06377, -0.03202, 0.00394},
-                                {0.11693, -0.21196, 0.06052, 0.25886}};
-constexpr ZenithFit kZenithY = {{0.00275, -0.00610, 0.00317, 0},
-                                {-0.04214, 0.08970, -0.04153, 0.00516},
-                                {0.15346, -0.26756, 0.06670, 0.26688}};
-
-double zenith_chromaticity(const ZenithFit& fit, double T, double theta_s) {
-    double value = 0;
-    for (const auto& row : fit) {
-        double in_theta = 0;
-        for (const double c : row) in_theta = in_theta * theta_s + c;
-        value = value * T + in_theta;
+    explicit TurbidityLevel(double turbidity) {
+        const double at = std::clamp(turbidity, 1.0, 10.0) - 1;
+        below = std::min(int(at), 8);
+        fraction = at - below;
     }
-    return value;
-}
-
-/// The sun outside the atmosphere (W m⁻² sr⁻¹ nm⁻¹) and the absorption of ozone (cm⁻¹), water
-/// vapour (cm⁻¹) and mixed gases (km⁻¹), from 380 nm in steps of 10 nm [Preetham et al. 1999, table
-/// 2].
-struct SunRow {
-    double radiance, ozone, vapour, gas;
+    /// `value(level)` between the two nearest levels.
+    template <class Value>
+    double interpolate(const Value& value) const {
+        return std::lerp(value(below), value(below + 1), fraction);
+    }
 };
-constexpr double kSunFirstNm = 380, kSunStepNm = 10;
-constexpr std::array<SunRow, 38> kSun = {{
-    {16559.0, 0, 0, 0},          {16233.7, 0, 0, 0},         {21127.5, 0, 0, 0},
-    {25888.2, 0, 0, 0},          {25829.1, 0, 0, 0},         {24232.3, 0, 0, 0},
-    {26760.5, 0, 0, 0},          {29658.3, 0.003, 0, 0},     {30545.4, 0.006, 0, 0},
-    {30057.5, 0.009, 0, 0},      {30663.7, 0.014, 0, 0},     {28830.4, 0.021, 0, 0},
-    {28712.1, 0.030, 0, 0},      {27825.0, 0.040, 0, 0},     {27100.6, 0.048, 0, 0},
-    {27233.6, 0.063, 0, 0},      {26361.3, 0.075, 0, 0},     {25503.8, 0.085, 0, 0},
-    {25060.2, 0.103, 0, 0},      {25311.6, 0.120, 0, 0},     {25355.9, 0.120, 0, 0},
-    {25134.2, 0.115, 0, 0},      {24631.5, 0.125, 0, 0},     {24173.2, 0.120, 0, 0},
-    {23685.3, 0.105, 0, 0},      {23212.1, 0.090, 0, 0},     {22827.7, 0.079, 0, 0},
-    {22339.8, 0.067, 0, 0},      {21970.2, 0.057, 0, 0},     {21526.7, 0.048, 0, 0},
-    {21097.9, 0.036, 0, 0},      {20728.3, 0.028, 0.016, 0}, {20240.4, 0.023, 0.024, 0},
-    {19870.8, 0.018, 0.0125, 0}, {19427.2, 0.014, 1.0, 0},   {19072.4, 0.011, 0.87, 0},
-    {18628.9, 0.010, 0.061, 0},  {18259.2, 0.009, 0.001, 0},
-}};
 
-/// The sun's radiance after its way through the atmosphere [Preetham et al. 1999, A.1].
-Rgb attenuated_sun(double T, double theta_s) {
-    constexpr double kOzoneCm = 0.35, kVapourCm = 2, kAlpha = 1.3;
-    const double beta = 0.04608 * T - 0.04586;
-    // Relative optical mass [Kasten 1965].
-    const double m = 1 / (std::cos(theta_s) + 0.15 * std::pow(93.885 - theta_s / kDegree, -1.253));
-    std::array<double, kSun.size()> nm, radiance;
-    for (size_t i = 0; i < kSun.size(); ++i) {
-        nm[i] = kSunFirstNm + kSunStepNm * double(i);
-        const double um = nm[i] / 1000;
-        const auto& [sun, ozone, vapour, gas] = kSun[i];
-        const double rayleigh = 0.008735 * std::pow(um, -4.08) * m;
-        const double aerosol = beta * std::pow(um, -kAlpha) * m;
-        const double in_gas = 1.41 * gas * m / std::pow(1 + 118.93 * gas * m, 0.45);
-        const double in_vapour =
-            0.2385 * vapour * kVapourCm * m / std::pow(1 + 20.07 * vapour * kVapourCm * m, 0.45);
-        radiance[i] =
-            sun * std::exp(-(rayleigh + aerosol + ozone * kOzoneCm * m + in_gas + in_vapour));
+/// Bézier curve of degree 5 over the sun's elevations, which the control points sample more densely near the horizon
+/// [Hosek & Wilkie 2012, §5.1].
+template <class Value>
+double at_elevation(double elevation, const Value& control_point) {
+    constexpr double kBinomial[] = {1, 5, 10, 10, 5, 1};
+    const double x = std::cbrt(elevation / (kPiD / 2));
+    double sum = 0;
+    for (int i = 0; i < 6; ++i)
+        sum += kBinomial[i] * std::pow(x, i) * std::pow(1 - x, 5 - i) * control_point(i);
+    return sum;
+}
+
+/// An entry of a table of the sky, interpolated over turbidity, albedo and elevation.
+double sky_entry(const float* table, int entries, int entry, int channel, double turbidity,
+                 double albedo, double elevation) {
+    return TurbidityLevel(turbidity).interpolate([&](int level) {
+        const auto of_albedo = [&](int a) {
+            return at_elevation(elevation, [&](int i) {
+                return double(table[(((level * 2 + a) * 6 + i) * 3 + channel) * entries + entry]);
+            });
+        };
+        return std::lerp(of_albedo(0), of_albedo(1), albedo);
+    });
+}
+
+/// ∫ ȳ(λ) dλ in nm. The table of the sky holds integrals over the wavelengths, of which this makes means.
+constexpr double kIntegralOfY = 106.7502593994140625;
+
+}  // namespace
+
+SkyModel::SkyModel(Vec3 sun, float turbidity, Rgb albedo) : sun_(sun) {
+    const double elevation = std::asin(std::clamp(double(sun.y), 0.0, 1.0));
+    for (int c = 0; c < 3; ++c) {
+        const auto entry = [&](const float* table, int entries, int i) {
+            return sky_entry(table, entries, i, c, turbidity, double(albedo[c]), elevation);
+        };
+        Channel& channel = channels_[size_t(c)];
+        for (int i = 0; i < 9; ++i) channel.shape[size_t(i)] = entry(hosek_wilkie::kSkyShape, 9, i);
+        channel.mean = sun.y >= 0 ? entry(hosek_wilkie::kSkyMean, 1, 0) / kIntegralOfY : 0;
     }
-    return spectrum_to_rgb(nm, radiance);
+}
+
+// [Hosek & Wilkie 2012, eq. 8 and 9]
+double SkyModel::Channel::radiance(double cos_theta, double gamma, double cos_gamma) const {
+    const auto [A, B, C, D, E, F, G, I, H] = shape;
+    const double chi = (1 + cos_gamma * cos_gamma) / std::pow(1 + H * H - 2 * H * cos_gamma, 1.5);
+    return mean * (1 + A * std::exp(B / (cos_theta + 0.01))) *
+           (C + D * std::exp(E * gamma) + F * cos_gamma * cos_gamma + G * chi +
+            I * std::sqrt(cos_theta));
+}
+
+Rgb SkyModel::radiance(Vec3 d) const {
+    if (!(d.y >= 0)) return {};
+    const double cos_gamma = std::clamp(double(dot(d, sun_)), -1.0, 1.0);
+    const double gamma = std::acos(cos_gamma);
+    Rgb out;
+    for (int c = 0; c < 3; ++c)
+        out[c] = float(std::max(0.0, channels_[size_t(c)].radiance(double(d.y), gamma, cos_gamma)));
+    return out;
+}
+
+namespace {
+
+constexpr int kWavelengths = 11, kPieces = 45;
+constexpr std::array<double, kWavelengths> kNanometres = {320, 360, 400, 440, 480, 520,
+                                                          560, 600, 640, 680, 720};
+
+/// Horner's rule, the constant coefficient first.
+template <size_t n>
+double polynomial(const float* coefficients, double x) {
+    double value = 0;
+    for (size_t i = n; i-- > 0;) value = value * x + double(coefficients[i]);
+    return value;
 }
 
 }  // namespace
 
-double SkyModel::Perez::operator()(double cos_theta, double gamma, double cos_gamma) const {
-    constexpr double kMinCosine = 1e-3;
-    return (1 + A * std::exp(B / std::max(cos_theta, kMinCosine))) *
-           (1 + C * std::exp(D * gamma) + E * cos_gamma * cos_gamma);
+SunModel::SunModel(float turbidity)
+    : turbidity_(double(turbidity)), weights_(spectrum_weights(kNanometres)) {}
+
+// [Hosek & Wilkie 2013, eq. 2 to 4]
+Rgb SunModel::radiance(double elevation, double cos_psi) const {
+    if (!(elevation >= 0)) return {};
+    const TurbidityLevel turbidity(turbidity_);
+    const int piece = std::min(int(std::cbrt(elevation / (kPiD / 2)) * kPieces), kPieces - 1);
+    const double x = elevation - std::pow(double(piece) / kPieces, 3) * (kPiD / 2);
+    Rgb out;
+    for (int i = 0; i < kWavelengths; ++i) {
+        const double in_the_middle = turbidity.interpolate([&](int level) {
+            return polynomial<4>(
+                hosek_wilkie::kSun + ((level * kPieces + piece) * kWavelengths + i) * 4, x);
+        });
+        const double darkened = polynomial<6>(hosek_wilkie::kLimbDarkening + i * 6, cos_psi);
+        out += weights_[size_t(i)] * float(in_the_middle * darkened);
+    }
+    // A low sun lies outside the gamut.
+    return {std::max(out.r, 0.0f), std::max(out.g, 0.0f), std::max(out.b, 0.0f)};
 }
 
-SkyModel::SkyModel(Vec3 sun, float turbidity) : sun_(sun) {
-    constexpr double kMinSkyTurbidity = 2;
-    const double cos_s = std::clamp(double(sun.y), 0.0, 1.0), theta_s = std::acos(cos_s);
-    const double T = std::max(double(turbidity), kMinSkyTurbidity);
-    const auto component = [&](const Perez& perez, double at_zenith) {
-        return Component{perez, at_zenith / perez(1, theta_s, cos_s)};
-    };
-    // [Preetham et al. 1999, A.2]
-    Y_ = component({0.1787 * T - 1.4630, -0.3554 * T + 0.4275, -0.0227 * T + 5.3251,
-                    0.1206 * T - 2.5771, -0.0670 * T + 0.3703},
-                   zenith_luminance_kcd(T, theta_s) * 1000 / kLuminanceOfUnitY);
-    x_ = component({-0.0193 * T - 0.2592, -0.0665 * T + 0.0008, -0.0004 * T + 0.2125,
-                    -0.0641 * T - 0.8989, -0.0033 * T + 0.0452},
-                   zenith_chromaticity(kZenithX, T, theta_s));
-    y_ = component({-0.0167 * T - 0.2608, -0.0950 * T + 0.0092, -0.0079 * T + 0.2102,
-                    -0.0441 * T - 1.6537, -0.0109 * T + 0.0529},
-                   zenith_chromaticity(kZenithY, T, theta_s));
-    if (sun.y >= 0) sun_radiance_ = attenuated_sun(turbidity, theta_s);
-}
-
-Rgb SkyModel::sky_radiance(Vec3 d) const {
-    if (!(d.y >= 0)) return {};
-    const double cos_gamma = std::clamp(double(dot(d, sun_)), -1.0, 1.0);
-    const double gamma = std::acos(cos_gamma);
-    const auto eval = [&](const Component& c) {
-        return c.at_zenith * c.perez(d.y, gamma, cos_gamma);
-    };
-    const double Y = eval(Y_), x = eval(x_), y = eval(y_);
-    const Rgb c = xyz_to_rgb(Y * x / y, Y, Y * (1 - x - y) / y);
-    return {std::max(c.r, 0.0f), std::max(c.g, 0.0f), std::max(c.b, 0.0f)};
+Rgb SunModel::mean_radiance(double elevation) const {
+    // Rings and sectors of equal area; the disc is flat at this size.
+    constexpr int kRings = 32, kSectors = 16;
+    constexpr double kRadius = kSunAperture / 2 * kDegree;
+    if (!(elevation >= 0)) return {};
+    Rgb sum;
+    for (int i = 0; i < kRings; ++i)
+        for (int j = 0; j < kSectors; ++j) {
+            const double r2 = (i + 0.5) / kRings, phi = 2 * kPiD * (j + 0.5) / kSectors;
+            sum += radiance(elevation + kRadius * std::sqrt(r2) * std::sin(phi), std::sqrt(1 - r2));
+        }
+    return sum / float(kRings * kSectors);
 }
 
 Vec3 sun_direction(const SunTime& time) {

@@ -1,49 +1,55 @@
 #pragma once
-// Clear daylight sky and sun [Preetham, Shirley & Smits 1999], and where the sun stands
-// [Blanco-Muriel et al. 2001].
+// Clear daylight: sky [Hosek & Wilkie 2012], sun [Hosek & Wilkie 2013], and where the sun stands [Blanco-Muriel et al.
+// 2001]. Mitsuba 3 has the same models.
 //
-// Units are W m⁻² sr⁻¹ nm⁻¹, averaged over the wavelengths as spectrum_to_rgb() does; a luminance of
-// 1 kcd/m² is a Y of 0.0137. These are Mitsuba's units too, but its sky is that of Hosek & Wilkie
-// [2012, 2013], which also has a ground albedo. Beside Mitsuba 3.9 this sky is up to 2.5 times
-// brighter at the zenith and down to 0.6 times at the horizon (turbidity 2 to 4), and the high sun
-// differs by 10 %. The sun is that of Mitsuba 0.6.
+// Units are W m⁻² sr⁻¹ nm⁻¹, averaged over the wavelengths as spectrum_to_rgb() does; a luminance of 1 kcd/m² is a Y of
+// 0.0137.
+
+#include <array>
+#include <vector>
 
 #include "color/rgb.h"
 #include "math/vec.h"
 
 namespace etendue {
 
-/// Radius of the sun's disc in radians (0.2665°).
-inline constexpr float kSunAngularRadius = 0.2665f * kPi / 180;
+/// Full angle of the sun's disc, degrees.
+inline constexpr double kSunAperture = 0.5358;
 
+/// Radiance of the sky without the sun, of the directions above the horizon.
 class SkyModel {
 public:
-    /// `sun` is the unit vector toward the sun, y being up; a sun below the horizon counts as one
-    /// on it. Turbidity lies in [1, 10]. Below 2 the fit of the sky turns negative, so that the sky
-    /// stays at 2 there.
-    SkyModel(Vec3 sun, float turbidity);
+    /// `sun` is the unit vector toward the sun, y being up; with the sun below the horizon the sky is black. Turbidity
+    /// lies in [1, 10], the albedo of the ground in [0, 1].
+    SkyModel(Vec3 sun, float turbidity, Rgb albedo);
 
-    /// Radiance of the sky without the sun in direction `d` (unit); zero below the horizon.
-    Rgb sky_radiance(Vec3 d) const;
-    /// Radiance of the sun's disc of the radius kSunAngularRadius; zero below the horizon.
-    Rgb sun_radiance() const { return sun_radiance_; }
-    Vec3 sun_direction() const { return sun_; }
+    Rgb radiance(Vec3 d) const;
 
 private:
-    /// F(θ, γ) = (1 + A exp(B / cos θ)) (1 + C exp(D γ) + E cos² γ) [Perez et al. 1993].
-    struct Perez {
-        double A, B, C, D, E;
-        double operator()(double cos_theta, double gamma, double cos_gamma) const;
-    };
-    /// Zenith value and distribution of the luminance Y or of a chromaticity x, y.
-    struct Component {
-        Perez perez;
-        double at_zenith;  ///< Divided by F(0, θ_s).
-    };
+    struct Channel {
+        std::array<double, 9> shape;
+        double mean;
 
+        double radiance(double cos_theta, double gamma, double cos_gamma) const;
+    };
     Vec3 sun_;
-    Component Y_, x_, y_;
-    Rgb sun_radiance_;
+    std::array<Channel, 3> channels_;
+};
+
+/// Radiance of a sun with the aperture kSunAperture.
+class SunModel {
+public:
+    explicit SunModel(float turbidity);
+
+    /// Seen at an elevation (radians), where the line of sight makes the angle ψ with the sun's surface normal: 1 in the
+    /// middle of the disc, 0 at its rim. Zero below the horizon.
+    Rgb radiance(double elevation, double cos_psi) const;
+    /// Mean over the disc of a sun at this elevation; zero below the horizon.
+    Rgb mean_radiance(double elevation) const;
+
+private:
+    double turbidity_;
+    std::vector<Rgb> weights_;  ///< Of the wavelengths.
 };
 
 /// Civil time and place of an observer.

@@ -62,6 +62,7 @@ bool memory_callback(void* user, ssize_t bytes, bool) {
 }  // namespace
 
 struct Accelerator::Impl {
+    AcceleratorOptions options;
     std::atomic<int64_t> bytes{0};
     RTCDevice device = nullptr;
     RTCScene top = nullptr;
@@ -76,7 +77,7 @@ struct Accelerator::Impl {
     std::vector<Instance> instances;
     uint32_t shape_count = 0;
 
-    Impl() {
+    explicit Impl(const AcceleratorOptions& o) : options(o) {
         device = rtcNewDevice(nullptr);
         if (!device) throw std::runtime_error("Embree: no device could be made");
         rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &bytes);
@@ -99,6 +100,7 @@ struct Accelerator::Impl {
     RTCScene new_scene() const {
         RTCScene scene = rtcNewScene(device);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+        if (options.is_watertight) rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
         return scene;
     }
 
@@ -133,7 +135,8 @@ struct Accelerator::Impl {
     }
 };
 
-Accelerator::Accelerator() : impl_(std::make_unique<Impl>()) {}
+Accelerator::Accelerator(const AcceleratorOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {}
 Accelerator::~Accelerator() = default;
 Accelerator::Accelerator(Accelerator&&) noexcept = default;
 Accelerator& Accelerator::operator=(Accelerator&&) noexcept = default;

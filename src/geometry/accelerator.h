@@ -24,10 +24,15 @@ struct RayHit : SurfaceLocation {
     float t;
 };
 
+struct AcceleratorOptions {
+    /// Without it rays are faster and slip through between triangles now and then.
+    bool is_watertight = true;
+};
+
 /// Shapes are added, then committed once; queries are thread-safe after that.
 class Accelerator {
 public:
-    Accelerator();
+    explicit Accelerator(const AcceleratorOptions& options = {});
     ~Accelerator();
     Accelerator(Accelerator&&) noexcept;
     Accelerator& operator=(Accelerator&&) noexcept;

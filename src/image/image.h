@@ -1,7 +1,6 @@
 #pragma once
 // Pixels with named channels, in linear floats; and pixels as a file stores them.
 
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -10,6 +9,8 @@
 #include <string_view>
 #include <variant>
 #include <vector>
+
+#include <Imath/half.h>
 
 #include "color/rgb.h"
 
@@ -44,33 +45,7 @@ void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
                    std::span<const Rgb> pixels);
 Image rgb_image(int width, int height, std::span<const Rgb> pixels);
 
-/// IEEE 754 binary16, as bits.
-struct Half {
-    uint16_t bits;
-};
-inline float to_float(Half h) {
-    // The 5 exponent bits land in the 8 of a float; 2^(127 - 15) corrects the bias, also of subnormal numbers.
-    const uint32_t sign = uint32_t(h.bits & 0x8000u) << 16;
-    uint32_t magnitude =
-        std::bit_cast<uint32_t>(std::bit_cast<float>(uint32_t(h.bits & 0x7fffu) << 13) * 0x1p112f);
-    if ((h.bits & 0x7c00u) == 0x7c00u) magnitude |= 0x7f800000u;  // infinity and NaN
-    return std::bit_cast<float>(sign | magnitude);
-}
-
-/// The nearest half, ties to even, with infinity for what is too large.
-inline Half to_half(float f) {
-    const uint32_t bits = std::bit_cast<uint32_t>(f), sign = bits >> 16 & 0x8000u;
-    const uint32_t magnitude = bits & 0x7fffffffu;
-    if (magnitude > 0x7f800000u) return {uint16_t(sign | 0x7e00u)};
-    if (magnitude >= 0x477ff000u) return {uint16_t(sign | 0x7c00u)};
-    if (magnitude < 0x38800000u) {
-        // Subnormal: adding 1/2 aligns the fraction's last bit with 2^-24.
-        const float aligned = std::bit_cast<float>(magnitude) + 0.5f;
-        return {uint16_t(sign | (std::bit_cast<uint32_t>(aligned) - 0x3f000000u))};
-    }
-    const uint32_t rounded = magnitude + 0xfffu + (magnitude >> 13 & 1u);
-    return {uint16_t(sign | (rounded - 0x38000000u) >> 13)};
-}
+using Half = Imath::half;
 
 /// Pixels in the file's own precision: 8-bit codes, or linear values of 16 or 32 bits. Rows from the top, channels
 /// fastest; alpha is not multiplied in.

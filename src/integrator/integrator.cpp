@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -81,15 +82,20 @@ const std::string& IntegratorParams::text(const char* name) const {
 
 namespace {
 
+[[noreturn]] void refuse(const std::string& integrator, const char* name, const std::string& text,
+                         const char* kind) {
+    throw std::runtime_error(
+        fmt::format("integrator \"{}\": parameter \"{}\" must be {}, but is \"{}\"", integrator,
+                    name, kind, text));
+}
+
 template <class T>
 T parse_number(const std::string& integrator, const char* name, const std::string& text,
                const char* kind) {
     T value{};
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size())
-        throw std::runtime_error(
-            fmt::format("integrator \"{}\": parameter \"{}\" must be {}, but is \"{}\"", integrator,
-                        name, kind, text));
+        refuse(integrator, name, text, kind);
     return value;
 }
 
@@ -100,7 +106,9 @@ int IntegratorParams::integer(const char* name) const {
 }
 
 float IntegratorParams::number(const char* name) const {
-    return parse_number<float>(integrator_, name, text(name), "a number");
+    const float value = parse_number<float>(integrator_, name, text(name), "a finite number");
+    if (!std::isfinite(value)) refuse(integrator_, name, text(name), "a finite number");
+    return value;
 }
 
 bool IntegratorParams::flag(const char* name) const {

@@ -3,11 +3,14 @@
 namespace etendue {
 namespace {
 
-/// Attenuation of the edge between two surface points by the media they say lie on it. Where they differ (a scene whose
-/// surfaces contradict each other) the choice does not depend on the side it is seen from.
-Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b,
-                     float distance) {
-    return scene.attenuation(std::min(a.medium_toward(a_to_b), b.medium_toward(-a_to_b)), distance);
+/// Attenuation of the edge from y_{s-1} to z_{t-1} by the media they say lie on it. Where they differ though no surface
+/// between them bounds a medium (a scene whose surfaces contradict each other) the choice does not depend on the side it
+/// is seen from.
+Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b) {
+    const MediumId at_a = a.medium_toward(a_to_b), at_b = b.medium_toward(-a_to_b);
+    const MediumId medium = scene.has_open_boundaries() ? at_b : std::min(at_a, at_b);
+    if (a.is_infinite) return scene.attenuation_to_infinity(medium, b.p, b.ng, a.p);
+    return scene.attenuation(medium, b.p, b.ng, a.p, a.has_cosine ? a.ng : Vec3{});
 }
 
 }  // namespace
@@ -74,8 +77,12 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     const float to_x0 = emitter.is_area() ? abs_dot(d.ng, d.wi) * inv_dist2 : inv_dist2;
     const float p_NE = emitter.selection_pmf * d.pdf;
     Rgb C = v.beta * f.f * d.Le * (to_x0 / p_NE);
-    const MediumId medium = v.medium_toward(d.wi);
-    if (medium != kVacuum) C *= scene.attenuation(medium, d.dist);
+    const Vec3 ng_b = emitter.is_area() ? d.ng : Vec3{};
+    if (scene.has_media()) {
+        const MediumId medium = v.medium_toward(d.wi);
+        C *= infinite ? scene.attenuation_to_infinity(medium, v.p, v.ng, d.wi)
+                      : scene.attenuation(medium, v.p, v.ng, d.p, ng_b);
+    }
 
     double others = emitter.is_delta() ? 0.0 : sqr(double(counts.hit) * f.pdf * to_x0 / p_NE);
     if (counts.uses_light_paths()) {
@@ -96,7 +103,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                 .a = v.p,
                 .ng_a = v.ng,
                 .b = d.p,
-                .ng_b = emitter.is_area() ? d.ng : Vec3{},
+                .ng_b = ng_b,
                 .to_infinity = infinite};
 }
 
@@ -130,8 +137,7 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     const double squares = s == 1 ? emission_squares(double(next_event_ratio(a, edge.w)), counts)
                                   : sqr(double(counts.connect));
     edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
-    if (scene.has_media() && !a.is_infinite)
-        edge.contribution *= edge_attenuation(scene, a, b, edge.w, dist2 * inv_dist);
+    if (scene.has_media()) edge.contribution *= edge_attenuation(scene, a, b, edge.w);
 
     edge.rev_a = double(fb.pdf) * (a.has_cosine ? abs_dot(a.ng, edge.w) : 1.0f) * inv_dist2;
     edge.rev_b = double(fa.pdf) * abs_dot(b.ng, edge.w) * inv_dist2;
@@ -253,8 +259,10 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
     const BsdfEval f = a.eval(w, TransportMode::Importance);
     if (f.f.is_zero()) return {};
     Rgb C = a.beta * f.f * (lens->We_cos / lens->pdf_pos * inv_dist2);
-    const MediumId medium = a.medium_toward(w);
-    if (medium != kVacuum) C *= scene.attenuation(medium, length(edge));
+    const Vec3 ng_a = a.has_cosine ? a.ng : Vec3{};
+    if (scene.has_media())
+        C *= a.is_infinite ? scene.attenuation_to_infinity(kVacuum, lens->p, {}, a.p)
+                           : scene.attenuation(a.medium_toward(w), a.p, ng_a, lens->p, {});
 
     const double rev_last =
         a.is_infinite ? lens->pdf_dir
@@ -273,7 +281,7 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
               .a = lens->p,
               .ng_a = Vec3{},
               .b = a.p,
-              .ng_b = a.has_cosine ? a.ng : Vec3{},
+              .ng_b = ng_a,
               .to_infinity = a.is_infinite};
     return join;
 }
@@ -289,7 +297,7 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
     const float dist2 = a.is_infinite ? 1.0f : length2(lens->p - origin);
     const float cos_lens = abs_dot(lens->ng, flight.d);
     const Rgb C = flight.beta * (lens->We_cos / cos_lens) *
-                  scene.attenuation(flight.medium, length(lens->p - origin));
+                  scene.attenuation(flight.medium, origin, {}, lens->p, {});
 
     const double p_fwd = double(flight.pdf_sa) * double(cos_lens / dist2);
     const double p_lens = lens->pdf_pos / p_fwd;

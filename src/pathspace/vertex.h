@@ -110,7 +110,7 @@ struct Vertex {
     /// Medium on the edge that leaves along `w`.
     MediumId medium_toward(Vec3 w) const {
         if (!shape || !shape->is_interface) return medium;
-        return dot(ng, w) < 0 ? shape->interior : shape->exterior;
+        return shape->medium_toward(ng, w);
     }
 };
 

@@ -15,23 +15,26 @@ Survival survival(const SubPath& path) {
 /// What became of a ray.
 enum class Met { Surface, Nothing, SurfaceEdgeOn };
 
-/// Traces from the last vertex and appends the surface that is met, with throughput `beta` and density `pdf_sa` of the
-/// direction (of a delta event its probability).
+/// Traces from the last vertex and appends the surface that is met, with throughput `beta`, which absorption on the way
+/// lessens, and density `pdf_sa` of the direction (of a delta event its probability).
 Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, const Ray& ray,
-                   Rgb beta, float pdf_sa, MediumId medium) {
+                   Rgb& beta, float pdf_sa, MediumId medium) {
     const Scene& scene = walk.scene;
     ++walk.stats.walk_rays;
     SurfaceHit hit;
     const float u = sampler.next_1d_if(scene.has_masks());
     path.flight = {ray.o, ray.d, kInf, beta, pdf_sa, medium};
-    if (!scene.intersect(ray, u, hit)) return Met::Nothing;
+    Passage passage{medium};
+    const bool found = scene.intersect(ray, u, hit, passage);
+    beta *= passage.attenuation;
+    if (!found) return Met::Nothing;
     path.flight.length = hit.t;
     ++walk.stats.vertices;
     Vertex& v = path.append();
     v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
-    v.medium = medium;
+    v.medium = passage.medium;
     v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
-    v.beta = medium == kVacuum ? beta : beta * scene.attenuation(medium, hit.t);
+    v.beta = beta;
     // hit.t is short of the distance by the offset of the ray's origin; densities are of the points themselves.
     const Vertex& previous = path[path.size() - 2];
     const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
@@ -91,9 +94,10 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u
     lens.p = lens.is_infinite ? -ray.d : ray.p;
 
     const Ray start{ray.p, ray.d, kInf};
-    const Met met = append_surface(walk, sampler, z, start, Rgb(1), ray.pdf_dir, kVacuum);
+    Rgb beta(1);
+    const Met met = append_surface(walk, sampler, z, start, beta, ray.pdf_dir, kVacuum);
     if (met == Met::Nothing && !walk.scene.infinite_emitters().empty())
-        append_escape(z, ray.d, Rgb(1), ray.pdf_dir);
+        append_escape(z, ray.d, beta, ray.pdf_dir);
 }
 
 bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
@@ -118,6 +122,7 @@ bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
     y0.uv = e.uv;
     y0.location.prim = e.prim;
     y0.is_connectible = true;
+    y0.medium = MediumId(emitter.medium);
     y0.gloss = gloss_of_emitter(emitter.is_area());
     y0.pdf_fwd = emitter.selection_pmf * e.pdf_y0;
     y0.beta = Rgb(1 / y0.pdf_fwd);
@@ -125,8 +130,8 @@ bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
     if (!(e.pdf_d > 0)) return true;
     const Vec3 origin = y0.has_cosine ? offset_origin(e.p, e.ng, e.d) : e.p;
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
-    const Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
-    if (append_surface(walk, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, kVacuum) ==
+    Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
+    if (append_surface(walk, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, y0.medium) ==
         Met::Surface)
         y[1].next_event_ratio = next_event_ratio(y[0], e.d);
     return true;
@@ -162,7 +167,7 @@ bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubP
     if (last >= 1) path[last - 1].pdf_rev = s.pdf_rev * v.to_predecessor;
     if (eye) path.eta2 *= sqr(s.eta);
 
-    const Rgb beta = v.beta * s.weight * (1 / v.survival.value());
+    Rgb beta = v.beta * s.weight * (1 / v.survival.value());
     const MediumId medium = v.medium_toward(s.wi);
     const Ray ray{offset_origin(v.p, v.ng, s.wi), s.wi, kInf};
     const Met met = append_surface(walk, sampler, path, ray, beta, s.pdf, medium);

@@ -88,6 +88,18 @@ void upgrade_bsdf(SceneObject& object) {
         object.params.push_back({"material", std::string("Cu"), object.where});
 }
 
+/// In 0.6 daylight has y up and z south; in 3, z up and x south.
+void upgrade_daylight(SceneObject& object) {
+    const Transform from_z_up(
+        Transform::Matrix{{{0, -1, 0, 0}, {0, 0, 1, 0}, {1, 0, 0, 0}, {0, 0, 0, 1}}});
+    for (Param& p : object.params)
+        if (auto* to_world = std::get_if<Transform>(&p.value); to_world && p.name == "to_world") {
+            *to_world = *to_world * from_z_up;
+            return;
+        }
+    object.params.push_back({"to_world", from_z_up, object.where});
+}
+
 }  // namespace
 
 std::string snake_case(std::string_view camel_case) {
@@ -109,6 +121,9 @@ void upgrade_object(SceneObject& object) {
     upgrade_uv(object);
     if (object.category == "bsdf") upgrade_bsdf(object);
     if (object.category == "texture" && object.type == "bitmap") upgrade_bitmap(object);
+    if (object.category == "emitter" &&
+        (object.type == "sky" || object.type == "sun" || object.type == "sunsky"))
+        upgrade_daylight(object);
     if (object.category == "integrator" && object.type == "volpath_simple") object.type = "volpath";
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "math/frame.h"
 
@@ -29,8 +30,9 @@ IrradianceRecord measure_irradiance(Vec3 p, Vec3 n, int rays, Sampler& sampler,
     for (int k = 0; k < N; ++k)
         for (int j = 0; j < M; ++j) {
             const Vec2 u = sampler.next_2d();
-            const float sin2 = (float(j) + u.x) / float(M), sine = std::sqrt(sin2),
-                        cosine = safe_sqrt(1 - sin2), at = float(k) + u.y;
+            // Rounding must not take the last row to the horizon, where tan θ is infinite.
+            const float sin2 = std::min((float(j) + u.x) / float(M), kOneMinusEpsilon),
+                        sine = std::sqrt(sin2), cosine = safe_sqrt(1 - sin2), at = float(k) + u.y;
             const IncidentRadiance cell = radiance(azimuth(at) * sine + n * cosine);
             cells[size_t(k * M + j)] = cell;
             out.E += cell.L;
@@ -48,7 +50,9 @@ IrradianceRecord measure_irradiance(Vec3 p, Vec3 n, int rays, Sampler& sampler,
         for (int j = 0; j < M; ++j) {
             const IncidentRadiance& cell = cells[size_t(k * M + j)];
             const auto add_border = [&](const IncidentRadiance& other, Vec3 along, float factor) {
-                const float nearer = std::min(cell.distance, other.distance);
+                // A surface may begin at the point itself.
+                const float nearer = std::max(std::min(cell.distance, other.distance),
+                                              std::numeric_limits<float>::min());
                 add(out.translation, along, (cell.L - other.L) * (factor / nearer));
             };
             const float low = sin_boundary(j), high = sin_boundary(j + 1);

@@ -108,6 +108,7 @@ void LightVertexCache::restore_head(uint64_t index, SubPath& y) const {
     y0.uv = head.uv;
     y0.location.prim = head.prim;
     y0.is_connectible = true;
+    y0.medium = MediumId(head.emitter->medium);
     y0.gloss = gloss_of_emitter(head.emitter->is_area());
     y0.pdf_fwd = head.pdf_fwd;
     y0.beta = head.beta;

@@ -5,24 +5,23 @@
 
 #include <fmt/format.h>
 
-#include "bsdf/material.h"
 #include "film/filter.h"
+#include "scene/model_builder.h"
+#include "scene/plugin_lookup.h"
 #include "scene/settings.h"
 #include "scene/shape_registry.h"
-#include "texture/texture_cache.h"
 
 namespace etendue {
 
-/// Walks the description from its roots and fills a Scene. Objects that are referred to several times are made once.
-class SceneBuilder final : public MaterialContext, public EmitterContext, public TextureContext {
+/// Walks the description from its roots and fills a Scene.
+class SceneBuilder {
 public:
     SceneBuilder(const SceneDescription& description, const BuildOptions& options)
-        : description_(description), options_(options) {}
+        : description_(description), options_(options), plugins_(description, options.lenient),
+          models_(plugins_) {}
 
     Scene build() {
         scene_.file_ = description_.file;
-        scene_.images_ = std::make_unique<TextureCache>();
-        scene_.warnings_ = description_.warnings;
         const SceneObject* sensor = nullptr;
         int sensor_index = -1;
         for (int root : description_.roots) {
@@ -31,175 +30,63 @@ public:
             if (c == "shape")
                 add_shape(root);
             else if (c == "emitter")
-                add_emitter(root);
+                models_.make_emitters(root);
             else if (c == "sensor") {
                 if (!sensor)
                     sensor = &object, sensor_index = root;
                 else
-                    warn(object.where, "only the first sensor is rendered; this one is left out");
+                    plugins_.warn(object.where,
+                                  "only the first sensor is rendered; this one is left out");
             } else if (c == "integrator")
-                read_integrator(params(root));
+                read_integrator(plugins_.params(root));
             else if (c == "bsdf" || c == "texture" || c == "medium")
                 check_unused(root);
             else
-                problem(object.where, fmt::format("a {} has no place at the top of a scene", c));
+                plugins_.problem(object.where,
+                                 fmt::format("a {} has no place at the top of a scene", c));
         }
+        take_models();
         if (scene_.shapes_.empty() && scene_.emitters_.empty())
             throw SceneError({description_.file, 0}, "the scene has no shapes and no emitters");
         if (!sensor) throw SceneError({description_.file, 0}, "the scene has no sensor");
         finish_geometry();
         make_sensor(sensor_index);
+        scene_.warnings_ = plugins_.warnings();
         finish_emitters();
         count();
         return std::move(scene_);
     }
 
-    // -- What the makers of models ask for.
-
-    TextureRef texture(const Params& p, std::string_view name, Rgb fallback, float hi) override {
-        const SceneObject::Child* child = nullptr;
-        for (const auto& c : p.object().children)
-            if (c.name == name && description_.objects[c.object].category == "texture") child = &c;
-        if (child) return TextureRef(make_texture(child->object));
-        if (name.empty()) return TextureRef(fallback);
-        const Rgb c = p.rgb(name, fallback);
-        if (c.max() > hi)
-            p.fail(name,
-                   fmt::format(
-                       "parameter \"{}\" is ({}, {}, {}), but its components must be at most {}",
-                       name, c.r, c.g, c.b, hi));
-        return TextureRef(c);
-    }
-
-    std::vector<const Material*> nested(const Params& p) override {
-        std::vector<const Material*> found;
-        for (const auto& c : p.children("bsdf")) found.push_back(make_material(c.object));
-        return found;
-    }
-
-    const Shape* shape() const override { return emitting_shape_; }
-    TextureCache& images() override { return *scene_.images_; }
-
 private:
-    using Location = SourceLocation;
-
-    Params params(int index) const { return {description_, index}; }
-
-    void warn(const Location& where, const std::string& message) {
-        scene_.warnings_.push_back(SceneError(where, message).what());
-    }
-    /// An error, or under `lenient` a warning.
-    void problem(const Location& where, const std::string& message) {
-        if (!options_.lenient) throw SceneError(where, message);
-        warn(where, message + " (left out)");
-    }
-
-    void check(int index, const PluginInfo& info) {
-        check_params(description_, index, info,
-                     [&](const Location& where, const std::string& m) { problem(where, m); });
-    }
-
-    /// The entry of the object's plug-in, its parameters checked; nullptr (under `lenient`) where there is none.
-    template <class Entry>
-    const Entry* find(int index, const std::vector<Entry>& registry) {
-        const SceneObject& object = description_.objects[index];
-        std::vector<std::string> known;
-        for (const Entry& e : registry) {
-            if (object.type == e.info.name) {
-                check(index, e.info);
-                return &e;
-            }
-            known.push_back(e.info.name);
-        }
-        if (object.category == "shape")
-            for (const PluginInfo& g : group_infos()) known.push_back(g.name);
-        const std::string near = nearest_name(object.type, known);
-        problem(object.where, near.empty()
-                                  ? fmt::format("unknown {} \"{}\" (known: {})", object.category,
-                                                object.type, fmt::join(known, ", "))
-                                  : fmt::format("unknown {} \"{}\" (did you mean \"{}\"?)",
-                                                object.category, object.type, near));
-        return nullptr;
-    }
-
-    /// Calls a maker; what it says without a place is put at the object's.
-    template <class Make>
-    auto guarded(int index, const Make& make) {
-        try {
-            return make();
-        } catch (const SceneError&) {
-            throw;
-        } catch (const std::exception& e) {
-            throw SceneError(description_.objects[index].where, e.what());
-        }
-    }
-
-    const Texture* make_texture(int index) {
-        if (const auto it = textures_.find(index); it != textures_.end()) return it->second;
-        const TextureEntry* entry = find(index, texture_registry());
-        if (!entry) return textures_[index] = nullptr;
-        scene_.textures_.push_back(
-            guarded(index, [&] { return entry->make(params(index), *this); }));
-        return textures_[index] = scene_.textures_.back().get();
-    }
-
-    const Material* make_material(int index) {
-        if (const auto it = materials_.find(index); it != materials_.end()) return it->second;
-        const MaterialEntry* entry = find(index, material_registry());
-        if (!entry) return materials_[index] = default_material(Rgb(0.5f));
-        scene_.materials_.push_back(
-            guarded(index, [&] { return entry->make(params(index), *this); }));
-        return materials_[index] = scene_.materials_.back().get();
+    void take_models() {
+        Models models = models_.take();
+        scene_.images_ = std::move(models.images);
+        scene_.textures_ = std::move(models.textures);
+        scene_.materials_ = std::move(models.materials);
+        scene_.emitters_ = std::move(models.emitters);
+        scene_.media_ = std::move(models.media);
     }
 
     /// A material or texture at the top that no shape uses is still checked.
     void check_unused(int index) {
         const std::string& c = description_.objects[index].category;
         if (c == "bsdf")
-            make_material(index);
+            models_.make_material(index);
         else if (c == "texture")
-            make_texture(index);
+            models_.make_texture(index);
         else
-            make_medium(index);
-    }
-
-    const Material* default_material(Rgb reflectance) {
-        const Material*& m = reflectance.is_zero() ? black_ : grey_;
-        if (!m) {
-            SceneDescription diffuse;
-            diffuse.objects = {{"bsdf", "diffuse", "", {}, {{"reflectance", reflectance, {}}}, {}}};
-            const auto& registry = material_registry();
-            const auto entry =
-                std::find_if(registry.begin(), registry.end(), [](const MaterialEntry& e) {
-                    return std::string_view(e.info.name) == "diffuse";
-                });
-            scene_.materials_.push_back(entry->make({diffuse, 0}, *this));
-            m = scene_.materials_.back().get();
-        }
-        return m;
-    }
-
-    MediumId make_medium(int index) {
-        if (const auto it = media_.find(index); it != media_.end()) return it->second;
-        const SceneObject& object = description_.objects[index];
-        if (object.type != "homogeneous")
-            throw SceneError(object.where, fmt::format("medium \"{}\" is not supported: media "
-                                                       "other than \"homogeneous\" with albedo 0 "
-                                                       "(absorption alone) need volume transport",
-                                                       object.type));
-        check(index, medium_info());
-        scene_.media_.push_back(read_absorption(params(index)));
-        return media_[index] = MediumId(scene_.media_.size() - 1);
+            models_.make_medium(index);
     }
 
     void read_media(const Params& p, SceneShape& s) {
         for (const auto& c : p.children("medium")) {
             if (c.name == "interior")
-                s.interior = make_medium(c.object);
+                s.interior = models_.make_medium(c.object);
             else if (c.name == "exterior")
-                s.exterior = make_medium(c.object);
+                s.exterior = models_.make_medium(c.object);
             else {
-                problem(c.where, "a shape's medium must be named \"interior\" or \"exterior\"");
+                plugins_.problem(c.where,
+                                 "a shape's medium must be named \"interior\" or \"exterior\"");
                 continue;
             }
             s.is_interface = true;
@@ -208,36 +95,36 @@ private:
 
     /// Shape with everything that hangs on it, not yet known to the accelerator.
     std::optional<SceneShape> make_shape(int index) {
-        const ShapeEntry* entry = find(index, shape_registry());
+        const ShapeEntry* entry = plugins_.find(index, shape_registry());
         if (!entry) return {};
-        const Params p = params(index);
+        const Params p = plugins_.params(index);
         SceneShape s;
-        scene_.owned_shapes_.push_back(guarded(index, [&] {
-            return entry->make(p, [&](const std::string& m) { warn(p.where(), m); });
+        scene_.owned_shapes_.push_back(plugins_.guarded(index, [&] {
+            return entry->make(p, [&](const std::string& m) { plugins_.warn(p.where(), m); });
         }));
         s.shape = scene_.owned_shapes_.back().get();
         s.is_mesh = dynamic_cast<const TriangleMesh*>(s.shape) != nullptr;
         s.name = p.object().id.empty() ? p.object().type : p.object().id;
         const auto materials = p.children("bsdf");
         if (materials.size() > 1)
-            problem(materials[1].where, "a shape has one bsdf, this is a second");
+            plugins_.problem(materials[1].where, "a shape has one bsdf, this is a second");
         const auto emitters = p.children("emitter");
         if (emitters.size() > 1)
-            problem(emitters[1].where, "a shape has one emitter, this is a second");
-        s.material = materials.empty() ? default_material(emitters.empty() ? Rgb(0.5f) : Rgb(0))
-                                       : make_material(materials[0].object);
+            plugins_.problem(emitters[1].where, "a shape has one emitter, this is a second");
+        s.material = materials.empty()
+                         ? models_.default_material(emitters.empty() ? Rgb(0.5f) : Rgb(0))
+                         : models_.make_material(materials[0].object);
         s.needs_tangents = !materials.empty() && s.material->needs_tangents();
         read_media(p, s);
         if (!s.material->is_opaque()) {
             scene_.has_masks_ = true;
+            scene_.has_open_boundaries_ |= s.is_interface;
             if (!emitters.empty())
                 throw SceneError(emitters[0].where,
                                  "an emitter on a masked shape is not supported");
         }
         if (!emitters.empty()) {
-            emitting_shape_ = s.shape;
-            s.emitter = make_emitters(emitters[0].object);
-            emitting_shape_ = nullptr;
+            s.emitter = models_.make_emitters(emitters[0].object, s.shape);
         }
         return s;
     }
@@ -245,15 +132,15 @@ private:
     void add_shape(int index) {
         const SceneObject& object = description_.objects[index];
         if (object.type == "shapegroup") {
-            check(index, group_infos()[0]);
+            plugins_.check(index, group_infos()[0]);
             make_group(index);
         } else if (object.type == "instance") {
-            check(index, group_infos()[1]);
-            const auto groups = params(index).children("shape");
+            plugins_.check(index, group_infos()[1]);
+            const auto groups = plugins_.params(index).children("shape");
             if (groups.size() != 1 || description_.objects[groups[0].object].type != "shapegroup")
                 throw SceneError(object.where, "an instance needs one reference to a shapegroup");
             instances_.push_back(
-                {make_group(groups[0].object), params(index).transform("to_world")});
+                {make_group(groups[0].object), plugins_.params(index).transform("to_world")});
         } else if (auto s = make_shape(index)) {
             top_.push_back(*s);
             scene_.shapes_.push_back(*s);  // its place in the order is set by finish_geometry()
@@ -263,7 +150,7 @@ private:
     size_t make_group(int index) {
         if (const auto it = group_of_.find(index); it != group_of_.end()) return it->second;
         std::vector<SceneShape> members;
-        for (const auto& c : params(index).children("shape")) {
+        for (const auto& c : plugins_.params(index).children("shape")) {
             const SceneObject& member = description_.objects[c.object];
             if (member.type == "shapegroup" || member.type == "instance")
                 throw SceneError(member.where, "shapegroups cannot be nested");
@@ -283,6 +170,7 @@ private:
     void finish_geometry() {
         scene_.shapes_ = top_;
         Accelerator& a = scene_.accelerator_;
+        a = Accelerator(options_.accelerator);
         for (const SceneShape& s : top_) {
             a.add_shape(*s.shape);
             scene_.bounds_.extend(s.shape->bounds());
@@ -304,28 +192,20 @@ private:
                                         corner & 4 ? b.hi.z : b.lo.z}));
             }
         }
-        guarded(0, [&] { a.commit(); });
+        plugins_.guarded(0, [&] { a.commit(); });
     }
-
-    const Emitter* make_emitters(int index) {
-        const EmitterEntry* entry = find(index, emitter_registry());
-        if (!entry) return nullptr;
-        if (emitting_shape_ && std::string_view(entry->info.name) != "area")
-            throw SceneError(description_.objects[index].where,
-                             fmt::format("emitter \"{}\" cannot sit on a shape", entry->info.name));
-        auto made = guarded(index, [&] { return entry->make(params(index), *this); });
-        const Emitter* first = made.empty() ? nullptr : made.front().get();
-        for (auto& e : made) scene_.emitters_.push_back(std::move(e));
-        return first;
-    }
-    void add_emitter(int index) { make_emitters(index); }
 
     void finish_emitters() {
         Bounds3 bounds = scene_.bounds_;
         bounds.extend(scene_.sensor_->lens_bounds());
         const float radius = std::max(bounds.radius(), 1e-6f);
+        // Area emitters shine to the outside.
+        std::map<const Emitter*, MediumId> media;
+        for (const SceneShape& s : scene_.shapes_)
+            if (s.emitter && s.is_interface) media[s.emitter] = s.exterior;
         std::vector<double> powers;
         for (auto& e : scene_.emitters_) {
+            if (const auto it = media.find(e.get()); it != media.end()) e->medium = it->second;
             // A margin, so that the bounding disc lies outside everything.
             e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);
             powers.push_back(e->power());
@@ -342,9 +222,9 @@ private:
 
     void read_integrator(const Params& p) {
         if (!scene_.defaults_.integrator.empty())
-            return problem(p.where(), "a scene has one integrator, this is a second");
+            return plugins_.problem(p.where(), "a scene has one integrator, this is a second");
         scene_.defaults_.integrator = "path";
-        const IntegratorAlias* alias = find(p.index(), integrator_aliases());
+        const IntegratorAlias* alias = plugins_.find(p.index(), integrator_aliases());
         if (!alias) return;
         scene_.defaults_.integrator = alias->integrator;
         for (const char* name : {"max_depth", "rr_depth"})
@@ -354,31 +234,34 @@ private:
     }
 
     void make_sensor(int index) {
-        const SensorEntry* entry = find(index, sensor_registry());
+        const SensorEntry* entry = plugins_.find(index, sensor_registry());
         if (!entry)
             throw SceneError(description_.objects[index].where,
                              "without a known sensor there is no image");
-        const Params p = params(index);
+        const Params p = plugins_.params(index);
         FilmGeometry film{.width = 768, .height = 576, .crop_width = 768, .crop_height = 576};
         const auto films = p.children("film");
-        if (films.size() > 1) problem(films[1].where, "a sensor has one film, this is a second");
+        if (films.size() > 1)
+            plugins_.problem(films[1].where, "a sensor has one film, this is a second");
         if (!films.empty()) {
-            if (const FilmEntry* f = find(films[0].object, film_registry()))
-                film = f->make(params(films[0].object));
-            for (const auto& c : params(films[0].object).children("rfilter"))
-                if (const FilterEntry* r = find(c.object, filter_registry()))
-                    scene_.filter_ = r->make(params(c.object));
-            if (params(films[0].object).children("rfilter").empty())
+            if (const FilmEntry* f = plugins_.find(films[0].object, film_registry()))
+                film = f->make(plugins_.params(films[0].object));
+            for (const auto& c : plugins_.params(films[0].object).children("rfilter"))
+                if (const FilterEntry* r = plugins_.find(c.object, filter_registry()))
+                    scene_.filter_ = r->make(plugins_.params(c.object));
+            if (plugins_.params(films[0].object).children("rfilter").empty())
                 scene_.filter_ = default_filter();
         }
         apply_overrides(film, p);
         for (const auto& c : p.children("sampler"))
-            if (find(c.object, sampler_registry()))
-                scene_.defaults_.spp = int(params(c.object).integer("sample_count", 4, 1, 1 << 30));
+            if (plugins_.find(c.object, sampler_registry()))
+                scene_.defaults_.spp =
+                    int(plugins_.params(c.object).integer("sample_count", 4, 1, 1 << 30));
         if (!p.children("medium").empty())
-            problem(p.children("medium")[0].where, "a medium around the sensor is not supported");
+            plugins_.problem(p.children("medium")[0].where,
+                             "a medium around the sensor is not supported");
         scene_.film_ = film;
-        scene_.sensor_ = guarded(index, [&] {
+        scene_.sensor_ = plugins_.guarded(index, [&] {
             return entry->make(p, {film, scene_.filter_.radius(), scene_.bounds_.radius(),
                                    scene_.bounds_.center()});
         });
@@ -423,10 +306,9 @@ private:
 
     const SceneDescription& description_;
     BuildOptions options_;
+    PluginLookup plugins_;
+    ModelBuilder models_;
     Scene scene_;
-    std::map<int, const Texture*> textures_;
-    std::map<int, const Material*> materials_;
-    std::map<int, MediumId> media_;
     std::map<int, size_t> group_of_;
     std::vector<SceneShape> top_;
     std::vector<std::vector<SceneShape>> groups_;
@@ -435,8 +317,6 @@ private:
         Transform to_world;
     };
     std::vector<Instance> instances_;
-    const Material *grey_ = nullptr, *black_ = nullptr;
-    const Shape* emitting_shape_ = nullptr;
 };
 
 Scene build_scene(const SceneDescription& description, const BuildOptions& options) {

@@ -14,6 +14,7 @@ struct BuildOptions {
     /// Image size and crop instead of the file's. A new size scales the file's crop away.
     std::optional<std::pair<int, int>> resolution;
     std::optional<std::array<int, 4>> crop;  ///< x, y, width, height
+    AcceleratorOptions accelerator;
 };
 
 /// Throws SceneError.

@@ -16,6 +16,11 @@ void transform_geometry(const Transform& t, SurfaceGeometry& g) {
     g.dpdv = t.vector(g.dpdv);
 }
 
+/// The medium behind a surface that a ray along `d` passes.
+MediumId medium_beyond(const SurfaceHit& hit, Vec3 d, MediumId before) {
+    return hit.shape->is_interface ? hit.shape->medium_toward(hit.geometry.ng, d) : before;
+}
+
 }  // namespace
 
 Scene::Scene() = default;
@@ -41,49 +46,91 @@ void Scene::fill_hit(const RayHit& raw, SurfaceHit& hit) const {
     hit.t = raw.t;
 }
 
-bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit) const {
-    Ray r = ray;
-    float travelled = 0;
-    RayHit raw;
-    while (accelerator_.intersect(r, raw)) {
-        fill_hit(raw, hit);
-        hit.t += travelled;
-        if (!has_masks_ || hit.shape->material->is_opaque()) return true;
-        const float opacity = hit.shape->material->opacity(hit.geometry.uv);
-        if (u < opacity) return true;
-        u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
-        travelled = hit.t;
-        r.o = offset_origin(hit.geometry.p, hit.geometry.ng, r.d);
-        r.tmax = ray.tmax - travelled;
-    }
-    return false;
-}
-
-float Scene::masked_transmittance(Ray r) const {
-    float Tr = 1;
+template <class Passes>
+Ray Scene::for_each_surface(Ray ray, const Passes& passes) const {
     RayHit raw;
     SurfaceHit hit;
-    const float length_d = length(r.d);
-    while (accelerator_.intersect(r, raw)) {
+    const float length_d = length(ray.d);
+    float skipped = 0;  // from the last surface to the origin, which is moved off it
+    while (ray.tmax > 0 && accelerator_.intersect(ray, raw)) {
         fill_hit(raw, hit);
-        if (hit.shape->material->is_opaque()) return 0;
-        Tr *= 1 - hit.shape->material->opacity(hit.geometry.uv);
-        if (Tr == 0) return 0;
-        const Vec3 o = offset_origin(hit.geometry.p, hit.geometry.ng, r.d);
-        const float advanced = dot(o - r.o, r.d) / (length_d * length_d);
-        r.o = o;
-        r.tmax -= advanced;
-        if (!(r.tmax > 0)) break;
+        hit.t = hit.t * length_d + skipped;
+        if (!passes(hit)) return ray;
+        const Vec3 p = hit.geometry.p, o = offset_origin(p, hit.geometry.ng, ray.d);
+        skipped = dot(o - p, ray.d) / length_d;
+        ray.tmax -= dot(o - ray.o, ray.d) / sqr(length_d);
+        ray.o = o;
     }
+    ray.tmax += skipped / length_d;
+    return ray;
+}
+
+bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
+    if (!has_masks_) {
+        RayHit raw;
+        const bool found = accelerator_.intersect(ray, raw);
+        if (found) fill_hit(raw, hit);
+        if (passage.medium != kVacuum)
+            passage.attenuation = attenuation(passage.medium, found ? hit.t : kInf);
+        return found;
+    }
+    float travelled = 0;
+    bool found = false;
+    for_each_surface(ray, [&](const SurfaceHit& next) {
+        hit = next;
+        travelled += next.t;
+        hit.t = travelled;
+        passage.attenuation *= attenuation(passage.medium, next.t);
+        const float opacity =
+            next.shape->material->is_opaque() ? 1 : next.shape->material->opacity(next.geometry.uv);
+        found = u < opacity;
+        if (found) return false;
+        u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
+        passage.medium = medium_beyond(next, ray.d, passage.medium);
+        return true;
+    });
+    if (!found) passage.attenuation *= attenuation(passage.medium, kInf);
+    return found;
+}
+
+bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit) const {
+    Passage passage;
+    return intersect(ray, u, hit, passage);
+}
+
+float Scene::masked_transmittance(const Ray& ray) const {
+    float Tr = 1;
+    for_each_surface(ray, [&](const SurfaceHit& hit) {
+        Tr *= hit.shape->material->is_opaque() ? 0
+                                               : 1 - hit.shape->material->opacity(hit.geometry.uv);
+        return Tr > 0;
+    });
     return Tr;
 }
 
-float Scene::transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const {
+Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
+    Rgb product(1);
+    const Ray rest = for_each_surface(ray, [&](const SurfaceHit& hit) {
+        product *= attenuation(medium, hit.t);
+        medium = medium_beyond(hit, ray.d, medium);
+        return !hit.shape->material->is_opaque();
+    });
+    return product * attenuation(medium, std::max(0.0f, rest.tmax) * length(ray.d));
+}
+
+/// A shadow ray from `a` to `b`, whose parameter runs from 0 to 1; both ends are moved off their surfaces.
+Ray Scene::segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) {
     const Vec3 d = b - a;
     const Vec3 from = offset_origin(a, ng_a, d);
-    const Vec3 to = offset_origin(b, ng_b, -d);
-    // A segment: the parameter runs from 0 to 1. The end is inside by the rounding of the far surface.
-    const Ray ray{from, to - from, 1 - 0x1p-16f};
+    // The ray meets the far surface with an error of some roundings of the distance.
+    constexpr float kRoundings = 8 * 0x1p-24f;
+    const float error = kRoundings * length(d);
+    const Vec3 to = offset_origin(b, ng_b, -d) + ng_b * std::copysign(error, -dot(ng_b, d));
+    return {from, to - from, 1};
+}
+
+float Scene::transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const {
+    const Ray ray = segment(a, ng_a, b, ng_b);
     if (!has_masks_) return accelerator_.occluded(ray) ? 0.0f : 1.0f;
     return masked_transmittance(ray);
 }
@@ -92,6 +139,16 @@ float Scene::transmittance_to_infinity(Vec3 a, Vec3 ng_a, Vec3 d) const {
     const Ray ray{offset_origin(a, ng_a, d), d, kInf};
     if (!has_masks_) return accelerator_.occluded(ray) ? 0.0f : 1.0f;
     return masked_transmittance(ray);
+}
+
+Rgb Scene::attenuation(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const {
+    return has_open_boundaries_ ? attenuation(medium, segment(a, ng_a, b, ng_b))
+                                : attenuation(medium, length(b - a));
+}
+
+Rgb Scene::attenuation_to_infinity(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 d) const {
+    return has_open_boundaries_ ? attenuation(medium, Ray{offset_origin(a, ng_a, d), d, kInf})
+                                : attenuation(medium, kInf);
 }
 
 }  // namespace etendue

@@ -2,6 +2,8 @@
 // The scene: immutable and ready to render. Shapes with their materials and emitters, the sensor, and the few questions
 // that path sampling asks of them.
 
+#include <algorithm>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,6 +31,15 @@ struct SceneShape {
     bool is_mesh = false;
     bool needs_tangents = false;  ///< The material asks for dpdu.
     std::string name;
+
+    /// Of an interface with the normal `ng`: the medium on the side of `d`.
+    MediumId medium_toward(Vec3 ng, Vec3 d) const { return dot(ng, d) < 0 ? interior : exterior; }
+};
+
+/// The media on a ray's way.
+struct Passage {
+    MediumId medium = kVacuum;  ///< Before the query: at the origin; after it: where the ray ended.
+    Rgb attenuation = Rgb(1);   ///< By absorption, up to there.
 };
 
 /// Where a ray met the scene.
@@ -56,7 +67,9 @@ public:
     // -- Queries of path sampling; thread-safe.
 
     /// Nearest surface. Masked surfaces let the ray pass with probability 1 - opacity, decided by `u`, which is
-    /// rescaled by each decision.
+    /// rescaled by each decision. `passage` follows the ray through the media that such surfaces bound.
+    bool intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
+    /// The same where media do not matter.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit) const;
     /// Geometry of a surface point that a ray met before.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
@@ -66,10 +79,17 @@ public:
     float transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
     float transmittance_to_infinity(Vec3 a, Vec3 ng_a, Vec3 d) const;
 
-    /// Attenuation over `distance` in a medium.
+    /// Attenuation over `distance`, which may be infinite, in a medium.
     Rgb attenuation(MediumId medium, float distance) const {
-        return medium == kVacuum ? Rgb(1) : exp(media_[medium] * -distance);
+        if (medium == kVacuum) return Rgb(1);
+        return exp(media_[size_t(medium)] * -std::min(distance, std::numeric_limits<float>::max()));
     }
+    /// Attenuation by the media along the segment of transmittance(), which begins in `medium`; of no meaning where
+    /// something is in the way.
+    Rgb attenuation(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
+    Rgb attenuation_to_infinity(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 d) const;
+    /// Whether rays pass from one medium into another without a vertex.
+    bool has_open_boundaries() const { return has_open_boundaries_; }
 
     /// Emitter drawn by power. `u` is not read where there is but one.
     const Emitter& sample_emitter(double u) const {
@@ -105,7 +125,13 @@ public:
 private:
     friend class SceneBuilder;
     void fill_hit(const RayHit& raw, SurfaceHit& hit) const;
-    float masked_transmittance(Ray ray) const;
+    static Ray segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b);
+    float masked_transmittance(const Ray& ray) const;
+    Rgb attenuation(MediumId medium, const Ray& ray) const;
+    /// Calls `passes(hit)` for the surfaces on a ray in their order, until it returns false or there are no more;
+    /// returns what is left of the ray then. `hit.t` is the distance from the surface before.
+    template <class Passes>
+    Ray for_each_surface(Ray ray, const Passes& passes) const;
 
     std::string file_;
     std::vector<std::unique_ptr<Shape>> owned_shapes_;
@@ -124,6 +150,7 @@ private:
     RenderDefaults defaults_;
     Bounds3 bounds_;
     bool has_masks_ = false;
+    bool has_open_boundaries_ = false;
     bool has_delta_emitters_ = false;
     std::vector<std::string> warnings_;
     Statistics statistics_;

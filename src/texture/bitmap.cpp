@@ -105,7 +105,7 @@ inline Rgb BitmapTexture::texel(const Texels& texels, int x, int y) const {
         if constexpr (std::is_same_v<Texels, std::vector<uint8_t>>)
             return decode_[p[c]];
         else if constexpr (std::is_same_v<Texels, std::vector<Half>>)
-            return to_float(p[c]);
+            return float(p[c]);
         else
             return p[c];
     };

@@ -14,13 +14,13 @@ bool is_finite(float v) {
     return std::isfinite(v);
 }
 bool is_finite(Half v) {
-    return (v.bits & 0x7c00u) != 0x7c00u;
+    return v.isFinite();
 }
 bool is_negative(float v) {
     return v < 0;
 }
 bool is_negative(Half v) {
-    return v.bits > 0x8000u;
+    return float(v) < 0;
 }
 
 /// Number of values that are not finite; takes negative ones as zero unless `raw`.

@@ -135,6 +135,8 @@ TEST_F(ProgramTest, RefusesBadCommandLines) {
     expect_refusal({"render", s, "--spp", "many"}, "spp");
     expect_refusal({"render", s, "--time", "-1"}, "time");
     expect_refusal({"render", s, "--error", "0"}, "error");
+    expect_refusal({"render", s, "--time=-1"}, "must be a number above 0, but is \"-1\"");
+    expect_refusal({"render", s, "--time", "nan"}, "must be a number above 0, but is \"nan\"");
     expect_refusal({"render", s, "--threads", "-2"}, "threads");
     expect_refusal({"render", s, "--sampler", "sobl"}, "sampler");
     expect_refusal({"render", s, "--aov", "albdo"}, "albdo");

@@ -360,6 +360,61 @@ TEST(ClosedForm, MaskBeforeEmitter) {
         0.045);
 }
 
+/// Matter in a box that has no surface of its own, or half a one, before an emitter and over a lit floor.
+TEST(ClosedForm, AbsorptionBehindOpenBoundaries) {
+    const Rgb sigma{0.2f, 1, 3};
+    const auto absorbed = [&](float distance) { return exp(sigma * -distance); };
+    const auto matter = [](const char* side) {
+        return fmt::format("<medium type=\"homogeneous\" name=\"{}\"><rgb name=\"sigma_t\" "
+                           "value=\"0.2,1,3\"/><float name=\"albedo\" value=\"0\"/></medium>",
+                           side);
+    };
+    const auto box = [&](const std::string& bsdf) {
+        return "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"10\" y=\"10\" "
+               "z=\"0.25\"/><translate z=\"1\"/></transform>" +
+               bsdf + matter("interior") + "</shape>";
+    };
+    const struct {
+        std::string bsdf;
+        float opacity;
+    } boundaries[] = {{"<bsdf type=\"null\"/>", 0},
+                      {"<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.3\"/>" +
+                           lambert(Rgb(0)) + "</bsdf>",
+                       0.3f}};
+    const std::vector<std::string> all{"path", "light", "bdpt"};
+    for (const auto& b : boundaries) {
+        const float pass = sqr(1 - b.opacity);
+        const Scene emitter =
+            build(camera_above("orthographic", 0.5f) + box(b.bsdf) +
+                  rectangle("<scale value=\"3\"/>",
+                            lambert(Rgb(0)) + "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                              "value=\"3,2,1\"/></emitter>"));
+        expect_image(
+            emitter, all, 2048, [&](float, float) { return Rgb(3, 2, 1) * absorbed(0.5f) * pass; },
+            0.045);
+        // Amid the matter, which it names as its exterior.
+        const Scene inside = build(camera_above("orthographic", 0.5f) + box(b.bsdf) +
+                                   rectangle("<scale value=\"3\"/><translate z=\"1\"/>",
+                                             lambert(Rgb(0)) + matter("exterior") +
+                                                 "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                                 "value=\"3,2,1\"/></emitter>"));
+        expect_image(
+            inside, all, 2048,
+            [&](float, float) { return Rgb(3, 2, 1) * absorbed(0.25f) * (1 - b.opacity); }, 0.045);
+        const Scene floor =
+            build(camera_above("orthographic", 0.5f) + box(b.bsdf) + floor_of(kFloor) +
+                  "<emitter type=\"directional\"><vector name=\"direction\" "
+                  "value=\"0.6,0,-0.8\"/><rgb name=\"irradiance\" value=\"3,2,1\"/></emitter>");
+        expect_image(
+            floor, all, 2048,
+            [&](float, float) {
+                return kFloor * Rgb(3, 2, 1) * absorbed(0.5f + 0.5f / 0.8f) *
+                       (0.8f / kPi * sqr(pass));
+            },
+            0.045);
+    }
+}
+
 /// Directional light through a glass plate onto the floor, seen from between them: only light paths find it. Paths of the
 /// fewest edges, so that nothing is reflected to and fro.
 TEST(ClosedForm, DirectionalLightThroughGlass) {

@@ -100,9 +100,9 @@ TEST(MadeReference, IsKeptUntilALongerOneIsAskedFor) {
     RenderSettings how;
     how.integrator = IntegratorSpec::parse("path");
     how.spp = 4;
-    const auto make = [&](uint64_t fingerprint) {
+    const auto make = [&](uint64_t scene_hash, uint64_t program = 7) {
         return *make_reference(
-            scene, {how, folder.path().string(), fingerprint}, [](const Progress&) {},
+            scene, {how, folder.path().string(), scene_hash, program}, [](const Progress&) {},
             kNotInterrupted);
     };
     const Reference first = make(1);
@@ -116,6 +116,7 @@ TEST(MadeReference, IsKeptUntilALongerOneIsAskedFor) {
     EXPECT_TRUE(same_bits(first.second, again.second));
     EXPECT_EQ(again.mean_relative_error, first.mean_relative_error);
     EXPECT_FALSE(make(2).reused) << "another scene";
+    EXPECT_FALSE(make(1, 8).reused) << "another build of the program";
     how.spp = 8;
     EXPECT_FALSE(make(1).reused) << "more samples";
     how.spp = 4;
@@ -131,7 +132,7 @@ TEST(MadeReference, IsNotHalfMadeWhenInterrupted) {
     how.spp = 4;
     const std::atomic<bool> interrupted{true};
     EXPECT_FALSE(make_reference(
-        scene, {how, folder.path().string(), 1}, [](const Progress&) {}, interrupted));
+        scene, {how, folder.path().string(), 1, 7}, [](const Progress&) {}, interrupted));
     EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
@@ -253,7 +254,7 @@ TEST(MeanRatio, IntervalHoldsOneForAnUnbiasedMethod) {
     how.integrator = IntegratorSpec::parse("bdpt");
     how.spp = 256;
     const Reference reference = *make_reference(
-        scene, {how, folder.path().string(), 1}, [](const Progress&) {}, kNotInterrupted);
+        scene, {how, folder.path().string(), 1, 7}, [](const Progress&) {}, kNotInterrupted);
     CompareSettings s = settings_of({"path"}, 64);
     s.sampler = SamplerKind::Independent;
     const MethodSummary m =

@@ -55,6 +55,13 @@ TEST(Params, GivesValuesAndDefaults) {
     EXPECT_EQ(p.children("texture").size(), 1u);
 }
 
+TEST(Params, RefusesNumbersBeyondSinglePrecision) {
+    SceneDescription scene = example();
+    scene.objects[0].params.push_back({"radius", 1e39, {"f", 10}});
+    EXPECT_EQ(error_of([&] { Params(scene, 0).number("radius", 1, 0); }),
+              "f:10: parameter \"radius\" is 1e+39, which is out of range for single precision");
+}
+
 TEST(Params, RefusesWrongTypesAndRanges) {
     const SceneDescription scene = example();
     const Params p(scene, 0);

@@ -27,99 +27,102 @@ double azimuth(Vec3 d) {
     const double degrees = std::atan2(d.x, -d.z) / kDegree;
     return degrees < 0 ? degrees + 360 : degrees;
 }
-double luminance_at(const SkyModel& sky, Vec3 d) {
-    return luminance(sky.sky_radiance(d));
+// Mitsuba 3.9.1, scalar_rgb, `sunsky` without its sun.
+TEST(Sky, HasMitsubasRadiance) {
+    const struct {
+        float turbidity, albedo, sun, elevation, azimuth;
+        Rgb radiance;
+    } cases[] = {{3, 0.3f, 40, 40, 30, {0.08122347f, 0.1109589f, 0.1611196f}},
+                 {3, 0.3f, 40, 90, 0, {0.02117196f, 0.03803002f, 0.07708794f}},
+                 {2.5f, 0, 10, 20, 180, {0.04531296f, 0.06627584f, 0.08253819f}},
+                 {6, 0.8f, 70, 5, 90, {0.2419752f, 0.2991554f, 0.3682576f}},
+                 {1, 0.3f, 0.5f, 1, 45, {0.05708832f, 0.03207782f, 0.009067428f}},
+                 {10, 1, 89, 60, 10, {0.28474f, 0.3091227f, 0.3246918f}}};
+    for (const auto& c : cases)
+        expect_near_relative(SkyModel(direction(c.sun), c.turbidity, Rgb(c.albedo))
+                                 .radiance(direction(c.elevation, c.azimuth)),
+                             c.radiance, 2e-4f);
 }
 
-// [Preetham et al. 1999, A.2], written out for one setting: T = 4, θ_s = 50°.
-TEST(Sky, ZenithHasThePapersLuminanceAndChromaticity) {
-    const double T = 4, theta = 50 * M_PI / 180, t2 = theta * theta, t3 = t2 * theta;
-    const double chi = (4.0 / 9 - T / 120) * (M_PI - 2 * theta);
-    const double kcd = (4.0453 * T - 4.9710) * std::tan(chi) - 0.2155 * T + 2.4192;
-    const double x = T * T * (0.00166 * t3 - 0.00375 * t2 + 0.00209 * theta) +
-                     T * (-0.02903 * t3 + 0.06377 * t2 - 0.03202 * theta + 0.00394) +
-                     (0.11693 * t3 - 0.21196 * t2 + 0.06052 * theta + 0.25886);
-    const double y = T * T * (0.00275 * t3 - 0.00610 * t2 + 0.00317 * theta) +
-                     T * (-0.04214 * t3 + 0.08970 * t2 - 0.04153 * theta + 0.00516) +
-                     (0.15346 * t3 - 0.26756 * t2 + 0.06670 * theta + 0.26688);
-    const Rgb c = SkyModel(direction(40), 4).sky_radiance({0, 1, 0});
-    EXPECT_NEAR(luminance(c) * kLuminanceOfUnitY / 1000, kcd, 1e-3 * kcd);
-    // sRGB to XYZ [IEC 61966-2-1].
-    const double X = 0.412453 * c.r + 0.357580 * c.g + 0.180423 * c.b;
-    const double Z = 0.019334 * c.r + 0.119193 * c.g + 0.950227 * c.b;
-    const double sum = X + luminance(c) + Z;
-    EXPECT_NEAR(X / sum, x, 1e-4);
-    EXPECT_NEAR(luminance(c) / sum, y, 1e-4);
-}
-
-TEST(Sky, IsFiniteAndLitForAllParameters) {
+TEST(Sky, IsFiniteForAllParameters) {
     for (float turbidity = 1; turbidity <= 10; turbidity += 0.5f)
         for (float sun = 0; sun <= 90; sun += 10) {
-            const SkyModel sky(direction(sun), turbidity);
+            const SkyModel sky(direction(sun), turbidity, Rgb(0, 0.5f, 1));
             for (float e = 0; e <= 90; e += 6)
                 for (float a = 0; a < 360; a += 30) {
-                    const Rgb c = sky.sky_radiance(direction(e, a));
+                    const Rgb c = sky.radiance(direction(e, a));
                     ASSERT_TRUE(is_finite(c));
-                    ASSERT_GT(luminance(c), 0) << turbidity << " " << sun << " " << e << " " << a;
-                    ASSERT_LT(luminance(c), 10);
+                    ASSERT_GE(std::min({c.r, c.g, c.b}), 0);
+                    ASSERT_LT(c.max(), 10);
                 }
         }
 }
 
-TEST(Sky, IsBrighterTowardTheSun) {
-    for (const float turbidity : {2.0f, 3.0f, 6.0f}) {
-        const SkyModel sky(direction(40), turbidity);
-        double before = luminance_at(sky, direction(40));
-        for (const float azimuth : {10.0f, 20.0f, 40.0f, 60.0f}) {
-            const double now = luminance_at(sky, direction(40, azimuth));
-            EXPECT_LT(now, before);
-            before = now;
-        }
-        EXPECT_GT(luminance_at(sky, direction(40)), 3 * luminance_at(sky, direction(40, 180)));
+TEST(Sky, IsSymmetricAboutTheSunsPlane) {
+    const SkyModel sky(direction(25), 3, Rgb(0.3f));
+    expect_near_relative(sky.radiance(direction(50, 70)), sky.radiance(direction(50, -70)), 1e-5f);
+}
+
+TEST(Sky, EndsAtTheHorizonAndWithTheDay) {
+    const SkyModel sky(direction(40), 3, Rgb(0.3f));
+    EXPECT_TRUE(sky.radiance(direction(-0.1f)).is_zero());
+    EXPECT_TRUE(sky.radiance({0, -1, 0}).is_zero());
+    EXPECT_FALSE(sky.radiance(direction(0)).is_zero());
+    EXPECT_TRUE(SkyModel(direction(-1), 3, Rgb(0.3f)).radiance(direction(30)).is_zero());
+}
+
+// Mitsuba 3.9.1, scalar_spectral, `sunsky` without its sky, `complex_sun`; 1 nm steps, with its colour matching functions:
+// the middle of the disc, and 0.2° above it. (Its RGB variants have a sun that is 5 to 8 % brighter.)
+TEST(Sun, HasMitsubasRadiance) {
+    const struct {
+        float turbidity, elevation;
+        Rgb middle, above;
+    } cases[] = {
+        {3, 40, {24158.4f, 19913.8f, 15026.6f}, {20299.4f, 16146.1f, 11504.5f}},
+        {2.5f, 10, {17437.1f, 10810.3f, 4163.7f}, {14738.0f, 8885.74f, 3264.08f}},
+        {6, 70, {23379.7f, 19829.9f, 16316.5f}, {19641.5f, 16069.5f, 12477.2f}},
+        {10, 85, {17102.0f, 14115.5f, 11935.5f}, {14361.8f, 11437.8f, 9123.2f}},
+    };
+    const double psi = std::asin(0.2 / (kSunAperture / 2));
+    for (const auto& c : cases) {
+        const SunModel sun(c.turbidity);
+        const double elevation = double(c.elevation) * M_PI / 180;
+        expect_near_relative(sun.radiance(elevation, 1), c.middle, 5e-4f);
+        expect_near_relative(sun.radiance(elevation + 0.2 * M_PI / 180, std::cos(psi)), c.above,
+                             5e-3f);
     }
 }
 
-TEST(Sky, IsSymmetricAboutTheSunsPlane) {
-    const SkyModel sky(direction(25), 3);
-    expect_near_relative(sky.sky_radiance(direction(50, 70)), sky.sky_radiance(direction(50, -70)),
-                         1e-5f);
+// The same without `complex_sun`, which Mitsuba takes from a table of elevations.
+TEST(Sun, HasMitsubasMeanRadiance) {
+    const struct {
+        float turbidity, elevation;
+        Rgb radiance;
+    } cases[] = {{3, 40, {20020.0f, 15912.7f, 11362.1f}},
+                 {2.5f, 10, {14323.6f, 8567.84f, 3127.31f}},
+                 {6, 70, {19379.8f, 15850.4f, 12342.9f}},
+                 {10, 85, {14172.0f, 11283.6f, 9027.15f}}};
+    for (const auto& c : cases)
+        expect_near_relative(SunModel(c.turbidity).mean_radiance(double(c.elevation) * M_PI / 180),
+                             c.radiance, 0.012f);
 }
 
-TEST(Sky, IsBlueAwayFromTheSunAndPalerWithTurbidity) {
-    const auto blueness = [](float turbidity) {
-        const Rgb c = SkyModel(direction(60), turbidity).sky_radiance(direction(50, 180));
-        return c.b / c.r;
-    };
-    EXPECT_GT(blueness(2), 2.5f);
-    EXPECT_GT(blueness(2), blueness(4));
-    EXPECT_GT(blueness(4), blueness(8));
-}
-
-TEST(Sky, EndsAtTheHorizon) {
-    const SkyModel sky(direction(40), 3);
-    EXPECT_TRUE(sky.sky_radiance(direction(-0.1f)).is_zero());
-    EXPECT_TRUE(sky.sky_radiance({0, -1, 0}).is_zero());
-    EXPECT_FALSE(sky.sky_radiance(direction(0)).is_zero());
-}
-
-// The sun overhead in clear air gives about 100,000 lux [Preetham et al. 1999 leave about 20 % to
-// the sky].
+// The sun overhead in clear air gives about 100,000 lux.
 TEST(Sun, OverheadIlluminanceIsThatOfDaylight) {
-    const SkyModel sky(direction(90), 2);
-    const double solid_angle = 2 * M_PI * (1 - std::cos(double(kSunAngularRadius)));
-    const double lux = luminance(sky.sun_radiance()) * kLuminanceOfUnitY * solid_angle;
+    const double solid_angle = 2 * M_PI * (1 - std::cos(kSunAperture / 2 * M_PI / 180));
+    const double lux =
+        double(luminance(SunModel(2).mean_radiance(M_PI / 2))) * kLuminanceOfUnitY * solid_angle;
     EXPECT_GT(lux, 80e3);
-    EXPECT_LT(lux, 125e3);
+    EXPECT_LT(lux, 135e3);
 }
 
 TEST(Sun, IsDimmerAndRedderWhenLowOrInHaze) {
-    const auto sun = [](float elevation, float turbidity) {
-        return SkyModel(direction(elevation), turbidity).sun_radiance();
+    const auto sun = [](double elevation, float turbidity) {
+        return SunModel(turbidity).mean_radiance(elevation * M_PI / 180);
     };
-    EXPECT_LT(luminance(sun(10, 3)), 0.5f * luminance(sun(60, 3)));
+    EXPECT_LT(luminance(sun(10, 3)), 0.6f * luminance(sun(60, 3)));
     EXPECT_LT(luminance(sun(40, 8)), luminance(sun(40, 2)));
     EXPECT_GT(sun(10, 3).r / sun(10, 3).b, 2 * sun(60, 3).r / sun(60, 3).b);
-    EXPECT_FALSE(sun(0, 3).is_zero());
     EXPECT_TRUE(sun(-1, 3).is_zero());
 }
 

@@ -44,6 +44,23 @@ IrradianceRecord record(const DiscLamp& lamp, Vec3 p, Vec3 n) {
     return measure_irradiance(p, n, 100'000, sampler, [&](Vec3 d) { return lamp.radiance(p, d); });
 }
 
+// In a corner a surface begins at the point itself, or within the smallest float of it.
+TEST(IrradianceCache, GradientsAreNumbersInCorners) {
+    Sampler sampler(SamplerKind::Independent, 3);
+    sampler.start(0, 0);
+    for (const float distance : {0.0f, 1e-45f, 1e-38f, kInf}) {
+        sampler.seek(Stream::Auxiliary, 0);
+        const IrradianceRecord r =
+            measure_irradiance({}, {0, 0, 1}, 1000, sampler, [&](Vec3 d) -> IncidentRadiance {
+                return {Rgb(), d.x > 0 ? distance : 1};
+            });
+        for (int c = 0; c < 3; ++c) {
+            EXPECT_TRUE(is_finite(r.rotation[size_t(c)])) << distance;
+            EXPECT_TRUE(is_finite(r.translation[size_t(c)])) << distance;
+        }
+    }
+}
+
 TEST(IrradianceCache, GradientsAreThoseOfADiscLamp) {
     const DiscLamp lamp;
     for (const Vec3 p : {Vec3{0.4f, 0, 0}, Vec3{0.5f, -0.7f, 0.2f}, Vec3{0, 0, 0.3f}}) {

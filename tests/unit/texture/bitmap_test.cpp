@@ -171,8 +171,10 @@ TEST(Bitmap, DecodesByKindOfPixels) {
     EXPECT_EQ(blue.eval({0.5f, 0.5f}), Rgb(1));
     EXPECT_EQ(blue.eval_scalar({0.5f, 0.5f}), 1);
 
-    const PixelBuffer half = {
-        .width = 1, .height = 1, .channels = 1, .data = std::vector<Half>{{0x3555}}};
+    const PixelBuffer half = {.width = 1,
+                              .height = 1,
+                              .channels = 1,
+                              .data = std::vector<Half>{Half(Half::FromBits, 0x3555)}};
     EXPECT_NEAR(BitmapTexture(half, {}).eval_scalar({0, 0}), 0.333251953f, 1e-8);
     const PixelBuffer grey_alpha = float_pixels(1, 1, 2, {0.25f, 0.5f});
     EXPECT_EQ(BitmapTexture(grey_alpha, {}).eval({0, 0}), Rgb(0.25f));

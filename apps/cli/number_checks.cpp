@@ -1,0 +1,35 @@
+#include "number_checks.h"
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+namespace etendue {
+namespace {
+
+/// The finite number that the whole text is, whatever the locale.
+std::optional<double> number(const std::string& text) {
+    double value = 0;
+    const char* end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (error != std::errc() || stop != end || !std::isfinite(value)) return {};
+    return value;
+}
+
+}  // namespace
+
+std::string must_be_above_0(const std::string& text) {
+    const auto value = number(text);
+    return value && *value > 0 ? "" : fmt::format("must be a number above 0, but is \"{}\"", text);
+}
+
+std::string must_be_at_least_0(const std::string& text) {
+    const auto value = number(text);
+    return value && *value >= 0
+               ? ""
+               : fmt::format("must be a number of at least 0, but is \"{}\"", text);
+}
+
+}  // namespace etendue

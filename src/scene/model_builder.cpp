@@ -1,0 +1,95 @@
+#include "scene/model_builder.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "scene/settings.h"
+
+namespace etendue {
+
+TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fallback, float hi) {
+    for (const auto& c : p.object().children)
+        if (c.name == name && plugins_.object(c.object).category == "texture")
+            return TextureRef(make_texture(c.object));
+    if (name.empty()) return TextureRef(fallback);
+    const Rgb c = p.rgb(name, fallback);
+    if (c.max() > hi)
+        p.fail(name, fmt::format(
+                         "parameter \"{}\" is ({}, {}, {}), but its components must be at most {}",
+                         name, c.r, c.g, c.b, hi));
+    return TextureRef(c);
+}
+
+std::vector<const Material*> ModelBuilder::nested(const Params& p) {
+    std::vector<const Material*> found;
+    for (const auto& c : p.children("bsdf")) found.push_back(make_material(c.object));
+    return found;
+}
+
+const Texture* ModelBuilder::make_texture(int index) {
+    if (const auto it = textures_.find(index); it != textures_.end()) return it->second;
+    const TextureEntry* entry = plugins_.find(index, texture_registry());
+    if (!entry) return textures_[index] = nullptr;
+    models_.textures.push_back(
+        plugins_.guarded(index, [&] { return entry->make(plugins_.params(index), *this); }));
+    return textures_[index] = models_.textures.back().get();
+}
+
+const Material* ModelBuilder::make_material(int index) {
+    if (const auto it = materials_.find(index); it != materials_.end()) return it->second;
+    const MaterialEntry* entry = plugins_.find(index, material_registry());
+    if (!entry) return materials_[index] = default_material(Rgb(0.5f));
+    models_.materials.push_back(
+        plugins_.guarded(index, [&] { return entry->make(plugins_.params(index), *this); }));
+    return materials_[index] = models_.materials.back().get();
+}
+
+const Material* ModelBuilder::default_material(Rgb reflectance) {
+    const Material*& m = reflectance.is_zero() ? black_ : grey_;
+    if (!m) {
+        SceneDescription diffuse;
+        diffuse.objects = {{"bsdf", "diffuse", "", {}, {{"reflectance", reflectance, {}}}, {}}};
+        const auto& registry = material_registry();
+        const auto entry =
+            std::find_if(registry.begin(), registry.end(), [](const MaterialEntry& e) {
+                return std::string_view(e.info.name) == "diffuse";
+            });
+        models_.materials.push_back(entry->make({diffuse, 0}, *this));
+        m = models_.materials.back().get();
+    }
+    return m;
+}
+
+MediumId ModelBuilder::make_medium(int index) {
+    if (const auto it = media_.find(index); it != media_.end()) return it->second;
+    const SceneObject& object = plugins_.object(index);
+    if (object.type != "homogeneous")
+        throw SceneError(object.where, fmt::format("medium \"{}\" is not supported: media "
+                                                   "other than \"homogeneous\" with albedo 0 "
+                                                   "(absorption alone) need volume transport",
+                                                   object.type));
+    plugins_.check(index, medium_info());
+    constexpr size_t kMostMedia = std::numeric_limits<MediumId>::max();
+    if (models_.media.size() >= kMostMedia)
+        throw SceneError(object.where, fmt::format("a scene has at most {} media", kMostMedia));
+    models_.media.push_back(read_absorption(plugins_.params(index)));
+    return media_[index] = MediumId(models_.media.size() - 1);
+}
+
+const Emitter* ModelBuilder::make_emitters(int index, const Shape* on_shape) {
+    const EmitterEntry* entry = plugins_.find(index, emitter_registry());
+    if (!entry) return nullptr;
+    if (on_shape && std::string_view(entry->info.name) != "area")
+        throw SceneError(plugins_.object(index).where,
+                         fmt::format("emitter \"{}\" cannot sit on a shape", entry->info.name));
+    emitting_shape_ = on_shape;
+    auto made = plugins_.guarded(index, [&] { return entry->make(plugins_.params(index), *this); });
+    emitting_shape_ = nullptr;
+    const Emitter* first = made.empty() ? nullptr : made.front().get();
+    for (auto& e : made) models_.emitters.push_back(std::move(e));
+    return first;
+}
+
+}  // namespace etendue

@@ -1,0 +1,61 @@
+#include "geometry/accelerator.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "random.h"
+
+namespace etendue {
+namespace {
+
+/// A closed mesh about the origin, with triangles of all shapes.
+TriangleMesh closed_mesh(int rows, int columns, float radius) {
+    TriangleMesh mesh;
+    testing::Random random(1);
+    const auto add = [&](float theta, float phi) {
+        const float r = radius * random.between(0.7f, 1.3f);
+        mesh.positions.push_back({r * std::sin(theta) * std::cos(phi), r * std::cos(theta),
+                                  r * std::sin(theta) * std::sin(phi)});
+    };
+    add(0, 0);
+    for (int i = 1; i < rows; ++i)
+        for (int j = 0; j < columns; ++j)
+            add(kPi * float(i) / float(rows), 2 * kPi * float(j) / float(columns));
+    add(kPi, 0);
+    const auto at = [&](int i, int j) {
+        return i == 0      ? 0u
+               : i == rows ? uint32_t(mesh.positions.size() - 1)
+                           : uint32_t(1 + (i - 1) * columns + j % columns);
+    };
+    for (int i = 0; i < rows; ++i)
+        for (int j = 0; j < columns; ++j) {
+            if (i > 0) mesh.triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j)});
+            if (i + 1 < rows)
+                mesh.triangles.push_back({at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)});
+        }
+    mesh.compute_face_normals();
+    return mesh;
+}
+
+// No ray slips through between triangles that share an edge.
+TEST(Accelerator, ClosedMeshesHaveNoGaps) {
+    const TriangleMesh mesh = closed_mesh(60, 120, 1);
+    Accelerator accelerator;
+    accelerator.add_shape(mesh);
+    accelerator.commit();
+    testing::Random random(2);
+    int missed = 0;
+    RayHit hit;
+    for (int i = 0; i < 300000; ++i) {
+        const auto& t = mesh.triangles[random.bits() % mesh.triangles.size()];
+        const Vec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]];
+        const Vec3 o = random.in_cube() * 0.3f;
+        const Ray ray{o, normalize(a + (b - a) * random.between(0.01f, 0.99f) - o), kInf};
+        missed += !accelerator.intersect(ray, hit) || !accelerator.occluded(ray);
+    }
+    EXPECT_EQ(missed, 0);
+}
+
+}  // namespace
+}  // namespace etendue

@@ -1,0 +1,28 @@
+#include "integrator/integrator.h"
+
+#include <gtest/gtest.h>
+
+namespace etendue {
+namespace {
+
+std::string error_of(const std::string& spec) {
+    try {
+        make_integrator(IntegratorSpec::parse(spec));
+    } catch (const std::exception& e) {
+        return e.what();
+    }
+    return "no error";
+}
+
+TEST(IntegratorParams, NumbersAreFinite) {
+    for (const char* name : {"vcm", "upg", "ppm", "sppm"})
+        for (const char* value : {"nan", "inf", "-inf", "1e39", "x"})
+            EXPECT_EQ(error_of(std::string(name) + ":radius=" + value),
+                      "integrator \"" + std::string(name) +
+                          "\": parameter \"radius\" must be a finite number, but is \"" + value +
+                          "\"");
+    EXPECT_EQ(error_of("vcm:radius=0.1"), "no error");
+}
+
+}  // namespace
+}  // namespace etendue

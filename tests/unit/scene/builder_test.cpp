@@ -1,0 +1,42 @@
+// What the scene builder refuses.
+
+#include <gtest/gtest.h>
+
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+template <class F>
+std::string error_of(F&& f) {
+    try {
+        f();
+    } catch (const std::exception& e) {
+        return e.what();
+    }
+    return "no error";
+}
+
+// Ids of media have 16 bits.
+TEST(SceneBuilder, RefusesMoreMediaThanThereAreIds) {
+    std::string media;
+    for (int i = 0; i <= 0x7fff; ++i)
+        media += "<medium type=\"homogeneous\"><float name=\"albedo\" value=\"0\"/></medium>";
+    const std::string error = error_of([&] { build(front_camera(4) + room() + media); });
+    EXPECT_NE(error.find("a scene has at most 32767 media"), std::string::npos) << error;
+}
+
+TEST(SceneBuilder, RefusesCropsBeyondTheImage) {
+    const SceneDescription scene = parse_mitsuba_xml(
+        "<scene version=\"3.0.0\">" + front_camera(4) + room() + "</scene>", "test.xml");
+    constexpr int kLargest = std::numeric_limits<int>::max();
+    for (const auto& crop : {std::array{kLargest, 0, 2, 2}, {0, kLargest, 2, 2}, {1, 1, 4, 3}}) {
+        BuildOptions options;
+        options.crop = crop;
+        const std::string error = error_of([&] { build_scene(scene, options); });
+        EXPECT_NE(error.find("does not lie within the image"), std::string::npos) << error;
+    }
+}
+
+}  // namespace
+}  // namespace etendue::test
