@@ -27,7 +27,7 @@ namespace {
 
 struct RenderCommand {
     SceneOptions scene;
-    std::string output = "out.exr", integrator, sampler = "sobol", techniques, preview, stats;
+    std::string output = "out.exr", integrator, sampler, techniques, preview, stats;
     std::vector<std::string> aovs;
     uint64_t seed = 0, spp = 0;
     double seconds = 0, error = 0;
@@ -338,9 +338,7 @@ void add_render_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
-    c.add_option("--sampler", command->sampler,
-                 "independent or sobol; with sobol the error estimate is an upper one")
-        ->capture_default_str();
+    add_sampler_option(c, command->sampler, "; with sobol the error estimate is an upper one");
     c.add_option("--threads", command->threads, "Number of threads; 0: all")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));

@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <map>
+#include <string_view>
 
 #include <unistd.h>
 
@@ -22,13 +25,65 @@ namespace {
 struct VerifyCommand {
     SceneOptions scene;
     std::vector<std::string> methods{"path", "light", "bdpt"};
-    std::string lengths = "1..8", against = "path", reference, json;
+    std::vector<std::string> against{"path", "light"};
+    std::string lengths = "1..8", sampler, detect, reference, json;
     uint64_t spp = 0;
+    double seconds = 0;
     VerifyOptions options;
     bool quiet = false;
 
     void run();
 };
+
+/// 0.5% or 0.005.
+double parse_share(const std::string& text, const char* option) {
+    double value = 0;
+    const char* begin = text.data();
+    const auto [end, error] = std::from_chars(begin, begin + text.size(), value);
+    const std::string_view rest(end, size_t(begin + text.size() - end));
+    if (rest == "%") value /= 100;
+    if (error != std::errc() || !(rest.empty() || rest == "%") || !(value >= 1e-4 && value < 1))
+        throw std::runtime_error(fmt::format(
+            "{} must be a share between 0.01% and 100%, such as 0.5% or 0.005, but is \"{}\"",
+            option, text));
+    return value;
+}
+
+/// How much larger than its squares over their count the sum of a filter's values is: a splat spreads its error over so
+/// many pixels at most.
+double filter_correlation(const ReconstructionFilter& filter) {
+    const auto of = [&](float x, float y) {
+        double sum = 0, squares = 0;
+        const int r = int(std::ceil(filter.radius())) + 1;
+        for (int v = -r; v <= r; ++v)
+            for (int u = -r; u <= r; ++u) {
+                const double h = std::fabs(double(filter.eval({x - float(u), y - float(v)})));
+                sum += h, squares += h * h;
+            }
+        return squares > 0 ? sum * sum / squares : 1.0;
+    };
+    double largest = 1;
+    for (const float x : {0.0f, 0.25f, 0.499f})
+        for (const float y : {0.0f, 0.25f, 0.499f}) largest = std::max(largest, of(x, y));
+    return largest;
+}
+
+/// How much the variance of the image's mean exceeds that of independent pixels. Splats, which the filter spreads, and
+/// light paths, which many pixels share, correlate pixels. The spread of the passes' means includes all of it
+/// ("etendue.mean_luminance_standard_error"). Where an image does not have that, the filter alone is allowed for.
+double pixel_correlation(const Image& image, const std::vector<Rgb>& variance, const Scene& scene) {
+    double correlation = filter_correlation(scene.filter());
+    const auto error = image.attributes.find("etendue.mean_luminance_standard_error");
+    const auto* standard_error =
+        error == image.attributes.end() ? nullptr : std::get_if<double>(&error->second);
+    if (!standard_error) return correlation;
+    // The luminance has at least the error that independent channels give it, so the factor is never too small.
+    const float r = luminance({1, 0, 0}), g = luminance({0, 1, 0}), b = luminance({0, 0, 1});
+    double independent = 0;
+    for (const Rgb& v : variance) independent += double(luminance({v.r * r, v.g * g, v.b * b}));
+    independent /= sqr(double(variance.size()));
+    return independent > 0 ? std::max(1.0, sqr(*standard_error) / independent) : correlation;
+}
 
 ReferenceImage read_reference(const std::string& path, const Scene& scene) {
     const Image image = read_image(path);
@@ -48,7 +103,10 @@ ReferenceImage read_reference(const std::string& path, const Scene& scene) {
         throw std::runtime_error(fmt::format("{} has {} x {} pixels, but the scene has {} x {}",
                                              path, image.width, image.height, film.crop_width,
                                              film.crop_height));
-    return {path, rgb_pixels(image), rgb_pixels(image, "variance"), int64_t(*samples)};
+    ReferenceImage reference{path, rgb_pixels(image), rgb_pixels(image, "variance"),
+                             int64_t(*samples)};
+    reference.correlation = pixel_correlation(image, reference.variance, scene);
+    return reference;
 }
 
 // -- Text.
@@ -58,12 +116,12 @@ std::string percent(double v) {
     return p == 0 ? "0 %" : p < 0.01 ? "< 0.01 %" : fmt::format("{:.{}f} %", p, p < 9.995 ? 2 : 1);
 }
 
-std::string describe(const VerifyReport& report, const Comparison& c) {
-    if (!c.is_tested())
-        return c.method.mean() == 0 && c.reference.mean() == 0 ? "nothing there"
+std::string describe(const VerifyReport& report, const WelchTest& t) {
+    if (!t.is_tested())
+        return t.method.mean() == 0 && t.reference.mean() == 0 ? "nothing there"
                                                                : "too few samples to test";
-    return fmt::format("ratio {:.5f} ± {:.5f}, p = {:.2g}{}", c.ratio(), c.ratio_error(), c.p,
-                       report.deviates(c) ? "  DEVIATES" : "");
+    return fmt::format("ratio {:.5f} ± {:.5f}, p = {:.2g}{}", t.ratio(), t.ratio_error(), t.p,
+                       report.deviates(t) ? "  DEVIATES" : "");
 }
 
 const char* kChannels[] = {"red", "green", "blue"};
@@ -73,10 +131,10 @@ void print_image(const VerifyReport& report, const MethodReport& m) {
         fmt::print("  image, {:<6} {}\n", kChannels[c], describe(report, m.image[c]));
     size_t tested = 0, deviating = 0, worst = 0;
     for (size_t i = 0; i < m.tiles.size(); ++i) {
-        const Comparison& c = m.tiles[i];
-        tested += c.is_tested();
-        deviating += report.deviates(c);
-        if (c.is_tested() && (!m.tiles[worst].is_tested() || c.p < m.tiles[worst].p)) worst = i;
+        const WelchTest& t = m.tiles[i];
+        tested += t.is_tested();
+        deviating += report.deviates(t);
+        if (t.is_tested() && (!m.tiles[worst].is_tested() || t.p < m.tiles[worst].p)) worst = i;
     }
     fmt::print("  tiles         {} of {} tested by channel, {} deviate", tested, m.tiles.size(),
                deviating);
@@ -84,6 +142,9 @@ void print_image(const VerifyReport& report, const MethodReport& m) {
         fmt::print("; the worst, tile {}, {}: {}", worst / 3, kChannels[worst % 3],
                    describe(report, m.tiles[worst]));
     fmt::print("\n");
+    if (m.out_of_reach + m.too_rare > 0)
+        fmt::print("  image and tiles hold the compared paths, {} of the light\n",
+                   percent(1 - m.out_of_reach - m.too_rare));
 }
 
 void print_lengths(const VerifyReport& report, const MethodReport& m) {
@@ -94,6 +155,39 @@ void print_lengths(const VerifyReport& report, const MethodReport& m) {
                    percent(l.out_of_reach), percent(l.too_rare),
                    l.comparison.is_tested() ? percent(l.comparison.detectable(report.level)) : "-",
                    describe(report, l.comparison));
+}
+
+void print_classes(const VerifyReport& report, const MethodReport& m) {
+    size_t deviating = 0;
+    for (const ClassReport& c : m.classes) deviating += report.deviates(c.comparison);
+    if (!m.classes.empty())
+        fmt::print("  {} classes of paths tested, {} deviate\n"
+                   "  class of paths     share  would be found  against  comparison\n",
+                   m.classes.size(), deviating);
+    for (const ClassReport& c : m.classes)
+        if (c.share >= kLargeShare || report.deviates(c.comparison))
+            fmt::print("  {:<14}  {:>8}  {:>14}  {:>7}  {}\n", to_string(c.path_class),
+                       percent(c.share), percent(c.comparison.detectable(report.level)),
+                       c.reference, describe(report, c.comparison));
+
+    constexpr size_t kMostShown = 6;
+    if (m.untested.empty()) return;
+    fmt::print("  not compared       share  could hide an error of the image up to its share\n");
+    double rest = 0;
+    for (size_t i = 0; i < m.untested.size(); ++i) {
+        const UntestedClass& c = m.untested[i];
+        if (i >= kMostShown)
+            rest += c.share;
+        else
+            fmt::print("  {:<14}  {:>8}  {}\n", to_string(c.path_class), percent(c.share),
+                       c.is_out_of_reach
+                           ? "out of reach"
+                           : fmt::format("too rare: {:.0f} effective contributions, {:.0f} of the "
+                                         "reference",
+                                         c.method_count, c.reference_count));
+    }
+    if (m.untested.size() > kMostShown)
+        fmt::print("  {} more         {:>8}\n", m.untested.size() - kMostShown, percent(rest));
 }
 
 /// One row a length, one column a number of light vertices s; pairs apart.
@@ -110,13 +204,14 @@ void print_techniques(const VerifyReport& report, const MethodReport& m, bool pa
         int column = 0;
         for (const TechniqueReport* t : row) {
             for (; column < t->technique.s; ++column) line += fmt::format(" {:>18}", "");
-            const Comparison& c = t->comparison;
-            line += fmt::format(
-                " {:>18}",
-                !c.is_tested()
-                    ? "-"
-                    : fmt::format("{}{:.3f}({:.0f}; {:.0f} %)", report.deviates(c) ? "!" : "",
-                                  c.ratio(), std::ceil(1000 * c.ratio_error()), 100 * t->coverage));
+            const WelchTest& test = t->comparison;
+            line += fmt::format(" {:>18}",
+                                !test.is_tested()
+                                    ? "-"
+                                    : fmt::format("{}{:.3f}({:.0f}; {:.0f} %)",
+                                                  report.deviates(test) ? "!" : "", test.ratio(),
+                                                  std::ceil(1000 * test.ratio_error()),
+                                                  100 * t->coverage));
             ++column;
         }
         fmt::print("{}\n", line);
@@ -127,7 +222,20 @@ void print_techniques(const VerifyReport& report, const MethodReport& m, bool pa
                        describe(report, t.comparison));
 }
 
-void print_verdict(const VerifyReport& report, const MethodReport& m) {
+/// Which error would have been found.
+std::string power(const Detectable& d) {
+    if (!d.image) return "no error of the image could have been found";
+    std::string text = fmt::format("an error of {} of the image", percent(*d.image));
+    if (d.length)
+        text += fmt::format(
+            ", and of {} of any path length with {:.0f} % of the light or more{}",
+            percent(*d.length), 100 * kLargeShare,
+            d.not_tested.empty() ? "" : fmt::format(" (but {})", fmt::join(d.not_tested, ", ")));
+    return text + ", would have been found with 90 % probability";
+}
+
+void print_verdict(const VerifyReport& report, const MethodReport& m,
+                   const VerifyOptions& options) {
     const char* claim = to_string(m.estimator);
     switch (report.verdict(m)) {
     case Verdict::Consistent:
@@ -140,17 +248,26 @@ void print_verdict(const VerifyReport& report, const MethodReport& m) {
         fmt::print("  verdict: undecided, more samples are needed (it claims to be {})", claim);
         break;
     }
+    const Detectable detectable = report.detectable(m);
+    fmt::print("; {}", power(detectable));
+    if (options.detect && !detectable.reaches(*options.detect))
+        fmt::print("; the time was up before {}", percent(*options.detect));
     if (m.out_of_reach > 0)
-        fmt::print("; {} of the light is out of its reach, or the reference's",
+        fmt::print("; {} of the light is out of its reach, or the references'",
                    percent(m.out_of_reach));
-    if (m.too_rare > 0) fmt::print("; {} comes by paths too rare for a test", percent(m.too_rare));
+    if (m.too_rare > 0)
+        fmt::print("; {} comes by paths too rare for a test, where an error of up to that size "
+                   "could hide",
+                   percent(m.too_rare));
     if (m.rejected > 0) fmt::print("; {} contributions were not finite", m.rejected);
     fmt::print("\n\n");
 }
 
-void print_report(const VerifyReport& report, const Scene& scene, const VerifyOptions& options) {
-    fmt::print("{}, {} x {} pixels, {} runs, against {}\n", scene.file(), scene.film().crop_width,
-               scene.film().crop_height, options.runs, report.reference);
+void print_report(const VerifyReport& report, const Scene& scene, const std::string& sampler,
+                  const VerifyOptions& options) {
+    fmt::print("{}, {} x {} pixels, {} runs, sampler {}, against {}\n", scene.file(),
+               scene.film().crop_width, scene.film().crop_height, options.runs, sampler,
+               report.reference);
     fmt::print("{} comparisons, together a false alarm with probability {}: each is tested at "
                "{:.3g}\n",
                report.tests, options.alpha, report.level);
@@ -159,42 +276,50 @@ void print_report(const VerifyReport& report, const Scene& scene, const VerifyOp
         fmt::print("{}, {} spp a run\n", m.method, m.spp);
         print_image(report, m);
         print_lengths(report, m);
+        print_classes(report, m);
         print_techniques(report, m, false);
         print_techniques(report, m, true);
         if (m.slope)
             fmt::print("  error of the mean of 1 to {} runs: slope {:.3f}\n", m.errors.back().runs,
                        *m.slope);
-        print_verdict(report, m);
+        print_verdict(report, m, options);
     }
 }
 
 // -- JSON.
 
-nlohmann::ordered_json to_json(const VerifyReport& report, const Comparison& c) {
-    nlohmann::ordered_json j{{"tested", c.is_tested()},
-                             {"method", c.method.mean()},
-                             {"method_standard_error", std::sqrt(c.method.squared_error())},
-                             {"reference", c.reference.mean()},
-                             {"reference_standard_error", std::sqrt(c.reference.squared_error())},
-                             {"effective_count", c.effective_count}};
-    if (c.is_tested()) {
-        j["p"] = c.p;
-        j["deviates"] = report.deviates(c);
-        if (c.reference.mean() != 0) j["detectable"] = c.detectable(report.level);
+nlohmann::ordered_json to_json(const VerifyReport& report, const WelchTest& t) {
+    nlohmann::ordered_json j{{"tested", t.is_tested()},
+                             {"method", t.method.mean()},
+                             {"method_standard_error", std::sqrt(t.method.squared_error())},
+                             {"reference", t.reference.mean()},
+                             {"reference_standard_error", std::sqrt(t.reference.squared_error())},
+                             {"effective_count", t.effective_count}};
+    if (t.is_tested()) {
+        j["p"] = t.p;
+        j["deviates"] = report.deviates(t);
+        if (t.reference.mean() != 0) j["detectable"] = t.detectable(report.level);
     }
     return j;
 }
 
-nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m) {
+nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m,
+                               const VerifyOptions& options) {
     nlohmann::ordered_json j{{"method", m.method},
                              {"estimator", to_string(m.estimator)},
                              {"verdict", to_string(report.verdict(m))},
                              {"spp", m.spp},
                              {"rejected_contributions", m.rejected},
                              {"out_of_reach", m.out_of_reach},
-                             {"too_rare", m.too_rare}};
-    for (const Comparison& c : m.image) j["image"].push_back(to_json(report, c));
-    for (const Comparison& c : m.tiles) j["tiles"].push_back(to_json(report, c));
+                             {"too_rare", m.too_rare},
+                             {"untested_tiles", m.untested_tiles}};
+    const Detectable detectable = report.detectable(m);
+    j["detectable"] = {{"lengths_not_tested", detectable.not_tested}};
+    if (detectable.image) j["detectable"]["image"] = *detectable.image;
+    if (detectable.length) j["detectable"]["length"] = *detectable.length;
+    if (options.detect) j["detectable"]["is_reached"] = detectable.reaches(*options.detect);
+    for (const WelchTest& t : m.image) j["image"].push_back(to_json(report, t));
+    for (const WelchTest& t : m.tiles) j["tiles"].push_back(to_json(report, t));
     for (const LengthReport& l : m.lengths) {
         j["lengths"].push_back(to_json(report, l.comparison));
         j["lengths"].back().update(nlohmann::ordered_json{{"edges", l.edges},
@@ -203,6 +328,17 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m
                                                           {"out_of_reach", l.out_of_reach},
                                                           {"too_rare", l.too_rare}});
     }
+    for (const ClassReport& c : m.classes) {
+        j["classes"].push_back(to_json(report, c.comparison));
+        j["classes"].back().update(nlohmann::ordered_json{
+            {"class", to_string(c.path_class)}, {"share", c.share}, {"against", c.reference}});
+    }
+    for (const UntestedClass& c : m.untested)
+        j["not_compared"].push_back({{"class", to_string(c.path_class)},
+                                     {"share", c.share},
+                                     {"out_of_reach", c.is_out_of_reach},
+                                     {"method_effective_count", c.method_count},
+                                     {"reference_effective_count", c.reference_count}});
     for (const TechniqueReport& t : m.techniques) {
         j["techniques"].push_back(to_json(report, t.comparison));
         j["techniques"].back().update(
@@ -218,17 +354,20 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m
 }
 
 nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
-                               const VerifyOptions& options) {
+                               const std::string& sampler, const VerifyOptions& options) {
     nlohmann::ordered_json j{{"scene", scene.file()},
                              {"width", scene.film().crop_width},
                              {"height", scene.film().crop_height},
                              {"reference", report.reference},
                              {"runs", options.runs},
                              {"seed", options.seed},
+                             {"sampler", sampler},
                              {"alpha", options.alpha},
                              {"tests", report.tests},
                              {"level", report.level}};
-    for (const MethodReport& m : report.methods) j["methods"].push_back(to_json(report, m));
+    if (options.detect) j["detect"] = *options.detect;
+    for (const MethodReport& m : report.methods)
+        j["methods"].push_back(to_json(report, m, options));
     return j;
 }
 
@@ -237,7 +376,13 @@ void VerifyCommand::run() {
     options.shortest = selected.shortest;
     options.longest = selected.longest;
     if (spp > 0) options.spp = spp;
-    options.against = IntegratorSpec::parse(against);
+    if (spp > 0 && seconds > 0 && detect.empty())
+        throw std::runtime_error("--time and --spp exclude each other, except with --detect");
+    if (seconds > 0) options.seconds = seconds;
+    if (!detect.empty()) options.detect = parse_share(detect, "--detect");
+    options.sampler = parse_sampler(sampler);
+    options.against.clear();
+    for (const std::string& m : against) options.against.push_back(IntegratorSpec::parse(m));
     std::vector<IntegratorSpec> specs;
     for (const std::string& m : methods) specs.push_back(IntegratorSpec::parse(m));
     for (const IntegratorSpec& s : specs) make_integrator(s);
@@ -252,8 +397,9 @@ void VerifyCommand::run() {
     });
     if (!quiet && is_terminal) fmt::print(stderr, "\r\033[K");
 
-    if (!quiet) print_report(report, s, options);
-    if (!json.empty()) write_file_atomically(json, to_json(report, s, options).dump(2) + "\n");
+    if (!quiet) print_report(report, s, sampler, options);
+    if (!json.empty())
+        write_file_atomically(json, to_json(report, s, sampler, options).dump(2) + "\n");
     std::vector<std::string> rejected;
     for (const MethodReport& m : report.methods)
         if (m.estimator == Estimator::Unbiased && report.verdict(m) == Verdict::Deviates)
@@ -281,17 +427,26 @@ void add_verify_command(CLI::App& app) {
                  "Probability of a false alarm, of all comparisons together")
         ->capture_default_str()
         ->check(CLI::Range(1e-9, 0.5));
-    auto* spp = c.add_option("--spp", command->spp, "Samples per pixel of each run")
-                    ->check(must_be_above_0);
-    c.add_option("--time", command->options.seconds, "Seconds for all runs of one method")
-        ->capture_default_str()
-        ->check(must_be_above_0)
-        ->excludes(spp);
-    auto* against = c.add_option("--against", command->against, "Method to compare with")
+    c.add_option("--spp", command->spp,
+                 "Samples per pixel of each run; with --detect of each rendering")
+        ->check(must_be_above_0);
+    c.add_option("--time", command->seconds,
+                 "Seconds for all runs of one method, 30 unless --spp is given; with --detect for "
+                 "everything, no limit unless given")
+        ->check(must_be_above_0);
+    auto* detect = c.add_option(
+        "--detect", command->detect,
+        "Render until a relative error of this size (0.5% or 0.005), of the image or of a path "
+        "length with 2 % of the light, would be found with 90 % probability");
+    add_sampler_option(c, command->sampler, ", as for render");
+    auto* against = c.add_option("--against", command->against,
+                                 "Methods to compare with: the first one; others on classes of "
+                                 "paths that they know much better")
                         ->capture_default_str();
     c.add_option("--reference", command->reference,
-                 "Picture to compare with, an .exr with a layer \"variance\", instead of a method")
-        ->excludes(against);
+                 "Image to compare with, an .exr with a layer \"variance\", instead of a method")
+        ->excludes(against)
+        ->excludes(detect);
     c.add_option("--tiles", command->options.tiles, "Tiles across and down the image")
         ->capture_default_str()
         ->check(CLI::Range(1, 64));

@@ -101,6 +101,11 @@ IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
     return spec;
 }
 
+void add_sampler_option(CLI::App& command, std::string& name, const std::string& more) {
+    name = "sobol";
+    command.add_option("--sampler", name, "independent or sobol" + more)->capture_default_str();
+}
+
 SamplerKind parse_sampler(const std::string& name) {
     if (name == "independent") return SamplerKind::Independent;
     if (name == "sobol") return SamplerKind::Sobol;

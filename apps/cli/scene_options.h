@@ -34,6 +34,8 @@ Scene load_scene(const SceneOptions& options);
 /// same ones.
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
 
+/// Adds --sampler; `name` starts as the default of all subcommands.
+void add_sampler_option(CLI::App& command, std::string& name, const std::string& more = "");
 SamplerKind parse_sampler(const std::string& name);
 
 }  // namespace etendue

@@ -1,7 +1,6 @@
 #include "verify/contribution_tally.h"
 
 #include <algorithm>
-#include <tuple>
 
 namespace etendue {
 
@@ -11,11 +10,13 @@ void ContributionTally::observe(const Join& join, Rgb contribution, float share,
     if (edges >= cut_offs_.size()) return;
     const Technique& q = join.technique;
     const SubPath& y = is_pair(q.strategy) ? paths.pair : paths.y;
-    PathClass c = classify(scene_, join, y, paths.z, cut_offs_[edges]);
+    const PathClass c = classify(scene_, join, y, paths.z, cut_offs_[edges]);
     Sums& sums = sums_[uint64_t(q.strategy) << 40 | uint64_t(q.s) << 32 | c.key()];
-    c.has_short_edge = false;
-    std::vector<TileSum>& tiles = tiles_[c];
-    tiles.resize(grid_.tiles());
+    if (!sums.tiles) {
+        sums.tiles = &tiles_[c.without_length_of_edges()];
+        sums.tiles->resize(grid_.tiles());
+    }
+    std::vector<TileSum>& tiles = *sums.tiles;
 
     const auto add_to_tile = [&](uint64_t at, Rgb value) {
         TileSum& t = tiles[grid_.tile(at)];
@@ -46,10 +47,7 @@ std::vector<ContributionTally::Entry> ContributionTally::entries() const {
         out.push_back(
             {c, {strategy, s, c.edges + 1 + is_pair(strategy) - s}, sums.weighted, sums.alone});
     }
-    std::sort(out.begin(), out.end(), [](const Entry& a, const Entry& b) {
-        return std::tuple(a.path_class, a.technique.strategy, a.technique.s) <
-               std::tuple(b.path_class, b.technique.strategy, b.technique.s);
-    });
+    std::sort(out.begin(), out.end());
     return out;
 }
 

@@ -1,10 +1,12 @@
 #pragma once
-// What one rendering brought, by class of paths and by technique.
+// What one rendering found, by class of paths and by technique.
 
 #include <algorithm>
 #include <array>
 #include <map>
+#include <tuple>
 #include <unordered_map>
+#include <vector>
 
 #include "render/contribution_observer.h"
 #include "verify/path_class.h"
@@ -16,9 +18,10 @@ struct Tally {
     double sum = 0, squares = 0, fourths = 0;
 
     void add(double v) {
+        const double square = v * v;
         sum += v;
-        squares += v * v;
-        fourths += v * v * v * v;
+        squares += square;
+        fourths += square * square;
     }
     Tally& operator+=(const Tally& o) {
         sum += o.sum;
@@ -30,8 +33,13 @@ struct Tally {
         const double square = factor * factor;
         return {sum * factor, squares * square, fourths * square * square};
     }
-    /// How many equal contributions would be spread as much [Kish 1965]: where it is small, a t-test is void. And so it is
-    /// where the spread itself rests on few: four times the same of the squares, if that is less.
+    /// What the same mean has where its samples are fewer by this factor.
+    Tally from_fewer_samples(double factor) const {
+        return {sum, squares * factor, fourths * factor * factor * factor};
+    }
+    /// The number of equal contributions with the same relative spread [Kish 1965]: a t-test is void where it is small.
+    /// The spread itself is uncertain where few contributions decide it, so the number is also limited to four times the
+    /// same of the squares.
     double effective_count() const {
         return squares > 0 ? std::min(sum * sum / squares, 4 * squares * squares / fourths) : 0.0;
     }
@@ -58,6 +66,12 @@ public:
         PathClass path_class;
         Technique technique;
         Tally weighted, alone;
+
+        /// By class, then by technique.
+        friend bool operator<(const Entry& a, const Entry& b) {
+            return std::tie(a.path_class, a.technique.strategy, a.technique.s) <
+                   std::tie(b.path_class, b.technique.strategy, b.technique.s);
+        }
     };
     /// Weighted sums over a tile.
     struct TileSum {
@@ -72,6 +86,7 @@ public:
     void observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
                  const Workspace& paths) override;
 
+    /// Sorted.
     std::vector<Entry> entries() const;
     /// By class, whether or not it has a short edge; tile by tile.
     const std::map<PathClass, std::vector<TileSum>>& tiles() const { return tiles_; }
@@ -82,6 +97,7 @@ private:
     std::vector<float> cut_offs_;
     struct Sums {
         Tally weighted, alone;
+        std::vector<TileSum>* tiles = nullptr;  ///< In tiles_.
     };
     std::unordered_map<uint64_t, Sums> sums_;  ///< By class, strategy and s.
     std::map<PathClass, std::vector<TileSum>> tiles_;

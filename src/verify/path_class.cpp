@@ -60,30 +60,36 @@ namespace {
 uint32_t fixed_vertices(const PathClass& c) {
     return c.delta_events | 1u << c.edges;
 }
-/// The vertex that both sub-paths of a pair have.
-uint32_t pair_vertex(const Technique& q) {
-    return 1u << (q.s - 1);
+/// The bit of x_{s-1}, the last light vertex; 0 where there is none. Of a pair it is the vertex that both sub-paths have.
+uint32_t last_light_vertex(const Technique& q) {
+    return q.s > 0 ? 1u << (q.s - 1) : 0u;
 }
 
 }  // namespace
 
 int times_made(const Technique& q, const PathClass& c, PairRule rule) {
     if (q.strategy != Strategy::Gather || rule != PairRule::Both) return 1;
-    const uint32_t x_m = pair_vertex(q), fixed = fixed_vertices(c);
+    const uint32_t x_m = last_light_vertex(q), fixed = fixed_vertices(c);
     return !(fixed & x_m << 1) + !(fixed & x_m >> 1);
 }
 
 bool can_make(const Technique& q, const PathClass& c) {
     if (q.vertices() != c.edges + 1) return false;
-    // A gather samples the vertex again from the one or the other side.
-    const uint32_t x_m = pair_vertex(q), fixed = fixed_vertices(c);
+    const uint32_t x_m = last_light_vertex(q), fixed = fixed_vertices(c);
     if (is_pair(q.strategy) && (fixed & x_m)) return false;
     if (q.strategy == Strategy::Merge) return true;
+    // A gather samples the vertex again from the one or the other side.
     if (q.strategy == Strategy::Gather) return !((fixed & x_m << 1) && (fixed & x_m >> 1));
     if (q.strategy == Strategy::Hit) return !c.delta_emitter;
     if (q.strategy == Strategy::HitLens) return true;
     if (q.s == 1 && q.t == 1) return !c.infinite_ends;
-    return (c.delta_events & (3u << (q.s - 1))) == 0;  // x_{s-1} and x_s are joined
+    return (c.delta_events & (x_m | x_m << 1)) == 0;  // x_{s-1} and x_s are joined
+}
+
+std::string to_string(const PathClass& c) {
+    std::string text = c.delta_emitter ? "L*" : "L";
+    for (int i = 1; i < c.edges; ++i) text += c.delta_events >> i & 1 ? 'S' : 'D';
+    return text + "E";
 }
 
 bool can_make(const TechniqueCounts& counts, const PathClass& c) {

@@ -3,6 +3,7 @@
 // compared on paths that both can make.
 
 #include <compare>
+#include <string>
 #include <vector>
 
 #include "pathspace/join.h"
@@ -19,6 +20,12 @@ struct PathClass {
     uint32_t delta_events = 0;    ///< Bit i: x_i scatters by a delta event.
 
     friend auto operator<=>(const PathClass&, const PathClass&) = default;
+    /// The same whether or not it has a short edge.
+    PathClass without_length_of_edges() const {
+        PathClass c = *this;
+        c.has_short_edge = false;
+        return c;
+    }
     /// All of it, in 32 bits.
     uint32_t key() const {
         return delta_events | uint32_t(edges) << kMostEdges | uint32_t(has_short_edge) << 29 |
@@ -32,6 +39,10 @@ struct PathClass {
                 .delta_events = key & ((1u << kMostEdges) - 1)};
     }
 };
+
+/// In Heckbert's notation: L for the emitter, L* for one without extent, D or S for smooth and delta events, E for the
+/// lens.
+std::string to_string(const PathClass& c);
 
 /// The class of the path that `join` makes of y and z; at most kMostEdges edges.
 PathClass classify(const Scene& scene, const Join& join, const SubPath& y, const SubPath& z,

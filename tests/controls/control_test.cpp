@@ -14,7 +14,7 @@ namespace {
 constexpr int kSize = 16;
 
 /// Where an error shows.
-enum Part : unsigned { Image = 1, Lengths = 2, Techniques = 4, Densities = 8 };
+enum Part : unsigned { Image = 1, Lengths = 2 /* and classes */, Techniques = 4, Densities = 8 };
 
 struct Planted {
     const char* name;
@@ -27,6 +27,8 @@ struct Planted {
 void PrintTo(const Planted& p, std::ostream* out) {
     *out << p.name;
 }
+
+const std::string kMirror = "<bsdf type=\"twosided\"><bsdf type=\"conductor\"/></bsdf>";
 
 /// A lamp as large as the ceiling: hits and next events share its light.
 std::string large_lamp() {
@@ -76,6 +78,8 @@ std::vector<Planted> planted() {
                              "<translate x=\"-0.1\" y=\"-0.2\"/>",
                              diffuse("0.7,0.7,0.7"));
     const std::string softly_lit = front_camera(kSize) + room() + large_lamp();
+    // Light that a glass ball gathers on the floor, from a lamp that eye paths hit often enough.
+    const std::string by_glass = softly_lit + sphere("0,-0.2,0.1", "0.45", kGlass);
     return {
         {"EtaSquared", front_camera(kSize) + room() + lamp_in_glass(), "light",
          Image | Lengths | Techniques, 0},
@@ -99,6 +103,10 @@ std::vector<Planted> planted() {
         {"RouletteOfPairs", lit_room, "upg+bdpt:radius=0.3", Lengths, 0},
         {"PredicatesDiffer", lit_room, "upg+bdpt:radius=0.2,roulette=0", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
+        {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},
+        {"LostSplats", by_glass, "bdpt:roulette=0", Image | Lengths, 0},
+        {"FivePercentOfOneClass", lit_room + sphere("-0.2,-0.5,0", "0.45", kMirror),
+         "bdpt:roulette=0", Lengths, 0, 256},
     };
 }
 
@@ -114,23 +122,28 @@ struct Findings {
     }
 };
 
-Findings findings(const Planted& planted) {
+Findings findings(const Planted& planted, SamplerKind sampler) {
     const Scene scene = build(planted.xml);
     VerifyOptions options;
     options.longest = 5;
     options.spp = planted.spp;
     options.threads = 1;
+    options.sampler = sampler;
     const VerifyReport report = verify(scene, {IntegratorSpec::parse(planted.method)}, options);
     const MethodReport& m = report.methods.front();
     Findings found;
     for (const auto* parts : {&m.image, &m.tiles})
-        for (const Comparison& c : *parts)
+        for (const WelchTest& c : *parts)
             found.add(Image, report.deviates(c), fmt::format("image or tile: {:.4f}", c.ratio()));
     for (const LengthReport& l : m.lengths)
         found.add(Lengths, report.deviates(l.comparison),
                   fmt::format("length {}: {:.4f} ± {:.4f}, would be found {:.4f}", l.edges,
                               l.comparison.ratio(), l.comparison.ratio_error(),
                               l.comparison.detectable(report.level)));
+    for (const ClassReport& c : m.classes)
+        found.add(Lengths, report.deviates(c.comparison),
+                  fmt::format("class {}: {:.4f} ± {:.4f}", to_string(c.path_class),
+                              c.comparison.ratio(), c.comparison.ratio_error()));
     for (const TechniqueReport& t : m.techniques)
         found.add(Techniques, report.deviates(t.comparison),
                   fmt::format("s = {}, t = {}: {:.4f} ± {:.4f}", t.technique.s, t.technique.t,
@@ -145,29 +158,38 @@ Findings findings(const Planted& planted) {
 }
 
 class Control : public ::testing::TestWithParam<Planted> {};
-class NoError : public ::testing::TestWithParam<Planted> {};
+class NoError : public ::testing::TestWithParam<std::tuple<Planted, SamplerKind>> {};
 
 TEST_P(Control, IsFound) {
-    const Findings found = findings(GetParam());
+    const Findings found = findings(GetParam(), SamplerKind::Independent);
     EXPECT_EQ(found.parts & GetParam().shows, GetParam().shows) << found.text;
     EXPECT_EQ(found.parts & GetParam().clear, 0u) << found.text;
     RecordProperty("found", found.text);
 }
 
 TEST_P(NoError, IsFound) {
-    const Findings found = findings(GetParam());
+    const auto& [planted, sampler] = GetParam();
+    const Findings found = findings(planted, sampler);
     EXPECT_EQ(found.parts, 0u) << found.text;
 }
 
-const auto kName = [](const auto& p) { return std::string(p.param.name); };
-INSTANTIATE_TEST_SUITE_P(Planted, Control, ::testing::ValuesIn(planted()), kName);
-INSTANTIATE_TEST_SUITE_P(Clean, NoError, ::testing::ValuesIn(planted()), kName);
+const auto kSamplers = ::testing::Values(SamplerKind::Sobol, SamplerKind::Independent);
+const auto kName = [](const auto& p) {
+    return fmt::format("{}_{}", std::get<0>(p.param).name,
+                       std::get<1>(p.param) == SamplerKind::Sobol ? "sobol" : "independent");
+};
+INSTANTIATE_TEST_SUITE_P(Planted, Control, ::testing::ValuesIn(planted()),
+                         [](const auto& p) { return std::string(p.param.name); });
+INSTANTIATE_TEST_SUITE_P(Clean, NoError,
+                         ::testing::Combine(::testing::ValuesIn(planted()), kSamplers), kName);
 // Two roulettes of one pair, which need numbers of their own.
-INSTANTIATE_TEST_SUITE_P(CleanPairs, NoError,
-                         ::testing::Values(Planted{
-                             "RateOfShortPaths", front_camera(kSize) + room() + area_lamp(),
-                             "upg+bdpt:short_rate=0.1,roulette=0.5,radius=0.15", 0, 0}),
-                         kName);
+INSTANTIATE_TEST_SUITE_P(
+    CleanPairs, NoError,
+    ::testing::Combine(::testing::Values(Planted{
+                           "RateOfShortPaths", front_camera(kSize) + room() + area_lamp(),
+                           "upg+bdpt:short_rate=0.1,roulette=0.5,radius=0.15", 0, 0}),
+                       kSamplers),
+    kName);
 
 }  // namespace
 }  // namespace etendue::test

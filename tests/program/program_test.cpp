@@ -343,7 +343,11 @@ TEST_F(ProgramTest, VerifiesMethods) {
              {{"--runs", "1"}, "--runs"},
              {{"--reference", image.string()}, "image.exr"},
              {{"--reference", same, "--resolution", "9x9"}, "has 8 x 8 pixels"},
-             {{"--against", "path", "--reference", same}, "--reference"}}) {
+             {{"--against", "path", "--reference", same}, "--reference"},
+             {{"--detect", "0.5%", "--reference", same}, "--reference"},
+             {{"--detect", "0.5 percent"}, "--detect must be a share"},
+             {{"--sampler", "random"}, "--sampler is \"random\""},
+             {{"--time", "1"}, "--time and --spp exclude each other"}}) {
         const ProgramResult refused = with(arguments);
         EXPECT_TRUE(refused.status == 1 || refused.status == 2) << refused.status;
         EXPECT_NE(refused.errors.find(message), std::string::npos)

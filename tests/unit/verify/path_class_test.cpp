@@ -97,6 +97,27 @@ TEST(PathClass, SaysWhatAMethodCannotMake) {
     EXPECT_TRUE(can_make(connection_technique(3, 1), c));
 }
 
+/// A technique without light vertices has no last one: its place must not be asked for.
+TEST(PathClass, KnowsTechniquesWithoutLightVertices) {
+    for (int edges = 1; edges <= PathClass::kMostEdges; ++edges) {
+        const Technique hit = connection_technique(0, edges + 1),
+                        hit_lens = connection_technique(edges + 1, 0);
+        PathClass c{.edges = uint8_t(edges)};
+        EXPECT_TRUE(can_make(hit, c) && can_make(hit_lens, c)) << edges;
+        EXPECT_EQ(times_made(hit, c, PairRule::Both), 1);
+        c.delta_emitter = true;
+        EXPECT_FALSE(can_make(hit, c));
+        EXPECT_TRUE(can_make(hit_lens, c));
+    }
+}
+
+TEST(PathClass, HasAName) {
+    EXPECT_EQ(to_string(PathClass{.edges = 1}), "LE");
+    EXPECT_EQ(to_string(PathClass{.edges = 4, .delta_events = 0b0110}), "LSSDE");
+    EXPECT_EQ(to_string(PathClass{.edges = 3, .delta_emitter = true, .delta_events = 0b100}),
+              "L*DSE");
+}
+
 /// A pair may drop the one and the other vertex, unless a neighbour cannot sample it again.
 TEST(PathClass, SaysHowOftenAPairMakesAPath) {
     const Technique middle{Strategy::Gather, 3, 3}, at_lens{Strategy::Gather, 4, 2};

@@ -1,0 +1,248 @@
+#include "verify/run_series.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "math/hash.h"
+#include "verify/verify.h"
+
+namespace etendue {
+namespace {
+
+/// Samples of the first, short rendering that tells times and edge lengths.
+constexpr uint64_t kPilotSamples = 20000;
+/// δ is the length that the shortest edge of this share of the light does not reach.
+constexpr double kShortShare = 0.2;
+
+void render_all(Renderer& renderer) {
+    const std::atomic<bool> interrupted{false};
+    renderer.run([](const Progress&) {}, interrupted);
+}
+
+/// The shortest edge of every path of a rendering, with the light that the path brings; by path length.
+class ShortestEdges final : public ContributionObserver {
+public:
+    ShortestEdges(const Scene& scene, int longest) : scene_(scene), lengths_(size_t(longest) + 1) {}
+    void observe(const Join& join, Rgb contribution, float share, uint64_t,
+                 const Workspace& paths) override {
+        const Technique& q = join.technique;
+        const SubPath& y = is_pair(q.strategy) ? paths.pair : paths.y;
+        lengths_[size_t(q.vertices() - 1)].emplace_back(
+            shortest_edge(scene_, join, y, paths.z),
+            double(luminance(contribution) * join.mis_weight * share));
+    }
+    /// The length that the shortest edge of this share of the light does not reach; 0 where there is none.
+    float quantile(size_t edges, double share) {
+        auto& paths = lengths_[edges];
+        std::sort(paths.begin(), paths.end());
+        double total = 0, sum = 0;
+        for (const auto& [edge, light] : paths) total += light;
+        for (const auto& [edge, light] : paths)
+            if ((sum += light) > share * total) return std::isfinite(edge) ? edge : 0.0f;
+        return 0;
+    }
+
+private:
+    const Scene& scene_;
+    std::vector<std::vector<std::pair<float, double>>> lengths_;
+};
+
+/// Calls task(i) for i < count on so many threads. What a task throws ends the others, and is thrown here.
+template <class Task>
+void for_each_in_parallel(size_t count, int threads, const Task& task) {
+    std::atomic<size_t> next{0};
+    std::mutex mutex;
+    std::exception_ptr error;
+    const auto work = [&] {
+        for (size_t i; (i = next++) < count;) {
+            try {
+                task(i);
+            } catch (...) {
+                const std::scoped_lock lock(mutex);
+                if (!error) error = std::current_exception();
+                next = count;
+            }
+        }
+    };
+    {
+        std::vector<std::jthread> workers;
+        for (int i = 0; i < std::min(threads, int(count)); ++i) workers.emplace_back(work);
+    }
+    if (error) std::rethrow_exception(error);
+}
+
+}  // namespace
+
+void IndependentRun::merge(const IndependentRun& other, uint64_t renderings) {
+    const double its = 1 / double(renderings), own = 1 - its;
+    for (size_t i = 0; i < pixels.size(); ++i)
+        pixels[i] = pixels[i] * float(own) + other.pixels[i] * float(its);
+    rejected += other.rejected;
+
+    // Entries are sorted, see ContributionTally::entries().
+    for (ContributionTally::Entry& e : entries)
+        e.weighted = e.weighted.scaled(own), e.alone = e.alone.scaled(own);
+    for (const ContributionTally::Entry& e : other.entries) {
+        const auto at = std::lower_bound(entries.begin(), entries.end(), e);
+        if (at != entries.end() && !(e < *at)) {
+            at->weighted += e.weighted.scaled(its);
+            at->alone += e.alone.scaled(its);
+        } else {
+            entries.insert(
+                at, {e.path_class, e.technique, e.weighted.scaled(its), e.alone.scaled(its)});
+        }
+    }
+    for (auto& [c, tally] : classes) tally = tally.scaled(own);
+    for (const auto& [c, tally] : other.classes) classes[c] += tally.scaled(its);
+    for (auto& [c, sums] : tiles)
+        for (ContributionTally::TileSum& t : sums) {
+            for (double& v : t.rgb) v *= own;
+            t.luminance = t.luminance.scaled(own);
+        }
+    for (const auto& [c, sums] : other.tiles) {
+        auto& to = tiles[c];
+        to.resize(sums.size());
+        for (size_t i = 0; i < sums.size(); ++i) {
+            for (size_t k = 0; k < 3; ++k) to[i].rgb[k] += sums[i].rgb[k] * its;
+            to[i].luminance += sums[i].luminance.scaled(its);
+        }
+    }
+}
+
+uint64_t RunSeries::rejected() const {
+    uint64_t sum = 0;
+    for (const IndependentRun& r : runs) sum += r.rejected;
+    return sum;
+}
+
+std::map<PathClass, Tally> RunSeries::classes() const {
+    std::map<PathClass, Tally> out;
+    for (const IndependentRun& r : runs)
+        for (const auto& [c, tally] : r.classes) out[c] += tally;
+    return out;
+}
+
+SeriesRenderer::SeriesRenderer(const Scene& scene, const VerifyOptions& options,
+                               const Report& progress)
+    : scene_(scene), options_(options),
+      progress_(progress), grid_{scene.film(), std::min({options.tiles, scene.film().crop_width,
+                                                         scene.film().crop_height})},
+      cut_offs_(size_t(options.longest) + 1) {}
+
+int SeriesRenderer::threads() const {
+    return options_.threads > 0 ? options_.threads
+                                : std::max(1, int(std::thread::hardware_concurrency()));
+}
+
+uint64_t SeriesRenderer::pilot_spp() const {
+    return 1 + kPilotSamples / scene_.film().pixel_count();
+}
+
+uint64_t SeriesRenderer::seed(const RunSeries& series, uint64_t run, uint64_t rendering) const {
+    return hash_combine(hash_combine(hash_combine(options_.seed, series.stream), run), rendering);
+}
+
+Renderer SeriesRenderer::renderer(const IntegratorSpec& spec, uint64_t seed, uint64_t spp,
+                                  ContributionObserver* observer) const {
+    RenderSettings settings;
+    settings.integrator = spec;
+    settings.sampler = options_.sampler;
+    settings.seed = seed;
+    settings.threads = 1;
+    settings.spp = spp;
+    settings.observer = observer;
+    return Renderer(scene_, settings);
+}
+
+void SeriesRenderer::choose_cut_offs(const IntegratorSpec& spec) {
+    ShortestEdges edges(scene_, options_.longest);
+    Renderer pilot = renderer(spec, hash_combine(options_.seed, 0), pilot_spp(), &edges);
+    render_all(pilot);
+    for (size_t i = 0; i < cut_offs_.size(); ++i) cut_offs_[i] = edges.quantile(i, kShortShare);
+}
+
+double SeriesRenderer::seconds_a_pass(const IntegratorSpec& spec, uint64_t seed) const {
+    ContributionTally tally(scene_, grid_, cut_offs_);
+    Renderer pilot = renderer(spec, seed, pilot_spp(), &tally);
+    render_all(pilot);
+    return pilot.seconds() / double(pilot_spp());
+}
+
+IndependentRun SeriesRenderer::render(const IntegratorSpec& spec, uint64_t seed,
+                                      uint64_t spp) const {
+    ContributionTally tally(scene_, grid_, cut_offs_);
+    Renderer r = renderer(spec, seed, spp, &tally);
+    render_all(r);
+    const double scale = 1 / (double(spp) * double(scene_.film().pixel_count()));
+    IndependentRun out{r.film().image(),
+                       tally.entries(),
+                       tally.tiles(),
+                       {},
+                       r.stats().rejected + r.film().rejected()};
+    for (ContributionTally::Entry& e : out.entries) {
+        e.weighted = e.weighted.scaled(scale), e.alone = e.alone.scaled(scale);
+        out.classes[e.path_class.without_length_of_edges()] += e.weighted;
+    }
+    for (auto& [path_class, tiles] : out.tiles)
+        for (ContributionTally::TileSum& t : tiles) {
+            for (double& v : t.rgb) v *= scale;
+            t.luminance = t.luminance.scaled(scale);
+        }
+    return out;
+}
+
+RunSeries SeriesRenderer::begin(const IntegratorSpec& spec, uint64_t stream,
+                                std::optional<uint64_t> spp, double seconds) const {
+    const auto integrator = make_integrator(spec);
+    if (!integrator->keeps_paths())
+        throw std::runtime_error(fmt::format(
+            "{} cannot be verified: its photons do not keep their paths; use compare", spec.name));
+    RunSeries series;
+    series.spec = spec;
+    series.stream = stream;
+    series.counts = integrator->counts(scene_, integrator->light_paths(scene_));
+    series.estimator = integrator->estimator();
+    series.runs.resize(size_t(options_.runs));
+    if (spp) {
+        series.spp = *spp;
+    } else {
+        const double share = seconds * std::min(threads(), options_.runs) / options_.runs;
+        const double pass = seconds_a_pass(spec, seed(series, uint64_t(options_.runs), 0));
+        series.spp = std::max(uint64_t(1), uint64_t(share / pass));
+    }
+    return series;
+}
+
+void SeriesRenderer::extend(RunSeries& series, uint64_t renderings) const {
+    const auto begin = std::chrono::steady_clock::now();
+    const size_t runs = series.runs.size();
+    std::mutex mutex;
+    size_t done = 0;
+    for_each_in_parallel(runs, threads(), [&](size_t i) {
+        IndependentRun& run = series.runs[i];
+        for (uint64_t k = 0; k < renderings; ++k) {
+            const uint64_t number = series.renderings + k;
+            IndependentRun more = render(series.spec, seed(series, i, number), series.spp);
+            if (number == 0)
+                run = std::move(more);
+            else
+                run.merge(more, number + 1);
+        }
+        const std::scoped_lock lock(mutex);
+        ++done;
+        if (progress_)
+            progress_(fmt::format("{}: {} of {} runs of {} spp", series.spec.to_string(), done,
+                                  runs, series.spp * (series.renderings + renderings)));
+    });
+    series.renderings += renderings;
+    series.seconds +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace etendue

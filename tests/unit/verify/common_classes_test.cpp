@@ -1,0 +1,96 @@
+// Which classes are compared: a class that one side loses must not be excused as too rare.
+
+#include "verify/common_classes.h"
+
+#include <gtest/gtest.h>
+
+#include "math/hash.h"
+#include "verify/comparisons.h"
+
+namespace etendue::test {
+namespace {
+
+constexpr int kRuns = 32;
+const PathClass kDirect{.edges = 2}, kCaustic{.edges = 4, .delta_events = 0b0110};
+const TechniqueCounts kPath{.hit = 1, .next_event = 1},
+    kBdpt{.hit = 1, .next_event = 1, .connect = 1, .splat = 100}, kLight{.splat = 100};
+
+/// A series with so many equal contributions to each class in each run, and a spread between the runs to match.
+RunSeries series(const char* name, const TechniqueCounts& counts,
+                 const std::map<PathClass, double>& contributions, uint64_t spp = 64) {
+    RunSeries s;
+    s.spec.name = name;
+    s.counts = counts;
+    s.spp = spp;
+    s.renderings = 1;
+    s.runs.resize(kRuns);
+    for (size_t r = 0; r < s.runs.size(); ++r)
+        for (const auto& [c, n] : contributions) {
+            // Sums over the runs' spread: 1 ± 1/√n.
+            const double u = double(to_unit_float(uint32_t(mix64(r + 100 * uint64_t(n)) >> 32)));
+            const double mean = 1 + std::sqrt(12 / n) * (u - 0.5);
+            s.runs[r].classes[c] = {mean, mean * mean / n, std::pow(mean / n, 4) * n};
+        }
+    return s;
+}
+
+TEST(CommonClasses, LostClassIsADeviation) {
+    const std::vector<RunSeries> references{
+        series("path", kPath, {{kDirect, 1000}, {kCaustic, 300}})};
+    const RunSeries lost = series("bdpt", kBdpt, {{kDirect, 1000}});
+    const CommonClasses common(lost, references);
+    EXPECT_TRUE(common.contains(kCaustic));
+    MethodReport report;
+    VerifyOptions options;
+    compare_lengths({lost, references, common}, options, std::vector<float>(9), report);
+    const WelchTest& test = report.lengths[3].comparison;
+    EXPECT_TRUE(test.is_tested());
+    EXPECT_LT(test.p, 1e-10);
+    EXPECT_EQ(report.lengths[3].too_rare, 0);
+    EXPECT_GT(report.lengths[1].comparison.p, 1e-3);
+}
+
+/// What the reference itself finds too seldom to know how often the method should: 32 runs of 30, a tenth of them.
+TEST(CommonClasses, LostClassIsTooRareWhereTheReferenceFindsItSeldom) {
+    const std::vector<RunSeries> references{
+        series("path", kPath, {{kDirect, 1000}, {kCaustic, 30}})};
+    const RunSeries lost = series("bdpt", kBdpt, {{kDirect, 1000}});
+    EXPECT_FALSE(CommonClasses(lost, references).contains(kCaustic));
+    // With a quarter of the reference's samples.
+    const std::vector<RunSeries> longer{series("path", kPath, {{kCaustic, 80}}, 256)};
+    EXPECT_FALSE(CommonClasses(lost, longer).contains(kCaustic));
+    EXPECT_TRUE(CommonClasses(lost, std::vector{series("path", kPath, {{kCaustic, 80}}, 64)})
+                    .contains(kCaustic));
+}
+
+/// Light tracing has other techniques than path tracing: nothing tells how seldom it may make what that finds often.
+TEST(CommonClasses, OtherTechniquesMayFindAClassSeldom) {
+    const std::vector<RunSeries> references{
+        series("path", kPath, {{kDirect, 1000}, {kCaustic, 300}})};
+    const CommonClasses common(series("light", kLight, {{kDirect, 1000}}), references);
+    ASSERT_TRUE(common.find(kCaustic));
+    EXPECT_TRUE(common.find(kCaustic)->is_reachable);
+    EXPECT_FALSE(common.contains(kCaustic));
+    const auto left = common.left_out([](const PathClass&) { return true; });
+    EXPECT_NEAR(left.too_rare, 0.5, 0.05);
+    EXPECT_EQ(left.out_of_reach, 0);
+}
+
+/// A class that the first reference hardly knows is compared with another one, but not with the method itself.
+TEST(CommonClasses, LaterReferencesServeWhereTheyAreMuchBetter) {
+    const PathClass caustic{.edges = 4, .delta_events = 0b0110};
+    const std::vector<RunSeries> references{
+        series("path", kPath, {{kDirect, 1000}, {caustic, 1}}),
+        series("light", kLight, {{kDirect, 1200}, {caustic, 5000}})};
+    const CommonClasses bdpt(series("bdpt", kBdpt, {{kDirect, 1000}, {caustic, 2000}}), references);
+    EXPECT_TRUE(bdpt.contains(caustic));
+    EXPECT_EQ(bdpt.find(caustic)->reference, 1u);
+    EXPECT_EQ(bdpt.find(kDirect)->reference, 0u);
+    const CommonClasses light(series("light", kLight, {{kDirect, 1000}, {caustic, 2000}}),
+                              references);
+    EXPECT_FALSE(light.contains(caustic));
+    EXPECT_EQ(light.find(kDirect)->reference, 0u);
+}
+
+}  // namespace
+}  // namespace etendue::test

@@ -1,0 +1,113 @@
+// verify() as a whole, on scenes of a few pixels.
+
+#include "verify/verify.h"
+
+#include <gtest/gtest.h>
+
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+std::string lit_room(int size) {
+    return front_camera(size) + room() + area_lamp();
+}
+
+VerifyOptions quick_options() {
+    VerifyOptions options;
+    options.longest = 3;
+    options.runs = 8;
+    options.threads = 2;
+    options.spp = 16;
+    return options;
+}
+
+/// An exception of a rendering reaches the caller; it must not end the program.
+TEST(Verify, ThrowsWhatARenderingThrows) {
+    const Scene scene = build(lit_room(8));
+    VerifyOptions options = quick_options();
+    options.spp = 1;
+    options.longest = 8;
+    try {
+        verify(scene, {IntegratorSpec::parse("vcm:memory=1,light_paths=40000")}, options);
+        FAIL() << "expected an error";
+    } catch (const std::runtime_error& e) {
+        EXPECT_NE(std::string(e.what()).find("more than 1 MiB"), std::string::npos) << e.what();
+    }
+}
+
+TEST(Verify, SamplersGiveTheSameMeans) {
+    const Scene scene = build(lit_room(8));
+    std::vector<double> means;
+    for (const SamplerKind sampler : {SamplerKind::Sobol, SamplerKind::Independent}) {
+        VerifyOptions options = quick_options();
+        options.sampler = sampler;
+        const VerifyReport report = verify(scene, {IntegratorSpec::parse("bdpt")}, options);
+        EXPECT_EQ(report.verdict(report.methods[0]), Verdict::Consistent);
+        means.push_back(report.methods[0].image[1].method.mean());
+    }
+    EXPECT_NE(means[0], means[1]);
+    EXPECT_NEAR(means[0] / means[1], 1, 0.05);
+}
+
+/// Rendering goes on until the error asked for would be found, and no longer than it may.
+TEST(Verify, RendersUntilAnErrorWouldBeFound) {
+    const Scene scene = build(lit_room(8));
+    VerifyOptions options = quick_options();
+    options.spp = 4;
+    options.detect = 0.03;
+    const VerifyReport report = verify(scene, {IntegratorSpec::parse("bdpt")}, options);
+    const MethodReport& m = report.methods[0];
+    const Detectable found = report.detectable(m);
+    EXPECT_TRUE(found.reaches(0.03));
+    EXPECT_LE(*found.image, 0.03);
+    EXPECT_LE(*found.length, 0.03);
+    EXPECT_GT(m.spp, 4u);
+    EXPECT_EQ(m.spp % 4, 0u);
+    EXPECT_EQ(report.verdict(m), Verdict::Consistent);
+
+    options.detect = 1e-4;
+    options.seconds = 0.5;
+    const VerifyReport unfinished = verify(scene, {IntegratorSpec::parse("bdpt")}, options);
+    EXPECT_FALSE(unfinished.detectable(unfinished.methods[0]).reaches(1e-4));
+}
+
+/// Light of a mirror is out of reach of `light`; the report names its classes and how much light they hold.
+TEST(Verify, NamesWhatIsNotCompared) {
+    const Scene scene =
+        build(lit_room(12) + sphere("0,-0.3,0.2", "0.6",
+                                    "<bsdf type=\"twosided\"><bsdf type=\"conductor\"/></bsdf>"));
+    const VerifyReport report = verify(scene, {IntegratorSpec::parse("light")}, quick_options());
+    const MethodReport& m = report.methods[0];
+    ASSERT_FALSE(m.untested.empty());
+    EXPECT_EQ(to_string(m.untested[0].path_class).back(), 'E');
+    double out_of_reach = 0, too_rare = 0;
+    for (const UntestedClass& c : m.untested) {
+        (c.is_out_of_reach ? out_of_reach : too_rare) += c.share;
+        EXPECT_TRUE(!c.is_out_of_reach || c.path_class.delta_events != 0)
+            << to_string(c.path_class);
+    }
+    EXPECT_NEAR(out_of_reach, m.out_of_reach, 1e-9);
+    EXPECT_NEAR(too_rare, m.too_rare, 1e-9);
+    EXPECT_GT(m.out_of_reach, 0.01);
+}
+
+/// Pixels that are correlated make the error of a reference's mean larger.
+TEST(Verify, AllowsForCorrelatedPixelsOfAReference) {
+    const Scene scene = build(lit_room(8));
+    VerifyOptions options = quick_options();
+    ReferenceImage image{"image", std::vector<Rgb>(64, Rgb(0.5f)), std::vector<Rgb>(64, Rgb(0.01f)),
+                         100};
+    const auto error = [&] {
+        return verify(scene, {IntegratorSpec::parse("path")}, options, image)
+            .methods[0]
+            .image[0]
+            .reference.squared_error();
+    };
+    const double independent = error();
+    image.correlation = 5;
+    EXPECT_NEAR(error(), 5 * independent, 1e-9);
+}
+
+}  // namespace
+}  // namespace etendue::test
