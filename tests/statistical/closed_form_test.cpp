@@ -370,7 +370,7 @@ TEST(ClosedForm, AbsorptionBehindOpenBoundaries) {
                            side);
     };
     const auto box = [&](const std::string& bsdf) {
-        return "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"10\" y=\"10\" "
+        return "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"2.5\" y=\"2.5\" "
                "z=\"0.25\"/><translate z=\"1\"/></transform>" +
                bsdf + matter("interior") + "</shape>";
     };
@@ -402,11 +402,11 @@ TEST(ClosedForm, AbsorptionBehindOpenBoundaries) {
             inside, all, 2048,
             [&](float, float) { return Rgb(3, 2, 1) * absorbed(0.25f) * (1 - b.opacity); }, 0.045);
         const Scene floor =
-            build(camera_above("orthographic", 0.5f) + box(b.bsdf) + floor_of(kFloor) +
+            build(camera_above("orthographic", 0.5f) + box(b.bsdf) + floor_of(kFloor, 2) +
                   "<emitter type=\"directional\"><vector name=\"direction\" "
                   "value=\"0.6,0,-0.8\"/><rgb name=\"irradiance\" value=\"3,2,1\"/></emitter>");
         expect_image(
-            floor, all, 2048,
+            floor, all, 4096,
             [&](float, float) {
                 return kFloor * Rgb(3, 2, 1) * absorbed(0.5f + 0.5f / 0.8f) *
                        (0.8f / kPi * sqr(pass));
