@@ -15,7 +15,7 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(etendue_options INTERFACE -Wno-maybe-uninitialized -Wno-restrict)
     if(ETENDUE_PCH)
         # With precompiled headers it does not see that the code is the standard library's (GCC bug 105651).
-        target_compile_options(etendue_options INTERFACE -Wno-array-bounds -Wno-stringop-overflow)
+        target_compile_options(etendue_options INTERFACE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
     endif()
 endif()
 if(ETENDUE_ARCH)

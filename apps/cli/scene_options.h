@@ -18,6 +18,7 @@ struct SceneOptions {
     std::string file;
     std::vector<std::string> defines;  ///< name=value
     bool lenient = false;
+    bool watertight = false;
     std::string resolution, crop;
 
     void add_to(CLI::App& command);

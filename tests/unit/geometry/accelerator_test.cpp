@@ -41,7 +41,7 @@ TriangleMesh closed_mesh(int rows, int columns, float radius) {
 // No ray slips through between triangles that share an edge.
 TEST(Accelerator, ClosedMeshesHaveNoGaps) {
     const TriangleMesh mesh = closed_mesh(60, 120, 1);
-    Accelerator accelerator;
+    Accelerator accelerator({.is_watertight = true});
     accelerator.add_shape(mesh);
     accelerator.commit();
     testing::Random random(2);
