@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 
 #include "pathspace/vertex.h"
 
@@ -29,17 +30,17 @@ public:
     }
 
     bool is_transmissive() const { return bits_ >> 15; }
-    /// Not of unit length.
+    /// To about a degree, of unit length.
     Vec3 normal() const {
-        const float a = float(bits_ >> 8 & 0x7f) * (2.0f / kStepsA) - 1,
-                    b = float(bits_ & 0xff) * (2.0f / kStepsB) - 1;
-        const float z = 1 - std::fabs(a) - std::fabs(b);
-        if (z >= 0) return {a, b, z};
-        return {std::copysign(1 - std::fabs(b), a), std::copysign(1 - std::fabs(a), b), z};
+        const Direction d = direction();
+        return normalize({float(d.x), float(d.y), float(d.z)});
     }
-    /// Whether what arrived on `other`, close by, may go on from here: not where the two are two sides of a wall.
+    /// Whether what arrived on `other`, close by, may go on from here: not where the two are two sides of a wall, or walls
+    /// at a right angle. In whole numbers, so that gathers and trials agree to the bit, however each is compiled.
     bool admits(ArrivalSide other) const {
-        return is_transmissive() || dot(normal(), other.normal()) > 0;
+        if (is_transmissive()) return true;
+        const Direction a = direction(), b = other.direction();
+        return a.x * b.x + a.y * b.y + a.z * b.z > 0;
     }
 
     uint16_t bits() const { return bits_; }
@@ -50,6 +51,22 @@ public:
     }
 
 private:
+    struct Direction {
+        int64_t x, y, z;
+    };
+    /// On the octahedron |x| + |y| + |z| = kStepsA·kStepsB.
+    Direction direction() const {
+        constexpr int64_t kOne = int64_t(kStepsA) * kStepsB;
+        const int64_t a = (2 * int64_t(bits_ >> 8 & 0x7f) - kStepsA) * kStepsB,
+                      b = (2 * int64_t(bits_ & 0xff) - kStepsB) * kStepsA;
+        const int64_t z = kOne - std::abs(a) - std::abs(b);
+        if (z >= 0) return {a, b, z};
+        const auto folded = [&](int64_t across, int64_t sign) {
+            return sign < 0 ? std::abs(across) - kOne : kOne - std::abs(across);
+        };
+        return {folded(b, a), folded(a, b), z};
+    }
+
     static constexpr int kStepsA = 126, kStepsB = 254;  // even, so that the axes are exact
 
     uint16_t bits_ = 0;

@@ -45,6 +45,14 @@ std::string lamp_in_glass() {
                                            "value=\"9,8,7\"/></emitter>");
 }
 
+/// The same behind smooth glass, filling most of it.
+std::string lamp_in_smooth_glass() {
+    return sphere("0.1,-0.2,0.3", "0.6", kGlass) +
+           sphere("0.1,-0.2,0.3", "0.45",
+                  diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                           "value=\"9,8,7\"/></emitter>");
+}
+
 std::string cropped_camera() {
     return "<sensor type=\"perspective\"><float name=\"fov\" value=\"45\"/><transform "
            "name=\"to_world\"><lookat origin=\"0,0,3.4\" target=\"0,0,0\" up=\"0,1,0\"/>"
@@ -105,6 +113,8 @@ std::vector<Planted> planted() {
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostSplats", by_glass, "bdpt:roulette=0", Image | Lengths, 0},
+        {"GeometryBehindDelta", front_camera(kSize) + room() + lamp_in_smooth_glass(),
+         "bdpt:roulette=0", Densities, 0},
         {"FivePercentOfOneClass", lit_room + sphere("-0.2,-0.5,0", "0.45", kMirror),
          "bdpt:roulette=0", Lengths, 0, 256},
     };
