@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <list>
+#include <memory>
 
 #include "math/warp.h"
 #include "pathspace/join.h"
@@ -268,9 +269,9 @@ struct WalkInputs {
 void add_path_space(const Report& report, const Options& options, const WalkInputs& in) {
     constexpr auto counts = WalkInputs::kCounts;
     add(report, options, "walk eye",
-        [&, path = SubPath()](size_t i) mutable { return in.walk_eye(i, path); });
+        [&, path = std::make_shared<SubPath>()](size_t i) { return in.walk_eye(i, *path); });
     add(report, options, "walk light",
-        [&, path = SubPath()](size_t i) mutable { return in.walk_light(i, path); });
+        [&, path = std::make_shared<SubPath>()](size_t i) { return in.walk_light(i, *path); });
     add(report, options, "scene intersect", [&](size_t i) {
         SurfaceHit hit;
         return in.scene.intersect(in.rays[i], 0.5f, hit) ? hit.t : 0;
