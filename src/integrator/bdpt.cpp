@@ -25,6 +25,16 @@ public:
           given_draws_(p.integer("cache_draws", 0, 1024)), light_(p) {}
 
     void learn(const LearnContext& pass) override { paths_.learn(pass); }
+    void save(LearnedState& to) const override {
+        paths_.save(to);
+        to.put(draws_);
+        to.put(count_);
+    }
+    void load(LearnedState& from) override {
+        paths_.load(from);
+        from.get(draws_);
+        from.get(count_);
+    }
     void trace(const PassContext& pass) override {
         if (!uses_cache_) return;
         if (draws_ == 0) choose_draws(pass);

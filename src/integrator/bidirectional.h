@@ -23,6 +23,8 @@ public:
 
     /// Sets the thresholds of efficiency-optimised roulette from what earlier passes brought.
     void learn(const LearnContext& pass);
+    void save(LearnedState& to) const { to.put(thresholds_); }
+    void load(LearnedState& from) { from.get(thresholds_); }
 
     WalkContext eye_walk(const Scene& scene, const TechniqueCounts& counts, RenderStats& stats,
                          const LearnedPlaces* learned = nullptr) const {

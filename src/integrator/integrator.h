@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "description/params.h"
+#include "pathspace/learned_state.h"
 #include "pathspace/sample_context.h"
 
 namespace etendue {
@@ -25,6 +26,11 @@ public:
     virtual void learn(const LearnContext&) {}
     /// Whether learn() changes what later passes sample or weigh.
     virtual bool is_learning() const { return false; }
+    /// Writes what later passes need of earlier ones, between passes: load() into an integrator with the same parameters
+    /// makes it go on as this one would. What the film and the statistics keep is not part of it, nor what a pass makes for
+    /// itself. load() throws std::runtime_error where the state is of another integrator.
+    virtual void save(LearnedState&) const {}
+    virtual void load(LearnedState&) {}
     /// Traces what the samples of the pass share. Called by one thread, before them. What it throws, and what samples throw,
     /// drops the pass.
     virtual void trace(const PassContext&) {}

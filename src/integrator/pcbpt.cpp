@@ -43,6 +43,8 @@ public:
           direct_(p.choice("direct", kDirect)) {}
 
     void learn(const LearnContext& pass) override { paths_.learn(pass); }
+    void save(LearnedState& to) const override { paths_.save(to); }
+    void load(LearnedState& from) override { paths_.load(from); }
     void trace(const PassContext& pass) override {
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
         trace_light_paths(pass, n);

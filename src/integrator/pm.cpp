@@ -63,13 +63,14 @@ public:
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();
-        if (pass.index > 0 && !retrace_) return;
+        if (has_maps_ && !retrace_) return;
         std::vector<MapPhoton> all = source_->trace(pass), caustic;
         for (const MapPhoton& photon : all)
             if (photon.is_caustic()) caustic.push_back(photon);
         global_.build(std::move(all));
         caustic_.build(std::move(caustic));
         if (cache_error_ > 0) fill_cache(pass);
+        has_maps_ = true;
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -267,6 +268,7 @@ private:
     uint32_t pass_ = 0;
     IrradianceCache cache_;
     PhotonMap global_, caustic_;
+    bool has_maps_ = false;
 };
 
 }  // namespace

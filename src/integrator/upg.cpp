@@ -59,17 +59,32 @@ public:
 
     void learn(const LearnContext& pass) override {
         paths_.learn(pass);
-        if (connects_) weight_scale_.learn(gathers_);
-        roulette_.learn(gathers_);
+        if (connects_) learned_.weight_scale.learn(learned_.gathers);
+        learned_.roulette.learn(learned_.gathers);
         choose_radius(pass);
         // The first pass's weights know of no density, so that what is learned from it is of no use for the scale.
-        learns_weight_scale_ = connects_ && pass.index > 0;
-        if (pass.index > 0) density_ = PairDensity(grid_.points(), radius_, kCorrelation);
+        learned_.learns_weight_scale = connects_ && pass.index > 0;
+        if (pass.index > 0) density_ = PairDensity(cells(), learned_.radius, kCorrelation);
+    }
+    void save(LearnedState& to) const override {
+        paths_.save(to);
+        to.put(learned_);
+        density_.save(to);
+        const CellCounts vertices = cells();
+        to.put(vertices.cells);
+        to.put(vertices.counts);
+    }
+    void load(LearnedState& from) override {
+        paths_.load(from);
+        from.get(learned_);
+        density_.load(from);
+        from.get(loaded_.cells);
+        from.get(loaded_.counts);
     }
     bool is_learning() const override { return true; }
     std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }
     void collect(std::span<const std::unique_ptr<PassSums>> workers) override {
-        gathers_.add(workers);
+        learned_.gathers.add(workers);
     }
 
     void trace(const PassContext& pass) override {
@@ -77,7 +92,7 @@ public:
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
-        grid_.build(cache_, radius_);
+        grid_.build(cache_, learned_.radius);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -92,7 +107,7 @@ public:
                                   cache_,
                                   grid_,
                                   density_,
-                                  roulette_,
+                                  learned_.roulette,
                                   paths_.max_depth(),
                                   flatness_,
                                   paths_.threshold(c),
@@ -114,8 +129,8 @@ public:
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n;
         if (connects_) n = Bidirectional::counts(scene, light_paths);
-        n.gather = float(light_paths) * (connects_ ? weight_scale_.value() : 1.0f);
-        n.pairs = {.disc = kPi * sqr(radius_),
+        n.gather = float(light_paths) * (connects_ ? learned_.weight_scale.value() : 1.0f);
+        n.pairs = {.disc = kPi * sqr(learned_.radius),
                    .min_edges = 3,
                    .short_rate = short_rate_,
                    .rule = rule_,
@@ -127,10 +142,16 @@ public:
     }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        return {{"radius", radius_}, {"weight_scale", connects_ ? weight_scale_.value() : 1}};
+        return {{"radius", learned_.radius},
+                {"weight_scale", connects_ ? learned_.weight_scale.value() : 1}};
     }
 
 private:
+    /// Of the light vertices of the pass before.
+    CellCounts cells() const {
+        return grid_.points().is_empty() ? loaded_ : grid_.points().counts();
+    }
+
     /// One of the two vertices is dropped, the other joined to the dropped one's predecessor by a shadow ray; r, by Bernoulli
     /// trials, estimates 1/p_c.
     void gather(const SampleContext& c, const TechniqueCounts& n, const GatherSearch& search,
@@ -148,7 +169,7 @@ private:
         c.sampler.seek(Stream::Auxiliary, pair.number);
         const double r =
             reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
-        if (learns_weight_scale_) {
+        if (learned_.learns_weight_scale) {
             const double seen =
                 double(luminance(*value)) / double(luminance(join->contribution) * pair.survival);
             observe_weight_scale(c, *join, search.scale(), r, seen, work);
@@ -162,27 +183,28 @@ private:
                               double seen, Workspace& work) const {
         const float pixel = c.film.expected_luminance(c.pixel);
         if (!(pixel > 0)) return;
-        weight_scale_.observe(double(luminance(join.contribution) * scale / pixel),
-                              double(join.mis_weight), double(join.pair_probability), r, seen,
-                              GatherSums::of(work));
+        learned_.weight_scale.observe(double(luminance(join.contribution) * scale / pixel),
+                                      double(join.mis_weight), double(join.pair_probability), r,
+                                      seen, GatherSums::of(work));
     }
 
     /// Such that an eye path finds kPairs pairs, as far as the passes since the last choice tell.
     void choose_radius(const LearnContext& pass) {
         if (given_radius_ > 0) {
-            radius_ = given_radius_;
+            learned_.radius = given_radius_;
             return;
         }
         const float size = pass.scene.bounds().radius(), largest = kLargest * size;
-        const double pairs = gathers_.expected_pairs - pairs_so_far_,
-                     paths = double(pass.so_far.eye_paths - eye_paths_so_far_);
-        pairs_so_far_ = gathers_.expected_pairs;
-        eye_paths_so_far_ = pass.so_far.eye_paths;
+        const double pairs = learned_.gathers.expected_pairs - learned_.pairs_so_far,
+                     paths = double(pass.so_far.eye_paths - learned_.eye_paths_so_far);
+        learned_.pairs_so_far = learned_.gathers.expected_pairs;
+        learned_.eye_paths_so_far = pass.so_far.eye_paths;
         const float wanted =
             pass.index == 0
                 ? size / std::sqrt(float(pass.light_paths))
-                : radius_ * float(std::clamp(std::sqrt(kPairs * paths / (pairs + 1)), 0.25, 4.0));
-        radius_ = std::min(largest, wanted);
+                : learned_.radius *
+                      float(std::clamp(std::sqrt(kPairs * paths / (pairs + 1)), 0.25, 4.0));
+        learned_.radius = std::min(largest, wanted);
     }
 
     static constexpr uint64_t kVertexBytes =
@@ -198,15 +220,17 @@ private:
     float short_rate_;
     bool clamps_;
 
-    // Learned.
-    float radius_ = 0;
-    GatherTotals gathers_;
-    double pairs_so_far_ = 0;  ///< When the radius was chosen.
-    uint64_t eye_paths_so_far_ = 0;
-    bool learns_weight_scale_ = false;
+    struct Learned {
+        float radius = 0;
+        GatherTotals gathers;
+        double pairs_so_far = 0;  ///< When the radius was chosen.
+        uint64_t eye_paths_so_far = 0;
+        bool learns_weight_scale = false;
+        GatherWeightScale weight_scale;
+        GatherRoulette roulette;
+    } learned_;
     PairDensity density_;
-    GatherWeightScale weight_scale_;
-    GatherRoulette roulette_;
+    CellCounts loaded_;  ///< Those of cells(), until there is a pass.
 
     // Of the pass.
     LightVertexCache cache_;

@@ -39,7 +39,24 @@ public:
         paths_.learn(pass);
         roulette_.learn(gathers_);
         const float radius = radius_params_.schedule(pass.scene).radius(pass.index);
-        if (merges_ && pass.index > 0) density_ = PairDensity(grid_.points(), radius, kCorrelation);
+        if (merges_ && pass.index > 0) density_ = PairDensity(cells(), radius, kCorrelation);
+    }
+    void save(LearnedState& to) const override {
+        paths_.save(to);
+        to.put(gathers_);
+        to.put(roulette_);
+        density_.save(to);
+        const CellCounts vertices = cells();
+        to.put(vertices.cells);
+        to.put(vertices.counts);
+    }
+    void load(LearnedState& from) override {
+        paths_.load(from);
+        from.get(gathers_);
+        from.get(roulette_);
+        density_.load(from);
+        from.get(loaded_.cells);
+        from.get(loaded_.counts);
     }
     bool is_learning() const override { return merges_; }
     std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }
@@ -97,6 +114,11 @@ public:
     }
 
 private:
+    /// Of the light vertices of the pass before.
+    CellCounts cells() const {
+        return grid_.points().is_empty() ? loaded_ : grid_.points().counts();
+    }
+
     /// M(s,t) with the light vertices near z_{t-1}.
     void merge(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
         const Vertex& z = work.z[t - 1];
@@ -147,6 +169,7 @@ private:
     GatherTotals gathers_;
     PairDensity density_;
     GatherRoulette roulette_;
+    CellCounts loaded_;  ///< Those of cells(), until there is a pass.
 
     // Of the pass.
     float radius_ = 0;

@@ -2,16 +2,14 @@
 
 #include <tbb/parallel_for.h>
 
-#include "reuse/point_grid.h"
-
 namespace etendue {
 
-PairDensity::PairDensity(const PointGrid& vertices, float radius, double correlation)
-    : cells_(vertices.cells()), levels_(cells_.buckets()), correlation_(correlation) {
+PairDensity::PairDensity(const CellCounts& vertices, float radius, double correlation)
+    : cells_(vertices.cells), levels_(vertices.counts.size()), correlation_(correlation) {
     // The area of a disc over that of the square that a plane has of a cell.
     const double scale = correlation * double(kPi) * sqr(double(radius / cells_.width()));
-    tbb::parallel_for(uint32_t(0), cells_.buckets(), [&](uint32_t bucket) {
-        if (const uint32_t n = vertices.points_in(bucket))
+    tbb::parallel_for(size_t(0), levels_.size(), [&](size_t bucket) {
+        if (const uint32_t n = vertices.counts[bucket])
             levels_[bucket] = pair_level_of_share(1 / (1 + scale * double(n)));
     });
 }

@@ -3,12 +3,11 @@
 
 #include <vector>
 
+#include "pathspace/learned_state.h"
 #include "pathspace/walk.h"
-#include "reuse/cell_hash.h"
+#include "reuse/point_grid.h"
 
 namespace etendue {
-
-class PointGrid;
 
 /// All pairs of one eye vertex share its eye path. If the errors of n of them have a correlation ρ they are worth
 /// n/(1 + ρ n), and where N_L light paths leave n partners about a vertex, its pairs count N_L/(1 + ρ n) in the weights.
@@ -21,7 +20,7 @@ public:
     /// Nothing is known yet: pairs count next to nothing, so that a first pass leaves them what no other technique makes.
     PairDensity() = default;
     /// From the light vertices of that pass; `radius`: of pairs; `correlation`: ρ.
-    PairDensity(const PointGrid& vertices, float radius, double correlation);
+    PairDensity(const CellCounts& vertices, float radius, double correlation);
 
     /// Of 1/(1 + ρ n) at `p`, to about 2 %: weights need it small in memory, not exact.
     uint8_t pair_level(Vec3 p) const override {
@@ -30,6 +29,17 @@ public:
     /// n, as exactly.
     float partners(uint8_t level) const {
         return correlation_ > 0 ? float((1 / pair_share(level) - 1) / correlation_) : 0.0f;
+    }
+
+    void save(LearnedState& to) const {
+        to.put(cells_);
+        to.put(levels_);
+        to.put(correlation_);
+    }
+    void load(LearnedState& from) {
+        from.get(cells_);
+        from.get(levels_);
+        from.get(correlation_);
     }
 
 private:

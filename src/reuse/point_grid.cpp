@@ -32,12 +32,20 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
     for_each_part([&](size_t i) { entries_[next[bucket[i]]++] = entries[i]; });
 }
 
+CellCounts PointGrid::counts() const {
+    CellCounts c{cells_, std::vector<uint32_t>(begins_.empty() ? 0 : cells_.buckets())};
+    for (size_t i = 0; i < c.counts.size(); ++i) c.counts[i] = begins_[i + 1] - begins_[i];
+    return c;
+}
+
 size_t PointGrid::candidates(Vec3 p) const {
     if (entries_.empty()) return 0;
     const CellHash::Cell lowest = cells_.lowest_cell(p);
     size_t count = 0;
-    for (int corner = 0; corner < 8; ++corner)
-        count += points_in(cells_.bucket_of(lowest.neighbour(corner)));
+    for (int corner = 0; corner < 8; ++corner) {
+        const uint32_t bucket = cells_.bucket_of(lowest.neighbour(corner));
+        count += begins_[bucket + 1] - begins_[bucket];
+    }
     return count;
 }
 

@@ -8,6 +8,12 @@
 
 namespace etendue {
 
+/// How many points each cell has, or the cells that share its bucket.
+struct CellCounts {
+    CellHash cells;
+    std::vector<uint32_t> counts;  ///< By bucket; empty where nothing is known.
+};
+
 class PointGrid {
 public:
     /// A point, the caller's number for it, and what the caller wants to know of it before looking that up.
@@ -21,8 +27,8 @@ public:
     /// For queries of up to `radius`. The order of the entries decides that of the answers.
     void build(std::span<const Entry> entries, float radius);
     const CellHash& cells() const { return cells_; }
-    /// Of all cells that share the bucket.
-    uint32_t points_in(uint32_t bucket) const { return begins_[bucket + 1] - begins_[bucket]; }
+    CellCounts counts() const;
+    bool is_empty() const { return entries_.empty(); }
 
     /// Calls use(entry) for every point nearer to `p` than `radius`, at most that of build().
     template <class Use>

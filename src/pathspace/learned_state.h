@@ -1,0 +1,67 @@
+#pragma once
+// What an integrator has learned, as bytes: written in one order and read back in the same, equal to the last bit.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+#include <type_traits>
+#include <vector>
+
+namespace etendue {
+
+/// For the same build only: numbers are stored as they lie in memory.
+class LearnedState {
+public:
+    template <class T>
+    void put(const T& value) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        put_bytes(&value, sizeof(T));
+    }
+    template <class T>
+    void put(const std::vector<T>& values) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        put(uint64_t(values.size()));
+        put_bytes(values.data(), values.size() * sizeof(T));
+    }
+
+    /// Throws std::runtime_error where fewer bytes are left.
+    template <class T>
+    void get(T& value) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        get_bytes(&value, sizeof(T));
+    }
+    template <class T>
+    void get(std::vector<T>& values) {
+        static_assert(std::is_trivially_copyable_v<T>);
+        uint64_t size = 0;
+        get(size);
+        if (size > (bytes_.size() - at_) / sizeof(T)) throw_too_short();
+        values.resize(size_t(size));
+        get_bytes(values.data(), values.size() * sizeof(T));
+    }
+
+    const std::vector<std::byte>& bytes() const { return bytes_; }
+    /// To read what was written.
+    explicit LearnedState(std::vector<std::byte> bytes) : bytes_(std::move(bytes)) {}
+    LearnedState() = default;
+
+private:
+    void put_bytes(const void* data, size_t size) {
+        const auto* from = static_cast<const std::byte*>(data);
+        bytes_.insert(bytes_.end(), from, from + size);
+    }
+    void get_bytes(void* data, size_t size) {
+        if (size > bytes_.size() - at_) throw_too_short();
+        if (size > 0) std::memcpy(data, bytes_.data() + at_, size);
+        at_ += size;
+    }
+    [[noreturn]] static void throw_too_short() {
+        throw std::runtime_error("the learned state ends too early: it is of another integrator");
+    }
+
+    std::vector<std::byte> bytes_;
+    size_t at_ = 0;  ///< Of the next byte to be read.
+};
+
+}  // namespace etendue
