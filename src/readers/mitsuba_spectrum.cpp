@@ -7,8 +7,7 @@
 namespace etendue {
 namespace {
 
-/// The parameters of one spectrum plug-in, taken one after the other; what is left at the end is
-/// unknown.
+/// Gets the parameters of one spectrum plug-in. finish() throws for those that were not asked for, which are unknown.
 class Taker {
 public:
     explicit Taker(const SceneObject& spectrum) : spectrum_(spectrum) {}
@@ -58,7 +57,8 @@ private:
 Rgb blackbody(Taker& take, const SourceLocation& where) {
     const double kelvin = take.number("temperature"), scale = take.number("scale", 1);
     if (!(kelvin > 0))
-        throw SceneError(where, fmt::format("a temperature must be positive, but is {} K", kelvin));
+        throw SceneError(where,
+                         fmt::format("the temperature must be above 0 K, but is {} K", kelvin));
     return blackbody_rgb(kelvin) * float(scale);
 }
 
@@ -113,7 +113,7 @@ Rgb spectrum_plugin_colour(const SceneObject& spectrum, SpectrumRole role) {
                                                      hint(type, {"blackbody", "d65", "irregular",
                                                                  "regular", "srgb", "uniform"})));
     take.finish();
-    if (!is_finite(c)) throw SceneError(spectrum.where, "the spectrum's colour is out of range");
+    if (!is_finite(c)) throw SceneError(spectrum.where, "the spectrum's colour is not finite");
     return c;
 }
 

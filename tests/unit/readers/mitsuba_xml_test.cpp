@@ -455,7 +455,8 @@ TEST(MitsubaXml, LimitsIncludes) {
     for (int i = 0; i < 100; ++i)
         files[fmt::format("{}.xml", i)] =
             fmt::format(R"(<scene version="3.0.0"><include filename="{}.xml"/></scene>)", i + 1);
-    EXPECT_NE(error3(R"(<include filename="0.xml"/>)", with_files(files)).find("more than 32 deep"),
+    EXPECT_NE(error3(R"(<include filename="0.xml"/>)", with_files(files))
+                  .find("more than 32 levels deep"),
               std::string::npos);
 }
 
