@@ -13,7 +13,7 @@
 namespace etendue {
 namespace {
 
-/// A method's part in one run.
+/// Renderer and measurements of one method in one run.
 struct Contestant {
     std::unique_ptr<Renderer> renderer;
     MemoryMeter memory;
@@ -57,7 +57,8 @@ RenderSettings render_settings(const CompareSettings& s, const IntegratorSpec& i
     return settings;
 }
 
-/// Methods take their turns forwards and backwards by turns, so that a machine that slows down steadily hits all alike.
+/// The order of the methods is reversed in every other round, so that a machine that slows down affects all of them
+/// equally.
 void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings& settings,
                      const Reference& reference, const CompareProgress& progress,
                      const std::string& label, const std::atomic<bool>& interrupted) {
@@ -82,7 +83,7 @@ void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings
     }
 }
 
-/// A rendering of its own, since technique images cost time; a quarter of the method's.
+/// Technique images are rendered separately, since they cost time; in a quarter of the method's time.
 void render_techniques(const Scene& scene, const CompareSettings& settings, Method& method,
                        const std::atomic<bool>& interrupted) {
     RenderSettings s = render_settings(settings, method.spec.integrator, settings.seed);
@@ -123,7 +124,7 @@ std::optional<PowerLaw> slope(const Run& run, const Get& get) {
         times.push_back(c.seconds);
         errors.push_back(get(c.errors));
     }
-    // What comes first is not the rule yet: a few samples have not found the rare paths.
+    // Early checkpoints are left out: few samples have not found rare paths yet.
     return fit_power_law(times, errors, times.empty() ? 0 : times.back() / 32);
 }
 
@@ -155,7 +156,7 @@ void check_methods(const std::vector<MethodSpec>& methods) {
 
 void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& methods,
                        const IntegratorSpec& reference) {
-    // Weights of pairs follow what was learned, so that no two renderings have the same: they have no fixed counts.
+    // Methods with learned weights of pairs have no fixed counts, since the weights differ between renderings.
     const auto fixed_counts = [&](const IntegratorSpec& spec) -> std::optional<TechniqueCounts> {
         const auto integrator = make_integrator(spec);
         const TechniqueCounts counts = integrator->counts(scene, scene.film().pixel_count());
@@ -167,8 +168,8 @@ void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& method
         const auto own = fixed_counts(m.integrator);
         if (!own || !judge || !(*own == *judge))
             throw std::runtime_error(fmt::format(
-                "--paths inner: \"{}\" weighs its techniques otherwise than \"{}\", by which it is "
-                "judged; their inner paths do not have the same mean",
+                "--paths inner: \"{}\" weights its techniques differently than the reference "
+                "\"{}\", so that their inner paths have different means",
                 m.name, reference.to_string()));
     }
 }

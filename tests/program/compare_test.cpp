@@ -54,7 +54,7 @@ TEST_F(CompareTest, JudgesInnerPathsAlone) {
 TEST_F(CompareTest, RefusesInnerPathsOfOtherWeights) {
     expect_refusal(
         {scene, "--methods", "bdpt", "pcbpt:direct=both", "--spp", "1", "--paths", "inner"},
-        "\"pcbpt:direct=both\" weighs its techniques otherwise than \"bdpt");
+        "\"pcbpt:direct=both\" weights its techniques differently than the reference \"bdpt");
     expect_refusal({scene, "--methods", "bdpt", "--spp", "1", "--paths", "outer"}, "outer");
 }
 
