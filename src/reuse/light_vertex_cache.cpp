@@ -72,8 +72,9 @@ void LightVertexCache::assemble() {
         paths += c.heads.size(), total += c.vertices.size();
     }
     if (total >= UINT32_MAX || paths >= size_t(1) << 30)
-        throw std::runtime_error("a pass has more light vertices than can be numbered; give fewer "
-                                 "light_paths, or limit max_depth");
+        throw std::runtime_error(
+            "a pass has more than 2^32 light vertices or 2^30 light paths; give "
+            "fewer light_paths, or limit max_depth");
     heads_.resize(paths);
     vertices_.resize(total);
     places_.resize(total);
@@ -166,7 +167,7 @@ void LightVertexCache::restore_first(const Scene& scene, uint32_t vertex, int si
     restore_head(path, y);
     for (int i = 1; i < size; ++i) {
         y.append();
-        // A BSDF looks toward its predecessor, whose place must be known.
+        // The BSDF of a vertex needs the position of its predecessor.
         if (whole || i >= size - 3)
             restore_vertex(scene, begin + uint32_t(i) - 1, i == size - 1, y, i);
     }

@@ -8,7 +8,7 @@ namespace etendue {
 
 PairDensity::PairDensity(const PointGrid& vertices, float radius, double correlation)
     : cells_(vertices.cells()), levels_(cells_.buckets()), correlation_(correlation) {
-    // The area of a disc over that of the square that a plane has of a cell.
+    // Ratio of the area of a disc to that of a cell's face: a plane through the cell has about that area in it.
     const double scale = correlation * double(kPi) * sqr(double(radius / cells_.width()));
     tbb::parallel_for(uint32_t(0), cells_.buckets(), [&](uint32_t bucket) {
         if (const uint32_t n = vertices.points_in(bucket))
