@@ -4,7 +4,8 @@
 
 namespace etendue {
 
-/// Handles SIGINT (Ctrl-C) and SIGTERM from now on: the first signal sets the returned flag, the second ends the program.
+/// Handles SIGINT (Ctrl-C) and SIGTERM from now on: the first signal sets the returned flag, the second ends the
+/// program.
 const std::atomic<bool>& catch_interrupts();
 
 /// Flags set by SIGINT (Ctrl-C) and SIGTERM.

@@ -31,8 +31,8 @@ Scene build_scene(const SceneDescription& description, const SceneOptions& optio
 /// Reads and builds the scene.
 Scene load_scene(const SceneOptions& options);
 
-/// The integrator that `text` names, or the scene's where `text` is empty. Parameters missing from `text` are taken from
-/// the scene's integrator.
+/// The integrator that `text` names, or the scene's where `text` is empty. Parameters missing from `text` are taken
+/// from the scene's integrator.
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
 
 /// Adds --sampler and sets `name` to its default. `more` is appended to the option's description.

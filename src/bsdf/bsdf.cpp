@@ -8,8 +8,8 @@ static_assert(sizeof(Lobe) <= 64 && std::is_trivially_copyable_v<Lobe>);
 
 namespace {
 
-/// Directions in the frame of one component, with the geometric normal, and the correction that they imply for the lobe's
-/// value.
+/// Directions in the frame of one component, with the geometric normal, and the correction that they imply for the
+/// lobe's value.
 class Side {
 public:
     Side(Vec3 ng, const BsdfComponent& c, Vec3 wo)
@@ -24,8 +24,8 @@ public:
     Local local(Vec3 w) const { return {c_.frame.to_local(w), dot(w, ng_)}; }
     const Local& wo() const { return wo_; }
 
-    /// Factor from the lobe's f|wi·ns| to f̃|wi·ng|: 1/η² for radiance, and the correction for shading normals for importance
-    /// [Veach 1997, p. 155].
+    /// Factor from the lobe's f|wi·ns| to f̃|wi·ng|: 1/η² for radiance, and the correction for shading normals for
+    /// importance [Veach 1997, p. 155].
     float correction(const Local& wi, float eta, TransportMode mode) const {
         if (mode == TransportMode::Radiance) return 1 / sqr(eta);
         return std::fabs(wo_.w.z * wi.ng / (wo_.ng * wi.w.z));
@@ -90,8 +90,8 @@ std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const 
                       .pdf_rev = cos_o * kInvPi};
 }
 
-/// The sample that `local_sample(wo)` returns in the frame of `c`, with weight and densities in world space. The densities
-/// include the probability c.weight of the component; the weight does not.
+/// The sample that `local_sample(wo)` returns in the frame of `c`, with weight and densities in world space. The
+/// densities include the probability c.weight of the component; the weight does not.
 template <class LocalSample>
 std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo,
                                            TransportMode mode, const LocalSample& local_sample) {

@@ -1,7 +1,7 @@
 #pragma once
-// Scattering at a surface point in world space. `Bsdf` evaluates one lobe, or a mixture of lobes, in shading frames, and
-// applies the corrections that depend on the direction of transport: that for shading normals and the η² of refraction
-// [Veach 1997, §5.2–5.3].
+// Scattering at a surface point in world space. `Bsdf` evaluates one lobe, or a mixture of lobes, in shading frames,
+// and applies the corrections that depend on the direction of transport: that for shading normals and the η² of
+// refraction [Veach 1997, §5.2–5.3].
 
 #include <variant>
 
@@ -38,8 +38,8 @@ public:
     Bsdf() = default;
 
     /// f̃·|wi·ng|, where f̃ is the radiance BSDF for light that arrives from the light's side and leaves to the eye's,
-    /// corrected for shading normals; densities are in solid angle. `wo` points to the predecessor of the walk in `mode`.
-    /// Zero where the shading normal and the geometric normal see `wi` or `wo` on different sides.
+    /// corrected for shading normals; densities are in solid angle. `wo` points to the predecessor of the walk in
+    /// `mode`. Zero where the shading normal and the geometric normal see `wi` or `wo` on different sides.
     BsdfEval eval(Vec3 wo, Vec3 wi, TransportMode mode) const;
     /// A direction with weight f̃·|wi·ng| / pdf; empty where the walk ends.
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const;

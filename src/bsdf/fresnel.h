@@ -66,8 +66,8 @@ inline Rgb fresnel_conductor(float cos_i, Rgb eta, Rgb k) {
 }
 
 /// Reflectance of a smooth dielectric boundary for diffuse light from outside, 2 ∫ F(μ) μ dμ; `eta`
-/// is η of the other side over η of the light's side. Closed form for eta > 1 [Walsh 1926; Duntley 1942]; eta < 1 follows
-/// from 1 − F_int = (1 − F_ext)/η².
+/// is η of the other side over η of the light's side. Closed form for eta > 1 [Walsh 1926; Duntley 1942]; eta < 1
+/// follows from 1 − F_int = (1 − F_ext)/η².
 float fresnel_diffuse_reflectance(float eta);
 
 }  // namespace etendue

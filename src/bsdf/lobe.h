@@ -11,8 +11,8 @@
 
 namespace etendue {
 
-/// Quantity transported by a walk: radiance for walks from the eye (`wo` points toward the eye), importance for walks from
-/// a light.
+/// Quantity transported by a walk: radiance for walks from the eye (`wo` points toward the eye), importance for walks
+/// from a light.
 enum class TransportMode : uint8_t { Radiance, Importance };
 
 /// Value of the smooth part of a lobe for a pair of directions. Delta components contribute nothing here.

@@ -1,6 +1,6 @@
 #pragma once
-// Materials, each made from a <bsdf> of the scene file. A material looks up its textures at a surface point and returns the
-// `Bsdf` there; it is immutable and shared by all threads.
+// Materials, each made from a <bsdf> of the scene file. A material looks up its textures at a surface point and returns
+// the `Bsdf` there; it is immutable and shared by all threads.
 
 #include <deque>
 #include <memory>
@@ -104,8 +104,8 @@ private:
 class MaterialContext {
 public:
     virtual ~MaterialContext() = default;
-    /// A constant or texture parameter; throws SceneError where a constant lies outside [0, hi]. The empty name is that of
-    /// an unnamed child.
+    /// A constant or texture parameter; throws SceneError where a constant lies outside [0, hi]. The empty name is that
+    /// of an unnamed child.
     virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback,
                                float hi = kInf) = 0;
     /// The nested materials in file order.

@@ -51,8 +51,8 @@ public:
     float max_pdf_of_reflection(Vec3 wo, const DirectionCone& c) const {
         return 0.25f * max_D(halfway_of_reflection(wo, c).theta) / sigma(wo);
     }
-    /// The same for refracted directions, with density D |wo·m| |wi·m| η² / (|wo + η wi|² σ(wo)); `eta` is η on their side
-    /// over η on wo's side.
+    /// The same for refracted directions, with density D |wo·m| |wi·m| η² / (|wo + η wi|² σ(wo)); `eta` is η on their
+    /// side over η on wo's side.
     float max_pdf_of_refraction(Vec3 wo, const DirectionCone& c, float eta) const;
 
     /// Projected area σ(w) for `w` on either side.

@@ -12,8 +12,8 @@
 //   clearcoat (0), clearcoat_gloss (0)   second, isotropic specular lobe, and its sharpness
 // All of them may be textures, except eta and specular. From below, the surface is rough glass only.
 //
-// Reflection is reciprocal. Energy is not conserved: specular reflection is added to the diffuse part without reducing it,
-// so that the albedo of white materials exceeds one, as in Burley's model.
+// Reflection is reciprocal. Energy is not conserved: specular reflection is added to the diffuse part without reducing
+// it, so that the albedo of white materials exceeds one, as in Burley's model.
 
 #include "bsdf/principled.h"
 

@@ -4,8 +4,8 @@
 
 namespace etendue {
 
-/// Disney's principled BSDF [Burley 2012, 2015] in the form of Mitsuba 3; see principled.cpp. All parameters except `eta`
-/// lie in [0, 1].
+/// Disney's principled BSDF [Burley 2012, 2015] in the form of Mitsuba 3; see principled.cpp. All parameters except
+/// `eta` lie in [0, 1].
 struct PrincipledLobe {
     Rgb base_color;
     float surface_roughness;  ///< Square root of the main specular lobe's α.

@@ -6,8 +6,8 @@
 //   int_ior (polypropylene), ext_ior (air)   indices of the coat and outside; numbers or names
 //   nonlinear (false)           whether interreflection under the coat saturates the colour
 //   sample_visible (true)       accepted; visible normals are always sampled
-// The rough transmittance is that of single scattering, as in Mitsuba 3: light scattered several times between facets is
-// lost. Reciprocal. One-sided.
+// The rough transmittance is that of single scattering, as in Mitsuba 3: light scattered several times between facets
+// is lost. Reciprocal. One-sided.
 
 #include "bsdf/roughplastic.h"
 
@@ -55,8 +55,8 @@ RoughTransmittance::RoughTransmittance(const Microfacet& distribution, float eta
         external_[i] = float(rough_transmittance(distribution, eta, wo));
         internal += 2 * cos_theta * rough_reflectance(distribution, 1 / eta, wo);
     }
-    // 2 ∫ R(μ) μ dμ with equal weights of all nodes, as in Mitsuba 3, to match its images; the trapezoidal rule gives about
-    // 1 % more.
+    // 2 ∫ R(μ) μ dμ with equal weights of all nodes, as in Mitsuba 3, to match its images; the trapezoidal rule gives
+    // about 1 % more.
     internal_reflectance_ = float(internal / kSize);
 }
 

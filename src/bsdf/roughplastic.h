@@ -8,8 +8,8 @@
 
 namespace etendue {
 
-/// Rough transmittance T(θ) of a dielectric boundary: the share of light from outside that is refracted at the first facet
-/// and not masked afterwards.
+/// Rough transmittance T(θ) of a dielectric boundary: the share of light from outside that is refracted at the first
+/// facet and not masked afterwards.
 class RoughTransmittance {
 public:
     /// `eta` is η of the inside over η outside.

@@ -44,8 +44,8 @@ inline constexpr const char* kFlipInvalidNormalsDoc =
 inline constexpr const char* kShadowingFunctionDoc =
     "Softening the terminator of the light; must be false.";
 
-/// Throws SceneError where one of these options is set: they make a material depend on which of the two directions is that
-/// of the view.
+/// Throws SceneError where one of these options is set: they make a material depend on which of the two directions is
+/// that of the view.
 inline void refuse_view_dependence(const Params& params) {
     for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
         if (params.flag(name, false))

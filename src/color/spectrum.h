@@ -11,8 +11,8 @@ namespace etendue {
 /// CIE XYZ to linear sRGB (Rec. 709 primaries, D65 white).
 Rgb xyz_to_rgb(double X, double Y, double Z);
 
-/// Illuminant that weights a spectrum. Emission is not weighted (EqualEnergy), so a flat spectrum has the reddish colour
-/// (1.205, 0.948, 0.909). Reflectances and other ratios are seen under D65, where a flat spectrum is (1, 1, 1).
+/// Illuminant that weights a spectrum. Emission is not weighted (EqualEnergy), so a flat spectrum has the reddish
+/// colour (1.205, 0.948, 0.909). Reflectances and other ratios are seen under D65, where a flat spectrum is (1, 1, 1).
 enum class Illuminant { EqualEnergy, D65 };
 
 /// Colour of a spectrum given at strictly increasing wavelengths in nm, linear between them and

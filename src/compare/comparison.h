@@ -89,13 +89,13 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
 /// Throws std::runtime_error where a method or its parameters do not exist, or two are the same.
 void check_methods(const std::vector<MethodSpec>& methods);
 
-/// Throws std::runtime_error where the MIS weights of a method differ from those of the reference's method, since the means
-/// of their inner paths are different then.
+/// Throws std::runtime_error where the MIS weights of a method differ from those of the reference's method, since the
+/// means of their inner paths are different then.
 void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& methods,
                        const IntegratorSpec& reference);
 
-/// Limits at which a method stops and the next one continues. Checkpoints are a factor of √2 in time or 2 in samples apart,
-/// so that they are equidistant in a logarithmic plot; long steps are divided into several turns.
+/// Limits at which a method stops and the next one continues. Checkpoints are a factor of √2 in time or 2 in samples
+/// apart, so that they are equidistant in a logarithmic plot; long steps are divided into several turns.
 struct Turn {
     RenderLimits limits;
     bool is_checkpoint;

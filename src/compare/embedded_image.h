@@ -13,8 +13,9 @@ namespace etendue {
 
 std::string base64(std::string_view bytes);
 
-/// Radiance, for a page with its own exposure control, as half floats with 8-bit mantissas. The PNG has twice the height:
-/// the upper half contains the high bytes, the lower half the low bytes. Finite values are clamped to the range.
+/// Radiance, for a page with its own exposure control, as half floats with 8-bit mantissas. The PNG has twice the
+/// height: the upper half contains the high bytes, the lower half the low bytes. Finite values are clamped to the
+/// range.
 std::string radiance_data_uri(int width, int height, std::span<const Rgb> pixels);
 /// Values in [0, 1] as 8-bit grey.
 std::string grey_data_uri(int width, int height, std::span<const float> values);

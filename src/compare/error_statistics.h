@@ -14,8 +14,8 @@ struct Interval {
 /// Mean of independent measurements with the interval of Student's t; empty for fewer than two.
 std::optional<Interval> mean_interval(std::span<const double> samples);
 
-/// error ≈ factor · time^slope, fitted by least squares of the logarithms. For an unbiased estimator with finite variance
-/// the slope is −1/2 for RMSE and −1 for squared errors.
+/// error ≈ factor · time^slope, fitted by least squares of the logarithms. For an unbiased estimator with finite
+/// variance the slope is −1/2 for RMSE and −1 for squared errors.
 struct PowerLaw {
     double slope = 0, factor = 0;
     int points = 0;
@@ -29,8 +29,8 @@ struct Cost {
     std::span<const double> squared_errors;
     double seconds;
 };
-/// Efficiency 1 / (squared error · time) [Veach 1997, §2.3.2] of `method` relative to `base`. The interval, for two runs or
-/// more, assumes normally distributed logarithms. Empty where an error is not positive.
+/// Efficiency 1 / (squared error · time) [Veach 1997, §2.3.2] of `method` relative to `base`. The interval, for two
+/// runs or more, assumes normally distributed logarithms. Empty where an error is not positive.
 struct Efficiency {
     double value = 0;
     std::optional<Interval> interval;

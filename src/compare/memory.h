@@ -4,14 +4,15 @@
 
 namespace etendue {
 
-/// Measures the memory of one of several users of a process that run in turns. Linux reports resident memory and its peak
-/// for the whole process only, so a user's share is what it adds between begin() and end(), and users must not run at the
-/// same time. Shared memory that existed before (the scene) is not counted.
+/// Measures the memory of one of several users of a process that run in turns. Linux reports resident memory and its
+/// peak for the whole process only, so a user's share is what it adds between begin() and end(), and users must not run
+/// at the same time. Shared memory that existed before (the scene) is not counted.
 class MemoryMeter {
 public:
     void begin();
     void end();
-    /// Largest sum, in bytes, of the memory kept from earlier turns and that added in a turn; 0 where it cannot be measured.
+    /// Largest sum, in bytes, of the memory kept from earlier turns and that added in a turn; 0 where it cannot be
+    /// measured.
     size_t peak_bytes() const { return peak_; }
 
 private:

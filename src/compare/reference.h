@@ -33,8 +33,8 @@ struct Reference {
     }
 };
 
-/// Reads an image of the size of the scene's crop. Its uncertainty comes from the layers "first" and "second" (of cached
-/// references) or "variance" (written by `render --aov variance`). Throws std::runtime_error.
+/// Reads an image of the size of the scene's crop. Its uncertainty comes from the layers "first" and "second" (of
+/// cached references) or "variance" (written by `render --aov variance`). Throws std::runtime_error.
 Reference read_reference(const std::string& file, const FilmGeometry& geometry);
 
 /// A reference is the mean of two independent renderings, each with half the time or half the samples.
@@ -44,14 +44,14 @@ struct ReferenceSettings {
     uint64_t scene;         ///< See scene_fingerprint().
     uint64_t program;       ///< See program_fingerprint().
 };
-/// The cached reference, if the same program rendered it from the same scene with the same settings and at least the same
-/// time or samples; otherwise a new one, which is cached. Empty where `interrupted` was set.
+/// The cached reference, if the same program rendered it from the same scene with the same settings and at least the
+/// same time or samples; otherwise a new one, which is cached. Empty where `interrupted` was set.
 std::optional<Reference> make_reference(const Scene& scene, const ReferenceSettings& settings,
                                         const std::function<void(const Progress&)>& progress,
                                         const std::atomic<bool>& interrupted);
 
-/// Hash of the scene's contents: all bits of the description, and the bytes of every mesh, texture and other file that it
-/// names.
+/// Hash of the scene's contents: all bits of the description, and the bytes of every mesh, texture and other file that
+/// it names.
 uint64_t scene_fingerprint(const SceneDescription& description);
 /// Hash of the executable file, since another build may render another image.
 uint64_t program_fingerprint();

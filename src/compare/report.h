@@ -12,8 +12,9 @@ struct ReportOptions {
     std::string version;  ///< Of the program.
 };
 
-/// Writes report.html, which needs no other file; report.json with all results; and one folder per scene with images (.exr
-/// and .png), error maps (.png) and convergence plots (.svg). Throws std::runtime_error where a file cannot be written.
+/// Writes report.html, which needs no other file; report.json with all results; and one folder per scene with images
+/// (.exr and .png), error maps (.png) and convergence plots (.svg). Throws std::runtime_error where a file cannot be
+/// written.
 void write_report(const std::vector<Comparison>& comparisons, const ReportOptions& options);
 
 /// `text` as part of a file name: characters other than letters, digits and "._=-" become '_'.

@@ -1,6 +1,6 @@
 #pragma once
-// The contents of a scene file as plain data: a flat list of objects with named parameters and children. Readers fill it,
-// and only the scene builder interprets it. Names are those of Mitsuba 3 (snake_case), whatever the file's dialect.
+// The contents of a scene file as plain data: a flat list of objects with named parameters and children. Readers fill
+// it, and only the scene builder interprets it. Names are those of Mitsuba 3 (snake_case), whatever the file's dialect.
 
 #include <cstdint>
 #include <stdexcept>

@@ -1,7 +1,7 @@
 #pragma once
 // Emitters: the first vertex of every path. Densities are those of a given emitter; the scene multiplies them by the
-// probability of choosing it. y_0 of a finite emitter is a point with an area density. y_0 of an emitter at infinity is a
-// direction with a solid-angle density, and its light starts on a disc outside the scene [Veach 1997, §8.2].
+// probability of choosing it. y_0 of a finite emitter is a point with an area density. y_0 of an emitter at infinity is
+// a direction with a solid-angle density, and its light starts on a disc outside the scene [Veach 1997, §8.2].
 
 #include <cstdint>
 #include <memory>

@@ -9,8 +9,8 @@
 namespace etendue {
 namespace {
 
-/// The image is interpolated bilinearly between pixel centres. The cells of the sampling density extend between centres as
-/// well, so that the density of a cell is zero only where the image is zero in the whole cell.
+/// The image is interpolated bilinearly between pixel centres. The cells of the sampling density extend between centres
+/// as well, so that the density of a cell is zero only where the image is zero in the whole cell.
 class EnvironmentEmitter final : public InfiniteEmitter {
 public:
     EnvironmentEmitter(int width, int height, std::vector<Rgb> pixels, const Transform& to_world)
@@ -39,8 +39,8 @@ public:
     }
 
 private:
-    // The unit square of distribution_ has the columns of cells along x and the height + 1 rows along y. The first and the
-    // last row have half the height of the others in the image.
+    // The unit square of distribution_ has the columns of cells along x and the height + 1 rows along y. The first and
+    // the last row have half the height of the others in the image.
     Sample sample_arrival(FinePoint u) const override {
         const auto s = distribution_.sample(u);
         Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};

@@ -57,7 +57,8 @@ private:
     Rgb scale_;
 };
 
-/// From the axes of sun_direction() and environments (x east, y up, z south) to those of Mitsuba 3 (x south, y west, z up).
+/// From the axes of sun_direction() and environments (x east, y up, z south) to those of Mitsuba 3 (x south, y west, z
+/// up).
 const Transform kFromYUp(Transform::Matrix{
     {{0, 0, 1, 0}, {-1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 0, 1}}});
 

@@ -30,8 +30,8 @@ struct TurbidityLevel {
     }
 };
 
-/// Bézier curve of degree 5 over the sun's elevation, parametrised by its cube root to be finer near the horizon [Hosek &
-/// Wilkie 2012, §5.1].
+/// Bézier curve of degree 5 over the sun's elevation, parametrised by its cube root to be finer near the horizon [Hosek
+/// & Wilkie 2012, §5.1].
 template <class Value>
 double at_elevation(double elevation, const Value& control_point) {
     constexpr double kBinomial[] = {1, 5, 10, 10, 5, 1};

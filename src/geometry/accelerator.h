@@ -40,7 +40,8 @@ public:
 
     /// The shape must outlive the accelerator. Returns its index.
     uint32_t add_shape(const Shape& shape);
-    /// Adds shapes that are visible only through instances; they take the next shape indices. Returns the group's index.
+    /// Adds shapes that are visible only through instances; they take the next shape indices. Returns the group's
+    /// index.
     uint32_t add_group(const std::vector<const Shape*>& shapes);
     uint32_t add_instance(uint32_t group, const Transform& to_world);
     /// Builds the hierarchy; throws std::runtime_error where Embree fails.

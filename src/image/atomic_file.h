@@ -7,9 +7,9 @@
 
 namespace etendue {
 
-/// A file that is written under a temporary name in the same folder. commit() renames it to `path` and replaces an older
-/// file; without it the temporary file is removed. Missing folders are created. All errors are std::runtime_error and
-/// name the file.
+/// A file that is written under a temporary name in the same folder. commit() renames it to `path` and replaces an
+/// older file; without it the temporary file is removed. Missing folders are created. All errors are std::runtime_error
+/// and name the file.
 class PendingFile {
 public:
     explicit PendingFile(const std::string& path);

@@ -49,8 +49,8 @@ Image rgb_image(int width, int height, std::span<const Rgb> pixels);
 
 using Half = Imath::half;
 
-/// Pixels in the file's own precision: 8-bit codes, or linear values of 16 or 32 bits. Rows from the top, the channels of
-/// a pixel adjacent; alpha is not premultiplied.
+/// Pixels in the file's own precision: 8-bit codes, or linear values of 16 or 32 bits. Rows from the top, the channels
+/// of a pixel adjacent; alpha is not premultiplied.
 struct PixelBuffer {
     int width = 0, height = 0, channels = 0;
     std::variant<std::vector<uint8_t>, std::vector<Half>, std::vector<float>> data;

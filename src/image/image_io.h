@@ -28,8 +28,9 @@ PixelBuffer read_pixels(const std::string& path, bool raw);
 enum class ExrPrecision { Float, Half };
 
 /// Writes the format given by the name's extension: .exr stores all channels and attributes; .pfm, .hdr and .png (sRGB,
-/// clamped, NaN as magenta) store the colours of the unnamed layer. Missing folders are created. The file appears, or is
-/// replaced, only once it is complete. With ExrPrecision::Half finite values are clamped to the range of half floats.
+/// clamped, NaN as magenta) store the colours of the unnamed layer. Missing folders are created. The file appears, or
+/// is replaced, only once it is complete. With ExrPrecision::Half finite values are clamped to the range of half
+/// floats.
 void write_image(const std::string& path, const Image& image,
                  ExrPrecision precision = ExrPrecision::Float);
 

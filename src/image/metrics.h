@@ -14,7 +14,8 @@ struct ErrorOptions {
     /// A second, independent reference R2 removes the references' own noise from the squared errors:
     /// E[(X − R1)(X − R2)] = E[(X − R)²]. R is (R1 + R2) / 2 wherever a single value is needed.
     std::span<const Rgb> reference2 = {};
-    /// Pixels whose reference is brighter, such as lamps seen directly, count only for the two means (m and mean_ratio).
+    /// Pixels whose reference is brighter, such as lamps seen directly, count only for the two means (m and
+    /// mean_ratio).
     float ignore_above = std::numeric_limits<float>::infinity();
 };
 

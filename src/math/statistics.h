@@ -46,8 +46,8 @@ inline constexpr double kNormalQuantile95 = 1.959964;
 
 /// Degrees of freedom of the difference of two means [Welch 1947]; infinite where both are exact.
 double welch_dof(const Moments& a, const Moments& b);
-/// p-value of Welch's test: the probability of means that differ at least as much as these if the expectations differ by
-/// `tolerance`, which allows for rounding errors of single precision that no number of samples averages out.
+/// p-value of Welch's test: the probability of means that differ at least as much as these if the expectations differ
+/// by `tolerance`, which allows for rounding errors of single precision that no number of samples averages out.
 double welch_p(const Moments& a, const Moments& b, double tolerance);
 
 /// Significance level of each of `tests` independent tests for which the probability of at least one false alarm is

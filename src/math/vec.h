@@ -25,7 +25,8 @@ struct Vec2 {
     friend constexpr Vec2 operator*(Vec2 a, float s) { return {a.x * s, a.y * s}; }
 };
 
-/// A point in [0, 1)² with 53 bits per coordinate. A choice among many uses some of the bits and leaves enough for reuse.
+/// A point in [0, 1)² with 53 bits per coordinate. A choice among many uses some of the bits and leaves enough for
+/// reuse.
 struct FinePoint {
     double x = 0, y = 0;
 };

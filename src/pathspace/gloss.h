@@ -1,6 +1,6 @@
 #pragma once
-// Gloss of a vertex, in six bits for cached vertices: of the two end points of a gathered pair, the one sampled from the
-// glossier vertex is kept [Qin et al. 2015, appendix B].
+// Gloss of a vertex, in six bits for cached vertices: of the two end points of a gathered pair, the one sampled from
+// the glossier vertex is kept [Qin et al. 2015, appendix B].
 
 #include <cstdint>
 

@@ -3,8 +3,9 @@
 namespace etendue {
 namespace {
 
-/// Attenuation along the edge from y_{s-1} to z_{t-1} by the medium that their surfaces define. If these differ although no
-/// surface lies between them (an inconsistent scene), the choice does not depend on the order of the two vertices.
+/// Attenuation along the edge from y_{s-1} to z_{t-1} by the medium that their surfaces define. If these differ
+/// although no surface lies between them (an inconsistent scene), the choice does not depend on the order of the two
+/// vertices.
 Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b) {
     const MediumId at_a = a.medium_toward(a_to_b), at_b = b.medium_toward(-a_to_b);
     const MediumId medium = scene.has_open_boundaries() ? at_b : std::min(at_a, at_b);
@@ -194,8 +195,8 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
 
 namespace {
 
-/// Density estimate at b = z_{t-1}: the contribution of a photon's flux, spread over the area `disc`. `f` is the value at b
-/// for the photon's direction `wi`; its cosine is already part of the flux.
+/// Density estimate at b = z_{t-1}: the contribution of a photon's flux, spread over the area `disc`. `f` is the value
+/// at b for the photon's direction `wi`; its cosine is already part of the flux.
 Rgb density_estimate(Rgb power, Vec3 wi, const BsdfEval& f, const Vertex& b, float disc) {
     return power * f.f * b.beta * (1 / (abs_dot(wi, b.ng) * disc));
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Joins: the ways in which a light and an eye sub-path form a full path. Each evaluates the unweighted contribution C_{s,t},
-// without visibility, and its MIS weight; the caller traces the shadow ray last.
+// Joins: the ways in which a light and an eye sub-path form a full path. Each evaluates the unweighted contribution
+// C_{s,t}, without visibility, and its MIS weight; the caller traces the shadow ray last.
 
 #include <optional>
 
@@ -44,11 +44,12 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
 /// M(s,t): y_{s-1} and z_{t-1} treated as one vertex [Georgiev et al. 2012; Hachisuka et al. 2012]. For one light path.
 std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
                                const TechniqueCounts& counts);
-/// M(s,t) of a photon near z_{t-1} whose power is spread over the area `disc` [Jensen 2001, §7.2], as the only technique
-/// that makes its path: weight 1.
+/// M(s,t) of a photon near z_{t-1} whose power is spread over the area `disc` [Jensen 2001, §7.2], as the only
+/// technique that makes its path: weight 1.
 std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, float disc);
-/// U(s,t): z_{t-1} (`drops_eye`) or y_{s-1} is dropped, and the other one is connected to the predecessor of the dropped one
-/// [Qin et al. 2015]. For one light path, and without the factor r, the estimate of 1/p_c. The dropped vertex is not read.
+/// U(s,t): z_{t-1} (`drops_eye`) or y_{s-1} is dropped, and the other one is connected to the predecessor of the
+/// dropped one [Qin et al. 2015]. For one light path, and without the factor r, the estimate of 1/p_c. The dropped
+/// vertex is not read.
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
                                 int t, bool drops_eye, const TechniqueCounts& counts);
 /// C(s,1): y_{s-1} is connected to a point on the lens.

@@ -1,6 +1,6 @@
 #pragma once
-// Reference definitions: contribution, densities and MIS weight of a full path, computed from its vertices only. Joins and
-// mis.h compute the same values incrementally; tests compare the two.
+// Reference definitions: contribution, densities and MIS weight of a full path, computed from its vertices only. Joins
+// and mis.h compute the same values incrementally; tests compare the two.
 
 #include <span>
 #include <vector>

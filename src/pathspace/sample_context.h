@@ -9,7 +9,8 @@
 
 namespace etendue {
 
-/// Sums that an integrator accumulates during a pass, for later passes; integers, since the order of workers is not fixed.
+/// Sums that an integrator accumulates during a pass, for later passes; integers, since the order of workers is not
+/// fixed.
 class PassSums {
 public:
     virtual ~PassSums() = default;
@@ -67,8 +68,8 @@ struct PassContext {
     using Use = std::function<void(const SampleContext&, Workspace&)>;
     std::function<void(uint64_t count, const Use& use)> for_each_sample;
     std::function<uint64_t(uint64_t count)> chunks;  ///< Number of chunks for `count` samples.
-    /// Calls `task(i, sampler, work)` for i < count in parallel, for paths that do not contribute to the film. The task must
-    /// call Sampler::start(); path numbers from `pixels` on are unused by samples.
+    /// Calls `task(i, sampler, work)` for i < count in parallel, for paths that do not contribute to the film. The task
+    /// must call Sampler::start(); path numbers from `pixels` on are unused by samples.
     using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;
     std::function<void(uint64_t count, const Task& task)> for_each_other_path;
 

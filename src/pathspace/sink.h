@@ -4,13 +4,13 @@
 
 namespace etendue {
 
-/// Receiver of contributions: the film of a pass, technique images, or the splat list of a Markov chain. A sink does not
-/// normalise by the number of paths; the film does.
+/// Receiver of contributions: the film of a pass, technique images, or the splat list of a Markov chain. A sink does
+/// not normalise by the number of paths; the film does.
 class ContributionSink {
 public:
     virtual ~ContributionSink() = default;
-    /// Adds the unweighted contribution of a join, including visibility. For t ≥ 2 it belongs to the pixel of the current eye
-    /// sub-path. For t ≤ 1 it is that of one light path, at any film point.
+    /// Adds the unweighted contribution of a join, including visibility. For t ≥ 2 it belongs to the pixel of the
+    /// current eye sub-path. For t ≤ 1 it is that of one light path, at any film point.
     virtual void add(const Join& join, Rgb contribution) = 0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// Techniques: the ways in which a full path x_0 … x_k (x_0 on the emitter, x_k on the lens) is formed from s light vertices
-// and t eye vertices.
+// Techniques: the ways in which a full path x_0 … x_k (x_0 on the emitter, x_k on the lens) is formed from s light
+// vertices and t eye vertices.
 
 #include <array>
 #include <cstdint>
@@ -51,8 +51,8 @@ enum class PairRule : uint8_t {
     Both,   ///< Each of them in turn, which makes two paths.
 };
 
-/// Whether the technique joins two sub-paths inside the scene: neither a hit of an emitter, nor a splat, nor a hit of the
-/// lens [Popov et al. 2015].
+/// Whether the technique joins two sub-paths inside the scene: neither a hit of an emitter, nor a splat, nor a hit of
+/// the lens [Popov et al. 2015].
 constexpr bool is_inner(const Technique& q) {
     return q.s >= 1 && q.t >= 2;
 }

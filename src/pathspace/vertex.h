@@ -39,8 +39,8 @@ struct Vertex {
         ng;  ///< Unit geometric normal; zero-cosine points (point lights) have the direction of the walk.
     Vec3 wo;   ///< Toward the predecessor; unused at the first vertex.
     Rgb beta;  ///< Throughput up to, not including, scattering here.
-    /// Area density as sampled from the predecessor. After a delta event it is the event's probability times |cos θ|/d²,
-    /// without the factor δ, which the density from the other side has too (see BsdfSample::pdf_rev).
+    /// Area density as sampled from the predecessor. After a delta event it is the event's probability times |cos
+    /// θ|/d², without the factor δ, which the density from the other side has too (see BsdfSample::pdf_rev).
     float pdf_fwd = 0;
     /// Solid angle at this vertex over area at the predecessor: |cos θ|/d² there, 1 where it is at infinity.
     float to_predecessor = 0;
@@ -82,8 +82,8 @@ struct Vertex {
         gloss = gloss_of_roughness(bsdf.roughness());
     }
 
-    /// A direction in which a walk in `mode` leaves, with weight f̃·|cos θ| / pdf (for emission L_e |cos θ| / pdf) and both
-    /// densities; empty where the walk ends. Not for emitters at infinity, whose direction is fixed.
+    /// A direction in which a walk in `mode` leaves, with weight f̃·|cos θ| / pdf (for emission L_e |cos θ| / pdf) and
+    /// both densities; empty where the walk ends. Not for emitters at infinity, whose direction is fixed.
     std::optional<BsdfSample> sample(float u_lobe, Vec2 u, TransportMode mode) const {
         if (kind != Kind::Emitter) return bsdf.sample(wo, u_lobe, u, mode);
         const Vec3 w = emitter->sample_direction(ng, u);
@@ -143,7 +143,8 @@ struct SubPath {
     int size() const { return size_; }
     const Vertex& operator[](int i) const { return store_[size_t(i)]; }
     Vertex& operator[](int i) { return store_[size_t(i)]; }
-    /// Appends a vertex. Only the fields that not every kind of vertex sets are reset; the others keep their old values.
+    /// Appends a vertex. Only the fields that not every kind of vertex sets are reset; the others keep their old
+    /// values.
     Vertex& append() {
         if (size_t(size_) == store_.size()) store_.resize(2 * store_.size() + 16);
         Vertex& v = store_[size_t(size_++)];
@@ -171,8 +172,8 @@ private:
     int size_ = 0;
 };
 
-/// Converts a solid-angle density at `from` to an area density at `to`: p_A = p_σ |cos θ_to| / d². It is unchanged where `to`
-/// is at infinity.
+/// Converts a solid-angle density at `from` to an area density at `to`: p_A = p_σ |cos θ_to| / d². It is unchanged
+/// where `to` is at infinity.
 inline float to_area(float pdf_sa, const Vertex& from, const Vertex& to) {
     if (to.is_infinite) return pdf_sa;
     // From infinity: pdf_sa is the density on the bounding disc.

@@ -5,8 +5,8 @@
 namespace etendue {
 namespace {
 
-/// Survival of Russian roulette at the last vertex: its throughput relative to that of the first scattering vertex. The η²
-/// of refractions is removed, since it cancels when the path leaves the glass.
+/// Survival of Russian roulette at the last vertex: its throughput relative to that of the first scattering vertex. The
+/// η² of refractions is removed, since it cancels when the path leaves the glass.
 Survival survival(const SubPath& path) {
     const float left = path[path.size() - 1].beta.max() * path.eta2 / path[1].beta.max();
     return Survival(left > 0 ? std::min(0.95f, left) : 0x1p-16f);
@@ -15,8 +15,8 @@ Survival survival(const SubPath& path) {
 /// Result of tracing a ray.
 enum class Met { Surface, Nothing, SurfaceEdgeOn };
 
-/// Traces a ray from the last vertex and appends the surface vertex that it hits. `beta` is the throughput along the ray and
-/// is multiplied by absorption; `pdf_sa` is the density of the direction, or the probability of a delta event.
+/// Traces a ray from the last vertex and appends the surface vertex that it hits. `beta` is the throughput along the
+/// ray and is multiplied by absorption; `pdf_sa` is the density of the direction, or the probability of a delta event.
 Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, const Ray& ray,
                    Rgb& beta, float pdf_sa, MediumId medium) {
     const Scene& scene = walk.scene;

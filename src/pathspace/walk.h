@@ -1,6 +1,6 @@
 #pragma once
-// The walk, which makes all sub-paths, from either end. A step samples a direction, appends the vertex in that direction, and
-// updates the sums of MIS weights that are then known.
+// The walk, which makes all sub-paths, from either end. A step samples a direction, appends the vertex in that
+// direction, and updates the sums of MIS weights that are then known.
 
 #include "pathspace/mis.h"
 #include "pathspace/render_stats.h"
@@ -32,8 +32,8 @@ struct WalkContext {
     const LearnedPlaces* learned = nullptr;
 };
 
-/// Makes z_0 on the lens and, if the ray hits a surface, z_1. The film point is sampled from the pixel's filter. If the ray
-/// leaves the scene, z_1 is a vertex at infinity if there are emitters at infinity; otherwise there is no z_1.
+/// Makes z_0 on the lens and, if the ray hits a surface, z_1. The film point is sampled from the pixel's filter. If the
+/// ray leaves the scene, z_1 is a vertex at infinity if there are emitters at infinity; otherwise there is no z_1.
 void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, Sampler& sampler,
                     SubPath& z);
 /// The same for a given film point; `u_lens` chooses the point on a finite lens. `sampler` must be positioned after the
@@ -46,15 +46,15 @@ bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y);
 /// p_NE / p_L of y_0 for a next vertex along `w`.
 float next_event_ratio(const Vertex& y0, Vec3 w);
 
-/// Russian roulette at the last vertex, and a sampled direction; empty where the walk ends. Every decision at a vertex has
-/// its own slot of random numbers (lobe, direction, roulette, masks), used or not, so that a Markov chain finds its numbers
-/// again.
+/// Russian roulette at the last vertex, and a sampled direction; empty where the walk ends. Every decision at a vertex
+/// has its own slot of random numbers (lobe, direction, roulette, masks), used or not, so that a Markov chain finds its
+/// numbers again.
 template <TransportMode mode>
 std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sampler,
                                             SubPath& path);
-/// Appends the vertex in direction s.wi from the last vertex, for any event `s`, sampled or not. False where no vertex was
-/// appended: the ray left the scene (eye walks get a vertex at infinity if there are emitters at infinity), or hit a
-/// surface edge-on.
+/// Appends the vertex in direction s.wi from the last vertex, for any event `s`, sampled or not. False where no vertex
+/// was appended: the ray left the scene (eye walks get a vertex at infinity if there are emitters at infinity), or hit
+/// a surface edge-on.
 template <TransportMode mode>
 bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubPath& path);
 /// Stores the sum of MIS weights, which is now known for level last-2, at the last vertex.

@@ -14,8 +14,8 @@ enum class SpectrumRole {
 
 Rgb spectrum_colour(const SpectrumSamples& samples, SpectrumRole role);
 
-/// The colour of <spectrum type="...">: blackbody, uniform, d65, irregular, regular or srgb. Throws SceneError for unknown
-/// types and invalid parameters.
+/// The colour of <spectrum type="...">: blackbody, uniform, d65, irregular, regular or srgb. Throws SceneError for
+/// unknown types and invalid parameters.
 Rgb spectrum_plugin_colour(const SceneObject& spectrum, SpectrumRole role);
 
 }  // namespace etendue

@@ -11,8 +11,8 @@ namespace etendue {
 /// "maxDepth" → "max_depth", "intIOR" → "int_ior".
 std::string snake_case(std::string_view camel_case);
 
-/// Converts an object of Mitsuba 0.6, whose names are in snake case already, to the plug-ins, parameters and values with
-/// the same meaning in Mitsuba 3:
+/// Converts an object of Mitsuba 0.6, whose names are in snake case already, to the plug-ins, parameters and values
+/// with the same meaning in Mitsuba 3:
 ///   uscale, vscale, uoffset, voffset   → to_uv, scale before offset
 ///   bitmap: gamma 1 or -1              → raw true or false
 ///   bitmap: filter_type ewa, trilinear → bilinear (there are no mip maps to select from)

@@ -15,8 +15,8 @@ namespace etendue {
 
 /// `text` in quotes for a message; shortened where it is long.
 std::string quote(std::string_view text);
-/// Hint for an error message about an unknown name: " (did you mean "x"?)", or a list of the known names, or " (there are
-/// none)".
+/// Hint for an error message about an unknown name: " (did you mean "x"?)", or a list of the known names, or " (there
+/// are none)".
 std::string hint(std::string_view name, const std::vector<std::string>& candidates);
 
 /// A finite number, with optional blanks around it.

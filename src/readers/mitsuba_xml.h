@@ -14,8 +14,8 @@ namespace etendue {
 /// Reads a scene file and the files it includes. Throws SceneError.
 SceneDescription read_mitsuba_xml(const std::string& file, const ReadOptions& options = {});
 
-/// The same for text in memory. `file` is its name in messages, and relative file names are relative to its folder. Files
-/// are opened through `options.read_file` only.
+/// The same for text in memory. `file` is its name in messages, and relative file names are relative to its folder.
+/// Files are opened through `options.read_file` only.
 SceneDescription parse_mitsuba_xml(std::string_view text, const std::string& file,
                                    const ReadOptions& options = {});
 

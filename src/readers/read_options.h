@@ -13,8 +13,8 @@ struct ReadOptions {
     std::map<std::string, std::string> defines;
     /// Unknown elements and attributes become warnings that name what was dropped.
     bool lenient = false;
-    /// Returns the contents of an included or spectrum file, or empty where it cannot be read. If this is not set, functions
-    /// that take a file name read from disk, and functions that take text find no files.
+    /// Returns the contents of an included or spectrum file, or empty where it cannot be read. If this is not set,
+    /// functions that take a file name read from disk, and functions that take text find no files.
     std::function<std::optional<std::string>(const std::string& path)> read_file = nullptr;
 };
 

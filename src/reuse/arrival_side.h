@@ -35,8 +35,8 @@ public:
         const Direction d = direction();
         return normalize({float(d.x), float(d.y), float(d.z)});
     }
-    /// Whether a path that arrived on `other`, nearby, may continue from here. False for the two sides of a wall and for
-    /// walls at right angles. Computed in integers, so that gathers and trials always agree.
+    /// Whether a path that arrived on `other`, nearby, may continue from here. False for the two sides of a wall and
+    /// for walls at right angles. Computed in integers, so that gathers and trials always agree.
     bool admits(ArrivalSide other) const {
         if (is_transmissive()) return true;
         const Direction a = direction(), b = other.direction();

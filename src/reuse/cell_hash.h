@@ -22,8 +22,8 @@ public:
             return {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)};
         }
     };
-    /// Has about twice as many buckets as `points`, and cells of width 2·radius, so that a ball of `radius` meets at most
-    /// eight cells.
+    /// Has about twice as many buckets as `points`, and cells of width 2·radius, so that a ball of `radius` meets at
+    /// most eight cells.
     CellHash(size_t points = 0, float radius = 1)
         : inv_width_(0.5f / radius),
           mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}

@@ -43,8 +43,8 @@ struct GatherSearch {
     void for_each_pair(int t, const Use& use) const {
         const float reflected = reflected_flux(t);
         const Vertex& z = work.z[t - 1];
-        // Roulette for the whole search: most pairs of some vertices contribute little. The number of pairs found has the
-        // second moment n (n+1), where n is its mean, and a search costs n+1 times as much as one that finds none.
+        // Roulette for the whole search: most pairs of some vertices contribute little. The number of pairs found has
+        // the second moment n (n+1), where n is its mean, and a search costs n+1 times as much as one that finds none.
         const float partners = std::max(1.0f, density.partners(z.pair_level));
         const float search_survival = join_survival(
             roulette.of_search(t) * reflected * grid.mean_flux() * std::sqrt(partners), threshold);
@@ -124,8 +124,8 @@ private:
         return {kept.p, kept.ng, side, grid.radius(), flatness * grid.radius()};
     }
 
-    /// Estimated contribution to the pixel of a pair at z_{t-1} per unit of flux, before the light path is looked up: that of
-    /// a merge on a diffuse surface, times the brightness of the highlight on a glossy one.
+    /// Estimated contribution to the pixel of a pair at z_{t-1} per unit of flux, before the light path is looked up:
+    /// that of a merge on a diffuse surface, times the brightness of the highlight on a glossy one.
     float reflected_flux(int t) const {
         const Vertex& z = work.z[t - 1];
         const float roughness = 1 - float(z.gloss) / kSharpestGloss;

@@ -7,10 +7,10 @@
 
 namespace etendue {
 
-/// The roulette estimates the contribution of a pair's join from the flux of the light vertex and the throughput of the eye
-/// path. The error of this estimate depends on the lengths of the two sub-paths, since the MIS weight of a gather does.
-/// Therefore the root mean square of the ratio of contribution to estimate is learned from joins of earlier passes, by s
-/// and t: the most efficient survival probability is proportional to it.
+/// The roulette estimates the contribution of a pair's join from the flux of the light vertex and the throughput of the
+/// eye path. The error of this estimate depends on the lengths of the two sub-paths, since the MIS weight of a gather
+/// does. Therefore the root mean square of the ratio of contribution to estimate is learned from joins of earlier
+/// passes, by s and t: the most efficient survival probability is proportional to it.
 class GatherRoulette {
 public:
     /// Learns from the sums of earlier passes; the ratio is 1/8 where there are none.

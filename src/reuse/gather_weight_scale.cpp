@@ -9,7 +9,8 @@ void GatherWeightScale::learn(const GatherTotals& totals) {
     const auto& moments = totals.second_moments;
     const double least = *std::min_element(moments.begin(), moments.end());
     if (!(least > 0)) return;
-    // The moments of large c depend on few bright pairs, so a smaller c is chosen only if its moment is clearly smaller.
+    // The moments of large c depend on few bright pairs, so a smaller c is chosen only if its moment is clearly
+    // smaller.
     constexpr double kClear = 1.25;
     choice_ = 0;
     while (moments[size_t(choice_)] > kClear * least) ++choice_;
@@ -24,8 +25,8 @@ void GatherWeightScale::observe(double luminance, double weight, double pair_pro
         const double w = 1 / (1 + 1 / (odds * sqr(double(of(k)))));
         const double moment =
             seen * sqr(luminance) * r * (sqr(w) * r + sqr(1 - w) / (others * pair_probability));
-        // Fixed point, since integer sums do not depend on their order. The bound is reached by a pair that adds a thousand
-        // times the pixel's luminance.
+        // Fixed point, since integer sums do not depend on their order. The bound is reached by a pair that adds a
+        // thousand times the pixel's luminance.
         constexpr double kUnit = 0x1p20, kMost = 1e6 * kUnit;
         if (moment > 0) sums.second_moments[size_t(k)] += uint64_t(std::min(moment * kUnit, kMost));
     }

@@ -1,6 +1,7 @@
 #pragma once
 // Importance records [Popov et al. 2015, §4.2, §6]: the contribution of each of V light vertices to some points of the
-// scene, stored as cumulative mass functions. Eye vertices sample light vertices from a mixture of those of nearby records.
+// scene, stored as cumulative mass functions. Eye vertices sample light vertices from a mixture of those of nearby
+// records.
 
 #include <array>
 #include <cstdint>
@@ -67,8 +68,8 @@ public:
 
     /// Combines the chunks' records in order, independent of the threads that made them.
     void assemble(std::span<Chunk> chunks, uint32_t vertices);
-    /// Mixture of the `neighbours` nearest records, weighted by similarity of normal and direction and by inverse distance,
-    /// and of the uniform distribution with weight `uniform`, or 1 where no record has a positive weight.
+    /// Mixture of the `neighbours` nearest records, weighted by similarity of normal and direction and by inverse
+    /// distance, and of the uniform distribution with weight `uniform`, or 1 where no record has a positive weight.
     VertexMixture mixture(const Vertex& z, int neighbours, double uniform) const;
 
     size_t size() const { return places_.size(); }

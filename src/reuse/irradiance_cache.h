@@ -1,6 +1,6 @@
 #pragma once
-// Irradiance and its gradients at few points, from which it is interpolated at others [Ward et al. 1988; Ward & Heckbert
-// 1992].
+// Irradiance and its gradients at few points, from which it is interpolated at others [Ward et al. 1988; Ward &
+// Heckbert 1992].
 
 #include <array>
 #include <functional>
@@ -34,8 +34,8 @@ IrradianceRecord measure_irradiance(Vec3 p, Vec3 n, int rays, Sampler& sampler,
 
 class IrradianceCache {
 public:
-    /// `error` is a in [Ward et al. 1988]: records are valid up to a times their distance, which is clamped to [min_distance,
-    /// max_distance].
+    /// `error` is a in [Ward et al. 1988]: records are valid up to a times their distance, which is clamped to
+    /// [min_distance, max_distance].
     void reset(float error, float min_distance, float max_distance);
     void add(std::span<const IrradianceRecord> records);
     size_t size() const { return records_.size(); }

@@ -10,7 +10,8 @@
 
 namespace etendue {
 
-/// y_i, i ≥ 1, in one cache line. Direction and geometry are recomputed from its location and its predecessor's position.
+/// y_i, i ≥ 1, in one cache line. Direction and geometry are recomputed from its location and its predecessor's
+/// position.
 struct LightVertex {
     Vec3 p;
     Rgb beta;
@@ -32,11 +33,11 @@ struct LightVertexPlace {
 
 class LightVertexCache {
 public:
-    /// Starts the collection of a pass's light paths in `chunks` chunks. `vertex_bytes`: memory per vertex, here and in the
-    /// caller's own structures; `max_bytes`: limit of the total.
+    /// Starts the collection of a pass's light paths in `chunks` chunks. `vertex_bytes`: memory per vertex, here and in
+    /// the caller's own structures; `max_bytes`: limit of the total.
     void begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes);
-    /// Adds the next path of a chunk; each chunk belongs to one thread at a time. Throws std::runtime_error where the paths
-    /// exceed `max_bytes`.
+    /// Adds the next path of a chunk; each chunk belongs to one thread at a time. Throws std::runtime_error where the
+    /// paths exceed `max_bytes`.
     void add(uint64_t chunk, const SubPath& y);
     /// Ends the collection. Paths are in the order of chunks, independent of threads.
     void assemble();
@@ -61,8 +62,8 @@ public:
     }
     /// For the vertex y_i: the gloss of y_{i-1}, or kDeltaGloss after a delta event.
     uint8_t gloss_before(uint32_t vertex) const;
-    /// Restores the first `size` vertices of the path of `vertex`. Only the vertices needed for joins with the last one are
-    /// set, y_0 and the last three, or all of them if `whole`; only the last one has a BSDF.
+    /// Restores the first `size` vertices of the path of `vertex`. Only the vertices needed for joins with the last one
+    /// are set, y_0 and the last three, or all of them if `whole`; only the last one has a BSDF.
     void restore_first(const Scene& scene, uint32_t vertex, int size, bool whole, SubPath& y) const;
 
     /// The flux that arrives at `vertex`.

@@ -23,8 +23,8 @@ struct Chosen {};
 /// Grid over the connectible vertices y_i, i ≥ 1, of a cache.
 class LightVertexGrid {
 public:
-    /// Memory per vertex while the grid is built: its entry and a copy, its bucket's index, and up to four buckets with two
-    /// numbers each and a level of PairDensity.
+    /// Memory per vertex while the grid is built: its entry and a copy, its bucket's index, and up to four buckets with
+    /// two numbers each and a level of PairDensity.
     static constexpr uint64_t kVertexBytes = 2 * sizeof(PointGrid::Entry) + 10 * sizeof(uint32_t);
 
     /// The cache must outlive the grid, and not change before the next build().

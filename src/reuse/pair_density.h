@@ -12,14 +12,14 @@ class PointGrid;
 
 /// All pairs of one eye vertex share its eye path. If the errors of n pairs have the correlation ρ, they are worth
 /// n/(1 + ρ n) independent pairs. Where N_L light paths have n vertices around an eye vertex, its pairs therefore count
-/// N_L/(1 + ρ n) in the weights. (For ρ = 1, 1/n_eff = 1/N_L + n/N_L: the variance of independent pairs plus that of the
-/// eye vertex. Compare the upper bound of [Popov et al. 2015, §5] and [Grittmann et al. 2021].)
+/// N_L/(1 + ρ n) in the weights. (For ρ = 1, 1/n_eff = 1/N_L + n/N_L: the variance of independent pairs plus that of
+/// the eye vertex. Compare the upper bound of [Popov et al. 2015, §5] and [Grittmann et al. 2021].)
 ///
 /// n is estimated in an earlier pass. It is a function of the position only, so that weights still sum to one.
 class PairDensity final : public LearnedPlaces {
 public:
-    /// Before anything is learned: pairs have the smallest weight, so that in the first pass they contribute only to paths
-    /// that no other technique makes.
+    /// Before anything is learned: pairs have the smallest weight, so that in the first pass they contribute only to
+    /// paths that no other technique makes.
     PairDensity() = default;
     /// Learns from the light vertices of a pass; `radius` is that of pairs, `correlation` is ρ.
     PairDensity(const PointGrid& vertices, float radius, double correlation);

@@ -12,8 +12,8 @@ namespace etendue {
 
 /// A photon stored without its path. Its power is a share of the flux of all light.
 struct MapPhoton : Photon {
-    /// Events on its path before: any; at least one, none of them on a diffuse surface; or at least one, all of them delta
-    /// events, from a delta emitter.
+    /// Events on its path before: any; at least one, none of them on a diffuse surface; or at least one, all of them
+    /// delta events, from a delta emitter.
     enum class Origin : uint8_t { Any, Caustic, DeltaCaustic } origin = Origin::Any;
 
     bool is_caustic() const { return origin != Origin::Any; }
@@ -37,9 +37,9 @@ public:
         int count;
         float disc;
     };
-    /// The `count` photons nearest to `p`, within `radius`. If there are that many, the last one only determines the radius of
-    /// the disc: (k-1) / (π r_k²) is an unbiased estimate of a uniform density, k / (π r_k²) is not [Loftsgaarden &
-    /// Quesenberry 1965].
+    /// The `count` photons nearest to `p`, within `radius`. If there are that many, the last one only determines the
+    /// radius of the disc: (k-1) / (π r_k²) is an unbiased estimate of a uniform density, k / (π r_k²) is not
+    /// [Loftsgaarden & Quesenberry 1965].
     void find(Vec3 p, int count, float radius, Neighbours& out) const;
 
 private:

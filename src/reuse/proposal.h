@@ -1,7 +1,7 @@
 #pragma once
-// Proposals of Bernoulli trials: sets of directions that contain all directions from a vertex into a neighbourhood. Each has
-// a mass: the integral of the walk's density, or of an upper bound of it, over the set. With an upper bound, proposed
-// directions are accepted with probability density / bound (thinning).
+// Proposals of Bernoulli trials: sets of directions that contain all directions from a vertex into a neighbourhood.
+// Each has a mass: the integral of the walk's density, or of an upper bound of it, over the set. With an upper bound,
+// proposed directions are accepted with probability density / bound (thinning).
 
 #include <optional>
 #include <variant>
@@ -51,8 +51,8 @@ struct BoxProposal {
     std::optional<Vec3> propose(const WalkDensity& density, Sampler& sampler, RenderStats&) const;
 };
 
-/// The cone of a ball above the horizon, for a cosine density. That density is uniform on the unit disc of (ω_x, ω_y), where
-/// the cone is an ellipse.
+/// The cone of a ball above the horizon, for a cosine density. That density is uniform on the unit disc of (ω_x, ω_y),
+/// where the cone is an ellipse.
 struct EllipseProposal {
     double mass;
     Frame frame;
@@ -104,8 +104,8 @@ struct ParallelProposal {
     Frame frame;
     float radius;
 
-    /// For the ball of radius `ball_radius` about `center`, or for its slab around the plane normal to `n` if that has less
-    /// mass.
+    /// For the ball of radius `ball_radius` about `center`, or for its slab around the plane normal to `n` if that has
+    /// less mass.
     static ParallelProposal make(const Vertex& y0, Vec3 center, Vec3 n, float ball_radius,
                                  std::optional<float> half_height);
     std::optional<Ray> propose(Sampler& sampler) const;

@@ -1,14 +1,14 @@
 #pragma once
-// Unbiased estimates of 1/p_c by Bernoulli trials [Booth 2007; Qin et al. 2015, §3]. p_c is the probability that the next
-// vertex of a walk lies near a given vertex.
+// Unbiased estimates of 1/p_c by Bernoulli trials [Booth 2007; Qin et al. 2015, §3]. p_c is the probability that the
+// next vertex of a walk lies near a given vertex.
 
 #include "pathspace/walk.h"
 #include "reuse/arrival_side.h"
 
 namespace etendue {
 
-/// The region of a vertex's partners: the part of a ball around it within `half_height` of its tangent plane, on its side of
-/// the surface if that is opaque. Gathers and trials use the same predicate.
+/// The region of a vertex's partners: the part of a ball around it within `half_height` of its tangent plane, on its
+/// side of the surface if that is opaque. Gathers and trials use the same predicate.
 struct Neighbourhood {
     Vec3 p, n;  ///< The vertex and its geometric normal.
     ArrivalSide side;
@@ -41,10 +41,10 @@ struct PairEvent {
 };
 
 /// r with E[r] = 1/p_c, where p_c is the probability that the walk continues from `from` by a smooth event and its next
-/// vertex lies in the neighbourhood. N trials of a proposal that contains the whole event give r = N / (q·mass), where q is
-/// the survival of roulette at `from`. The proposal with the smallest mass is chosen. `sampler` must be positioned at
-/// numbers used by this pair only. Returns 0 after ten million failed trials, due to a defect or an almost unreachable
-/// neighbourhood; RenderStats::runaways counts these.
+/// vertex lies in the neighbourhood. N trials of a proposal that contains the whole event give r = N / (q·mass), where
+/// q is the survival of roulette at `from`. The proposal with the smallest mass is chosen. `sampler` must be positioned
+/// at numbers used by this pair only. Returns 0 after ten million failed trials, due to a defect or an almost
+/// unreachable neighbourhood; RenderStats::runaways counts these.
 double reciprocal_probability(const Scene& scene, const PairEvent& event, Sampler& sampler,
                               Vertex& scratch, RenderStats& stats);
 

@@ -1,6 +1,6 @@
 #pragma once
-// Regions that contain every direction to a flat neighbourhood, parametrised over the unit square, and a division of the
-// square into cells for densities that vary over a region.
+// Regions that contain every direction to a flat neighbourhood, parametrised over the unit square, and a division of
+// the square into cells for densities that vary over a region.
 
 #include <array>
 #include <cstddef>
@@ -52,8 +52,8 @@ private:
     double height_, foot_, radius_;
 };
 
-/// A range of elevations above the plane and of azimuths, measured by solid angle. For all viewers; it is thin for viewers
-/// close to the plane.
+/// A range of elevations above the plane and of azimuths, measured by solid angle. For all viewers; it is thin for
+/// viewers close to the plane.
 class SeenBand {
 public:
     explicit SeenBand(const SlabView& view);
@@ -69,11 +69,12 @@ private:
     Vec2 lo_, size_;  ///< Of the sine of the elevation, and of the azimuth.
 };
 
-/// A division of the unit square into cells with an upper bound of the density in each; mass() is the integral of the bounds.
+/// A division of the unit square into cells with an upper bound of the density in each; mass() is the integral of the
+/// bounds.
 class BoundedCells {
 public:
-    /// Divides the cell with the largest mass repeatedly, until the total mass is at most `enough` or there are 16 cells.
-    /// `max_pdf(cone)` is an upper bound of the density of directions.
+    /// Divides the cell with the largest mass repeatedly, until the total mass is at most `enough` or there are 16
+    /// cells. `max_pdf(cone)` is an upper bound of the density of directions.
     template <class Region, class MaxPdf>
     BoundedCells(const Region& region, const MaxPdf& max_pdf, double enough) {
         const auto cell = [&](Vec2 lo, Vec2 size) -> Cell {

@@ -5,8 +5,8 @@
 namespace etendue {
 namespace {
 
-/// Owen scrambling of an integer in reversed bit order: a hash in which each bit depends on itself and on lower bits only
-/// [Laine & Karras 2011; constants of Vegdahl 2021].
+/// Owen scrambling of an integer in reversed bit order: a hash in which each bit depends on itself and on lower bits
+/// only [Laine & Karras 2011; constants of Vegdahl 2021].
 constexpr uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
     x ^= x * 0x3d20adeau;
     x += seed;
@@ -54,8 +54,8 @@ Sampler::Vec2Bits Sampler::next_2d_structured() {
         slot_ += 2;
         return {source_->bits(stream_, vertex_, slot), source_->bits(stream_, vertex_, slot + 1)};
     }
-    // Every pair of dimensions takes the same two-dimensional sequence over the passes, in its own order and with its own
-    // scrambling [Burley 2020].
+    // Every pair of dimensions takes the same two-dimensional sequence over the passes, in its own order and with its
+    // own scrambling [Burley 2020].
     const uint64_t seed = bits(path_key_), scramble = mix64(seed);
     const uint32_t index = reverse_bits(scramble_reversed(pass_reversed_, uint32_t(seed)));
     const uint32_t x = scramble_reversed(index, uint32_t(scramble));

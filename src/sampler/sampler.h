@@ -1,7 +1,7 @@
 #pragma once
-// Random numbers by address. Every number is a function of (seed, pass, path, stream, vertex, slot), without hidden state.
-// Therefore images do not depend on the number of threads, and a change at vertex 3 of a walk does not affect the numbers
-// of vertex 4.
+// Random numbers by address. Every number is a function of (seed, pass, path, stream, vertex, slot), without hidden
+// state. Therefore images do not depend on the number of threads, and a change at vertex 3 of a walk does not affect
+// the numbers of vertex 4.
 
 #include <cstdint>
 
@@ -26,8 +26,8 @@ enum class SamplerKind : uint8_t {
     PrimarySample,  ///< Numbers from a PrimarySource.
 };
 
-/// Number of the join of y_{s-1} and z_{t-1}; `draw` distinguishes several joins of one vertex. Different arguments with
-/// s < 2^16, t < 2^21, draw < 2^21 have different numbers.
+/// Number of the join of y_{s-1} and z_{t-1}; `draw` distinguishes several joins of one vertex. Different arguments
+/// with s < 2^16, t < 2^21, draw < 2^21 have different numbers.
 constexpr uint64_t join_number(int s, int t, uint32_t draw = 0) {
     return uint64_t(draw) << 37 ^ uint64_t(uint32_t(t) >> 16) << 32 ^ uint64_t(uint32_t(s)) << 16 ^
            (uint32_t(t) & 0xffff);
@@ -121,8 +121,8 @@ private:
         ++slot_;
         return b;
     }
-    /// Low-order bits for the slot just read. They depend on the address only, so they stay the same while a Markov chain
-    /// keeps that number.
+    /// Low-order bits for the slot just read. They depend on the address only, so they stay the same while a Markov
+    /// chain keeps that number.
     uint64_t low_bits() const {
         return mix64(~(key_ + block_) + 0x9e3779b97f4a7c15ull * address());
     }

@@ -1,6 +1,6 @@
 #pragma once
-// Lookup of the plug-in that an object of a description names, and the check of its parameters. Unknown names are errors,
-// or warnings under `lenient`.
+// Lookup of the plug-in that an object of a description names, and the check of its parameters. Unknown names are
+// errors, or warnings under `lenient`.
 
 #include <string>
 #include <string_view>
@@ -27,7 +27,8 @@ public:
 
     void check(int index, const PluginInfo& info);
 
-    /// The entry of the object's plug-in, after a check of its parameters; nullptr (under `lenient`) where it is unknown.
+    /// The entry of the object's plug-in, after a check of its parameters; nullptr (under `lenient`) where it is
+    /// unknown.
     template <class Entry>
     const Entry* find(int index, const std::vector<Entry>& registry) {
         std::vector<std::string> known;

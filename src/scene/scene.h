@@ -1,6 +1,6 @@
 #pragma once
-// The scene, immutable and ready to render: shapes with their materials and emitters, the sensor, and the queries of path
-// sampling.
+// The scene, immutable and ready to render: shapes with their materials and emitters, the sensor, and the queries of
+// path sampling.
 
 #include <algorithm>
 #include <limits>
@@ -73,8 +73,8 @@ public:
     /// Geometry of a surface point.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
-    /// Transmittance of masks along the open segment from `a` to `b`, which lie on surfaces with normals `ng_a` and `ng_b`;
-    /// 0 where an opaque surface is in between.
+    /// Transmittance of masks along the open segment from `a` to `b`, which lie on surfaces with normals `ng_a` and
+    /// `ng_b`; 0 where an opaque surface is in between.
     float transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
     float transmittance_to_infinity(Vec3 a, Vec3 ng_a, Vec3 d) const;
 
@@ -127,8 +127,8 @@ private:
     static Ray segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b);
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;
-    /// Calls `passes(hit)` for the surfaces along a ray in order, until it returns false or there are no more; returns the
-    /// rest of the ray. `hit.t` is the distance from the previous surface.
+    /// Calls `passes(hit)` for the surfaces along a ray in order, until it returns false or there are no more; returns
+    /// the rest of the ray. `hit.t` is the distance from the previous surface.
     template <class Passes>
     Ray for_each_surface(Ray ray, const Passes& passes) const;
 

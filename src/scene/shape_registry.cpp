@@ -175,8 +175,8 @@ std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn&) {
     const float height = length(axis);
     if (!(height > 0)) params.fail("p1", "\"p0\" and \"p1\" of a cylinder must differ");
     const Transform t = params.transform("to_world");
-    // Columns: two vectors of length `radius` normal to the axis, the axis, and p0. The choice of the two determines where
-    // u = 0; these are those of Mitsuba 3.
+    // Columns: two vectors of length `radius` normal to the axis, the axis, and p0. The choice of the two determines
+    // where u = 0; these are those of Mitsuba 3.
     const Frame frame = Frame::from_normal(axis / height);
     const Vec3 s = frame.s * radius, r = frame.t * radius;
     const Transform local(Transform::Matrix{{{s.x, r.x, axis.x, p0.x},

@@ -1,6 +1,6 @@
 #pragma once
-// Sensors: the last vertex of every path. Densities of directions are per pixel (film area in pixels), so that one eye path
-// per pixel counts 1 in MIS weights. W_e is normalised so that the throughput of an eye path at z_1 is 1.
+// Sensors: the last vertex of every path. Densities of directions are per pixel (film area in pixels), so that one eye
+// path per pixel counts 1 in MIS weights. W_e is normalised so that the throughput of an eye path at z_1 is 1.
 
 #include <memory>
 #include <optional>
@@ -40,11 +40,12 @@ public:
 
     /// Ray through a film point, in pixels; `u_lens` chooses the point on a finite lens.
     virtual SensorRay sample_ray(Vec2 film, Vec2 u_lens) const = 0;
-    /// Connection from `from`, a point or the direction to one at infinity, to the lens; empty outside the crop, extended
-    /// by the filter's radius.
+    /// Connection from `from`, a point or the direction to one at infinity, to the lens; empty outside the crop,
+    /// extended by the filter's radius.
     virtual std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity,
                                                           Vec2 u_lens) const = 0;
-    /// The measurement of a light ray o + t·d, t in (0, tmax), that crosses a finite lens from its front; empty otherwise.
+    /// The measurement of a light ray o + t·d, t in (0, tmax), that crosses a finite lens from its front; empty
+    /// otherwise.
     virtual std::optional<SensorSample> hit_lens(Vec3 o, Vec3 d, float tmax) const;
 
     /// Whether z_0 is at infinity, in a fixed direction.

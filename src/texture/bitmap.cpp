@@ -1,10 +1,10 @@
-// Image texture. (u, v) = (0, 0) is the upper left corner of the image, (1, 1) its lower right one, and texel centres lie
-// at half-integers, as in Mitsuba 3 (which flips v in some mesh readers, not in textures).
+// Image texture. (u, v) = (0, 0) is the upper left corner of the image, (1, 1) its lower right one, and texel centres
+// lie at half-integers, as in Mitsuba 3 (which flips v in some mesh readers, not in textures).
 //   filename (required)       any format OpenImageIO reads
 //   filter_type (bilinear)    or nearest
 //   wrap_mode (repeat)        or mirror, clamp
-//   raw (false)               whether integer formats contain linear data instead of sRGB; floating-point ones always do
-//   channel (all)             r, g, b or a: one channel as grey (alpha is always linear); all: the colours without alpha
+//   raw (false)               whether integer formats contain linear data, not sRGB; floating-point ones always do
+//   channel (all)             r, g, b or a: one channel as grey (alpha is linear); all: the colours without alpha
 //   to_uv (identity)          affine map of (u, v) before the look-up; the upper 2D part of a 4×4 matrix
 // eval_scalar() of colours is their luminance, as in Mitsuba 3 for opacity and roughness.
 

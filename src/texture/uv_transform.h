@@ -28,8 +28,8 @@ public:
     Vec2 gradient(Vec2 g) const {
         return {m_[0][0] * g.x + m_[1][0] * g.y, m_[0][1] * g.x + m_[1][1] * g.y};
     }
-    /// From the size of a grid over the unit square of point(uv) to that of a grid of the same detail over the unit square
-    /// of uv.
+    /// From the size of a grid over the unit square of point(uv) to that of a grid of the same detail over the unit
+    /// square of uv.
     void resolution(int& width, int& height) const {
         const auto cells = [&](int column) {
             const float n = std::hypot(m_[0][column] * float(width), m_[1][column] * float(height));

@@ -8,8 +8,8 @@ namespace {
 /// See CommonClasses.
 constexpr double kRouletteMargin = 10, kClusterMargin = 10;
 /// A later reference replaces the first one where its squared error is smaller by the factor kMuchBetter and it has at
-/// least kManyContributions effective contributions. With fewer, rare bright contributions may be missing, so that its error
-/// only seems small.
+/// least kManyContributions effective contributions. With fewer, rare bright contributions may be missing, so that its
+/// error only seems small.
 constexpr double kMuchBetter = 4, kManyContributions = 4000;
 
 /// Whether `method` has all techniques of `reference`, with at least the same counts.

@@ -23,26 +23,25 @@ struct SideTallies {
     double effective_count() const { return std::min(method_count(), reference.effective_count()); }
 };
 
-/// A class is compared where both sides can make it and have enough effective contributions for a t-test. Its reference is
-/// the first one, unless a later one samples the class much better.
+/// A class is compared where both sides can make it and have enough effective contributions for a t-test. Its reference
+/// is the first one, unless a later one samples the class much better.
 ///
-/// **Lost classes.** A method that never makes a class that it claims to make has no contributions there. The class must
-/// not count as too rare then, so the method is credited with the contributions that it *should* have, where these are
-/// known. Let R be a
-/// reference whose techniques the method M has too, with at least the same counts, and let both use the power heuristic.
-/// For a path x let a_q = n_q p_q(x) and S = (Σ_{q ∈ R} a_q²)^½. A contribution of R by its strongest technique is
-/// v_R = f max_q a_q / S² ≥ f / (√2 S) where R has two techniques. One of M is f a_q / Σ_M a². For q ∈ R this is at most
-/// that of R by the same technique. For others it is at most f a_q / (S² + a_q²) ≤ f / (2S) < v_R. So no contribution of
-/// M exceeds v_R. The second moment of one sample of M is ∫ f Σ_q w_q v_q ≤ ∫ f v_R, and that of R is at least 1/1.21 of
-/// ∫ f v_R. Hence with equal samples M has at least 1/1.21 of R's effective contributions (Σv)² / Σv².
-/// Russian roulette, which references do not use, makes contributions fewer and larger. kRouletteMargin allows for it: M
-/// is credited with a tenth. Light paths shared by many eye paths make contributions correlated; then M is credited with a
-/// hundredth. Where M has no such reference, or the credit is too small, a lost class remains "too rare" and the report
-/// names it.
+/// **Lost classes.** A method that never makes a class that it claims to make has no contributions there. The class
+/// must not count as too rare then, so the method is credited with the contributions that it *should* have, where these
+/// are known. Let R be a reference whose techniques the method M has too, with at least the same counts, and let both
+/// use the power heuristic. For a path x let a_q = n_q p_q(x) and S = (Σ_{q ∈ R} a_q²)^½. A contribution of R by its
+/// strongest technique is v_R = f max_q a_q / S² ≥ f / (√2 S) where R has two techniques. One of M is f a_q / Σ_M a².
+/// For q ∈ R this is at most that of R by the same technique. For others it is at most f a_q / (S² + a_q²) ≤ f / (2S) <
+/// v_R. So no contribution of M exceeds v_R. The second moment of one sample of M is ∫ f Σ_q w_q v_q ≤ ∫ f v_R, and
+/// that of R is at least 1/1.21 of ∫ f v_R. Hence with equal samples M has at least 1/1.21 of R's effective
+/// contributions (Σv)² / Σv². Russian roulette, which references do not use, makes contributions fewer and larger.
+/// kRouletteMargin allows for it: M is credited with a tenth. Light paths shared by many eye paths make contributions
+/// correlated; then M is credited with a hundredth. Where M has no such reference, or the credit is too small, a lost
+/// class remains "too rare" and the report names it.
 ///
-/// The credit affects which classes are tested, but not the test. Under the hypothesis that M is unbiased, its sum over a
-/// class consists of at least kEnoughContributions effective contributions, as for all other classes, so the level of the
-/// test is unchanged.
+/// The credit affects which classes are tested, but not the test. Under the hypothesis that M is unbiased, its sum over
+/// a class consists of at least kEnoughContributions effective contributions, as for all other classes, so the level of
+/// the test is unchanged.
 class CommonClasses {
 public:
     CommonClasses(const RunSeries& method, std::span<const RunSeries> references);
@@ -64,7 +63,8 @@ public:
         const Class* found = find(c);
         return found && found->is_common;
     }
-    /// Whether the method can be compared with a reference: the first one always, later ones unless they are the method.
+    /// Whether the method can be compared with a reference: the first one always, later ones unless they are the
+    /// method.
     bool may_serve(size_t reference) const { return may_serve_[reference]; }
     /// Contributions that the method should have where `reference` has `tally`; zero where they are unknown.
     Tally implied_by(size_t reference, const Tally& tally) const {

@@ -6,8 +6,8 @@
 namespace etendue {
 namespace {
 
-/// Effective contributions that a test of one technique needs: unweighted contributions have heavier tails than weighted
-/// ones.
+/// Effective contributions that a test of one technique needs: unweighted contributions have heavier tails than
+/// weighted ones.
 constexpr double kEnoughAlone = 4000;
 
 /// Mean colour of every tile, followed by that of the image.
@@ -86,8 +86,8 @@ void compare_tiles(const TileMoments& method, const TileMoments& reference,
         for (size_t k = 0; k < 3; ++k)
             (i + 1 < method.size() ? report.tiles : report.image)
                 .push_back(WelchTest::of(method[i][k], reference[i][k], effective_counts[i]));
-    // Contributions too rare for some tiles may be missing from others, which then seem well sampled but are too dark. If
-    // there are too many such tiles, no tile is tested.
+    // Contributions too rare for some tiles may be missing from others, which then seem well sampled but are too dark.
+    // If there are too many such tiles, no tile is tested.
     const std::vector<double> pixels = pixels_of_tiles(grid);
     double all = 0, untested = 0;
     for (size_t i = 0; i < report.tiles.size(); ++i) {

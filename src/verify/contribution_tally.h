@@ -37,8 +37,8 @@ struct Tally {
     Tally from_fewer_samples(double factor) const {
         return {sum, squares * factor, fourths * factor * factor * factor};
     }
-    /// Effective sample size (Σv)² / Σv² [Kish 1965]: a t-test needs a large one. Where few contributions dominate Σv², it is
-    /// uncertain itself, so it is limited to four times the effective sample size of the squares.
+    /// Effective sample size (Σv)² / Σv² [Kish 1965]: a t-test needs a large one. Where few contributions dominate Σv²,
+    /// it is uncertain itself, so it is limited to four times the effective sample size of the squares.
     double effective_count() const {
         return squares > 0 ? std::min(sum * sum / squares, 4 * squares * squares / fourths) : 0.0;
     }
@@ -78,8 +78,8 @@ public:
         Tally luminance;
     };
 
-    /// Paths with an edge shorter than cut_offs[number of edges] get has_short_edge. Paths with more edges than there are
-    /// cut-offs are ignored.
+    /// Paths with an edge shorter than cut_offs[number of edges] get has_short_edge. Paths with more edges than there
+    /// are cut-offs are ignored.
     ContributionTally(const Scene& scene, TileGrid grid, std::vector<float> cut_offs)
         : scene_(scene), grid_(grid), cut_offs_(std::move(cut_offs)) {}
 

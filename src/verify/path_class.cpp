@@ -37,8 +37,8 @@ PathClass classify(const Scene& scene, const Join& join, const SubPath& y, const
                 .has_short_edge = shortest_edge(scene, join, y, z) < cut_off,
                 .delta_emitter = join.emitter->is_delta(),
                 .infinite_ends = join.emitter->is_infinite() && scene.sensor().is_orthographic()};
-    // At the end points of a join the path scatters by a smooth lobe, whatever event the walk sampled there. C(s,0) has no
-    // such end point.
+    // At the end points of a join the path scatters by a smooth lobe, whatever event the walk sampled there. C(s,0) has
+    // no such end point.
     for (int i = 1; i < (q.t == 0 ? last : q.s - 1); ++i)
         if (y[i].is_delta) c.delta_events |= 1u << i;
     for (int i = 1; i < q.t - 1; ++i)
@@ -61,8 +61,8 @@ namespace {
 uint32_t fixed_vertices(const PathClass& c) {
     return c.delta_events | 1u << c.edges;
 }
-/// The bit of x_{s-1}, the last light vertex; 0 where s = 0. For merges and gathers it is the vertex that both sub-paths
-/// have.
+/// The bit of x_{s-1}, the last light vertex; 0 where s = 0. For merges and gathers it is the vertex that both
+/// sub-paths have.
 uint32_t last_light_vertex(const Technique& q) {
     return q.s > 0 ? 1u << (q.s - 1) : 0u;
 }

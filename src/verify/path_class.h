@@ -1,6 +1,6 @@
 #pragma once
-// Classes of paths: the properties that determine which techniques can make a path. Methods and techniques can be compared
-// only on paths that both can make.
+// Classes of paths: the properties that determine which techniques can make a path. Methods and techniques can be
+// compared only on paths that both can make.
 
 #include <compare>
 #include <string>
@@ -53,8 +53,8 @@ float shortest_edge(const Scene& scene, const Join& join, const SubPath& y, cons
 std::vector<Technique> techniques_of_length(int edges);
 /// Whether the technique can make paths of the class.
 bool can_make(const Technique& technique, const PathClass& c);
-/// Number of times that `technique` makes each path of a class that it can make: 2 for gathers under PairRule::Both where
-/// either vertex can be dropped, otherwise 1.
+/// Number of times that `technique` makes each path of a class that it can make: 2 for gathers under PairRule::Both
+/// where either vertex can be dropped, otherwise 1.
 int times_made(const Technique& technique, const PathClass& c, PairRule rule);
 /// Whether any technique with a positive count can make paths of the class.
 bool can_make(const TechniqueCounts& counts, const PathClass& c);

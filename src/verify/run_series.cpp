@@ -37,8 +37,8 @@ public:
             shortest_edge(scene_, join, y, paths.z),
             double(luminance(contribution) * join.mis_weight * share));
     }
-    /// The weighted quantile of the shortest edge: `share` of the light comes along paths with a shorter one. 0 where there is
-    /// none.
+    /// The weighted quantile of the shortest edge: `share` of the light comes along paths with a shorter one. 0 where
+    /// there is none.
     float quantile(size_t edges, double share) {
         auto& paths = lengths_[edges];
         std::sort(paths.begin(), paths.end());
@@ -54,8 +54,8 @@ private:
     std::vector<std::vector<std::pair<float, double>>> lengths_;
 };
 
-/// Calls task(i) for i < count on up to `threads` threads. If a task throws, no further tasks start and the exception is
-/// rethrown.
+/// Calls task(i) for i < count on up to `threads` threads. If a task throws, no further tasks start and the exception
+/// is rethrown.
 template <class Task>
 void for_each_in_parallel(size_t count, int threads, const Task& task) {
     std::atomic<size_t> next{0};

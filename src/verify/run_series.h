@@ -56,7 +56,8 @@ struct RunSeries {
     }
 };
 
-/// Renders series with common scene, options and δ: techniques are compared on paths whose edges have at least the length δ.
+/// Renders series with common scene, options and δ: techniques are compared on paths whose edges have at least the
+/// length δ.
 class SeriesRenderer {
 public:
     using Report = std::function<void(const std::string&)>;

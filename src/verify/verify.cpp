@@ -21,7 +21,8 @@ constexpr double kFirstSeconds = 2;
 constexpr double kMostGrowth = 4;
 /// Planned squared errors are smaller than needed by this factor, so that the next estimate is likely the last one.
 constexpr double kHeadroom = 0.9;
-/// With `detect`: share of the time for renderings of single techniques, to which the required precision does not apply.
+/// With `detect`: share of the time for renderings of single techniques, to which the required precision does not
+/// apply.
 constexpr double kTechniqueTime = 0.15;
 
 IntegratorSpec limited(IntegratorSpec spec, int longest) {
@@ -37,8 +38,9 @@ IntegratorSpec without_roulette(IntegratorSpec spec, int longest) {
     return spec;
 }
 
-/// Russian roulette before shadow rays depends on the weighted contribution. Unweighted contributions of a technique with
-/// small weights become rare and unbounded. Therefore techniques are rendered without it. Empty where `spec` has none.
+/// Russian roulette before shadow rays depends on the weighted contribution. Unweighted contributions of a technique
+/// with small weights become rare and unbounded. Therefore techniques are rendered without it. Empty where `spec` has
+/// none.
 std::optional<IntegratorSpec> without_join_roulette(IntegratorSpec spec) {
     for (const IntegratorEntry& e : integrator_registry())
         for (const ParamInfo& p : e.info.params)
@@ -121,13 +123,13 @@ public:
     VerifyReport report() const;
     /// Adds renderings until a relative error of `size` would be found or the time is over.
     ///
-    /// The decision to stop depends on the spreads only, not on the difference of the means, which is tested once at the
-    /// end. For independent normal values mean and variance are independent, so the final mean has the same distribution as
-    /// with a fixed number of samples [Stein 1945]. The values are means of runs with at least kEnoughContributions on each
-    /// side, hence nearly normal. The final variance is slightly too small, since a small estimate ends the rendering. There
-    /// are few decisions, each with several times the samples of the previous one, so the effect is far smaller than the
-    /// uncertainty already covered by the degrees of freedom (tests/unit/verify/sample_plan_test.cpp measures the rate of
-    /// false alarms).
+    /// The decision to stop depends on the spreads only, not on the difference of the means, which is tested once at
+    /// the end. For independent normal values mean and variance are independent, so the final mean has the same
+    /// distribution as with a fixed number of samples [Stein 1945]. The values are means of runs with at least
+    /// kEnoughContributions on each side, hence nearly normal. The final variance is slightly too small, since a small
+    /// estimate ends the rendering. There are few decisions, each with several times the samples of the previous one,
+    /// so the effect is far smaller than the uncertainty already covered by the degrees of freedom
+    /// (tests/unit/verify/sample_plan_test.cpp measures the rate of false alarms).
     VerifyReport render_until(double size, const SeriesRenderer::Report& progress);
 
 private:

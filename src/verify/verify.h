@@ -1,10 +1,10 @@
 #pragma once
-// Statistical evidence that methods are unbiased. Means over independent runs are compared with those of references: of the
-// image, its tiles, path lengths, classes of paths and single techniques. Every comparison is a Welch test; Šidák's
+// Statistical evidence that methods are unbiased. Means over independent runs are compared with those of references: of
+// the image, its tiles, path lengths, classes of paths and single techniques. Every comparison is a Welch test; Šidák's
 // correction gives all of them together the stated probability of a false alarm.
 //
-// Two sides are compared on the classes of paths (see common_classes.h) that both can make and sample often enough for a
-// t-test. Classes that are left out are reported.
+// Two sides are compared on the classes of paths (see common_classes.h) that both can make and sample often enough for
+// a t-test. Classes that are left out are reported.
 //
 // Single techniques: an unweighted connection has infinite variance where surfaces meet, since its second moment is
 // ∝ 1/(shortest edge). So both sides are multiplied by [every edge ≥ δ], with one δ per path length.
@@ -26,10 +26,11 @@ struct VerifyOptions {
     /// Samples per pixel of one run; with `detect` of each of the renderings whose mean a run is. If empty, `seconds`
     /// determines them.
     std::optional<uint64_t> spp;
-    /// Time of all runs of one method, 30 if empty. With `detect` the time of the whole verification, unlimited if empty.
+    /// Time of all runs of one method, 30 if empty. With `detect` the time of the whole verification, unlimited if
+    /// empty.
     std::optional<double> seconds;
-    /// If given, renders until a relative error of this size in the image, or in a path length with at least kLargeShare of
-    /// the light, would be found with a probability of 90 %.
+    /// If given, renders until a relative error of this size in the image, or in a path length with at least
+    /// kLargeShare of the light, would be found with a probability of 90 %.
     std::optional<double> detect;
     uint64_t seed = 0;
     int threads = 0;  ///< Number of runs rendered at the same time; 0: one per core.
@@ -47,13 +48,13 @@ struct ReferenceImage {
     double correlation = 1;
 };
 
-/// Largest shares of the light that may be too rare for a test. Beyond them the other tests lack rare contributions as well
-/// and are not reliable: the tests of tiles, and the verdict.
+/// Largest shares of the light that may be too rare for a test. Beyond them the other tests lack rare contributions as
+/// well and are not reliable: the tests of tiles, and the verdict.
 inline constexpr double kTooMuchUntested = 0.05, kTooMuchTooRare = 0.1;
 /// Share of the light above which a path length counts for `detect`.
 inline constexpr double kLargeShare = 0.02;
-/// Share of the light and effective contributions above which a class of paths is tested on its own. An error in one class
-/// is large relative to the class, but small relative to lengths and images that include it.
+/// Share of the light and effective contributions above which a class of paths is tested on its own. An error in one
+/// class is large relative to the class, but small relative to lengths and images that include it.
 inline constexpr double kTestedShare = 1e-3, kEnoughOfClass = 1000;
 
 struct LengthReport {
@@ -82,8 +83,8 @@ struct UntestedClass {
 
 struct TechniqueReport {
     Technique technique;
-    /// Share of the light of this length that is compared: of classes that the technique can make and that are sampled often
-    /// enough, with edges ≥ δ.
+    /// Share of the light of this length that is compared: of classes that the technique can make and that are sampled
+    /// often enough, with edges ≥ δ.
     double coverage = 0;
     WelchTest comparison;
 };
@@ -127,8 +128,8 @@ struct MethodReport {
 enum class Verdict { Consistent, Deviates, Undecided };
 const char* to_string(Verdict verdict);
 
-/// Smallest relative errors of the compared light that would have been found with a probability of 90 %. Path lengths count
-/// if at least kLargeShare of the light is within reach.
+/// Smallest relative errors of the compared light that would have been found with a probability of 90 %. Path lengths
+/// count if at least kLargeShare of the light is within reach.
 struct Detectable {
     std::optional<double> image;   ///< Empty where the image was not tested.
     std::optional<double> length;  ///< The largest of all tested path lengths.
@@ -152,8 +153,8 @@ struct VerifyReport {
     Detectable detectable(const MethodReport& method) const;
 };
 
-/// `progress` receives lines of text, from one thread at a time. Throws std::runtime_error where a method's parameters are
-/// invalid, and rethrows exceptions of renderings.
+/// `progress` receives lines of text, from one thread at a time. Throws std::runtime_error where a method's parameters
+/// are invalid, and rethrows exceptions of renderings.
 VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& methods,
                     const VerifyOptions& options,
                     const std::optional<ReferenceImage>& reference = {},
