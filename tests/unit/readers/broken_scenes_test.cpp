@@ -1,5 +1,5 @@
-// Every file of tests/scenes/broken has one mistake, which its name tells. The reader must refuse it with this message.
-// Those in tests/scenes/broken/builder are for the program: they read well, and the scene cannot be built.
+// Every file of tests/scenes/broken has one mistake, described by its name; the reader must refuse it with the message
+// in this table. The reader accepts the files in tests/scenes/broken/builder, and the scene builder must refuse them.
 
 #include <filesystem>
 #include <fstream>

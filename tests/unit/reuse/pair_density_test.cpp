@@ -16,7 +16,7 @@ double share(const PairDensity& density, Vec3 p) {
     return pair_share(density.pair_level(p));
 }
 
-TEST(PairDensity, CountsPairsForLittleBeforeItIsBuilt) {
+TEST(PairDensity, HasTheSmallestShareBeforeLearning) {
     EXPECT_LT(share(PairDensity(), {0, 0, 0}), 1e-4);
 }
 

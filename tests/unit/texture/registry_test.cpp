@@ -68,7 +68,7 @@ protected:
         scene_.objects.insert(scene_.objects.begin(), std::move(root));
         return *builder_.build(0);
     }
-    /// What the maker says about an object.
+    /// The message of the error for an object; "" without one.
     std::string error(SceneObject root) {
         try {
             build(std::move(root));
@@ -200,6 +200,12 @@ TEST(TextureCache, LoadsEachImageOnce) {
     EXPECT_THROW(cache.load(path + "no", false), std::runtime_error);
     EXPECT_EQ(cache.memory_bytes(), 12u);
     std::filesystem::remove(path);
+}
+
+TEST(TextureRef, ScalarOfAConstantIsItsLuminance) {
+    const Rgb colour(0.9f, 0.2f, 0.4f);
+    EXPECT_EQ(TextureRef(colour).eval_scalar({}), luminance(colour));
+    EXPECT_EQ(TextureRef(Rgb(0.3f)).eval_scalar({}), 0.3f);
 }
 
 TEST(TextureDefaults, GradientIsByCentralDifferences) {
