@@ -74,11 +74,11 @@ std::vector<Entry> choose(std::vector<Entry> entries, const std::string& categor
         if (e.category == category) names.insert(names.end(), e.names.begin(), e.names.end());
     }
     if (!category.empty() && names.empty())
-        throw std::runtime_error(fmt::format("there is no category \"{}\" (there are: {})",
-                                             category, fmt::join(categories, ", ")));
+        throw std::runtime_error(fmt::format("unknown category \"{}\" (known: {})", category,
+                                             fmt::join(categories, ", ")));
     if (!name.empty() && std::ranges::find(names, name) == names.end())
-        throw std::runtime_error(fmt::format("there is no {} \"{}\" (there are: {})", category,
-                                             name, fmt::join(names, ", ")));
+        throw std::runtime_error(
+            fmt::format("unknown {} \"{}\" (known: {})", category, name, fmt::join(names, ", ")));
     std::erase_if(entries, [&](const Entry& e) {
         return (!category.empty() && e.category != category) ||
                (!name.empty() && std::ranges::find(e.names, name) == e.names.end());

@@ -177,8 +177,8 @@ void check_aovs(const std::vector<std::string>& names) {
     for (const AovInfo& a : aov_registry()) known.push_back(a.name);
     for (const std::string& n : names)
         if (std::find(known.begin(), known.end(), n) == known.end())
-            throw std::runtime_error(fmt::format("--aov: there is no \"{}\" (there are: {})", n,
-                                                 fmt::join(known, ", ")));
+            throw std::runtime_error(
+                fmt::format("--aov: unknown layer \"{}\" (known: {})", n, fmt::join(known, ", ")));
 }
 
 void write_techniques(const Renderer& r, const Scene& scene, const std::string& folder) {

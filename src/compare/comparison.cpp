@@ -14,7 +14,7 @@ namespace etendue {
 namespace {
 
 /// Renderer and measurements of one method in one run.
-struct Contestant {
+struct MethodRun {
     std::unique_ptr<Renderer> renderer;
     MemoryMeter memory;
     std::vector<Checkpoint> checkpoints;
@@ -24,7 +24,7 @@ ImageErrors errors_of(const std::vector<Rgb>& image, const Reference& r) {
     return image_errors(image, r.half(0), {.reference2 = r.half(1)});
 }
 
-void add_checkpoint(Contestant& c, const Reference& reference) {
+void add_checkpoint(MethodRun& c, const Reference& reference) {
     const Film& film = c.renderer->film();
     if (film.passes() == 0) return;
     if (!c.checkpoints.empty() && c.checkpoints.back().spp == film.passes()) return;
@@ -32,7 +32,7 @@ void add_checkpoint(Contestant& c, const Reference& reference) {
         {film.passes(), c.renderer->seconds(), errors_of(film.image(), reference)});
 }
 
-Run finished_run(const Contestant& c, uint64_t seed, const Reference& reference) {
+Run finished_run(const MethodRun& c, uint64_t seed, const Reference& reference) {
     const Renderer& r = *c.renderer;
     Run run;
     run.seed = seed;
@@ -59,14 +59,14 @@ RenderSettings render_settings(const CompareSettings& s, const IntegratorSpec& i
 
 /// The order of the methods is reversed in every other round, so that a machine that slows down affects all of them
 /// equally.
-void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings& settings,
+void render_in_turns(std::vector<MethodRun>& method_runs, const CompareSettings& settings,
                      const Reference& reference, const CompareProgress& progress,
                      const std::string& label, const std::atomic<bool>& interrupted) {
     bool forwards = true;
     for (const Turn& turn : schedule(settings.limits)) {
-        for (size_t i = 0; i < contestants.size(); ++i) {
-            const size_t method = forwards ? i : contestants.size() - 1 - i;
-            Contestant& c = contestants[method];
+        for (size_t i = 0; i < method_runs.size(); ++i) {
+            const size_t method = forwards ? i : method_runs.size() - 1 - i;
+            MethodRun& c = method_runs[method];
             c.memory.begin();
             c.renderer->run(
                 turn.limits,
@@ -163,10 +163,10 @@ void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& method
         const bool learns = counts.gather > 0 || (counts.merge > 0 && counts.connect > 0);
         return learns ? std::nullopt : std::optional(counts);
     };
-    const auto judge = fixed_counts(reference);
+    const auto expected = fixed_counts(reference);
     for (const MethodSpec& m : methods) {
         const auto own = fixed_counts(m.integrator);
-        if (!own || !judge || !(*own == *judge))
+        if (!own || !expected || !(*own == *expected))
             throw std::runtime_error(fmt::format(
                 "--paths inner: \"{}\" weights its techniques differently than the reference "
                 "\"{}\", so that their inner paths have different means",
@@ -223,18 +223,18 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
 
     for (int index = 0; index < settings.runs && !interrupted.load(); ++index) {
         const uint64_t seed = settings.seed + uint64_t(index);
-        std::vector<Contestant> contestants(settings.methods.size());
-        for (size_t i = 0; i < contestants.size(); ++i) {
-            contestants[i].memory.begin();
-            contestants[i].renderer = std::make_unique<Renderer>(
+        std::vector<MethodRun> method_runs(settings.methods.size());
+        for (size_t i = 0; i < method_runs.size(); ++i) {
+            method_runs[i].memory.begin();
+            method_runs[i].renderer = std::make_unique<Renderer>(
                 scene, render_settings(settings, settings.methods[i].integrator, seed));
-            contestants[i].memory.end();
+            method_runs[i].memory.end();
         }
         const std::string label =
             settings.runs > 1 ? fmt::format("run {} of {}, ", index + 1, settings.runs) : "";
-        render_in_turns(contestants, settings, reference, progress, label, interrupted);
-        for (size_t i = 0; i < contestants.size(); ++i) {
-            Contestant& c = contestants[i];
+        render_in_turns(method_runs, settings, reference, progress, label, interrupted);
+        for (size_t i = 0; i < method_runs.size(); ++i) {
+            MethodRun& c = method_runs[i];
             add_checkpoint(c, reference);
             if (c.checkpoints.empty()) continue;  // interrupted before its first pass
             Method& m = out.methods[i];

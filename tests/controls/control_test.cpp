@@ -20,8 +20,8 @@ struct Planted {
     const char* name;
     std::string xml;
     std::string method;
-    unsigned shows;  ///< Parts that must find it.
-    unsigned clear;  ///< Parts that must not find it, since they are not affected.
+    unsigned must_find;      ///< Parts that must find it.
+    unsigned must_not_find;  ///< Parts that must not find it, since they are not affected.
     uint64_t spp = 64;
 };
 void PrintTo(const Planted& p, std::ostream* out) {
@@ -159,7 +159,7 @@ Findings findings(const Planted& planted, SamplerKind sampler) {
                   fmt::format("s = {}, t = {}: {:.4f} ± {:.4f}", t.technique.s, t.technique.t,
                               t.comparison.ratio(), t.comparison.ratio_error()));
     EXPECT_GE(report.tests, 40) << "hardly anything was tested";
-    if ((planted.shows | planted.clear) & Densities)
+    if ((planted.must_find | planted.must_not_find) & Densities)
         for (const DensityTest& d : test_sample_densities(scene, planted.method))
             found.add(Densities, d.deviates,
                       fmt::format("density of s = {}, t = {}: {:.4f}", d.technique.s, d.technique.t,
@@ -172,8 +172,8 @@ class NoError : public ::testing::TestWithParam<std::tuple<Planted, SamplerKind>
 
 TEST_P(Control, IsFound) {
     const Findings found = findings(GetParam(), SamplerKind::Independent);
-    EXPECT_EQ(found.parts & GetParam().shows, GetParam().shows) << found.text;
-    EXPECT_EQ(found.parts & GetParam().clear, 0u) << found.text;
+    EXPECT_EQ(found.parts & GetParam().must_find, GetParam().must_find) << found.text;
+    EXPECT_EQ(found.parts & GetParam().must_not_find, 0u) << found.text;
     RecordProperty("found", found.text);
 }
 
