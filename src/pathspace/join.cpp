@@ -113,9 +113,9 @@ namespace {
 struct Edge {
     Vec3 w;            ///< From y_{s-1} to z_{t-1}.
     Rgb contribution;  ///< Of the connection, without visibility.
-    double rev_a;      ///< Density of y_{s-1} as sampled from z_{t-1}.
-    double rev_b;      ///< Density of z_{t-1} as sampled from y_{s-1}.
-    double total;      ///< Σ (n·p)² over all techniques, relative to p of this split.
+    /// Densities of y_{s-1} as sampled from z_{t-1}, and of z_{t-1} as sampled from y_{s-1}.
+    double rev_a, rev_b;
+    double total;  ///< Σ (n·p)² over all techniques, relative to p of this split.
 };
 
 /// y_{s-1} (which may be y_0, as the emission sampled it) connected to z_{t-1}, t ≥ 2.

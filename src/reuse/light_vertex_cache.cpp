@@ -72,9 +72,8 @@ void LightVertexCache::assemble() {
         paths += c.heads.size(), total += c.vertices.size();
     }
     if (total >= UINT32_MAX || paths >= size_t(1) << 30)
-        throw std::runtime_error(
-            "a pass has more than 2^32 light vertices or 2^30 light paths; give "
-            "fewer light_paths, or limit max_depth");
+        throw std::runtime_error("a pass has more light vertices than can be numbered; give fewer "
+                                 "light_paths, or limit max_depth");
     heads_.resize(paths);
     vertices_.resize(total);
     places_.resize(total);
