@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -45,11 +44,11 @@ RgbImage DiffCommand::read_like(const std::string& path, const RgbImage& first) 
 
 bool DiffCommand::is_hdr() const {
     if (flip != "auto") return flip == "hdr";
-    return std::ranges::all_of(
-        std::initializer_list<std::string>{image, reference}, [](const std::string& path) {
-            const std::string e = std::filesystem::path(path).extension().string();
-            return e == ".exr" || e == ".pfm" || e == ".hdr";
-        });
+    return std::ranges::all_of(std::initializer_list<std::string>{image, reference},
+                               [](const std::string& path) {
+                                   const std::string e = image_extension(path);
+                                   return e == ".exr" || e == ".pfm" || e == ".hdr";
+                               });
 }
 
 void DiffCommand::print(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const {
@@ -85,7 +84,7 @@ void DiffCommand::print_json(const ImageErrors& e,
 void DiffCommand::write_map(const std::vector<float>& errors, int width, int height) const {
     Image out(width, height, {"Y"});
     out.data = errors;
-    if (std::filesystem::path(map).extension() == ".png") {
+    if (image_extension(map) == ".png") {
         std::vector<Rgb> colours;
         for (float v : errors) colours.push_back(magma(v));
         out = rgb_image(width, height, colours);

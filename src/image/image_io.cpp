@@ -208,9 +208,7 @@ constexpr Writer kWriters[] = {
     {".exr", write_exr}, {".pfm", write_pfm}, {".hdr", write_hdr}, {".png", write_png}};
 
 const Writer& writer_for(const std::string& path) {
-    std::string e = fs::path(path).extension().string();
-    std::transform(e.begin(), e.end(), e.begin(),
-                   [](unsigned char c) { return char(std::tolower(c)); });
+    const std::string e = image_extension(path);
     for (const Writer& w : kWriters)
         if (e == w.extension) return w;
     fail_write(path,
@@ -218,6 +216,13 @@ const Writer& writer_for(const std::string& path) {
 }
 
 }  // namespace
+
+std::string image_extension(const std::string& path) {
+    std::string e = fs::path(path).extension().string();
+    std::transform(e.begin(), e.end(), e.begin(),
+                   [](unsigned char c) { return char(std::tolower(c)); });
+    return e;
+}
 
 Image read_image(const std::string& path) {
     const auto input = open_input(path);

@@ -37,6 +37,9 @@ void write_image(const std::string& path, const Image& image,
 /// The bytes of a PNG file with these 8-bit sRGB codes, of one (grey) or three channels.
 std::string encode_png(int width, int height, std::span<const uint8_t> codes);
 
+/// The extension of a file name in lower case, with its dot: ".exr".
+std::string image_extension(const std::string& path);
+
 /// Throws unless write_image() supports the extension; for a check before a long rendering.
 void check_image_extension(const std::string& path);
 

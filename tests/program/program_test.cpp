@@ -247,6 +247,18 @@ TEST_F(ProgramTest, WritesEveryFormat) {
     }
 }
 
+TEST_F(ProgramTest, DiffIgnoresTheCaseOfExtensions) {
+    const std::string a = (folder.path() / "a.EXR").string(),
+                      map = (folder.path() / "map.PNG").string();
+    write_image(a, rgb_image(2, 1, std::vector<Rgb>{Rgb(1), Rgb(0.5f)}));
+    const ProgramResult r = run({"diff", a, a, "--map", map});
+    ASSERT_EQ(r.status, 0) << r.errors;
+    EXPECT_NE(r.output.find("FLIP (HDR)"), std::string::npos) << r.output;
+    // False colours: no error is nearly black, but has some blue.
+    const std::vector<Rgb> pixels = read_rgb(map).pixels;
+    EXPECT_GT(pixels.at(0).b, pixels.at(0).r);
+}
+
 TEST_F(ProgramTest, WritesTechniqueImages) {
     const fs::path techniques = folder.path() / "techniques";
     const ProgramResult r =
