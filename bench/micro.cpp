@@ -1,5 +1,5 @@
-// Nanoseconds of processor time of the parts: random numbers, BSDFs, emitters, walks, joins,
-// weights, ray queries; and the bytes of what is stored.
+// Processor time, in nanoseconds, of random numbers, BSDFs, emitters, walks, joins, weights and ray queries; and sizes
+// of stored data in bytes.
 
 #include <benchmark/benchmark.h>
 
@@ -18,10 +18,10 @@
 namespace etendue::bench {
 namespace {
 
-/// Inputs are drawn beforehand and used in turn, so that branches are not learnt by heart.
+/// Number of inputs, which are sampled beforehand and used in turn, so that branch predictors do not learn them.
 constexpr size_t kInputs = 1 << 12;
 
-/// One operation on input i; what it returns is kept from being optimised away.
+/// One operation on input i; its result is not optimised away.
 template <class Operation>
 void add(const Report& report, const Options& options, const std::string& name,
          const Operation& operation) {

@@ -1,6 +1,6 @@
-// Photons: what a gathered pair costs beside a merged one; what it costs to keep a pass's light paths,
-// to build the grid over them and to search it, and their memory; how the grid's times grow with
-// photons and radius. One thread, processor time.
+// Photons: the cost of a gathered pair relative to a merged one; time and memory for storing the light paths of a pass,
+// and for building and searching the grid; growth of these times with the number of photons and the radius. One thread,
+// processor time.
 
 #include <malloc.h>
 
@@ -23,7 +23,7 @@ double processor_seconds() {
     return double(std::clock()) / CLOCKS_PER_SEC;
 }
 
-/// Of one call, as the mean of as many as take `least` seconds.
+/// Seconds of one call: the mean of as many calls as take at least `least` seconds.
 template <class F>
 double processor_seconds_of(double least, const F& f) {
     const double begin = processor_seconds();
@@ -35,7 +35,7 @@ double processor_seconds_of(double least, const F& f) {
     }
 }
 
-/// What `run` returns, run by run, after one unmeasured call.
+/// The results of repeated calls of `run`, after one unmeasured call.
 template <class Run>
 auto repeat(int repeats, const Run& run) {
     run();
@@ -47,7 +47,7 @@ auto repeat(int repeats, const Run& run) {
 RenderSettings settings_for(const IntegratorSpec& spec) {
     RenderSettings settings;
     settings.integrator = spec;
-    settings.sampler = SamplerKind::Sobol;  // as the program does
+    settings.sampler = SamplerKind::Sobol;  // the default of the program
     settings.threads = 1;
     return settings;
 }
@@ -59,7 +59,7 @@ void add_passes(Renderer& renderer, uint64_t passes) {
         limits, [](const Progress&) {}, false);
 }
 
-/// The radius of pairs that the integrator has of itself after some passes.
+/// The default radius of pairs of an integrator after some passes.
 float own_radius(const Scene& scene, const IntegratorSpec& spec, uint64_t passes) {
     Renderer renderer(scene, settings_for(spec));
     add_passes(renderer, passes);
@@ -76,8 +76,8 @@ IntegratorParams params_of(const IntegratorSpec& spec) {
 
 // ------------------------------------------------------------------------------------------- gather cost
 
-/// `vcm` or `upg+bdpt` with a fixed radius. Half of the passes find pairs, and count them, but make
-/// nothing of them; weights, roulette and all other techniques are the same.
+/// `vcm` or `upg+bdpt` with a fixed radius. Half of the passes find and count pairs without using them; weights,
+/// roulette and all other techniques are the same.
 class HalfOfThePasses final : public Integrator {
 public:
     HalfOfThePasses(const IntegratorSpec& spec, float radius)
@@ -92,7 +92,7 @@ public:
         whole_->collect(workers);
     }
     void trace(const PassContext& pass) override {
-        // Both kinds come after as many passes of the other: roulette knows the image of all.
+        // The two kinds alternate, so that roulette has learned from equally many passes.
         is_whole_ = (pass.index + 1) % 4 < 2;
         if (is_whole_) {
             whole_->trace(pass);
@@ -209,7 +209,7 @@ void measure_gather_cost(const Report& report, const Options& options, const Sce
     constexpr uint64_t kAdaptingPasses = 8;
     const float radius = own_radius(scene, upg, kAdaptingPasses);
     GatherCost merging(scene, vcm, radius), gathering(scene, upg, radius);
-    // Differences of what is much alike need longer runs.
+    // Small differences need longer runs.
     const double seconds = 4 * options.seconds;
     const auto [merged, gathered] = alternate(
         options.repeats, [&] { return merging.run(seconds); },
@@ -266,7 +266,7 @@ public:
         paths_.trace_light_paths(pass, counts(light_paths), light_paths, kept);
         kept.assemble();
     }
-    /// Eye vertices that would look for photons, in the order of a pass; of every eighth chunk.
+    /// Eye vertices that search for photons, in the order of a pass; of every eighth chunk.
     std::vector<Vec3> queries() {
         std::vector<Vec3> points;
         const uint64_t pixels = scene_.film().pixel_count();
@@ -352,12 +352,12 @@ double query_seconds(const PointGrid& grid, const std::vector<Vec3>& queries, fl
         for (Vec3 p : queries)
             grid.for_each_near(p, radius, [&](const PointGrid::Entry& e) { sum += e.index; });
     });
-    // What is never looked at need not be found.
+    // Vertices that no query can find are left out.
     [[maybe_unused]] volatile uint64_t looked_at = sum;
     return seconds / double(queries.size());
 }
 
-/// Of what the heap holds, whether in its arenas or mapped by itself.
+/// Bytes in use on the heap, in its arenas or mapped separately.
 double heap_bytes() {
     const struct mallinfo2 info = mallinfo2();
     return double(info.uordblks + info.hblkhd);

@@ -91,7 +91,7 @@ double ticks_of_reading() {
 
 uint64_t ticks() {
 #if defined(__x86_64__)
-    // What came before is finished, and what follows has not begun.
+    // All previous instructions are finished, and no later one has started.
     _mm_lfence();
     const uint64_t now = __rdtsc();
     _mm_lfence();

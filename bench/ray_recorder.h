@@ -1,10 +1,9 @@
 #pragma once
-// Rays as Embree gets them, recorded from whatever traces them and replayed alone.
+// Records rays passed to Embree, and replays them without a renderer.
 //
-// The programs are linked so that calls of rtcIntersect1 and rtcOccluded1 pass through here first
-// (ld --wrap): the integrators run as they are, without a hook in their code, and what is recorded
-// is every ray in the order they traced it. While neither recording nor timing, that costs one
-// predictable branch a ray.
+// The programs are linked so that calls of rtcIntersect1 and rtcOccluded1 pass through this code (ld --wrap).
+// Integrators need no hooks, and every ray is recorded in the order of tracing. When neither recording nor timing, this
+// costs one predictable branch per ray.
 
 #include <cstdint>
 #include <functional>
@@ -37,7 +36,7 @@ private:
     void* scene_ = nullptr;  ///< RTCScene
 };
 
-/// Clock ticks: those of the processor where it has a cheap counter, else nanoseconds.
+/// Clock ticks of the processor where it has a fast counter, otherwise nanoseconds.
 uint64_t ticks();
 
 /// Runs `trace` on one thread and returns the ticks spent within Embree, without those of reading

@@ -1,6 +1,5 @@
-// How near the integrators come to Embree itself: ray rate against the same rays replayed alone,
-// and the share of the time that is spent within Embree. And what Embree does on this machine, to
-// compare with others.
+// Overhead of integrators over Embree: their ray rate relative to that of the same rays replayed alone, and the share
+// of time spent in Embree. Also the speed of Embree on this machine.
 
 #include "ray_recorder.h"
 #include "support.h"

@@ -1,6 +1,6 @@
-// Samples a second, and the error after a given time, each beside bare Embree measured in turn.
-// `normalised` figures are what the machine of the peers would show if the ratio to its Embree is
-// the same. Two threads, as the peers had.
+// Samples per second, and the error after a given time, alternating with measurements of bare Embree. `normalised`
+// results are those expected on the machine where other renderers were measured, assuming the same ratio to Embree
+// there. Two threads, as for the other renderers.
 
 #include "image/image_io.h"
 #include "image/metrics.h"
@@ -10,11 +10,10 @@
 namespace etendue::bench {
 namespace {
 
-/// A scene, and what the best peers do on it.
+/// A scene, and targets from the results of other renderers.
 struct Case {
     SceneFile file;
-    /// Seconds after which the error is told; 0 where there are no references ref1.pfm and
-    /// ref2.pfm.
+    /// Seconds after which the error is measured; 0 where there are no references ref1.pfm and ref2.pfm.
     double error_seconds = 0;
     struct Aim {
         std::string integrator;
@@ -44,7 +43,7 @@ void measure_samples(const Report& report, const Options& options, const Yardsti
     const std::string name = aim.integrator + " " + scene_name;
     if (!report.wants(name)) return;
     const IntegratorSpec integrator = integrator_for(scene, aim.integrator);
-    // Enough that the first pass, which knows nothing of the image yet, weighs little.
+    // Enough passes that the first one, before roulette has learned the image, matters little.
     const uint64_t passes =
         std::max(passes_for(scene, integrator, kPeerThreads, options.seconds), uint64_t{8});
     const auto [rendered, bare] = alternate(

@@ -1,4 +1,4 @@
-// Two threads over one: the same passes, the time of one thread over that of two.
+// Speed-up by a second thread: the time of one thread divided by that of two, for the same passes.
 
 #include "support.h"
 

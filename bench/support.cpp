@@ -114,7 +114,7 @@ Rendering render(const Scene& scene, const IntegratorSpec& integrator, int threa
                  const Length& length, uint64_t seed) {
     RenderSettings settings;
     settings.integrator = integrator;
-    settings.sampler = SamplerKind::Sobol;  // as the program does
+    settings.sampler = SamplerKind::Sobol;  // the default of the program
     settings.threads = threads;
     settings.seed = seed;
     settings.spp = length.passes;

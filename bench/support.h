@@ -1,8 +1,7 @@
 #pragma once
-// What all benchmarks share: options, scenes, a timed rendering, two sides measured in turn, and
-// the result lines.
+// Parts shared by all benchmarks: options, scenes, timed renderings, alternating measurements, and result lines.
 //
-// A benchmark prints one JSON object a line and case:
+// A benchmark prints one line with a JSON object per case:
 //     {"bench": "scaling", "case": "bdpt yard-ring", "figures": {"scaling": {"unit": …, "better": "higher" | "lower",
 //      "aim": …, "median": …, "min": …, "max": …, "runs": […]}}, "notes": {…}}
 // or {"bench": …, "case": …, "skipped": reason}. bench/compare reads these lines.
@@ -23,12 +22,11 @@ namespace etendue::bench {
 
 struct Options {
     int repeats = 5;     ///< Runs of each side.
-    double seconds = 1;  ///< Least length of one run.
-    bool quick = false;  ///< Short runs, to see that all works; the figures mean nothing.
-    std::string only;    ///< Cases whose name contains this text; all where empty.
+    double seconds = 1;  ///< Minimal duration of one run.
+    bool quick = false;  ///< Short runs, to test the benchmarks; the results are meaningless.
+    std::string only;    ///< Only cases whose name contains this text; all if empty.
 
-    /// `--repeats N --seconds S --quick --only TEXT`; ends the program where it knows better than
-    /// to go on.
+    /// Parses `--repeats N --seconds S --quick --only TEXT`; ends the program on errors.
     static Options parse(int argc, char** argv);
 };
 
@@ -48,7 +46,7 @@ public:
     Report(std::string bench, const Options& options)
         : bench_(std::move(bench)), only_(options.only) {}
 
-    /// Whether this case was asked for.
+    /// Whether this case is selected by --only.
     bool wants(const std::string& name) const { return name.find(only_) != std::string::npos; }
     void add(const std::string& name, const std::vector<Figure>& figures,
              const nlohmann::ordered_json& notes = {}) const;
@@ -59,8 +57,7 @@ private:
     std::string bench_, only_;
 };
 
-/// Calls `a` and `b` in turn, A B A B …, after one unmeasured call of each; what they return, run
-/// by run.
+/// Calls `a` and `b` alternately, A B A B …, after one unmeasured call of each; returns their results by run.
 template <class A, class B>
 auto alternate(int repeats, const A& a, const B& b) {
     a(), b();
@@ -72,7 +69,7 @@ auto alternate(int repeats, const A& a, const B& b) {
     return runs;
 }
 
-/// Run by run f(a_i, b_i).
+/// f(a_i, b_i) for every run i.
 template <class A, class B, class F>
 std::vector<double> each(const std::vector<A>& a, const std::vector<B>& b, const F& f) {
     std::vector<double> values;
@@ -111,7 +108,7 @@ struct Rendering {
     double samples_per_second() const { return samples / seconds; }
     double rays_per_second() const { return double(stats.rays()) / seconds; }
 };
-/// What ends a rendering: passes, or seconds.
+/// Length of a rendering: passes, or seconds.
 struct Length {
     std::optional<uint64_t> passes;
     std::optional<double> seconds;

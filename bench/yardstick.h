@@ -1,14 +1,13 @@
 #pragma once
-// What this machine can do: bare Embree along diffuse paths among 100k triangles. Figures of other
-// machines are compared through its ratio to theirs, not through seconds.
+// Speed of this machine: bare Embree along diffuse paths among 100k triangles. Results of other machines are compared
+// relative to the ray rate of Embree there, not in seconds.
 
 #include "geometry/accelerator.h"
 #include "ray_recorder.h"
 
 namespace etendue::bench {
 
-/// Threads of the peers' figures, and the ray rate of Embree on their machine (between 8.5 and 9.7
-/// million).
+/// Threads in the results of other renderers, and the ray rate of Embree on that machine (between 8.5 and 9.7 million).
 inline constexpr int kPeerThreads = 2;
 inline constexpr double kPeerRays = 9.1e6;
 

@@ -7,10 +7,10 @@ find_package(ZLIB REQUIRED)
 find_package(nanoflann REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(Imath REQUIRED)
-find_package(Boost REQUIRED)  # Math, headers alone
+find_package(Boost REQUIRED)  # Boost.Math, header only
 find_path(XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
 
-# Embree 3.13 is what Debian 12 has; the code also compiles against 4.
+# Debian 12 has Embree 3.13; the code also compiles with Embree 4.
 find_package(embree 4 QUIET)
 if(NOT embree_FOUND)
     find_package(embree 3.13 REQUIRED)

@@ -1,5 +1,5 @@
-# etendue_embed_text(TARGET HEADER NAME FILE [NAME FILE]...): defines std::string_view NAME of namespace etendue, which
-# HEADER declares, as the contents of FILE, for each pair; made anew when a file changes.
+# etendue_embed_text(TARGET HEADER NAME FILE [NAME FILE]...): for each pair defines std::string_view NAME in namespace
+# etendue, declared in HEADER, with the contents of FILE. Changed files are embedded again.
 function(etendue_embed_text target header)
     set(output ${CMAKE_CURRENT_BINARY_DIR}/${target}_text.cpp)
     set(text "#include \"${header}\"\n\nnamespace etendue {\n\n")

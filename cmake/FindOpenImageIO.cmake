@@ -1,5 +1,5 @@
-# Debian's own OpenImageIOConfig.cmake insists on files of openimageio-tools and of Python packages that the library
-# does not need; this module looks for the headers and the libraries alone.
+# Debian's OpenImageIOConfig.cmake requires files of openimageio-tools and of Python packages that the library does not
+# need; this module looks for headers and libraries only.
 find_path(OpenImageIO_INCLUDE_DIR OpenImageIO/imageio.h)
 find_library(OpenImageIO_LIBRARY OpenImageIO)
 find_library(OpenImageIO_UTIL_LIBRARY OpenImageIO_Util)

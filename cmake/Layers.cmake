@@ -1,6 +1,6 @@
-# One static library per folder of src/. A layer sees its own headers and those of the layers it names, nothing
-# else: each folder is reached through a directory that holds a link to that folder alone, so that
-# #include "scene/scene.h" does not compile in a layer below the scene.
+# One static library per folder of src/. A layer sees only its own headers and those of its dependencies: the include
+# directory of a folder contains nothing but a link to it, so that #include "scene/scene.h" does not compile in a layer
+# below the scene.
 
 set(ETENDUE_LAYER_INCLUDES ${CMAKE_BINARY_DIR}/layers)
 
@@ -11,10 +11,10 @@ target_compile_options(etendue_options INTERFACE
     $<IF:$<CXX_COMPILER_ID:GNU>,-Wshadow=local,-Wshadow> -Werror
     -fno-math-errno -fno-trapping-math)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # GCC 12 fires these in inlined code of optionals, variants and strings where nothing is wrong (GCC bug 105329).
+    # False positives of GCC 12 in inlined code of optionals, variants and strings (GCC bug 105329).
     target_compile_options(etendue_options INTERFACE -Wno-maybe-uninitialized -Wno-restrict)
     if(ETENDUE_PCH)
-        # With precompiled headers it does not see that the code is the standard library's (GCC bug 105651).
+        # With precompiled headers GCC does not recognise system headers (GCC bug 105651).
         target_compile_options(etendue_options INTERFACE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
     endif()
 endif()
@@ -26,14 +26,14 @@ if(ETENDUE_SANITIZE)
         -fsanitize=${ETENDUE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
     target_link_options(etendue_options INTERFACE -fsanitize=${ETENDUE_SANITIZE})
     if(ETENDUE_SANITIZE STREQUAL "thread")
-        # GCC warns of fences, which are in TBB's headers.
+        # GCC warns about fences in TBB's headers.
         target_include_directories(etendue_options BEFORE INTERFACE ${PROJECT_SOURCE_DIR}/tests/support/tsan)
         target_compile_options(etendue_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>)
     endif()
 endif()
 
-# Standard headers that most sources include, parsed once for all layers. A source must include what it uses all the same:
-# the preset `clang` goes without.
+# Standard headers that most sources include, precompiled once for all layers. Sources must still include what they use,
+# since the preset `clang` has no precompiled headers.
 set(ETENDUE_COMMON_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <map> <memory> <optional> <span> <string>
     <string_view> <utility> <variant> <vector>)
 function(etendue_precompiled_headers target)

@@ -43,7 +43,7 @@ private:
                                       const std::vector<MethodSpec>& specs) const;
 };
 
-/// A line that is rewritten, ten times a second at most; nothing where no terminal shows it.
+/// A status line on stderr, rewritten at most ten times a second; silent where stderr is no terminal.
 class StatusLine {
 public:
     explicit StatusLine(bool quiet) : active_(!quiet && isatty(STDERR_FILENO)) {}
@@ -64,7 +64,7 @@ private:
     Clock::time_point last_;
 };
 
-/// The longest path as an integrator takes it, as text; its table's default where the spec does not say.
+/// The integrator's max_depth as text: given in `spec`, or the default of its table.
 std::string max_depth(const IntegratorSpec& spec) {
     if (const auto found = spec.params.find("max_depth"); found != spec.params.end())
         return found->second;
@@ -80,17 +80,17 @@ void CompareCommand::check() const {
         throw std::runtime_error(
             "--time and --spp exclude each other: equal time or equal samples");
     if (!(seconds > 0) && spp == 0)
-        throw std::runtime_error("--time or --spp is missing: how long each method renders");
+        throw std::runtime_error("give --time or --spp: how long each method renders");
     if (!references.empty() && references.size() != scenes.size())
         throw std::runtime_error(
-            fmt::format("--reference needs one image a scene: {} for {} scenes", references.size(),
-                        scenes.size()));
+            fmt::format("--reference needs one image per scene, but has {} for {} scenes",
+                        references.size(), scenes.size()));
     if (!references.empty() &&
         (reference_seconds > 0 || reference_spp > 0 || !reference_method.empty()))
         throw std::runtime_error("--reference excludes --reference-time, --reference-spp and "
-                                 "--reference-method, which make one");
+                                 "--reference-method, which render one");
     if (std::filesystem::exists(report) && !std::filesystem::is_directory(report))
-        throw std::runtime_error(fmt::format("--report: \"{}\" is not a folder", report));
+        throw std::runtime_error(fmt::format("--report: {} is not a folder", report));
 }
 
 PathSelection CompareCommand::shown() const {
@@ -113,7 +113,7 @@ CompareSettings CompareCommand::settings(const Scene& scene) const {
     return s;
 }
 
-/// bdpt unless the command line names another, with paths as long as those of the methods where these agree.
+/// The method of --reference-method, or bdpt with the methods' max_depth where they agree on it.
 IntegratorSpec CompareCommand::reference_integrator(const Scene& scene,
                                                     const std::vector<MethodSpec>& specs) const {
     if (!reference_method.empty()) return choose_integrator(scene, reference_method);
@@ -125,7 +125,7 @@ IntegratorSpec CompareCommand::reference_integrator(const Scene& scene,
     return spec;
 }
 
-/// Ten times the time of a method, or 16 times its samples, unless the command line tells.
+/// By default the reference takes ten times the time of a method, or 16 times its samples.
 RenderSettings CompareCommand::reference_settings(const Scene& scene,
                                                   const std::vector<MethodSpec>& specs) const {
     RenderSettings s;
@@ -176,11 +176,10 @@ void CompareCommand::run() const {
             if (s.shown.inner_only) check_inner_paths(scene, s.methods, how.integrator);
             for (const MethodSpec& m : s.methods)
                 if (max_depth(m.integrator) != max_depth(how.integrator))
-                    fmt::print(
-                        stderr,
-                        "warning: {} ends paths at max_depth {}, the reference at {}: errors "
-                        "contain the difference\n",
-                        m.name, max_depth(m.integrator), max_depth(how.integrator));
+                    fmt::print(stderr,
+                               "warning: {} has max_depth {}, the reference {}: errors include the "
+                               "difference\n",
+                               m.name, max_depth(m.integrator), max_depth(how.integrator));
             reference = make_reference(
                 scene,
                 {how, kept_references, scene_fingerprint(description), program_fingerprint()},
@@ -198,7 +197,7 @@ void CompareCommand::run() const {
         if (!quiet) print_summary(comparisons.back());
     }
     if (comparisons.empty())
-        throw std::runtime_error("interrupted before anything could be compared");
+        throw std::runtime_error("interrupted before the first comparison: nothing was written");
     write_report(comparisons, {report, ETENDUE_VERSION});
     if (!quiet)
         fmt::print(stderr, "{}\n", (std::filesystem::path(report) / "report.html").string());
@@ -208,28 +207,30 @@ void CompareCommand::run() const {
 
 void add_compare_command(CLI::App& app) {
     auto command = std::make_shared<CompareCommand>();
-    CLI::App& c = *app.add_subcommand("compare", "Compare methods at equal time, as a report");
+    CLI::App& c = *app.add_subcommand(
+        "compare", "Compare methods at equal time or equal samples, and write a report");
     c.add_option("SCENE", command->scenes, "Scene files (.xml)")->required();
     command->reading.add_reading_options(c);
     c.add_option("-m,--methods", command->methods,
-                 "Integrators with parameters: path 'bdpt:max_depth=8'; the first is the yardstick")
+                 "Integrators with parameters: path 'bdpt:max_depth=8'; efficiencies are relative "
+                 "to the first")
         ->required();
     c.add_option("--time", command->seconds, "Seconds that each method renders")
         ->check(must_be_above_0);
     c.add_option("--spp", command->spp, "Samples per pixel of each method, instead of --time")
         ->check(must_be_above_0);
-    c.add_option("--runs", command->runs, "Independent runs, with seeds that count on")
+    c.add_option("--runs", command->runs, "Independent runs, with consecutive seeds")
         ->capture_default_str()
         ->check(CLI::Range(1, 10000));
     c.add_option("--paths", command->paths,
-                 "all, or inner: the image shows only paths that join both sub-paths inside the "
-                 "scene, s >= 1 and t >= 2")
+                 "Paths shown in the images: all, or inner, those that join two sub-paths inside "
+                 "the scene (s >= 1 and t >= 2)")
         ->capture_default_str()
         ->check(CLI::IsMember({"all", "inner"}));
     c.add_option("--lengths", command->lengths,
-                 "Path lengths, in edges, that the image shows: 3..5, 4..4, or 4.. without an end")
+                 "Path lengths shown in the images, in edges: 3..5, 4..4, or 4.. without a limit")
         ->capture_default_str();
-    c.add_option("--reference", command->references, "Images to judge by, one a scene");
+    c.add_option("--reference", command->references, "Reference images, one per scene");
     c.add_option("--reference-time", command->reference_seconds,
                  "Seconds to render the reference (default: 10 times --time)")
         ->check(must_be_above_0);
@@ -242,12 +243,12 @@ void add_compare_command(CLI::App& app) {
         ->capture_default_str();
     c.add_option("--report", command->report, "Folder for the report")->capture_default_str();
     c.add_option("--techniques-max-depth", command->technique_depth,
-                 "Longest path with technique images, edges; 0: none")
+                 "Longest path with technique images, in edges; 0: none")
         ->capture_default_str()
         ->check(CLI::Range(0, 16));
     c.add_option("--seed", command->seed, "Seed of the first run")->capture_default_str();
     c.add_option("--sampler", command->sampler, "independent or sobol")->capture_default_str();
-    c.add_option("--threads", command->threads, "Number of threads; 0: all")
+    c.add_option("--threads", command->threads, "Number of threads; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");

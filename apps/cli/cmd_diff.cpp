@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -45,11 +44,11 @@ RgbImage DiffCommand::read_like(const std::string& path, const RgbImage& first) 
 
 bool DiffCommand::is_hdr() const {
     if (flip != "auto") return flip == "hdr";
-    return std::ranges::all_of(
-        std::initializer_list<std::string>{image, reference}, [](const std::string& path) {
-            const std::string e = std::filesystem::path(path).extension().string();
-            return e == ".exr" || e == ".pfm" || e == ".hdr";
-        });
+    return std::ranges::all_of(std::initializer_list<std::string>{image, reference},
+                               [](const std::string& path) {
+                                   const std::string e = image_extension(path);
+                                   return e == ".exr" || e == ".pfm" || e == ".hdr";
+                               });
 }
 
 void DiffCommand::print(const ImageErrors& e, const std::optional<FlipResult>& flip_result) const {
@@ -66,11 +65,11 @@ void DiffCommand::print(const ImageErrors& e, const std::optional<FlipResult>& f
     if (flip_result) line(is_hdr() ? "FLIP (HDR)" : "FLIP (LDR)", flip_result->mean);
     line("mean ratio", e.mean_ratio);
     if (e.ignored > 0)
-        fmt::print("{} of {} pixels are above {} and count for means only\n", e.ignored, e.pixels,
-                   ignore_above);
+        fmt::print("{} of {} pixels are brighter than {} in the reference: they count only for "
+                   "the mean ratio\n",
+                   e.ignored, e.pixels, ignore_above);
     if (e.not_finite > 0)
-        fmt::print("{} of {} pixels are infinite or not a number: left out\n", e.not_finite,
-                   e.pixels);
+        fmt::print("{} of {} pixels are infinite or NaN: left out\n", e.not_finite, e.pixels);
 }
 
 void DiffCommand::print_json(const ImageErrors& e,
@@ -81,11 +80,11 @@ void DiffCommand::print_json(const ImageErrors& e,
     fmt::print("{}\n", j.dump(2));
 }
 
-// PNG shows the errors in false colours; the other formats hold their values.
+// A .png file shows the errors in false colours; the other formats store their values.
 void DiffCommand::write_map(const std::vector<float>& errors, int width, int height) const {
     Image out(width, height, {"Y"});
     out.data = errors;
-    if (std::filesystem::path(map).extension() == ".png") {
+    if (image_extension(map) == ".png") {
         std::vector<Rgb> colours;
         for (float v : errors) colours.push_back(magma(v));
         out = rgb_image(width, height, colours);
@@ -104,7 +103,8 @@ void DiffCommand::run() const {
         flip_result = is_hdr() ? hdr_flip(x.pixels, r.pixels, x.width, x.height)
                                : ldr_flip(x.pixels, r.pixels, x.width, x.height);
     if (flip_map && !flip_result)
-        throw std::runtime_error("--map needs FLIP or --map-metric relse");
+        throw std::runtime_error(
+            "--map with --map-metric flip cannot be combined with --flip none");
     json ? print_json(errors, flip_result) : print(errors, flip_result);
     if (!map.empty())
         write_map(flip_map ? flip_result->map
@@ -117,24 +117,22 @@ void DiffCommand::run() const {
 void add_diff_command(CLI::App& app) {
     auto command = std::make_shared<DiffCommand>();
     CLI::App& c = *app.add_subcommand("diff", "Compare an image with a reference");
-    c.add_option("IMAGE", command->image, "Image to judge")->required();
-    c.add_option("REFERENCE", command->reference, "Image of the same size to judge it by")
-        ->required();
-    c.add_option(
-        "--reference2", command->reference2,
-        "A second, independent reference: takes the references' noise out of squared errors");
+    c.add_option("IMAGE", command->image, "Image to evaluate")->required();
+    c.add_option("REFERENCE", command->reference, "Reference image of the same size")->required();
+    c.add_option("--reference2", command->reference2,
+                 "Second, independent reference: removes the noise of both from squared errors");
     c.add_option("--layer", command->layer,
-                 "Compare this layer, e.g. albedo, instead of the picture");
+                 "Compare this layer, e.g. albedo, instead of the image");
     c.add_option("--ignore-above", command->ignore_above,
-                 "Leave out pixels whose reference is brighter, such as lamps");
+                 "Leave out pixels whose reference is brighter than this, such as lamps");
     c.add_option("--flip", command->flip,
-                 "Which FLIP: hdr, ldr, none; auto: hdr for .exr, .pfm and .hdr")
+                 "Variant of FLIP: hdr, ldr or none; auto: hdr for .exr, .pfm and .hdr")
         ->capture_default_str()
         ->check(CLI::IsMember({"auto", "hdr", "ldr", "none"}));
     c.add_option("--map", command->map,
                  "Write an error map: false colours to .png, values to .exr or .pfm");
     c.add_option("--map-metric", command->map_metric,
-                 "Error of the map: flip, or relse for the summands of relMSE")
+                 "Error shown by --map: flip, or relse for each pixel's term of relMSE")
         ->capture_default_str()
         ->check(CLI::IsMember({"flip", "relse"}));
     c.add_flag("--json", command->json, "Print JSON");

@@ -72,9 +72,9 @@ void add_info_command(CLI::App& app) {
         bool json = false;
     };
     auto options = std::make_shared<Options>();
-    CLI::App& c = *app.add_subcommand("info", "Tell what is in a scene");
+    CLI::App& c = *app.add_subcommand("info", "Summarise a scene");
     options->scene.add_to(c);
-    c.add_flag("--json", options->json, "As JSON");
+    c.add_flag("--json", options->json, "Print JSON");
     c.callback([options] { info(options->scene, options->json); });
 }
 

@@ -18,7 +18,7 @@
 namespace etendue {
 namespace {
 
-/// What is listed as one: plug-ins that differ in nothing but their names.
+/// One entry of the list: plug-ins that differ only in their names.
 struct Entry {
     std::string category;
     std::vector<std::string> names;
@@ -50,7 +50,7 @@ void add(std::vector<Entry>& entries, const PluginInfo& p, const std::string& do
     entries.push_back({p.category, {p.name}, doc, p.params});
 }
 
-/// Everything, by category.
+/// All plug-ins, grouped by category.
 std::vector<Entry> all_entries() {
     std::vector<Entry> entries;
     for (const IntegratorEntry& e : integrator_registry()) add(entries, e.info, e.info.doc);
@@ -64,7 +64,8 @@ std::vector<Entry> all_entries() {
     return entries;
 }
 
-/// Keeps what the command line asks for; an error that names what there is where that is nothing.
+/// Keeps the entries of `category` and `name`, each of which may be empty for all. Throws std::runtime_error with the
+/// known names where there is no such entry.
 std::vector<Entry> choose(std::vector<Entry> entries, const std::string& category,
                           const std::string& name) {
     std::vector<std::string> categories, names;
@@ -73,11 +74,11 @@ std::vector<Entry> choose(std::vector<Entry> entries, const std::string& categor
         if (e.category == category) names.insert(names.end(), e.names.begin(), e.names.end());
     }
     if (!category.empty() && names.empty())
-        throw std::runtime_error(fmt::format("there is no category \"{}\" (there are: {})",
-                                             category, fmt::join(categories, ", ")));
+        throw std::runtime_error(fmt::format("unknown category \"{}\" (known: {})", category,
+                                             fmt::join(categories, ", ")));
     if (!name.empty() && std::ranges::find(names, name) == names.end())
-        throw std::runtime_error(fmt::format("there is no {} \"{}\" (there are: {})", category,
-                                             name, fmt::join(names, ", ")));
+        throw std::runtime_error(
+            fmt::format("unknown {} \"{}\" (known: {})", category, name, fmt::join(names, ", ")));
     std::erase_if(entries, [&](const Entry& e) {
         return (!category.empty() && e.category != category) ||
                (!name.empty() && std::ranges::find(e.names, name) == e.names.end());
@@ -110,7 +111,7 @@ void print_parameter_table(const std::vector<ParamInfo>& params) {
                    cell(q.doc));
 }
 
-/// `headings`: off where one plug-in was asked for, to stand in a page of its own.
+/// `headings` is false where the command line names one plug-in, whose page has its own heading.
 void print_markdown(const std::vector<Entry>& entries, bool headings) {
     std::string category;
     bool is_first = true;
@@ -158,12 +159,11 @@ void ListCommand::run() const {
 void add_list_command(CLI::App& app) {
     auto command = std::make_shared<ListCommand>();
     CLI::App& c = *app.add_subcommand(
-        "list",
-        "List integrators and everything scene files may name, with parameters and defaults");
-    c.add_option("CATEGORY", command->category, "Only this category, e.g. bsdf");
-    c.add_option("NAME", command->name, "Only this one of the category, e.g. diffuse");
-    CLI::Option* markdown = c.add_flag("--markdown", command->markdown, "As Markdown");
-    c.add_flag("--json", command->json, "As JSON")->excludes(markdown);
+        "list", "List integrators and all plug-ins of scene files, with parameters and defaults");
+    c.add_option("CATEGORY", command->category, "List only this category, e.g. bsdf");
+    c.add_option("NAME", command->name, "List only this plug-in of the category, e.g. diffuse");
+    CLI::Option* markdown = c.add_flag("--markdown", command->markdown, "Print Markdown");
+    c.add_flag("--json", command->json, "Print JSON")->excludes(markdown);
     c.callback([command] { command->run(); });
 }
 

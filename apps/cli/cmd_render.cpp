@@ -39,9 +39,9 @@ struct RenderCommand {
 
 private:
     RenderSettings settings_for(const Scene& scene) const;
-    /// Before the scene is read.
+    /// Checks that need no scene.
     void check_options() const;
-    /// Before anything is rendered; makes missing folders.
+    /// Checks before rendering that all outputs can be written; creates missing folders.
     void check_outputs() const;
     void write_outputs(const Renderer& renderer, const Scene& scene,
                        const nlohmann::json& report) const;
@@ -54,7 +54,7 @@ std::string format_seconds(double s) {
                     : fmt::format("{}:{:02}:{:02}", t / 3600, t / 60 % 60, t % 60);
 }
 
-/// One line that is rewritten on a terminal; in a log a line now and then.
+/// Progress on stderr: on a terminal one line that is rewritten, otherwise new lines at growing intervals.
 class ProgressLine {
 public:
     explicit ProgressLine(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO)) {}
@@ -85,7 +85,7 @@ private:
     double last_ = 0;
 };
 
-/// How the passes went, one by one.
+/// Seconds and pairs of vertices of each pass.
 struct PassLog {
     std::vector<double> seconds;
     std::vector<uint64_t> pairs;
@@ -102,7 +102,7 @@ private:
     uint64_t pairs_before_ = 0;
 };
 
-/// What the image lacks, or may.
+/// Known or possible errors of the image.
 std::vector<std::string> warnings(const Renderer& r) {
     std::vector<std::string> all;
     const RenderStats& s = r.stats();
@@ -110,13 +110,13 @@ std::vector<std::string> warnings(const Renderer& r) {
         all.push_back(fmt::format("{} contributions were not finite and were left out", n));
     if (s.runaways > 0)
         all.push_back(
-            fmt::format("{} pairs of vertices were given up after too many trials: their light is "
+            fmt::format("{} pairs of vertices were abandoned after too many trials: their light is "
                         "missing, and the image is darker than it should be",
                         s.runaways));
     if (s.bounds_exceeded > 0)
         all.push_back(fmt::format(
-            "{} trials met a density above the bound that was assumed: the image may be biased "
-            "there; please report the scene",
+            "{} trials met a density above its assumed bound: the image may be biased there; "
+            "please report the scene",
             s.bounds_exceeded));
     return all;
 }
@@ -177,8 +177,8 @@ void check_aovs(const std::vector<std::string>& names) {
     for (const AovInfo& a : aov_registry()) known.push_back(a.name);
     for (const std::string& n : names)
         if (std::find(known.begin(), known.end(), n) == known.end())
-            throw std::runtime_error(fmt::format("--aov: there is no \"{}\" (there are: {})", n,
-                                                 fmt::join(known, ", ")));
+            throw std::runtime_error(
+                fmt::format("--aov: unknown layer \"{}\" (known: {})", n, fmt::join(known, ", ")));
 }
 
 void write_techniques(const Renderer& r, const Scene& scene, const std::string& folder) {
@@ -193,7 +193,7 @@ void write_techniques(const Renderer& r, const Scene& scene, const std::string& 
     }
 }
 
-/// Throws where the file could not be written.
+/// Throws std::runtime_error where the file could not be written.
 void check_writable(const std::string& path) {
     const PendingFile file(path);
     errno = 0;
@@ -288,7 +288,7 @@ void RenderCommand::run() const {
             },
             interrupts.stop, interrupts.drop));
     } catch (const std::exception& e) {
-        // The passes before this one are whole.
+        // The passes before this one are complete and can be written.
         if (renderer.film().passes() == 0) throw;
         stopped_by = "failure";
         failure = dynamic_cast<const std::bad_alloc*>(&e) ? "not enough memory" : e.what();
@@ -303,8 +303,8 @@ void RenderCommand::run() const {
     for (const std::string& w : warnings(renderer)) fmt::print(stderr, "warning: {}\n", w);
     if (!failure.empty())
         throw std::runtime_error(
-            fmt::format("pass {} failed: {}; {} is the image of the {} before it", passes + 1,
-                        failure, output, passes == 1 ? "one" : fmt::format("{} passes", passes)));
+            fmt::format("pass {} failed: {}; {} contains the {} before it", passes + 1, failure,
+                        output, passes == 1 ? "pass" : fmt::format("{} passes", passes)));
     if (quiet) return;
     const ErrorEstimate e = renderer.film().error();
     fmt::print(stderr, "{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output, passes,
@@ -328,31 +328,31 @@ void add_render_command(CLI::App& app) {
         "-i,--integrator", command->integrator,
         "Integrator with parameters: bdpt or bdpt:max_depth=12,rr_depth=5 (default: the scene's)");
     c.add_option("--spp", command->spp, "Samples per pixel")->check(must_be_above_0);
-    c.add_option("--time", command->seconds, "Seconds to render, within one pass")
+    c.add_option("--time", command->seconds, "Seconds to render, to the nearest pass")
         ->check(must_be_above_0);
-    c.add_option("--error", command->error, "Stop at this relative RMS error of the image")
+    c.add_option("--error", command->error,
+                 "Stop at this estimated relative RMS error of the image, e.g. 0.01")
         ->check(must_be_above_0);
     c.add_option("--grace", command->grace,
-                 "Seconds that the pass in flight may go on after Ctrl-C or SIGTERM; then it is "
-                 "dropped")
+                 "Seconds given to the current pass after Ctrl-C or SIGTERM before it is dropped")
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
-    add_sampler_option(c, command->sampler, "; with sobol the error estimate is an upper one");
-    c.add_option("--threads", command->threads, "Number of threads; 0: all")
+    add_sampler_option(c, command->sampler, "; with sobol the error estimate is an upper bound");
+    c.add_option("--threads", command->threads, "Number of threads; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
     c.add_option("--aov", command->aovs,
                  "Layers to add: albedo, normal, depth, position, uv, variance")
         ->delimiter(',');
     c.add_option("--techniques", command->techniques,
-                 "Folder for an image per technique (s,t), weighted and unweighted");
+                 "Folder for the images of each technique (s,t), weighted and unweighted");
     c.add_option("--techniques-max-depth", command->technique_depth,
-                 "Longest path with technique images, edges")
+                 "Longest path with technique images, in edges")
         ->capture_default_str()
         ->check(CLI::Range(1, 64));
     c.add_option("--preview", command->preview,
-                 "Show the image while it renders: tev or tev://host:port");
+                 "Show the image during rendering: tev, or tev://host:port");
     c.add_option("--stats", command->stats, "Write statistics to this JSON file");
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
     c.callback([command] { command->run(); });

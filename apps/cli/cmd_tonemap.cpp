@@ -28,20 +28,19 @@ struct TonemapCommand {
 
 void add_tonemap_command(CLI::App& app) {
     auto command = std::make_shared<TonemapCommand>();
-    CLI::App& c =
-        *app.add_subcommand("tonemap", "Turn a picture of radiance into one for displays");
+    CLI::App& c = *app.add_subcommand("tonemap", "Convert an image of radiance for displays");
     c.add_option("INPUT", command->input, "Image to read")->required();
     c.add_option("OUTPUT", command->output, "Image to write, usually .png")->required();
-    c.add_option("--operator", command->op, "aces, reinhard, or srgb for clamping alone")
+    c.add_option("--operator", command->op, "aces, reinhard, or srgb, which only clamps")
         ->capture_default_str()
         ->check(CLI::IsMember({"aces", "reinhard", "srgb"}));
     c.add_option("--exposure", command->mapping.exposure, "Exposure in stops")
         ->capture_default_str();
     c.add_option("--white", command->mapping.white,
-                 "Luminance that becomes white under reinhard; 0: the image's largest")
+                 "Luminance mapped to white by reinhard; 0: the largest in the image")
         ->capture_default_str()
         ->check(must_be_at_least_0);
-    c.add_option("--layer", command->layer, "Take this layer, e.g. albedo, instead of the picture");
+    c.add_option("--layer", command->layer, "Read this layer, e.g. albedo, instead of the image");
     c.callback([command] { command->run(); });
 }
 

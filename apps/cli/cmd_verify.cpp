@@ -35,7 +35,7 @@ struct VerifyCommand {
     void run();
 };
 
-/// 0.5% or 0.005.
+/// A share such as "0.5%" or "0.005", in [1e-4, 1).
 double parse_share(const std::string& text, const char* option) {
     double value = 0;
     const char* begin = text.data();
@@ -49,8 +49,8 @@ double parse_share(const std::string& text, const char* option) {
     return value;
 }
 
-/// How much larger than its squares over their count the sum of a filter's values is: a splat spreads its error over so
-/// many pixels at most.
+/// Largest (Σ|h|)² / Σ h² over sub-pixel offsets, h being the filter's values at the pixels around a splat: the number
+/// of pixels over which a splat spreads its error, at most.
 double filter_correlation(const ReconstructionFilter& filter) {
     const auto of = [&](float x, float y) {
         double sum = 0, squares = 0;
@@ -68,16 +68,17 @@ double filter_correlation(const ReconstructionFilter& filter) {
     return largest;
 }
 
-/// How much the variance of the image's mean exceeds that of independent pixels. Splats, which the filter spreads, and
-/// light paths, which many pixels share, correlate pixels. The spread of the passes' means includes all of it
-/// ("etendue.mean_luminance_standard_error"). Where an image does not have that, the filter alone is allowed for.
+/// Ratio of the variance of the image's mean to that of independent pixels. Pixels are correlated by splats, which the
+/// filter spreads, and by light paths, which many pixels share. The spread of the passes' means includes both
+/// (attribute "etendue.mean_luminance_standard_error"). Without that attribute only the filter is accounted for.
 double pixel_correlation(const Image& image, const std::vector<Rgb>& variance, const Scene& scene) {
     double correlation = filter_correlation(scene.filter());
     const auto error = image.attributes.find("etendue.mean_luminance_standard_error");
     const auto* standard_error =
         error == image.attributes.end() ? nullptr : std::get_if<double>(&error->second);
     if (!standard_error) return correlation;
-    // The luminance has at least the error that independent channels give it, so the factor is never too small.
+    // Channels are positively correlated, so this underestimates the error of luminance, and the factor is never too
+    // small.
     const float r = luminance({1, 0, 0}), g = luminance({0, 1, 0}), b = luminance({0, 0, 1});
     double independent = 0;
     for (const Rgb& v : variance) independent += double(luminance({v.r * r, v.g * g, v.b * b}));
@@ -90,7 +91,7 @@ ReferenceImage read_reference(const std::string& path, const Scene& scene) {
     const auto layers = image.layers();
     if (std::find(layers.begin(), layers.end(), "variance") == layers.end())
         throw std::runtime_error(fmt::format(
-            "{}: expected a layer \"variance\" beside the picture, as render --aov variance writes",
+            "{}: expected a layer \"variance\" beside the image, as render --aov variance writes",
             path));
     const auto spp = image.attributes.find("etendue.spp");
     const auto* samples =
@@ -100,7 +101,7 @@ ReferenceImage read_reference(const std::string& path, const Scene& scene) {
             "{}: expected the attribute \"etendue.spp\", samples per pixel, at least 2", path));
     const FilmGeometry& film = scene.film();
     if (image.width != film.crop_width || image.height != film.crop_height)
-        throw std::runtime_error(fmt::format("{} has {} x {} pixels, but the scene has {} x {}",
+        throw std::runtime_error(fmt::format("{}: has {} x {} pixels, but the scene has {} x {}",
                                              path, image.width, image.height, film.crop_width,
                                              film.crop_height));
     ReferenceImage reference{path, rgb_pixels(image), rgb_pixels(image, "variance"),
@@ -118,7 +119,7 @@ std::string percent(double v) {
 
 std::string describe(const VerifyReport& report, const WelchTest& t) {
     if (!t.is_tested())
-        return t.method.mean() == 0 && t.reference.mean() == 0 ? "nothing there"
+        return t.method.mean() == 0 && t.reference.mean() == 0 ? "no light"
                                                                : "too few samples to test";
     return fmt::format("ratio {:.5f} ± {:.5f}, p = {:.2g}{}", t.ratio(), t.ratio_error(), t.p,
                        report.deviates(t) ? "  DEVIATES" : "");
@@ -143,7 +144,7 @@ void print_image(const VerifyReport& report, const MethodReport& m) {
                    describe(report, m.tiles[worst]));
     fmt::print("\n");
     if (m.out_of_reach + m.too_rare > 0)
-        fmt::print("  image and tiles hold the compared paths, {} of the light\n",
+        fmt::print("  image and tiles contain only the compared paths, {} of the light\n",
                    percent(1 - m.out_of_reach - m.too_rare));
 }
 
@@ -172,7 +173,7 @@ void print_classes(const VerifyReport& report, const MethodReport& m) {
 
     constexpr size_t kMostShown = 6;
     if (m.untested.empty()) return;
-    fmt::print("  not compared       share  could hide an error of the image up to its share\n");
+    fmt::print("  not compared       share  reason; could hide an error of up to that share\n");
     double rest = 0;
     for (size_t i = 0; i < m.untested.size(); ++i) {
         const UntestedClass& c = m.untested[i];
@@ -190,7 +191,8 @@ void print_classes(const VerifyReport& report, const MethodReport& m) {
         fmt::print("  {} more         {:>8}\n", m.untested.size() - kMostShown, percent(rest));
 }
 
-/// One row a length, one column a number of light vertices s; pairs apart.
+/// A table with one row per path length and one column per number s of light vertices; `pairs` selects merges and
+/// gathers, or all other techniques.
 void print_techniques(const VerifyReport& report, const MethodReport& m, bool pairs) {
     std::map<int, std::vector<const TechniqueReport*>> rows;
     for (const TechniqueReport& t : m.techniques)
@@ -222,7 +224,7 @@ void print_techniques(const VerifyReport& report, const MethodReport& m, bool pa
                        describe(report, t.comparison));
 }
 
-/// Which error would have been found.
+/// The smallest error that the tests would have found, in words.
 std::string power(const Detectable& d) {
     if (!d.image) return "no error of the image could have been found";
     std::string text = fmt::format("an error of {} of the image", percent(*d.image));
@@ -251,13 +253,13 @@ void print_verdict(const VerifyReport& report, const MethodReport& m,
     const Detectable detectable = report.detectable(m);
     fmt::print("; {}", power(detectable));
     if (options.detect && !detectable.reaches(*options.detect))
-        fmt::print("; the time was up before {}", percent(*options.detect));
+        fmt::print("; the time ran out before {} was reached", percent(*options.detect));
     if (m.out_of_reach > 0)
-        fmt::print("; {} of the light is out of its reach, or the references'",
+        fmt::print("; {} of the light is out of reach of the method or of all references",
                    percent(m.out_of_reach));
     if (m.too_rare > 0)
-        fmt::print("; {} comes by paths too rare for a test, where an error of up to that size "
-                   "could hide",
+        fmt::print("; {} of the light comes along paths too rare for a test, which could hide an "
+                   "error of up to that size",
                    percent(m.too_rare));
     if (m.rejected > 0) fmt::print("; {} contributions were not finite", m.rejected);
     fmt::print("\n\n");
@@ -268,7 +270,7 @@ void print_report(const VerifyReport& report, const Scene& scene, const std::str
     fmt::print("{}, {} x {} pixels, {} runs, sampler {}, against {}\n", scene.file(),
                scene.film().crop_width, scene.film().crop_height, options.runs, sampler,
                report.reference);
-    fmt::print("{} comparisons, together a false alarm with probability {}: each is tested at "
+    fmt::print("{} comparisons with a joint probability of a false alarm of {}: each is tested at "
                "{:.3g}\n",
                report.tests, options.alpha, report.level);
     fmt::print("\n");
@@ -424,36 +426,37 @@ void add_verify_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(8, 4096));
     c.add_option("--alpha", command->options.alpha,
-                 "Probability of a false alarm, of all comparisons together")
+                 "Probability of a false alarm in all comparisons together")
         ->capture_default_str()
         ->check(CLI::Range(1e-9, 0.5));
     c.add_option("--spp", command->spp,
-                 "Samples per pixel of each run; with --detect of each rendering")
+                 "Samples per pixel of each run; with --detect, of each rendering")
         ->check(must_be_above_0);
     c.add_option("--time", command->seconds,
-                 "Seconds for all runs of one method, 30 unless --spp is given; with --detect for "
-                 "everything, no limit unless given")
+                 "Seconds for all runs of one method (default: 30, unless --spp is given); with "
+                 "--detect, for the whole command (default: no limit)")
         ->check(must_be_above_0);
     auto* detect = c.add_option(
         "--detect", command->detect,
-        "Render until a relative error of this size (0.5% or 0.005), of the image or of a path "
-        "length with 2 % of the light, would be found with 90 % probability");
+        "Render until a relative error of this size (0.5% or 0.005) in the image, or in a path "
+        "length with at least 2 % of the light, would be found with 90 % probability");
     add_sampler_option(c, command->sampler, ", as for render");
     auto* against = c.add_option("--against", command->against,
-                                 "Methods to compare with: the first one; others on classes of "
-                                 "paths that they know much better")
+                                 "Methods to compare with: the first one, and the others on "
+                                 "classes of paths that they sample much better")
                         ->capture_default_str();
     c.add_option("--reference", command->reference,
-                 "Image to compare with, an .exr with a layer \"variance\", instead of a method")
+                 "Reference image, an .exr with a layer \"variance\", instead of --against")
         ->excludes(against)
         ->excludes(detect);
     c.add_option("--tiles", command->options.tiles, "Tiles across and down the image")
         ->capture_default_str()
         ->check(CLI::Range(1, 64));
-    c.add_option("--json", command->json, "Write every figure to this JSON file");
+    c.add_option("--json", command->json, "Write all results to this JSON file");
     c.add_option("--seed", command->options.seed, "Seed of all random numbers")
         ->capture_default_str();
-    c.add_option("--threads", command->options.threads, "Runs at a time; 0: one a core")
+    c.add_option("--threads", command->options.threads,
+                 "Number of runs rendered at the same time; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");

@@ -1,6 +1,6 @@
 #pragma once
-// The subcommands of the program. Each adds its options and a callback; what goes wrong is thrown as an exception,
-// printed by main() as one message.
+// The subcommands of the program. Each function adds its options and a callback to `app`. Callbacks report errors as
+// exceptions, which main() prints as one message.
 
 namespace CLI {
 class App;

@@ -8,7 +8,7 @@
 namespace etendue {
 namespace {
 
-// Signal handlers have no other way to what they change.
+// Globals, since a signal handler has no argument through which to reach them.
 std::atomic<bool> stop{false}, drop{false}, is_graceful{false};
 std::atomic<unsigned> grace_seconds{0};
 

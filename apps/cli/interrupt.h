@@ -4,15 +4,18 @@
 
 namespace etendue {
 
-/// From now on Ctrl-C or SIGTERM set the flag that this returns; the second one ends the program.
+/// Handles SIGINT (Ctrl-C) and SIGTERM from now on: the first signal sets the returned flag, the second ends the
+/// program.
 const std::atomic<bool>& catch_interrupts();
 
-/// Flags that Ctrl-C and SIGTERM set.
+/// Flags set by SIGINT (Ctrl-C) and SIGTERM.
 struct Interrupts {
-    const std::atomic<bool>& stop;  ///< By the first one: end after the work in flight.
-    const std::atomic<bool>& drop;  ///< By the second, or when the grace is over: leave that work.
+    const std::atomic<bool>&
+        stop;  ///< Set by the first signal: finish the work in flight, then end.
+    const std::atomic<bool>& drop;  ///< Set by the second one or after `grace`: abandon that work.
 };
-/// From now on they set these flags; the third one ends the program. `grace`: seconds from the first one on.
+/// Handles both signals from now on by setting these flags; a further signal once `drop` is set ends the program.
+/// `grace`: seconds after the first signal.
 Interrupts catch_interrupts(unsigned grace);
 
 }  // namespace etendue

@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
     } catch (const CLI::Success& e) {
         return app.exit(e);
     } catch (const CLI::Error& e) {
-        // One message; the way to more help instead of all of it.
+        // One line that points to --help, instead of printing all of it.
         std::fprintf(stderr, "etendue: %s (see etendue --help)\n", e.what());
         return 2;
     } catch (const std::bad_alloc&) {

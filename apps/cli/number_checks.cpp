@@ -9,7 +9,7 @@
 namespace etendue {
 namespace {
 
-/// The finite number that the whole text is, whatever the locale.
+/// The value of `text` where all of it is one finite number, independent of the locale.
 std::optional<double> number(const std::string& text) {
     double value = 0;
     const char* end = text.data() + text.size();

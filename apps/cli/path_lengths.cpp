@@ -9,7 +9,7 @@
 namespace etendue {
 namespace {
 
-/// The whole of `text` as a number.
+/// Whether all of `text` is one integer, which is then stored in `number`.
 bool read_number(std::string_view text, int& number) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     return error == std::errc() && end == text.data() + text.size();

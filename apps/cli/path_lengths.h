@@ -7,8 +7,8 @@
 
 namespace etendue {
 
-/// Of the form 2..8, in edges; also 2.. where there is no longest. Throws std::runtime_error where `text` has not this
-/// form, or lengths beyond `most`.
+/// Parses a range of path lengths in edges: "2..8", or "2.." where `most` is kNoLimit. Throws std::runtime_error where
+/// `text` has another form or a length lies outside [1, most].
 PathSelection parse_lengths(const std::string& text, int most = PathSelection::kNoLimit);
 
 }  // namespace etendue

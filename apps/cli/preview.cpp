@@ -92,7 +92,7 @@ void Preview::send(const std::string& payload) {
         if (n <= 0) {
             ::close(socket_);
             socket_ = -1;
-            fmt::print(stderr, "warning: the preview's viewer is gone\n");
+            fmt::print(stderr, "warning: the preview's viewer closed the connection\n");
             return;
         }
         sent += size_t(n);

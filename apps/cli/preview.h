@@ -6,11 +6,12 @@
 
 namespace etendue {
 
-/// Sends the image to the viewer tev (https://github.com/Tom94/tev) while it renders, at most once a second. A viewer that
-/// goes away ends the preview, not the rendering.
+/// Sends the image to the viewer tev (https://github.com/Tom94/tev) during rendering, at most once a second. If the
+/// viewer closes the connection, the preview ends and the rendering goes on.
 class Preview {
 public:
-    /// `address`: tev, tev://host or tev://host:port (14158). Throws std::runtime_error where nobody listens.
+    /// `address`: tev, tev://host or tev://host:port; port 14158 by default. Throws std::runtime_error where no viewer
+    /// listens there.
     Preview(const std::string& address, const std::string& image_name, int width, int height);
     ~Preview();
     Preview(const Preview&) = delete;

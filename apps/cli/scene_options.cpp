@@ -12,7 +12,7 @@
 namespace etendue {
 namespace {
 
-/// Integers between separators, all of them or an error that names the option.
+/// Exactly `count` integers between separators; otherwise throws an error that names the option.
 std::vector<int> parse_integers(const std::string& text, char separator, size_t count,
                                 const char* option, const char* form) {
     std::vector<int> numbers;
@@ -46,7 +46,7 @@ void SceneOptions::add_reading_options(CLI::App& command) {
         ->allow_extra_args(false);
     command.add_flag("--lenient", lenient, "Turn unknown plug-ins and parameters into warnings");
     command.add_flag("--watertight", watertight,
-                     "Let no ray slip through between triangles; rays take up to a fifth longer");
+                     "Let no ray pass between adjacent triangles; rays take up to a fifth longer");
     command.add_option("--resolution", resolution, "Image size WxH instead of the file's");
     command.add_option("--crop", crop, "Part of the image to render: x,y,w,h in pixels");
 }
@@ -55,7 +55,8 @@ SceneDescription read_scene(const SceneOptions& options) {
     if (!std::filesystem::exists(options.file))
         throw std::runtime_error(fmt::format("{}: there is no such file", options.file));
     if (std::filesystem::is_directory(options.file))
-        throw std::runtime_error(fmt::format("{}: is a folder, not a scene file", options.file));
+        throw std::runtime_error(
+            fmt::format("{}: this is a folder, not a scene file", options.file));
     ReadOptions read;
     read.lenient = options.lenient;
     for (const std::string& d : options.defines) {
@@ -80,7 +81,9 @@ Scene build_scene(const SceneDescription& description, const SceneOptions& optio
     if (!options.resolution.empty()) {
         const auto v = parse_integers(options.resolution, 'x', 2, "--resolution", "WxH");
         if (v[0] < 1 || v[1] < 1 || v[0] > 65536 || v[1] > 65536)
-            throw std::runtime_error("--resolution must lie between 1x1 and 65536x65536");
+            throw std::runtime_error(
+                fmt::format("--resolution must lie between 1x1 and 65536x65536, but is \"{}\"",
+                            options.resolution));
         build.resolution = {v[0], v[1]};
     }
     if (!options.crop.empty()) {
@@ -113,7 +116,7 @@ SamplerKind parse_sampler(const std::string& name) {
     if (name == "independent") return SamplerKind::Independent;
     if (name == "sobol") return SamplerKind::Sobol;
     throw std::runtime_error(
-        fmt::format("--sampler is \"{}\", but must be independent or sobol", name));
+        fmt::format("--sampler must be independent or sobol, but is \"{}\"", name));
 }
 
 }  // namespace etendue

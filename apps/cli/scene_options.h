@@ -1,5 +1,5 @@
 #pragma once
-// What every subcommand that reads a scene has in common.
+// Options and steps shared by every subcommand that reads a scene.
 
 #include <string>
 #include <vector>
@@ -22,7 +22,7 @@ struct SceneOptions {
     std::string resolution, crop;
 
     void add_to(CLI::App& command);
-    /// Without the scene file itself.
+    /// All of these options except the scene file.
     void add_reading_options(CLI::App& command);
 };
 
@@ -31,11 +31,11 @@ Scene build_scene(const SceneDescription& description, const SceneOptions& optio
 /// Reads and builds the scene.
 Scene load_scene(const SceneOptions& options);
 
-/// The command line's integrator, or the scene's; parameters that are not given come from the scene's where it names the
-/// same ones.
+/// The integrator that `text` names, or the scene's where `text` is empty. Parameters missing from `text` are taken
+/// from the scene's integrator.
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
 
-/// Adds --sampler; `name` starts as the default of all subcommands.
+/// Adds --sampler and sets `name` to its default. `more` is appended to the option's description.
 void add_sampler_option(CLI::App& command, std::string& name, const std::string& more = "");
 SamplerKind parse_sampler(const std::string& name);
 

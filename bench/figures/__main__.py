@@ -1,8 +1,7 @@
-"""Makes the figures and tables of the papers with etendue: NAME.json with all that was measured, the paper's figures
-beside it, and NAME.svg, or NAME.png where it is pictures.
+"""Reproduces the figures and tables of the papers with etendue: NAME.json with all measurements and the paper's results,
+and a plot NAME.svg or images NAME.png.
 
-Errors are those of small pictures and short times, on a machine with nothing else to do. Run one figure again to see
-how far they scatter.
+Errors are those of small images and short times, on an otherwise idle machine. Repeat a figure to see their variation.
 """
 
 import argparse
@@ -17,8 +16,8 @@ import upg
 from output import save, text_table
 from runs import REFERENCE_SECONDS, ROOT, Runs, Skipped
 
-# What makes it, and seconds of its methods. References take REFERENCE_SECONDS more for each scene, and each choice of
-# paths; figures that are made together share them.
+# Function that makes the figure, and seconds of its methods. References take REFERENCE_SECONDS more for each scene and each
+# selection of paths; figures made by the same call share them.
 FIGURES = {
     "upg-convergence": (upg.convergence, 150),
     "upg-speed": (upg.speed, 90),

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import matplotlib.ticker
 import numpy as np
 
-# The same figures give the same bytes.
+# Makes output files reproducible.
 plt.rcParams.update({
     "svg.hashsalt": "etendue",
     "svg.fonttype": "none",
@@ -34,7 +34,7 @@ SIGNIFICANT_DIGITS = 6
 
 @dataclasses.dataclass
 class Figure:
-    """What a figure has to show. `paper` is what the paper states, `rows` a table whose first row is its head."""
+    """Contents of a figure. `paper` has the results stated in the paper; the first row of `rows` is the table's header."""
 
     results: object
     rows: list
@@ -63,7 +63,7 @@ def plot_lines(axes, curves, *, title="", x="", y="", logarithmic=True, marker=N
 
 
 def _label_few_values(axis):
-    """Labels 1, 2, 5, 10 … where the axis spans little, else powers of ten."""
+    """Labels 1, 2, 5, 10 … for a short axis, otherwise powers of ten."""
     low, high = axis.get_view_interval()
     factors = (1, 2, 5) if high < 50 * low else (1,)
     axis.set_major_locator(matplotlib.ticker.LogLocator(subs=factors))
@@ -72,14 +72,14 @@ def _label_few_values(axis):
 
 
 def displayed(image, exposure):
-    """sRGB; radiance of 1/exposure becomes half of white [Reinhard et al. 2002]."""
+    """sRGB image; a radiance of 1/exposure is mapped to half of white [Reinhard et al. 2002]."""
     x = np.maximum(image, 0) * exposure
     x = x / (1 + x)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
 def plot_pictures(images, exposure, *, boxes=(), zoom=2):
-    """Pictures side by side with their names below, and boxes (x, y, w, h) in the first of them."""
+    """Images side by side with their names below, and boxes (x, y, w, h) in the first one."""
     first = next(iter(images.values()))
     height, width = (zoom * n / 100 for n in first.shape[:2])
     figure, axes = panels(len(images), height=height + 0.35, width=width + 0.03)
@@ -140,7 +140,7 @@ def _rounded(value):
 
 
 def _json(value, indent=""):
-    """With lists of numbers on one line."""
+    """JSON with lists of numbers on one line."""
     inner = indent + " "
     if isinstance(value, dict) and value:
         items = [f"{inner}{json.dumps(k)}: {_json(v, inner)}" for k, v in value.items()]

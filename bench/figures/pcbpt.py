@@ -6,7 +6,7 @@ from output import Figure, panels, plot_lines, plot_pictures
 from runs import FIRST_SEED, mean_curve, scene_settings, speed_up
 
 INTERIORS = ("veach-ajar", "staircase2", "living-room")
-# The paper's error; it contains the noise of the reference, which the squared errors do not.
+# The error of the paper. Unlike the squared errors, it includes the noise of the reference.
 ERRORS = {"rel_mse": "relMSE", "rel_mse_trimmed": "relMSE, trimmed", "l1": "L1"}
 
 
@@ -57,7 +57,7 @@ CACHE_METHODS = {
 }
 
 
-# Exact mass functions take so long that only a small picture shows them.
+# Exact mass functions are so slow that only a small image is rendered.
 EXACT_SIZE = (96, 54)
 
 
@@ -155,7 +155,7 @@ def phases(runs, seconds):
     scenes = runs.available(*INTERIORS)
     rows = [["scene", "method", *(p.replace("_", " ") for p in PHASES), "connections K",
              "selection and connections over those of bdpt:roulette=0", "with records"]]
-    # First the one that the paper compares with: all its connections are tested.
+    # First the method that the paper compares with, without roulette before shadow rays.
     results, methods = [], ("bdpt:roulette=0", "bdpt", "pcbpt")
     figure, (axes,) = panels(1, width=6, height=2.8)
     bars, names = [], []
@@ -196,7 +196,7 @@ def phases(runs, seconds):
 
 # -------------------------------------------------------------------------- figures 16, 18: time
 
-# The inner paths of bdpt:connections=cache weigh otherwise, so that they show another image.
+# bdpt:connections=cache has other weights, so that its inner paths give a different image.
 INNER_METHODS = {"bdpt": "bdpt", "bdpt, EORR": "bdpt:eorr=true", "pcbpt": "pcbpt"}
 ALL_METHODS = INNER_METHODS | {"bdpt, cache": "bdpt:connections=cache"}
 

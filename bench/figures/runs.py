@@ -1,4 +1,4 @@
-"""Runs etendue, and reads what it writes."""
+"""Runs etendue and reads its output."""
 
 import json
 import os
@@ -11,7 +11,7 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SHARED = pathlib.Path(os.environ.get("ETENDUE_SCENES", ROOT.parent / "shared" / "scenes"))
 
-# File, below scenes/ of the project or in the folder of shared scenes, and size of its pictures.
+# File, in scenes/ of the project or in the folder of shared scenes, and size of its images.
 SCENES = {
     "ajar": ("scenes/ajar.xml", (160, 120)),
     "cornell": ("scenes/cornell.xml", (64, 64)),
@@ -23,17 +23,17 @@ SCENES = {
     "veach-bidir": ("veach-bidir-mts3/scene.xml", (120, 120)),
     "living-room": ("living-room-mts06/scene.xml", (160, 90)),
 }
-# Of a scene, made once and kept for all figures of a call.
+# Per scene; a reference is rendered once and cached for all figures of a call.
 REFERENCE_SECONDS = 40
 FIRST_SEED = 1
 
 
 class Skipped(Exception):
-    """A figure that cannot be made here."""
+    """Raised where a figure cannot be made, such as for a missing scene."""
 
 
 class Runs:
-    """How long, and with what, all figures are made."""
+    """Program, threads and scale of times for all figures."""
 
     def __init__(self, program, threads, scale, folder):
         self.program = program
@@ -58,7 +58,7 @@ class Runs:
         }
 
     def available(self, *names):
-        """Those of the scenes that are there; says which are not."""
+        """Those of the scenes that exist; prints a message for each of the others."""
         found = [name for name in names if scene_file(name).exists()]
         for name in set(names) - set(found):
             print(f"{name} is left out: {SCENES[name][0]} was not found", file=sys.stderr)
@@ -78,7 +78,7 @@ class Runs:
         return json.loads(stats.read_text()), read_pfm(image)
 
     def spp_within(self, scene, methods, seconds, **options):
-        """Samples of a pixel that the slowest of the methods makes in so many seconds, scaled."""
+        """Samples per pixel that the slowest of the methods takes in `seconds`, scaled."""
         speeds = []
         for method in methods:
             stats, _ = self.render(scene, method, spp=2, **options)
@@ -87,8 +87,8 @@ class Runs:
 
     def compare(self, scene, methods, *, seconds=None, spp=None, runs=1, paths="all",
                 lengths="1..", size=None):
-        """What `etendue compare` reports of each method, in short. `seconds` are those of all methods and runs
-        together, to be scaled."""
+        """A summary of the results of `etendue compare` for each method. `seconds`, which is scaled, is the time of all
+        methods and runs together."""
         report = self.folder / "report"
         arguments = ["compare", scene_file(scene), "--methods", *methods, "--runs", runs]
         if spp:
@@ -133,7 +133,7 @@ ERRORS = ("rmse", "rel_mse", "rel_mse_trimmed", "l1", "mape", "spike")
 
 
 def _comparison(report, scene):
-    """Without what the figures do not need, such as names of files."""
+    """The report without data that the figures do not need, such as names of files."""
     settings, compared = report["settings"], report["scenes"][0]
     reference = compared["reference"]
     shown = ("seconds", "spp", "runs", "seed", "sampler", "paths", "shortest_path", "longest_path")
@@ -195,7 +195,7 @@ def mean_curve(method, error="rel_mse", over="seconds", points=24):
 
 
 def speed_up(base, method, error="rel_mse"):
-    """Time of `base` over that of `method` for the same error: the least that both reached."""
+    """Ratio of the times of `base` and `method` for the same error, the smallest that both reached."""
     (base_t, base_e), (t, e) = mean_curve(base, error), mean_curve(method, error)
     if len(base_t) == 0 or len(t) == 0:
         return None

@@ -9,7 +9,7 @@ from runs import FIRST_SEED, mean_curve, power_law, scene_settings
 
 CONVERGENCE_RUNS = 64
 FEWEST_CONVERGENCE_RUNS = 16  # where times are scaled down
-# Below the lamp, whose edges would decide the error.
+# Below the lamp, whose edges would dominate the error.
 CONVERGENCE_CROP = (0, 16, 64, 48)
 CONVERGENCE_RADIUS = 0.1
 
@@ -20,7 +20,7 @@ def convergence(runs, seconds):
     count = CONVERGENCE_RUNS if runs.scale >= 0.1 else FEWEST_CONVERGENCE_RUNS
     methods = [f"upg+bdpt:radius={CONVERGENCE_RADIUS}", f"vcm:radius={CONVERGENCE_RADIUS},alpha=1"]
     spp = runs.spp_within(scene, methods, seconds / 4 / count, crop=crop)
-    # Two halves, so that the reference's noise cancels; together they have as many samples as a method's runs.
+    # Two halves, so that the reference's noise cancels; together they have as many samples as all runs of a method.
     reference_spp = runs.spp_within(scene, ["bdpt"], seconds / 4, crop=crop)
     reference = [
         runs.render(scene, "bdpt", spp=reference_spp, seed=seed, crop=crop)[1]
@@ -88,7 +88,7 @@ def speed(runs, seconds):
     repeats = max(1, runs.spp_within(scene, SPEED_METHODS, seconds / len(SPEED_METHODS)) // passes)
     times = {method: [] for method in SPEED_METHODS}
     pairs = {method: [] for method in SPEED_METHODS}
-    for i in range(repeats):  # in turns, so that a change of the machine's speed is one for all
+    for i in range(repeats):  # alternating, so that changes of the machine's speed affect all methods
         for method in SPEED_METHODS if i % 2 == 0 else SPEED_METHODS[::-1]:
             stats, image = runs.render(scene, method, spp=passes, seed=FIRST_SEED + i)
             times[method].append(stats["pass_seconds"])
@@ -280,7 +280,7 @@ def _relative_difference(images, reference, box):
 
 # ----------------------------------------------------------------------------- table 1: path lengths
 
-# On a substitute: the paper's scene, "stairs", is not public.
+# With a substitute scene: the paper's scene, "stairs", is not public.
 DEPTHS = {"1..2": "k ≤ 2", "3..3": "k = 3", "4..4": "k = 4", "5..": "k > 4"}
 PAPER_DEPTHS = {"bdpt": (0.0074, 0.0614, 0.0733, 0.1570), "upg": (0.0123, 0.0333, 0.0310, 0.0418)}
 

@@ -1,8 +1,8 @@
 // Linear blend of two materials: (1 - weight)·first + weight·second.
-//   weight (required)  number or texture; values above one count as one
+//   weight (required)  number or texture; clamped to [0, 1]
 //   nested: two bsdfs, which may be blends themselves
-// Opacities blend in the same way. Where a ray meets the surface, each material has its share of
-// the blended opacity.
+// Opacities are blended in the same way. Where a ray meets the surface, each material has its share of the blended
+// opacity.
 
 #include <array>
 

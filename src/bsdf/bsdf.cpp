@@ -8,7 +8,7 @@ static_assert(sizeof(Lobe) <= 64 && std::is_trivially_copyable_v<Lobe>);
 
 namespace {
 
-/// One component seen with the geometric normal: its local directions, and what they do to the
+/// Directions in the frame of one component, with the geometric normal, and the correction that they imply for the
 /// lobe's value.
 class Side {
 public:
@@ -24,8 +24,8 @@ public:
     Local local(Vec3 w) const { return {c_.frame.to_local(w), dot(w, ng_)}; }
     const Local& wo() const { return wo_; }
 
-    /// From the lobe's f|wi·ns| to f̃|wi·ng|: radiance loses η² at refraction, importance is
-    /// corrected for the shading normal [Veach 1997, p. 155].
+    /// Factor from the lobe's f|wi·ns| to f̃|wi·ng|: 1/η² for radiance, and the correction for shading normals for
+    /// importance [Veach 1997, p. 155].
     float correction(const Local& wi, float eta, TransportMode mode) const {
         if (mode == TransportMode::Radiance) return 1 / sqr(eta);
         return std::fabs(wo_.w.z * wi.ng / (wo_.ng * wi.w.z));
@@ -59,7 +59,7 @@ BsdfEval eval_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, Vec3 wi, Trans
     return e;
 }
 
-/// eval_component() of a diffuse lobe, which needs the normals alone: most evaluations are of this kind.
+/// eval_component() of a diffuse lobe without its frame: the most frequent case.
 BsdfEval eval_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe, Vec3 wo, Vec3 wi,
                       TransportMode mode) {
     const Vec3 ns = c.frame.n;
@@ -72,7 +72,7 @@ BsdfEval eval_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe, 
             cos_o * c.weight * kInvPi};
 }
 
-/// Sampling's counterpart of eval_diffuse().
+/// Samples eval_diffuse() of a component with weight 1.
 std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe,
                                          Vec3 wo, Vec2 u, TransportMode mode) {
     const float side = std::copysign(1.0f, dot(ng, c.frame.n));
@@ -90,7 +90,8 @@ std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const 
                       .pdf_rev = cos_o * kInvPi};
 }
 
-/// The sample that `local_sample(wo)` makes of `c` in its frame, as if `c` were chosen for certain.
+/// The sample that `local_sample(wo)` returns in the frame of `c`, with weight and densities in world space. The
+/// densities include the probability c.weight of the component; the weight does not.
 template <class LocalSample>
 std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo,
                                            TransportMode mode, const LocalSample& local_sample) {
@@ -113,7 +114,7 @@ std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3
     return s;
 }
 
-/// Adds another component's share; η is that of whoever has a value.
+/// Adds the value of another component; η is that of the first one whose value is not zero.
 void add(BsdfEval& sum, const BsdfEval& e) {
     if (sum.f.is_zero()) sum.eta = e.eta;
     sum.f += e.f;
@@ -142,7 +143,7 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
         u_lobe -= chosen->weight;
         chosen = chosen->next;
     }
-    if (!chosen) return {};  // beyond the sum of the weights
+    if (!chosen) return {};  // rounding: u_lobe exceeds the sum of the weights
     u_lobe = std::fmin(u_lobe / chosen->weight, kOneMinusEpsilon);
     std::optional<BsdfSample> s = sample_component(ng_, *chosen, wo, mode, [&](Vec3 local_wo) {
         return sample_lobe(chosen->lobe, local_wo, u_lobe, u);
@@ -154,7 +155,7 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
         return s;
     }
 
-    // The other components sample the same direction: weight = Σ f / Σ pdf.
+    // The other components may sample the same direction: weight = Σ f / Σ pdf.
     BsdfEval sum{s->weight * s->pdf, s->pdf, s->pdf_rev, s->eta};
     for (const BsdfComponent* c = &first_; c; c = c->next)
         if (c != chosen) add(sum, eval_component(ng_, *c, wo, s->wi, mode));

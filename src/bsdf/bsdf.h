@@ -1,6 +1,6 @@
 #pragma once
-// Scattering at a surface point in world space. `Bsdf` puts one lobe, or a mixture of lobes, into its shading frame and
-// applies, in one place, what depends on the direction of transport: the shading-normal correction and the η² of
+// Scattering at a surface point in world space. `Bsdf` evaluates one lobe, or a mixture of lobes, in shading frames,
+// and applies the corrections that depend on the direction of transport: that for shading normals and the η² of
 // refraction [Veach 1997, §5.2–5.3].
 
 #include <variant>
@@ -28,8 +28,8 @@ struct BsdfComponent {
     Frame frame;
     Lobe lobe;
     float weight = 1;
-    const BsdfComponent* next =
-        nullptr;  ///< In the arena of the walk that made it; nullptr for the last.
+    /// In the arena of the walk that made it; nullptr for the last one.
+    const BsdfComponent* next = nullptr;
 };
 
 /// Everything that scatters at one surface point.
@@ -37,29 +37,28 @@ class Bsdf {
 public:
     Bsdf() = default;
 
-    /// Path-space scattering value for the edge pair: f̃(…)·|wi·ng|, where f̃ is the radiance BSDF for light arriving
-    /// from the light's side and leaving to the eye's, corrected for shading normals; with pdfs in solid angle.
-    /// `wo` points to the predecessor of the walk in `mode`. Zero where `wi` or `wo` lies on different sides of the
-    /// geometric and the shading surface.
+    /// f̃·|wi·ng|, where f̃ is the radiance BSDF for light that arrives from the light's side and leaves to the eye's,
+    /// corrected for shading normals; densities are in solid angle. `wo` points to the predecessor of the walk in
+    /// `mode`. Zero where the shading normal and the geometric normal see `wi` or `wo` on different sides.
     BsdfEval eval(Vec3 wo, Vec3 wi, TransportMode mode) const;
-    /// A direction with weight f̃·|wi·ng| / pdf; nothing where the walk ends.
+    /// A direction with weight f̃·|wi·ng| / pdf; empty where the walk ends.
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const;
 
-    /// The delta event of that number at `wo`, with the direction it has there: to follow a path whose vertices have moved.
-    /// Nothing where there is none. Numbers are those of BsdfSample::event: 2·(index of the component) + transmits.
+    /// The direction of delta event number `event` for `wo`, to recompute a path whose vertices have moved; empty where
+    /// there is no such event. Numbers are those of BsdfSample::event: 2·(index of the component) + transmits.
     std::optional<BsdfSample> sample_delta(Vec3 wo, uint8_t event, TransportMode mode) const;
 
-    /// Bound of eval(wo, w).pdf over the directions w of a cone; kInf where none is known.
+    /// Upper bound of eval(wo, w).pdf over the directions w of a cone; kInf where none is known.
     float max_pdf(Vec3 wo, const DirectionCone& cone) const;
-    /// Shading normal of a surface that is diffuse alone; its density is that of the cosine about it.
+    /// Shading normal where the only lobe is diffuse, so that sampling has density cos θ/π about it; empty otherwise.
     std::optional<Vec3> diffuse_normal() const;
 
-    /// Whether some lobe is smooth, so that connections can be made here.
+    /// Whether any lobe is smooth, so that connections are possible here.
     bool has_smooth() const { return has_smooth_; }
     bool has_delta() const;
     /// Whether sample() reads u_lobe.
     bool uses_lobe_choice() const { return uses_lobe_choice_; }
-    /// α of the sharpest smooth lobe, 0 where there is only a delta one.
+    /// α of the sharpest smooth lobe; 0 where all lobes are delta.
     float roughness() const;
     Rgb albedo_estimate() const;
     Vec3 shading_normal() const { return first_.frame.n; }

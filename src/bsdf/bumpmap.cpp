@@ -3,9 +3,9 @@
 //   displacement (required)  texture of heights in units of the scene; its name may be left out
 //   scale (1)                factor of the heights
 //   nested: one bsdf
-// With the height h(u, v) the tangents become ∂p/∂u + n ∂h/∂u and ∂p/∂v + n ∂h/∂v, both with their
-// parts along n replaced; the change of n along the surface is neglected. Inside a two-sided
-// material the bumps stand out on both sides. Surfaces without tangents stay as they are.
+// With the height h(u, v) the components of the tangents ∂p/∂u and ∂p/∂v along n become ∂h/∂u and ∂h/∂v; the change of
+// n along the surface is neglected. In a two-sided material bumps are raised on both sides. Surfaces without tangents
+// are not changed.
 
 #include "bsdf/wrapper.h"
 

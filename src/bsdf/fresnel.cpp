@@ -6,8 +6,7 @@ namespace {
 
 /// For n > 1.
 double external_diffuse_reflectance(double n) {
-    // Nearer to one the terms cancel to fewer digits than the answer has; it is below 1e-3 there
-    // and falls to zero.
+    // Closer to n = 1 the terms cancel. The value is below 1e-3 there and approximated as linear.
     constexpr double kNearlyOne = 1.0005;
     if (n < kNearlyOne)
         return external_diffuse_reflectance(kNearlyOne) * (n - 1) / (kNearlyOne - 1);

@@ -35,8 +35,8 @@ inline float fresnel_transmittance(float cos_i, float cos_t, float eta) {
     return 2 * eta * ci * ct * (1 / sqr(ci + eta * ct) + 1 / sqr(eta * ci + ct));
 }
 
-/// The direction into which `w` is refracted at a facet with normal `m` (either side), with fresnel
-/// = fresnel_dielectric(dot(w, m), η).
+/// The direction into which `w` is refracted at a facet with normal `m` on either side; `fresnel` is
+/// fresnel_dielectric(dot(w, m), η).
 inline Vec3 refract(Vec3 w, Vec3 m, const DielectricFresnel& fresnel) {
     return m * (dot(w, m) / fresnel.eta + fresnel.cos_t) - w * (1 / fresnel.eta);
 }
@@ -48,8 +48,7 @@ inline Vec3 refract(Vec3 w, const DielectricFresnel& fresnel) {
 /// Reflectance of a conductor with index η + ik relative to the outside, per channel; `cos_i` in
 /// [0, 1].
 inline Rgb fresnel_conductor(float cos_i, Rgb eta, Rgb k) {
-    // a² + b² and a of the complex cosine, with t = η² − k² − sin² θ; the floor keeps η = 1, k = 0
-    // from 0/0 at 90°.
+    // a² + b² and a of the complex cosine, with t = η² − k² − sin² θ. The clamp avoids 0/0 at 90° for η = 1, k = 0.
     const float cos2 = sqr(clamp(cos_i, 1e-6f, 1));
     const float sin2 = 1 - cos2;
     const float cos1 = std::sqrt(cos2);
@@ -67,8 +66,8 @@ inline Rgb fresnel_conductor(float cos_i, Rgb eta, Rgb k) {
 }
 
 /// Reflectance of a smooth dielectric boundary for diffuse light from outside, 2 ∫ F(μ) μ dμ; `eta`
-/// is η of the other side over η of the light's side. For eta > 1 in closed form [Walsh 1926;
-/// Duntley 1942]; the inside follows from 1 − F_int = (1 − F_ext)/η².
+/// is η of the other side over η of the light's side. Closed form for eta > 1 [Walsh 1926; Duntley 1942]; eta < 1
+/// follows from 1 − F_int = (1 − F_ext)/η².
 float fresnel_diffuse_reflectance(float eta);
 
 }  // namespace etendue

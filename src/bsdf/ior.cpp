@@ -42,7 +42,7 @@ constexpr NamedIor kNamedIors[] = {
     {"diamond", 2.419f},
 };
 
-/// Far beyond any metal; larger numbers overflow in Fresnel's equations.
+/// Far beyond any metal; larger indices overflow in the Fresnel equations.
 constexpr float kMaxConductorIndex = 1e4f;
 
 float named_ior(const Params& params, const char* parameter, const std::string& name) {
@@ -51,11 +51,9 @@ float named_ior(const Params& params, const char* parameter, const std::string& 
     if (it != std::end(kNamedIors)) return it->ior;
     std::vector<std::string> names;
     for (const NamedIor& n : kNamedIors) names.push_back(n.name);
-    params.fail(
-        parameter,
-        fmt::format(
-            "parameter \"{}\" names no known material: \"{}\"; it may be a number or one of: {}",
-            parameter, name, fmt::join(names, ", ")));
+    params.fail(parameter,
+                fmt::format("parameter \"{}\" is \"{}\", but must be a number or one of: {}",
+                            parameter, name, fmt::join(names, ", ")));
 }
 
 }  // namespace
@@ -65,7 +63,8 @@ float read_ior(const Params& params, const char* name, const char* fallback) {
     if (!p || p->type() == ParamType::String)
         return named_ior(params, name, params.text(name, fallback));
     const float ior = params.number(name, 1, 0);
-    if (!(ior > 0)) params.fail(name, fmt::format("parameter \"{}\" must be above zero", name));
+    if (!(ior > 0))
+        params.fail(name, fmt::format("parameter \"{}\" is {}, but must be above 0", name, ior));
     return ior;
 }
 
@@ -84,8 +83,10 @@ ConductorIndex::ConductorIndex(const Params& params, MaterialContext& context) {
             const std::string near = nearest_name(name, metal_names());
             params.fail(
                 "material",
-                fmt::format("parameter \"material\" names no known metal: \"{}\"{}", name,
-                            near.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", near)));
+                fmt::format("parameter \"material\" is \"{}\", which is not a known metal{}", name,
+                            near.empty()
+                                ? fmt::format(" (known: none, {})", fmt::join(metal_names(), ", "))
+                                : fmt::format(" (did you mean \"{}\"?)", near)));
         }
         eta = metal->eta;
         k = metal->k;

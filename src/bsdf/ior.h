@@ -1,6 +1,5 @@
 #pragma once
-// Indices of refraction and roughness as scene files give them, and their rows in the plug-ins'
-// tables.
+// Indices of refraction and roughness: parsing of their parameters, and the rows of these in the tables of plug-ins.
 
 #include "bsdf/material.h"
 #include "bsdf/microfacet.h"
@@ -13,7 +12,7 @@ float read_ior(const Params& params, const char* name, const char* fallback);
 
 /// η inside over η outside, from "int_ior" (bk7) and "ext_ior" (air).
 float read_relative_ior(const Params& params);
-/// Rows for that and for the factors "specular_reflectance" and "specular_transmittance".
+/// Rows for these two parameters, "specular_reflectance" and "specular_transmittance".
 std::vector<ParamInfo> dielectric_params();
 
 /// Complex index of a metal: "material" (a name of color/metals.h, or "none", a perfect mirror), or
@@ -22,7 +21,7 @@ struct ConductorIndex {
     TextureRef eta, k;
     ConductorIndex(const Params& params, MaterialContext& context);
 };
-/// Rows for that and for the factor "specular_reflectance".
+/// Rows for these parameters and "specular_reflectance".
 std::vector<ParamInfo> conductor_params();
 
 /// "distribution": beckmann (default) or ggx.
@@ -42,7 +41,7 @@ private:
 };
 std::vector<ParamInfo> roughness_params();
 
-/// The rows of both.
+/// `a` followed by `b`.
 std::vector<ParamInfo> concat(std::vector<ParamInfo> a, const std::vector<ParamInfo>& b);
 
 }  // namespace etendue

@@ -11,29 +11,29 @@
 
 namespace etendue {
 
-/// What the walk carries: radiance from the eye (`wo` points toward the eye's side), importance from a light.
+/// Quantity transported by a walk: radiance for walks from the eye (`wo` points toward the eye), importance for walks
+/// from a light.
 enum class TransportMode : uint8_t { Radiance, Importance };
 
 /// Value of the smooth part of a lobe for a pair of directions. Delta components contribute nothing here.
 struct BsdfEval {
-    Rgb f;  ///< f(wo, wi)·|cos θ_i|, in the convention of importance transport (no η² of radiance).
-    float pdf =
-        0;  ///< Solid-angle density of sampling wi from wo, lobe choice included, not renormalised.
+    Rgb f;  ///< f(wo, wi)·|cos θ_i|, for importance transport (without the η² of radiance).
+    /// Solid-angle density of sampling wi from wo, including the choice of the lobe, not renormalised.
+    float pdf = 0;
     float pdf_rev = 0;  ///< The same for sampling wo from wi.
-    /// η on wi's side over η on wo's side; 1 for reflection.
-    float eta = 1;
+    float eta = 1;      ///< η on wi's side over η on wo's side; 1 for reflection.
 };
 
 struct BsdfSample {
     Vec3 wi;
-    Rgb weight;  ///< f·|cos θ_i| / pdf in the convention of BsdfEval::f; for a delta event f / pmf.
+    Rgb weight;     ///< BsdfEval::f / pdf; for a delta event its coefficient divided by `pdf`.
     float pdf = 0;  ///< As BsdfEval; for a delta event its discrete probability.
-    /// As BsdfEval. For a delta event the discrete probability of the reverse event, times |dω_i/dω_o| (a lobe leaves that
-    /// factor to Bsdf): with it, densities of the two directions of a path refer to the same δ.
+    /// As BsdfEval; for a delta event the discrete probability of the reverse event. Bsdf multiplies the latter by
+    /// |dω_i/dω_o|, so that the densities of both directions of a path refer to the same δ.
     float pdf_rev = 0;
     float eta = 1;  ///< As BsdfEval.
     bool is_delta = false;
-    uint8_t event = 0;  ///< Of a delta event: which one, see Bsdf::sample_delta().
+    uint8_t event = 0;  ///< Number of a delta event, see Bsdf::sample_delta().
 };
 
 /// All directions within `angle` (radians, at most π) of `axis`.
@@ -41,7 +41,7 @@ struct DirectionCone {
     Vec3 axis;
     float angle;
 
-    /// Bound of dot(w, n) over the cone. The slack covers the rounding of acos near 0 and π.
+    /// Upper bound of dot(w, n) over the cone. The slack covers the rounding errors of acos near 0 and π.
     float max_cos(Vec3 n) const {
         constexpr float kSlack = 1e-3f;
         const float a = std::acos(clamp(dot(axis, n), -1.0f, 1.0f)) - angle - kSlack;
@@ -49,7 +49,7 @@ struct DirectionCone {
     }
 };
 
-/// The sample of a smooth lobe from its value and densities; nothing where it cannot have been sampled.
+/// The sample of a smooth lobe from its value and densities; empty where the density is zero.
 inline std::optional<BsdfSample> make_sample(Vec3 wi, const BsdfEval& e) {
     if (!(e.pdf > 0)) return {};
     return BsdfSample{
@@ -58,14 +58,14 @@ inline std::optional<BsdfSample> make_sample(Vec3 wi, const BsdfEval& e) {
 
 // ---- Lobes: each has
 //   BsdfEval eval(Vec3 wo, Vec3 wi) const
-//   std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const      nothing where the walk ends
+//   std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const      empty where the walk ends
 //   Rgb albedo_estimate() const       rough hemispherical reflectance, for AOVs and heuristics
 //   float roughness() const           GGX-like α of the *sharpest smooth* lobe: 0 delta only … 1 diffuse
 //   bool has_smooth() const, has_delta() const
 //   std::optional<BsdfSample> delta_event(Vec3 wo, bool transmits) const       only where there are delta events
 //   bool kUsesLobeChoice              whether sample() reads u_lobe
-//   float max_pdf(Vec3 wo, const DirectionCone& c) const   bound of eval(wo, wi).pdf for wi in c; kInf if unknown
-// `wo` and `wi` are unit vectors in local coordinates, away from the surface. A reflecting-only lobe is black for
-// wo.z <= 0 (Material's two-sided wrapper turns the frame). A smooth lobe may share its model with a delta one.
+//   float max_pdf(Vec3 wo, const DirectionCone& c) const   upper bound of eval(wo, wi).pdf for wi in c; kInf if unknown
+// `wo` and `wi` are unit vectors in local coordinates, away from the surface. A lobe that only reflects is black for
+// wo.z <= 0 (the material `twosided` turns the frame). A lobe may have both a smooth part and a delta part.
 
 }  // namespace etendue

@@ -1,9 +1,7 @@
-// Opacity mask: a ray meets the nested material with probability `opacity`, else it passes
-// unchanged.
-//   opacity (0.5)  number or texture; values above one count as one
+// Opacity mask: a ray meets the nested material with probability `opacity`, and otherwise passes unchanged.
+//   opacity (0.5)  number or texture; clamped to [0, 1]
 //   nested: one bsdf
-// The walk of rays decides about passing; where a ray does meet the surface, the nested material is
-// not scaled.
+// Ray traversal (Scene::intersect()) decides whether a ray passes, so the nested material is not scaled.
 
 #include "bsdf/wrapper.h"
 

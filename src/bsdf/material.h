@@ -1,6 +1,6 @@
 #pragma once
-// Materials: what a scene file's <bsdf> becomes. A material looks up its textures at a surface point and returns the
-// `Bsdf` there; it is immutable and shared by all threads.
+// Materials, each made from a <bsdf> of the scene file. A material looks up its textures at a surface point and returns
+// the `Bsdf` there; it is immutable and shared by all threads.
 
 #include <deque>
 #include <memory>
@@ -14,14 +14,15 @@ namespace etendue {
 /// A point on a surface as materials see it. Directions are unit vectors.
 struct SurfacePoint {
     Vec3 p;
-    Vec3 ng;          ///< Geometric normal of the shape's own orientation (not turned toward wo).
-    Vec3 ns;          ///< Interpolated normal, on ng's side.
-    Vec3 dpdu, dpdv;  ///< Tangents; may be zero where there is no parametrisation.
+    Vec3 ng;  ///< Geometric normal in the shape's orientation (not turned toward wo).
+    Vec3 ns;  ///< Interpolated normal, on the same side as ng.
+    Vec3 dpdu,
+        dpdv;  ///< Tangents (not unit vectors); may be zero where there is no parametrisation.
     Vec2 uv;
     Vec3 wo;  ///< Toward the predecessor.
 };
 
-/// Where mixtures keep their second and further components until the walk is over; reset() keeps the memory.
+/// Storage for the second and further components of mixtures during a walk. reset() keeps the memory for reuse.
 class ComponentArena {
 public:
     const BsdfComponent* keep(const BsdfComponent& c) {
@@ -39,24 +40,24 @@ private:
 class Material {
 public:
     virtual ~Material() = default;
-    /// Adds this material's lobes at `point`, scaled by `weight`, in `frame` (whose n is the shading normal to use;
-    /// a two-sided material turns it toward wo). Components are appended to `list`.
+    /// Appends this material's lobes at `point` to `list`, scaled by `weight`, in the shading frame `frame` (which a
+    /// two-sided material turns toward wo).
     virtual void append(const SurfacePoint& point, const Frame& frame, float weight,
                         class ComponentList& list) const = 0;
-    /// Probability that a ray meets the surface at all; 1 unless masked. 0 everywhere for `null`.
+    /// Probability that a ray meets the surface: 1 unless masked, 0 for `null`.
     virtual float opacity(Vec2) const { return 1; }
-    virtual bool is_opaque() const { return true; }  ///< opacity is 1 everywhere
-    /// Whether light can pass (so that both sides of the surface see each other).
+    virtual bool is_opaque() const { return true; }  ///< Whether opacity is 1 everywhere.
+    /// Whether a lobe transmits light to the other side of the surface.
     virtual bool is_transmissive() const { return false; }
     virtual bool is_two_sided() const { return is_transmissive(); }
-    /// False where every lobe at every point is delta: no connection can ever be made there.
+    /// False if all lobes are delta at every point, so that connections are never possible.
     virtual bool may_be_smooth() const { return true; }
-    /// Whether SurfacePoint::dpdu and dpdv matter.
+    /// Whether append() uses SurfacePoint::dpdu and dpdv.
     virtual bool needs_tangents() const { return true; }
-    /// Average reflectance for `info` and for heuristics.
+    /// Approximate average reflectance, for heuristics.
     virtual Rgb mean_albedo() const = 0;
 
-    /// Makes the BSDF at `point` in place; further components go to the arena.
+    /// Constructs the BSDF at `point` in `out`; further components of a mixture are stored in the arena.
     void make_bsdf(const SurfacePoint& point, ComponentArena& arena, Bsdf& out) const;
     Bsdf bsdf(const SurfacePoint& point, ComponentArena& arena) const {
         Bsdf out;
@@ -65,7 +66,7 @@ public:
     }
 };
 
-/// Gathers components while a material tree is walked: the first in the Bsdf itself, the rest in the arena.
+/// Collects the components of a tree of materials: the first in the Bsdf itself, the others in the arena.
 class ComponentList {
 public:
     ComponentList(Vec3 ng, ComponentArena& arena, Bsdf& out) : arena_(&arena), out_(&out) {
@@ -99,11 +100,12 @@ private:
     bool is_empty_ = true;
 };
 
-/// What a material's maker may ask of the scene builder.
+/// Services of the scene builder for the construction of materials.
 class MaterialContext {
 public:
     virtual ~MaterialContext() = default;
-    /// Colour or texture parameter; checks that constants lie in [0, hi]. An empty name is the unnamed texture child.
+    /// A constant or texture parameter; throws SceneError where a constant lies outside [0, hi]. The empty name is that
+    /// of an unnamed child.
     virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback,
                                float hi = kInf) = 0;
     /// The nested materials in file order.
@@ -119,7 +121,7 @@ template <class M>
 std::unique_ptr<Material> make_material(const Params& params, MaterialContext& context) {
     return std::make_unique<M>(params, context);
 }
-/// All BSDF plug-ins, in the order `list` prints them.
+/// All BSDF plug-ins, in the order of `etendue list`.
 const std::vector<MaterialEntry>& material_registry();
 
 }  // namespace etendue

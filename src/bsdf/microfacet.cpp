@@ -35,7 +35,7 @@ float sample_gaussian_slope(float u) {
 /// proportional to max(0, cos θ − x sin θ) exp(−x²), so that with b = erf(x) the cumulative
 /// distribution is
 ///     C(b) = (1 + b) cos θ + sin θ exp(−x²)/√π,   dC/db = cos θ − x sin θ,  b in [−1, erf(cot θ)].
-/// C is concave in b: Newton's steps, kept in a bracket, converge from the left [Jakob 2014].
+/// C is concave in b, so Newton's method, kept within a bracket, converges from the left [Jakob 2014].
 float sample_visible_slope(float cos_theta, float sin_theta, float u) {
     constexpr float kInvSqrtPi = 0.56418958354775628695f;
     const auto C = [&](float b, float x) {
@@ -131,7 +131,7 @@ float Microfacet::max_pdf_of_refraction(Vec3 wo, const DirectionCone& c, float e
 }
 
 Vec3 Microfacet::sample_visible(Vec3 w, Vec2 u) const {
-    // Stretched so that the roughness is one; normals stretch back with the inverse transpose.
+    // The configuration is stretched to unit roughness; normals are transformed back by the inverse transpose.
     const Vec3 w_std = normalize({alpha_x_ * w.x, alpha_y_ * w.y, w.z});
     const Vec3 m =
         kind_ == Kind::Ggx ? sample_visible_ggx(w_std, u) : sample_visible_beckmann(w_std, u);

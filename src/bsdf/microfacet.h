@@ -2,7 +2,7 @@
 // Distributions of microfacet normals, GGX and Beckmann, with anisotropic roughness and Smith
 // shadowing.
 //
-// Everything is written with the projected area of the microsurface seen from w,
+// All formulas use the projected area of the microsurface seen from w,
 //     σ(w) = ∫ max(w·m, 0) D(m) dm = |cos θ| (1 + Λ(w)) = |cos θ| / G1(w),
 // which stays finite and above zero at grazing angles. With it
 //     D_w(m)    = max(w·m, 0) D(m) / σ(w)               density of visible normals [Heitz 2014],
@@ -12,12 +12,11 @@
 
 namespace etendue {
 
-/// What is known of the halfway vectors of one direction and all those of a cone.
+/// Bounds on the half vectors m of one direction wo and all directions wi of a cone.
 struct HalfwayBound {
-    float theta = 0;  ///< They are at least this far from ±z.
-    float cos_d =
-        0;  ///< At least so much is the cosine between them and the directions they halve.
-    float length = 0;  ///< Of wo + η wi, at least.
+    float theta = 0;   ///< Lower bound of the angle between m and ±z, in radians.
+    float cos_d = 0;   ///< Lower bound of the cosine between m and wo or wi; for reflection only.
+    float length = 0;  ///< Lower bound of |wo + η wi|; for refraction only.
 };
 /// m ∝ ±(wo + wi). As wi turns by dα, m turns by at most dα / (2 cos θ_d), θ_d = ∠(wo, m) = ∠(wo, wi)/2.
 HalfwayBound halfway_of_reflection(Vec3 wo, const DirectionCone& c);
@@ -28,7 +27,7 @@ class Microfacet {
 public:
     enum class Kind : uint8_t { Beckmann, Ggx };
 
-    /// Roughness is clamped to this range: sharper is not resolved by float directions.
+    /// Roughness is clamped to this range; float directions do not resolve sharper highlights.
     static constexpr float kMinAlpha = 1e-4f, kMaxAlpha = 100;
 
     Microfacet() = default;
@@ -46,17 +45,17 @@ public:
         return density > 0 ? density / (norm * sqr(cos2)) : 0;
     }
 
-    /// Bound of D over all normals that are at least `theta` from z.
+    /// Upper bound of D over all normals at an angle of at least `theta` to z.
     float max_D(float theta) const;
-    /// Bound of D_wo(m) dω_m/dω_i over a cone of reflected directions: D / (4 σ(wo)).
+    /// Upper bound of the density D_wo(m) dω_m/dω_i = D / (4 σ(wo)) over a cone of reflected directions.
     float max_pdf_of_reflection(Vec3 wo, const DirectionCone& c) const {
         return 0.25f * max_D(halfway_of_reflection(wo, c).theta) / sigma(wo);
     }
-    /// The same of refracted directions: D |wo·m| |wi·m| η² / (|wo + η wi|² σ(wo)), `eta` being η on their side over η on
-    /// wo's.
+    /// The same for refracted directions, with density D |wo·m| |wi·m| η² / (|wo + η wi|² σ(wo)); `eta` is η on their
+    /// side over η on wo's side.
     float max_pdf_of_refraction(Vec3 wo, const DirectionCone& c, float eta) const;
 
-    /// Projected area σ(w), for `w` on either side.
+    /// Projected area σ(w) for `w` on either side.
     float sigma(Vec3 w) const {
         const float cos = std::fabs(w.z), s2 = sqr(alpha_x_ * w.x) + sqr(alpha_y_ * w.y);
         if (kind_ == Kind::Ggx) return 0.5f * (cos + std::sqrt(sqr(cos) + s2));

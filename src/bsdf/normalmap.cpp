@@ -2,7 +2,7 @@
 //   normalmap (required)  texture of (n + 1)/2 in the shading frame with x along ∂p/∂u; raw, not
 //                         sRGB
 //   nested: one bsdf
-// Inside a two-sided material the tilt is the same on both sides, as in Mitsuba 3.
+// In a two-sided material the normals are tilted equally on both sides, as in Mitsuba 3.
 
 #include "bsdf/wrapper.h"
 
@@ -21,7 +21,7 @@ public:
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         const Rgb c = normals_.eval(point.uv);
-        // A frame turned by a two-sided material has its t reversed with n; the map's y has not.
+        // A two-sided material reverses t together with n, but the y of the map must not change.
         const float t_sign = dot(frame.n, point.ng) < 0 ? -1.0f : 1.0f;
         const Vec3 n = frame.to_world({2 * c.r - 1, (2 * c.g - 1) * t_sign, 2 * c.b - 1});
         nested_->append(point, perturbed_frame(point, frame, n), weight, list);

@@ -1,4 +1,4 @@
-// A surface that is not there: every ray passes unchanged. It bounds media.
+// An invisible surface that every ray passes unchanged; a boundary of media.
 
 #include "bsdf/material.h"
 

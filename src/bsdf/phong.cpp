@@ -3,8 +3,8 @@
 //   diffuse_reflectance (0.5)   colour or texture in [0, 1]
 //   specular_reflectance (0.2)  colour or texture in [0, 1]
 //   exponent (30)               number or texture, at least 0
-// Where the two colours add up to more than one, both are scaled down. The part of the lobe below
-// the surface is lost. One-sided.
+// Where the sum of the two colours exceeds one, both are scaled down. The part of the lobe below the surface is lost.
+// One-sided.
 
 #include "bsdf/phong.h"
 
@@ -30,8 +30,7 @@ std::optional<BsdfSample> PhongLobe::sample(Vec3 wo, float u_lobe, Vec2 u) const
         const Vec3 wi = sample_cosine_hemisphere(u);
         return make_sample(wi, eval(wo, wi));
     }
-    // Density (n + 1)/(2π) cosⁿ α about the mirror direction; what falls below the surface ends the
-    // walk.
+    // Density (n + 1)/(2π) cosⁿ α about the mirror direction; directions below the surface end the walk.
     const float cos_alpha = std::pow(u.x, 1 / (exponent + 1)),
                 sin_alpha = safe_sqrt(1 - sqr(cos_alpha));
     float s, c;

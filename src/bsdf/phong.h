@@ -20,7 +20,7 @@ struct PhongLobe {
                (1 - specular_probability) * std::fmax(c.max_cos({0, 0, 1}), 0.0f) * kInvPi;
     }
     Rgb albedo_estimate() const { return diffuse + specular; }
-    /// The GGX or Beckmann α of about the same highlight.
+    /// The GGX or Beckmann α of a similar highlight.
     float roughness() const { return specular_probability > 0 ? std::sqrt(2 / (exponent + 2)) : 1; }
     bool has_smooth() const { return true; }
     static constexpr bool kUsesLobeChoice = true;

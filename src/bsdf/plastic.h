@@ -5,8 +5,8 @@
 
 namespace etendue {
 
-/// Probability of the specular one of two parts that get `F` and 1 − `F` of the light, with
-/// `specular_share` the share of the specular colour in the sum of both colours.
+/// Probability of sampling the specular part, where the specular part receives `F` and the diffuse part 1 − `F` of the
+/// light, and `specular_share` is the share of the specular colour in the sum of both colours.
 inline float coat_probability(float F, float specular_share) {
     const float s = F * specular_share, d = (1 - F) * (1 - specular_share);
     return s + d > 0 ? s / (s + d) : 0;

@@ -1,5 +1,5 @@
 #pragma once
-// What smooth and rough plastic read from a scene file.
+// Parameters shared by smooth and rough plastic.
 
 #include "bsdf/material.h"
 
@@ -15,16 +15,16 @@ struct PlasticParams {
     struct Colors {
         Rgb diffuse, specular;
         float
-            specular_share;  ///< Share of the specular colour in the sum of both, before the coat.
+            specular_share;  ///< Share of the specular colour in the sum of both, without the coat.
     };
-    /// Colours at `uv`, the diffuse one as the coat sends it out before the two transmittances:
+    /// Colours at `uv`. The diffuse one includes interreflection below the coat, but not the two transmittances:
     ///     ρ / (η² (1 − ρ' F_int)),
-    /// F_int being the coat's reflectance for diffuse light from below. ρ' = ρ sums the
-    /// interreflection of the colour (`nonlinear`); ρ' = 1 keeps the colours of textures.
+    /// where F_int is the coat's reflectance for diffuse light from below. With `nonlinear` ρ' = ρ, which saturates the
+    /// colour; otherwise ρ' = 1, which keeps the hue of textures.
     Colors eval(Vec2 uv, float F_int) const;
     Rgb mean_albedo() const;
 
-    /// Rows for the tables of plug-ins that read these.
+    /// Rows for the tables of plug-ins with these parameters.
     static std::vector<ParamInfo> table();
 };
 

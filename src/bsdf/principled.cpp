@@ -10,16 +10,16 @@
 //   sheen (0), sheen_tint (0)      retroreflective cloth at grazing angles, and its hue
 //   flatness (0)           share of fake subsurface scattering in the diffuse part
 //   clearcoat (0), clearcoat_gloss (0)   second, isotropic specular lobe, and its sharpness
-// All of them may be textures, except eta and specular. Directions below the surface see rough
-// glass only.
+// All of them may be textures, except eta and specular. From below, the surface is rough glass only.
 //
-// Reflection is reciprocal. Energy is not conserved by construction: specular reflection is added
-// to the diffuse part without taking from it, so that the albedo of white materials exceeds one (as
-// Burley's does).
+// Reflection is reciprocal. Energy is not conserved: specular reflection is added to the diffuse part without reducing
+// it, so that the albedo of white materials exceeds one, as in Burley's model.
 
 #include "bsdf/principled.h"
 
 #include <algorithm>
+
+#include <fmt/format.h>
 
 #include "bsdf/fresnel.h"
 #include "bsdf/material.h"
@@ -34,15 +34,13 @@ float schlick_weight(float cos) {
     return sqr(sqr(m)) * m;
 }
 
-/// Schlick's Fresnel reflectance for light from above, with the angle on the side of the smaller
-/// index.
+/// Schlick's Fresnel reflectance for light from above, with the angle on the side of the smaller index.
 Rgb schlick(Rgb R0, float cos_m, float eta) {
     const float cos = eta > 1 ? cos_m : std::fabs(fresnel_dielectric(cos_m, eta).cos_t);
     return lerp(schlick_weight(cos), R0, Rgb(1));
 }
 
-/// GTR1 distribution of normals [Burley 2012, app. B], the clearcoat's; sin² instead of 1 − cos²
-/// keeps its digits.
+/// GTR1 distribution of normals of the clearcoat [Burley 2012, app. B]; sin² replaces 1 − cos², which would cancel.
 struct Gtr1 {
     float alpha2;
 
@@ -131,7 +129,7 @@ Rgb PrincipledLobe::diffuse_and_sheen(Vec3 wo, Vec3 wi, float cos_m) const {
 BsdfEval PrincipledLobe::eval_reflection(Vec3 wo, Vec3 wi) const {
     const bool is_above = wo.z > 0;
     const Vec3 h = is_above ? wo + wi : -(wo + wi), m = h / length(h);
-    if (!(m.z > 0)) return {};  // both grazing and opposite, beyond the range of float
+    if (!(m.z > 0)) return {};  // opposite grazing directions: not resolved by float
     const float cos_m = dot(wo, m), F = fresnel_dielectric(cos_m, eta).R;
     const Microfacet main = main_distribution();
     const float quarter_D = 0.25f * main.D(m), sigma_o = main.sigma(wo), sigma_i = main.sigma(wi);
@@ -160,7 +158,7 @@ BsdfEval PrincipledLobe::eval_reflection(Vec3 wo, Vec3 wi) const {
     return e;
 }
 
-/// As RoughDielectricLobe's, tinted by √base_color: light passes the boundary twice.
+/// As RoughDielectricLobe's refraction, tinted by √base_color, since light passes the boundary twice.
 BsdfEval PrincipledLobe::eval_refraction(Vec3 wo, Vec3 wi) const {
     const bool is_above = wo.z > 0;
     const float eta_io = is_above ? eta : 1 / eta;
@@ -168,7 +166,7 @@ BsdfEval PrincipledLobe::eval_refraction(Vec3 wo, Vec3 wi) const {
     if (m.z < 0) m = -m;
     const float cos_o = dot(wo, m), cos_i = dot(wi, m);
     if (!(cos_o * wo.z > 0 && cos_i * wi.z > 0)) return {};
-    // From the thinner medium, where F is smooth; it is the same from both.
+    // Evaluated on the side of the smaller index, where F is smooth; both sides have the same F.
     const float F = fresnel_dielectric(eta_io > 1 ? cos_o : cos_i, eta).R;
     const Microfacet main = main_distribution();
     const float sigma_o = main.sigma(wo), sigma_i = main.sigma(wi);
@@ -287,7 +285,7 @@ public:
     Rgb mean_albedo() const override { return base_color_.mean(); }
 
 private:
-    /// Refraction at equal indices would be a delta event; Mitsuba 3 uses the same way out.
+    /// Replaces η = 1, where refraction would be a delta event, as in Mitsuba 3.
     static constexpr float kEtaOfClearGlass = 1.001f;
 
     static float read_eta(const Params& params) {
@@ -295,7 +293,9 @@ private:
             params.fail("specular", "give either \"eta\" or \"specular\", not both");
         if (params.has("eta")) {
             const float eta = params.number("eta", 1.5f, 0);
-            if (!(eta > 0)) params.fail("eta", "parameter \"eta\" must be above zero");
+            if (!(eta > 0))
+                params.fail("eta",
+                            fmt::format("parameter \"eta\" is {}, but must be above 0", eta));
             return eta;
         }
         // F0 = 0.08 specular.

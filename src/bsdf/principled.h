@@ -4,8 +4,8 @@
 
 namespace etendue {
 
-/// Disney's principled BSDF [Burley 2012, 2015] with the details of Mitsuba 3; principled.cpp has
-/// the formulas. All parameters but `eta` lie in [0, 1].
+/// Disney's principled BSDF [Burley 2012, 2015] in the form of Mitsuba 3; see principled.cpp. All parameters except
+/// `eta` lie in [0, 1].
 struct PrincipledLobe {
     Rgb base_color;
     float surface_roughness;  ///< Square root of the main specular lobe's α.
@@ -32,14 +32,13 @@ private:
     float refraction_weight() const { return (1 - metallic) * spec_trans; }
     /// Normals of the main specular lobe, for reflection and refraction.
     Microfacet main_distribution() const;
-    /// Probabilities of the parts for directions above the surface; below it there is the main one
-    /// only.
+    /// Probabilities of sampling the parts, for wo above the surface; below it only the main part is sampled.
     struct Selection {
         float diffuse, clearcoat, main;
     };
     Selection selection() const;
-    /// Probability that a visible normal of the main part with Fresnel reflectance F reflects; else
-    /// it refracts.
+    /// Probability that sampling reflects at a visible normal of the main part with Fresnel reflectance F; otherwise it
+    /// refracts.
     float reflection_probability(bool is_above, float F) const;
 
     BsdfEval eval_reflection(Vec3 wo, Vec3 wi) const;

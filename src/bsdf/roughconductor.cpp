@@ -5,8 +5,8 @@
 //   material (none), or eta, k         named metal, "none" for reflectance 1, or its complex index
 //   specular_reflectance (1)           factor of the reflectance; only 1 is physical
 //   sample_visible (true)              accepted; visible normals are always sampled
-// References: [Walter et al. 2007], [Heitz 2014]. One-sided; Smith's separable masking; light that
-// would scatter several times between facets is lost, which darkens metals from about alpha 0.3 on.
+// References: [Walter et al. 2007], [Heitz 2014]. One-sided; separable Smith masking. Light scattered several times
+// between facets is lost, which visibly darkens metals with alpha above about 0.3.
 
 #include "bsdf/roughconductor.h"
 

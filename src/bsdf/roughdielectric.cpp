@@ -4,8 +4,7 @@
 //   int_ior (bk7), ext_ior (air)       indices behind and in front; numbers or names; not equal
 //   specular_reflectance (1), specular_transmittance (1)   factors; only 1 is physical
 //   sample_visible (true)              accepted; visible normals are always sampled
-// References: [Walter et al. 2007], [Heitz 2014]. Light that would scatter several times between
-// facets is lost.
+// References: [Walter et al. 2007], [Heitz 2014]. Light scattered several times between facets is lost.
 
 #include "bsdf/roughdielectric.h"
 
@@ -15,8 +14,8 @@ namespace etendue {
 
 namespace {
 
-/// D(m), σ(wo) and σ(wi) of one facet and pair of directions; value and densities of both events
-/// follow from them.
+/// D(m), σ(wo) and σ(wi) of one facet and one pair of directions, from which value and densities of reflection and
+/// refraction follow.
 struct Facet {
     float D, sigma_o, sigma_i;
 
@@ -47,7 +46,7 @@ BsdfEval RoughDielectricLobe::eval(Vec3 wo, Vec3 wi) const {
     if (!(len2 > 0)) return {};
     m = m * (std::copysign(1 / std::sqrt(len2), m.z));
     const float wo_m = dot(wo, m), wi_m = dot(wi, m);
-    // Both directions must see the side of the facet that they see of the surface.
+    // Each direction must see the same side of the facet and of the surface.
     if (!(wo_m * wo.z > 0 && wi_m * wi.z > 0)) return {};
     const float D = distribution.D(m);
     if (!(D > 0)) return {};

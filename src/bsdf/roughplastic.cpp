@@ -6,8 +6,8 @@
 //   int_ior (polypropylene), ext_ior (air)   indices of the coat and outside; numbers or names
 //   nonlinear (false)           whether interreflection under the coat saturates the colour
 //   sample_visible (true)       accepted; visible normals are always sampled
-// The rough transmittance is that of single scattering, as in Mitsuba 3: light that meets several
-// facets is lost. Reciprocal. One-sided.
+// The rough transmittance is that of single scattering, as in Mitsuba 3: light scattered several times between facets
+// is lost. Reciprocal. One-sided.
 
 #include "bsdf/roughplastic.h"
 
@@ -17,8 +17,7 @@
 namespace etendue {
 namespace {
 
-/// The mean of `value(m)` over the facets m visible from `wo`, by the midpoint rule with n × n
-/// points.
+/// Mean of `value(m)` over the facets m visible from `wo`, by the midpoint rule with n × n points.
 template <class F>
 double mean_over_visible_normals(int n, const Microfacet& distribution, Vec3 wo, const F& value) {
     double sum = 0;
@@ -28,8 +27,7 @@ double mean_over_visible_normals(int n, const Microfacet& distribution, Vec3 wo,
     return sum / (n * n);
 }
 
-/// Share of the light from `wo` that a rough dielectric refracts at once: the mean of (1 − F(wo·m))
-/// G1(wi).
+/// Share of the light from `wo` that a rough dielectric refracts at the first facet: the mean of (1 − F(wo·m)) G1(wi).
 double rough_transmittance(const Microfacet& distribution, float eta, Vec3 wo) {
     return mean_over_visible_normals(32, distribution, wo, [&](Vec3 m) {
         const DielectricFresnel fresnel = fresnel_dielectric(dot(wo, m), eta);
@@ -38,8 +36,7 @@ double rough_transmittance(const Microfacet& distribution, float eta, Vec3 wo) {
     });
 }
 
-/// Share that it reflects at once: the mean of F(wo·m) G1(wi). Total internal reflection asks for
-/// more points.
+/// Share that it reflects at the first facet: the mean of F(wo·m) G1(wi). Total internal reflection needs more points.
 double rough_reflectance(const Microfacet& distribution, float eta, Vec3 wo) {
     return mean_over_visible_normals(64, distribution, wo, [&](Vec3 m) {
         const Vec3 wi = reflect(wo, m);
@@ -58,22 +55,21 @@ RoughTransmittance::RoughTransmittance(const Microfacet& distribution, float eta
         external_[i] = float(rough_transmittance(distribution, eta, wo));
         internal += 2 * cos_theta * rough_reflectance(distribution, 1 / eta, wo);
     }
-    // 2 ∫ R(μ) μ dμ with equal weights of all nodes, as in Mitsuba 3, with whose images this model
-    // is compared; the trapezoidal rule gives about 1 % more.
+    // 2 ∫ R(μ) μ dμ with equal weights of all nodes, as in Mitsuba 3, to match its images; the trapezoidal rule gives
+    // about 1 % more.
     internal_reflectance_ = float(internal / kSize);
 }
 
 BsdfEval RoughPlasticLobe::eval(Vec3 wo, Vec3 wi) const {
     if (!(wo.z > 0 && wi.z > 0)) return {};
     const Vec3 h = wo + wi, m = h / length(h);
-    if (!(m.z > 0)) return {};  // both grazing and opposite, beyond the range of float
+    if (!(m.z > 0)) return {};  // opposite grazing directions: not resolved by float
     const float F = fresnel_dielectric(dot(wo, m), eta).R;
     const float To = RoughTransmittance::lookup(transmittance, wo.z);
     const float Ti = RoughTransmittance::lookup(transmittance, wi.z);
     const float qo = coat_probability(1 - To, specular_share),
                 qi = coat_probability(1 - Ti, specular_share);
-    // With σ(w) = |cos θ| / G1(w): D G / (4 cos θo) and the density of the mirrored visible
-    // normals.
+    // With σ(w) = |cos θ| / G1(w): D G / (4 cos θo), and the density of reflection at visible normals.
     const float quarter_D = 0.25f * distribution.D(m), sigma_o = distribution.sigma(wo),
                 sigma_i = distribution.sigma(wi);
     return {.f = specular * (F * quarter_D * wi.z / (sigma_o * sigma_i)) +

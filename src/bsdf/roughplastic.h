@@ -8,8 +8,8 @@
 
 namespace etendue {
 
-/// Rough transmittance T(θ) of a dielectric boundary: the share of light from outside that is
-/// refracted at a first facet and leaves it unhindered.
+/// Rough transmittance T(θ) of a dielectric boundary: the share of light from outside that is refracted at the first
+/// facet and not masked afterwards.
 class RoughTransmittance {
 public:
     /// `eta` is η of the inside over η outside.
@@ -22,7 +22,7 @@ public:
         return lerp(x - float(i), table[i], table[i + 1]);
     }
     const float* table() const { return external_.data(); }
-    /// Share of diffuse light from inside that is reflected at a first facet.
+    /// Share of diffuse light from inside that is reflected at the first facet.
     float internal_reflectance() const { return internal_reflectance_; }
 
 private:

@@ -1,5 +1,5 @@
-// Pane so thin that what it transmits goes straight on; internal reflections are included.
-//   int_ior (bk7), ext_ior (air)   indices of the pane and of what is around it; numbers or names
+// Pane so thin that transmitted light goes straight on; internal reflections are included.
+//   int_ior (bk7), ext_ior (air)   indices of the pane and of the medium around it; numbers or names
 //   specular_reflectance (1), specular_transmittance (1)   factors; only 1 is physical
 
 #include "bsdf/thindielectric.h"

@@ -1,7 +1,6 @@
 // Makes a reflecting material visible from both sides.
 //   nested: one bsdf for both sides, or two, the first where the normal points, the second behind
-// The frame is turned toward the side of the geometric surface that wo is on. What is nested must
-// reflect only.
+// The frame is turned to wo's side of the geometric surface. Nested materials must not transmit light.
 
 #include "bsdf/wrapper.h"
 
@@ -14,16 +13,15 @@ public:
         const auto nested = nested_materials(params, context, 1, 2);
         for (const Material* m : nested)
             if (m->is_transmissive() || !m->is_opaque())
-                params.fail("bsdf \"twosided\" can hold only materials that reflect, none that "
-                            "lets light pass "
-                            "(put a \"mask\" around the \"twosided\" instead)");
+                params.fail("bsdf \"twosided\" cannot hold a material that lets light pass "
+                            "(to mask it, put the \"twosided\" into a \"mask\")");
         front_ = nested.front();
         back_ = nested.back();
     }
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        // Relative to the given frame, which an outer material may have turned already.
+        // Relative to `frame`, which an outer material may have turned already.
         const bool is_front = (dot(point.wo, point.ng) < 0) == (dot(frame.n, point.ng) < 0);
         if (is_front)
             front_->append(point, frame, weight, list);

@@ -1,5 +1,5 @@
 #pragma once
-// What the materials that change another material share.
+// Shared parts of materials that modify nested materials.
 
 #include <algorithm>
 
@@ -9,7 +9,7 @@
 
 namespace etendue {
 
-/// The materials nested in `params`; an error where there are fewer than `lo` or more than `hi`.
+/// The materials nested in `params`; throws SceneError where there are fewer than `lo` or more than `hi`.
 inline std::vector<const Material*> nested_materials(const Params& params, MaterialContext& context,
                                                      size_t lo, size_t hi) {
     std::vector<const Material*> nested = context.nested(params);
@@ -21,7 +21,7 @@ inline std::vector<const Material*> nested_materials(const Params& params, Mater
     return nested;
 }
 
-/// A material that changes one nested material and passes on the rest.
+/// A material that modifies one nested material; everything not overridden is that of the nested one.
 class WrapperMaterial : public Material {
 public:
     float opacity(Vec2 uv) const override { return nested_->opacity(uv); }
@@ -38,28 +38,27 @@ protected:
     const Material* nested_;
 };
 
-// Options of Mitsuba 3.7's bump and normal maps that are known but not supported.
+// Options of the bump and normal maps of Mitsuba 3.7, which are known but not supported.
 inline constexpr const char* kFlipInvalidNormalsDoc =
     "Turning normals toward the view; must be false.";
 inline constexpr const char* kShadowingFunctionDoc =
     "Softening the terminator of the light; must be false.";
 
-/// Refuses these options: they make the material depend on which of the two directions is the
-/// view's.
+/// Throws SceneError where one of these options is set: they make a material depend on which of the two directions is
+/// that of the view.
 inline void refuse_view_dependence(const Params& params) {
     for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
         if (params.flag(name, false))
             params.fail(
                 name,
-                fmt::format("\"{}\" must be false: it has no meaning for paths from the lights",
+                fmt::format("parameter \"{}\" must be false: it is not defined for light paths",
                             name));
 }
 
-/// The shading frame turned to the normal `n` (of any length, in world space). The result stays on
-/// that side of the geometric surface on which `frame` is: an `n` beyond it has its tilt turned
-/// around, as Mitsuba 3 does [Schüssler et al. 2017], but by ng and never by the direction of
-/// view, so that both ends of a path see the same surface. An `n` that cannot be used leaves the
-/// frame as it is.
+/// The shading frame `frame` turned to the normal `n` (of any length, in world space). The result stays on the side of
+/// `frame.n` of the geometric surface: an `n` beyond it is mirrored about `frame.n`, as in Mitsuba 3 [Schüssler et al.
+/// 2017]. The condition uses ng, never the direction of view, so that both ends of a path see the same surface. Where
+/// mirroring does not help, or `n` is zero or not finite, `frame` is returned.
 inline Frame perturbed_frame(const SurfacePoint& point, const Frame& frame, Vec3 n) {
     const float len = length(n);
     if (!(len > 0 && std::isfinite(len))) return frame;

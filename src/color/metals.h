@@ -15,8 +15,8 @@ struct ConductorIor {
     Rgb eta, k;
 };
 
-/// Index of the material with this name ("Au", "Cu", "TiN", ...; case matters). The suffix "_palik"
-/// that some scene files use is accepted for every name.
+/// Index of the material with this name ("Au", "Cu", "TiN", ...; case-sensitive), or empty for an unknown one. The
+/// suffix "_palik", which some scene files use, is accepted for every name.
 std::optional<ConductorIor> named_metal(std::string_view name);
 
 /// All names, in alphabetical order.

@@ -8,8 +8,7 @@ namespace etendue {
 namespace {
 
 constexpr double kFirstNm = 380, kLastNm = 780, kTableStepNm = 5;
-/// Step of the midpoint rule; it divides the table's step, so that no cell straddles a knot of the
-/// table.
+/// Step of the midpoint rule. It divides the table's step, so no cell contains a knot of the table.
 constexpr double kStepNm = 0.25;
 
 /// Colour matching functions of the CIE 1931 2° observer and the relative power of illuminant D65

@@ -11,9 +11,8 @@ namespace etendue {
 /// CIE XYZ to linear sRGB (Rec. 709 primaries, D65 white).
 Rgb xyz_to_rgb(double X, double Y, double Z);
 
-/// What a spectrum is seen by. Emission stands for itself, so the flat spectrum is the reddish
-/// (1.205, 0.948, 0.909); a reflectance or another ratio is weighted by daylight, so the flat one
-/// is (1, 1, 1).
+/// Illuminant that weights a spectrum. Emission is not weighted (EqualEnergy), so a flat spectrum has the reddish
+/// colour (1.205, 0.948, 0.909). Reflectances and other ratios are seen under D65, where a flat spectrum is (1, 1, 1).
 enum class Illuminant { EqualEnergy, D65 };
 
 /// Colour of a spectrum given at strictly increasing wavelengths in nm, linear between them and
@@ -22,7 +21,7 @@ enum class Illuminant { EqualEnergy, D65 };
 Rgb spectrum_to_rgb(std::span<const double> wavelengths_nm, std::span<const double> values,
                     Illuminant illuminant = Illuminant::EqualEnergy);
 
-/// By how much each sample of a spectrum adds to its colour: spectrum_to_rgb() without the clipping.
+/// Coefficients of spectrum_to_rgb() before clipping: the colour is the sum of each value times its weight.
 std::vector<Rgb> spectrum_weights(std::span<const double> wavelengths_nm,
                                   Illuminant illuminant = Illuminant::EqualEnergy);
 

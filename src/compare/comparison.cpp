@@ -13,8 +13,8 @@
 namespace etendue {
 namespace {
 
-/// A method's part in one run.
-struct Contestant {
+/// Renderer and measurements of one method in one run.
+struct MethodRun {
     std::unique_ptr<Renderer> renderer;
     MemoryMeter memory;
     std::vector<Checkpoint> checkpoints;
@@ -24,7 +24,7 @@ ImageErrors errors_of(const std::vector<Rgb>& image, const Reference& r) {
     return image_errors(image, r.half(0), {.reference2 = r.half(1)});
 }
 
-void add_checkpoint(Contestant& c, const Reference& reference) {
+void add_checkpoint(MethodRun& c, const Reference& reference) {
     const Film& film = c.renderer->film();
     if (film.passes() == 0) return;
     if (!c.checkpoints.empty() && c.checkpoints.back().spp == film.passes()) return;
@@ -32,7 +32,7 @@ void add_checkpoint(Contestant& c, const Reference& reference) {
         {film.passes(), c.renderer->seconds(), errors_of(film.image(), reference)});
 }
 
-Run finished_run(const Contestant& c, uint64_t seed, const Reference& reference) {
+Run finished_run(const MethodRun& c, uint64_t seed, const Reference& reference) {
     const Renderer& r = *c.renderer;
     Run run;
     run.seed = seed;
@@ -57,15 +57,16 @@ RenderSettings render_settings(const CompareSettings& s, const IntegratorSpec& i
     return settings;
 }
 
-/// Methods take their turns forwards and backwards by turns, so that a machine that slows down steadily hits all alike.
-void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings& settings,
+/// The order of the methods is reversed in every other round, so that a machine that slows down affects all of them
+/// equally.
+void render_in_turns(std::vector<MethodRun>& method_runs, const CompareSettings& settings,
                      const Reference& reference, const CompareProgress& progress,
                      const std::string& label, const std::atomic<bool>& interrupted) {
     bool forwards = true;
     for (const Turn& turn : schedule(settings.limits)) {
-        for (size_t i = 0; i < contestants.size(); ++i) {
-            const size_t method = forwards ? i : contestants.size() - 1 - i;
-            Contestant& c = contestants[method];
+        for (size_t i = 0; i < method_runs.size(); ++i) {
+            const size_t method = forwards ? i : method_runs.size() - 1 - i;
+            MethodRun& c = method_runs[method];
             c.memory.begin();
             c.renderer->run(
                 turn.limits,
@@ -82,7 +83,7 @@ void render_in_turns(std::vector<Contestant>& contestants, const CompareSettings
     }
 }
 
-/// A rendering of its own, since technique images cost time; a quarter of the method's.
+/// Technique images are rendered separately, since they cost time; in a quarter of the method's time.
 void render_techniques(const Scene& scene, const CompareSettings& settings, Method& method,
                        const std::atomic<bool>& interrupted) {
     RenderSettings s = render_settings(settings, method.spec.integrator, settings.seed);
@@ -123,7 +124,7 @@ std::optional<PowerLaw> slope(const Run& run, const Get& get) {
         times.push_back(c.seconds);
         errors.push_back(get(c.errors));
     }
-    // What comes first is not the rule yet: a few samples have not found the rare paths.
+    // Early checkpoints are left out: few samples have not found rare paths yet.
     return fit_power_law(times, errors, times.empty() ? 0 : times.back() / 32);
 }
 
@@ -155,20 +156,20 @@ void check_methods(const std::vector<MethodSpec>& methods) {
 
 void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& methods,
                        const IntegratorSpec& reference) {
-    // Weights of pairs follow what was learned, so that no two renderings have the same: they have no fixed counts.
+    // Methods with learned weights of pairs have no fixed counts, since the weights differ between renderings.
     const auto fixed_counts = [&](const IntegratorSpec& spec) -> std::optional<TechniqueCounts> {
         const auto integrator = make_integrator(spec);
         const TechniqueCounts counts = integrator->counts(scene, scene.film().pixel_count());
         const bool learns = counts.gather > 0 || (counts.merge > 0 && counts.connect > 0);
         return learns ? std::nullopt : std::optional(counts);
     };
-    const auto judge = fixed_counts(reference);
+    const auto expected = fixed_counts(reference);
     for (const MethodSpec& m : methods) {
         const auto own = fixed_counts(m.integrator);
-        if (!own || !judge || !(*own == *judge))
+        if (!own || !expected || !(*own == *expected))
             throw std::runtime_error(fmt::format(
-                "--paths inner: \"{}\" weighs its techniques otherwise than \"{}\", by which it is "
-                "judged; their inner paths do not have the same mean",
+                "--paths inner: \"{}\" weights its techniques differently than the reference "
+                "\"{}\", so that their inner paths have different means",
                 m.name, reference.to_string()));
     }
 }
@@ -222,18 +223,18 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
 
     for (int index = 0; index < settings.runs && !interrupted.load(); ++index) {
         const uint64_t seed = settings.seed + uint64_t(index);
-        std::vector<Contestant> contestants(settings.methods.size());
-        for (size_t i = 0; i < contestants.size(); ++i) {
-            contestants[i].memory.begin();
-            contestants[i].renderer = std::make_unique<Renderer>(
+        std::vector<MethodRun> method_runs(settings.methods.size());
+        for (size_t i = 0; i < method_runs.size(); ++i) {
+            method_runs[i].memory.begin();
+            method_runs[i].renderer = std::make_unique<Renderer>(
                 scene, render_settings(settings, settings.methods[i].integrator, seed));
-            contestants[i].memory.end();
+            method_runs[i].memory.end();
         }
         const std::string label =
             settings.runs > 1 ? fmt::format("run {} of {}, ", index + 1, settings.runs) : "";
-        render_in_turns(contestants, settings, reference, progress, label, interrupted);
-        for (size_t i = 0; i < contestants.size(); ++i) {
-            Contestant& c = contestants[i];
+        render_in_turns(method_runs, settings, reference, progress, label, interrupted);
+        for (size_t i = 0; i < method_runs.size(); ++i) {
+            MethodRun& c = method_runs[i];
             add_checkpoint(c, reference);
             if (c.checkpoints.empty()) continue;  // interrupted before its first pass
             Method& m = out.methods[i];

@@ -1,5 +1,5 @@
 #pragma once
-// Methods side by side on one scene: rendered in turns, judged by one reference.
+// Comparison of methods on one scene: they are rendered in turns, and compared with one reference.
 
 #include <atomic>
 #include <functional>
@@ -14,7 +14,7 @@
 
 namespace etendue {
 
-/// What is compared: an integrator, and what people call it.
+/// A method: an integrator and its name in reports.
 struct MethodSpec {
     std::string name;
     IntegratorSpec integrator;
@@ -23,19 +23,19 @@ struct MethodSpec {
 struct CompareSettings {
     std::vector<MethodSpec> methods;
     SamplerKind sampler = SamplerKind::Sobol;
-    uint64_t seed = 0;    ///< Of the first run; the others count on.
-    int threads = 0;      ///< 0: all.
+    uint64_t seed = 0;    ///< Of the first run; the others have consecutive seeds.
+    int threads = 0;      ///< 0: one per core.
     RenderLimits limits;  ///< Of each method in each run: seconds or spp.
     int runs = 1;
     PathSelection shown;  ///< As in RenderSettings.
-    /// Technique images up to this many edges, from a rendering of their own; 0 for none.
+    /// Longest path, in edges, with technique images, which are rendered separately; 0 for none.
     int technique_depth = 0;
 };
 
-/// The image so far.
+/// Errors of the image at one time.
 struct Checkpoint {
     uint64_t spp;
-    double seconds;  ///< Spent rendering.
+    double seconds;  ///< Rendering time so far.
     ImageErrors errors;
 };
 
@@ -45,9 +45,8 @@ struct Run {
     RenderStats stats;
     uint64_t rejected = 0;  ///< Contributions that were not finite.
     Film::MeanEstimate mean;
-    std::vector<Checkpoint> checkpoints;  ///< The last is that of the final image.
-    /// Without the subtraction of the reference's variance.
-    ImageErrors uncorrected;
+    std::vector<Checkpoint> checkpoints;  ///< The last one is that of the final image.
+    ImageErrors uncorrected;              ///< Including the reference's variance.
 
     const ImageErrors& errors() const { return checkpoints.back().errors; }
 };
@@ -56,7 +55,7 @@ struct Method {
     MethodSpec spec;
     Estimator estimator = Estimator::Unbiased;
     std::vector<Run> runs;
-    // Of the first run.
+    // Of the first run:
     std::vector<Rgb> image;
     std::vector<float> flip_map;
     double flip = 0;
@@ -72,40 +71,40 @@ struct Comparison {
     FilmGeometry film;
     CompareSettings settings;
     Reference reference;
-    /// The reference's own variance, in units of mse and rel_mse; 0 where it is not known.
+    /// The reference's own variance, in units of mse and rel_mse; 0 where it is unknown.
     double reference_mse = 0, reference_rel_mse = 0;
     std::vector<Method> methods;
-    size_t scene_bytes = 0;  ///< Resident before the first method began.
+    size_t scene_bytes = 0;  ///< Resident memory before the first method started.
     bool interrupted = false;
 };
 
-/// What is going on: `text` is fit for a line on the terminal.
+/// Receives the current status as one line of text.
 using CompareProgress = std::function<void(const std::string& text)>;
 
-/// Renders and judges. Where `interrupted` is set, what there is then is judged. Throws std::runtime_error where a method
-/// or its parameters do not exist.
+/// Renders the methods and evaluates them. If `interrupted` is set, evaluates the images rendered until then. Throws
+/// std::runtime_error where a method or its parameters do not exist.
 Comparison compare(const Scene& scene, const Reference& reference, const CompareSettings& settings,
                    const CompareProgress& progress, const std::atomic<bool>& interrupted);
 
 /// Throws std::runtime_error where a method or its parameters do not exist, or two are the same.
 void check_methods(const std::vector<MethodSpec>& methods);
 
-/// Throws std::runtime_error where a method weighs its techniques otherwise than the reference's: then the inner paths of
-/// both have different means.
+/// Throws std::runtime_error where the MIS weights of a method differ from those of the reference's method, since the
+/// means of their inner paths are different then.
 void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& methods,
                        const IntegratorSpec& reference);
 
-/// Where methods stop and let the next one go on. Checkpoints are a factor of √2 in time or 2 in samples apart, evenly in
-/// a logarithmic plot; long steps are cut into several turns.
+/// Limits at which a method stops and the next one continues. Checkpoints are a factor of √2 in time or 2 in samples
+/// apart, so that they are equidistant in a logarithmic plot; long steps are divided into several turns.
 struct Turn {
     RenderLimits limits;
     bool is_checkpoint;
 };
 std::vector<Turn> schedule(const RenderLimits& limits);
 
-/// Figures over all runs.
+/// Results of one method over all runs.
 struct MethodSummary {
-    double spp = 0, seconds = 0, rays = 0;  ///< Means of one run.
+    double spp = 0, seconds = 0, rays = 0;  ///< Means per run.
     double rmse = 0;                        ///< √ mean mse
     double rel_mse = 0, rel_mse_trimmed = 0, mape = 0, spike = 0;
     std::optional<Interval> rel_mse_interval;
@@ -113,7 +112,7 @@ struct MethodSummary {
     std::optional<PowerLaw> rmse_slope, rel_mse_slope;
     std::optional<Interval> rel_mse_slope_interval;  ///< From the slopes of the runs.
     std::optional<Efficiency> efficiency;  ///< From rel_mse, relative to the first method.
-    /// Share of the measured rel_mse that was the reference's noise; none where that is not known.
+    /// Share of the uncorrected rel_mse that is due to the reference's noise; empty where it is unknown.
     std::optional<double> reference_share;
 };
 std::vector<MethodSummary> summarize(const Comparison& comparison);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kMaxHalf = 65504;
 
-/// Halves whose two lowest bits are zero: they are noise to the eye and to deflate.
+/// Rounds to a half float whose two lowest bits are zero: they are invisible, and would not compress.
 uint16_t short_half(float v) {
     if (std::isfinite(v)) v = std::clamp(v, -kMaxHalf, kMaxHalf);
     const uint16_t bits = Half(v).bits();

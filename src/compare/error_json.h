@@ -6,7 +6,7 @@
 
 namespace etendue {
 
-/// All figures by name, as `compare` and `diff` write them.
+/// All errors by name, as printed by `compare` and `diff`.
 nlohmann::ordered_json to_json(const ImageErrors& e);
 
 }  // namespace etendue

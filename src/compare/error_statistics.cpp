@@ -11,7 +11,7 @@ namespace {
 
 struct Mean {
     double value = 0;
-    double variance = 0;  ///< Of the mean; 0 for a single sample.
+    double variance = 0;  ///< Variance of the mean; 0 for a single sample.
 
     explicit Mean(std::span<const double> samples) {
         const double n = double(samples.size());
@@ -56,7 +56,8 @@ std::optional<Efficiency> relative_efficiency(const Cost& base, const Cost& meth
     Efficiency out{c0 / c1, {}};
     const size_t runs = std::min(base.squared_errors.size(), method.squared_errors.size());
     if (runs < 2) return out;
-    // Variance of log e is var(e) / e² to first order; the degrees of freedom are those of the smaller side.
+    // To first order the variance of log e is var(e) / e². The degrees of freedom are those of the side with fewer
+    // runs.
     const double spread =
         std::sqrt(e0.variance / (e0.value * e0.value) + e1.variance / (e1.value * e1.value));
     const double factor = std::exp(student_quantile(0.05, double(runs - 1)) * spread);

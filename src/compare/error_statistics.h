@@ -1,5 +1,5 @@
 #pragma once
-// What a comparison concludes from errors: rates of convergence, means over runs, efficiencies, and how sure they are.
+// Statistics of errors: rates of convergence, means over runs and efficiencies, with confidence intervals.
 
 #include <optional>
 #include <span>
@@ -11,17 +11,16 @@ struct Interval {
     double value = 0, low = 0, high = 0;
 };
 
-/// Mean of independent measurements with Student's interval; none where there are fewer than two.
+/// Mean of independent measurements with the interval of Student's t; empty for fewer than two.
 std::optional<Interval> mean_interval(std::span<const double> samples);
 
-/// error ≈ factor · time^slope, by least squares of the logarithms. RMSE falls with slope −1/2, squared errors with −1,
-/// where an estimator is unbiased and its variance finite.
+/// error ≈ factor · time^slope, fitted by least squares of the logarithms. For an unbiased estimator with finite
+/// variance the slope is −1/2 for RMSE and −1 for squared errors.
 struct PowerLaw {
     double slope = 0, factor = 0;
     int points = 0;
 };
-/// Of the points, in order of time, with positive errors and times of at least `from`; none where fewer than three
-/// remain.
+/// Fits the points, ordered by time, with positive errors and times of at least `from`; empty for fewer than three.
 std::optional<PowerLaw> fit_power_law(std::span<const double> times, std::span<const double> errors,
                                       double from = 0);
 
@@ -30,15 +29,15 @@ struct Cost {
     std::span<const double> squared_errors;
     double seconds;
 };
-/// Efficiency is 1 / (squared error · time) [Veach 1997, §2.3.2]: that of `method` over that of `base`. With two runs or
-/// more the interval is known; it treats the logarithms as normal. None where an error is not positive.
+/// Efficiency 1 / (squared error · time) [Veach 1997, §2.3.2] of `method` relative to `base`. The interval, for two
+/// runs or more, assumes normally distributed logarithms. Empty where an error is not positive.
 struct Efficiency {
     double value = 0;
     std::optional<Interval> interval;
 };
 std::optional<Efficiency> relative_efficiency(const Cost& base, const Cost& method);
 
-/// Of a ratio X / R of two independent means, from their relative standard errors.
+/// Interval of the ratio X / R of two independent means, from their relative standard errors.
 Interval ratio_interval(double ratio, double relative_error_x, double relative_error_r);
 
 }  // namespace etendue

@@ -9,7 +9,7 @@
 namespace etendue {
 namespace {
 
-/// A field of /proc/self/status, which is in units of 1024 bytes.
+/// A field of /proc/self/status in bytes (the file has units of 1024 bytes); 0 where it is missing.
 size_t status_field(const std::string& name) {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;) {
@@ -26,7 +26,8 @@ size_t resident_bytes() {
 }
 
 void MemoryMeter::begin() {
-    malloc_trim(0);  // what others have freed must not serve this user unseen
+    malloc_trim(
+        0);  // otherwise memory freed by other users could be reused here without being counted
     std::ofstream("/proc/self/clear_refs") << "5";  // resets the peak, VmHWM
     resident_at_begin_ = resident_bytes();
 }
@@ -35,7 +36,7 @@ void MemoryMeter::end() {
     const size_t resident = resident_bytes(), highest = std::max(status_field("VmHWM"), resident);
     if (highest > resident_at_begin_)
         peak_ = std::max(peak_, kept_ + (highest - resident_at_begin_));
-    // Memory of others that is given back during this turn must not make the share negative.
+    // Other users' memory may be released during this turn, which must not make the share negative.
     kept_ = resident > resident_at_begin_ ? kept_ + (resident - resident_at_begin_)
                                           : kept_ - std::min(kept_, resident_at_begin_ - resident);
 }

@@ -4,21 +4,22 @@
 
 namespace etendue {
 
-/// Memory that became resident while one of several users of a process was at work. Linux reports residence, and its
-/// peak since the peak was last reset, for the whole process; a user's share is what it added between begin() and end(),
-/// so users must not run at the same time. What all share (the scene) was there before and counts for none.
+/// Measures the memory of one of several users of a process that run in turns. Linux reports resident memory and its
+/// peak for the whole process only, so a user's share is what it adds between begin() and end(), and users must not run
+/// at the same time. Shared memory that existed before (the scene) is not counted.
 class MemoryMeter {
 public:
     void begin();
     void end();
-    /// Largest sum of what the user kept from earlier turns and had in use beyond it. 0 where it cannot be told.
+    /// Largest sum, in bytes, of the memory kept from earlier turns and that added in a turn; 0 where it cannot be
+    /// measured.
     size_t peak_bytes() const { return peak_; }
 
 private:
     size_t resident_at_begin_ = 0, kept_ = 0, peak_ = 0;
 };
 
-/// Resident now; 0 where it cannot be told.
+/// Resident memory of the process; 0 where it cannot be measured.
 size_t resident_bytes();
 
 }  // namespace etendue

@@ -29,7 +29,7 @@ std::string escape(const std::string& text) {
     return out;
 }
 
-/// The part of one axis that is shown, as decimal logarithms, and where it lies on the page.
+/// Visible range of one axis, as decimal logarithms, and its position on the page.
 struct Axis {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     double from = 0, to = 0;
@@ -50,7 +50,7 @@ struct Axis {
         return from + (to - from) * (std::log10(value) - low) / (high - low);
     }
     bool shows(double value) const { return std::log10(value) >= low && std::log10(value) <= high; }
-    /// Powers of ten, and their multiples where few of them are shown.
+    /// Powers of ten, and multiples of them where the range is small.
     std::vector<double> ticks() const {
         const std::vector<double> multiples =
             high - low > 3     ? std::vector<double>{1}
@@ -140,7 +140,7 @@ std::string LogLogPlot::svg() const {
     for (size_t i = 0; i < curves.size(); ++i)
         draw_curve(out, curves[i], kColours[i % std::size(kColours)], x, y);
     out += "</g>\n";
-    // Errors fall from left to right, so the lower left corner is free.
+    // The legend is in the lower left corner, since errors decrease from left to right.
     for (size_t i = 0; i < curves.size(); ++i) {
         const double row = y.from - 12 - 18 * double(curves.size() - 1 - i);
         const std::string slope =

@@ -10,20 +10,20 @@ namespace etendue {
 
 struct PlotCurve {
     std::string label;
-    /// Points with a value that is not positive are left out: a logarithm does not show them.
+    /// Points with a value that is not positive are left out, since the axes are logarithmic.
     struct Point {
         double x, y;
     };
     std::vector<Point> points;
-    std::optional<PowerLaw> law;  ///< Drawn thin over the points, its slope in the legend.
+    std::optional<PowerLaw> law;  ///< Drawn as a dashed line; the legend shows its slope.
 };
 
-/// Both axes logarithmic.
+/// A plot with two logarithmic axes.
 struct LogLogPlot {
     std::string title, x_label, y_label;
     std::vector<PlotCurve> curves;
 
-    /// A complete SVG document. Colours are those of Okabe and Ito, told apart by most eyes.
+    /// A complete SVG document, with the colour-blind-safe palette of Okabe and Ito.
     std::string svg() const;
 };
 

@@ -16,9 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Raised when references that are kept can no longer be used.
+/// Version of cached references; increased when older ones can no longer be used.
 constexpr uint64_t kFormat = 2;
-/// Far from the seeds that people give, so that no method shares the reference's random numbers.
+/// Unlikely as a seed on the command line, so that no method shares the reference's random numbers.
 constexpr uint64_t kSeed = 0x7265666572656e63;
 
 std::string contents_of(const fs::path& path) {
@@ -26,7 +26,7 @@ std::string contents_of(const fs::path& path) {
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Adds the value of a parameter, to the last bit.
+/// Adds all bits of a parameter's value.
 struct AddValue {
     ContentHash& hash;
 
@@ -47,7 +47,7 @@ private:
     }
 };
 
-/// Adds the contents of the file that the scene names so, if there is one.
+/// Adds the contents of the file `name` in the scene's search paths, if there is one.
 void add_file(ContentHash& hash, const SceneDescription& description, const std::string& name) {
     if (name.empty()) return;
     for (const std::string& folder : description.search_paths) {
@@ -103,7 +103,7 @@ std::string cache_file(const FilmGeometry& film, const ReferenceSettings& settin
 }
 
 bool is_long_enough(const Reference& r, const RenderLimits& limits) {
-    // A rendering ends within a pass of its limit.
+    // A rendering may end up to one pass before its limit.
     return (!limits.spp || r.spp >= *limits.spp) &&
            (!limits.seconds || r.seconds >= 0.95 * *limits.seconds);
 }
@@ -125,7 +125,7 @@ Reference read_reference(const std::string& file, const FilmGeometry& geometry) 
     const Image image = read_image(file);
     if (image.width != geometry.crop_width || image.height != geometry.crop_height)
         throw std::runtime_error(fmt::format(
-            "reference \"{}\" has {} x {} pixels, but the scene is rendered with {} x {}", file,
+            "reference {} has {} x {} pixels, but the scene is rendered with {} x {}", file,
             image.width, image.height, geometry.crop_width, geometry.crop_height));
     Reference r;
     r.file = file;

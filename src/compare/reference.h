@@ -1,5 +1,5 @@
 #pragma once
-// What methods are judged by: an image, read or rendered, and how uncertain it is.
+// References: images that methods are compared with, read from files or rendered, and their uncertainty.
 
 #include <atomic>
 #include <functional>
@@ -15,45 +15,45 @@ namespace etendue {
 struct Reference {
     int width = 0, height = 0;
     std::vector<Rgb> pixels;
-    /// Two images whose mean is `pixels` and whose product of differences to any X is, on average, free of the
-    /// reference's variance: independent halves, or pixels ± standard error. Empty where the variance is not known.
+    /// Two images with mean `pixels` for which E[(X − first)(X − second)] does not contain the reference's variance:
+    /// independent halves, or `pixels` ± standard error. Empty where the variance is unknown.
     std::vector<Rgb> first, second;
-    /// Relative standard error of the mean luminance; 0 where it is not known.
+    /// Relative standard error of the mean luminance; 0 where it is unknown.
     double mean_relative_error = 0;
-    std::string file;    ///< Where it was read from, or is kept.
-    std::string method;  ///< Empty where it was given.
+    std::string file;    ///< The file that it was read from or is cached in.
+    std::string method;  ///< The integrator that rendered it; empty where it is unknown.
     double seconds = 0;
     uint64_t spp = 0;
-    bool reused = false;  ///< From an earlier comparison.
+    bool reused = false;  ///< Whether it was cached by an earlier comparison.
 
     bool has_variance() const { return !first.empty(); }
-    /// The second argument of image_errors(), and ErrorOptions::reference2 beside it.
+    /// i = 0: second argument of image_errors(); i = 1: its ErrorOptions::reference2.
     const std::vector<Rgb>& half(int i) const {
         return !has_variance() ? pixels : i == 0 ? first : second;
     }
 };
 
-/// Reads an image of the size of the scene's crop. Layers "first" and "second" (as references that are kept here have
-/// them), or a layer "variance" (as `render --aov variance` writes it), tell its uncertainty. Throws std::runtime_error.
+/// Reads an image of the size of the scene's crop. Its uncertainty comes from the layers "first" and "second" (of
+/// cached references) or "variance" (written by `render --aov variance`). Throws std::runtime_error.
 Reference read_reference(const std::string& file, const FilmGeometry& geometry);
 
-/// Two independent renderings of half the time, or half the samples, each.
+/// A reference is the mean of two independent renderings, each with half the time or half the samples.
 struct ReferenceSettings {
-    RenderSettings render;  ///< Seeds are chosen here.
-    std::string folder;     ///< Where references are kept, named by what they show.
+    RenderSettings render;  ///< The seed is not used.
+    std::string folder;     ///< The cache; file names are hashes of scene, program and settings.
     uint64_t scene;         ///< See scene_fingerprint().
     uint64_t program;       ///< See program_fingerprint().
 };
-/// The one that is kept, if the same program rendered it from the same scene with the same settings for at least as long,
-/// else a new one; none where `interrupted` was set.
+/// The cached reference, if the same program rendered it from the same scene with the same settings and at least the
+/// same time or samples; otherwise a new one, which is cached. Empty where `interrupted` was set.
 std::optional<Reference> make_reference(const Scene& scene, const ReferenceSettings& settings,
                                         const std::function<void(const Progress&)>& progress,
                                         const std::atomic<bool>& interrupted);
 
-/// Hash of all that the scene's files say: the description, to the last bit, whatever files it was read from; and the
-/// bytes of every mesh, texture and other file that it names.
+/// Hash of the scene's contents: all bits of the description, and the bytes of every mesh, texture and other file that
+/// it names.
 uint64_t scene_fingerprint(const SceneDescription& description);
-/// Hash of the running program: another build of it renders another image.
+/// Hash of the executable file, since another build may render another image.
 uint64_t program_fingerprint();
 
 }  // namespace etendue

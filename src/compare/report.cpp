@@ -149,7 +149,7 @@ std::string dumped(const Json& json, int indent) {
 
 // ------------------------------------------------------------------------------------------------------- pictures
 
-/// Stops that bring the 95th percentile of the reference's luminance to 0.8, in steps of a quarter.
+/// Exposure, in stops, that maps the 95th percentile of the luminance to 0.8; a multiple of 1/4.
 float auto_exposure(const std::vector<Rgb>& pixels) {
     std::vector<float> values;
     for (Rgb c : pixels)
@@ -166,8 +166,7 @@ std::vector<Rgb> false_colours(const std::vector<float>& values) {
     return out;
 }
 
-/// Empty for connections.
-/// Of techniques beside connection_technique(s, t).
+/// Name of a technique other than connection_technique(s, t); "" for that one.
 const char* kind_name(const Technique& q) {
     return q.strategy == Strategy::Merge                 ? "merge"
            : q.strategy == Strategy::Gather              ? "gather"
@@ -189,7 +188,7 @@ constexpr CurveKind kCurves[] = {
     {"mape", "MAPE", [](const ImageErrors& e) { return e.mape; }, false},
 };
 
-/// Of the first run, with the slope over all of them.
+/// The convergence plot of the first run, with the mean slope of all runs.
 LogLogPlot convergence(const Comparison& c, const std::vector<MethodSummary>& summaries,
                        const CurveKind& kind, const std::string& title) {
     LogLogPlot plot{title, "rendering time (s)", kind.label, {}};
@@ -204,7 +203,7 @@ LogLogPlot convergence(const Comparison& c, const std::vector<MethodSummary>& su
     return plot;
 }
 
-/// Writes the pictures of one scene to its folder, and what of them the page shows to its JSON.
+/// Writes the images and plots of one scene to its folder; write() returns those that the page shows, as JSON.
 class SceneFigures {
 public:
     SceneFigures(const Comparison& comparison, const std::string& folder, const std::string& name)
@@ -290,7 +289,7 @@ private:
     ToneMapping mapping_;
 };
 
-/// The file's name, or its folder's where it is but "scene..."; numbered where several scenes share it.
+/// The name of the file, or of its folder where the file is called "scene..."; numbered where several scenes share it.
 std::string scene_name(const std::string& file, std::set<std::string>& taken) {
     const fs::path path = fs::absolute(file);
     std::string stem = path.stem().string();
@@ -308,7 +307,7 @@ void replace(std::string& page, std::string_view mark, std::string_view text) {
     page.replace(page.find(mark), mark.size(), text);
 }
 
-/// JSON that may stand in a <script>.
+/// JSON escaped for a <script> element.
 std::string script_json(const Json& json) {
     std::string text = dumped(json, -1);
     for (size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3)

@@ -12,11 +12,12 @@ struct ReportOptions {
     std::string version;  ///< Of the program.
 };
 
-/// Writes report.html, which holds everything it shows; report.json with every figure; and in a folder a scene the images
-/// (.exr and .png), error maps (.png) and convergence plots (.svg).
+/// Writes report.html, which needs no other file; report.json with all results; and one folder per scene with images
+/// (.exr and .png), error maps (.png) and convergence plots (.svg). Throws std::runtime_error where a file cannot be
+/// written.
 void write_report(const std::vector<Comparison>& comparisons, const ReportOptions& options);
 
-/// `text` as part of a file name: letters, digits and "._=-" stay.
+/// `text` as part of a file name: characters other than letters, digits and "._=-" become '_'.
 std::string file_stem(const std::string& text);
 
 }  // namespace etendue

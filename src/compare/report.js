@@ -1,6 +1,6 @@
 'use strict';
 
-// The page is drawn from two pieces of JSON: `report`, the figures, and `pictures`, the images.
+// The page shows two pieces of JSON: `report` with the results, and `pictures` with the images.
 const report = JSON.parse(document.getElementById('report').textContent);
 const pictures = JSON.parse(document.getElementById('pictures').textContent);
 
@@ -154,10 +154,10 @@ function paintMap(picture, value) {
     });
 }
 
-/// What a pane may show of a picture; X is the picture, R the reference, m the mean of R.
+/// What a pane can show of an image X; R is the reference, m the mean of R.
 const displays = {
     'image': (p, view) => paintRadiance(p, view.table),
-    // The summand of relMSE.
+    // The term of relMSE.
     'relative squared error': (p, view) => {
         const floor = 0.01 * view.referenceMean ** 2, scale = 2 ** view.errorExposure;
         return paintMap(p, i => {
@@ -183,7 +183,7 @@ const displays = {
 
 const insetColours = ['#e69f00', '#56b4e9', '#cc79a7', '#009e73'];
 
-/// Images of one scene: one beside, over or after the other, under one zoom, one exposure and common insets.
+/// Shows the images of one scene side by side, with a slider or one at a time, with common zoom, exposure and insets.
 class Viewer {
     constructor(scene, figures) {
         this.pictures = scene;  // the reference first
@@ -212,7 +212,7 @@ class Viewer {
 
     // -- Insets
 
-    /// Squares where the methods are wrong most, in units of the brightness there.
+    /// The squares with the largest relative squared errors.
     chooseInsets() {
         const size = Math.max(8, Math.round(Math.min(this.width, this.height) / 7));
         const columns = Math.max(1, Math.floor(this.width / size));
@@ -238,7 +238,7 @@ class Viewer {
         for (let y = y0; y < Math.min(y0 + size, this.height); ++y)
             for (let x = x0; x < Math.min(x0 + size, this.width); ++x) {
                 const i = y * this.width + x, r = grey(this.reference.codes, i);
-                // One bright pixel must not decide.
+                // The limit keeps single bright pixels from determining the choice.
                 sum += Math.min(1, (grey(picture.codes, i) - r) ** 2 / (r * r + floor));
             }
         return sum;
@@ -310,8 +310,8 @@ class Viewer {
                 element('button', {type: 'button', textContent: 'save figure', className: 'save', onclick: () => this.save()}),
             ]),
             this.stage, this.readout,
-            element('p', {className: 'note', textContent: 'Wheel: zoom. Drag: pan, or move the divider or an ' +
-                'inset; wheel over an inset below: its size. Keys 1 to 9 choose an image, space flips back.'}),
+            element('p', {className: 'note', textContent: 'Wheel: zoom. Drag: pan, or move the divider or an inset. ' +
+                'Wheel over a crop below: size of the insets. Keys 1 to 9: choose an image; space: back to the previous one.'}),
             element('div', {className: 'scroll'}, this.insetGrid));
         this.element.tabIndex = 0;
         this.element.addEventListener('keydown', event => this.onKey(event));
@@ -359,7 +359,7 @@ class Viewer {
         this.setExposure(this.shownExposure());
     }
 
-    /// One pane, or one a picture, each with what it shows.
+    /// One pane, or one per image in the mode 'side by side'.
     buildStage() {
         const count = this.mode === 'side by side' ? this.pictures.length : 1;
         this.pairControls.hidden = this.mode !== 'slider';
@@ -396,7 +396,7 @@ class Viewer {
 
     // -- Pointer
 
-    /// Dragging the crop itself: the image under the pointer stays under it.
+    /// Dragging a crop moves its inset.
     dragInset(canvas, inset) {
         canvas.addEventListener('pointerdown', down => {
             canvas.setPointerCapture(down.pointerId);
@@ -427,7 +427,7 @@ class Viewer {
             this.center[1] + (event.clientY - box.top - box.height / 2) / scale];
     }
 
-    /// What the pointer would take hold of: an inset, the divider, or the image.
+    /// The object that a press of the pointer would drag: an inset, the divider or the image.
     target(pane, event) {
         const box = pane.canvas.getBoundingClientRect();
         if (this.mode === 'slider' && Math.abs((event.clientX - box.left) - this.divider * box.width) < 8)
@@ -495,14 +495,14 @@ class Viewer {
 
     // -- Drawing
 
-    /// Paints every picture anew: exposure or display have changed.
+    /// Repaints all images after a change of exposure or display.
     refresh() {
         this.table = toneTable(this.exposure, this.operator);
         for (const p of this.pictures) p.painted = null;
         this.draw();
     }
 
-    /// Once a frame at most.
+    /// Draws at most once per frame.
     draw() {
         if (this.pending) return;
         this.pending = requestAnimationFrame(() => {
@@ -571,7 +571,7 @@ class Viewer {
         context.drawImage(this.painted(index), inset.x, inset.y, inset.size, inset.size, 0, 0, canvas.width, canvas.height);
     }
 
-    /// A figure as papers have it: the image with its insets marked, and the crops beside it, as a PNG.
+    /// Downloads a figure for papers: the image with marked insets, and the crops beside it, as a PNG.
     save() {
         const pane = this.panes[0].canvas, crop = 200, gap = 6, head = 22;
         const rows = this.insets.length, columns = this.pictures.length;
@@ -603,7 +603,8 @@ function download(canvas, name) {
 
 // ---------------------------------------------------------------------------------------- sections
 
-/// Name; figure of a method; how the best is found, how it is shown, what stands below it, whether to doubt it.
+/// Columns of the table: name; value of a method; choice of the best value, format of the value, small text below it, and
+/// condition for the mark of doubtful values.
 const columns = [
     ['spp', m => m.summary.spp, {show: v => large(v)}],
     ['rays', m => m.summary.rays, {show: v => large(v)}],
@@ -650,14 +651,14 @@ function referenceNote(scene) {
     const origin = r.method ? `${r.method}, ${large(r.spp)} spp in ${significant(r.seconds)} s${r.reused ? ' (kept from an earlier comparison)' : ''}`
         : `the file ${r.file}`;
     if (!r.variance_known)
-        return element('p', {className: 'warning', textContent: `Reference: ${origin}. Its variance is not known, ` +
-            'so it is taken as exact: errors contain its noise, and cannot be told below it.'});
+        return element('p', {className: 'warning', textContent: `Reference: ${origin}. Its variance is unknown, so it ` +
+            'is treated as exact: errors include its noise, and smaller errors cannot be measured.'});
     const shares = scene.methods.map(m => m.summary.reference_share).filter(Number.isFinite);
     const worst = Math.max(...shares);
-    const text = `Reference: ${origin}. Its own relMSE is about ${significant(r.rel_mse, 2)}; this is subtracted from MSE, ` +
-        `RMSE and relMSE, of which it would have been at most ${percent(worst)}. MAPE, FLIP and spikes still contain it.`;
+    const text = `Reference: ${origin}. Its own relMSE is about ${significant(r.rel_mse, 2)}. The reference's noise is ` +
+        `subtracted from MSE, RMSE and relMSE (at most ${percent(worst)} of relMSE), but MAPE, FLIP and spike include it.`;
     return element('p', {className: worst > 0.25 ? 'warning' : 'note', textContent: worst > 0.25
-        ? `${text} That is much: render the reference for longer.` : text});
+        ? `${text} This share is large: render the reference for longer.` : text});
 }
 
 function plotSection(page) {
@@ -680,7 +681,7 @@ function plotSection(page) {
         element('div', {className: 'bar'}, [bar.element, save, saveSvg]), image]);
 }
 
-/// Veach's pyramid: a row for each length of path, a column for each s; pairs of vertices to the right of connections.
+/// Veach's pyramid: one row per path length, one column per s; merges and gathers are to the right of the other techniques.
 async function pyramid(method, figures, viewer) {
     const state = {kind: 'weighted', exposure: viewer.startExposure}, cells = [];
     const lengths = [...new Set(method.techniques.map(t => t.edges))].sort((a, b) => a - b);
@@ -722,8 +723,8 @@ async function fillViewer(holder, scene, page) {
     const withTechniques = page.methods.filter(m => m.techniques.length > 0);
     if (withTechniques.length === 0) return;
     holder.append(element('h3', {textContent: 'Contributions by technique'}), element('p', {className: 'note',
-        textContent: 'A row for each length of path, a column for each number s of light vertices. Weighted images add ' +
-            'up to the picture; unweighted ones show what each technique would make alone.'}));
+        textContent: 'One row per path length, one column per number s of light vertices. The weighted images sum to the ' +
+            'image; an unweighted one is the estimate by this technique alone.'}));
     for (const m of withTechniques)
         holder.append(await pyramid(m, scene.methods.find(f => f.name === m.name), viewer));
 }
@@ -739,20 +740,20 @@ function sceneSection(scene, page) {
         element('h2', {textContent: scene.name}),
         element('p', {className: 'note', textContent: `${scene.file}, ${scene.width} × ${scene.height} pixels`})]);
     if (scene.interrupted)
-        section.append(element('p', {className: 'warning', textContent: 'The comparison was interrupted: times differ.'}));
+        section.append(element('p', {className: 'warning', textContent: 'The comparison was interrupted, so the times of the methods differ.'}));
     section.append(figuresTable(scene), referenceNote(scene), plotSection(page), holder);
     return section;
 }
 
 const legend = [
-    ['rendering time', 'Wall-clock time inside the renderer, all methods with the same threads, in turns of a few seconds at most. Reading the scene and judging images are not counted.'],
+    ['rendering time', 'Wall-clock time of rendering. All methods use the same number of threads, in turns of a few seconds at most. Reading the scene and computing errors are not counted.'],
     ['RMSE, relMSE, MAPE', 'With X the image, R the reference, both grey, and m the mean of R: √mean (X − R)², mean (X − R)² / (R² + 0.01 m²), mean |X − R| / (R + 0.01 m). With several runs, means over them; ± is a 95 % interval.'],
-    ['trimmed', 'relMSE without the largest 0.1 % of the pixels’ errors.'],
-    ['FLIP', 'Mean of HDR-FLIP, first run.'],
-    ['mean ratio', 'Mean of X over mean of R with a 95 % interval, which holds the spread of the passes of X and of R. Marked where 1 is outside. The interval is too wide with the Sobol’ sampler, whose passes are spread against each other.'],
+    ['trimmed', 'relMSE without the 0.1 % of the pixels with the largest errors.'],
+    ['FLIP', 'Mean of HDR-FLIP of the first run.'],
+    ['mean ratio', 'Mean of X over mean of R with a 95 % interval, from the spread of the passes of X and of R. Marked where the interval does not contain 1. With the Sobol’ sampler the interval is too wide, since its passes are negatively correlated.'],
     ['spike', '99.99th percentile over the pixels of |X − R| / m.'],
-    ['slope', 'Of log relMSE against log time, over the last 1/32 to 1 of the time: −1 where the estimator is unbiased, its variance finite, and its samples independent. The dashed lines of the plots.'],
-    ['memory', 'Peak of what became resident while the method ran (film, buffers, maps), without the scene, which all methods share. Measured in turns from the process’ resident set.'],
+    ['slope', 'Slope of log relMSE against log time, between 1/32 of the time and its end; −1 for an unbiased estimator with finite variance and independent samples. Plots show it as dashed lines.'],
+    ['memory', 'Peak of the resident memory added by the method (film, buffers, maps). The scene, which all methods share, is not included.'],
     ['efficiency', '1 / (relMSE · time), relative to the first method.'],
 ];
 
@@ -761,12 +762,12 @@ document.getElementById('settings').textContent =
     `${report.program}. Each method ${s.seconds ? `for ${s.seconds} s` : `with ${s.spp} samples per pixel`}, ` +
     `${s.runs === 1 ? 'one run' : `${s.runs} runs`} from seed ${s.seed}, sampler ${s.sampler}, ` +
     `${s.threads} threads of ${report.processor}.` +
-    (s.paths === 'inner' ? ' Only paths that join both sub-paths inside the scene are shown and judged.' : '') +
+    (s.paths === 'inner' ? ' Only paths that join two sub-paths inside the scene are shown and compared.' : '') +
     (s.shortest_path > 1 || s.longest_path
-        ? ` Only paths of ${s.shortest_path} to ${s.longest_path ?? '∞'} edges are shown and judged.` : '');
+        ? ` Only paths of ${s.shortest_path} to ${s.longest_path ?? '∞'} edges are shown and compared.` : '');
 document.getElementById('contents').append(...report.scenes.map(
     scene => element('a', {href: `#${scene.name}`, textContent: scene.name})));
 document.getElementById('scenes').append(...report.scenes.map((scene, i) => sceneSection(scene, pictures[i])));
-document.getElementById('legend').append(element('h3', {textContent: 'What the figures are'}),
+document.getElementById('legend').append(element('h3', {textContent: 'Definitions'}),
     element('dl', {}, legend.flatMap(([term, text]) =>
         [element('dt', {textContent: term}), element('dd', {textContent: text})])));

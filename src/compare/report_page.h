@@ -1,5 +1,5 @@
 #pragma once
-// The files report.html, report.css and report.js of this folder, as they are; the build makes the definitions.
+// The contents of report.html, report.css and report.js in this folder, embedded by the build.
 
 #include <string_view>
 

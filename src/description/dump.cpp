@@ -23,8 +23,8 @@ std::string escape(std::string_view text) {
     return out + '"';
 }
 
-/// Sixteen numbers to six digits; what is noise beside the largest entry is zero, so that a
-/// rotation by 90° reads well.
+/// Sixteen numbers with six digits. Rounding errors (entries below 1e-9 of the largest) are printed as zero, so that a
+/// rotation by 90° has exact zeros.
 std::string print(const Transform& t) {
     double largest = 0;
     for (const auto& row : t.matrix())
@@ -60,8 +60,7 @@ public:
     }
 
 private:
-    /// An object with several parents gets a label where it is first met and is only named
-    /// afterwards.
+    /// An object with several parents is printed once, with a label; afterwards only its label is printed.
     void print_object(int index, const std::string& name, int depth) {
         const SceneObject& object = scene_.objects[index];
         out_.append(size_t(depth) * 2, ' ');

@@ -7,9 +7,8 @@
 namespace etendue {
 namespace {
 
-/// Unit normal of a triangle; nothing where it has no area that float arithmetic could tell from
-/// zero. Products of floats are exact in double, so exactly parallel edges give exactly zero, with
-/// fused multiply-add or without.
+/// Unit normal of a triangle, or empty where its area is zero in single precision. Products of floats are exact in
+/// double, so exactly parallel edges give exactly zero, with or without fused multiply-add.
 std::optional<Vec3> face_normal(const MeshData& mesh, const MeshData::Triangle& t) {
     const Vec3 a = mesh.positions[t[1]] - mesh.positions[t[0]];
     const Vec3 b = mesh.positions[t[2]] - mesh.positions[t[0]];
@@ -80,11 +79,11 @@ void compute_vertex_normals(MeshData& mesh) {
             const Vec3 corner = mesh.positions[t[i]];
             const Vec3 a = direction(corner, mesh.positions[t[(i + 1) % 3]]);
             const Vec3 b = direction(corner, mesh.positions[t[(i + 2) % 3]]);
-            // The angle between unit vectors, also where it is small or flat [Kahan 2006, §12].
+            // The angle between unit vectors, accurate near 0 and π [Kahan 2006, §12].
             mesh.normals[t[i]] += *n * (2 * std::atan2(length(a - b), length(a + b)));
         }
     }
-    // Where the faces cancel, the vertex takes the normal of one of them.
+    // Where the normals of the faces cancel, the vertex takes that of one face.
     constexpr float kCancelled2 = 1e-12f;
     for (const MeshData::Triangle& t : mesh.triangles)
         for (const uint32_t v : t)
@@ -98,7 +97,7 @@ void finish_mesh(MeshData& mesh, const MeshOptions& options, const SourceLocatio
     check_indices(mesh, where);
     drop_degenerate(mesh);
     if (mesh.triangles.empty())
-        throw SceneError(where, mesh.dropped_degenerate ? "none of the mesh's triangles has an area"
+        throw SceneError(where, mesh.dropped_degenerate ? "all triangles of the mesh have zero area"
                                                         : "the mesh has no triangles");
     if (mesh.face_normals) mesh.normals.clear();
     repair_normals(mesh);

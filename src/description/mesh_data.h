@@ -20,24 +20,23 @@ struct MeshData {
     std::vector<Vec2> uvs;      ///< One per vertex, or empty.
     std::vector<Triangle> triangles;
     bool face_normals = false;        ///< The file asks for flat shading; normals is empty then.
-    uint32_t dropped_degenerate = 0;  ///< Triangles without area, kept out by finish_mesh().
+    uint32_t dropped_degenerate = 0;  ///< Triangles of zero area, removed by finish_mesh().
     uint32_t replaced_normals = 0;    ///< Normals that were zero or not finite in the file.
 };
 
-/// How a file's numbers are taken. Mitsuba's default is to flip for .obj, not to for .ply and
-/// .serialized.
+/// How the numbers of a mesh file are interpreted. Mitsuba flips texture coordinates by default for .obj, but not for
+/// .ply and .serialized.
 struct MeshOptions {
     bool flip_tex_coords = false;  ///< v becomes 1 - v.
 };
 
-/// What every reader ends with: applies the options, checks that indices are in range and that
-/// positions and texture coordinates are finite, keeps out triangles without area, and makes
-/// normals unit vectors (those that are zero or not finite are computed from the faces). Throws
-/// SceneError where no triangle is left.
+/// Last step of every mesh reader: checks that indices are in range and that positions and texture coordinates are
+/// finite, removes triangles of zero area, normalises normals (those that are zero or not finite are computed from the
+/// faces), and applies the options. Throws SceneError where a check fails or no triangle is left.
 void finish_mesh(MeshData& mesh, const MeshOptions& options, const SourceLocation& where);
 
-/// Replaces the normals by the sum of those of the adjacent faces, weighted by the angle at the
-/// vertex [Thürmer & Wüthrich 1998]. Vertices of no triangle get +z.
+/// Replaces the normals by normalised sums of those of the adjacent faces, weighted by the angle at the vertex [Thürmer
+/// & Wüthrich 1998]. Vertices of no triangle get +z.
 void compute_vertex_normals(MeshData& mesh);
 
 }  // namespace etendue

@@ -11,8 +11,13 @@ namespace {
 constexpr const char* kTypeNames[] = {"boolean", "integer", "float",    "string",
                                       "vector",  "colour",  "transform"};
 
-const char* type_name(const Param& p) {
-    return kTypeNames[int(p.type())];
+/// "an integer", "a float", ...
+std::string with_article(std::string_view noun) {
+    return fmt::format("{} {}", noun.find_first_of("aeiou") == 0 ? "an" : "a", noun);
+}
+
+std::string type_name(const Param& p) {
+    return with_article(kTypeNames[int(p.type())]);
 }
 
 bool accepts(ParamKind kind, ParamType type) {
@@ -57,9 +62,10 @@ const T* Params::get(std::string_view name, const char* expected) const {
     if (!p) return nullptr;
     const T* v = std::get_if<T>(&p->value);
     if (!v)
-        throw SceneError(
-            p->where, fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", name,
-                                  object().category, object().type, expected, type_name(*p)));
+        throw SceneError(p->where,
+                         fmt::format("parameter \"{}\" of {} \"{}\" must be {}, but is {}", name,
+                                     object().category, object().type, with_article(expected),
+                                     type_name(*p)));
     return v;
 }
 
@@ -177,9 +183,9 @@ void check_params(const SceneDescription& scene, int index, const PluginInfo& in
         if (it == info.params.end())
             unknown(p.where, p.name);
         else if (!accepts(it->kind, p.type()))
-            report(p.where,
-                   fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", p.name,
-                               info.category, info.name, kind_name(it->kind), type_name(p)));
+            report(p.where, fmt::format("parameter \"{}\" of {} \"{}\" must be {}, but is {}",
+                                        p.name, info.category, info.name,
+                                        with_article(kind_name(it->kind)), type_name(p)));
     }
     for (const auto& c : object.children) {
         if (c.name.empty()) continue;
@@ -190,9 +196,9 @@ void check_params(const SceneDescription& scene, int index, const PluginInfo& in
             if (is_texture) unknown(c.where, c.name);
         } else if (it->kind != ParamKind::Object &&
                    !(is_texture && it->kind == ParamKind::Texture)) {
-            report(c.where,
-                   fmt::format("parameter \"{}\" of {} \"{}\" must be a {}, but is a {}", c.name,
-                               info.category, info.name, kind_name(it->kind), category));
+            report(c.where, fmt::format("parameter \"{}\" of {} \"{}\" must be {}, but is {}",
+                                        c.name, info.category, info.name,
+                                        with_article(kind_name(it->kind)), with_article(category)));
         }
     }
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Typed access to the parameters of one scene object, checked against the plug-in's table. What a model asks for, what
-// the parser accepts and what `etendue list` prints come from the same `PluginInfo`.
+// Typed access to the parameters of one scene object, and their check against the table of the plug-in. The check and
+// `etendue list` use the same `PluginInfo`.
 
 #include <functional>
 #include <initializer_list>
@@ -13,38 +13,38 @@
 
 namespace etendue {
 
-/// Kinds a plug-in's parameter may have; the last ones are children of the object.
+/// Kind of a plug-in's parameter. A Texture may be, and an Object is, a child of the object.
 enum class ParamKind {
     Bool,
     Int,
     Float,
     String,
     Vector,  ///< point or vector
-    Rgb,     ///< colour or spectrum; a float is taken as grey
+    Rgb,     ///< colour or spectrum; a number is taken as grey
     Transform,
-    Texture,      ///< colour, spectrum, float or nested texture
+    Texture,      ///< colour, spectrum, number or nested texture
     Object,       ///< nested bsdf, medium, film, ...
-    FloatOrName,  ///< number, or the name of one in a table
+    FloatOrName,  ///< number, or a name that stands for one
 };
 
 struct ParamInfo {
     const char* name;
     ParamKind kind;
     const char*
-        fallback;  ///< Default as printed; "" where the parameter is required or has no single default.
+        fallback;     ///< Default as printed; "" where it is required or has no single default.
     const char* doc;  ///< One sentence with unit and range.
 };
 
-/// One plug-in of one category: what `list` prints and what the parser checks.
+/// One plug-in of one category, as `etendue list` prints it and check_params() uses it.
 struct PluginInfo {
     const char* category;
     const char* name;
-    const char* doc;  ///< One sentence: what it is and its source.
+    const char* doc;  ///< One sentence with its source.
     std::vector<ParamInfo> params;
 };
 
-/// The parameters of `object`, by name and type. Every getter throws SceneError where the type or the range does not
-/// fit, and returns the default where the parameter is absent.
+/// The parameters of `object`, by name. Every getter returns the default where the parameter is absent, and throws
+/// SceneError where its type or value is invalid.
 class Params {
 public:
     Params(const SceneDescription& scene, int object) : scene_(&scene), index_(object) {}
@@ -53,22 +53,23 @@ public:
     const SceneDescription& scene() const { return *scene_; }
     int index() const { return index_; }
     const SourceLocation& where() const { return object().where; }
+    /// Location of the parameter or child `name`, or of the object where it has none.
     SourceLocation where(std::string_view name) const;
 
     bool has(std::string_view name) const;
     bool flag(std::string_view name, bool fallback) const;
     int64_t integer(std::string_view name, int64_t fallback, int64_t lo, int64_t hi) const;
-    /// A number within [lo, hi]; must be finite.
+    /// A finite number in [lo, hi].
     float number(std::string_view name, float fallback, float lo = -kInf, float hi = kInf) const;
     std::string text(std::string_view name, std::string_view fallback) const;
-    /// Index of the parameter's text in `options`; an error that names them all where it is none of them.
+    /// Index of the parameter's text in `options`; throws SceneError, which lists them, where it is none of them.
     int choice(std::string_view name, std::initializer_list<const char*> options,
                int fallback) const;
     Vec3 vector(std::string_view name, Vec3 fallback) const;
     /// A colour whose components are finite and at least `lo`.
     Rgb rgb(std::string_view name, Rgb fallback, float lo = 0) const;
-    Transform
-    transform(std::string_view name) const;  ///< Identity where absent; must be invertible.
+    /// An invertible transform; identity where absent.
+    Transform transform(std::string_view name) const;
 
     /// Child given under this parameter name, if any.
     const SceneObject::Child* child(std::string_view name) const;
@@ -88,12 +89,12 @@ private:
     int index_;
 };
 
-/// Checks that every parameter of `object` is in the table and has a kind that fits. What is unknown goes to `report`
-/// (location, message with the nearest known name); the caller throws or warns.
+/// Checks that every parameter of `object` is in the table and has a suitable type. Calls `report` with location and
+/// message for each one that has not; the caller throws or warns.
 void check_params(const SceneDescription& scene, int object, const PluginInfo& info,
                   const std::function<void(const SourceLocation&, const std::string&)>& report);
 
-/// "bool", "float", ... as printed in messages and by `list`.
+/// "boolean", "float", ... as printed in messages and by `etendue list`.
 const char* kind_name(ParamKind kind);
 
 }  // namespace etendue

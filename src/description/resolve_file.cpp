@@ -9,10 +9,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The name in the file's folder that is nearest to the one asked for, or "".
+/// The name in the folder of `path` that is nearest to its file name, or "".
 std::string nearest_file(const fs::path& path) {
     std::vector<std::string> names;
-    std::error_code error;  // a folder that cannot be listed has no near names
+    std::error_code error;  // ignored: a folder that cannot be listed has no names
     for (const auto& entry : fs::directory_iterator(path.parent_path(), error))
         names.push_back(entry.path().filename().string());
     return nearest_name(path.filename().string(), names);

@@ -1,5 +1,5 @@
 #pragma once
-// Where the files that a scene names are.
+// Search for the files that a scene names.
 
 #include <string>
 #include <string_view>
@@ -8,8 +8,8 @@
 
 namespace etendue {
 
-/// Path of the file that string parameter `name` of the object names: absolute, or in the first of the scene's search
-/// paths that has it. Throws SceneError, telling where it looked and the nearest name there.
+/// Path of the file named by string parameter `name`: an absolute path, or one relative to the first of the scene's
+/// search paths that contains it. Throws SceneError with the folders searched and the nearest name found there.
 std::string resolve_file(const Params& params, std::string_view name = "filename");
 
 }  // namespace etendue

@@ -19,7 +19,8 @@ const Param* SceneObject::find(std::string_view param_name) const {
 }
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
-    // Optimal string alignment distance; a candidate is near where at most a third of the name differs.
+    // Optimal string alignment distance. A candidate is near if the distance is at most a third of the name's length,
+    // or 1.
     auto distance = [](std::string_view a, std::string_view b) {
         std::vector<std::vector<size_t>> d(a.size() + 1, std::vector<size_t>(b.size() + 1));
         for (size_t i = 0; i <= a.size(); ++i) d[i][0] = i;

@@ -1,7 +1,6 @@
 #pragma once
-// What a scene file says, as plain data: a flat list of objects with named parameters and children. Readers fill it;
-// the scene builder is the only one that knows what an object means. Names are those of Mitsuba 3 (snake_case),
-// whatever the file's dialect.
+// The contents of a scene file as plain data: a flat list of objects with named parameters and children. Readers fill
+// it, and only the scene builder interprets it. Names are those of Mitsuba 3 (snake_case), whatever the file's dialect.
 
 #include <cstdint>
 #include <stdexcept>
@@ -22,7 +21,7 @@ struct SourceLocation {
     bool operator==(const SourceLocation&) const = default;
 };
 
-/// The one exception of readers and of the scene builder. what() is "file:line: message".
+/// The exception thrown by readers and the scene builder. what() is "file:line: message".
 class SceneError : public std::runtime_error {
 public:
     SceneError(const SourceLocation& where, const std::string& message);
@@ -34,7 +33,7 @@ private:
     std::string message_;
 };
 
-/// What a `ParamValue` holds, in the order of its alternatives.
+/// Type of a `ParamValue`, in the order of its alternatives.
 enum class ParamType { Bool, Int, Float, String, Vector, Rgb, Transform };
 using ParamValue = std::variant<bool, int64_t, double, std::string, Vec3, Rgb, Transform>;
 
@@ -56,8 +55,8 @@ struct SceneObject {
     std::vector<Param> params;
     struct Child {
         std::string
-            name;  ///< Parameter name of the child ("reflectance", "interior", ...); empty where unnamed.
-        int object;  ///< Index into SceneDescription::objects; shared where the file used a reference.
+            name;    ///< Parameter name ("reflectance", "interior", ...); empty where unnamed.
+        int object;  ///< Index into SceneDescription::objects; shared by all references to it.
         SourceLocation where;
     };
     std::vector<Child> children;
@@ -66,16 +65,16 @@ struct SceneObject {
 };
 
 struct SceneDescription {
-    std::vector<SceneObject> objects;  ///< Children precede nothing in particular; no cycles.
+    std::vector<SceneObject> objects;  ///< In any order; the graph of children has no cycles.
     std::vector<int> roots;            ///< The scene's own children, in file order.
     std::string file;                  ///< The scene file, as given.
     /// Directories in which relative file names are looked up, in order; the scene file's own comes first.
     std::vector<std::string> search_paths;
-    /// What was dropped or replaced (only under `lenient`), one line each.
+    /// What was dropped or replaced under `lenient`, one line each.
     std::vector<std::string> warnings;
 };
 
-/// The candidate nearest to `name` by edit distance, if it is near enough to be meant; else empty.
+/// The candidate nearest to `name` by edit distance; empty if none is near enough for a suggestion.
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
 
 /// Canonical text of a description (for golden tests): one line per object and parameter, sorted by parameter name,

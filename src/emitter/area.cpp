@@ -1,5 +1,6 @@
-// Area emitter: radiance L_e(uv) from the front of a shape, the same in all directions. Points are drawn by primitive with
-// probability proportional to area times mean radiance, then uniform in area; directions with density cos θ / π.
+// Area emitter: radiance L_e(uv) from the front of a shape, the same in all directions. Sampling chooses a primitive
+// with probability proportional to area times mean radiance, a point uniform in area, and a direction with density cos
+// θ / π.
 
 #include "emitter/area.h"
 
@@ -21,7 +22,8 @@ public:
             areas[i] = shape.primitive_area(i);
             double L = mean;
             if (!radiance.is_constant()) {
-                // A few points decide how often a primitive is chosen; the mean keeps dark ones possible.
+                // Mean over a few points of the primitive. A share of the overall mean is added below, so that a
+                // primitive that is dark at all these points can still be chosen.
                 constexpr int kGrid = 4;
                 double sum = 0;
                 for (int k = 0; k < kGrid * kGrid; ++k)
@@ -95,7 +97,7 @@ private:
     const Shape& shape_;
     TextureRef radiance_;
     AliasTable choice_;
-    std::vector<float> pdf_;  ///< Area density by primitive.
+    std::vector<float> pdf_;  ///< Area density of points, by primitive.
     double power_;
 };
 

@@ -9,19 +9,19 @@
 namespace etendue {
 namespace {
 
-/// The interpolated image is bilinear between pixel centres, so the cells of the sampling density lie between centres
-/// too: a cell is dark only where the whole interpolant is.
+/// The image is interpolated bilinearly between pixel centres. The cells of the sampling density extend between centres
+/// as well, so that the density of a cell is zero only where the image is zero in the whole cell.
 class EnvironmentEmitter final : public InfiniteEmitter {
 public:
     EnvironmentEmitter(int width, int height, std::vector<Rgb> pixels, const Transform& to_world)
         : width_(width), height_(height), pixels_(std::move(pixels)), to_world_(to_world),
           to_local_(to_world.inverse()) {
-        // Rows of cells: one above the first row of centres, one between each two, one below the last.
+        // height + 1 rows of cells: above the first row of centres, between adjacent rows, and below the last row.
         std::vector<float> weights(size_t(width) * (height + 1));
         for (int y = 0; y <= height; ++y) {
             const double top = std::max(0.0, (y - 0.5) / height),
                          bottom = std::min(1.0, (y + 0.5) / height);
-            // Solid angle of the row over that of its share of the (u, v) square, up to a constant.
+            // Mean of sin θ over the row, up to a constant.
             const double area =
                 (std::cos(double(kPi) * top) - std::cos(double(kPi) * bottom)) / (bottom - top);
             for (int x = 0; x < width; ++x) {
@@ -39,8 +39,8 @@ public:
     }
 
 private:
-    // The square of the density: u runs over the cells' columns, v over height + 1 rows, of which the first and the last
-    // are half as high on the image.
+    // The unit square of distribution_ has the columns of cells along x and the height + 1 rows along y. The first and
+    // the last row have half the height of the others in the image.
     Sample sample_arrival(FinePoint u) const override {
         const auto s = distribution_.sample(u);
         Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};
@@ -67,7 +67,7 @@ private:
                     lerp(fx, texel(x0, y0 + 1), texel(x0 + 1, y0 + 1)));
     }
 
-    /// Position among the rows of cells, in [0, 1), of an image coordinate v, piecewise linear.
+    /// From image coordinate v to the y of distribution_, in [0, 1); piecewise linear.
     float to_cell_v(float v) const {
         const float y = v * float(height_);
         const float rows = float(height_ + 1);
@@ -136,22 +136,21 @@ EmitterEntry envmap_entry() {
               {"mis_compensation", ParamKind::Bool, "false", "Accepted; without effect."}}},
             [](const Params& p, EmitterContext&) {
                 const std::string path = resolve_file(p);
-                Image image;
+                RgbImage image;
                 try {
-                    image = read_image(path);
+                    image = read_rgb(path);
                 } catch (const std::exception& e) {
                     p.fail("filename", e.what());
                 }
-                std::vector<Rgb> pixels = rgb_pixels(image);
                 const float scale = p.number("scale", 1, 0);
-                for (Rgb& c : pixels) {
+                for (Rgb& c : image.pixels) {
                     c *= scale;
                     if (!is_finite(c) || std::min({c.r, c.g, c.b}) < 0)
                         p.fail("filename",
-                               path + ": the image has a pixel that is not finite or is negative");
+                               "image \"" + path + "\" has a pixel that is negative or not finite");
                 }
                 std::vector<std::unique_ptr<Emitter>> made;
-                made.push_back(make_environment(image.width, image.height, std::move(pixels),
+                made.push_back(make_environment(image.width, image.height, std::move(image.pixels),
                                                 p.transform("to_world")));
                 return made;
             }};

@@ -1,5 +1,5 @@
 #pragma once
-// Coefficients of the sky and sun model of Hosek & Wilkie, see sky_model.cpp. The last index runs fastest.
+// Coefficients of the sky and sun model of Hosek & Wilkie, see sky_model.cpp. The last index varies fastest.
 
 namespace etendue::hosek_wilkie {
 

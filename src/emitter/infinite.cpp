@@ -15,7 +15,7 @@ EmissionSample InfiniteEmitter::sample_emission(FinePoint u_y0, Vec2 u_d) const 
 
 bool InfiniteEmitter::sample_direct(Vec3, FinePoint u, DirectSample& out) const {
     const Sample s = sample_arrival(u);
-    // Rounding may take a direction into a cell of the environment without density.
+    // Due to rounding, the direction may lie in a cell of the environment with density zero.
     if (s.L.is_zero() || !(s.pdf > 0)) return false;
     out = {s.d, -s.d, s.d, kInf, s.L, s.pdf, s.pdf, pdf_disk_, {}, 0};
     return true;
@@ -102,10 +102,10 @@ EmitterEntry directional_entry() {
           {"to_world", ParamKind::Transform, "identity", "The light travels along its +z."}}},
         [](const Params& p, EmitterContext&) {
             if (p.has("direction") && p.has("to_world"))
-                p.fail("to_world", "give either direction or to_world, not both");
+                p.fail("to_world", "give either \"direction\" or \"to_world\", not both");
             const Vec3 d = p.has("direction") ? p.vector("direction", {})
                                               : p.transform("to_world").vector({0, 0, 1});
-            if (!(length2(d) > 0)) p.fail("direction", "the direction must not be zero");
+            if (!(length2(d) > 0)) p.fail("direction", "parameter \"direction\" must not be zero");
             return one(
                 std::make_unique<DirectionalEmitter>(normalize(d), p.rgb("irradiance", Rgb(1))));
         }};

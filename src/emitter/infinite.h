@@ -1,25 +1,25 @@
 #pragma once
-// Emitters at infinity: what they share, and their entries.
+// Emitters at infinity: their common base class and their entries.
 
 #include "emitter/emitter.h"
 
 namespace etendue {
 
-/// An emitter of which every point is a direction. Light arriving from direction `d` travels along -d.
+/// An emitter whose points are directions. Light that arrives from direction `d` travels along -d.
 class InfiniteEmitter : public Emitter {
 public:
     EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const final;
     bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const final;
     EmitterHit eval_infinite(Vec3 d) const final;
     Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const final;
-    /// The direction of y_0 alone; what varies is the point of the bounding disc.
+    /// Always the direction of y_0; only the point on the bounding disc varies.
     Vec3 sample_direction(Vec3 ng, Vec2) const final { return ng; }
     bool is_infinite() const final { return true; }
     Disc disc() const final { return {center_, radius_}; }
     void set_scene_bounds(Vec3 center, float radius) final;
 
 protected:
-    /// Direction d the light comes from, radiance and solid-angle density.
+    /// Direction d from which light arrives, its radiance (irradiance if delta) and solid-angle density.
     struct Sample {
         Vec3 d;
         Rgb L;

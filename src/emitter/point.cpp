@@ -1,5 +1,5 @@
-// Emitters at a point: `point` (the same intensity in all directions) and `spot` (a cone with a linear fall-off in
-// angle between beam width and cut-off). y_0 is discrete; its cosine is not part of G.
+// Emitters at a point: `point`, with the same intensity in all directions, and `spot`, a cone whose intensity decreases
+// linearly with the angle between beam width and cut-off. y_0 is discrete, and G has no cosine there.
 
 #include "emitter/point.h"
 
@@ -95,7 +95,7 @@ EmitterEntry point_entry() {
           {"to_world", ParamKind::Transform, "identity", "Its origin is the light's position."}}},
         [](const Params& p, EmitterContext&) {
             if (p.has("position") && p.has("to_world"))
-                p.fail("to_world", "give either position or to_world, not both");
+                p.fail("to_world", "give either \"position\" or \"to_world\", not both");
             const Vec3 at = p.has("position") ? p.vector("position", {})
                                               : p.transform("to_world").point({0, 0, 0});
             return one(std::make_unique<PointEmitter>(at, p.rgb("intensity", Rgb(1))));
@@ -116,7 +116,8 @@ EmitterEntry spot_entry() {
                 const Transform t = p.transform("to_world");
                 const float cutoff = p.number("cutoff_angle", 20, 0.01f, 179.9f);
                 const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
-                if (beam > cutoff) p.fail("beam_width", "beam_width must not exceed cutoff_angle");
+                if (beam > cutoff)
+                    p.fail("beam_width", "\"beam_width\" must not exceed \"cutoff_angle\"");
                 return one(std::make_unique<SpotEmitter>(t.point({0, 0, 0}),
                                                          normalize(t.vector({0, 0, 1})),
                                                          p.rgb("intensity", Rgb(1)), cutoff, beam));

@@ -1,5 +1,5 @@
-// Daylight: `sky`, `sun` and both as `sunsky`, from the model of sky_model.h. The sky is tabulated as an environment
-// image; the sun is a disc of directions, sampled by itself.
+// Daylight: `sky`, `sun`, and both as `sunsky`, with the model of sky_model.h. The sky is tabulated as an environment
+// image; the sun is an emitter of its own, a disc of directions.
 
 #include <cmath>
 #include <optional>
@@ -11,10 +11,12 @@
 namespace etendue {
 namespace {
 
-/// A disc of directions, sampled uniformly. An angle of half a degree needs more than the digits of its cosine.
+/// A disc of directions, sampled uniformly. Its extent is stored as sin² and 1 − cos, since the cosine of such a small
+/// angle has too few digits.
 class SunEmitter final : public InfiniteEmitter {
 public:
-    /// `limb` where the disc is darker toward its rim and toward the horizon: else its radiance is that of its middle.
+    /// With `limb` the disc is darker toward its rim and toward the horizon; without it, it has the same radiance
+    /// everywhere. `radiance` is the mean.
     SunEmitter(Vec3 toward, Vec3 up, double angular_radius, Rgb radiance,
                std::optional<SunModel> limb, Rgb scale)
         : frame_(Frame::from_normal(toward)), up_(up), sin2_(sqr(std::sin(angular_radius))),
@@ -50,12 +52,13 @@ private:
     Vec3 up_;
     double sin2_, one_minus_cos_;
     float pdf_;
-    Rgb radiance_;  ///< Its mean.
+    Rgb radiance_;  ///< Mean over the disc.
     std::optional<SunModel> limb_;
     Rgb scale_;
 };
 
-/// From east (x), up (y) and south (z), as sun_direction() and environments have them, to Mitsuba 3's south, west and up.
+/// From the axes of sun_direction() and environments (x east, y up, z south) to those of Mitsuba 3 (x south, y west, z
+/// up).
 const Transform kFromYUp(Transform::Matrix{
     {{0, 0, 1, 0}, {-1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 0, 1}}});
 
@@ -91,10 +94,10 @@ std::vector<ParamInfo> params() {
     };
 }
 
-/// What the parameters say.
+/// Parameters shared by sky and sun.
 struct Daylight {
-    Transform to_world;  ///< From y up.
-    Vec3 sun;            ///< Unit vector, y being up.
+    Transform to_world;  ///< From axes with y up.
+    Vec3 sun;            ///< Unit vector toward the sun, with y up.
     float turbidity;
 
     bool is_day() const { return sun.y >= 0; }
@@ -106,7 +109,8 @@ Daylight read_daylight(const Params& p) {
     out.turbidity = p.number("turbidity", 3, 1, 10);
     if (p.has("sun_direction")) {
         const Vec3 d = out.to_world.inverse().vector(p.vector("sun_direction", {}));
-        if (!(length2(d) > 0)) p.fail("sun_direction", "the direction must not be zero");
+        if (!(length2(d) > 0))
+            p.fail("sun_direction", "parameter \"sun_direction\" must not be zero");
         out.sun = normalize(d);
         return out;
     }
@@ -126,7 +130,8 @@ Daylight read_daylight(const Params& p) {
 
 Rgb read_albedo(const Params& p) {
     const Rgb albedo = p.rgb("albedo", Rgb(0.3f));
-    if (albedo.max() > 1) p.fail("albedo", "an albedo must be at most 1");
+    if (albedo.max() > 1)
+        p.fail("albedo", "parameter \"albedo\" must have components of at most 1");
     return albedo;
 }
 
@@ -146,10 +151,11 @@ std::unique_ptr<Emitter> make_sky(const Params& p, const Daylight& day) {
     return make_environment(width, height, std::move(pixels), day.to_world);
 }
 
-/// The sun's aperture over that of nature.
+/// Aperture of the sun relative to the real one.
 double read_aperture(const Params& p) {
     if (p.has("sun_aperture") && p.has("sun_radius_scale"))
-        p.fail("sun_radius_scale", "give either sun_aperture or sun_radius_scale, not both");
+        p.fail("sun_radius_scale",
+               "give either \"sun_aperture\" or \"sun_radius_scale\", not both");
     return p.has("sun_aperture") ? double(p.number("sun_aperture", 0, 1e-3f, 179)) / kSunAperture
                                  : double(p.number("sun_radius_scale", 1, 0.01f, 100));
 }
@@ -157,7 +163,7 @@ double read_aperture(const Params& p) {
 std::unique_ptr<Emitter> make_sun(const Params& p, const Daylight& day) {
     constexpr double kDegree = M_PI / 180;
     const double natural = kSunAperture / 2 * kDegree, radius = natural * read_aperture(p);
-    // The power stays, whatever the aperture.
+    // Keeps the power independent of the aperture.
     const double share = sqr(std::sin(natural / 2) / std::sin(radius / 2));
     const Rgb scale(p.number("scale", 1, 0) * p.number("sun_scale", 1, 0) * float(share));
     const Vec3 toward = normalize(day.to_world.vector(day.sun)),

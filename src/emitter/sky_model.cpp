@@ -30,8 +30,8 @@ struct TurbidityLevel {
     }
 };
 
-/// Bézier curve of degree 5 over the sun's elevations, which the control points sample more densely near the horizon
-/// [Hosek & Wilkie 2012, §5.1].
+/// Bézier curve of degree 5 over the sun's elevation, parametrised by its cube root to be finer near the horizon [Hosek
+/// & Wilkie 2012, §5.1].
 template <class Value>
 double at_elevation(double elevation, const Value& control_point) {
     constexpr double kBinomial[] = {1, 5, 10, 10, 5, 1};
@@ -55,7 +55,7 @@ double sky_entry(const float* table, int entries, int entry, int channel, double
     });
 }
 
-/// ∫ ȳ(λ) dλ in nm. The table of the sky holds integrals over the wavelengths, of which this makes means.
+/// ∫ ȳ(λ) dλ in nm: converts the table of the sky, which has integrals over wavelengths, to means.
 constexpr double kIntegralOfY = 106.7502593994140625;
 
 }  // namespace
@@ -125,12 +125,12 @@ Rgb SunModel::radiance(double elevation, double cos_psi) const {
         const double darkened = polynomial<6>(hosek_wilkie::kLimbDarkening + i * 6, cos_psi);
         out += weights_[size_t(i)] * float(in_the_middle * darkened);
     }
-    // A low sun lies outside the gamut.
+    // The colour of a low sun is outside the gamut.
     return {std::max(out.r, 0.0f), std::max(out.g, 0.0f), std::max(out.b, 0.0f)};
 }
 
 Rgb SunModel::mean_radiance(double elevation) const {
-    // Rings and sectors of equal area; the disc is flat at this size.
+    // Rings and sectors of equal area; at this size the disc is treated as flat.
     constexpr int kRings = 32, kSectors = 16;
     constexpr double kRadius = kSunAperture / 2 * kDegree;
     if (!(elevation >= 0)) return {};

@@ -1,6 +1,6 @@
 #pragma once
-// Clear daylight: sky [Hosek & Wilkie 2012], sun [Hosek & Wilkie 2013], and where the sun stands [Blanco-Muriel et al.
-// 2001]. Mitsuba 3 has the same models.
+// Clear daylight: radiance of the sky [Hosek & Wilkie 2012] and of the sun [Hosek & Wilkie 2013], and position of the
+// sun [Blanco-Muriel et al. 2001]. Mitsuba 3 has the same models.
 //
 // Units are W m⁻² sr⁻¹ nm⁻¹, averaged over the wavelengths as spectrum_to_rgb() does; a luminance of 1 kcd/m² is a Y of
 // 0.0137.
@@ -13,16 +13,17 @@
 
 namespace etendue {
 
-/// Full angle of the sun's disc, degrees.
+/// Angular diameter of the sun, in degrees.
 inline constexpr double kSunAperture = 0.5358;
 
-/// Radiance of the sky without the sun, of the directions above the horizon.
+/// Radiance of the sky without the sun.
 class SkyModel {
 public:
-    /// `sun` is the unit vector toward the sun, y being up; with the sun below the horizon the sky is black. Turbidity
-    /// lies in [1, 10], the albedo of the ground in [0, 1].
+    /// `sun` is the unit vector toward the sun, with y up; the sky is black if the sun is below the horizon. The
+    /// turbidity is in [1, 10], the albedo of the ground in [0, 1].
     SkyModel(Vec3 sun, float turbidity, Rgb albedo);
 
+    /// Radiance from the unit vector `d`, with y up; black below the horizon.
     Rgb radiance(Vec3 d) const;
 
 private:
@@ -36,20 +37,20 @@ private:
     std::array<Channel, 3> channels_;
 };
 
-/// Radiance of a sun with the aperture kSunAperture.
+/// Radiance of a sun of angular diameter kSunAperture.
 class SunModel {
 public:
     explicit SunModel(float turbidity);
 
-    /// Seen at an elevation (radians), where the line of sight makes the angle ψ with the sun's surface normal: 1 in the
-    /// middle of the disc, 0 at its rim. Zero below the horizon.
+    /// Radiance at an elevation in radians. ψ is the angle between the line of sight and the normal of the sun's
+    /// surface: `cos_psi` is 1 at the centre of the disc and 0 at its rim. Zero below the horizon.
     Rgb radiance(double elevation, double cos_psi) const;
     /// Mean over the disc of a sun at this elevation; zero below the horizon.
     Rgb mean_radiance(double elevation) const;
 
 private:
     double turbidity_;
-    std::vector<Rgb> weights_;  ///< Of the wavelengths.
+    std::vector<Rgb> weights_;  ///< Of the model's wavelengths, see spectrum_weights().
 };
 
 /// Civil time and place of an observer.

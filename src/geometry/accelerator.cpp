@@ -16,7 +16,7 @@ namespace {
 void bounds_callback(const RTCBoundsFunctionArguments* args) {
     const auto* shape = static_cast<const AnalyticShape*>(args->geometryUserPtr);
     Bounds3 b = shape->bounds();
-    // Flat boxes are widened a little: traversal rounds, and the callback decides exactly.
+    // Padding, since traversal rounds and bounds may be flat. The callback decides exactly.
     const float pad = 1e-5f * (b.radius() + length(b.center()));
     b.lo = b.lo - Vec3{pad, pad, pad};
     b.hi = b.hi + Vec3{pad, pad, pad};
@@ -30,7 +30,7 @@ bool intersect_analytic(const AnalyticShape& shape, const RTCRay& ray, AnalyticS
                            ray.tnear, ray.tfar, hit);
 }
 
-// Only single rays are ever traced, so the packets that Embree hands over have one element.
+// Only single rays are traced, so the packets passed by Embree have one element.
 void intersect_callback(const RTCIntersectFunctionNArguments* args) {
     if (!args->valid[0]) return;
     auto* rayhit = reinterpret_cast<RTCRayHit*>(args->rayhit);
@@ -72,14 +72,14 @@ struct Accelerator::Impl {
         uint32_t first_shape;
     };
     std::vector<uint32_t> group_first;  ///< Index of each group's first shape.
-    std::vector<uint32_t>
-        shape_of_geom;  ///< By geometry id of the top scene; instances hold their index instead.
+    /// By geometry id of the top-level scene: index of the shape, or of the instance.
+    std::vector<uint32_t> shape_of_geom;
     std::vector<Instance> instances;
     uint32_t shape_count = 0;
 
     explicit Impl(const AcceleratorOptions& o) : options(o) {
         device = rtcNewDevice(nullptr);
-        if (!device) throw std::runtime_error("Embree: no device could be made");
+        if (!device) throw std::runtime_error("Embree: cannot create a device");
         rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &bytes);
         top = new_scene();
     }
@@ -108,7 +108,7 @@ struct Accelerator::Impl {
         RTCGeometry geometry;
         if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape)) {
             geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-            // Copied, not shared: Embree reads 16 bytes a vertex, beyond the end of a packed array.
+            // Copied, not shared: Embree reads 16 bytes per vertex, beyond the end of a packed array.
             auto* p = static_cast<Vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX,
                                                                  0, RTC_FORMAT_FLOAT3, sizeof(Vec3),
                                                                  mesh->positions.size()));

@@ -9,12 +9,12 @@ namespace etendue {
 
 struct Ray {
     Vec3 o;
-    Vec3 d;  ///< Unit length, unless a segment is meant (`tmax` = 1 at its end).
+    Vec3 d;  ///< Unit vector, or for a segment the vector to its end, with `tmax` = 1.
     float tmax = kInf;
 };
 
-/// Moves a ray's origin off the surface it starts from, along the geometric normal to the side of `d`, by a distance
-/// that covers the rounding of hit points [after Wächter & Binder 2019].
+/// Moves a ray's origin off its surface, along the geometric normal to the side of `d`, by a distance that exceeds the
+/// rounding error of hit points [after Wächter & Binder 2019].
 inline Vec3 offset_origin(Vec3 p, Vec3 ng, Vec3 d) {
     constexpr float kRelative = 0x1p-16f;
     const float scale = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), 0x1p-6f});

@@ -140,7 +140,7 @@ bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
     const double c = ox * ox + oy * oy + oz * oz - double(radius_) * radius_;
     const double disc = b * b - a * c;
     if (!(disc >= 0)) return false;
-    // q has the larger magnitude of the two numerators, so that neither root cancels.
+    // q is the numerator of larger magnitude, so that neither root suffers from cancellation.
     const double root = std::sqrt(disc);
     const double q = b < 0 ? -b + root : -b - root;
     double t0 = q / a, t1 = q != 0 ? c / q : -q / a;

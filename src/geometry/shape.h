@@ -1,5 +1,5 @@
 #pragma once
-// Shapes: triangle meshes, and the quadrics that must not be tessellated because a caustic shows their curvature.
+// Shapes: triangle meshes, and quadrics, which are not tessellated since caustics would show the facets.
 
 #include <array>
 #include <cstdint>
@@ -15,9 +15,9 @@ namespace etendue {
 /// A point on a shape with the differential geometry that shading needs. World space.
 struct SurfaceGeometry {
     Vec3 p;
-    Vec3 ng;          ///< Unit geometric normal, on the side of ns.
+    Vec3 ng;          ///< Unit geometric normal, on the same side as ns.
     Vec3 ns;          ///< Unit interpolated normal.
-    Vec3 dpdu, dpdv;  ///< Zero unless asked for.
+    Vec3 dpdu, dpdv;  ///< Zero unless requested.
     Vec2 uv;
 };
 
@@ -35,7 +35,7 @@ public:
     virtual double area() const = 0;
     virtual size_t primitive_count() const { return 1; }
     virtual double primitive_area(uint32_t) const { return area(); }
-    /// Geometry at parameters (u, v) of primitive `prim` as reported by an intersection.
+    /// Geometry at parameters (u, v) of primitive `prim`, as in RayHit; dpdu and dpdv only if `tangents`.
     virtual SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const = 0;
     /// Uniform in area on primitive `prim`.
     virtual ShapeSample sample(uint32_t prim, Vec2 u) const = 0;
@@ -45,7 +45,7 @@ public:
 class TriangleMesh final : public Shape {
 public:
     std::vector<Vec3> positions;
-    std::vector<Vec3> normals;  ///< Empty, or unit and one per vertex.
+    std::vector<Vec3> normals;  ///< Empty, or one unit vector per vertex.
     std::vector<Vec2> uvs;      ///< Empty, or one per vertex.
     std::vector<std::array<uint32_t, 3>> triangles;
     std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see compute_face_normals().
@@ -57,7 +57,7 @@ public:
     double area() const override;
     size_t primitive_count() const override { return triangles.size(); }
     double primitive_area(uint32_t prim) const override;
-    /// Inline on the hot path: (u, v) are the barycentric coordinates of the second and third corner.
+    /// (u, v) are the barycentric coordinates of the second and third vertex.
     SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const override;
     ShapeSample sample(uint32_t prim, Vec2 u) const override;
     size_t memory_bytes() const override;
@@ -66,15 +66,16 @@ public:
 /// A shape that Embree intersects through a callback.
 class AnalyticShape : public Shape {
 public:
-    /// Nearest intersection with o + t·d for t in (tmin, tmax), in double because `o` may be far away.
+    /// An intersection at o + t·d; t is double, since `o` may be far away.
     struct Hit {
         double t;
         float u, v;
     };
+    /// The nearest intersection with t in (tmin, tmax); false where there is none.
     virtual bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const = 0;
 };
 
-/// Sphere of a centre and radius; u is the azimuth over 2π about +z, v the polar angle over π.
+/// Sphere with (u, v) = (azimuth about +z over 2π, polar angle over π).
 class Sphere final : public AnalyticShape {
 public:
     Sphere(Vec3 center, float radius, bool flip_normals)
@@ -96,7 +97,7 @@ private:
     bool flip_;
 };
 
-/// The unit disc of the xy plane under any affine map; normal +z; (u, v) = (radius, azimuth over 2π).
+/// Affine image of the unit disc in the xy plane with normal +z; (u, v) = (radius, azimuth over 2π).
 class Disk final : public AnalyticShape {
 public:
     Disk(const Transform& to_world, bool flip_normals);

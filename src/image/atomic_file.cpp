@@ -18,7 +18,7 @@ PendingFile::PendingFile(const std::string& path) : path_(path) {
     if (fs::is_directory(target, error)) fail("there is a folder of that name");
     if (target.has_parent_path() && !fs::is_directory(target.parent_path(), error)) {
         fs::create_directories(target.parent_path(), error);
-        if (error) fail("cannot make its folder: " + error.message());
+        if (error) fail("cannot create its folder: " + error.message());
     }
     temporary_ =
         target.parent_path() / fmt::format(".{}.{}", ::getpid(), target.filename().string());

@@ -1,5 +1,5 @@
 #pragma once
-// Files that are never seen half written.
+// Files that appear under their name only when complete.
 
 #include <filesystem>
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace etendue {
 
-/// A file that takes its name, replacing an older one, only when commit() is called; until then it is written under
-/// another name in the same folder, and it vanishes if it never is. Makes missing folders. All errors are
-/// std::runtime_error and name the file.
+/// A file that is written under a temporary name in the same folder. commit() renames it to `path` and replaces an
+/// older file; without it the temporary file is removed. Missing folders are created. All errors are std::runtime_error
+/// and name the file.
 class PendingFile {
 public:
     explicit PendingFile(const std::string& path);
@@ -18,7 +18,8 @@ public:
     ~PendingFile();
 
     std::string temporary() const { return temporary_.string(); }  ///< Where to write.
-    [[noreturn]] void fail(std::string why) const;  ///< Speaks of the final name only.
+    /// Throws; temporary() in `why` is replaced by the final name.
+    [[noreturn]] void fail(std::string why) const;
     void commit();
 
 private:
@@ -27,7 +28,7 @@ private:
     bool committed_ = false;
 };
 
-/// Writes a text file at once.
+/// Writes `text` to a file through a PendingFile.
 void write_file_atomically(const std::string& path, std::string_view text);
 
 }  // namespace etendue

@@ -1,7 +1,7 @@
 // ꟻLIP [Andersson et al. 2020: "FLIP: A Difference Evaluator for Alternating Images"; Andersson et al. 2021:
 // "Visualizing and Communicating Errors in Rendered Images"]. Both images are filtered by the contrast sensitivity of
-// the eye; the distances of their colours are raised to 1 − (distance of their edges and points). Constants are those
-// of the papers.
+// the eye. The error of a pixel is its colour difference to the power of 1 − (difference of edges and points).
+// Constants are those of the papers.
 
 #include "image/flip.h"
 
@@ -37,7 +37,7 @@ Triple operator*(const Matrix3& m, const Triple& v) {
     return r;
 }
 
-/// XYZ over that of white.
+/// XYZ divided by that of the white point.
 Triple relative_xyz(Rgb c) {
     Triple t = kXyzFromRgb * Triple{c.r, c.g, c.b};
     for (int i = 0; i < 3; ++i) t[i] /= kWhite[i];
@@ -56,7 +56,7 @@ Rgb rgb_from_ycxcz(const Triple& t) {
             std::clamp(c[2], 0.0f, 1.0f)};
 }
 
-/// L*a*b* whose chroma shrinks with the lightness, after Hunt.
+/// L*a*b* with the Hunt effect: a* and b* are scaled by 0.01 L*.
 Triple hunt_lab(Rgb c) {
     Triple f = relative_xyz(c);
     constexpr float kDelta = 6.0f / 29;
@@ -79,7 +79,7 @@ struct Plane {
     Plane(int width, int height) : width(width), height(height), data(size_t(width) * height) {}
 };
 
-/// An odd number of taps around the centre.
+/// Coefficients at −radius, …, radius; always an odd number.
 using Kernel = std::vector<float>;
 
 /// `rows` along x, then `columns` along y; the border is repeated.
@@ -239,7 +239,7 @@ void check_sizes(std::span<const Rgb> image, std::span<const Rgb> reference, int
         throw std::invalid_argument("images of different sizes cannot be compared");
 }
 
-/// Pixels that are not finite become black here and are counted as wrong at the end.
+/// Replaces pixels that are not finite by black; finished() gives them the largest error.
 std::vector<Rgb> finite_or_black(std::span<const Rgb> pixels) {
     std::vector<Rgb> v(pixels.begin(), pixels.end());
     for (Rgb& c : v)
@@ -282,7 +282,7 @@ std::vector<float> flip_exposures(std::span<const Rgb> reference) {
     std::sort(luminances.begin(), luminances.end());
     if (luminances.empty() || luminances.back() <= 0) return {0};
     const double largest = luminances.back();
-    // Half the pixels black: the least luminance that matters for the brightest pixel, instead of none.
+    // The median is zero where half the pixels are black; a fraction of the largest luminance replaces it then.
     const double median = std::max(luminances[luminances.size() / 2], largest * 0x1p-24);
     const double bright = inverse_aces_curve(0.85);
     const double start = std::log2(bright / largest), stop = std::log2(bright / median);

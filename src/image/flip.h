@@ -20,11 +20,11 @@ struct FlipResult {
 FlipResult ldr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
                     int height, float pixels_per_degree = kFlipPixelsPerDegree);
 
-/// HDR-ꟻLIP: the largest LDR-ꟻLIP over the exposures that the reference asks for, under the ACES curve.
+/// HDR-ꟻLIP: per pixel the largest LDR-ꟻLIP over flip_exposures(reference), tone-mapped by the ACES curve.
 FlipResult hdr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
                     int height, float pixels_per_degree = kFlipPixelsPerDegree);
 
-/// Exposures, in stops, of HDR-ꟻLIP for a reference [Andersson et al. 2021, §3.2].
+/// Exposures of HDR-ꟻLIP for a reference, in stops and ascending [Andersson et al. 2021, §3.2].
 std::vector<float> flip_exposures(std::span<const Rgb> reference);
 
 }  // namespace etendue

@@ -50,7 +50,7 @@ std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer) {
         }
         if (grey < 0)
             throw std::runtime_error(
-                fmt::format("the image has no channels R, G, B{}; it has {}",
+                fmt::format("the image has no channels R, G, B{} (it has: {})",
                             layer.empty() ? "" : fmt::format(" in layer \"{}\"", layer),
                             fmt::join(image.channels, ", ")));
         std::fill(rgb, rgb + 3, grey);
@@ -68,7 +68,8 @@ void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
                    std::span<const Rgb> pixels) {
     if (image.channels.empty()) image = Image(width, height, {});
     if (image.width != width || image.height != height || pixels.size() != image.pixel_count())
-        throw std::invalid_argument(fmt::format("layer \"{}\" is not of the image's size", layer));
+        throw std::invalid_argument(
+            fmt::format("layer \"{}\" has another size than the image", layer));
     const size_t before = image.channels.size(), after = before + 3;
     std::vector<float> data(image.pixel_count() * after);
     for (size_t i = 0; i < pixels.size(); ++i) {

@@ -16,12 +16,13 @@
 
 namespace etendue {
 
-/// Rows from the top, channels fastest; colours are linear. A layer's channels carry its name: "albedo.R".
+/// Rows from the top, the channels of a pixel adjacent; colours are linear. Channels of a layer are prefixed with its
+/// name: "albedo.R".
 struct Image {
     int width = 0, height = 0;
     std::vector<std::string> channels;
     std::vector<float> data;
-    /// Text and numbers that EXR files carry along.
+    /// Metadata stored in EXR files.
     std::map<std::string, std::variant<std::string, double>> attributes;
 
     Image() = default;
@@ -38,7 +39,8 @@ private:
     size_t offset(int x, int y) const { return (size_t(y) * width + x) * channels.size(); }
 };
 
-/// The colours of a layer: its R, G and B, or its only channel (any, or "Y") as grey; throws where it has neither.
+/// The colours of a layer: its channels R, G and B, or its channel Y or its only one as grey. Throws std::runtime_error
+/// where it has none of these.
 std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer = "");
 /// Appends the channels R, G, B (prefixed with "layer." unless that is empty); an empty image takes the given size.
 void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
@@ -47,8 +49,8 @@ Image rgb_image(int width, int height, std::span<const Rgb> pixels);
 
 using Half = Imath::half;
 
-/// Pixels in the file's own precision: 8-bit codes, or linear values of 16 or 32 bits. Rows from the top, channels
-/// fastest; alpha is not multiplied in.
+/// Pixels in the file's own precision: 8-bit codes, or linear values of 16 or 32 bits. Rows from the top, the channels
+/// of a pixel adjacent; alpha is not premultiplied.
 struct PixelBuffer {
     int width = 0, height = 0, channels = 0;
     std::variant<std::vector<uint8_t>, std::vector<Half>, std::vector<float>> data;

@@ -43,7 +43,7 @@ std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path) {
     std::error_code error;
     const fs::file_status status = fs::status(path, error);
     if (!fs::exists(status)) fail_read(path, "there is no such file");
-    if (!fs::is_regular_file(status)) fail_read(path, "it is not a file");
+    if (!fs::is_regular_file(status)) fail_read(path, "it is not a regular file");
     OIIO::ImageSpec config;
     config["oiio:UnassociatedAlpha"] = 1;  // the file's own colours, not premultiplied
     auto input = OIIO::ImageInput::open(path, &config);
@@ -51,7 +51,7 @@ std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path) {
     const OIIO::ImageSpec& spec = input->spec();
     if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep)
         fail_read(path, "it is not a flat image with at least one pixel and one channel");
-    // No codec packs better than this; a larger claim is a damaged header that would exhaust the memory.
+    // No codec compresses better than this. A header with a larger size is damaged, and would exhaust the memory.
     constexpr uint64_t kBestRatio = 4096, kAlwaysFine = 256u << 20;
     const uint64_t bytes = spec.image_bytes();
     if (bytes > kAlwaysFine && bytes / kBestRatio > fs::file_size(path))
@@ -75,7 +75,7 @@ std::vector<T> read_all(OIIO::ImageInput& input, const std::string& path, OIIO::
     }
 }
 
-// Integer formats hold sRGB unless they say that they do not.
+// Integer formats contain sRGB codes unless the file declares them linear.
 bool holds_srgb(const OIIO::ImageSpec& spec) {
     return !spec.format.is_floating_point() &&
            spec.get_string_attribute("oiio:ColorSpace") != "Linear";
@@ -86,7 +86,7 @@ void linearize(std::vector<float>& data, const OIIO::ImageSpec& spec) {
         if (int(i % spec.nchannels) != spec.alpha_channel) data[i] = srgb_to_linear(data[i]);
 }
 
-// Text and numbers, but for what describes the encoding of this one file.
+// Text and numbers, except those that describe the encoding of the file.
 void read_attributes(Image& image, const OIIO::ImageSpec& spec) {
     for (const OIIO::ParamValue& a : spec.extra_attribs) {
         const std::string name = a.name().string();
@@ -131,7 +131,8 @@ void write_exr(const PendingFile& file, const Image& image, ExrPrecision precisi
     spec.channelnames = image.channels;
     spec.alpha_channel = image.channel("A");
     spec["compression"] = "zip";
-    spec["DateTime"] = "";  // else the time of day, and no two files are the same
+    spec["DateTime"] =
+        "";  // otherwise the current time is written and equal images give different files
     for (const auto& [name, value] : image.attributes) {
         if (const auto* text = std::get_if<std::string>(&value))
             spec.attribute(name, *text);
@@ -177,7 +178,7 @@ uint8_t srgb_code(float v) {
     return uint8_t(linear_to_srgb(std::clamp(v, 0.0f, 1.0f)) * 255 + 0.5f);
 }
 
-// OpenImageIO's writer of PNG does not notice a full disk.
+// Whether the file contains these pixels: OpenImageIO's PNG writer does not report a full disk.
 bool holds(const std::string& path, const std::vector<uint8_t>& codes) try {
     return std::get<std::vector<uint8_t>>(read_pixels(path, true).data) == codes;
 } catch (const std::runtime_error&) {
@@ -196,7 +197,7 @@ void write_png(const PendingFile& file, const Image& image, ExrPrecision) {
     spec["oiio:ColorSpace"] = "sRGB";
     write_with_oiio(file, spec, OIIO::TypeUInt8, codes.data());
     if (!holds(file.temporary(), codes))
-        file.fail("what was written cannot be read back; the disk may be full");
+        file.fail("the file differs when read back; the disk may be full");
 }
 
 struct Writer {
@@ -207,9 +208,7 @@ constexpr Writer kWriters[] = {
     {".exr", write_exr}, {".pfm", write_pfm}, {".hdr", write_hdr}, {".png", write_png}};
 
 const Writer& writer_for(const std::string& path) {
-    std::string e = fs::path(path).extension().string();
-    std::transform(e.begin(), e.end(), e.begin(),
-                   [](unsigned char c) { return char(std::tolower(c)); });
+    const std::string e = image_extension(path);
     for (const Writer& w : kWriters)
         if (e == w.extension) return w;
     fail_write(path,
@@ -217,6 +216,13 @@ const Writer& writer_for(const std::string& path) {
 }
 
 }  // namespace
+
+std::string image_extension(const std::string& path) {
+    std::string e = fs::path(path).extension().string();
+    std::transform(e.begin(), e.end(), e.begin(),
+                   [](unsigned char c) { return char(std::tolower(c)); });
+    return e;
+}
 
 Image read_image(const std::string& path) {
     const auto input = open_input(path);

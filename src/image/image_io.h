@@ -10,7 +10,8 @@
 
 namespace etendue {
 
-/// Reads any format OpenImageIO knows. Integer formats are taken as sRGB (alpha as linear) and linearised.
+/// Reads any format supported by OpenImageIO. Integer formats are decoded from sRGB, except alpha and files declared
+/// linear.
 Image read_image(const std::string& path);
 
 /// The colours of one layer; see rgb_pixels().
@@ -20,22 +21,26 @@ struct RgbImage {
 };
 RgbImage read_rgb(const std::string& path, std::string_view layer = "");
 
-/// Reads pixels for a texture in the file's own precision. Integer formats are codes of sRGB unless `raw`: 8-bit ones
-/// stay codes, deeper ones become floats, linearised unless `raw`.
+/// Reads pixels for a texture in the file's own precision. 8-bit formats stay codes; deeper integer formats become
+/// floats, decoded from sRGB unless `raw`.
 PixelBuffer read_pixels(const std::string& path, bool raw);
 
 enum class ExrPrecision { Float, Half };
 
-/// Writes by the name's extension: .exr takes all channels and attributes; .pfm, .hdr and .png (sRGB, clamped, NaN in
-/// magenta) take the colours without a layer. Missing folders are made. The file appears, or is replaced, only once it
-/// is complete. Finite values beyond the range of half floats are clamped to it.
+/// Writes the format given by the name's extension: .exr stores all channels and attributes; .pfm, .hdr and .png (sRGB,
+/// clamped, NaN as magenta) store the colours of the unnamed layer. Missing folders are created. The file appears, or
+/// is replaced, only once it is complete. With ExrPrecision::Half finite values are clamped to the range of half
+/// floats.
 void write_image(const std::string& path, const Image& image,
                  ExrPrecision precision = ExrPrecision::Float);
 
-/// The bytes of a PNG file with these 8-bit codes, of one (grey) or three channels. Codes of colours are sRGB.
+/// The bytes of a PNG file with these 8-bit sRGB codes, of one (grey) or three channels.
 std::string encode_png(int width, int height, std::span<const uint8_t> codes);
 
-/// Throws unless write_image knows the extension: to be called before a long rendering.
+/// The extension of a file name in lower case, with its dot: ".exr".
+std::string image_extension(const std::string& path);
+
+/// Throws unless write_image() supports the extension; for a check before a long rendering.
 void check_image_extension(const std::string& path);
 
 }  // namespace etendue

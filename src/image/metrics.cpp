@@ -14,7 +14,7 @@ double grey(Rgb c) {
     return (double(c.r) + c.g + c.b) / 3;
 }
 
-/// 0/0 is no error: black pixels of black images.
+/// 0/0 is 0: black pixels of black images have no error.
 double ratio(double error, double scale) {
     return error == 0 ? 0 : error / scale;
 }

@@ -9,7 +9,7 @@
 namespace etendue {
 namespace {
 
-// (a x² + b x) / (c x² + d x + e) of [Narkowicz 2016]; its input is the exposed colour times kAcesScale.
+// (a x² + b x) / (c x² + d x + e) of [Narkowicz 2016], where x is the exposed colour times kAcesScale.
 constexpr double kAcesScale = 0.6, kAcesA = 2.51, kAcesB = 0.03, kAcesC = 2.43, kAcesD = 0.59,
                  kAcesE = 0.14;
 

@@ -1,5 +1,5 @@
 #pragma once
-// From linear colours to those of a display, still linear and in [0, 1]; and false colours.
+// Tone mapping of linear colours to linear display colours in [0, 1], and false colours.
 
 #include <optional>
 #include <span>
@@ -11,7 +11,7 @@
 namespace etendue {
 
 enum class ToneOperator {
-    Srgb,      ///< Clamping alone.
+    Srgb,      ///< Only clamps.
     Reinhard,  ///< Global, with a white point [Reinhard et al. 2002, eq. 4], on luminance.
     Aces,      ///< Fit of the ACES reference transforms [Narkowicz 2016], on each channel.
 };
@@ -20,18 +20,18 @@ std::optional<ToneOperator> tone_operator(std::string_view name);  ///< "srgb", 
 struct ToneMapping {
     ToneOperator op = ToneOperator::Srgb;
     float exposure = 0;  ///< Stops: colours are multiplied by 2^exposure first.
-    float white =
-        0;  ///< Luminance, after exposure, that becomes white under Reinhard; 0: the image's largest.
+    /// Luminance, after exposure, that Reinhard maps to white; 0: the largest in the image.
+    float white = 0;
 };
-/// In [0, 1], linear; not-a-number stays as it is.
+/// Linear colours in [0, 1]; NaN stays NaN.
 std::vector<Rgb> tone_map(std::span<const Rgb> pixels, const ToneMapping& mapping);
 
-/// The rational function of [Narkowicz 2016], for x that is scaled by 0.6 as there; clamped to [0, 1].
+/// The rational function of [Narkowicz 2016] at 0.6 x, the scale he recommends; clamped to [0, 1].
 float aces_curve(float x);
-/// The largest x that the unclamped aces_curve maps to y in [0, 1).
+/// The larger x that the unclamped aces_curve() maps to y in [0, 1).
 double inverse_aces_curve(double y);
 
-/// Colour map "magma" of matplotlib (van der Walt, Smith; CC0), for v clamped to [0, 1]; linear sRGB. Not-a-number stays.
+/// Colour map "magma" of matplotlib (van der Walt, Smith; CC0) at v clamped to [0, 1], as linear sRGB; NaN stays NaN.
 Rgb magma(float v);
 
 }  // namespace etendue

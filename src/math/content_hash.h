@@ -1,5 +1,6 @@
 #pragma once
-// Hash of contents: files, parameters, programs. The same for the same bytes on every machine.
+// Hash of the contents of files, parameters and programs, for recognising them again. Equal bytes have equal hashes in
+// every run.
 
 #include <cstdint>
 #include <memory>
@@ -7,8 +8,8 @@
 
 namespace etendue {
 
-/// XXH3 with 64 bits [Collet 2012], of everything that was added, in order. What is added is told apart: "ab" and "c" are
-/// not "a" and "bc".
+/// 64-bit XXH3 [Collet 2012] of everything added, in order. Boundaries between the added strings count: "ab", "c" and
+/// "a", "bc" have different hashes.
 class ContentHash {
 public:
     ContentHash();

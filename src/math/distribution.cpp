@@ -33,7 +33,7 @@ AliasTable::AliasTable(std::span<const double> weights) {
         }
     }
     for (uint32_t i : large) cells_[i].keep = 1, cells_[i].alias = i;
-    // What rounding leaves over keeps its own index, unless it has no weight at all.
+    // Cells left over by rounding keep their own index, unless its weight is zero.
     for (uint32_t i : small) {
         cells_[i].keep = 1, cells_[i].alias = i;
         if (cells_[i].pmf == 0) {
@@ -60,8 +60,7 @@ int cell_of(float x, int n) {
     return std::clamp(int(x * float(n)), 0, n - 1);
 }
 
-/// The point (i + f) / n, kept in the cell i where rounding would take it to a neighbour: there the
-/// density is another.
+/// The point (i + f) / n, corrected where rounding would move it into a neighbouring cell, whose density differs.
 float point_in_cell(int i, float f, int n) {
     float x = (float(i) + f) / float(n);
     while (cell_of(x, n) > i) x = std::nextafter(x, 0.0f);

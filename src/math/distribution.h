@@ -10,7 +10,7 @@
 
 namespace etendue {
 
-/// The point of the i-th of n equal parts of [0, 1), i + u into them, below 1 too.
+/// (i + u) / n: the point u in [0, 1) of the i-th of n equal parts of [0, 1); always below 1.
 inline double stratum(int i, int n, double u) {
     return std::fmin((double(i) + u) / double(n), 0x1.fffffffffffffp-1);
 }
@@ -25,10 +25,10 @@ public:
     struct Draw {
         uint32_t index;
         float pmf;
-        double
-            u;  ///< `u` rescaled to [0, 1), to be used again; it has lost some log2(size() / keep) of its bits.
+        /// The argument rescaled to [0, 1), for reuse; about log2(size() / keep) of its bits are lost.
+        double u;
     };
-    /// With 53 bits of `u` the frequency of an index of probability p is right to 2^-53 size() / p, relative.
+    /// For `u` with 53 bits, the frequency of an index of probability p has a relative error of up to 2^-53 size() / p.
     Draw sample(double u) const;
     float pmf(uint32_t i) const { return cells_[i].pmf; }
     double total() const { return total_; }
@@ -37,7 +37,7 @@ public:
 
 private:
     struct Cell {
-        double keep;  ///< Probability that the cell's own index is taken.
+        double keep;  ///< Probability of the cell's own index; `alias` is taken otherwise.
         uint32_t alias;
         float pmf;
     };
@@ -45,7 +45,7 @@ private:
     double total_ = 0;
 };
 
-/// Piecewise-constant density on [0, 1).
+/// Piecewise-constant density on [0, 1), proportional to `values` (not negative); uniform where all are zero.
 class PiecewiseConstant1D {
 public:
     PiecewiseConstant1D() = default;
@@ -66,7 +66,7 @@ private:
     double integral_ = 0;
 };
 
-/// Piecewise-constant density on [0, 1)², `width` × `height` cells, row by row.
+/// Piecewise-constant density on [0, 1)²; `values` are those of `width` × `height` cells, row by row.
 class PiecewiseConstant2D {
 public:
     PiecewiseConstant2D() = default;

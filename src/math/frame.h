@@ -30,7 +30,7 @@ struct Frame {
 
     Vec3 to_local(Vec3 v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
     Vec3 to_world(Vec3 v) const { return s * v.x + t * v.y + n * v.z; }
-    /// The same tangent with the normal turned to the other side (left-handed frames are avoided by turning t too).
+    /// The frame with n and t reversed, so that it stays right-handed.
     Frame flipped() const { return {s, -t, -n}; }
 };
 

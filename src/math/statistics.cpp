@@ -8,7 +8,7 @@
 namespace etendue {
 namespace {
 
-/// What has no finite value is infinite or NaN, without an exception.
+/// Returns infinity or NaN instead of throwing where there is no finite value.
 using NoThrow = boost::math::policies::policy<
     boost::math::policies::domain_error<boost::math::policies::ignore_error>,
     boost::math::policies::overflow_error<boost::math::policies::ignore_error>>;

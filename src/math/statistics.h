@@ -1,5 +1,5 @@
 #pragma once
-// Estimates with their spread, and the tests that compare them.
+// Means with their standard errors, and the tests that compare them.
 
 #include <cmath>
 #include <cstdint>
@@ -9,7 +9,7 @@ namespace etendue {
 /// Mean and spread of independent samples of one quantity [Welford 1962].
 class Moments {
 public:
-    /// A quantity that is known.
+    /// A known value, without error.
     static Moments exact(double value) { return estimate(value, 0, 0); }
     /// The mean of `count` samples, and the variance of that mean.
     static Moments estimate(double mean, double squared_error, int64_t count) {
@@ -36,21 +36,21 @@ private:
     double mean_ = 0, sum2_ = 0;
 };
 
-/// Probability that |T| exceeds t for Student's distribution.
+/// Probability that |T| exceeds t for Student's distribution with `dof` degrees of freedom.
 double student_tail(double t, double dof);
-/// The t whose student_tail() is `p`: half an interval of confidence 1 - p is so many standard errors.
+/// The t whose student_tail() is `p`: the half-width, in standard errors, of a confidence interval of level 1 - p.
 double student_quantile(double p, double dof);
 
 /// Two-sided 95 % quantile of the normal distribution.
 inline constexpr double kNormalQuantile95 = 1.959964;
 
-/// Degrees of freedom of the difference of two means [Welch 1947]; infinite where both are known.
+/// Degrees of freedom of the difference of two means [Welch 1947]; infinite where both are exact.
 double welch_dof(const Moments& a, const Moments& b);
-/// Welch's test: the probability of means at least this different, where the expectations differ by at most
-/// `tolerance` (for what single precision does to a render, which no number of samples averages out).
+/// p-value of Welch's test: the probability of means that differ at least as much as these if the expectations differ
+/// by `tolerance`, which allows for rounding errors of single precision that no number of samples averages out.
 double welch_p(const Moments& a, const Moments& b, double tolerance);
 
-/// Significance level of each of `tests` independent tests such that all together raise a false alarm with probability
+/// Significance level of each of `tests` independent tests for which the probability of at least one false alarm is
 /// `family` [Šidák 1967].
 double sidak(double family, int tests);
 

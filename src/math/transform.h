@@ -18,18 +18,19 @@ public:
 
     static Transform translate(Vec3 t);
     static Transform scale(Vec3 s);
-    /// Rotation by `degrees` about `axis` (any length above zero), counter-clockwise seen against the axis.
+    /// Right-handed rotation by `degrees` about `axis` (of any length above zero).
     static Transform rotate(Vec3 axis, double degrees);
-    /// Camera to world: the z axis looks from `origin` to `target`; nothing where `up` is parallel to that.
+    /// Camera to world, with the z axis from `origin` to `target`; empty where `origin` equals `target` or `up` is
+    /// parallel to the viewing direction.
     static std::optional<Transform> look_at(Vec3 origin, Vec3 target, Vec3 up);
 
     /// This transform applied after `b`.
     Transform operator*(const Transform& b) const;
     bool operator==(const Transform& b) const { return m_ == b.m_; }
 
-    Vec3 point(Vec3 p) const;   ///< With the division by w.
-    Vec3 vector(Vec3 v) const;  ///< Upper 3×3 part.
-    Vec3 normal(Vec3 n) const;  ///< Inverse transpose, not normalised.
+    Vec3 point(Vec3 p) const;   ///< Divides by w.
+    Vec3 vector(Vec3 v) const;  ///< Applies the upper 3×3 part.
+    Vec3 normal(Vec3 n) const;  ///< Applies the inverse transpose; not normalised.
     Transform inverse() const;
 
     const Matrix& matrix() const { return m_; }

@@ -25,11 +25,12 @@ struct Vec2 {
     friend constexpr Vec2 operator*(Vec2 a, float s) { return {a.x * s, a.y * s}; }
 };
 
-/// A point of the unit square with 53 bits a coordinate, for choices among many that leave numbers over.
+/// A point in [0, 1)² with 53 bits per coordinate. A choice among many uses some of the bits and leaves enough for
+/// reuse.
 struct FinePoint {
     double x = 0, y = 0;
 };
-/// A number of [0, 1) as float, below one too.
+/// A number in [0, 1) rounded to float, kept below one.
 inline float to_float(double u) {
     return std::fmin(float(u), kOneMinusEpsilon);
 }
@@ -82,7 +83,7 @@ constexpr Vec3 max(Vec3 a, Vec3 b) {
     return {a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z};
 }
 
-/// sqrt that maps the small negative numbers of cancellation to zero.
+/// √max(x, 0): negative x are results of cancellation.
 inline float safe_sqrt(float x) {
     return x > 0 ? std::sqrt(x) : 0.0f;
 }

@@ -47,7 +47,7 @@ inline constexpr float kUniformSpherePdf = kInvPi / 4;
 
 /// Uniform in solid angle within the cone about +z whose half-angle has cosine `cos_max`.
 inline Vec3 sample_uniform_cone(Vec2 u, float cos_max) {
-    // sin² θ = (1 - cos θ)(1 + cos θ): a narrow cone's 1 - cos² θ would have few digits left.
+    // sin² θ = (1 - cos θ)(1 + cos θ), since 1 - cos² θ cancels for narrow cones.
     const float versine = u.x * (1 - cos_max);
     const float r = safe_sqrt(versine * (2 - versine));
     float s, c;
@@ -58,7 +58,7 @@ inline float pdf_uniform_cone(float cos_max) {
     return kInvPi / (2 * (1 - cos_max));
 }
 
-/// Barycentric coordinates (of the second and third corner), uniform in area.
+/// Barycentric coordinates of the second and third vertex, uniform in area.
 inline Vec2 sample_uniform_triangle(Vec2 u) {
     const float r = std::sqrt(u.x);
     return {1 - r, u.y * r};

@@ -1,6 +1,6 @@
 #pragma once
-// Order in which the end points of a gathered pair are kept: the one that was sampled from the glossier vertex [Qin et al.
-// 2015, appendix B]. In six bits, for cached vertices.
+// Gloss of a vertex, in six bits for cached vertices: of the two end points of a gathered pair, the one sampled from
+// the glossier vertex is kept [Qin et al. 2015, appendix B].
 
 #include <cstdint>
 
@@ -9,7 +9,7 @@
 namespace etendue {
 
 inline constexpr uint8_t kSharpestGloss = 59;  ///< Of a smooth lobe.
-inline constexpr uint8_t kPointGloss = 60;     ///< An emitter without extent, or at infinity.
+inline constexpr uint8_t kPointGloss = 60;     ///< A point emitter, or one at infinity.
 inline constexpr uint8_t kDeltaGloss = 61;     ///< A delta event: it cannot be sampled again.
 inline constexpr uint8_t kLensGloss = 62;
 

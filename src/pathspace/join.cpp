@@ -3,9 +3,9 @@
 namespace etendue {
 namespace {
 
-/// Attenuation of the edge from y_{s-1} to z_{t-1} by the media they say lie on it. Where they differ though no surface
-/// between them bounds a medium (a scene whose surfaces contradict each other) the choice does not depend on the side it
-/// is seen from.
+/// Attenuation along the edge from y_{s-1} to z_{t-1} by the medium that their surfaces define. If these differ
+/// although no surface lies between them (an inconsistent scene), the choice does not depend on the order of the two
+/// vertices.
 Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b) {
     const MediumId at_a = a.medium_toward(a_to_b), at_b = b.medium_toward(-a_to_b);
     const MediumId medium = scene.has_open_boundaries() ? at_b : std::min(at_a, at_b);
@@ -112,10 +112,10 @@ namespace {
 /// The edge between y_{s-1} and z_{t-1}.
 struct Edge {
     Vec3 w;            ///< From y_{s-1} to z_{t-1}.
-    Rgb contribution;  ///< Of the connection, visibility left out.
-    double rev_a,
-        rev_b;     ///< Densities of y_{s-1} as sampled from z_{t-1}, and the other way round.
-    double total;  ///< Σ (n·p)² over all techniques, relative to p of the split here.
+    Rgb contribution;  ///< Of the connection, without visibility.
+    /// Densities of y_{s-1} as sampled from z_{t-1}, and of z_{t-1} as sampled from y_{s-1}.
+    double rev_a, rev_b;
+    double total;  ///< Σ (n·p)² over all techniques, relative to p of this split.
 };
 
 /// y_{s-1} (which may be y_0, as the emission sampled it) connected to z_{t-1}, t ≥ 2.
@@ -154,7 +154,7 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     return edge;
 }
 
-/// The join by the edge between `a` of y and `b` of z; `np` relative to p of the split there.
+/// The join by the edge between `a` of y and `b` of z; `np` is relative to the density p of the split there.
 Join joined(const Edge& edge, const Technique& technique, double np, const SubPath& y,
             const Vertex& a, const SubPath& z, const Vertex& b) {
     return {.technique = technique,
@@ -195,8 +195,8 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
 
 namespace {
 
-/// Radiance that a photon's flux, spread over the area `disc`, brings to the lens from b = z_{t-1}. `f` is that of b for
-/// the photon's direction `wi`, whose cosine belongs to the flux.
+/// Density estimate at b = z_{t-1}: the contribution of a photon's flux, spread over the area `disc`. `f` is the value
+/// at b for the photon's direction `wi`; its cosine is already part of the flux.
 Rgb density_estimate(Rgb power, Vec3 wi, const BsdfEval& f, const Vertex& b, float disc) {
     return power * f.f * b.beta * (1 / (abs_dot(wi, b.ng) * disc));
 }

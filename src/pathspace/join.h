@@ -1,6 +1,6 @@
 #pragma once
-// Joins: the ways in which an eye and a light sub-path become a full path. Each evaluates the unweighted contribution
-// C_{s,t} without visibility and its weight; the caller traces the shadow ray last, if the product is worth it.
+// Joins: the ways in which a light and an eye sub-path form a full path. Each evaluates the unweighted contribution
+// C_{s,t}, without visibility, and its MIS weight; the caller traces the shadow ray last.
 
 #include <optional>
 
@@ -11,11 +11,11 @@ namespace etendue {
 
 struct Join {
     Technique technique;
-    const Emitter* emitter;  ///< That x_0 lies on.
-    Rgb contribution;  ///< C_{s,t}, visibility left out; of splats for one light path (the film divides by N_L).
+    const Emitter* emitter;  ///< The emitter of x_0.
+    Rgb contribution;  ///< C_{s,t} without visibility; for one light path where t ≤ 1 (the film divides by N_L).
     float mis_weight;
     Vec2 film{};  ///< Film point; that of the eye sub-path unless t ≤ 1.
-    /// The edge that the join adds; b is a direction where `to_infinity`. A hit adds none.
+    /// The edge added by the join; b is a direction where `to_infinity`. A hit adds no edge.
     Vec3 a{}, ng_a{}, b{}, ng_b{};
     bool to_infinity = false;
     /// Of a gather: the disc's approximation π d² p of p_c, clamped as in the weights [Qin et al. 2015, eq. 7 and 24].
@@ -23,8 +23,8 @@ struct Join {
     bool needs_test = true;
 };
 
-/// Russian roulette before the shadow ray [Veach 1997, §10.4.1]: the probability with which a join that will add
-/// `contribution` (luminance, weighted) to a pixel is evaluated. `threshold` must not depend on the sample.
+/// Survival probability of Russian roulette before the shadow ray [Veach 1997, §10.4.1] for a join whose weighted
+/// contribution to a pixel has the luminance `contribution`. `threshold` must not depend on the sample.
 inline float join_survival(float contribution, float threshold) {
     return contribution < threshold ? contribution / threshold : 1.0f;
 }
@@ -35,27 +35,27 @@ float visibility(const Scene& scene, const Join& join, RenderStats& stats);
 /// C(0,t): z_{t-1} lies on `emitter`.
 std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
                              const TechniqueCounts& counts);
-/// C(1,t): a point on an emitter drawn for z_{t-1}.
+/// C(1,t): a point on an emitter sampled for z_{t-1}.
 std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,
                                     const TechniqueCounts& counts);
-/// C(s,t), t ≥ 2; where s = 1, y_0 is what the emission sampled (Strategy::Connect, not NextEvent).
+/// C(s,t), t ≥ 2; for s = 1, y_0 comes from emission sampling (Strategy::Connect, not NextEvent).
 std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
                                  int t, const TechniqueCounts& counts);
-/// M(s,t): y_{s-1} and z_{t-1} taken for one vertex [Georgiev et al. 2012; Hachisuka et al. 2012]. For one light path.
+/// M(s,t): y_{s-1} and z_{t-1} treated as one vertex [Georgiev et al. 2012; Hachisuka et al. 2012]. For one light path.
 std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
                                const TechniqueCounts& counts);
-/// M(s,t) of a photon near z_{t-1} whose power is spread over the area `disc` [Jensen 2001, §7.2], as the only technique
-/// that makes its path: weight 1.
+/// M(s,t) of a photon near z_{t-1} whose power is spread over the area `disc` [Jensen 2001, §7.2], as the only
+/// technique that makes its path: weight 1.
 std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, float disc);
-/// U(s,t): z_{t-1} (`drops_eye`) or y_{s-1} is dropped and the other joined to the dropped one's predecessor [Qin et al.
-/// 2015]. For one light path, and without the factor r = 1/p_c of the event that the pair was found. The dropped vertex
-/// is not read.
+/// U(s,t): z_{t-1} (`drops_eye`) or y_{s-1} is dropped, and the other one is connected to the predecessor of the
+/// dropped one [Qin et al. 2015]. For one light path, and without the factor r, the estimate of 1/p_c. The dropped
+/// vertex is not read.
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
                                 int t, bool drops_eye, const TechniqueCounts& counts);
 /// C(s,1): y_{s-1} is connected to a point on the lens.
 std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler,
                                const TechniqueCounts& counts);
-/// C(s+1,0): the ray that left y_{s-1} (the path's last flight) crosses a finite lens, which becomes y_s.
+/// C(s+1,0): the ray that left y_{s-1}, the path's last flight, crosses a finite lens; the intersection is y_s.
 std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
                                   const TechniqueCounts& counts);
 

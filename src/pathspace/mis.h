@@ -3,14 +3,14 @@
 // [Veach 1997, §9.2, §10.2], in constant time per join.
 //
 // With the light and eye densities p_L(x_i), p_E(x_i) of every vertex, the density of the technique whose split lies
-// before x_i (i light vertices) is  p_i = Π_{j<i} p_L(x_j) · Π_{j≥i} p_E(x_j).  Moving the split past a vertex multiplies by
-// a ratio, so relative to the present split the sum over all others is, on each side, a nested product
+// before x_i (i light vertices) is  p_i = Π_{j<i} p_L(x_j) · Π_{j≥i} p_E(x_j).  Moving the split past a vertex
+// multiplies by a ratio, so relative to the present split the sum over all others is, on each side, a nested product
 //     S_L = ρ_L² (b_L + ρ_{L-1}² (b_{L-1} + … )),     ρ_i = pdf_rev_i / pdf_fwd_i,
 //     b_i = Σ c_i² + m_i²,
 // where c_i is the number of samples of a technique whose split lies between v_{i-1} and v_i, 0 where an event there
-// is a delta event, and m_i that of pairs at v_i, relative to the density of this split. Everything but the last two
-// levels is known while the sub-path is walked: v[L].weight_sum holds the sum inside from level L-2 on. `path_pdfs.h`
-// has the same weight as an explicit sum; a test holds them together.
+// is a delta event, and m_i that of pairs at v_i, relative to the density of this split. All levels except the last two
+// are known during the walk: v[L].weight_sum is the inner sum from level L-2 on. `path_pdfs.h` defines the same weight
+// as an explicit sum; tests compare the two.
 
 #include "math/vec.h"
 #include "pathspace/gloss.h"
@@ -27,7 +27,7 @@ inline uint8_t gloss(const Vertex& v, bool is_delta) {
     return is_delta ? kDeltaGloss : v.gloss;
 }
 
-/// Of the techniques C(1,t), relative to p_L of y_0.
+/// Σ c² of the techniques C(1,t), relative to p_L(y_0).
 inline double emission_squares(double next_event_ratio, const TechniqueCounts& n) {
     return sqr(n.next_event * next_event_ratio) + sqr(double(n.connect_emission));
 }
@@ -76,9 +76,9 @@ inline double squares_at(const SubPath& v, int i, bool delta, double rev, uint8_
     return b;
 }
 
-/// What lies beyond the last vertex of one side of a join.
+/// The other side of a join, seen from the last vertex of one side.
 struct Across {
-    double rev_last, rev_prev;  ///< Densities of v[last], v[last-1] as sampled from there.
+    double rev_last, rev_prev;  ///< Densities of v[last], v[last-1] as sampled from the other side.
     uint8_t gloss = 0;          ///< Of the next vertex; read only where there are gathers.
     int edges = 0;              ///< Length of the whole path.
 };
@@ -98,7 +98,7 @@ inline double outward_sum(const SubPath& v, int last, bool last_is_delta, const 
     return sqr(a.rev_last / v[last].pdf_fwd) * inner;
 }
 
-/// The sum from level i on, stored at v[i+2] once v[i].pdf_rev is known; `below` is that of level i-1.
+/// The sum from level i on, stored at v[i+2] as soon as v[i].pdf_rev is known; `below` is that of level i-1.
 template <Side side>
 inline double level_sum(const SubPath& v, int i, double below, const TechniqueCounts& n,
                         int edges = 1 << 30) {
@@ -107,8 +107,8 @@ inline double level_sum(const SubPath& v, int i, double below, const TechniqueCo
     return sqr(rev / v[i].pdf_fwd) *
            (squares_at<side>(v, i, v[i].is_delta, rev, inward, edges, n) + below);
 }
-/// v[last].weight_sum for a path of so many edges. The stored one is for paths of more than three edges, the one length
-/// with a rate of its own.
+/// v[last].weight_sum for a path of `edges` edges. The stored sum is that of paths of more than three edges; three
+/// edges are the only length with its own rate of gathers (PairModel::short_rate).
 template <Side side>
 inline double sum_below(const SubPath& v, int last, int edges, const TechniqueCounts& n) {
     if (edges != 3 || last != 3 || n.pairs.short_rate == 1) return v[last].weight_sum;

@@ -1,6 +1,6 @@
 #pragma once
-// The slow definitions: contribution, densities and weight of a finished path, from its vertices alone. What joins and
-// mis.h compute incrementally must equal these; tests hold them together, and so can whoever adds a technique.
+// Reference definitions: contribution, densities and MIS weight of a full path, computed from its vertices only. Joins
+// and mis.h compute the same values incrementally; tests compare the two.
 
 #include <span>
 #include <vector>
@@ -13,25 +13,25 @@ namespace etendue {
 /// Densities of every vertex of a full path x_0 (emitter) … x_k (lens), from either side, in the conventions of Vertex.
 struct PathPdfs {
     std::vector<double> light, eye;
-    std::vector<bool> is_delta;       ///< Events.
+    std::vector<bool> is_delta;       ///< Whether the path scatters by a delta event.
     std::vector<uint8_t> gloss;       ///< See gloss.h.
     std::vector<uint8_t> pair_level;  ///< See Vertex.
-    double next_event = 0;            ///< p_NE(x_0) as chosen for x_1.
+    double next_event = 0;            ///< p_NE(x_0), sampled from x_1.
     bool can_hit_emitter = true;
-    bool can_connect_ends = true;  ///< Not both are at infinity.
+    bool can_connect_ends = true;  ///< False where both ends are at infinity.
 
     int vertices() const { return int(light.size()); }
-    /// Density of the path as the technique makes it; 0 where it cannot.
+    /// Density with which the technique samples the path; 0 where it cannot.
     double density(const Technique& technique) const;
-    /// n·p of the technique.
+    /// Sample count times density, n·p, of the technique.
     double sampled(const Technique& technique, const TechniqueCounts& counts) const;
 };
 
 /// Power heuristic with β = 2 by the explicit sum over all techniques.
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts);
 
-/// The vertices of the path that joins s light to t eye vertices, from x_0 to x_k. A technique that samples its own end
-/// point (next event, splat) brings it as `emitter_point` or `lens_point`.
+/// The vertices x_0 … x_k of the path that joins s light and t eye vertices. End points sampled by the technique itself
+/// (next event, splat) are given as `emitter_point` or `lens_point`.
 std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t,
                                          const Vertex* emitter_point = nullptr,
                                          const Vertex* lens_point = nullptr);

@@ -1,5 +1,5 @@
 #pragma once
-// What density estimation needs of a light vertex.
+// The data of a light vertex that density estimation needs.
 
 #include "color/rgb.h"
 #include "math/vec.h"
@@ -11,7 +11,7 @@ class Emitter;
 /// Flux that arrives at a surface point.
 struct Photon {
     Vec3 p;
-    Vec3 wi;  ///< Toward where it came from.
+    Vec3 wi;  ///< Toward its origin, unit length.
     Rgb power;
     const Emitter* emitter;
     int s;  ///< Vertices of its path, from y_0 to this one.

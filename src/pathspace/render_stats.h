@@ -1,5 +1,5 @@
 #pragma once
-// What a rendering counts: by worker, added up at the end of a pass.
+// Statistics of a rendering, counted by each worker and merged at the end of a pass.
 
 #include <algorithm>
 #include <array>
@@ -10,11 +10,11 @@
 
 namespace etendue {
 
-/// Where the time of samples goes, seconds on one thread. Only every kTimedSamples-th sample is timed.
+/// Time spent on samples by phase, in seconds of one thread. Only every kTimedSamples-th sample is timed.
 struct PhaseSeconds {
-    double light_paths = 0;  ///< With their techniques t ≤ 1.
-    double eye_paths = 0;    ///< With all that follows.
-    double connections = 0;  ///< To light vertices, their choice included.
+    double light_paths = 0;  ///< Including their techniques with t ≤ 1.
+    double eye_paths = 0;    ///< Including all their joins.
+    double connections = 0;  ///< To light vertices, including the choice of these.
     double records = 0;      ///< Importance records.
 
     PhaseSeconds& operator+=(const PhaseSeconds& o) {
@@ -28,17 +28,17 @@ struct PhaseSeconds {
 struct RenderStats {
     static constexpr int kTimedSamples = 8;
     PhaseSeconds phases;
-    bool is_timed = false;  ///< The sample at hand.
+    bool is_timed = false;  ///< Whether the current sample is timed.
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
     uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
-    uint64_t joins_skipped = 0;           ///< By roulette, before their shadow ray.
-    uint64_t pairs = 0;                   ///< Merged, or found by the searches of gathers.
-    uint64_t visible_pairs = 0;           ///< Gathered, and joined without obstacle.
+    uint64_t joins_skipped = 0;           ///< By Russian roulette before the shadow ray.
+    uint64_t pairs = 0;                   ///< Merged, or found by searches for gathers.
+    uint64_t visible_pairs = 0;           ///< Gathered pairs whose shadow ray was not blocked.
     uint64_t trials = 0, trial_rays = 0;  ///< Of all visible pairs.
     /// Visible pairs by trials: 1, 2, 3–4, 5–8, … The share of those with 1 is 1 - Var(r)/E(r)².
     std::array<uint64_t, 24> pairs_by_trials{};
-    uint64_t bounds_exceeded = 0;  ///< Densities above their bound: must stay 0.
-    uint64_t runaways = 0;         ///< Pairs given up after too many trials: must stay 0.
+    uint64_t bounds_exceeded = 0;  ///< Densities above their assumed bound; must be 0.
+    uint64_t runaways = 0;         ///< Pairs abandoned after too many trials; must be 0.
     uint64_t rejected = 0;         ///< Contributions that were not finite or negative.
 
     void count_trials(uint64_t n) {
@@ -49,7 +49,7 @@ struct RenderStats {
     uint64_t rays() const { return walk_rays + shadow_rays + trial_rays; }
 };
 
-/// Adds the time until its end to a phase, where the sample is timed.
+/// Adds the time until its destruction to a phase, if the sample is timed.
 class PhaseTimer {
 public:
     PhaseTimer(RenderStats& stats, double PhaseSeconds::*phase)

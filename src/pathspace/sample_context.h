@@ -1,5 +1,5 @@
 #pragma once
-// What a sample, and a pass of samples, is made of: sub-paths, random numbers, and where contributions go.
+// Contexts of samples and of passes: sub-paths, random numbers, and the destination of contributions.
 
 #include <functional>
 #include <memory>
@@ -9,7 +9,8 @@
 
 namespace etendue {
 
-/// What an integrator adds up during a pass, for later ones: whole numbers, since workers add in no fixed order.
+/// Sums that an integrator accumulates during a pass, for later passes; integers, since the order of workers is not
+/// fixed.
 class PassSums {
 public:
     virtual ~PassSums() = default;
@@ -18,44 +19,45 @@ public:
 /// Buffers of one worker, reused from sample to sample.
 struct Workspace {
     SubPath y, z;
-    SubPath pair;  ///< The other path of a pair of vertices.
+    SubPath pair;  ///< The stored light path of a merge or gather.
     Vertex scratch;
-    std::vector<float> masses;  ///< Of light vertices, seen from one eye vertex.
-    bool is_observed = false;   ///< Whole sub-paths are read, not only what joins need of them.
+    std::vector<float> masses;  ///< Of light vertices, for one eye vertex.
+    bool is_observed =
+        false;  ///< Whether whole sub-paths must be restored, for a ContributionObserver.
     RenderStats stats;
-    std::unique_ptr<PassSums> sums;  ///< Of the integrator's kind.
+    std::unique_ptr<PassSums> sums;  ///< Of the type of the integrator.
 };
 
 /// One sample: the eye path of a pixel, a light path, or both.
 struct SampleContext {
     const Scene& scene;
     const Film& film;
-    uint64_t pixel;        ///< Index within the crop.
-    uint64_t chunk;        ///< Part of the pass; its samples are taken in order by one thread.
+    uint64_t pixel;  ///< Index within the crop.
+    uint64_t chunk;  ///< Part of the pass, whose samples are processed in order by one thread.
     uint64_t light_paths;  ///< N_L of the pass.
-    float splat_scale;     ///< 1 / N_L: what a splat is worth on the film.
+    float splat_scale;     ///< 1 / N_L: factor of splats.
     Sampler& sampler;
     ContributionSink& sink;
 
-    /// The light path that belongs to the pixel; some belong to several, where there are fewer than pixels.
+    /// Index of the light path of this pixel; pixels share light paths where there are fewer paths than pixels.
     uint64_t own_light_path() const { return pixel % light_paths; }
 
-    /// The same sample with other numbers, and contributions to `to`.
+    /// The same sample with other random numbers and another sink.
     SampleContext with(Sampler& numbers, ContributionSink& to) const {
         return {scene, film, pixel, chunk, light_paths, splat_scale, numbers, to};
     }
 };
 
-/// What is known before a pass: the scene, and what the finished passes left.
+/// Data available before a pass: the scene and the results of the finished passes.
 struct LearnContext {
     const Scene& scene;
     const Film& film;
-    uint32_t index;             ///< Of the pass that will be traced, from 0.
+    uint32_t index;             ///< Of the next pass, from 0.
     uint64_t light_paths;       ///< N_L of that pass.
     const RenderStats& so_far;  ///< Of all finished passes; the same for any number of threads.
 };
 
-/// What an integrator may do before the samples of a pass.
+/// Services for an integrator before the samples of a pass.
 struct PassContext {
     const Scene& scene;
     const Film& film;
@@ -65,9 +67,9 @@ struct PassContext {
     /// Calls `use(context, work)` for the samples 0 … count-1 in parallel. Only splats may be added.
     using Use = std::function<void(const SampleContext&, Workspace&)>;
     std::function<void(uint64_t count, const Use& use)> for_each_sample;
-    std::function<uint64_t(uint64_t count)> chunks;  ///< That so many samples are cut into.
-    /// Calls `task(i, sampler, work)` for i < count in parallel: paths that bring nothing to the film. The task starts the
-    /// sampler; paths from the number of pixels on have numbers of their own.
+    std::function<uint64_t(uint64_t count)> chunks;  ///< Number of chunks for `count` samples.
+    /// Calls `task(i, sampler, work)` for i < count in parallel, for paths that do not contribute to the film. The task
+    /// must call Sampler::start(); path numbers from `pixels` on are unused by samples.
     using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;
     std::function<void(uint64_t count, const Task& task)> for_each_other_path;
 

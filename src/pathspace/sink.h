@@ -4,13 +4,13 @@
 
 namespace etendue {
 
-/// Where contributions go: the film of a pass, images by technique, the splat list of a Markov chain. A sink never
-/// normalises by the number of paths; the film does.
+/// Receiver of contributions: the film of a pass, technique images, or the splat list of a Markov chain. A sink does
+/// not normalise by the number of paths; the film does.
 class ContributionSink {
 public:
     virtual ~ContributionSink() = default;
-    /// What the join brings, unweighted, with visibility. Where t ≥ 2 it belongs to the current eye sub-path's pixel;
-    /// where t ≤ 1 it may land anywhere on the film, and is for one light path.
+    /// Adds the unweighted contribution of a join, including visibility. For t ≥ 2 it belongs to the pixel of the
+    /// current eye sub-path. For t ≤ 1 it is that of one light path, at any film point.
     virtual void add(const Join& join, Rgb contribution) = 0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// Techniques: the ways in which a full path x_0 … x_k (x_0 on the emitter, x_k on the lens) can be put together from s
-// light vertices and t eye vertices.
+// Techniques: the ways in which a full path x_0 … x_k (x_0 on the emitter, x_k on the lens) is formed from s light
+// vertices and t eye vertices.
 
 #include <array>
 #include <cstdint>
@@ -9,13 +9,13 @@
 namespace etendue {
 
 enum class Strategy : uint8_t {
-    Hit,        ///< C(0,t): the eye path lands on an emitter.
-    NextEvent,  ///< C(1,t), t ≥ 2: a point chosen on an emitter for z_{t-1}.
-    Connect,    ///< C(s,t), s ≥ 2, t ≥ 2; with s = 1, to the y_0 of a light path.
+    Hit,        ///< C(0,t): the eye path hits an emitter.
+    NextEvent,  ///< C(1,t), t ≥ 2: a point sampled on an emitter for z_{t-1}.
+    Connect,    ///< C(s,t), s ≥ 2, t ≥ 2; for s = 1, with y_0 of a light path.
     Splat,      ///< C(s,1): the light path is connected to the lens.
-    HitLens,    ///< C(s,0): the light path lands on a finite lens.
-    Merge,      ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are taken for one vertex.
-    Gather,     ///< U(s,t): such a pair, one of the two dropped, the rest joined by a shadow ray.
+    HitLens,    ///< C(s,0): the light path hits a finite lens.
+    Merge,      ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are treated as one vertex.
+    Gather,     ///< U(s,t): one vertex of such a pair is dropped; a shadow ray connects the rest.
 };
 
 /// Whether y_{s-1} and z_{t-1} stand for one vertex of the full path.
@@ -26,14 +26,14 @@ constexpr bool is_pair(Strategy strategy) {
 struct Technique {
     Strategy strategy;
     int s, t;
-    bool drops_eye = false;  ///< Of a gather: z_{t-1} is dropped, else y_{s-1}.
+    bool drops_eye = false;  ///< Of a gather: whether z_{t-1} is dropped, or y_{s-1}.
 
-    /// Of the full path.
+    /// Number of vertices of the full path.
     int vertices() const { return s + t - is_pair(strategy); }
     friend bool operator==(const Technique&, const Technique&) = default;
 };
 
-/// The technique that joins s light to t eye vertices by connections alone.
+/// The technique that joins s light and t eye vertices without pairs.
 constexpr Technique connection_technique(int s, int t) {
     return {t == 0   ? Strategy::HitLens
             : t == 1 ? Strategy::Splat
@@ -43,25 +43,25 @@ constexpr Technique connection_technique(int s, int t) {
             s, t};
 }
 
-/// Which end point of a pair is dropped where either could be [Qin et al. 2015, appendix B and table 2].
+/// The vertex of a pair that is dropped where either one could be [Qin et al. 2015, appendix B and table 2].
 enum class PairRule : uint8_t {
-    Gloss,  ///< The one that was sampled from the less glossy vertex; z_{t-1} where they are alike.
+    Gloss,  ///< The one sampled from the less glossy vertex; z_{t-1} if both are equal.
     Eye,    ///< z_{t-1}.
     Light,  ///< y_{s-1}.
-    Both,   ///< Each of them, for a path of its own.
+    Both,   ///< Each of them in turn, which makes two paths.
 };
 
-/// Whether it joins an eye and a light sub-path inside the scene: neither a hit of an emitter nor light brought to the
-/// lens [Popov et al. 2015].
+/// Whether the technique joins two sub-paths inside the scene: neither a hit of an emitter, nor a splat, nor a hit of
+/// the lens [Popov et al. 2015].
 constexpr bool is_inner(const Technique& q) {
     return q.s >= 1 && q.t >= 2;
 }
 
-/// Which paths an image shows.
+/// The paths that an image shows.
 struct PathSelection {
     static constexpr int kNoLimit = std::numeric_limits<int>::max();
 
-    bool inner_only = false;               ///< Only what inner techniques bring, see is_inner().
+    bool inner_only = false;  ///< Only contributions of inner techniques, see is_inner().
     int shortest = 1, longest = kNoLimit;  ///< Path lengths, in edges.
 
     bool contains(const Technique& q) const {
@@ -71,15 +71,15 @@ struct PathSelection {
     bool has_all_lengths() const { return shortest <= 1 && longest == kNoLimit; }
 };
 
-/// How light and eye vertices near each other form pairs.
+/// Pairs of light and eye vertices near each other.
 struct PairModel {
-    float disc = 0;        ///< π d², the area in which a pair's partner is sought.
-    int min_edges = 2;     ///< Shorter paths are not made from pairs.
-    float short_rate = 1;  ///< Share of the gathers that are made of paths of three edges.
+    float disc = 0;        ///< π d², the area of the disc in which partners are searched.
+    int min_edges = 2;     ///< Length, in edges, of the shortest paths made from pairs.
+    float short_rate = 1;  ///< Share of gathers made for paths of three edges.
     PairRule rule = PairRule::Gloss;
-    bool clamps = true;  ///< Weights know that no probability exceeds 1 [Qin et al. 2015, eq. 24].
+    bool clamps = true;  ///< Whether weights clamp probabilities to 1 [Qin et al. 2015, eq. 24].
 
-    /// Approximate probability that a pair is found whose dropped vertex has the area density `pdf` [ibid., eq. 24].
+    /// Approximate probability of finding a pair whose dropped vertex has the area density `pdf` [ibid., eq. 24].
     double probability(double pdf) const {
         const double p = double(disc) * pdf;
         return clamps && p > 1 ? 1 : p;
@@ -89,20 +89,21 @@ struct PairModel {
 };
 
 extern const std::array<float, 256> kPairShares;
-/// The pairs of one vertex share its eye path, so that weights count only a share of them: 2^(-level/16), where the vertex
-/// has the level (Vertex::pair_level).
+/// Share of pairs that weights count at a vertex, since its pairs share the eye path: 2^(-level/16), where level is
+/// Vertex::pair_level.
 inline double pair_share(uint8_t level) {
     return double(kPairShares[level]);
 }
 /// The level whose share is nearest to `share`, in (0, 1].
 uint8_t pair_level_of_share(double share);
 
-/// How many samples of each strategy an algorithm takes per eye sub-path, 0 for those it does not run. Eye densities are
-/// per pixel, so one eye path a pixel counts 1 and whatever reaches any pixel counts N_L, the number of light paths.
+/// Number of samples of each strategy, 0 for strategies that an algorithm does not use. Eye densities are per pixel, so
+/// techniques of one eye path per pixel count 1, and those that reach any pixel count N_L, the number of light paths.
 struct TechniqueCounts {
     float hit = 0, next_event = 0, connect = 0, splat = 0, hit_lens = 0;
-    float connect_emission = 0;   ///< C(1,t) with y_0 as light paths sample it, Strategy::Connect.
-    float merge = 0, gather = 0;  ///< Of each inner vertex of the path; one of the two is 0.
+    float connect_emission = 0;  ///< C(1,t) with y_0 of light paths, Strategy::Connect.
+    float merge = 0,
+          gather = 0;  ///< For each inner vertex of the path; at least one of the two is 0.
     PairModel pairs{};
 
     friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
@@ -111,11 +112,11 @@ struct TechniqueCounts {
                gather > 0;
     }
     bool uses_pairs() const { return merge > 0 || gather > 0; }
-    /// Gathers of each pair of a path of so many edges.
+    /// Number of gathers at each inner vertex of a path of `edges` edges.
     float gathers(int edges) const {
         return edges < pairs.min_edges ? 0.0f : edges == 3 ? gather * pairs.short_rate : gather;
     }
-    /// What the weights count for the gathers, or the merges, at an x_m of this level.
+    /// Counts of gathers and merges in MIS weights at an x_m of this level.
     double weighed_gathers(uint8_t pair_level, int edges) const {
         return double(gathers(edges)) * pair_share(pair_level);
     }

@@ -1,5 +1,5 @@
 #pragma once
-// Vertices and sub-paths. A sub-path is walked once and then only read: joins and weights never change it.
+// Vertices and sub-paths. After its walk a sub-path is read only: joins and weights never change it.
 
 #include <cmath>
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace etendue {
 
-/// A probability in steps of 2^-10, so that what is kept of it compactly is what was decided by.
+/// A probability in steps of 2^-10, so that the compactly stored value is exactly the one used in the decision.
 class Survival {
 public:
     Survival() = default;
@@ -30,7 +30,7 @@ private:
     uint16_t steps_ = 0x3ff;
 };
 
-/// One end or scattering point with everything that connections and weights need.
+/// An end point or scattering point, with all data that joins and weights need.
 struct Vertex {
     enum class Kind : uint8_t { Sensor, Emitter, Surface };
 
@@ -39,8 +39,8 @@ struct Vertex {
         ng;  ///< Unit geometric normal; zero-cosine points (point lights) have the direction of the walk.
     Vec3 wo;   ///< Toward the predecessor; unused at the first vertex.
     Rgb beta;  ///< Throughput up to, not including, scattering here.
-    /// Area density as sampled from the predecessor. After a delta event it is the event's probability times |cos θ|/d²: the
-    /// factor δ is left out, which the density from the other side has too (see BsdfSample::pdf_rev).
+    /// Area density as sampled from the predecessor. After a delta event it is the event's probability times |cos
+    /// θ|/d², without the factor δ, which the density from the other side has too (see BsdfSample::pdf_rev).
     float pdf_fwd = 0;
     /// Solid angle at this vertex over area at the predecessor: |cos θ|/d² there, 1 where it is at infinity.
     float to_predecessor = 0;
@@ -51,22 +51,22 @@ struct Vertex {
     /// p_NE / p_L of an emitter vertex y_0 seen from here (stored at y_1); see mis.h.
     float next_event_ratio = 1;
     Kind kind = Kind::Surface;
-    bool is_delta = false;        ///< The walk left this vertex by a delta event.
-    bool is_infinite = false;     ///< At infinity; p is a direction.
-    bool has_cosine = true;       ///< A surface: |cos θ| belongs to G here.
-    bool is_connectible = false;  ///< Has a smooth lobe, or is an end point.
+    bool is_delta = false;        ///< Whether the walk left this vertex by a delta event.
+    bool is_infinite = false;     ///< Whether it is at infinity; p is a direction then.
+    bool has_cosine = true;       ///< Whether |cos θ| is part of G here, as on surfaces.
+    bool is_connectible = false;  ///< Whether it has a smooth lobe or is an end point.
     MediumId medium = kVacuum;    ///< On the edge to the predecessor.
-    Survival survival;            ///< Of the roulette before the walk left this vertex.
+    Survival survival;            ///< Of Russian roulette before the walk left this vertex.
     uint8_t gloss = 0;            ///< Of the emitter or the material, see gloss.h.
-    uint8_t pair_level = 0;       ///< Of pair_share(): how far weights believe in pairs here.
-    uint8_t event = 0;            ///< Of a delta event, see Bsdf::sample_delta().
+    uint8_t pair_level = 0;       ///< Argument of pair_share().
+    uint8_t event = 0;            ///< Number of a delta event, see Bsdf::sample_delta().
     const SceneShape* shape = nullptr;
-    const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or on the surface.
-    SurfaceLocation location;          ///< Of a surface; of an emitter's y_0 only `prim`.
+    const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or of the surface.
+    SurfaceLocation location;          ///< On a surface; for y_0 only `prim` is set.
     Vec2 uv;
     Bsdf bsdf;
 
-    /// Makes this a point of a surface, seen from `wo`.
+    /// Makes this a surface vertex with the given wo.
     void set_surface(const SceneShape& on, const SurfaceLocation& at, const SurfaceGeometry& g,
                      Vec3 toward_predecessor, ComponentArena& arena) {
         kind = Kind::Surface;
@@ -82,8 +82,8 @@ struct Vertex {
         gloss = gloss_of_roughness(bsdf.roughness());
     }
 
-    /// A direction in which a walk in `mode` leaves, with weight f̃·|cos θ| / pdf (of emission: L_e |cos θ| / pdf) and both
-    /// densities. Nothing where the walk ends. Not for emitters at infinity, whose direction is fixed.
+    /// A direction in which a walk in `mode` leaves, with weight f̃·|cos θ| / pdf (for emission L_e |cos θ| / pdf) and
+    /// both densities; empty where the walk ends. Not for emitters at infinity, whose direction is fixed.
     std::optional<BsdfSample> sample(float u_lobe, Vec2 u, TransportMode mode) const {
         if (kind != Kind::Emitter) return bsdf.sample(wo, u_lobe, u, mode);
         const Vec3 w = emitter->sample_direction(ng, u);
@@ -91,17 +91,17 @@ struct Vertex {
         if (!(e.pdf_d > 0)) return {};
         return BsdfSample{.wi = w, .weight = e.Le_cos * (1 / e.pdf_d), .pdf = e.pdf_d};
     }
-    /// f̃·|cos θ| (of emission L_e |cos θ|) toward `w`, and the densities of sample(); its smooth part.
+    /// f̃·|cos θ| (for emission L_e |cos θ|) toward `w`, and the densities of sample(); of smooth lobes only.
     BsdfEval eval(Vec3 w, TransportMode mode) const {
         if (kind != Kind::Emitter) return bsdf.eval(wo, w, mode);
         const Emitter::Emission e = emitter->eval_emission(ng, uv, w);
         return {.f = e.Le_cos, .pdf = e.pdf_d};
     }
-    /// Bound of eval(w).pdf over the directions of a cone; kInf where none is known.
+    /// Upper bound of eval(w).pdf over the directions of a cone; kInf where none is known.
     float max_pdf(const DirectionCone& cone) const {
         return kind == Kind::Emitter ? emitter->max_pdf_d() : bsdf.max_pdf(wo, cone);
     }
-    /// The normal about which a density cos θ/π of directions lies, where it is of that kind.
+    /// The normal n where directions have the density cos θ/π about n; empty for other densities.
     std::optional<Vec3> cosine_normal() const {
         if (kind != Kind::Emitter) return bsdf.diffuse_normal();
         return emitter->is_area() ? std::optional(ng) : std::nullopt;
@@ -114,17 +114,17 @@ struct Vertex {
     }
 };
 
-/// The last ray of a walk, whether or not it met a surface: a finite lens may lie on it.
+/// The last ray of a walk, whether or not it hit a surface; it may cross a finite lens.
 struct Flight {
     Vec3 o, d;
-    float length = kInf;  ///< Distance to what it met.
+    float length = kInf;  ///< Distance to the surface it hit.
     Rgb beta;  ///< Throughput along it: that of the vertex it left, times scattering over density.
-    /// Density of d, of a delta event its probability; 0: the last step traced no ray.
+    /// Density of d, or probability of a delta event; 0 where the last step traced no ray.
     float pdf_sa = 0;
     MediumId medium = kVacuum;
 };
 
-/// A walk from one end of the path space: y_0 … or z_0 …
+/// A walk from one end of a path: y_0 … or z_0 …
 struct SubPath {
     ComponentArena arena;
     Vec2 film;  ///< Film point of an eye sub-path.
@@ -143,7 +143,8 @@ struct SubPath {
     int size() const { return size_; }
     const Vertex& operator[](int i) const { return store_[size_t(i)]; }
     Vertex& operator[](int i) { return store_[size_t(i)]; }
-    /// A new last vertex. What it held before stays but for the fields that not every kind of vertex sets.
+    /// Appends a vertex. Only the fields that not every kind of vertex sets are reset; the others keep their old
+    /// values.
     Vertex& append() {
         if (size_t(size_) == store_.size()) store_.resize(2 * store_.size() + 16);
         Vertex& v = store_[size_t(size_++)];
@@ -167,11 +168,12 @@ struct SubPath {
     }
 
 private:
-    std::vector<Vertex> store_;  ///< Grown and kept: walks do not allocate.
+    std::vector<Vertex> store_;  ///< Never shrinks, so that walks rarely allocate.
     int size_ = 0;
 };
 
-/// Solid-angle density at `from` to area density at `to`: p_A = p_σ |cos θ_to| / d². At infinity it stays as it is.
+/// Converts a solid-angle density at `from` to an area density at `to`: p_A = p_σ |cos θ_to| / d². It is unchanged
+/// where `to` is at infinity.
 inline float to_area(float pdf_sa, const Vertex& from, const Vertex& to) {
     if (to.is_infinite) return pdf_sa;
     // From infinity: pdf_sa is the density on the bounding disc.

@@ -5,18 +5,18 @@
 namespace etendue {
 namespace {
 
-/// Survival of Russian roulette at the last vertex: how much throughput is left of what it was at the first scattering
-/// vertex. η² of refractions is taken out, since it comes back when the path leaves the glass.
+/// Survival of Russian roulette at the last vertex: its throughput relative to that of the first scattering vertex. The
+/// η² of refractions is removed, since it cancels when the path leaves the glass.
 Survival survival(const SubPath& path) {
     const float left = path[path.size() - 1].beta.max() * path.eta2 / path[1].beta.max();
     return Survival(left > 0 ? std::min(0.95f, left) : 0x1p-16f);
 }
 
-/// What became of a ray.
+/// Result of tracing a ray.
 enum class Met { Surface, Nothing, SurfaceEdgeOn };
 
-/// Traces from the last vertex and appends the surface that is met, with throughput `beta`, which absorption on the way
-/// lessens, and density `pdf_sa` of the direction (of a delta event its probability).
+/// Traces a ray from the last vertex and appends the surface vertex that it hits. `beta` is the throughput along the
+/// ray and is multiplied by absorption; `pdf_sa` is the density of the direction, or the probability of a delta event.
 Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, const Ray& ray,
                    Rgb& beta, float pdf_sa, MediumId medium) {
     const Scene& scene = walk.scene;
@@ -35,7 +35,7 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, con
     v.medium = passage.medium;
     v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
     v.beta = beta;
-    // hit.t is short of the distance by the offset of the ray's origin; densities are of the points themselves.
+    // hit.t is the distance from the offset origin of the ray; densities need the distance between the vertices.
     const Vertex& previous = path[path.size() - 2];
     const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
     v.pdf_fwd = pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
@@ -47,7 +47,7 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, con
     return Met::SurfaceEdgeOn;
 }
 
-/// The end of an eye path that left the scene: a vertex at infinity, on all emitters there at once.
+/// Appends the vertex at infinity of an eye path that left the scene; it belongs to all emitters at infinity.
 void append_escape(SubPath& path, Vec3 d, Rgb beta, float pdf) {
     Vertex& v = path.append();
     v.kind = Vertex::Kind::Emitter;
@@ -182,7 +182,7 @@ void close(const WalkContext& walk, SubPath& path) {
     constexpr Side side = mode == TransportMode::Radiance ? Side::Eye : Side::Light;
     const int last = path.size() - 1;
     if (last < 2) return;
-    // Level last-2 became known with this vertex; the levels below it were stored at its predecessor.
+    // Level last-2 is known now; the levels below it were stored at the predecessor.
     path[last].weight_sum = level_sum<side>(path, last - 2, path[last - 1].weight_sum, walk.counts);
 }
 

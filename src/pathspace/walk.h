@@ -1,6 +1,6 @@
 #pragma once
-// The walk: the one way in which sub-paths are made, from either end. A step samples a direction, appends the vertex that
-// lies there, and closes what is known with it: the sums of MIS weights.
+// The walk, which makes all sub-paths, from either end. A step samples a direction, appends the vertex in that
+// direction, and updates the sums of MIS weights that are then known.
 
 #include "pathspace/mis.h"
 #include "pathspace/render_stats.h"
@@ -9,13 +9,13 @@
 
 namespace etendue {
 
-/// How far a walk goes.
+/// Limits of a walk.
 struct WalkOptions {
     int max_vertices = 1 << 20;  ///< Of the sub-path, its first vertex included.
     int rr_depth = 5;            ///< Russian roulette from the vertex with this index on.
 };
 
-/// What an integrator has learned of places, which every vertex looks up once, when it is appended.
+/// Data learned by an integrator as a function of position; every vertex looks it up once, when it is appended.
 class LearnedPlaces {
 public:
     virtual ~LearnedPlaces() = default;
@@ -23,7 +23,7 @@ public:
     virtual uint8_t pair_level(Vec3 p) const = 0;
 };
 
-/// What all walks of a sample share.
+/// Data shared by all walks of a sample.
 struct WalkContext {
     const Scene& scene;
     const TechniqueCounts& counts;  ///< Of the weights.
@@ -32,35 +32,36 @@ struct WalkContext {
     const LearnedPlaces* learned = nullptr;
 };
 
-/// z_0 on the lens and, if the scene is met, z_1. The film point is drawn from the pixel's filter.
-/// Where the ray leaves the scene, z_1 is a vertex at infinity if there are emitters there, else z_0 stays alone.
+/// Makes z_0 on the lens and, if the ray hits a surface, z_1. The film point is sampled from the pixel's filter. If the
+/// ray leaves the scene, z_1 is a vertex at infinity if there are emitters at infinity; otherwise there is no z_1.
 void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, Sampler& sampler,
                     SubPath& z);
-/// The same through a given film point; `u_lens` picks the point on a finite lens. `sampler` stands behind the numbers that
-/// these two took.
+/// The same for a given film point; `u_lens` chooses the point on a finite lens. `sampler` must be positioned after the
+/// numbers used for these two.
 void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
                     Sampler& sampler, SubPath& z);
-/// y_0 on an emitter and, if the scene is met, y_1. False where there is no emitter to choose.
+/// Makes y_0 on an emitter and, if the ray hits a surface, y_1. False where no emitter has power.
 bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y);
 
 /// p_NE / p_L of y_0 for a next vertex along `w`.
 float next_event_ratio(const Vertex& y0, Vec3 w);
 
-/// Russian roulette at the last vertex, and a direction from there. Nothing where the walk ends. Every decision at a vertex
-/// has a slot of its own (lobe, direction, roulette, masks), used or not, so that a Markov chain finds its numbers again.
+/// Russian roulette at the last vertex, and a sampled direction; empty where the walk ends. Every decision at a vertex
+/// has its own slot of random numbers (lobe, direction, roulette, masks), used or not, so that a Markov chain finds its
+/// numbers again.
 template <TransportMode mode>
 std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sampler,
                                             SubPath& path);
-/// Appends what lies in the direction s.wi from the last vertex, which leaves there by the event `s`, however that was
-/// found. False where nothing was appended: the ray left the scene, which for an eye walk over a scene with emitters at
-/// infinity is a vertex there, or met a surface edge-on.
+/// Appends the vertex in direction s.wi from the last vertex, for any event `s`, sampled or not. False where no vertex
+/// was appended: the ray left the scene (eye walks get a vertex at infinity if there are emitters at infinity), or hit
+/// a surface edge-on.
 template <TransportMode mode>
 bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubPath& path);
-/// Stores at the last vertex the sum of weights that its predecessors make known.
+/// Stores the sum of MIS weights, which is now known for level last-2, at the last vertex.
 template <TransportMode mode>
 void close(const WalkContext& walk, SubPath& path);
 
-/// A whole step; false where the walk ends.
+/// One step of the walk; false where it ends.
 template <TransportMode mode>
 bool extend(const WalkContext& walk, Sampler& sampler, SubPath& path) {
     const auto s = sample_scattering<mode>(walk, sampler, path);
@@ -69,7 +70,7 @@ bool extend(const WalkContext& walk, Sampler& sampler, SubPath& path) {
     return true;
 }
 
-/// Whole sub-paths, as far as the walk goes.
+/// Walks whole sub-paths.
 inline void trace_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
     if (!start_light_path(walk, sampler, y)) return;
     while (extend<TransportMode::Importance>(walk, sampler, y)) {

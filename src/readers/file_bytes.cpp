@@ -19,7 +19,7 @@ std::string read_file_bytes(const std::string& path) {
 
     std::string bytes;
     size_t used = 0;
-    // The size is a hint only: pipes and devices have none.
+    // The size is only a hint: pipes and devices have none.
     if (std::fseek(file.get(), 0, SEEK_END) == 0) {
         if (const long size = std::ftell(file.get()); size > 0) bytes.resize(size_t(size) + 1);
         std::rewind(file.get());

@@ -20,7 +20,7 @@ struct Element {
             if (key == attribute) return &value;
         return nullptr;
     }
-    /// An attribute that the reader has checked to be there.
+    /// An attribute whose presence the reader has checked.
     const std::string& operator[](std::string_view attribute) const { return *find(attribute); }
 };
 

@@ -9,7 +9,8 @@
 namespace etendue {
 namespace {
 
-/// Defaults may double each other's text; this bounds what all of them can add up to.
+/// Limit on the total length of all substituted values: each default may contain others, so it could grow
+/// exponentially.
 constexpr size_t kMostSubstituted = size_t(16) << 20;
 
 bool is_name_character(char c) {

@@ -13,12 +13,12 @@ class SceneParameters {
 public:
     explicit SceneParameters(const std::map<std::string, std::string>& overrides);
 
-    /// A <default> element; the first one and any override win.
+    /// Declares a <default> element. The first default of a name applies, unless it is overridden.
     void declare(const std::string& name, const std::string& value);
     /// `text` with every $name replaced by its value and "\$" by a dollar sign. A name is the
     /// longest run of letters, digits and '_'.
     std::string substitute(std::string_view text, const SourceLocation& where);
-    /// Throws for an override that no <default> declares and no $name asked for.
+    /// Throws SceneError for an override of a parameter that the scene neither declares nor uses.
     void check_overrides(const std::string& scene_file) const;
 
 private:

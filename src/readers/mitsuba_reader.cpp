@@ -14,8 +14,7 @@
 namespace etendue {
 namespace {
 
-// Far beyond any real scene; they keep hostile files from exhausting the stack, the time or the
-// memory.
+// Limits far beyond any real scene, which keep malicious files from exhausting stack, time or memory.
 constexpr int kDeepestNesting = 64;
 constexpr size_t kDeepestInclude = 32;
 constexpr int kMostIncludes = 10'000;
@@ -153,10 +152,9 @@ void MitsubaReader::read_document(std::string_view text, const std::string& file
     Source source(file, text, source_ && source_->old_dialect);
     if (const size_t zero = text.find('\0'); zero != text.npos)
         throw SceneError({file, source.line(ptrdiff_t(zero))},
-                         "a zero byte: this is not an XML text");
+                         "a zero byte: this is not an XML file");
     pugi::xml_document document;
-    // As a fragment, so that text outside the root is seen; as UTF-8, so that offsets are those of
-    // `text`.
+    // parse_fragment keeps text outside the root, which is an error; with encoding_utf8 offsets are those of `text`.
     const auto parsed = document.load_buffer(
         text.data(), text.size(), pugi::parse_default | pugi::parse_fragment, pugi::encoding_utf8);
     if (!parsed)
@@ -220,9 +218,8 @@ void MitsubaReader::read_version(const pugi::xml_node& root) {
         throw SceneError(locate(root), fmt::format("expected a version such as \"3.0.0\", found {}",
                                                    quote(text)));
     if (version < std::array{0, 4, 0} || version[0] > 3)
-        throw SceneError(
-            locate(root),
-            fmt::format("version {} is not one this reader knows (0.4.0 to 3.x)", quote(text)));
+        throw SceneError(locate(root),
+                         fmt::format("unknown version {} (known: 0.4.0 to 3.x)", quote(text)));
     source_->old_dialect = version[0] < 2;
 }
 
@@ -230,8 +227,8 @@ void MitsubaReader::read_version(const pugi::xml_node& root) {
 
 void MitsubaReader::read_children(const pugi::xml_node& parent, Scope& scope) {
     if (scope.depth > kDeepestNesting)
-        throw SceneError(locate(parent),
-                         fmt::format("elements nest more than {} deep", kDeepestNesting));
+        throw SceneError(locate(parent), fmt::format("elements are nested more than {} levels deep",
+                                                     kDeepestNesting));
     for (const pugi::xml_node& node : parent.children()) {
         if (node.type() != pugi::node_element) fail_text(node);
         read_element(node, scope);
@@ -381,8 +378,9 @@ void MitsubaReader::read_default(const Element& e, const pugi::xml_node& node, S
     if (!std::all_of(name.begin(), name.end(),
                      [](unsigned char c) { return std::isalnum(c) || c == '_'; }))
         throw SceneError(
-            e.where, fmt::format("a parameter's name has letters, digits and '_' only, unlike {}",
-                                 quote(name)));
+            e.where,
+            fmt::format("a parameter's name must have only letters, digits and '_', but is {}",
+                        quote(name)));
     parameters_.declare(name, e["value"]);
 }
 
@@ -398,8 +396,8 @@ void MitsubaReader::read_include(const Element& e, const pugi::xml_node& node, S
         throw SceneError(e.where,
                          fmt::format("the scene includes more than {} files", kMostIncludes));
     if (open_files_.size() > kDeepestInclude)
-        throw SceneError(
-            e.where, fmt::format("files include each other more than {} deep", kDeepestInclude));
+        throw SceneError(e.where, fmt::format("files include each other more than {} levels deep",
+                                              kDeepestInclude));
     std::string path;
     const std::string text = load(e["filename"], e.where, path);
     const std::string normal = std::filesystem::path(path).lexically_normal().string();
@@ -418,7 +416,7 @@ std::string MitsubaReader::load(const std::string& name, const SourceLocation& w
         if (!options_.read_file) continue;
         if (auto contents = options_.read_file(path)) return *std::move(contents);
     }
-    throw SceneError(where, fmt::format("cannot read the file {}; searched: {}", quote(name),
+    throw SceneError(where, fmt::format("cannot read the file {} (looked in {})", quote(name),
                                         fmt::join(directories, ", ")));
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// The machine behind mitsuba_xml.h: one object reads one scene.
+// Implementation of mitsuba_xml.h: one object reads one scene.
 
 #include <map>
 #include <set>
@@ -40,11 +40,11 @@ private:
         std::string category = "scene";
         int depth = 0;
         bool in_emitter = false;
-        std::set<std::string> names;  ///< Of its parameters and children so far.
+        std::set<std::string> names;  ///< Names of the parameters and children read so far.
     };
     struct Rule {
         const char* element;
-        const char* required;  ///< Attributes, between blanks.
+        const char* required;  ///< Attributes, separated by blanks.
         const char* optional;
         void (MitsubaReader::*read)(const Element&, const pugi::xml_node&, Scope&);
     };
@@ -98,7 +98,7 @@ private:
     SourceLocation locate(const pugi::xml_node& node) const;
     [[noreturn]] void fail_text(const pugi::xml_node& text) const;
     void check_leaf(const pugi::xml_node& node) const;
-    /// An error, or under `lenient` a warning that something was dropped.
+    /// Throws SceneError, or under `lenient` adds a warning that something was dropped.
     void reject(const SourceLocation& where, const std::string& what, const std::string& hint);
 
     const ReadOptions& options_;

@@ -43,7 +43,7 @@ SpectrumRole role_of(const std::string& category, const std::string& parameter, 
                                                                    : SpectrumRole::Ratio;
 }
 
-/// The intent only matters to spectral renderers; it is checked and then ignored.
+/// Checks the attribute `intent`, which matters to spectral renderers only and is ignored here.
 void check_intent(const Element& e) {
     const std::string* intent = e.find("intent");
     if (intent && *intent != "reflectance" && *intent != "illuminant")
@@ -56,8 +56,8 @@ void check_intent(const Element& e) {
 
 void MitsubaReader::add_param(const Element& e, Scope& scope, ParamValue value) {
     if (scope.object < 0)
-        throw SceneError(e.where, fmt::format("the <scene> has no parameters, but here is {}",
-                                              quote(e["name"])));
+        throw SceneError(e.where,
+                         fmt::format("parameter {} cannot stand in the <scene>", quote(e["name"])));
     scene_.objects[scope.object].params.push_back(
         {claim_name(e, scope), std::move(value), e.where});
 }
@@ -100,7 +100,7 @@ void MitsubaReader::read_rgb(const Element& e, const pugi::xml_node& node, Scope
     if (hex.empty())
         colour = to_rgb(parse_triple(e["value"], e.where), e.where);
     else if (source_->old_dialect)
-        colour = to_rgb(hex, e.where);  // Mitsuba 0.6 takes these as linear; only <srgb> decodes
+        colour = to_rgb(hex, e.where);  // linear in Mitsuba 0.6, which decodes sRGB in <srgb> only
     else
         colour = parse_srgb(e["value"], e.where);
     add_param(e, scope, colour);
@@ -154,8 +154,8 @@ Rgb MitsubaReader::spectrum_from_value(const Element& e, SpectrumRole role) cons
     if (value.find(':') != value.npos)
         return spectrum_colour(parse_spectrum_list(value, e.where), role);
     const std::vector<double> numbers = parse_floats(value, e.where);
-    // A constant is grey also where it is emitted: a scaled D65, as in Mitsuba 0.6. There, a build
-    // with three spectral samples takes three numbers as a colour.
+    // A constant is grey in emitters too, a scaled D65, as in Mitsuba 0.6. Builds of Mitsuba 0.6 with three spectral
+    // samples take three numbers as a colour.
     if (numbers.size() == 1 || (numbers.size() == 3 && source_->old_dialect))
         return to_rgb(parse_triple(value, e.where), e.where);
     throw SceneError(
@@ -165,8 +165,7 @@ Rgb MitsubaReader::spectrum_from_value(const Element& e, SpectrumRole role) cons
 
 Rgb MitsubaReader::spectrum_from_plugin(const Element& e, const pugi::xml_node& node,
                                         const Scope& scope, SpectrumRole role) {
-    // Read as an object for the time being; it has no children, so it is the last one again
-    // afterwards.
+    // The spectrum is read as a temporary object. It has no children, so it is still the last object afterwards.
     const int index = int(scene_.objects.size());
     scene_.objects.push_back({.category = "spectrum",
                               .type = e["type"],
@@ -191,7 +190,7 @@ void MitsubaReader::read_transform(const Element& e, const pugi::xml_node& node,
             });
         if (rule == kTransformSteps.end()) {
             reject(locate(child), fmt::format("a <transform> cannot contain a <{}>", child.name()),
-                   ", only translate, rotate, scale, matrix, lookat");
+                   " (known: translate, rotate, scale, matrix, lookat)");
             continue;
         }
         check_leaf(child);
@@ -199,7 +198,8 @@ void MitsubaReader::read_transform(const Element& e, const pugi::xml_node& node,
     }
     for (const auto& row : transform.matrix())
         for (double v : row)
-            if (!std::isfinite(v)) throw SceneError(e.where, "the transform is out of range");
+            if (!std::isfinite(v))
+                throw SceneError(e.where, "the transform has an entry that is not finite");
     add_param(e, scope, transform);
 }
 

@@ -7,11 +7,10 @@
 namespace etendue {
 namespace {
 
-/// The parameters of one spectrum plug-in, taken one after the other; what is left at the end is
-/// unknown.
-class Taker {
+/// Gets the parameters of one spectrum plug-in. finish() throws for those that were not asked for, which are unknown.
+class ParameterReader {
 public:
-    explicit Taker(const SceneObject& spectrum) : spectrum_(spectrum) {}
+    explicit ParameterReader(const SceneObject& spectrum) : spectrum_(spectrum) {}
 
     double number(const char* name, std::optional<double> fallback = {}) {
         const Param* p = find(name, !fallback);
@@ -34,15 +33,15 @@ public:
     }
     void finish() const {
         for (const Param& p : spectrum_.params)
-            if (std::find(taken_.begin(), taken_.end(), p.name) == taken_.end())
+            if (std::find(requested_.begin(), requested_.end(), p.name) == requested_.end())
                 throw SceneError(p.where,
                                  fmt::format("spectrum \"{}\" has no parameter \"{}\"{}",
-                                             spectrum_.type, p.name, hint(p.name, taken_)));
+                                             spectrum_.type, p.name, hint(p.name, requested_)));
     }
 
 private:
     const Param* find(const char* name, bool required) {
-        taken_.push_back(name);
+        requested_.push_back(name);
         const Param* p = spectrum_.find(name);
         if (!p && required)
             throw SceneError(
@@ -52,18 +51,19 @@ private:
     }
 
     const SceneObject& spectrum_;
-    std::vector<std::string> taken_;
+    std::vector<std::string> requested_;
 };
 
-Rgb blackbody(Taker& take, const SourceLocation& where) {
-    const double kelvin = take.number("temperature"), scale = take.number("scale", 1);
+Rgb blackbody(ParameterReader& params, const SourceLocation& where) {
+    const double kelvin = params.number("temperature"), scale = params.number("scale", 1);
     if (!(kelvin > 0))
-        throw SceneError(where, fmt::format("a temperature must be positive, but is {} K", kelvin));
+        throw SceneError(where,
+                         fmt::format("the temperature must be above 0 K, but is {} K", kelvin));
     return blackbody_rgb(kelvin) * float(scale);
 }
 
-Rgb irregular(Taker& take, SpectrumRole role, const SourceLocation& where) {
-    const SpectrumSamples samples{take.numbers("wavelengths"), take.numbers("values")};
+Rgb irregular(ParameterReader& params, SpectrumRole role, const SourceLocation& where) {
+    const SpectrumSamples samples{params.numbers("wavelengths"), params.numbers("values")};
     if (samples.wavelengths.size() != samples.values.size())
         throw SceneError(where, fmt::format("a spectrum has {} wavelengths but {} values",
                                             samples.wavelengths.size(), samples.values.size()));
@@ -71,9 +71,9 @@ Rgb irregular(Taker& take, SpectrumRole role, const SourceLocation& where) {
     return spectrum_colour(samples, role);
 }
 
-Rgb regular(Taker& take, SpectrumRole role, const SourceLocation& where) {
-    const double lo = take.number("wavelength_min"), hi = take.number("wavelength_max");
-    SpectrumSamples samples{{}, take.numbers("values")};
+Rgb regular(ParameterReader& params, SpectrumRole role, const SourceLocation& where) {
+    const double lo = params.number("wavelength_min"), hi = params.number("wavelength_max");
+    SpectrumSamples samples{{}, params.numbers("values")};
     const size_t n = samples.values.size();
     for (size_t i = 0; i < n; ++i)
         samples.wavelengths.push_back(lo + (hi - lo) * double(i) / double(n - 1));
@@ -93,27 +93,27 @@ Rgb spectrum_colour(const SpectrumSamples& samples, SpectrumRole role) {
 }
 
 Rgb spectrum_plugin_colour(const SceneObject& spectrum, SpectrumRole role) {
-    Taker take(spectrum);
+    ParameterReader params(spectrum);
     const std::string& type = spectrum.type;
     Rgb c;
     if (type == "blackbody")
-        c = blackbody(take, spectrum.where);
+        c = blackbody(params, spectrum.where);
     else if (type == "uniform")
-        c = Rgb(float(take.number("value", 1)));
+        c = Rgb(float(params.number("value", 1)));
     else if (type == "d65")
-        c = take.colour("color", Rgb(1)) * float(take.number("scale", 1));
+        c = params.colour("color", Rgb(1)) * float(params.number("scale", 1));
     else if (type == "irregular")
-        c = irregular(take, role, spectrum.where);
+        c = irregular(params, role, spectrum.where);
     else if (type == "regular")
-        c = regular(take, role, spectrum.where);
+        c = regular(params, role, spectrum.where);
     else if (type == "srgb")
-        c = take.colour("color");
+        c = params.colour("color");
     else
         throw SceneError(spectrum.where, fmt::format("unknown spectrum type \"{}\"{}", type,
                                                      hint(type, {"blackbody", "d65", "irregular",
                                                                  "regular", "srgb", "uniform"})));
-    take.finish();
-    if (!is_finite(c)) throw SceneError(spectrum.where, "the spectrum's colour is out of range");
+    params.finish();
+    if (!is_finite(c)) throw SceneError(spectrum.where, "the spectrum's colour is not finite");
     return c;
 }
 

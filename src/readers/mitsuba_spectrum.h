@@ -5,17 +5,17 @@
 
 namespace etendue {
 
-/// What a spectrum stands for, which decides the white it is seen under and its range.
+/// The quantity that a spectrum describes; it determines the illuminant and the range.
 enum class SpectrumRole {
-    Emission,     ///< Radiance and the like: its own colour.
+    Emission,     ///< Radiance, irradiance, ...; no illuminant.
     Reflectance,  ///< A ratio in [0, 1], seen under D65.
-    Ratio,  ///< A ratio without an upper bound (index of refraction, extinction), seen under D65.
+    Ratio,  ///< A ratio without an upper bound (such as an index of refraction), seen under D65.
 };
 
 Rgb spectrum_colour(const SpectrumSamples& samples, SpectrumRole role);
 
-/// The colour of <spectrum type="...">: blackbody, uniform, d65, irregular, regular, srgb. Checks
-/// its parameters.
+/// The colour of <spectrum type="...">: blackbody, uniform, d65, irregular, regular or srgb. Throws SceneError for
+/// unknown types and invalid parameters.
 Rgb spectrum_plugin_colour(const SceneObject& spectrum, SpectrumRole role);
 
 }  // namespace etendue

@@ -27,8 +27,7 @@ Transform matrix(const Element& e) {
     const std::vector<double> v = parse_floats(e["value"], e.where);
     if (v.size() != 9 && v.size() != 16)
         throw SceneError(
-            e.where,
-            fmt::format("<matrix> needs 16 numbers, or 9, row by row; found {}", v.size()));
+            e.where, fmt::format("<matrix> needs 16 or 9 numbers, row by row, found {}", v.size()));
     const size_t n = v.size() == 16 ? 4 : 3;
     Transform::Matrix m = Transform().matrix();
     for (size_t i = 0; i < n; ++i)

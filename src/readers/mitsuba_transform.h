@@ -6,7 +6,7 @@
 
 namespace etendue {
 
-/// The map of one step. Throws SceneError where its attributes define none.
+/// The transform of one step. Throws SceneError where its attributes are invalid.
 Transform read_transform_step(const Element& step);
 
 /// Three components from the attributes x, y and z, each `fallback` where absent, or all from

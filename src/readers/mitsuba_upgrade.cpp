@@ -88,7 +88,7 @@ void upgrade_bsdf(SceneObject& object) {
         object.params.push_back({"material", std::string("Cu"), object.where});
 }
 
-/// In 0.6 daylight has y up and z south; in 3, z up and x south.
+/// Mitsuba 0.6 has y up and z south for sky and sun; Mitsuba 3 has z up and x south.
 void upgrade_daylight(SceneObject& object) {
     const Transform from_z_up(
         Transform::Matrix{{{0, -1, 0, 0}, {0, 0, 1, 0}, {1, 0, 0, 0}, {0, 0, 0, 1}}});
@@ -104,7 +104,7 @@ void upgrade_daylight(SceneObject& object) {
 
 std::string snake_case(std::string_view camel_case) {
     std::string snake;
-    bool in_capitals = false;  // all capitals of a run are lowered: "IOR" is one word
+    bool in_capitals = false;  // a run of capitals such as "IOR" is one word
     for (size_t i = 0; i < camel_case.size(); ++i) {
         const char c = camel_case[i];
         if (is_upper(c) && i > 0 && is_lower(camel_case[i - 1])) {

@@ -11,14 +11,14 @@ namespace etendue {
 /// "maxDepth" → "max_depth", "intIOR" → "int_ior".
 std::string snake_case(std::string_view camel_case);
 
-/// Renames plug-ins and parameters of an object whose names are in snake case already, and
-/// translates values, so that the object means the same as in Mitsuba 0.6:
+/// Converts an object of Mitsuba 0.6, whose names are in snake case already, to the plug-ins, parameters and values
+/// with the same meaning in Mitsuba 3:
 ///   uscale, vscale, uoffset, voffset   → to_uv, scale before offset
 ///   bitmap: gamma 1 or -1              → raw true or false
 ///   bitmap: filter_type ewa, trilinear → bilinear (there are no mip maps to select from)
 ///   bitmap: wrap_mode_u = wrap_mode_v  → wrap_mode
 ///   diffuse, roughdiffuse: diffuse_reflectance → reflectance
-///   conductor, roughconductor without a material, eta or k → material Cu, the default then
+///   conductor, roughconductor without a material, eta or k → material Cu, the default of Mitsuba 0.6
 ///   bsdf bump → bumpmap; integrator volpath_simple → volpath
 void upgrade_object(SceneObject& object);
 

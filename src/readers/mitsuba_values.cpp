@@ -30,8 +30,7 @@ std::vector<std::string_view> split(std::string_view text, std::string_view sepa
     return tokens;
 }
 
-/// std::from_chars over the whole of `text`, which may begin with the '+' that from_chars does not
-/// know.
+/// std::from_chars on all of `text`, which may also begin with '+'.
 template <class T>
 T parse_number(std::string_view text, const char* expected, const SourceLocation& where) {
     std::string_view digits = trim(text);

@@ -1,6 +1,6 @@
 #pragma once
-// The values in a scene file's attributes: numbers, colours and spectra, from text. Everything
-// throws SceneError at `where` and quotes what it could not read.
+// Parsers for the attributes of scene files: numbers, colours and spectra. On invalid text all of them throw SceneError
+// with location `where` and the text in quotes.
 
 #include <cstdint>
 #include <string>
@@ -15,22 +15,22 @@ namespace etendue {
 
 /// `text` in quotes for a message; shortened where it is long.
 std::string quote(std::string_view text);
-/// What to tell after an unknown name: " (did you mean "x"?)", or the names there are, or that
-/// there are none.
+/// Hint for an error message about an unknown name: " (did you mean "x"?)", or a list of the known names, or " (there
+/// are none)".
 std::string hint(std::string_view name, const std::vector<std::string>& candidates);
 
-/// A finite number and nothing else but blanks around it.
+/// A finite number, with optional blanks around it.
 double parse_float(std::string_view text, const SourceLocation& where);
 int64_t parse_integer(std::string_view text, const SourceLocation& where);
 bool parse_boolean(std::string_view text, const SourceLocation& where);
-/// Numbers between blanks or commas.
+/// Numbers separated by blanks or commas.
 std::vector<double> parse_floats(std::string_view text, const SourceLocation& where);
 /// Three numbers, or one that stands for all three.
 std::vector<double> parse_triple(std::string_view text, const SourceLocation& where);
 Vec3 to_vec3(const std::vector<double>& xyz, const SourceLocation& where);
 Rgb to_rgb(const std::vector<double>& rgb, const SourceLocation& where);
 
-/// "#rrggbb" as three fractions of 255, still encoded; empty where `text` does not begin with '#'.
+/// "#rrggbb" as three numbers in [0, 1], not linearised; empty where `text` does not begin with '#'.
 std::vector<double> parse_hex_colour(std::string_view text, const SourceLocation& where);
 /// sRGB in [0, 1], one or three numbers or "#rrggbb", as a linear colour.
 Rgb parse_srgb(std::string_view text, const SourceLocation& where);

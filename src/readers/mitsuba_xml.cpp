@@ -13,6 +13,7 @@ std::optional<std::string> read_from_disk(const std::string& path) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) return {};
     std::ifstream in(path, std::ios::binary);
+    if (!in) return {};
     std::string contents((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
     if (in.bad()) return {};
     return contents;

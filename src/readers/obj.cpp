@@ -10,7 +10,7 @@
 namespace etendue {
 namespace {
 
-/// Index of an attribute that a corner does not have.
+/// Index for an attribute that is missing from a corner.
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 /// Indices (from 0) of one face corner.
@@ -62,7 +62,7 @@ public:
     }
 
 private:
-    /// The largest index of one kind that faces use, to be checked once all vertices are known.
+    /// Largest index of one attribute used by faces; checked after the whole file is read.
     struct Largest {
         uint32_t index = 0;
         int line = 0;  ///< 0 where faces use none.
@@ -81,7 +81,7 @@ private:
         }
     }
 
-    /// Whether the statement goes on.
+    /// Whether the current line has another word before a comment.
     bool more() { return in_.skip_blanks() && !in_.at_char('#'); }
     float number(const char* what) {
         in_.skip_blanks();
@@ -95,8 +95,7 @@ private:
         const float u = number("texture coordinate");
         return {u, more() ? number("texture coordinate") : 0};
     }
-    /// Exporters write "nan" for the normals of faces without area: finish_mesh() replaces such a
-    /// normal.
+    /// NaN is accepted, since exporters write it for faces of zero area; finish_mesh() replaces it.
     Vec3 normal() {
         Vec3 n;
         for (int i = 0; i < 3; ++i) {
@@ -127,8 +126,7 @@ private:
         if (in_.skip_char('/')) c.normal = index(normals_.size(), largest_normal_);
         return c;
     }
-    /// Positive indices count from 1, negative ones back from the latest of the `count` elements
-    /// read so far.
+    /// Positive indices count from 1, negative ones back from the last of the `count` elements read so far.
     uint32_t index(size_t count, Largest& largest) {
         const int64_t given = in_.integer("index");
         const int64_t i = given > 0 ? given - 1 : int64_t(count) + given;
@@ -143,7 +141,7 @@ private:
             throw SceneError({in_.where().file, largest.line},
                              "a face refers to " + std::string(what) + " " +
                                  std::to_string(uint64_t(largest.index) + 1) +
-                                 ", but the file has only " + std::to_string(count));
+                                 ", but there are only " + std::to_string(count));
     }
 
     MeshData assemble() {
@@ -154,7 +152,7 @@ private:
         mesh.triangles = std::move(triangles_);
         const auto& corners = table_.corners();
         for (const Corner& c : corners) mesh.positions.push_back(positions_[c.position]);
-        // A corner without the attribute that others have gets (0, 0), or a normal from
+        // Where only some corners have an attribute, the others get texture coordinates (0, 0), and normals from
         // finish_mesh().
         if (largest_uv_.line != 0)
             for (const Corner& c : corners) mesh.uvs.push_back(c.uv == kNone ? Vec2{} : uvs_[c.uv]);

@@ -13,7 +13,7 @@ std::string label(const SceneObject& object) {
     return object.id.empty() ? fmt::format("{} \"{}\"", object.category, object.type) : object.id;
 }
 
-/// `unsorted` marks the objects on cycles and those below them; there is at least one.
+/// `unsorted` marks the objects on cycles and their descendants; there is at least one.
 [[noreturn]] void fail_cycle(const SceneDescription& scene, const std::vector<bool>& unsorted) {
     // Every unsorted object has an unsorted parent, so walking up ends in a cycle.
     const int n = int(scene.objects.size());
@@ -52,9 +52,8 @@ void check_object_graph(const SceneDescription& scene, int deepest) {
         ready.pop_back();
         unsorted[at] = false;
         if (depth[at] > deepest)
-            throw SceneError(
-                scene.objects[at].where,
-                fmt::format("objects stand more than {} levels deep in each other", deepest));
+            throw SceneError(scene.objects[at].where,
+                             fmt::format("objects are nested more than {} levels deep", deepest));
         for (const auto& child : scene.objects[at].children) {
             depth[child.object] = std::max(depth[child.object], depth[at] + 1);
             if (--parents_left[child.object] == 0) ready.push_back(child.object);

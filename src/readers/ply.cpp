@@ -13,7 +13,7 @@
 namespace etendue {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "binary readers assume it");
+static_assert(std::endian::native == std::endian::little, "binary readers assume little-endian");
 
 enum class Type { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float32, Float64 };
 
@@ -38,9 +38,9 @@ bool is_integer(Type type) {
 struct Property {
     std::string_view name;
     Type type;
-    std::optional<Type> count_type;  ///< Of lists.
+    std::optional<Type> count_type;  ///< Type of the length of a list; empty for a scalar.
 
-    /// Bytes that one value takes at least.
+    /// Smallest size of one value or list in the file.
     size_t min_bytes(bool ascii) const { return ascii ? 1 : size_of(count_type.value_or(type)); }
 };
 
@@ -110,8 +110,9 @@ private:
         else if (name == "binary_big_endian")
             header_.format = Format::BigEndian;
         else
-            in_.fail("unknown format \"" + std::string(name.substr(0, 40)) + "\"");
-        if (word() != "1.0") in_.fail("only version 1.0 of the format is known");
+            in_.fail("unknown format \"" + std::string(name.substr(0, 40)) +
+                     "\" (known: ascii, binary_little_endian, binary_big_endian)");
+        if (word() != "1.0") in_.fail("unknown version of the format (known: 1.0)");
     }
     void element() {
         const std::string_view name = word();
@@ -265,13 +266,13 @@ public:
     }
 
 private:
-    /// Nothing is allocated for elements that the rest of the file cannot hold.
+    /// Checks that the rest of the file can contain the elements, before memory is allocated for them.
     void check_count(const Element& e) const {
         size_t bytes = 0;
         for (const Property& p : e.properties) bytes += p.min_bytes(Body::kAscii);
         if (bytes > 0 && e.count > in_.remaining() / bytes)
-            in_.fail("the header promises " + std::to_string(e.count) + " elements \"" +
-                     std::string(e.name.substr(0, 40)) + "\", more than the file can hold");
+            in_.fail("the header declares " + std::to_string(e.count) + " elements \"" +
+                     std::string(e.name.substr(0, 40)) + "\", more than the file can contain");
     }
 
     void vertices(const Element& e) {
@@ -339,14 +340,15 @@ private:
             previous = v;
         }
     }
-    /// Checked here where the vertices are known, as is usual, so that the error can tell the line;
-    /// finish_mesh() checks the rest.
+    /// Checks the index where the vertices were read before the faces, as usual, so that the error names the line.
+    /// Otherwise finish_mesh() checks it.
     uint32_t vertex_index(Type type) {
         const int64_t v = in_.integer(type);
         const size_t limit =
             mesh_.positions.empty() ? std::numeric_limits<uint32_t>::max() : mesh_.positions.size();
         if (v < 0 || uint64_t(v) >= limit)
-            in_.fail("vertex index " + std::to_string(v) + " is out of range");
+            in_.fail("vertex index " + std::to_string(v) + " must lie in [0, " +
+                     std::to_string(limit - 1) + "]");
         return uint32_t(v);
     }
 

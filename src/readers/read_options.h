@@ -1,5 +1,5 @@
 #pragma once
-// What every scene reader takes besides the file's name.
+// Options of all scene readers.
 
 #include <functional>
 #include <map>
@@ -9,12 +9,12 @@
 namespace etendue {
 
 struct ReadOptions {
-    /// Values of the scene's parameters (`$name`), stronger than the file's own defaults.
+    /// Values of the scene's parameters (`$name`); they override the file's defaults.
     std::map<std::string, std::string> defines;
     /// Unknown elements and attributes become warnings that name what was dropped.
     bool lenient = false;
-    /// Contents of an included or spectrum file, nothing where there is none. Readers that are given a file's name
-    /// take the disk where this is empty; those that are given text then find no file at all.
+    /// Returns the contents of an included or spectrum file, or empty where it cannot be read. If this is not set,
+    /// functions that take a file name read from disk, and functions that take text find no files.
     std::function<std::optional<std::string>(const std::string& path)> read_file = nullptr;
 };
 

@@ -14,7 +14,7 @@
 namespace etendue {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "binary readers assume it");
+static_assert(std::endian::native == std::endian::little, "binary readers assume little-endian");
 
 constexpr uint16_t kMagic = 0x041C;
 constexpr uint16_t kOldVersion = 3, kVersion = 4;
@@ -36,7 +36,7 @@ T load(const char* at) {
     return value;
 }
 
-/// Inflates a zlib stream piece by piece, so that memory is spent only on data that is there.
+/// Inflates a zlib stream in pieces, so that no memory is allocated for data that the file does not contain.
 class InflateStream {
 public:
     InflateStream(std::string_view compressed, const SourceLocation& where) : where_(where) {
@@ -91,7 +91,7 @@ public:
     MeshData parse() {
         flags_ = in_.read<uint32_t>();
         if (((flags_ & kSinglePrecision) != 0) == ((flags_ & kDoublePrecision) != 0))
-            throw SceneError(where_, "the flags name neither single nor double precision");
+            throw SceneError(where_, "the flags must name either single or double precision");
         MeshData mesh;
         if (version_ == kVersion)
             for (char c = in_.read<char>(); c != 0; c = in_.read<char>()) mesh.name += c;
@@ -111,7 +111,7 @@ private:
         const auto n = in_.read<uint64_t>();
         if (n > std::numeric_limits<uint32_t>::max())
             throw SceneError(where_,
-                             std::to_string(n) + " " + what + " are more than 32 bits can count");
+                             std::to_string(n) + " " + what + " are more than 32 bits can index");
         return n;
     }
     template <class Vec>
@@ -138,10 +138,11 @@ uint16_t check_mesh_header(std::string_view bytes, uint64_t offset, const Source
     if (offset > bytes.size() || bytes.size() - offset < kMeshHeaderBytes)
         throw SceneError(where, "a mesh begins beyond the end of the file");
     if (load<uint16_t>(&bytes[offset]) != kMagic)
-        throw SceneError(where, "not a .serialized file: the mark 0x041C is missing");
+        throw SceneError(where, "not a .serialized file: the identifier 0x041C is missing");
     const auto version = load<uint16_t>(&bytes[offset + 2]);
     if (version != kOldVersion && version != kVersion)
-        throw SceneError(where, "version " + std::to_string(version) + " of the format is unknown");
+        throw SceneError(where, "unknown version " + std::to_string(version) +
+                                    " of the format (known: 3, 4)");
     return version;
 }
 
@@ -154,8 +155,9 @@ uint64_t mesh_offset(std::string_view bytes, int shape_index, uint16_t version,
     if (meshes == 0 || meshes > body / entry)
         throw SceneError(where, "the table of meshes at the end of the file is damaged");
     if (shape_index < 0 || uint32_t(shape_index) >= meshes)
-        throw SceneError(where, "mesh " + std::to_string(shape_index) + " of a file that has " +
-                                    std::to_string(meshes) + " (counted from 0)");
+        throw SceneError(where, "there is no mesh " + std::to_string(shape_index) +
+                                    ": the file has " + std::to_string(meshes) +
+                                    ", counted from 0");
     const char* at = &bytes[body - entry * (meshes - uint32_t(shape_index))];
     return version == kVersion ? load<uint64_t>(at) : load<uint32_t>(at);
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Reads numbers and words from the text of a mesh file and knows the line it is on.
+// Reads numbers and words from the text of a mesh file and counts its lines.
 
 #include <charconv>
 #include <cmath>
@@ -22,7 +22,7 @@ public:
     int line() const { return line_; }
     SourceLocation where() const { return {*file_, line_}; }
 
-    /// To the next word of this line; false where there is none. A backslash joins the next line.
+    /// Moves to the next word of this line; false where there is none. A backslash at the end of a line continues it.
     bool skip_blanks() {
         for (; at_ != end_; ++at_) {
             if (*at_ == '\\' && joins_next_line()) {
@@ -35,7 +35,7 @@ public:
         }
         return false;
     }
-    /// To the next word of this or a later line; false at the end of the text.
+    /// Moves to the next word of this or a later line; false at the end of the text.
     bool skip_blank_lines() {
         while (!skip_blanks()) {
             if (at_end()) return false;
@@ -43,7 +43,7 @@ public:
         }
         return true;
     }
-    /// To the beginning of the next line.
+    /// Moves to the beginning of the next line.
     void next_line() {
         while (at_ != end_ && *at_ != '\n') ++at_;
         if (at_ != end_) {
@@ -66,7 +66,7 @@ public:
         while (last != begin && is_blank(last[-1])) --last;
         return {begin, size_t(last - begin)};
     }
-    /// Whether the next character is `c`, which is then passed over.
+    /// Skips the next character and returns true where it is `c`.
     bool skip_char(char c) {
         if (!at_char(c)) return false;
         ++at_;

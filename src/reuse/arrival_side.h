@@ -1,5 +1,5 @@
 #pragma once
-// From which side of a surface a walk came, in 16 bits.
+// The side of a surface on which a walk arrived, in 16 bits.
 
 #include <cmath>
 #include <cstdint>
@@ -14,7 +14,7 @@ class ArrivalSide {
 public:
     ArrivalSide() = default;
     ArrivalSide(Vec3 normal, bool is_transmissive) {
-        // On the octahedron |x| + |y| + |z| = 1, whose lower half is folded over the upper one [Meyer et al. 2010].
+        // Octahedral mapping: |x| + |y| + |z| = 1, with the lower half folded over the upper one [Meyer et al. 2010].
         const float scale = 1 / (std::fabs(normal.x) + std::fabs(normal.y) + std::fabs(normal.z));
         float a = normal.x * scale, b = normal.y * scale;
         if (normal.z < 0) {
@@ -30,13 +30,13 @@ public:
     }
 
     bool is_transmissive() const { return bits_ >> 15; }
-    /// To about a degree, of unit length.
+    /// Unit vector, to about a degree.
     Vec3 normal() const {
         const Direction d = direction();
         return normalize({float(d.x), float(d.y), float(d.z)});
     }
-    /// Whether what arrived on `other`, close by, may go on from here: not where the two are two sides of a wall, or walls
-    /// at a right angle. In whole numbers, so that gathers and trials agree to the bit, however each is compiled.
+    /// Whether a path that arrived on `other`, nearby, may continue from here. False for the two sides of a wall and
+    /// for walls at right angles. Computed in integers, so that gathers and trials always agree.
     bool admits(ArrivalSide other) const {
         if (is_transmissive()) return true;
         const Direction a = direction(), b = other.direction();
@@ -72,7 +72,7 @@ private:
     uint16_t bits_ = 0;
 };
 
-/// Of a point of a surface.
+/// The side on which the walk arrived at surface vertex `v`.
 inline ArrivalSide arrival_side(const Vertex& v) {
     return {dot(v.ng, v.wo) < 0 ? -v.ng : v.ng, v.shape->material->is_transmissive()};
 }

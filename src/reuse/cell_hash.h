@@ -1,5 +1,5 @@
 #pragma once
-// Cubes of space in hashed buckets.
+// Hashing of cubic cells of space into buckets.
 
 #include <algorithm>
 #include <bit>
@@ -17,20 +17,20 @@ public:
     struct Cell {
         int x, y, z;
         friend bool operator==(const Cell&, const Cell&) = default;
-        /// One of the eight that share the upper corner of this one.
+        /// One of the eight cells that share the upper corner of this cell, itself included.
         Cell neighbour(int corner) const {
             return {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)};
         }
     };
-    /// So many buckets that few cells of `points` points share one; cells so wide that a ball of `radius` meets at most
-    /// eight.
+    /// Has about twice as many buckets as `points`, and cells of width 2·radius, so that a ball of `radius` meets at
+    /// most eight cells.
     CellHash(size_t points = 0, float radius = 1)
         : inv_width_(0.5f / radius),
           mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}
 
     float width() const { return 1 / inv_width_; }
     uint32_t buckets() const { return mask_ + 1; }
-    /// Of those that a ball meets.
+    /// The lowest of the eight cells that a ball about `p` can meet.
     Cell lowest_cell(Vec3 p) const {
         const Vec3 s = p * inv_width_;
         return {int(std::floor(s.x - 0.5f)), int(std::floor(s.y - 0.5f)),

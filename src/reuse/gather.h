@@ -1,5 +1,5 @@
 #pragma once
-// The search for the pairs of an eye vertex, and the roulette that most of them end by [Qin et al. 2015].
+// The search for the pairs of an eye vertex, and the Russian roulette that ends most of them [Qin et al. 2015].
 
 #include "pathspace/sample_context.h"
 #include "reuse/gather_roulette.h"
@@ -12,13 +12,13 @@ namespace etendue {
 /// A pair of y_{s-1} and z_{t-1}, one of which is dropped.
 struct GatherPair {
     Technique technique;
-    Neighbourhood kept;  ///< Of the vertex that stays.
-    uint64_t number;     ///< Of the random numbers that belong to it.
-    float estimate;      ///< Of what its join adds to the pixel, for GatherRoulette.
-    float survival;      ///< Of all roulette so far.
-    float rate;          ///< The same, times the share of such pairs that is used at all.
+    Neighbourhood kept;  ///< Of the vertex that is kept.
+    uint64_t number;     ///< Address of its random numbers.
+    float estimate;      ///< Estimated contribution of its join to the pixel, for GatherRoulette.
+    float survival;      ///< Probability of surviving all roulette so far.
+    float rate;  ///< `survival` times the share of gathers that are made (PairModel::short_rate).
 
-    /// What the dropped vertex was sampled from, by the walks y and z.
+    /// The event from which the dropped vertex was sampled, on the walks y and z.
     PairEvent event(const SubPath& y, const SubPath& z) const {
         if (technique.drops_eye) return {z[technique.t - 2], TransportMode::Radiance, kept};
         return {y[technique.s - 2], TransportMode::Importance, kept};
@@ -35,7 +35,7 @@ struct GatherSearch {
     const GatherRoulette& roulette;
     int max_depth;    ///< Edges of the longest path.
     float flatness;   ///< Half the height of a neighbourhood over its radius.
-    float threshold;  ///< Of join_survival(), for what is added to the own pixel.
+    float threshold;  ///< Of join_survival(), for contributions to the own pixel.
     Workspace& work;
 
     /// Calls use(pair) for the pairs of z_{t-1}, with y_0 … y_{s-1} in work.pair as far as the join reads them.
@@ -43,8 +43,8 @@ struct GatherSearch {
     void for_each_pair(int t, const Use& use) const {
         const float reflected = reflected_flux(t);
         const Vertex& z = work.z[t - 1];
-        // Where most pairs contribute little, z_{t-1} mostly looks for none. A search that finds n of them has a second moment
-        // of n (n+1), and takes n+1 times as long as to find none.
+        // Roulette for the whole search: most pairs of some vertices contribute little. The number of pairs found has
+        // the second moment n (n+1), where n is its mean, and a search costs n+1 times as much as one that finds none.
         const float partners = std::max(1.0f, density.partners(z.pair_level));
         const float search_survival = join_survival(
             roulette.of_search(t) * reflected * grid.mean_flux() * std::sqrt(partners), threshold);
@@ -96,10 +96,10 @@ struct GatherSearch {
         });
     }
 
-    /// What a unit of contribution of a gather adds to the pixel, r and roulette left out.
+    /// Factor from the contribution of a gather to the pixel's value, without r and roulette.
     float scale() const { return std::fabs(work.z.film_weight) * c.splat_scale; }
 
-    /// Tells the roulette what the join of a pair contributes, or that there is none.
+    /// Records the contribution of a pair's join for the roulette; an empty join has none.
     void observe(const GatherPair& pair, const std::optional<Join>& join) const {
         if (!(pair.estimate > 0)) return;
         const float value = join ? luminance(join->contribution) * join->mis_weight * scale() /
@@ -124,8 +124,8 @@ private:
         return {kept.p, kept.ng, side, grid.radius(), flatness * grid.radius()};
     }
 
-    /// What a pair at z_{t-1} adds to its pixel for each unit of flux, as far as roulette knows before it looks up the
-    /// light path: as a merge does on a diffuse surface, or on one as bright as the highlight of a glossy one.
+    /// Estimated contribution to the pixel of a pair at z_{t-1} per unit of flux, before the light path is looked up:
+    /// that of a merge on a diffuse surface, times the brightness of the highlight on a glossy one.
     float reflected_flux(int t) const {
         const Vertex& z = work.z[t - 1];
         const float roughness = 1 - float(z.gloss) / kSharpestGloss;

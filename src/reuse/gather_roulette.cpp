@@ -5,15 +5,15 @@
 namespace etendue {
 namespace {
 
-/// Of the squares, which are summed in whole numbers.
+/// Fixed-point unit of the sums of squares.
 constexpr double kUnit = 0x1p24;
 
 }  // namespace
 
 void GatherRoulette::learn(const GatherTotals& totals) {
-    // As if there had been a few joins with the ratio that is first assumed.
+    // Prior: kJoins joins with the ratio kFirst.
     constexpr double kFirst = 0.125, kJoins = 16;
-    // By trial on four scenes; a factor of two in either is hardly seen.
+    // Found by experiment on four scenes; a factor of two in either has little effect.
     constexpr float kPair = 2, kSearch = 0.7f;
     search_factors_.fill(0);
     for (size_t i = 0; i < factors_.size(); ++i) {
@@ -27,7 +27,7 @@ void GatherRoulette::learn(const GatherTotals& totals) {
 }
 
 void GatherRoulette::observe(int s, int t, float ratio, GatherSums& sums) {
-    // A few joins that contribute much more than was estimated are no rule.
+    // Limits the influence of single joins that contribute much more than estimated.
     constexpr float kMost = 8;
     GatherSums::Joins& joins = sums.joins[index(s, t)];
     ++joins.count;

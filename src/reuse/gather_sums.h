@@ -1,5 +1,5 @@
 #pragma once
-// What the gathers of a pass tell later ones.
+// Statistics of the gathers of a pass, from which later passes learn.
 
 #include <array>
 #include <memory>
@@ -9,12 +9,12 @@
 
 namespace etendue {
 
-/// Candidates of the scale c of gathers' weights, see GatherWeightScale.
+/// Number of candidates for the scale c of GatherWeightScale.
 inline constexpr size_t kWeightScales = 6;
-/// Sub-paths of this many vertices, and of more, are alike to GatherRoulette.
+/// GatherRoulette does not distinguish sub-paths of more vertices than this.
 inline constexpr size_t kGatherLengths = 8;
 
-/// One worker's sums of a pass, in whole numbers.
+/// Sums of one worker in a pass, in fixed point.
 struct GatherSums final : PassSums {
     std::array<uint64_t, kWeightScales> second_moments{};
     struct Joins {
@@ -36,7 +36,7 @@ struct GatherSums final : PassSums {
     }
 };
 
-/// Of all finished passes.
+/// Sums over all finished passes.
 struct GatherTotals {
     std::array<double, kWeightScales> second_moments{};
     struct Joins {
@@ -45,7 +45,7 @@ struct GatherTotals {
     std::array<Joins, kGatherLengths * kGatherLengths> joins{};
     double expected_pairs = 0;
 
-    /// Adds a pass. Its workers are added up in whole numbers first, so that their order does not matter.
+    /// Adds a pass. Sums of its workers are added as integers first, so that the order of workers does not matter.
     void add(std::span<const std::unique_ptr<PassSums>> workers) {
         GatherSums pass;
         for (const auto& w : workers) pass.add(static_cast<const GatherSums&>(*w));

@@ -1,25 +1,28 @@
 #pragma once
-// How much weights count a gather.
+// Factor of the sample count of gathers in MIS weights.
 
 #include "reuse/gather_sums.h"
 
 namespace etendue {
 
-/// Weights take the probability that a pair is found for that of a disc, π r² p [Qin et al. 2015, eq. 24]. Where
-/// surfaces are small or curved it is less, and 1/p_c with all its noise more. So gathers count c N_L in the weights, where c
-/// is that of a few values for which the second moment of a pixel's estimate,
+/// MIS weights approximate the probability that a pair is found by that of a disc, π r² p [Qin et al. 2015, eq. 24]. On
+/// small or curved surfaces it is smaller, so that 1/p_c is larger and noisier. Therefore gathers count c N_L samples
+/// in the weights. c is the one of a few candidates that minimises the second moment of a pixel's estimate, relative to
+/// its luminance,
 ///     ∫ w(c)² f² / (N_L p p_c) + (1 - w(c))² f² / (N_S p_S),
-/// is least, the pixel's luminance being the unit: w is the weight of the gather, S the other techniques as if they were
-/// one. Pairs and their r of earlier passes estimate it, so that an image keeps the right expectation.
+/// where w is the weight of the gather, and S stands for all other techniques together. It is estimated from the pairs,
+/// and their r, of earlier passes, so that the image remains unbiased.
 class GatherWeightScale {
 public:
-    /// Chooses c from the sums of earlier passes: the largest with nearly the least moment; 1/2 where there are none.
+    /// Chooses c from the sums of earlier passes: the largest whose moment is close to the least; 1/2 where there are
+    /// none.
     void learn(const GatherTotals& totals);
     /// c.
     float value() const { return of(choice_); }
 
-    /// One visible pair. `luminance`: what it would add to its pixel, over the pixel's, with weight 1, r = 1 and
-    /// `weight` given for the present c; `seen`: the inverse of the probability that roulette let it be seen.
+    /// Records one visible pair. `luminance`: its contribution for weight 1 and r = 1, relative to the pixel's
+    /// luminance; `weight`: its MIS weight for the current c; `seen`: the inverse of the probability that it survived
+    /// roulette.
     void observe(double luminance, double weight, double pair_probability, double r, double seen,
                  GatherSums& sums) const;
 

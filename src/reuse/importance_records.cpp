@@ -54,7 +54,7 @@ void ImportanceRecords::Chunk::add(const Vertex& z, std::vector<float>& masses) 
     cdfs_.insert(cdfs_.end(), masses.begin(), masses.end());
 }
 
-/// Over the places of the records.
+/// k-d tree of the records' positions.
 struct ImportanceRecords::Tree {
     struct Points {
         std::vector<std::array<float, 3>> points;
@@ -78,7 +78,7 @@ struct ImportanceRecords::Tree {
           index(3, points, {kLeafSize}) {}
 
     static constexpr size_t kLeafSize = 6;
-    /// The places nearest to `p`, up to a factor of 2 in distance; which they are is no matter of correctness.
+    /// The positions nearest to `p`, approximate up to a factor of 2 in distance; any choice is unbiased.
     size_t nearest(Vec3 p, int count, uint32_t* places, float* distances2) const {
         constexpr float kEpsilon = 3;
         nanoflann::KNNResultSet<float, uint32_t> found{size_t(count)};
@@ -112,7 +112,7 @@ VertexMixture ImportanceRecords::mixture(const Vertex& z, int neighbours, double
     std::array<uint32_t, VertexMixture::kMostParts> nearest;
     std::array<float, VertexMixture::kMostParts> distances2;
     const size_t found = tree_->nearest(z.p, neighbours, nearest.data(), distances2.data());
-    // Inverse distance; a record at the very place counts as if it were a tenth as far as the farthest.
+    // Weights are inverse distances, plus a tenth of the largest distance to keep them finite.
     const float reach = 0.1f * std::sqrt(distances2[found - 1]) + 1e-20f;
     std::array<double, VertexMixture::kMostParts> weights;
     double total = 0;

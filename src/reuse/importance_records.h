@@ -1,6 +1,7 @@
 #pragma once
-// Importance records [Popov et al. 2015, §4.2, §6]: what each of V light vertices brings to some points of the scene, kept
-// as cumulative mass functions. An eye vertex draws light vertices from a mixture of those near it.
+// Importance records [Popov et al. 2015, §4.2, §6]: the contribution of each of V light vertices to some points of the
+// scene, stored as cumulative mass functions. Eye vertices sample light vertices from a mixture of those of nearby
+// records.
 
 #include <array>
 #include <cstdint>
@@ -12,26 +13,26 @@
 
 namespace etendue {
 
-/// Turns V masses into the V + 1 values, from 0 to 1, of their cumulative distribution; false where all are 0.
+/// Replaces V masses by the V + 1 values, from 0 to 1, of their cumulative distribution; false where all are 0.
 bool to_cdf(std::vector<float>& masses);
 
-/// Σ_i w_i pmf_i over V light vertices, one summand being uniform.
+/// The mixture Σ_i w_i pmf_i over V light vertices, with one uniform component.
 class VertexMixture {
 public:
     static constexpr int kMostParts = 16;
 
-    /// Uniform with the weight that the parts leave of 1.
+    /// The uniform component has the weight 1 minus that of the parts.
     explicit VertexMixture(uint32_t vertices) : vertices_(vertices) {}
-    /// `cdf` as from to_cdf(); it must outlive the mixture.
+    /// Adds a part; `cdf` is the result of to_cdf() and must outlive the mixture.
     void add(const float* cdf, double weight) { parts_[size_t(count_++)] = {cdf, weight}; }
 
     struct Draw {
         uint32_t vertex;
         double pmf;
     };
-    /// From `u` in [0, 1): chooses a summand by its weight, then a vertex by that summand alone.
+    /// Chooses a component by its weight, then a vertex from it; `u` is in [0, 1).
     Draw sample(double u) const;
-    /// From differences of the values that sample() compares, so that rounding of the CDFs does not bias.
+    /// Computed from differences of the values that sample() compares, so that rounding of the CDFs causes no bias.
     double pmf(uint32_t vertex) const;
 
 private:
@@ -46,11 +47,11 @@ private:
 
 class ImportanceRecords {
 public:
-    /// Records along one eye path; filled by one thread.
+    /// Records of one chunk of eye paths; filled by one thread.
     class Chunk {
     public:
         void clear();
-        /// What the light vertices bring to `z`; where all is 0 there is no record.
+        /// Adds a record with the contributions of the light vertices to `z`, unless all of them are 0.
         void add(const Vertex& z, std::vector<float>& masses);
 
     private:
@@ -65,10 +66,10 @@ public:
     ImportanceRecords();
     ~ImportanceRecords();
 
-    /// Takes the chunks' records in order, whichever threads made them.
+    /// Combines the chunks' records in order, independent of the threads that made them.
     void assemble(std::span<Chunk> chunks, uint32_t vertices);
-    /// Of the `neighbours` nearest records, those weighted more whose normal and direction are alike and that are near,
-    /// and of the uniform distribution with the share `uniform`: all of it where no record has a weight.
+    /// Mixture of the `neighbours` nearest records, weighted by similarity of normal and direction and by inverse
+    /// distance, and of the uniform distribution with weight `uniform`, or 1 where no record has a positive weight.
     VertexMixture mixture(const Vertex& z, int neighbours, double uniform) const;
 
     size_t size() const { return places_.size(); }

@@ -10,7 +10,7 @@ namespace etendue {
 
 IrradianceRecord measure_irradiance(Vec3 p, Vec3 n, int rays, Sampler& sampler,
                                     const std::function<IncidentRadiance(Vec3)>& radiance) {
-    // M × N cells of equal cosine-weighted solid angle; N ≈ π M makes them about as wide as high.
+    // M × N cells of equal cosine-weighted solid angle; N ≈ π M makes width and height of cells similar.
     const int M = std::max(1, int(std::lround(std::sqrt(float(rays) * kInvPi))));
     const int N = std::max(3, int(std::lround(float(rays) / float(M))));
     const Frame frame = Frame::from_normal(n);
@@ -30,14 +30,15 @@ IrradianceRecord measure_irradiance(Vec3 p, Vec3 n, int rays, Sampler& sampler,
     for (int k = 0; k < N; ++k)
         for (int j = 0; j < M; ++j) {
             const Vec2 u = sampler.next_2d();
-            // Rounding must not take the last row to the horizon, where tan θ is infinite.
+            // Rounding must not move the last row to the horizon, where tan θ is infinite.
             const float sin2 = std::min((float(j) + u.x) / float(M), kOneMinusEpsilon),
                         sine = std::sqrt(sin2), cosine = safe_sqrt(1 - sin2), at = float(k) + u.y;
             const IncidentRadiance cell = radiance(azimuth(at) * sine + n * cosine);
             cells[size_t(k * M + j)] = cell;
             out.E += cell.L;
             inverse_distances += 1 / double(cell.distance);
-            // tan θ L about v̂, a quarter turn ahead, so that leaning toward the light gains [Ward & Heckbert 1992, eq. 2].
+            // tan θ L times v̂, which is a quarter turn ahead [Ward & Heckbert 1992, eq. 2]: tilting n toward the light
+            // increases E.
             add(out.rotation, azimuth(at + float(N) / 4), cell.L * (sine / cosine));
         }
     const float per_cell = kPi / float(M * N);
@@ -45,12 +46,12 @@ IrradianceRecord measure_irradiance(Vec3 p, Vec3 n, int rays, Sampler& sampler,
     for (Vec3& g : out.rotation) g *= per_cell;
     out.distance = float(double(M * N) / inverse_distances);
 
-    // The borders between cells move with the nearer of the two that they part [Ward & Heckbert 1992, eq. 3].
+    // The border between two cells moves with the nearer surface [Ward & Heckbert 1992, eq. 3].
     for (int k = 0; k < N; ++k)
         for (int j = 0; j < M; ++j) {
             const IncidentRadiance& cell = cells[size_t(k * M + j)];
             const auto add_border = [&](const IncidentRadiance& other, Vec3 along, float factor) {
-                // A surface may begin at the point itself.
+                // The distance may be 0.
                 const float nearer = std::max(std::min(cell.distance, other.distance),
                                               std::numeric_limits<float>::min());
                 add(out.translation, along, (cell.L - other.L) * (factor / nearer));
@@ -75,7 +76,7 @@ void IrradianceCache::reset(float error, float min_distance, float max_distance)
 
 void IrradianceCache::add(std::span<const IrradianceRecord> records) {
     for (IrradianceRecord r : records) {
-        // Nor farther than the gradient lets the irradiance fall to 0 [Ward & Heckbert 1992].
+        // Limits the distance to that at which the gradient makes the irradiance 0 [Ward & Heckbert 1992].
         for (int c = 0; c < 3; ++c) {
             const float slope = length(r.translation[size_t(c)]);
             if (slope * r.distance > r.E[c]) r.distance = r.E[c] / slope;
@@ -96,7 +97,7 @@ std::optional<Rgb> IrradianceCache::find(Vec3 p, Vec3 n) const {
         const Vec3 d = p - r.p;
         const float change = length(d) / r.distance + safe_sqrt(1 - dot(n, r.n));
         if (!(change < error_)) return;
-        // What lies before the record's point may see light that is hidden from it.
+        // Points in front of the record's point may see light that is hidden from it.
         if (dot(d, n + r.n) < -0.02f * r.distance) return;
         const float w = 1 / std::max(change, 1e-4f);
         const Vec3 turn = cross(r.n, n);

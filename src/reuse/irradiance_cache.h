@@ -1,5 +1,5 @@
 #pragma once
-// Irradiance at few points, and its gradients, from which that at points near them follows [Ward et al. 1988; Ward &
+// Irradiance and its gradients at few points, from which it is interpolated at others [Ward et al. 1988; Ward &
 // Heckbert 1992].
 
 #include <array>
@@ -19,28 +19,28 @@ struct IrradianceRecord {
     Rgb E;
     /// By channel: E at a normal n' differs by (n × n')·rotation, at a point p' by (p' - p)·translation.
     std::array<Vec3, 3> rotation, translation;
-    float distance;  ///< Harmonic mean of the distances to what is seen.
+    float distance;  ///< Harmonic mean of the distances to visible surfaces.
 };
 
-/// What arrives from a direction, and from how far.
+/// Radiance from one direction, and the distance of its origin.
 struct IncidentRadiance {
     Rgb L;
     float distance = kInf;
 };
 
-/// A record from about `rays` stratified directions about `n`, whose radiance is asked for.
+/// Computes a record from `radiance(direction)` for about `rays` stratified directions in the hemisphere about `n`.
 IrradianceRecord measure_irradiance(Vec3 p, Vec3 n, int rays, Sampler& sampler,
                                     const std::function<IncidentRadiance(Vec3)>& radiance);
 
 class IrradianceCache {
 public:
-    /// `error`: the a of [Ward et al. 1988]; records reach as far as a times their distance, taken to lie in
+    /// `error` is a in [Ward et al. 1988]: records are valid up to a times their distance, which is clamped to
     /// [min_distance, max_distance].
     void reset(float error, float min_distance, float max_distance);
     void add(std::span<const IrradianceRecord> records);
     size_t size() const { return records_.size(); }
 
-    /// Interpolated irradiance; nothing where no record is near enough.
+    /// Interpolated irradiance; empty where no record is near enough.
     std::optional<Rgb> find(Vec3 p, Vec3 n) const;
 
 private:

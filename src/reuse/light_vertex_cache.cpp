@@ -166,7 +166,7 @@ void LightVertexCache::restore_first(const Scene& scene, uint32_t vertex, int si
     restore_head(path, y);
     for (int i = 1; i < size; ++i) {
         y.append();
-        // A BSDF looks toward its predecessor, whose place must be known.
+        // The BSDF of a vertex needs the position of its predecessor.
         if (whole || i >= size - 3)
             restore_vertex(scene, begin + uint32_t(i) - 1, i == size - 1, y, i);
     }

@@ -1,5 +1,5 @@
 #pragma once
-// The light sub-paths of a pass, kept for merges, gathers and connections from any eye path.
+// The light sub-paths of a pass, stored for merges, gathers and connections with any eye path.
 
 #include <atomic>
 #include <span>
@@ -10,7 +10,8 @@
 
 namespace etendue {
 
-/// y_i, i ≥ 1, in one cache line. Direction and geometry follow from its place and its predecessor's.
+/// y_i, i ≥ 1, in one cache line. Direction and geometry are recomputed from its location and its predecessor's
+/// position.
 struct LightVertex {
     Vec3 p;
     Rgb beta;
@@ -24,7 +25,7 @@ struct LightVertex {
 };
 static_assert(sizeof(LightVertex) == 64);
 
-/// What else there is of y_i, as in Vertex.
+/// The remaining data of y_i, as in Vertex.
 struct LightVertexPlace {
     ArrivalSide side;
     uint8_t pair_level;
@@ -32,13 +33,13 @@ struct LightVertexPlace {
 
 class LightVertexCache {
 public:
-    /// Begins the collection of a pass's light paths, in so many chunks. `vertex_bytes`: what the caller will use for each
-    /// vertex, here and in structures of its own; `max_bytes`: the most of that.
+    /// Starts the collection of a pass's light paths in `chunks` chunks. `vertex_bytes`: memory per vertex, here and in
+    /// the caller's own structures; `max_bytes`: limit of the total.
     void begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes);
-    /// Keeps the next path of a chunk; each chunk belongs to one thread at a time. Throws std::runtime_error where the
-    /// paths need more than they may.
+    /// Adds the next path of a chunk; each chunk belongs to one thread at a time. Throws std::runtime_error where the
+    /// paths exceed `max_bytes`.
     void add(uint64_t chunk, const SubPath& y);
-    /// Ends the collection: paths are in the order of chunks, whichever threads made them.
+    /// Ends the collection. Paths are in the order of chunks, independent of threads.
     void assemble();
 
     std::span<const LightVertex> vertices() const { return vertices_; }
@@ -47,9 +48,9 @@ public:
     size_t size() const { return heads_.size(); }
     size_t memory_bytes() const;
 
-    /// The whole path `index` as it was walked.
+    /// Restores the whole path `index`.
     void restore(const Scene& scene, uint64_t index, SubPath& y) const;
-    /// Hints that `vertex` will be read soon; then, that its path will be.
+    /// Prefetches `vertex`, or the head of its path.
     void prefetch(uint32_t vertex) const { __builtin_prefetch(&vertices_[vertex]); }
     void prefetch_head(uint32_t vertex) const {
         __builtin_prefetch(&heads_[vertices_[vertex].path]);
@@ -59,24 +60,24 @@ public:
     int depth(uint32_t vertex) const {
         return int(vertex - heads_[vertices_[vertex].path].begin) + 1;
     }
-    /// The gloss of y_{i-1}, or of its event, for the vertex y_i.
+    /// For the vertex y_i: the gloss of y_{i-1}, or kDeltaGloss after a delta event.
     uint8_t gloss_before(uint32_t vertex) const;
-    /// The first `size` vertices of the path that `vertex` is on; of them only what joins with the last one read: y_0
-    /// and the last three; all of them, without the earlier BSDFs, if `whole`.
+    /// Restores the first `size` vertices of the path of `vertex`. Only the vertices needed for joins with the last one
+    /// are set, y_0 and the last three, or all of them if `whole`; only the last one has a BSDF.
     void restore_first(const Scene& scene, uint32_t vertex, int size, bool whole, SubPath& y) const;
 
-    /// What arrives at `vertex`.
+    /// The flux that arrives at `vertex`.
     Photon photon(uint32_t vertex) const;
     /// Whether all scattering before `vertex` was by delta events.
     bool came_by_delta_events(uint32_t vertex) const;
 
-    /// Bytes of a vertex in a chunk, which may have as much to spare, and among all.
+    /// Memory per vertex: in its chunk, whose capacity may be twice its size, and after assemble().
     static constexpr uint64_t kVertexBytes = 3 * (sizeof(LightVertex) + sizeof(LightVertexPlace));
 
 private:
-    /// y_0 and the range of the others.
+    /// y_0, and the range of the other vertices.
     struct Head {
-        const Emitter* emitter = nullptr;  ///< nullptr: the path has no vertex at all.
+        const Emitter* emitter = nullptr;  ///< nullptr for a path without vertices.
         Vec3 p, ng;
         Vec2 uv;
         uint32_t prim = 0;
@@ -84,7 +85,7 @@ private:
         Rgb beta;
         uint32_t begin = 0, end = 0;
     };
-    /// What one chunk of a pass's paths leaves.
+    /// The paths of one chunk.
     struct Chunk {
         std::vector<Head> heads;
         std::vector<LightVertex> vertices;

@@ -9,7 +9,7 @@ namespace etendue {
 void LightVertexGrid::build(const LightVertexCache& cache, float radius) {
     cache_ = &cache;
     radius_ = radius;
-    // Counted, then written, by blocks, so that their order depends on no thread.
+    // Entries are counted, then written, in blocks, so that their order does not depend on threads.
     const auto vertices = cache.vertices();
     constexpr size_t kBlock = 4096;
     struct Block {

@@ -6,25 +6,25 @@
 
 namespace etendue {
 
-/// A light vertex y_{s-1} near an eye vertex, with as much as is known without looking it up.
+/// A light vertex y_{s-1} near an eye vertex, with the data that is known without a look-up in the cache.
 struct GatherCandidate {
     Vec3 p;
     uint32_t vertex;
     int s;
     ArrivalSide side;
-    uint8_t gloss_before;  ///< Of y_{s-2}, or of its event.
-    /// Luminance, times the area density of y_{s-1} over the disc's where it is larger.
+    uint8_t gloss_before;  ///< LightVertexCache::gloss_before().
+    /// Luminance of the throughput, times max(1, π r² pdf_fwd).
     float flux;
 };
 
-/// The choice of a candidate about which nothing more is to be known.
+/// A choice without data, for for_each_near().
 struct Chosen {};
 
-/// Over the connectible vertices y_i, i ≥ 1, of a cache.
+/// Grid over the connectible vertices y_i, i ≥ 1, of a cache.
 class LightVertexGrid {
 public:
-    /// Bytes of a vertex, the building of the grid included: an entry and the list it is made from, up to four buckets,
-    /// twice, and as many bytes for densities.
+    /// Memory per vertex while the grid is built: its entry and a copy, its bucket's index, and up to four buckets with
+    /// two numbers each and a level of PairDensity.
     static constexpr uint64_t kVertexBytes = 2 * sizeof(PointGrid::Entry) + 10 * sizeof(uint32_t);
 
     /// The cache must outlive the grid, and not change before the next build().
@@ -35,8 +35,8 @@ public:
     float mean_flux() const { return mean_flux_; }
     const PointGrid& points() const { return grid_; }
 
-    /// Calls use(candidate, choice) for the light vertices nearer to `p` than the radius for which
-    /// `choose(candidate) -> std::optional<Choice>` has a choice.
+    /// Calls use(candidate, choice) for the light vertices within the radius of `p` for which
+    /// `choose(candidate) -> std::optional<Choice>` returns a choice.
     template <class Choose, class Use>
     void for_each_near(Vec3 p, const Choose& choose, const Use& use) const {
         constexpr int kBatch = 32;
@@ -70,7 +70,7 @@ public:
     }
 
 private:
-    /// Tags of the grid's entries: arrival side, s or kManyVertices, and gloss before.
+    /// Tags of the grid's entries: arrival side (16 bits), s or kManyVertices (8), and gloss_before (8).
     static constexpr uint32_t kManyVertices = 255;
     int size_of(const PointGrid::Entry& e) const {
         const uint32_t s = e.tag >> 8 & 0xff;

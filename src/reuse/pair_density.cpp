@@ -6,7 +6,7 @@ namespace etendue {
 
 PairDensity::PairDensity(const CellCounts& vertices, float radius, double correlation)
     : cells_(vertices.cells), levels_(vertices.counts.size()), correlation_(correlation) {
-    // The area of a disc over that of the square that a plane has of a cell.
+    // Ratio of the area of a disc to that of a cell's face: a plane through the cell has about that area in it.
     const double scale = correlation * double(kPi) * sqr(double(radius / cells_.width()));
     tbb::parallel_for(size_t(0), levels_.size(), [&](size_t bucket) {
         if (const uint32_t n = vertices.counts[bucket])

@@ -1,5 +1,5 @@
 #pragma once
-// A photon map: the nearest photons of a point [Jensen 2001, §6].
+// A photon map with queries for the photons nearest to a point [Jensen 2001, §6].
 
 #include <array>
 #include <memory>
@@ -10,10 +10,10 @@
 
 namespace etendue {
 
-/// A photon that is kept without its path. Its power is a share of the flux of all light.
+/// A photon stored without its path. Its power is a share of the flux of all light.
 struct MapPhoton : Photon {
-    /// What its path met before: anything; one surface or more, none of them diffuse enough; or one or more by delta
-    /// events alone, from an emitter without extent.
+    /// Events on its path before: any; at least one, none of them on a diffuse surface; or at least one, all of them
+    /// delta events, from a delta emitter.
     enum class Origin : uint8_t { Any, Caustic, DeltaCaustic } origin = Origin::Any;
 
     bool is_caustic() const { return origin != Origin::Any; }
@@ -31,14 +31,15 @@ public:
     void build(std::vector<MapPhoton> photons);
     std::span<const MapPhoton> photons() const { return photons_; }
 
-    /// The photons of a density estimate, and the area they are spread over.
+    /// The photons of a density estimate, and the area of its disc.
     struct Neighbours {
         std::array<uint32_t, kMostNeighbours> index;
         int count;
         float disc;
     };
-    /// The `count` photons nearest to `p`, within `radius`. Where there are so many the last one only tells the disc's
-    /// radius: (k-1) / (π r_k²) is an unbiased estimate of a uniform density, k / (π r_k²) is not [Loftsgaarden & Quesenberry 1965].
+    /// The `count` photons nearest to `p`, within `radius`. If there are that many, the last one only determines the
+    /// radius of the disc: (k-1) / (π r_k²) is an unbiased estimate of a uniform density, k / (π r_k²) is not
+    /// [Loftsgaarden & Quesenberry 1965].
     void find(Vec3 p, int count, float radius, Neighbours& out) const;
 
 private:

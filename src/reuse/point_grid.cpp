@@ -14,7 +14,8 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
     tbb::parallel_for(size_t(0), entries.size(), [&](size_t i) {
         bucket[i] = cells_.bucket_of(cells_.cell_of(entries[i].p));
     });
-    // Each part has some of the buckets, and looks at all entries in order, so that their number changes nothing.
+    // Each part fills some of the buckets and reads all entries in order, so that the result does not depend on the
+    // number of parts.
     const uint32_t parts = uint32_t(std::clamp(tbb::this_task_arena::max_concurrency(), 1, 8));
     const auto for_each_part = [&](const auto& use) {
         tbb::parallel_for(uint32_t(0), parts, [&](uint32_t part) {

@@ -1,5 +1,5 @@
 #pragma once
-// Points within a distance of another: a hashed grid, built by counting.
+// Fixed-radius search among points: a hashed grid, built by counting sort.
 
 #include <span>
 #include <vector>
@@ -16,7 +16,7 @@ struct CellCounts {
 
 class PointGrid {
 public:
-    /// A point, the caller's number for it, and what the caller wants to know of it before looking that up.
+    /// A point, the caller's index for it, and data that the caller needs without a look-up.
     struct Entry {
         Vec3 p;
         uint32_t index;
@@ -24,7 +24,7 @@ public:
         float weight = 0;
     };
 
-    /// For queries of up to `radius`. The order of the entries decides that of the answers.
+    /// For queries of up to `radius`. The order of the entries determines that of the results.
     void build(std::span<const Entry> entries, float radius);
     const CellHash& cells() const { return cells_; }
     CellCounts counts() const;
@@ -36,7 +36,7 @@ public:
         if (entries_.empty()) return;
         const CellHash::Cell lowest = cells_.lowest_cell(p);
         const float radius2 = radius * radius;
-        // All eight at a time, since what takes the time is waiting for memory.
+        // All eight at the same time, since the time is dominated by memory latency.
         CellHash::Cell cells[8];
         uint32_t begin[8], end[8];
         for (int corner = 0; corner < 8; ++corner) {
@@ -56,7 +56,7 @@ public:
                 if (length2(e.p - p) < radius2 && cells_.cell_of(e.p) == cells[corner]) use(e);
             }
     }
-    /// Entries that for_each_near() looks at.
+    /// Number of entries that for_each_near() tests.
     size_t candidates(Vec3 p) const;
     size_t memory_bytes() const {
         return entries_.capacity() * sizeof(Entry) + begins_.capacity() * sizeof(uint32_t);
@@ -65,7 +65,7 @@ public:
 private:
     CellHash cells_;
     std::vector<Entry> entries_;    ///< Sorted by bucket.
-    std::vector<uint32_t> begins_;  ///< Of each bucket in the entries; one more than there are.
+    std::vector<uint32_t> begins_;  ///< First entry of each bucket, and the number of entries.
 };
 
 }  // namespace etendue

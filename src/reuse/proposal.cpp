@@ -131,7 +131,7 @@ std::optional<Vec3> ConeProposal::propose(const WalkDensity& density, Sampler& s
 template <class Region>
 std::optional<RegionProposal<Region>> RegionProposal<Region>::make(const Region& region,
                                                                    const WalkDensity& density) {
-    // From this far on over what would be without loss, more cells gain little.
+    // If the mass is at most this factor above that of an exact bound, more cells gain little.
     constexpr double kEnough = 1.1;
     const RegionPoint center = region.at({0.5f, 0.5f});
     const double without_loss = region.measure() * double(density.pdf(center.d) * center.scale);
@@ -152,7 +152,7 @@ template struct RegionProposal<SeenBand>;
 std::optional<CosineDiscProposal> CosineDiscProposal::make(const SeenDisc& disc, Vec3 normal,
                                                            const WalkDensity& density,
                                                            double below) {
-    // Loss costs no trials here, only time.
+    // Rejections cost time here, but no trials.
     constexpr double kEnough = 2, kMost = 16;
     const double mass = disc.cosine_mass(normal);
     if (!(mass > 0 && mass < below)) return {};
@@ -164,7 +164,7 @@ std::optional<CosineDiscProposal> CosineDiscProposal::make(const SeenDisc& disc,
 std::optional<Vec3> CosineDiscProposal::propose(const WalkDensity& density, Sampler& sampler,
                                                 RenderStats& stats) const {
     const auto cosine = [&](Vec3 w) { return std::max(0.0f, dot(w, normal)) * kInvPi; };
-    // One draw in kMost is kept at least; that none of so many is, means that the geometry is no number.
+    // At least one draw in kMost is accepted on average. So many rejections mean that the geometry is NaN.
     for (int draw = 0; draw < 100000; ++draw)
         if (const auto w = thinned(disc, cells, cosine, sampler, stats))
             return where_positive(density, *w);
@@ -183,7 +183,7 @@ ParallelProposal ParallelProposal::make(const Vertex& y0, Vec3 center, Vec3 n, f
     const double disc2 = sqr(double(p.disc.radius)), ball = sqr(double(ball_radius));
     p.mass = ball / disc2;
     if (!half_height) return p;
-    // Through this part of the tangent plane passes all that meets the slab.
+    // All rays that meet the slab pass through this disc in the tangent plane.
     const double cos = double(abs_dot(n, y0.p));
     const double through =
         double(ball_radius) + double(*half_height) * std::sqrt(std::max(0.0, 1 - cos * cos)) / cos;

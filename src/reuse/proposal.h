@@ -1,7 +1,7 @@
 #pragma once
-// What Bernoulli trials propose: directions among which lie all that lead from a vertex into a neighbourhood. Each proposal
-// knows its mass, the probability that the walk's own density (or a bound of it, which thinning makes up for) gives to
-// them; a trial fails with the rest.
+// Proposals of Bernoulli trials: sets of directions that contain all directions from a vertex into a neighbourhood.
+// Each has a mass: the integral of the walk's density, or of an upper bound of it, over the set. With an upper bound,
+// proposed directions are accepted with probability density / bound (thinning).
 
 #include <optional>
 #include <variant>
@@ -12,7 +12,7 @@
 
 namespace etendue {
 
-/// The directions in which a walk leaves `from`: its smooth events alone, roulette left out.
+/// Density of the directions in which a walk leaves `from` by smooth events, without roulette.
 struct WalkDensity {
     const Vertex& from;
     TransportMode mode;
@@ -21,7 +21,7 @@ struct WalkDensity {
     float max_pdf(const DirectionCone& cone) const;
 };
 
-/// A ball about the kept vertex, seen from `from`.
+/// A ball around the kept vertex, seen from WalkDensity::from.
 struct BallView {
     Vec3 to_center;
     float radius;
@@ -29,13 +29,13 @@ struct BallView {
     std::optional<Vec3>
         cosine;  ///< Normal about which the density of directions is cos θ/π, if it is.
 
-    /// Sine of the half-angle, squared; 1 and more from inside.
+    /// Squared sine of the half-angle of the ball's cone; at least 1 from inside the ball.
     double sin2() const { return sqr(double(radius)) / dist2; }
 };
 
-// Each has `double mass` and propose(): a direction, or nothing where the trial fails without a ray.
+// Each has `double mass` and propose(): a direction, or empty where the trial fails without a ray.
 
-/// The walk's own directions: all of them.
+/// All directions, sampled like the walk.
 struct WalkProposal {
     double mass = 1;
     std::optional<Vec3> propose(const WalkDensity& density, Sampler& sampler, RenderStats&) const;
@@ -51,8 +51,8 @@ struct BoxProposal {
     std::optional<Vec3> propose(const WalkDensity& density, Sampler& sampler, RenderStats&) const;
 };
 
-/// The cone of a ball clear of the horizon of a cosine density, which is uniform on the unit disc of (ω_x, ω_y), where the
-/// cone is an ellipse.
+/// The cone of a ball above the horizon, for a cosine density. That density is uniform on the unit disc of (ω_x, ω_y),
+/// where the cone is an ellipse.
 struct EllipseProposal {
     double mass;
     Frame frame;
@@ -62,7 +62,7 @@ struct EllipseProposal {
     std::optional<Vec3> propose(const WalkDensity& density, Sampler& sampler, RenderStats&) const;
 };
 
-/// The cone of a ball, uniformly, thinned by the density over its bound.
+/// The cone of a ball, sampled uniformly, with thinning by density / bound.
 struct ConeProposal {
     double mass;
     Frame frame;
@@ -72,7 +72,7 @@ struct ConeProposal {
     std::optional<Vec3> propose(const WalkDensity& density, Sampler& sampler, RenderStats&) const;
 };
 
-/// A region through which all of a flat neighbourhood is seen, in cells each of which is thinned by a bound of its own.
+/// A region that contains all directions to a flat neighbourhood, divided into cells with separate bounds for thinning.
 template <class Region>
 struct RegionProposal {
     double mass;
@@ -83,7 +83,8 @@ struct RegionProposal {
     std::optional<Vec3> propose(const WalkDensity& density, Sampler& sampler, RenderStats&) const;
 };
 
-/// A cosine density within a disc of the tangent plane, whose mass is known: to draw from it is no trial yet.
+/// A cosine density restricted to a disc in the tangent plane, whose mass is known in closed form. It is sampled by
+/// rejection, and the rejections are not trials.
 struct CosineDiscProposal {
     double mass;
     Vec3 normal;
@@ -95,15 +96,16 @@ struct CosineDiscProposal {
     std::optional<Vec3> propose(const WalkDensity& density, Sampler& sampler, RenderStats&) const;
 };
 
-/// The parallel rays of an emitter at infinity that may pass the neighbourhood, of all that start on the emitter's disc.
+/// The parallel rays from an emitter at infinity that can meet the neighbourhood, among all that start on its disc.
 struct ParallelProposal {
     double mass;
-    Vec3 travel, center;  ///< Of the rays; of the neighbourhood.
+    Vec3 travel, center;  ///< Direction of the rays; centre of the neighbourhood.
     Emitter::Disc disc;
     Frame frame;
     float radius;
 
-    /// The ball of `ball_radius` about `center`; of it the slab about the plane normal to `n`, where that is less.
+    /// For the ball of radius `ball_radius` about `center`, or for its slab around the plane normal to `n` if that has
+    /// less mass.
     static ParallelProposal make(const Vertex& y0, Vec3 center, Vec3 n, float ball_radius,
                                  std::optional<float> half_height);
     std::optional<Ray> propose(Sampler& sampler) const;

@@ -8,7 +8,7 @@
 namespace etendue {
 namespace {
 
-/// The trials of one pair: rays that leave where the walk left, by the proposal with the least mass.
+/// The trials of one pair: rays from PairEvent::from, by the proposal with the least mass.
 class Trials {
 public:
     explicit Trials(const PairEvent& event) : e_(event), density_{event.from, event.mode} {
@@ -19,7 +19,7 @@ public:
                 ParallelProposal::make(e_.from, e_.near.p, e_.near.n, e_.near.radius, half_height);
             return;
         }
-        // Rays start beside `from`, so that what its own directions meet may lie as much beside the neighbourhood.
+        // Rays start at a small offset from `from`, so the set of directions is enlarged by it.
         const float beside = length(offset_origin(e_.from.p, e_.from.ng, e_.from.ng) - e_.from.p);
         const Vec3 to_center = e_.near.p - e_.from.p;
         choose({to_center, e_.near.radius + beside, double(length2(to_center)),
@@ -27,13 +27,13 @@ public:
                e_.near.half_height + beside);
     }
 
-    /// The probability, in the walk's density, of all that may be proposed.
+    /// Mass of the proposal, see proposal.h.
     double mass() const {
         if (parallel_) return parallel_->mass;
         return std::visit([](const auto& p) { return p.mass; }, proposal_);
     }
 
-    /// A proposed ray, up to the end of the neighbourhood; nothing where the trial fails without one.
+    /// A proposed ray, which ends behind the neighbourhood; empty where the trial fails without a ray.
     std::optional<Ray> next(Sampler& sampler, RenderStats& stats) const {
         std::optional<Ray> ray;
         if (parallel_) {
@@ -63,7 +63,7 @@ private:
         else
             take_if_less(ConeProposal::make(ball, density_));
         if (e_.bound != TrialBound::Slab) return;
-        // Below this height over the plane, in half heights of the slab, a disc would be much larger than the slab.
+        // Height above the plane, in half heights of the slab, below which the disc would be much larger than the slab.
         constexpr float kLow = 2;
         const SlabView view(ball.to_center, e_.near.n, ball.radius, half_height);
         const bool is_high = view.height > kLow * half_height;
@@ -104,7 +104,7 @@ bool Neighbourhood::clip(Ray& ray) const {
     } else if (std::fabs(to_plane) > half_height) {
         return false;
     }
-    // What rounding puts outside is left to contains().
+    // The slack covers rounding errors; contains() decides exactly.
     const float slack = 1e-5f * std::fabs(end);
     if (!(end > 0) || begin > end + slack) return false;
     ray.tmax = end + slack;

@@ -34,8 +34,8 @@ RegionPoint SeenDisc::at(Vec2 u) const {
 
 RegionPart SeenDisc::part(Vec2 lo, Vec2 size) const {
     const Vec3 v = point(lo + size * 0.5f);
-    // The concentric map moves a point along the radius as u moves along the longer coordinate, and across it by at most
-    // π/4 of what u moves along both.
+    // In the concentric map the radius changes with the larger coordinate of u only; perpendicular to it a point moves
+    // by at most π/4 of the sum of the changes of both coordinates.
     const float reach =
         float(radius_) * std::hypot(std::max(size.x, size.y), kPi / 4 * (size.x + size.y));
     const float dist = length(v), sin = reach / dist;
@@ -47,8 +47,8 @@ RegionPart SeenDisc::part(Vec2 lo, Vec2 size) const {
 }
 
 double SeenDisc::cosine_mass(Vec3 n) const {
-    // ∫ cos θ H/(π |v|³) over the disc is the irradiance from one of radiance 1/π, a vector times n whose components towards
-    // the plane and along it are known [Howell, configuration factors B-12 and B-13].
+    // ∫ cos θ H/(π |v|³) over the disc is the irradiance from a disc of radiance 1/π: the product of n and a vector
+    // whose components normal to the plane and along it are known [Howell, configuration factors B-12 and B-13].
     const Vec3 m = frame_.to_local(n);
     const double H = height_, R2 = radius_ * radius_;
     const double along = double(center_.x) * double(m.x) + double(center_.y) * double(m.y),
@@ -92,7 +92,7 @@ RegionPart SeenBand::part(Vec2 lo, Vec2 size) const {
         return std::asin(std::clamp(lo_.x + x * size_.x, -1.0f, 1.0f));
     };
     const float middle = elevation(lo.x + size.x / 2);
-    // From the middle along its parallel, then along a meridian.
+    // Largest angle from the middle: along its parallel, then along a meridian.
     const float azimuth = std::cos(middle) * size_.y * size.y / 2;
     const float up = std::max(elevation(lo.x + size.x) - middle, middle - elevation(lo.x));
     return {{frame_.to_world(direction(lo + size * 0.5f)), std::min(kPi, azimuth + up)},

@@ -1,6 +1,6 @@
 #pragma once
-// Regions that hold every direction in which a flat neighbourhood is seen, as maps of the unit square, and the square's
-// cells where what is to be drawn from a region varies much.
+// Regions that contain every direction to a flat neighbourhood, parametrised over the unit square, and a division of
+// the square into cells for densities that vary over a region.
 
 #include <array>
 #include <cstddef>
@@ -10,30 +10,30 @@
 
 namespace etendue {
 
-/// The part of a ball at most `half_height` away from a plane through its centre, seen from a point `height` away from that
-/// plane, whose foot on it is `foot` away from the centre.
+/// The slab: the part of a ball within `half_height` of a plane through its centre, seen from a point at the distance
+/// `height` from that plane, whose projection onto the plane is at the distance `foot` from the centre.
 struct SlabView {
     Frame frame;  ///< n points to the plane.
-    Vec2 center;  ///< From the foot, along s and t.
+    Vec2 center;  ///< Of the ball, relative to the projected point, along s and t.
     float height, foot, radius, half_height;
 
     SlabView(Vec3 to_center, Vec3 normal, float radius, float half_height);
 };
 
-/// A point of a region: a density p of directions is p·scale in the measure of which the map keeps shares.
+/// A point of a region: a density p of directions corresponds to p·scale in the measure that the map preserves.
 struct RegionPoint {
     Vec3 d;
     float scale;
 };
-/// The map of a part of the unit square: a cone around it, the largest scale in it, and along which side it is longer.
+/// Bounds for a part of the unit square: a cone that contains its directions, and the largest scale.
 struct RegionPart {
     DirectionCone cone;
     float max_scale;
     bool is_longer_in_x;
 };
 
-/// By area, a disc of the plane through all of which the slab is seen: its own, in perspective. For viewers that are not
-/// in the slab, height > half_height.
+/// A disc in the plane through which all of the slab is seen, measured by area. For viewers outside the slab: height >
+/// half_height.
 class SeenDisc {
 public:
     explicit SeenDisc(const SlabView& view);
@@ -41,18 +41,19 @@ public:
     double measure() const { return double(kPi) * radius_ * radius_; }
     RegionPoint at(Vec2 u) const;
     RegionPart part(Vec2 lo, Vec2 size) const;
-    /// The probability of a density cos θ/π about `n`; 0 where the horizon cuts the disc.
+    /// Integral of the density cos θ/π about `n` over the disc; 0 where the horizon intersects the disc.
     double cosine_mass(Vec3 n) const;
 
 private:
-    Vec3 point(Vec2 u) const;  ///< In the frame, from the viewer.
+    Vec3 point(Vec2 u) const;  ///< In frame_, relative to the viewer.
 
     Frame frame_;
     Vec2 center_;
     double height_, foot_, radius_;
 };
 
-/// By solid angle, a range of elevations over the plane and of azimuths. For all viewers; thin for one close to the plane.
+/// A range of elevations above the plane and of azimuths, measured by solid angle. For all viewers; it is thin for
+/// viewers close to the plane.
 class SeenBand {
 public:
     explicit SeenBand(const SlabView& view);
@@ -62,17 +63,18 @@ public:
     RegionPart part(Vec2 lo, Vec2 size) const;
 
 private:
-    Vec3 direction(Vec2 u) const;  ///< In the frame.
+    Vec3 direction(Vec2 u) const;  ///< In frame_.
 
     Frame frame_;
     Vec2 lo_, size_;  ///< Of the sine of the elevation, and of the azimuth.
 };
 
-/// Parts of the unit square, each with a bound of the density there. Their mass is that of the bounds.
+/// A division of the unit square into cells with an upper bound of the density in each; mass() is the integral of the
+/// bounds.
 class BoundedCells {
 public:
-    /// Divides the square, always the cell with the largest mass, while the mass of all is more than `enough`.
-    /// `max_pdf(cone)` bounds the density of directions.
+    /// Divides the cell with the largest mass repeatedly, until the total mass is at most `enough` or there are 16
+    /// cells. `max_pdf(cone)` is an upper bound of the density of directions.
     template <class Region, class MaxPdf>
     BoundedCells(const Region& region, const MaxPdf& max_pdf, double enough) {
         const auto cell = [&](Vec2 lo, Vec2 size) -> Cell {

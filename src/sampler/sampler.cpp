@@ -5,8 +5,8 @@
 namespace etendue {
 namespace {
 
-/// Owen scrambling of an integer whose bits stand in reverse: a hash in which bits influence higher
-/// bits only [Laine & Karras 2011; constants of Vegdahl 2021].
+/// Owen scrambling of an integer in reversed bit order: a hash in which each bit depends on itself and on lower bits
+/// only [Laine & Karras 2011; constants of Vegdahl 2021].
 constexpr uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
     x ^= x * 0x3d20adeau;
     x += seed;
@@ -16,8 +16,9 @@ constexpr uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
     return x;
 }
 
-/// Second dimension of the Sobol' sequence with its bits in reverse, by bytes of the index: columns
-/// v, v ^ v >> 1, ... (Pascal's matrix mod 2). The first dimension in reverse is the index itself.
+/// Second dimension of the Sobol' sequence in reversed bit order, tabulated by the bytes of the index. Its generator
+/// matrix has the columns v, v ^ v >> 1, ... (Pascal's matrix mod 2). The first dimension in reversed bit order is the
+/// index itself.
 constexpr auto kSecondReversed = [] {
     std::array<std::array<uint32_t, 256>, 4> table{};
     std::array<uint32_t, 32> columns{};
@@ -53,8 +54,8 @@ Sampler::Vec2Bits Sampler::next_2d_structured() {
         slot_ += 2;
         return {source_->bits(stream_, vertex_, slot), source_->bits(stream_, vertex_, slot + 1)};
     }
-    // Each pair of dimensions is the same two-dimensional sequence over the passes, with an order
-    // and a scrambling of its own.
+    // Every pair of dimensions takes the same two-dimensional sequence over the passes, in its own order and with its
+    // own scrambling [Burley 2020].
     const uint64_t seed = bits(path_key_), scramble = mix64(seed);
     const uint32_t index = reverse_bits(scramble_reversed(pass_reversed_, uint32_t(seed)));
     const uint32_t x = scramble_reversed(index, uint32_t(scramble));

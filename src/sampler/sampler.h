@@ -1,6 +1,7 @@
 #pragma once
-// Random numbers by address. Every number belongs to (seed, pass, path, stream, vertex, slot); there is no hidden state, so
-// an image does not depend on threads, and a walk that changes at vertex 3 leaves the numbers of vertex 4 alone.
+// Random numbers by address. Every number is a function of (seed, pass, path, stream, vertex, slot), without hidden
+// state. Therefore images do not depend on the number of threads, and a change at vertex 3 of a walk does not affect
+// the numbers of vertex 4.
 
 #include <cstdint>
 
@@ -9,30 +10,30 @@
 
 namespace etendue {
 
-/// Which part of a sample the numbers are for.
+/// The part of a sample that the numbers are used for.
 enum class Stream : uint8_t {
-    Eye,         ///< Film point, lens point and the eye sub-path's vertices.
-    Light,       ///< Emission and the light sub-path's vertices.
-    Connection,  ///< Next event and lens points of splats; vertex = that of the sub-path.
-    Roulette,    ///< Whether a join is evaluated; vertex = join_number().
-    Auxiliary,   ///< Loops of unbounded length.
-    Selection,   ///< Which light vertices an eye vertex is connected to; vertex = its own.
+    Eye,         ///< Film point, lens point and vertices of the eye sub-path.
+    Light,       ///< Emission and vertices of the light sub-path.
+    Connection,  ///< Points of next events and lens points of splats; `vertex` is that of the sub-path.
+    Roulette,   ///< Russian roulette of joins; `vertex` is join_number().
+    Auxiliary,  ///< Loops of unbounded length.
+    Selection,  ///< Choice of the light vertices to which an eye vertex is connected; `vertex` is that of the eye path.
 };
 
 enum class SamplerKind : uint8_t {
     Independent,  ///< Counter-based pseudo-random numbers.
-    Sobol,  ///< Owen-scrambled Sobol' points over the passes, padded by dimension pairs [Burley 2020].
+    Sobol,  ///< Owen-scrambled Sobol' points over the passes, padded in pairs of dimensions [Burley 2020].
     PrimarySample,  ///< Numbers from a PrimarySource.
 };
 
-/// Number of the join of y_{s-1} and z_{t-1}; `draw` tells apart several of one vertex. Distinct for distinct arguments
-/// with s < 2^16, t < 2^21, draw < 2^21.
+/// Number of the join of y_{s-1} and z_{t-1}; `draw` distinguishes several joins of one vertex. Different arguments
+/// with s < 2^16, t < 2^21, draw < 2^21 have different numbers.
 constexpr uint64_t join_number(int s, int t, uint32_t draw = 0) {
     return uint64_t(draw) << 37 ^ uint64_t(uint32_t(t) >> 16) << 32 ^ uint64_t(uint32_t(s)) << 16 ^
            (uint32_t(t) & 0xffff);
 }
 
-/// Where a Markov chain keeps its point of primary sample space: 32 bits a number.
+/// The point of a Markov chain in primary sample space, 32 bits per coordinate.
 class PrimarySource {
 public:
     virtual ~PrimarySource() = default;
@@ -41,6 +42,7 @@ public:
 
 class Sampler {
 public:
+    /// Sobol' points are used for vertices with a smaller number; pseudo-random numbers from there on.
     static constexpr uint32_t kStructuredVertices = 4;
 
     Sampler(SamplerKind kind, uint64_t seed)
@@ -55,7 +57,7 @@ public:
     }
     /// Begins another path of the same pass.
     void start(uint64_t path) { start(reverse_bits(pass_reversed_), path); }
-    /// Moves to the block of numbers of one vertex, or of whatever else `vertex` counts, at its first slot.
+    /// Moves to slot 0 of the block of numbers of `vertex` (see Stream for what it counts).
     void seek(Stream stream, uint64_t vertex) {
         stream_ = stream;
         vertex_ = vertex;
@@ -73,17 +75,18 @@ public:
         const Vec2Bits b = next_2d_bits();
         return {to_unit_float(b.x), to_unit_float(b.y)};
     }
-    /// As next_1d() where the number matters; otherwise its slot is passed over.
+    /// next_1d() where `is_needed`; otherwise skips the slot and returns 0.
     float next_1d_if(bool is_needed) {
         if (is_needed) return next_1d();
         ++slot_;
         return 0;
     }
-    /// With 53 bits, for decisions that gain nothing from structured points: pseudo-random unless a Markov chain drives.
+    /// A number with 53 bits for decisions that do not benefit from Sobol' points: pseudo-random, or from the
+    /// PrimarySource.
     double next_1d_unstructured() {
         return kind_ == SamplerKind::PrimarySample ? next_1d_fine() : to_unit_double(bits(key_));
     }
-    /// As next_1d(), next_2d(), with 53 bits: 32 structured ones over pseudo-random ones.
+    /// next_1d() and next_2d() with 53 bits per number: 32 structured bits followed by pseudo-random ones.
     double next_1d_fine() {
         if (!is_structured_) return to_unit_double(bits(key_));
         const uint64_t high = next_bits_structured();
@@ -103,7 +106,7 @@ public:
     SamplerKind kind() const { return kind_; }
 
 private:
-    /// Vertices from here on do not fit into the address.
+    /// Larger vertex numbers do not fit into address(); `block_` tells them apart.
     static constexpr uint64_t kManyVertices = uint64_t(1) << 24;
 
     struct Vec2Bits {
@@ -112,13 +115,14 @@ private:
     uint64_t address() const {
         return uint64_t(stream_) << 56 ^ (vertex_ & (kManyVertices - 1)) << 32 ^ slot_;
     }
-    /// 64 bits of the present address; moves on by one slot.
+    /// 64 bits for the current address; moves to the next slot.
     uint64_t bits(uint64_t key) {
         const uint64_t b = mix64(key + block_ + 0x9e3779b97f4a7c15ull * (address() + 1));
         ++slot_;
         return b;
     }
-    /// Bits beyond those of the slot just read, which stay the same where a Markov chain leaves that number alone.
+    /// Low-order bits for the slot just read. They depend on the address only, so they stay the same while a Markov
+    /// chain keeps that number.
     uint64_t low_bits() const {
         return mix64(~(key_ + block_) + 0x9e3779b97f4a7c15ull * address());
     }

@@ -13,7 +13,7 @@
 
 namespace etendue {
 
-/// Walks the description from its roots and fills a Scene.
+/// Traverses a description from its roots and fills a Scene.
 class SceneBuilder {
 public:
     SceneBuilder(const SceneDescription& description, const BuildOptions& options)
@@ -36,14 +36,14 @@ public:
                     sensor = &object, sensor_index = root;
                 else
                     plugins_.warn(object.where,
-                                  "only the first sensor is rendered; this one is left out");
+                                  "only the first sensor is used; this one is left out");
             } else if (c == "integrator")
                 read_integrator(plugins_.params(root));
             else if (c == "bsdf" || c == "texture" || c == "medium")
                 check_unused(root);
             else
                 plugins_.problem(object.where,
-                                 fmt::format("a {} has no place at the top of a scene", c));
+                                 fmt::format("a <{}> cannot stand in the <scene>", c));
         }
         take_models();
         if (scene_.shapes_.empty() && scene_.emitters_.empty())
@@ -67,7 +67,7 @@ private:
         scene_.media_ = std::move(models.media);
     }
 
-    /// A material or texture at the top that no shape uses is still checked.
+    /// Checks a top-level material, texture or medium, even if no shape uses it.
     void check_unused(int index) {
         const std::string& c = description_.objects[index].category;
         if (c == "bsdf")
@@ -93,7 +93,7 @@ private:
         }
     }
 
-    /// Shape with everything that hangs on it, not yet known to the accelerator.
+    /// A shape with its material, emitter and media, not yet added to the accelerator.
     std::optional<SceneShape> make_shape(int index) {
         const ShapeEntry* entry = plugins_.find(index, shape_registry());
         if (!entry) return {};
@@ -107,10 +107,12 @@ private:
         s.name = p.object().id.empty() ? p.object().type : p.object().id;
         const auto materials = p.children("bsdf");
         if (materials.size() > 1)
-            plugins_.problem(materials[1].where, "a shape has one bsdf, this is a second");
+            plugins_.problem(materials[1].where,
+                             "a shape can have only one bsdf; this is a second");
         const auto emitters = p.children("emitter");
         if (emitters.size() > 1)
-            plugins_.problem(emitters[1].where, "a shape has one emitter, this is a second");
+            plugins_.problem(emitters[1].where,
+                             "a shape can have only one emitter; this is a second");
         s.material = materials.empty()
                          ? models_.default_material(emitters.empty() ? Rgb(0.5f) : Rgb(0))
                          : models_.make_material(materials[0].object);
@@ -138,12 +140,13 @@ private:
             plugins_.check(index, group_infos()[1]);
             const auto groups = plugins_.params(index).children("shape");
             if (groups.size() != 1 || description_.objects[groups[0].object].type != "shapegroup")
-                throw SceneError(object.where, "an instance needs one reference to a shapegroup");
+                throw SceneError(object.where,
+                                 "an instance needs exactly one reference to a shapegroup");
             instances_.push_back(
                 {make_group(groups[0].object), plugins_.params(index).transform("to_world")});
         } else if (auto s = make_shape(index)) {
             top_.push_back(*s);
-            scene_.shapes_.push_back(*s);  // its place in the order is set by finish_geometry()
+            scene_.shapes_.push_back(*s);  // finish_geometry() sets the order
         }
     }
 
@@ -156,8 +159,8 @@ private:
                 throw SceneError(member.where, "shapegroups cannot be nested");
             if (auto s = make_shape(c.object)) {
                 if (s->emitter)
-                    throw SceneError(member.where, "an emitter in a shapegroup is not supported; "
-                                                   "place the shape itself instead");
+                    throw SceneError(member.where, "an emitter in a shapegroup is not supported "
+                                                   "(add the shape to the scene instead)");
                 members.push_back(*s);
             }
         }
@@ -199,14 +202,14 @@ private:
         Bounds3 bounds = scene_.bounds_;
         bounds.extend(scene_.sensor_->lens_bounds());
         const float radius = std::max(bounds.radius(), 1e-6f);
-        // Area emitters shine to the outside.
+        // Area emitters emit into the exterior medium.
         std::map<const Emitter*, MediumId> media;
         for (const SceneShape& s : scene_.shapes_)
             if (s.emitter && s.is_interface) media[s.emitter] = s.exterior;
         std::vector<double> powers;
         for (auto& e : scene_.emitters_) {
             if (const auto it = media.find(e.get()); it != media.end()) e->medium = it->second;
-            // A margin, so that the bounding disc lies outside everything.
+            // The margin keeps bounding discs outside all objects.
             e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);
             powers.push_back(e->power());
             if (e->is_infinite() && !e->is_delta()) scene_.infinite_.push_back(e.get());
@@ -217,12 +220,13 @@ private:
             scene_.emitters_[i]->selection_pmf = scene_.selection_.pmf(uint32_t(i));
         if (scene_.selection_.empty())
             scene_.warnings_.push_back(
-                "the scene has no emitter with any power: the image will be black");
+                "no emitter of the scene has any power: the image will be black");
     }
 
     void read_integrator(const Params& p) {
         if (!scene_.defaults_.integrator.empty())
-            return plugins_.problem(p.where(), "a scene has one integrator, this is a second");
+            return plugins_.problem(p.where(),
+                                    "a scene can have only one integrator; this is a second");
         scene_.defaults_.integrator = "path";
         const IntegratorAlias* alias = plugins_.find(p.index(), integrator_aliases());
         if (!alias) return;
@@ -237,20 +241,19 @@ private:
         const SensorEntry* entry = plugins_.find(index, sensor_registry());
         if (!entry)
             throw SceneError(description_.objects[index].where,
-                             "without a known sensor there is no image");
+                             "the sensor is unknown and cannot be left out");
         const Params p = plugins_.params(index);
         FilmGeometry film{.width = 768, .height = 576, .crop_width = 768, .crop_height = 576};
         const auto films = p.children("film");
         if (films.size() > 1)
-            plugins_.problem(films[1].where, "a sensor has one film, this is a second");
+            plugins_.problem(films[1].where, "a sensor can have only one film; this is a second");
+        scene_.filter_ = default_filter();
         if (!films.empty()) {
             if (const FilmEntry* f = plugins_.find(films[0].object, film_registry()))
                 film = f->make(plugins_.params(films[0].object));
             for (const auto& c : plugins_.params(films[0].object).children("rfilter"))
                 if (const FilterEntry* r = plugins_.find(c.object, filter_registry()))
                     scene_.filter_ = r->make(plugins_.params(c.object));
-            if (plugins_.params(films[0].object).children("rfilter").empty())
-                scene_.filter_ = default_filter();
         }
         apply_overrides(film, p);
         for (const auto& c : p.children("sampler"))
@@ -277,16 +280,17 @@ private:
             if (x < 0 || y < 0 || w < 1 || h < 1 || w > film.width - x || h > film.height - y)
                 throw SceneError(
                     sensor.where(),
-                    fmt::format("the crop {},{},{},{} does not lie within the image of {}x{}", x, y,
-                                w, h, film.width, film.height));
+                    fmt::format("the crop of {} x {} pixels at ({}, {}) does not lie within the "
+                                "image of {} x {}",
+                                w, h, x, y, film.width, film.height));
             film.crop_x = x, film.crop_y = y, film.crop_width = w, film.crop_height = h;
         }
-        // Light paths are numbered with 30 bits.
+        // Numbers of light paths have 30 bits.
         if (film.pixel_count() > uint64_t(1) << 30)
             throw SceneError(
                 sensor.where(),
-                fmt::format("an image of {} x {} pixels is too large: at most 2^30 are "
-                            "rendered at once; render it in crops",
+                fmt::format("an image of {} x {} pixels is too large: the limit is 2^30 "
+                            "pixels; render it in crops",
                             film.crop_width, film.crop_height));
     }
 

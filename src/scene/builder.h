@@ -1,5 +1,5 @@
 #pragma once
-// From a SceneDescription to a Scene.
+// Construction of a Scene from a SceneDescription.
 
 #include <optional>
 
@@ -9,19 +9,19 @@
 namespace etendue {
 
 struct BuildOptions {
-    bool lenient =
-        false;  ///< Unknown plug-ins and parameters become warnings that name what was dropped.
-    /// Image size and crop instead of the file's. A new size scales the file's crop away.
+    /// Unknown plug-ins and parameters become warnings that name what was left out.
+    bool lenient = false;
+    /// Width and height of the image, instead of the file's size and crop.
     std::optional<std::pair<int, int>> resolution;
     std::optional<std::array<int, 4>> crop;  ///< x, y, width, height
     AcceleratorOptions accelerator;
 };
 
-/// Throws SceneError.
+/// Throws SceneError where the description is invalid.
 Scene build_scene(const SceneDescription& description, const BuildOptions& options = {});
 
-/// Tables of every plug-in the scene builder knows, by category in the order of `list`: shapes, BSDFs, textures,
-/// emitters, media, sensors, films, filters, samplers, and the integrators' names that files may use.
+/// Tables of all plug-ins of the scene builder by category, in the order of `etendue list`: shapes, BSDFs, textures,
+/// emitters, media, sensors, films, filters and samplers.
 std::vector<PluginInfo> scene_plugins();
 
 }  // namespace etendue

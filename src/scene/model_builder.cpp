@@ -11,8 +11,10 @@ namespace etendue {
 
 TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fallback, float hi) {
     for (const auto& c : p.object().children)
-        if (c.name == name && plugins_.object(c.object).category == "texture")
-            return TextureRef(make_texture(c.object));
+        if (c.name == name && plugins_.object(c.object).category == "texture") {
+            const Texture* texture = make_texture(c.object);
+            return texture ? TextureRef(texture) : TextureRef(fallback);
+        }
     if (name.empty()) return TextureRef(fallback);
     const Rgb c = p.rgb(name, fallback);
     if (c.max() > hi)
@@ -66,14 +68,15 @@ MediumId ModelBuilder::make_medium(int index) {
     if (const auto it = media_.find(index); it != media_.end()) return it->second;
     const SceneObject& object = plugins_.object(index);
     if (object.type != "homogeneous")
-        throw SceneError(object.where, fmt::format("medium \"{}\" is not supported: media "
-                                                   "other than \"homogeneous\" with albedo 0 "
-                                                   "(absorption alone) need volume transport",
-                                                   object.type));
+        throw SceneError(object.where,
+                         fmt::format("medium \"{}\" is not supported (supported: \"homogeneous\" "
+                                     "with albedo 0, that is absorption only)",
+                                     object.type));
     plugins_.check(index, medium_info());
     constexpr size_t kMostMedia = std::numeric_limits<MediumId>::max();
     if (models_.media.size() >= kMostMedia)
-        throw SceneError(object.where, fmt::format("a scene has at most {} media", kMostMedia));
+        throw SceneError(object.where,
+                         fmt::format("a scene can have at most {} media", kMostMedia));
     models_.media.push_back(read_absorption(plugins_.params(index)));
     return media_[index] = MediumId(models_.media.size() - 1);
 }
@@ -83,7 +86,8 @@ const Emitter* ModelBuilder::make_emitters(int index, const Shape* on_shape) {
     if (!entry) return nullptr;
     if (on_shape && std::string_view(entry->info.name) != "area")
         throw SceneError(plugins_.object(index).where,
-                         fmt::format("emitter \"{}\" cannot sit on a shape", entry->info.name));
+                         fmt::format("emitter \"{}\" cannot stand in a shape (only \"area\" can)",
+                                     entry->info.name));
     emitting_shape_ = on_shape;
     auto made = plugins_.guarded(index, [&] { return entry->make(plugins_.params(index), *this); });
     emitting_shape_ = nullptr;

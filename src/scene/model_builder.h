@@ -1,5 +1,6 @@
 #pragma once
-// Textures, materials, media and emitters of a description. Objects that are referred to several times are made once.
+// Construction of the textures, materials, media and emitters of a description. An object with several references is
+// constructed once.
 
 #include <map>
 #include <memory>
@@ -13,7 +14,7 @@
 
 namespace etendue {
 
-/// What was made.
+/// The constructed models.
 struct Models {
     std::unique_ptr<TextureCache> images = std::make_unique<TextureCache>();
     std::vector<std::unique_ptr<Texture>> textures;
@@ -26,13 +27,14 @@ class ModelBuilder final : private MaterialContext, private EmitterContext, priv
 public:
     explicit ModelBuilder(PluginLookup& plugins) : plugins_(plugins) {}
 
-    /// By the object's index in the description.
+    /// `index` is that of the object in the description. Under `lenient` an unknown texture is nullptr, and an unknown
+    /// material is replaced by the default one.
     const Texture* make_texture(int index);
     const Material* make_material(int index);
     MediumId make_medium(int index);
-    /// The first of the emitters that the object stands for. Those on a shape are area emitters.
+    /// Constructs all emitters of the object and returns the first one. With `on_shape` it must be an area emitter.
     const Emitter* make_emitters(int index, const Shape* on_shape = nullptr);
-    /// Of shapes that name none.
+    /// The material of shapes without one: diffuse.
     const Material* default_material(Rgb reflectance);
 
     Models take() { return std::move(models_); }

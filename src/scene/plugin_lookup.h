@@ -1,6 +1,6 @@
 #pragma once
-// From an object of a description to the plug-in that it names, its parameters checked; what is unknown is an error, or,
-// under `lenient`, a warning.
+// Lookup of the plug-in that an object of a description names, and the check of its parameters. Unknown names are
+// errors, or warnings under `lenient`.
 
 #include <string>
 #include <string_view>
@@ -20,14 +20,15 @@ public:
     Params params(int index) const { return {description_, index}; }
 
     void warn(const SourceLocation& where, const std::string& message);
-    /// An error, or under `lenient` a warning.
+    /// Throws SceneError, or adds a warning under `lenient`.
     void problem(const SourceLocation& where, const std::string& message);
-    /// The description's, and those since.
+    /// Warnings of the description and of this object, in order.
     const std::vector<std::string>& warnings() const { return warnings_; }
 
     void check(int index, const PluginInfo& info);
 
-    /// The entry of the object's plug-in, its parameters checked; nullptr (under `lenient`) where there is none.
+    /// The entry of the object's plug-in, after a check of its parameters; nullptr (under `lenient`) where it is
+    /// unknown.
     template <class Entry>
     const Entry* find(int index, const std::vector<Entry>& registry) {
         std::vector<std::string> known;
@@ -42,7 +43,7 @@ public:
         return nullptr;
     }
 
-    /// Calls a maker; what it says without a place is put at the object's.
+    /// Calls make(); exceptions other than SceneError get the location of the object.
     template <class Make>
     auto guarded(int index, const Make& make) {
         try {

@@ -6,7 +6,7 @@
 namespace etendue {
 namespace {
 
-/// Normals and points of an instance's shape, moved to the world.
+/// Transforms the geometry of an instance's shape to world space.
 void transform_geometry(const Transform& t, SurfaceGeometry& g) {
     const float side = t.determinant3() < 0 ? -1.0f : 1.0f;
     g.p = t.point(g.p);
@@ -16,7 +16,7 @@ void transform_geometry(const Transform& t, SurfaceGeometry& g) {
     g.dpdv = t.vector(g.dpdv);
 }
 
-/// The medium behind a surface that a ray along `d` passes.
+/// The medium beyond a surface that a ray along `d` passes.
 MediumId medium_beyond(const SurfaceHit& hit, Vec3 d, MediumId before) {
     return hit.shape->is_interface ? hit.shape->medium_toward(hit.geometry.ng, d) : before;
 }
@@ -51,7 +51,8 @@ Ray Scene::for_each_surface(Ray ray, const Passes& passes) const {
     RayHit raw;
     SurfaceHit hit;
     const float length_d = length(ray.d);
-    float skipped = 0;  // from the last surface to the origin, which is moved off it
+    float skipped =
+        0;  // distance from the last surface to the ray's origin, which is offset from it
     while (ray.tmax > 0 && accelerator_.intersect(ray, raw)) {
         fill_hit(raw, hit);
         hit.t = hit.t * length_d + skipped;
@@ -118,11 +119,11 @@ Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
     return product * attenuation(medium, std::max(0.0f, rest.tmax) * length(ray.d));
 }
 
-/// A shadow ray from `a` to `b`, whose parameter runs from 0 to 1; both ends are moved off their surfaces.
+/// A shadow ray from `a` to `b` with parameters in [0, 1]; both ends are moved off their surfaces.
 Ray Scene::segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) {
     const Vec3 d = b - a;
     const Vec3 from = offset_origin(a, ng_a, d);
-    // The ray meets the far surface with an error of some roundings of the distance.
+    // Bound for the rounding error of the distance at which the ray meets the far surface.
     constexpr float kRoundings = 8 * 0x1p-24f;
     const float error = kRoundings * length(d);
     const Vec3 to = offset_origin(b, ng_b, -d) + ng_b * std::copysign(error, -dot(ng_b, d));

@@ -1,6 +1,6 @@
 #pragma once
-// The scene: immutable and ready to render. Shapes with their materials and emitters, the sensor, and the few questions
-// that path sampling asks of them.
+// The scene, immutable and ready to render: shapes with their materials and emitters, the sensor, and the queries of
+// path sampling.
 
 #include <algorithm>
 #include <limits>
@@ -26,23 +26,23 @@ struct SceneShape {
     const Material* material = nullptr;
     const Emitter* emitter = nullptr;
     MediumId interior = kVacuum, exterior = kVacuum;
-    bool is_interface =
-        false;  ///< interior and exterior are told; else the medium is that of the walk.
+    /// Whether interior or exterior are given; otherwise both sides have the medium of the walk.
+    bool is_interface = false;
     bool is_mesh = false;
-    bool needs_tangents = false;  ///< The material asks for dpdu.
+    bool needs_tangents = false;  ///< Whether the material uses dpdu and dpdv.
     std::string name;
 
-    /// Of an interface with the normal `ng`: the medium on the side of `d`.
+    /// The medium of an interface with normal `ng` on the side of `d`.
     MediumId medium_toward(Vec3 ng, Vec3 d) const { return dot(ng, d) < 0 ? interior : exterior; }
 };
 
-/// The media on a ray's way.
+/// The media along a ray.
 struct Passage {
-    MediumId medium = kVacuum;  ///< Before the query: at the origin; after it: where the ray ended.
-    Rgb attenuation = Rgb(1);   ///< By absorption, up to there.
+    MediumId medium = kVacuum;  ///< Input: at the origin. Output: where the ray ends.
+    Rgb attenuation = Rgb(1);   ///< Output: by absorption along the ray.
 };
 
-/// Where a ray met the scene.
+/// Intersection of a ray with the scene, at distance t.
 struct SurfaceHit {
     SurfaceGeometry geometry;
     const SceneShape* shape;
@@ -50,12 +50,11 @@ struct SurfaceHit {
     float t;
 };
 
-/// Settings that the file gives for the integrator and the sampler, before the command line.
+/// Settings of the scene file for integrator and sampler; the command line overrides them.
 struct RenderDefaults {
     std::string integrator;  ///< Empty where the file names none.
-    std::vector<std::pair<std::string, std::string>>
-        integrator_params;  ///< Those this project knows.
-    int spp = 0;
+    std::vector<std::pair<std::string, std::string>> integrator_params;  ///< max_depth, rr_depth.
+    int spp = 0;                                                         ///< 0: not given.
 };
 
 class Scene {
@@ -66,16 +65,16 @@ public:
 
     // -- Queries of path sampling; thread-safe.
 
-    /// Nearest surface. Masked surfaces let the ray pass with probability 1 - opacity, decided by `u`, which is
-    /// rescaled by each decision. `passage` follows the ray through the media that such surfaces bound.
+    /// The nearest surface; false where there is none. Masked surfaces let the ray pass with probability 1 - opacity,
+    /// decided by `u`, which is rescaled at each one. `passage` tracks the media bounded by masked surfaces.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
-    /// The same where media do not matter.
+    /// The same without media.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit) const;
-    /// Geometry of a surface point that a ray met before.
+    /// Geometry of a surface point.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
-    /// Transmittance of masks along the open segment between two points, their surfaces left out by offsets along
-    /// `ng`; 0 where something is in the way. For a point at infinity use `transmittance_to_infinity`.
+    /// Transmittance of masks along the open segment from `a` to `b`, which lie on surfaces with normals `ng_a` and
+    /// `ng_b`; 0 where an opaque surface is in between.
     float transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
     float transmittance_to_infinity(Vec3 a, Vec3 ng_a, Vec3 d) const;
 
@@ -84,20 +83,20 @@ public:
         if (medium == kVacuum) return Rgb(1);
         return exp(media_[size_t(medium)] * -std::min(distance, std::numeric_limits<float>::max()));
     }
-    /// Attenuation by the media along the segment of transmittance(), which begins in `medium`; of no meaning where
-    /// something is in the way.
+    /// Attenuation by the media along the segment of transmittance(), which starts in `medium`; undefined where
+    /// transmittance() is 0.
     Rgb attenuation(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
     Rgb attenuation_to_infinity(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 d) const;
-    /// Whether rays pass from one medium into another without a vertex.
+    /// Whether rays can pass from one medium into another without a vertex, through masked surfaces.
     bool has_open_boundaries() const { return has_open_boundaries_; }
 
-    /// Emitter drawn by power. `u` is not read where there is but one.
+    /// An emitter chosen with probability proportional to its power. `u` is not used where there is only one.
     const Emitter& sample_emitter(double u) const {
         return *emitters_[emitters_.size() == 1 ? 0u : selection_.sample(u).index];
     }
     bool has_emitters() const { return !selection_.empty(); }
     bool has_emitter_choice() const { return emitters_.size() > 1; }
-    /// Whether some emitter can never be hit.
+    /// Whether any emitter is delta.
     bool has_delta_emitters() const { return has_delta_emitters_; }
 
     const Sensor& sensor() const { return *sensor_; }
@@ -105,7 +104,7 @@ public:
     const ReconstructionFilter& filter() const { return filter_; }
     const std::vector<const Emitter*>& infinite_emitters() const { return infinite_; }
 
-    // -- What `info` and the command line ask.
+    // -- Information for the command line.
 
     const std::vector<SceneShape>& shapes() const { return shapes_; }
     const std::vector<std::unique_ptr<Emitter>>& emitters() const { return emitters_; }
@@ -128,8 +127,8 @@ private:
     static Ray segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b);
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;
-    /// Calls `passes(hit)` for the surfaces on a ray in their order, until it returns false or there are no more;
-    /// returns what is left of the ray then. `hit.t` is the distance from the surface before.
+    /// Calls `passes(hit)` for the surfaces along a ray in order, until it returns false or there are no more; returns
+    /// the rest of the ray. `hit.t` is the distance from the previous surface.
     template <class Passes>
     Ray for_each_surface(Ray ray, const Passes& passes) const;
 

@@ -37,9 +37,10 @@ const std::vector<FilmEntry>& film_registry() {
             f.crop_width = int(p.integer("crop_width", f.width, 1, kMost));
             f.crop_height = int(p.integer("crop_height", f.height, 1, kMost));
             if (f.crop_x + f.crop_width > f.width || f.crop_y + f.crop_height > f.height)
-                p.fail(fmt::format(
-                    "the crop of {}x{} at ({}, {}) does not lie within the image of {}x{}",
-                    f.crop_width, f.crop_height, f.crop_x, f.crop_y, f.width, f.height));
+                p.fail(fmt::format("the crop of {} x {} pixels at ({}, {}) does not lie within the "
+                                   "image of {} x {}",
+                                   f.crop_width, f.crop_height, f.crop_x, f.crop_y, f.width,
+                                   f.height));
             return f;
         };
         std::vector<FilmEntry> all;
@@ -115,12 +116,12 @@ Rgb read_absorption(const Params& p) {
     const float scale = p.number("scale", 1, 0);
     const bool by_absorption = p.has("sigma_a");
     if (by_absorption && p.has("sigma_t"))
-        p.fail("sigma_t", "give either sigma_a and sigma_s, or sigma_t and albedo");
+        p.fail("sigma_t", "give either \"sigma_a\" and \"sigma_s\", or \"sigma_t\" and \"albedo\"");
     const Rgb scattering = by_absorption ? p.rgb("sigma_s", Rgb(0)) : p.rgb("albedo", Rgb(0.75f));
     if (!scattering.is_zero())
         p.fail(by_absorption ? "sigma_s" : "albedo",
-               "scattering media are not supported: a homogeneous medium must have albedo 0 "
-               "(absorption alone)");
+               "scattering media are not supported: a homogeneous medium must have albedo 0, that "
+               "is absorption only");
     return (by_absorption ? p.rgb("sigma_a", Rgb(0)) : p.rgb("sigma_t", Rgb(1))) * scale;
 }
 

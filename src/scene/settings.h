@@ -1,5 +1,5 @@
 #pragma once
-// The parts of a scene file that say how to render: film, sampler, integrator; and absorbing media.
+// Settings in scene files for film, sampler and integrator; and absorbing media.
 
 #include "description/params.h"
 #include "film/film.h"
@@ -11,17 +11,17 @@ struct FilmEntry {
     FilmGeometry (*make)(const Params& params);
 };
 const std::vector<FilmEntry>& film_registry();
-/// What a film without a filter has.
+/// The filter of films without one: gaussian.
 ReconstructionFilter default_filter();
 
-/// Sampler plug-ins that scene files may name. Only their sample count is taken: which random numbers to use is the
-/// command line's choice.
+/// Sampler plug-ins that scene files may name. Only their sample count is used; the random numbers are chosen on the
+/// command line.
 struct SamplerEntry {
     PluginInfo info;
 };
 const std::vector<SamplerEntry>& sampler_registry();
 
-/// Integrators that scene files name and what renders them here; the command line's choice is stronger.
+/// An integrator that scene files may name, and the integrator used for it unless the command line names one.
 struct IntegratorAlias {
     PluginInfo info;
     const char* integrator;
@@ -29,7 +29,7 @@ struct IntegratorAlias {
 const std::vector<IntegratorAlias>& integrator_aliases();
 
 const PluginInfo& medium_info();
-/// σ_t of a homogeneous medium without scattering; an error for any other.
+/// σ_t, in 1/length, of a homogeneous medium without scattering; throws SceneError for any other.
 Rgb read_absorption(const Params& params);
 
 }  // namespace etendue

@@ -39,10 +39,10 @@ std::vector<ParamInfo> mesh_params(const char* flip) {
          {"srgb", ParamKind::Bool, "false", "Accepted; vertex colours are not used."}});
 }
 
-/// Turns file data into a world-space mesh.
+/// Converts the data of a mesh file to a mesh in world space.
 std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& warn) {
     if (data.dropped_degenerate > 0)
-        warn(fmt::format("{}: {} triangle{} without area left out",
+        warn(fmt::format("{}: {} triangle{} of zero area left out",
                          params.text("filename", data.name), data.dropped_degenerate,
                          data.dropped_degenerate == 1 ? "" : "s"));
     const Transform t = params.transform("to_world");
@@ -67,8 +67,9 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     mesh->triangles = std::move(data.triangles);
     for (Vec3 p : mesh->positions)
         if (!is_finite(p))
-            params.fail("to_world",
-                        "the transform takes a vertex of the mesh out of the range of floats");
+            params.fail(
+                "to_world",
+                "\"to_world\" moves a vertex of the mesh out of the range of single precision");
     mesh->compute_face_normals();
     return mesh;
 }
@@ -86,11 +87,11 @@ struct Corner {
     Vec2 uv;
 };
 
-/// Quads given by their corners, counter-clockwise seen from the front; flat, oriented by the transformed normal.
+/// A flat-shaded mesh of quads, given by their vertices, counter-clockwise seen from the front.
 std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quads,
                                   const Params& params) {
     const Transform t = params.transform("to_world");
-    // A mirroring transform would turn the winding, but not the normal that the shape is documented to have.
+    // A mirroring transform reverses the winding, but must not reverse the documented normal of the shape.
     const bool turn = (t.determinant3() < 0) != params.flag("flip_normals", false);
     auto mesh = std::make_unique<TriangleMesh>();
     for (const auto& q : quads) {
@@ -104,7 +105,7 @@ std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quad
             mesh->triangles.push_back({base + tri[0], base + tri[1], base + tri[2]});
         }
     }
-    if (!(mesh->area() > 0)) params.fail("to_world", "the transform leaves the shape without area");
+    if (!(mesh->area() > 0)) params.fail("to_world", "\"to_world\" gives the shape zero area");
     mesh->compute_face_normals();
     return mesh;
 }
@@ -117,7 +118,7 @@ std::unique_ptr<Shape> make_rectangle(const Params& params, const Warn&) {
                       params);
 }
 
-/// The cube [-1, 1]³; the texture coordinates of each face as Mitsuba's cube has them.
+/// The cube [-1, 1]³, with the texture coordinates of Mitsuba's cube.
 std::unique_ptr<Shape> make_cube(const Params& params, const Warn&) {
     // Normal, and the directions of u and v.
     struct Face {
@@ -138,7 +139,7 @@ std::unique_ptr<Shape> make_cube(const Params& params, const Warn&) {
     return make_quads(quads, params);
 }
 
-/// Lengths of the transformed axes; refuses shear (and, for `uniform`, different lengths).
+/// Throws SceneError where `t` has shear or scales x and y (for `uniform` also z) differently.
 void check_similarity(const Transform& t, const Params& params, bool uniform) {
     const Vec3 x = t.vector({1, 0, 0}), y = t.vector({0, 1, 0}), z = t.vector({0, 0, 1});
     const float lx = length(x), ly = length(y), lz = length(z);
@@ -149,8 +150,9 @@ void check_similarity(const Transform& t, const Params& params, bool uniform) {
         std::fabs(lx - ly) < 1e-3f * lx && (!uniform || std::fabs(lx - lz) < 1e-3f * lx);
     if (!orthogonal || !round)
         params.fail("to_world",
-                    fmt::format("a {} needs a transform without shear and with {} scale",
-                                params.object().type, uniform ? "a uniform" : "the same x and y"));
+                    fmt::format("\"to_world\" of a {} must have no shear and {}",
+                                params.object().type,
+                                uniform ? "a uniform scale" : "the same scale in x and y"));
 }
 
 std::unique_ptr<Shape> make_sphere(const Params& params, const Warn&) {
@@ -171,10 +173,10 @@ std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn&) {
     const float radius = params.number("radius", 1, 1e-20f);
     const Vec3 axis = p1 - p0;
     const float height = length(axis);
-    if (!(height > 0)) params.fail("p1", "a cylinder's p0 and p1 must differ");
+    if (!(height > 0)) params.fail("p1", "\"p0\" and \"p1\" of a cylinder must differ");
     const Transform t = params.transform("to_world");
-    // Columns: two unit vectors normal to the axis times the radius, the axis, p0. Which two decides where u = 0; these
-    // are Mitsuba 3's.
+    // Columns: two vectors of length `radius` normal to the axis, the axis, and p0. The choice of the two determines
+    // where u = 0; these are those of Mitsuba 3.
     const Frame frame = Frame::from_normal(axis / height);
     const Vec3 s = frame.s * radius, r = frame.t * radius;
     const Transform local(Transform::Matrix{{{s.x, r.x, axis.x, p0.x},

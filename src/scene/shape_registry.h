@@ -1,5 +1,5 @@
 #pragma once
-// Shape plug-ins: their tables and makers.
+// Shape plug-ins: their tables and factories.
 
 #include <memory>
 #include <vector>
@@ -11,11 +11,11 @@ namespace etendue {
 
 struct ShapeEntry {
     PluginInfo info;
-    /// `warn` takes remarks on data that was mended.
+    /// `warn` is called with a message where data was repaired.
     std::unique_ptr<Shape> (*make)(const Params& params,
                                    const std::function<void(const std::string&)>& warn);
 };
-/// All but `shapegroup` and `instance`, which the builder resolves itself; their tables are `group_info()`.
+/// All shape plug-ins except `shapegroup` and `instance`, which the builder handles; their tables are group_infos().
 const std::vector<ShapeEntry>& shape_registry();
 const std::vector<PluginInfo>& group_infos();
 

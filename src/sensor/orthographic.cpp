@@ -1,5 +1,5 @@
-// Orthographic camera: every eye path starts in the same direction. z_0 is at infinity, as a directional emitter's
-// y_0 is: its density is 1 (discrete), and z_1 has density |cos θ| / A_pixel per pixel.
+// Orthographic camera: every eye path starts in the same direction. Like y_0 of a directional emitter, z_0 is at
+// infinity: its density is 1 (discrete), and z_1 has density |cos θ| / A_pixel per pixel.
 
 #include "sensor/orthographic.h"
 

@@ -1,9 +1,9 @@
 // Perspective cameras: pinhole (`perspective`) and with a finite round lens (`thinlens`).
 //
-// Camera space looks along +z with x to the left and y up, as Mitsuba's look-at matrices have it. A film point maps to
-// the plane z = 1; a pixel's area there is `pixel_area_`. The density of a direction per pixel is
+// In camera space the view is along +z, with x to the left and y up, as in Mitsuba. A film point is mapped to the plane
+// z = 1, where `pixel_area_` is the area of a pixel. The density of a direction per pixel is
 //     pdf_σ = 1 / (pixel_area · cos³θ)
-// for the pinhole and for any point of the lens alike, since the plane in focus is a scaled copy of z = 1.
+// for the pinhole and for every point of the lens, since the plane in focus is a scaled copy of z = 1.
 
 #include "sensor/perspective.h"
 
@@ -92,7 +92,7 @@ private:
                     (1 - 2 * (film.y / float(camera_.film.height) + camera_.offset.y))};
     }
 
-    /// What light leaving the scene along -v (v: from the lens point to the scene) measures.
+    /// The measurement of light that arrives at `lens` along -v; v points from the lens into the scene.
     std::optional<SensorSample> measure(Vec3 lens, Vec3 v) const {
         const float dist2 = length2(v);
         if (!(dist2 > 0)) return {};
@@ -119,17 +119,17 @@ private:
     }
 
     PerspectiveCamera camera_;
-    Vec3 origin_, left_, up_, forward_;  ///< Camera space in the world.
-    Vec2 lo_, hi_;                       ///< Film points that reach some pixel of the crop.
+    Vec3 origin_, left_, up_, forward_;  ///< Origin and axes of camera space, in world space.
+    Vec2 lo_, hi_;                       ///< Film points within the filter's radius of the crop.
     float pixel_area_, pdf_pos_;
 };
 
-/// The camera's transform with any scale taken out: lengths (lens radius, focus distance) are in world units.
+/// The camera's transform without its scale: lens radius and focus distance are in world units.
 Transform rigid(const Params& params) {
     const Transform t = params.transform("to_world");
     Transform::Matrix m = t.matrix();
     if (m[3][0] != 0 || m[3][1] != 0 || m[3][2] != 0 || m[3][3] != 1)
-        params.fail("to_world", "a sensor's to_world must be an affine transform");
+        params.fail("to_world", "\"to_world\" of a sensor must be an affine transform");
     for (int c = 0; c < 3; ++c) {
         const double len = std::sqrt(m[0][c] * m[0][c] + m[1][c] * m[1][c] + m[2][c] * m[2][c]);
         for (int r = 0; r < 3; ++r) m[r][c] /= len;
@@ -137,13 +137,13 @@ Transform rigid(const Params& params) {
     return Transform(m);
 }
 
-/// Half extents of the image on the plane z = 1.
+/// Sets the half extents of the image on the plane z = 1.
 void set_field_of_view(const Params& params, PerspectiveCamera& camera) {
     const double aspect = double(camera.film.width) / camera.film.height;
     double half_width;
     const std::string focal = params.text("focal_length", "");
     if (!params.has("fov")) {
-        // A 35 mm film's diagonal of 43.27 mm is kept, whatever the aspect ratio.
+        // The diagonal is that of 35 mm film (43.27 mm) for any aspect ratio.
         const std::string text = focal.empty() ? "50mm" : focal;
         double mm = 0;
         const char* const text_end = text.data() + text.size();
@@ -152,13 +152,14 @@ void set_field_of_view(const Params& params, PerspectiveCamera& camera) {
         if (error != std::errc() || (unit != "mm" && unit != "") || !(mm > 0) || !std::isfinite(mm))
             params.fail(
                 "focal_length",
-                fmt::format("focal_length is \"{}\", but must be a length in mm, like \"50mm\"",
+                fmt::format("parameter \"focal_length\" is \"{}\", but must be a length in mm, "
+                            "like \"50mm\"",
                             focal));
         const double half_diagonal = std::hypot(36.0, 24.0) / 2 / mm;
         half_width = half_diagonal * aspect / std::hypot(aspect, 1.0);
     } else {
         if (!focal.empty())
-            params.fail("focal_length", "give either fov or focal_length, not both");
+            params.fail("focal_length", "give either \"fov\" or \"focal_length\", not both");
         const double tangent = std::tan(params.number("fov", 0, 1e-3f, 179.9f) * double(kPi) / 360);
         switch (params.choice("fov_axis", {"x", "y", "diagonal", "smaller", "larger"}, 0)) {
         case 0: half_width = tangent; break;
@@ -181,10 +182,10 @@ std::unique_ptr<Sensor> make(const Params& params, const SensorContext& context,
     if (lens) {
         camera.lens_radius = params.number("aperture_radius", 0, 0);
         if (!params.has("aperture_radius"))
-            params.fail("thinlens needs an aperture_radius (world units)");
+            params.fail("sensor \"thinlens\" needs the parameter \"aperture_radius\"");
         camera.focus_distance = params.number("focus_distance", 0, 1e-6f);
         if (!params.has("focus_distance"))
-            params.fail("thinlens needs a focus_distance (world units)");
+            params.fail("sensor \"thinlens\" needs the parameter \"focus_distance\"");
     }
     return make_perspective(camera, rigid(params), context.filter_radius);
 }

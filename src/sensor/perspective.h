@@ -6,10 +6,10 @@ namespace etendue {
 
 struct PerspectiveCamera {
     FilmGeometry film;
-    float half_width = 1, half_height = 1;  ///< Of the image on the plane z = 1.
-    Vec2 offset;                            ///< Principal point, fractions of the image.
-    float lens_radius = 0;                  ///< 0: pinhole.
-    float focus_distance = 1;
+    float half_width = 1, half_height = 1;  ///< Of the image on the plane z = 1 of camera space.
+    Vec2 offset;                            ///< Of the principal point, in widths and heights.
+    float lens_radius = 0;                  ///< World units; 0: pinhole.
+    float focus_distance = 1;               ///< World units, along +z.
 };
 
 /// `to_world` must be rigid.

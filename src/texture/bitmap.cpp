@@ -1,12 +1,12 @@
-// Image texture. (u, v) = (0, 0) is the upper left corner of the image, (1, 1) its lower right one, and texel centres lie
-// at half-integers, as in Mitsuba 3 (whose readers of meshes turn v around, not its textures).
+// Image texture. (u, v) = (0, 0) is the upper left corner of the image, (1, 1) its lower right one, and texel centres
+// lie at half-integers, as in Mitsuba 3 (which flips v in some mesh readers, not in textures).
 //   filename (required)       any format OpenImageIO reads
 //   filter_type (bilinear)    or nearest
 //   wrap_mode (repeat)        or mirror, clamp
-//   raw (false)               integer formats hold linear data; otherwise they hold sRGB, floating-point ones never do
-//   channel (all)             r, g, b or a alone, as grey; alpha is never sRGB. "all" is the colours without alpha
+//   raw (false)               whether integer formats contain linear data, not sRGB; floating-point ones always do
+//   channel (all)             r, g, b or a: one channel as grey (alpha is linear); all: the colours without alpha
 //   to_uv (identity)          affine map of (u, v) before the look-up; the upper 2D part of a 4×4 matrix
-// eval_scalar() is the luminance of coloured images, as where Mitsuba 3 uses one for opacity or roughness.
+// eval_scalar() of colours is their luminance, as in Mitsuba 3 for opacity and roughness.
 
 #include "texture/bitmap.h"
 
@@ -34,7 +34,7 @@ const float* decoding(bool srgb) {
     return srgb ? kSrgb.data() : kLinear.data();
 }
 
-/// A coordinate brought into [0, 1], and its derivative.
+/// A coordinate wrapped to [0, 1], and the derivative of the wrapping.
 struct Wrapped {
     float t, slope;
 };
@@ -49,7 +49,7 @@ Wrapped wrap(float u, TextureWrap mode) {
         break;
     case TextureWrap::Clamp: break;
     }
-    // Not a number becomes zero: indices must be good whatever the mesh holds.
+    // NaN becomes zero, so that indices are valid for any mesh.
     return {w.t > 0 ? std::min(w.t, 1.0f) : 0.0f, w.slope};
 }
 
@@ -62,7 +62,7 @@ struct Neighbours {
 Neighbours neighbours(float t, int n, bool repeat) {
     const float x = t * float(n) - 0.5f, floor = std::floor(x);
     int i0 = int(floor), i1 = i0 + 1;
-    // A mirrored image meets its own edge texel there, so that mirroring clamps too.
+    // Beyond its edge a mirrored image continues with the edge texel itself, so mirroring clamps here too.
     if (i0 < 0) i0 = repeat ? n - 1 : 0;
     if (i1 >= n) i1 = repeat ? 0 : n - 1;
     return {i0, i1, x - floor};
@@ -151,15 +151,15 @@ void BitmapTexture::resolution(int& width, int& height) const {
     options_.to_uv.resolution(width, height);
 }
 
-// Over the unit square of the image every texel weighs the same, whatever the filter and the wrapping.
+// Over the unit square of the image every texel has the same weight, for any filter and wrapping.
 template <class Texels>
 Rgb BitmapTexture::image_mean(const Texels& texels) const {
     double sum[3] = {};
     const auto add = [&](Rgb c) {
         for (int i = 0; i < 3; ++i) sum[i] += c[i];
     };
-    constexpr int kGrid =
-        256;  // look-ups along each axis where `to_uv` selects another part of the plane
+    // Look-ups along each axis where `to_uv` maps the unit square to another part of the plane.
+    constexpr int kGrid = 256;
     const bool whole = options_.to_uv.is_identity();
     const int width = whole ? image_->width : kGrid, height = whole ? image_->height : kGrid;
     for (int y = 0; y < height; ++y)

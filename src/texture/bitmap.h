@@ -17,9 +17,9 @@ public:
     struct Options {
         TextureFilter filter = TextureFilter::Bilinear;
         TextureWrap wrap = TextureWrap::Repeat;
-        bool raw = false;  ///< 8-bit codes are linear values, not sRGB.
+        bool raw = false;  ///< Whether 8-bit codes are linear values instead of sRGB.
         int channel =
-            -1;  ///< The only channel to use, or -1 for colours (the sole one of grey images).
+            -1;  ///< The one channel to use; -1: the colours, or the first channel of grey images.
         UvTransform to_uv = {};
     };
 

@@ -1,4 +1,4 @@
-// Checkerboard with two by two squares to the unit square of (u, v).
+// Checkerboard with 2 × 2 squares in the unit square of (u, v).
 //   color0 (0.4)       the squares of the diagonal, that of (0, 0) among them; colour or texture
 //   color1 (0.2)       the others
 //   to_uv (identity)   affine map of (u, v); nested textures take the coordinates before it, as in Mitsuba 3

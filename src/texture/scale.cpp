@@ -1,4 +1,4 @@
-// Product of two textures, as `scale` of Mitsuba 0.6 and of pbrt.
+// Product of two textures, like `scale` of Mitsuba 0.6 and pbrt.
 //   value (required)   texture; its name may be left out
 //   scale (1)          factor: number, colour or texture
 
@@ -32,8 +32,6 @@ public:
     }
 
 private:
-    static bool is_grey(Rgb c) { return c.r == c.g && c.g == c.b; }
-
     static std::string value_name(const Params& params) {
         if (params.has("value")) return "value";
         for (const auto& c : params.children("texture"))

@@ -1,5 +1,5 @@
 #pragma once
-// Textures: functions of the surface's (u, v). A `TextureRef` is what materials hold: a constant, or a texture.
+// Textures: functions of the surface's (u, v). Materials and emitters store `TextureRef`s: a constant or a texture.
 
 #include <memory>
 #include <string>
@@ -17,26 +17,31 @@ public:
     virtual ~Texture() = default;
     /// Colour at `uv`; finite and not negative.
     virtual Rgb eval(Vec2 uv) const = 0;
-    /// The scalar that roughness, opacity or height maps use: the luminance of colour images, the value of grey ones.
+    /// Value of roughness, opacity and height maps: the luminance of colours, the value of grey.
     virtual float eval_scalar(Vec2 uv) const { return luminance(eval(uv)); }
-    /// (∂/∂u, ∂/∂v) of eval_scalar, for bump mapping; by central differences unless a texture knows better.
+    /// (∂/∂u, ∂/∂v) of eval_scalar(), for bump mapping; by central differences unless overridden.
     virtual Vec2 gradient(Vec2 uv) const;
-    /// Average over the unit square, for emitter power and for albedo statistics.
+    /// Average over the unit square, for the power of emitters and average albedos; may be approximate.
     virtual Rgb mean() const = 0;
-    /// Resolution that resolves the texture's detail, (1, 1) for a constant: the grid for importance sampling.
+    /// Size of a grid over the unit square that resolves the texture's detail, for importance sampling.
     virtual void resolution(int& width, int& height) const { width = height = 1; }
     virtual size_t memory_bytes() const { return 0; }
 };
 
-/// A constant colour or a texture that outlives it.
+constexpr bool is_grey(Rgb c) {
+    return c.r == c.g && c.g == c.b;
+}
+
+/// A constant colour, or a texture, which must outlive the reference.
 class TextureRef {
 public:
     TextureRef() = default;
-    TextureRef(Rgb constant) : constant_(constant) {}
+    TextureRef(Rgb constant)
+        : constant_(constant), scalar_(is_grey(constant) ? constant.g : luminance(constant)) {}
     explicit TextureRef(const Texture* texture) : texture_(texture) {}
 
     Rgb eval(Vec2 uv) const { return texture_ ? texture_->eval(uv) : constant_; }
-    float eval_scalar(Vec2 uv) const { return texture_ ? texture_->eval_scalar(uv) : constant_.g; }
+    float eval_scalar(Vec2 uv) const { return texture_ ? texture_->eval_scalar(uv) : scalar_; }
     Vec2 gradient(Vec2 uv) const { return texture_ ? texture_->gradient(uv) : Vec2(); }
     Rgb mean() const { return texture_ ? texture_->mean() : constant_; }
     void resolution(int& width, int& height) const {
@@ -48,28 +53,29 @@ public:
 
 private:
     Rgb constant_;
+    float scalar_ = 0;  ///< eval_scalar() of the constant.
     const Texture* texture_ = nullptr;
 };
 
 class TextureCache;
 
-/// What a texture's maker may ask of the scene builder.
+/// Services of the scene builder for the construction of textures.
 class TextureContext {
 public:
     virtual ~TextureContext() = default;
-    /// Colour or nested texture; checks that constants lie in [0, hi].
+    /// A constant or nested texture; throws SceneError where a constant lies outside [0, hi].
     virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback,
                                float hi = kInf) = 0;
     /// The scene's images; they outlive its textures.
     virtual TextureCache& images() = 0;
 };
 
-/// A texture plug-in: its table and its maker.
+/// A texture plug-in: its table and its factory.
 struct TextureEntry {
     PluginInfo info;
     std::unique_ptr<Texture> (*make)(const Params& params, TextureContext& context);
 };
-/// All texture plug-ins, in the order `list` prints them.
+/// All texture plug-ins, in the order of `etendue list`.
 const std::vector<TextureEntry>& texture_registry();
 
 }  // namespace etendue

@@ -23,7 +23,7 @@ bool is_negative(Half v) {
     return float(v) < 0;
 }
 
-/// Number of values that are not finite; takes negative ones as zero unless `raw`.
+/// Sets negative values to zero unless `raw`; returns the number of values that are not finite.
 template <class T>
 size_t sanitize(std::vector<T>& data, bool raw) {
     size_t bad = 0;
@@ -47,7 +47,7 @@ const PixelBuffer& TextureCache::load(const std::string& path, bool raw) {
             std::visit([&](auto& data) { return sanitize(data, raw); }, loaded->data);
         if (bad > 0)
             throw std::runtime_error("image \"" + path + "\" has " + std::to_string(bad) +
-                                     " values that are infinite or not a number");
+                                     " values that are infinite or NaN");
         image = std::move(loaded);
     }
     return *image;

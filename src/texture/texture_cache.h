@@ -12,8 +12,8 @@ namespace etendue {
 /// The images of a scene's textures, each loaded once. Must outlive the textures made with it.
 class TextureCache {
 public:
-    /// See read_pixels(). Throws std::runtime_error, also where a value is not finite; negative values count as zero
-    /// unless `raw`.
+    /// Loads an image with read_pixels(). Negative values become zero unless `raw`. Throws std::runtime_error where the
+    /// file cannot be read or a value is not finite.
     const PixelBuffer& load(const std::string& path, bool raw);
     size_t memory_bytes() const;
 

@@ -7,7 +7,7 @@
 
 namespace etendue {
 
-/// The affine map of (u, v) that is in the upper left and the last column of a 4×4 matrix (parameter `to_uv`).
+/// Affine map of (u, v), from the first two rows and the columns 0, 1 and 3 of a 4×4 matrix (parameter `to_uv`).
 class UvTransform {
 public:
     /// Finest grid that resolution() asks for along one axis.
@@ -24,11 +24,12 @@ public:
         return {m_[0][0] * uv.x + m_[0][1] * uv.y + m_[0][2],
                 m_[1][0] * uv.x + m_[1][1] * uv.y + m_[1][2]};
     }
-    /// Gradient with respect to uv from the one with respect to point(uv).
+    /// Converts a gradient with respect to point(uv) to one with respect to uv.
     Vec2 gradient(Vec2 g) const {
         return {m_[0][0] * g.x + m_[1][0] * g.y, m_[0][1] * g.x + m_[1][1] * g.y};
     }
-    /// Grid of the unit square of uv that resolves `width` × `height` cells of the unit square of point(uv).
+    /// From the size of a grid over the unit square of point(uv) to that of a grid of the same detail over the unit
+    /// square of uv.
     void resolution(int& width, int& height) const {
         const auto cells = [&](int column) {
             const float n = std::hypot(m_[0][column] * float(width), m_[1][column] * float(height));

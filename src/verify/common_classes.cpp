@@ -7,11 +7,12 @@ namespace {
 
 /// See CommonClasses.
 constexpr double kRouletteMargin = 10, kClusterMargin = 10;
-/// A later reference takes over where its squared error is so many times smaller, and where it has so many effective
-/// contributions: rare bright ones that have not come yet would make it look good.
+/// A later reference replaces the first one where its squared error is smaller by the factor kMuchBetter and it has at
+/// least kManyContributions effective contributions. With fewer, rare bright contributions may be missing, so that its
+/// error only seems small.
 constexpr double kMuchBetter = 4, kManyContributions = 4000;
 
-/// Whether `method` makes all that `reference` makes, as often.
+/// Whether `method` has all techniques of `reference`, with at least the same counts.
 bool has_techniques_of(const TechniqueCounts& method, const TechniqueCounts& reference) {
     if (reference.uses_pairs()) return false;
     for (const auto count :

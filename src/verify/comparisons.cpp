@@ -6,10 +6,11 @@
 namespace etendue {
 namespace {
 
-/// Effective contributions that a technique alone needs: its values have longer tails than weights leave them.
+/// Effective contributions that a test of one technique needs: unweighted contributions have heavier tails than
+/// weighted ones.
 constexpr double kEnoughAlone = 4000;
 
-/// Means of every tile, then of the image.
+/// Mean colour of every tile, followed by that of the image.
 using TileMeans = std::vector<std::array<double, 3>>;
 
 std::vector<double> pixels_of_tiles(const TileGrid& grid) {
@@ -46,14 +47,14 @@ void add_run(const TileMeans& means, TileMoments& moments) {
         for (size_t k = 0; k < 3; ++k) moments[i][k].add(means[i][k]);
 }
 
-/// Calls use(tile or image, tally) for the tiles of a class.
+/// Calls use(index, tally) for every tile of a class, with the index of the tile and with that of the image.
 template <class Use>
 void for_each_part(const std::vector<ContributionTally::TileSum>& tiles, const Use& use) {
     for (size_t i = 0; i < tiles.size(); ++i)
         for (const size_t part : {i, tiles.size()}) use(part, tiles[i].luminance);
 }
 
-/// Contributions of both sides to each tile, and to the image.
+/// Contributions of both sides to every tile and to the image.
 std::vector<SideTallies> tile_tallies(const Sides& sides, const TileGrid& grid) {
     std::vector<SideTallies> found(grid.tiles() + 1);
     for (const IndependentRun& run : sides.method.runs)
@@ -85,7 +86,8 @@ void compare_tiles(const TileMoments& method, const TileMoments& reference,
         for (size_t k = 0; k < 3; ++k)
             (i + 1 < method.size() ? report.tiles : report.image)
                 .push_back(WelchTest::of(method[i][k], reference[i][k], effective_counts[i]));
-    // What is too rare in some tiles may be missing from others, unseen: a tile without it looks well sampled, and dark.
+    // Contributions too rare for some tiles may be missing from others, which then seem well sampled but are too dark.
+    // If there are too many such tiles, no tile is tested.
     const std::vector<double> pixels = pixels_of_tiles(grid);
     double all = 0, untested = 0;
     for (size_t i = 0; i < report.tiles.size(); ++i) {
@@ -112,7 +114,7 @@ void compare_images(const Sides& sides, const TileGrid& grid, MethodReport& repo
             if (!sides.common.contains(c)) add_class(tiles, -1, pixels, means);
         add_run(means, method);
 
-        // The image of the first reference; classes that it does not serve are taken out, those of others put in.
+        // The image of the first reference, with the classes compared with other references replaced by theirs.
         means = tile_means(sides.references[0].runs[r].pixels, grid);
         for (size_t i = 0; i < sides.references.size(); ++i)
             for (const auto& [c, tiles] : sides.references[i].runs[r].tiles) {
@@ -166,7 +168,7 @@ void compare_classes(const Sides& sides, MethodReport& report) {
     const auto left = sides.common.left_out([](const PathClass&) { return true; });
     report.out_of_reach = left.out_of_reach;
     report.too_rare = left.too_rare;
-    std::map<int, int> compared;  // classes of a length
+    std::map<int, int> compared;  // number of compared classes by path length
     for (const auto& [c, k] : sides.common.all()) compared[c.edges] += k.is_common;
     for (const auto& [c, k] : sides.common.all()) {
         const double share = left.light > 0 ? k.light / left.light : 0.0;
@@ -200,7 +202,7 @@ TechniqueReport compare_technique(const Technique& q, const Sides& sides,
     const auto is_of_length = [&](const ContributionTally::Entry& e) {
         return e.technique.vertices() == q.vertices();
     };
-    /// The reference that serves a class, if the technique can make it.
+    /// Index of the reference of a class; empty where the technique cannot make the class.
     const auto reference_of = [&](const PathClass& c) -> std::optional<size_t> {
         const CommonClasses::Class* k = sides.common.find(c);
         if (!k || !k->is_reachable || c.has_short_edge || !can_make(q, c)) return {};
@@ -216,7 +218,7 @@ TechniqueReport compare_technique(const Technique& q, const Sides& sides,
     for (const auto& [c, k] : sides.common.all())
         if (c.edges + 1 == q.vertices()) length_total += k.light;
     for (size_t i = 0; i < sides.references.size(); ++i) {
-        // Where a reference has this technique, too, with at most the same count, it tells how often it makes a class.
+        // A reference with this technique, and at most the same count, implies how many contributions the method has.
         const RunSeries& reference = sides.references[i];
         const bool has_it = reference.counts.of(q) > 0 &&
                             reference.counts.of(q) <= sides.method.counts.of(q) &&

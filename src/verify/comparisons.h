@@ -1,32 +1,32 @@
 #pragma once
-// The comparisons of a method with its references: which means are held together, one function for each kind.
+// The comparisons of a method with its references, one function for each kind of mean.
 
 #include "verify/common_classes.h"
 #include "verify/verify.h"
 
 namespace etendue {
 
-/// A method, its references, and the classes that they are compared on.
+/// A method, its references, and the classes on which they are compared.
 struct Sides {
     const RunSeries& method;
     std::span<const RunSeries> references;
     const CommonClasses& common;
 };
 
-/// Image and tiles, from the film, without the classes that are not compared.
+/// Compares the image and its tiles, without the light of classes that are not compared.
 void compare_images(const Sides& sides, const TileGrid& grid, MethodReport& report);
-/// The same with an image, which has no classes.
+/// Compares image and tiles with a reference image, where classes are unknown.
 void compare_images(const RunSeries& method, const ReferenceImage& reference, const TileGrid& grid,
                     MethodReport& report);
 void compare_lengths(const Sides& sides, const VerifyOptions& options,
                      const std::vector<float>& cut_offs, MethodReport& report);
-/// Classes on their own, and what is left out.
+/// Compares single classes, and reports those that are not compared.
 void compare_classes(const Sides& sides, MethodReport& report);
-/// `unthinned` is the method without roulette before shadow rays.
+/// Compares one technique; `unthinned` is the series of the method without Russian roulette before shadow rays.
 TechniqueReport compare_technique(const Technique& technique, const Sides& sides,
                                   const RunSeries& unthinned);
 
-/// Light of the method, or of its references, in the compared classes for which `belongs(class)`; over the runs.
+/// Moments over the runs of the method's light in the compared classes that satisfy `belongs(class)`.
 template <class Belongs>
 Moments method_light(const Sides& sides, const Belongs& belongs) {
     return sides.method.moments([&](const IndependentRun& run) {
@@ -36,7 +36,7 @@ Moments method_light(const Sides& sides, const Belongs& belongs) {
         return sum;
     });
 }
-/// The part of the reference's light that comes from one of the references.
+/// The same light of one reference in one run: of the classes that are compared with it.
 template <class Belongs>
 double reference_light(const Sides& sides, size_t reference, size_t run, const Belongs& belongs) {
     double sum = 0;
@@ -46,6 +46,7 @@ double reference_light(const Sides& sides, size_t reference, size_t run, const B
     }
     return sum;
 }
+/// Moments over the runs of the sum of this light over all references.
 template <class Belongs>
 Moments reference_light(const Sides& sides, const Belongs& belongs) {
     Moments m;

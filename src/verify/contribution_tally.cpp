@@ -23,7 +23,7 @@ void ContributionTally::observe(const Join& join, Rgb contribution, float share,
         for (int i = 0; i < 3; ++i) t.rgb[size_t(i)] += double(value[i]);
         t.luminance.add(double(luminance(value)));
     };
-    double reach = double(share);  // what the pixels of the crop get of a contribution of 1
+    double reach = double(share);  // sum over the pixels of the crop for a contribution of 1
     if (join.technique.t >= 2) {
         add_to_tile(pixel, contribution * (join.mis_weight * share));
     } else {

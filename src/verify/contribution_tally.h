@@ -1,5 +1,5 @@
 #pragma once
-// What one rendering found, by class of paths and by technique.
+// Contributions of one rendering, by class of paths and by technique.
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace etendue {
 
-/// Luminance of many contributions to one mean.
+/// Sums of powers of the luminance of contributions to one mean.
 struct Tally {
     double sum = 0, squares = 0, fourths = 0;
 
@@ -33,19 +33,18 @@ struct Tally {
         const double square = factor * factor;
         return {sum * factor, squares * square, fourths * square * square};
     }
-    /// What the same mean has where its samples are fewer by this factor.
+    /// The tally of the same mean with fewer samples by this factor.
     Tally from_fewer_samples(double factor) const {
         return {sum, squares * factor, fourths * factor * factor * factor};
     }
-    /// The number of equal contributions with the same relative spread [Kish 1965]: a t-test is void where it is small.
-    /// The spread itself is uncertain where few contributions decide it, so the number is also limited to four times the
-    /// same of the squares.
+    /// Effective sample size (Σv)² / Σv² [Kish 1965]: a t-test needs a large one. Where few contributions dominate Σv²,
+    /// it is uncertain itself, so it is limited to four times the effective sample size of the squares.
     double effective_count() const {
         return squares > 0 ? std::min(sum * sum / squares, 4 * squares * squares / fourths) : 0.0;
     }
 };
 
-/// The image cut into count × count tiles.
+/// Division of the crop into count × count tiles.
 struct TileGrid {
     FilmGeometry film;
     int count;
@@ -58,10 +57,10 @@ struct TileGrid {
     size_t tiles() const { return size_t(count) * size_t(count); }
 };
 
-/// Serves one rendering on one thread.
+/// Collects the contributions of one rendering, which must run on one thread.
 class ContributionTally final : public ContributionObserver {
 public:
-    /// Sums over the crop: the weighted contributions, and the unweighted ones, of one technique to one class.
+    /// Weighted and unweighted contributions of one technique to one class, summed over the crop.
     struct Entry {
         PathClass path_class;
         Technique technique;
@@ -79,16 +78,17 @@ public:
         Tally luminance;
     };
 
-    /// An edge shorter than cut_offs[edges of the path] marks the path. Paths with more edges are passed over.
+    /// Paths with an edge shorter than cut_offs[number of edges] get has_short_edge. Paths with more edges than there
+    /// are cut-offs are ignored.
     ContributionTally(const Scene& scene, TileGrid grid, std::vector<float> cut_offs)
         : scene_(scene), grid_(grid), cut_offs_(std::move(cut_offs)) {}
 
     void observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
                  const Workspace& paths) override;
 
-    /// Sorted.
+    /// All entries, sorted.
     std::vector<Entry> entries() const;
-    /// By class, whether or not it has a short edge; tile by tile.
+    /// Sums of every tile by class; classes that differ only in has_short_edge are combined.
     const std::map<PathClass, std::vector<TileSum>>& tiles() const { return tiles_; }
 
 private:
@@ -97,7 +97,7 @@ private:
     std::vector<float> cut_offs_;
     struct Sums {
         Tally weighted, alone;
-        std::vector<TileSum>* tiles = nullptr;  ///< In tiles_.
+        std::vector<TileSum>* tiles = nullptr;  ///< Element of tiles_.
     };
     std::unordered_map<uint64_t, Sums> sums_;  ///< By class, strategy and s.
     std::map<PathClass, std::vector<TileSum>> tiles_;

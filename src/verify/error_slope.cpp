@@ -35,7 +35,7 @@ std::vector<ErrorOfRuns> errors_of_runs(const RunSeries& series, const ErrorRefe
                     mse += sqr(sum / double(n) - reference.pixels[i][size_t(c)].mean());
                 }
         mse = mse / double(groups * 3 * pixels) - noise;
-        // Below the reference's own noise nothing is seen.
+        // Errors below the reference's own noise cannot be measured.
         if (mse < noise) break;
         out.push_back({int(n), std::sqrt(mse)});
     }

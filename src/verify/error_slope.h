@@ -1,5 +1,5 @@
 #pragma once
-// How the error of the mean of n runs falls with n [Qin et al. 2015, fig. 7].
+// Decrease of the error of the mean of n runs with n [Qin et al. 2015, fig. 7].
 
 #include <optional>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace etendue {
 
-/// The image that errors are measured from, and its own variance; by channel.
+/// Reference image with its own variance, by pixel and channel.
 struct ErrorReference {
     std::vector<std::array<Moments, 3>> pixels;
 
@@ -17,9 +17,9 @@ struct ErrorReference {
     explicit ErrorReference(const ReferenceImage& image);
 };
 
-/// RMSE of the mean of 1, 2, 4 … runs, each over as many groups of runs as there are.
+/// RMSE of the mean of 1, 2, 4 … runs, each averaged over all disjoint groups of that many runs.
 std::vector<ErrorOfRuns> errors_of_runs(const RunSeries& series, const ErrorReference& reference);
-/// By least squares in logarithms.
+/// Slope of log RMSE over log n, by least squares; empty for fewer than four points.
 std::optional<double> error_slope(const std::vector<ErrorOfRuns>& errors);
 
 }  // namespace etendue

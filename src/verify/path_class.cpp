@@ -5,7 +5,7 @@
 namespace etendue {
 namespace {
 
-/// Edges between the first `count` vertices of a walk.
+/// Length of the shortest edge between the first `count` vertices of a walk.
 float shortest_edge(const SubPath& path, int count) {
     float shortest = kInf;
     for (int i = 1; i < count; ++i)
@@ -18,7 +18,7 @@ float shortest_edge(const SubPath& path, int count) {
 
 float shortest_edge(const Scene& scene, const Join& join, const SubPath& y, const SubPath& z) {
     const Technique& q = join.technique;
-    // Vertices of the walks: the lens of C(s,0) is not one; a gather drops one or the other.
+    // Numbers of vertices taken from the walks: the lens of C(s,0) is not one of them, and a gather drops one.
     int light = q.t == 0 ? q.s - 1 : q.s, eye = q.t;
     if (q.strategy == Strategy::Gather) --(length2(join.a - z[eye - 2].p) == 0 ? eye : light);
     float shortest = std::min(shortest_edge(y, light), shortest_edge(z, eye));
@@ -37,7 +37,8 @@ PathClass classify(const Scene& scene, const Join& join, const SubPath& y, const
                 .has_short_edge = shortest_edge(scene, join, y, z) < cut_off,
                 .delta_emitter = join.emitter->is_delta(),
                 .infinite_ends = join.emitter->is_infinite() && scene.sensor().is_orthographic()};
-    // The event at an end point of a join is a smooth one, whatever the walk did there; C(s,0) has no such end point.
+    // At the end points of a join the path scatters by a smooth lobe, whatever event the walk sampled there. C(s,0) has
+    // no such end point.
     for (int i = 1; i < (q.t == 0 ? last : q.s - 1); ++i)
         if (y[i].is_delta) c.delta_events |= 1u << i;
     for (int i = 1; i < q.t - 1; ++i)
@@ -56,11 +57,12 @@ std::vector<Technique> techniques_of_length(int edges) {
 
 namespace {
 
-/// x_i by its bit, of those where a walk cannot choose a direction again.
+/// Bit i is set where a walk cannot sample another direction at x_i.
 uint32_t fixed_vertices(const PathClass& c) {
     return c.delta_events | 1u << c.edges;
 }
-/// The bit of x_{s-1}, the last light vertex; 0 where there is none. Of a pair it is the vertex that both sub-paths have.
+/// The bit of x_{s-1}, the last light vertex; 0 where s = 0. For merges and gathers it is the vertex that both
+/// sub-paths have.
 uint32_t last_light_vertex(const Technique& q) {
     return q.s > 0 ? 1u << (q.s - 1) : 0u;
 }
@@ -78,12 +80,12 @@ bool can_make(const Technique& q, const PathClass& c) {
     const uint32_t x_m = last_light_vertex(q), fixed = fixed_vertices(c);
     if (is_pair(q.strategy) && (fixed & x_m)) return false;
     if (q.strategy == Strategy::Merge) return true;
-    // A gather samples the vertex again from the one or the other side.
+    // A gather samples the vertex again from one of the two sides.
     if (q.strategy == Strategy::Gather) return !((fixed & x_m << 1) && (fixed & x_m >> 1));
     if (q.strategy == Strategy::Hit) return !c.delta_emitter;
     if (q.strategy == Strategy::HitLens) return true;
     if (q.s == 1 && q.t == 1) return !c.infinite_ends;
-    return (c.delta_events & (x_m | x_m << 1)) == 0;  // x_{s-1} and x_s are joined
+    return (c.delta_events & (x_m | x_m << 1)) == 0;  // x_{s-1} and x_s are connected
 }
 
 std::string to_string(const PathClass& c) {

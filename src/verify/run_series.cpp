@@ -15,9 +15,9 @@
 namespace etendue {
 namespace {
 
-/// Samples of the first, short rendering that tells times and edge lengths.
+/// Samples of the short pilot renderings that measure time and edge lengths.
 constexpr uint64_t kPilotSamples = 20000;
-/// δ is the length that the shortest edge of this share of the light does not reach.
+/// δ is chosen so that this share of the light comes along paths whose shortest edge is shorter.
 constexpr double kShortShare = 0.2;
 
 void render_all(Renderer& renderer) {
@@ -25,7 +25,7 @@ void render_all(Renderer& renderer) {
     renderer.run([](const Progress&) {}, interrupted);
 }
 
-/// The shortest edge of every path of a rendering, with the light that the path brings; by path length.
+/// Shortest edge and contribution of every path of a rendering, by path length.
 class ShortestEdges final : public ContributionObserver {
 public:
     ShortestEdges(const Scene& scene, int longest) : scene_(scene), lengths_(size_t(longest) + 1) {}
@@ -37,7 +37,8 @@ public:
             shortest_edge(scene_, join, y, paths.z),
             double(luminance(contribution) * join.mis_weight * share));
     }
-    /// The length that the shortest edge of this share of the light does not reach; 0 where there is none.
+    /// The weighted quantile of the shortest edge: `share` of the light comes along paths with a shorter one. 0 where
+    /// there is none.
     float quantile(size_t edges, double share) {
         auto& paths = lengths_[edges];
         std::sort(paths.begin(), paths.end());
@@ -53,7 +54,8 @@ private:
     std::vector<std::vector<std::pair<float, double>>> lengths_;
 };
 
-/// Calls task(i) for i < count on so many threads. What a task throws ends the others, and is thrown here.
+/// Calls task(i) for i < count on up to `threads` threads. If a task throws, no further tasks start and the exception
+/// is rethrown.
 template <class Task>
 void for_each_in_parallel(size_t count, int threads, const Task& task) {
     std::atomic<size_t> next{0};
@@ -202,7 +204,8 @@ RunSeries SeriesRenderer::begin(const IntegratorSpec& spec, uint64_t stream,
     const auto integrator = make_integrator(spec);
     if (!integrator->keeps_paths())
         throw std::runtime_error(fmt::format(
-            "{} cannot be verified: its photons do not keep their paths; use compare", spec.name));
+            "{} cannot be verified, since its photons do not store their paths; use compare",
+            spec.name));
     RunSeries series;
     series.spec = spec;
     series.stream = stream;

@@ -1,5 +1,5 @@
 #pragma once
-// Independent renderings of one method: the sample that all tests are made from.
+// Independent renderings of one method, on which all tests are based.
 
 #include <functional>
 #include <map>
@@ -15,16 +15,16 @@ namespace etendue {
 
 struct VerifyOptions;
 
-/// The mean of one or more renderings, each with a seed of its own; per pixel and pass.
+/// Mean of one or more renderings with different seeds; contributions are per pixel and pass.
 struct IndependentRun {
     std::vector<Rgb> pixels;
     std::vector<ContributionTally::Entry> entries;
-    /// By class, whether or not it has a short edge; tile by tile, and in total.
+    /// Sums of every tile, and of the crop, by class; classes that differ only in has_short_edge are combined.
     std::map<PathClass, std::vector<ContributionTally::TileSum>> tiles;
     std::map<PathClass, Tally> classes;
     uint64_t rejected = 0;
 
-    /// Makes it the mean of `renderings` renderings, the last of which is `other`.
+    /// From the mean of `renderings` − 1 renderings to that of `renderings`, the last of which is `other`.
     void merge(const IndependentRun& other, uint64_t renderings);
     double light(const PathClass& c) const {
         const auto found = classes.find(c);
@@ -35,19 +35,19 @@ struct IndependentRun {
 /// All runs of one method.
 struct RunSeries {
     IntegratorSpec spec;
-    uint64_t stream = 0;  ///< Tells its random numbers from those of other series.
+    uint64_t stream = 0;  ///< Distinguishes its random numbers from those of other series.
     TechniqueCounts counts;
     Estimator estimator = Estimator::Unbiased;
-    uint64_t spp = 0;         ///< Of one rendering.
-    uint64_t renderings = 0;  ///< In each run.
-    double seconds = 0;       ///< Spent on all of it.
+    uint64_t spp = 0;         ///< Samples per pixel of one rendering.
+    uint64_t renderings = 0;  ///< Renderings per run.
+    double seconds = 0;       ///< Wall-clock time of all renderings.
     std::vector<IndependentRun> runs;
 
-    uint64_t samples() const { return spp * renderings; }  ///< Of a pixel, in each run.
+    uint64_t samples() const { return spp * renderings; }  ///< Samples per pixel of one run.
     uint64_t rejected() const;
-    /// Sum over the runs.
+    /// Sums over the runs.
     std::map<PathClass, Tally> classes() const;
-    /// Mean and spread of `value(run)`.
+    /// Mean and spread of `value(run)` over the runs.
     template <class Value>
     Moments moments(const Value& value) const {
         Moments m;
@@ -56,7 +56,8 @@ struct RunSeries {
     }
 };
 
-/// Renders series. They share the scene, the options, and δ, the shortest edge of paths that techniques are compared on.
+/// Renders series with common scene, options and δ: techniques are compared on paths whose edges have at least the
+/// length δ.
 class SeriesRenderer {
 public:
     using Report = std::function<void(const std::string&)>;
@@ -66,14 +67,14 @@ public:
     const TileGrid& grid() const { return grid_; }
     /// δ by path length.
     const std::vector<float>& cut_offs() const { return cut_offs_; }
-    /// Finds them from a short rendering by the method.
+    /// Chooses δ by a short rendering with the method `spec`.
     void choose_cut_offs(const IntegratorSpec& spec);
 
-    /// A series without renderings. Without `spp` one rendering has as many samples as make all runs take `seconds`,
-    /// by the time of a rendering that is thrown away.
+    /// Creates a series without renderings. Without `spp` the samples per pixel of a rendering are chosen so that one
+    /// rendering in every run takes `seconds` altogether, as measured by a pilot rendering.
     RunSeries begin(const IntegratorSpec& spec, uint64_t stream, std::optional<uint64_t> spp,
                     double seconds) const;
-    /// Adds so many renderings to every run. Throws what a rendering threw.
+    /// Adds `renderings` renderings to every run. Rethrows exceptions of renderings.
     void extend(RunSeries& series, uint64_t renderings) const;
 
 private:

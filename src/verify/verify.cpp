@@ -15,31 +15,32 @@ namespace etendue {
 namespace {
 
 constexpr double kDefaultSeconds = 30;
-/// Of each series before the first look at its spread, where `detect` decides how many samples there are.
+/// With `detect`: time of each series before its spread is first estimated.
 constexpr double kFirstSeconds = 2;
-/// Factor by which samples grow at most from look to look: spreads that rest on few samples are uncertain.
+/// Largest factor by which samples grow between two estimates of the spread, which are uncertain for few samples.
 constexpr double kMostGrowth = 4;
-/// Squared errors are planned to be this much smaller than needed, so that the next look is the last one.
+/// Planned squared errors are smaller than needed by this factor, so that the next estimate is likely the last one.
 constexpr double kHeadroom = 0.9;
-/// Share of all time that techniques alone may take where `detect` decides: it does not count them.
+/// With `detect`: share of the time for renderings of single techniques, to which the required precision does not
+/// apply.
 constexpr double kTechniqueTime = 0.15;
 
 IntegratorSpec limited(IntegratorSpec spec, int longest) {
     if (!spec.params.emplace("max_depth", std::to_string(longest)).second)
         throw std::runtime_error(fmt::format(
-            "{}: max_depth must not be given: the path lengths that are compared set it",
-            spec.to_string()));
+            "{}: max_depth must not be given, since --lengths determines it", spec.to_string()));
     return spec;
 }
 
-/// References do without Russian roulette, so that it is verified, too.
+/// References do not use Russian roulette, so that the roulette of methods is verified as well.
 IntegratorSpec without_roulette(IntegratorSpec spec, int longest) {
     spec.params.emplace("rr_depth", std::to_string(longest + 1));
     return spec;
 }
 
-/// Roulette before shadow rays thins by the weighted contribution: it leaves a technique alone, where its weight is
-/// small, rare values without bound. So techniques are rendered without it. Nothing where `spec` has none.
+/// Russian roulette before shadow rays depends on the weighted contribution. Unweighted contributions of a technique
+/// with small weights become rare and unbounded. Therefore techniques are rendered without it. Empty where `spec` has
+/// none.
 std::optional<IntegratorSpec> without_join_roulette(IntegratorSpec spec) {
     for (const IntegratorEntry& e : integrator_registry())
         for (const ParamInfo& p : e.info.params)
@@ -84,7 +85,7 @@ VerifyReport verify_with_image(const std::vector<IntegratorSpec>& methods,
     return report;
 }
 
-/// The series of a comparison with other methods, and what they tell.
+/// A comparison of methods with reference methods: its series of renderings and the evaluation.
 class MethodVerification {
 public:
     MethodVerification(const std::vector<IntegratorSpec>& methods, const VerifyOptions& options,
@@ -112,7 +113,7 @@ public:
             references_.push_back(start(reference_specs_[i]));
     }
 
-    /// One rendering in each run; the methods first, since they may fail.
+    /// Makes one rendering in every run. Methods come first, since they may fail.
     void render() {
         for (RunSeries& s : methods_) renderer_.extend(s, 1);
         for (auto& s : unthinned_)
@@ -120,14 +121,15 @@ public:
         for (RunSeries& s : references_) renderer_.extend(s, 1);
     }
     VerifyReport report() const;
-    /// Renders more, as the spread of what is compared tells, until an error of `size` would be found or the time is up.
+    /// Adds renderings until a relative error of `size` would be found or the time is over.
     ///
-    /// Looks at the spread decide when to stop; the difference of the means, which is tested once at the end, has no part
-    /// in it. Of independent normal values the mean and the variance are independent, so the mean at the end is that of
-    /// any other sample of this size [Stein 1945]. The values are means of runs with at least kEnoughContributions each
-    /// side, hence nearly normal. The variance at the end is a little too small, since a small one ends the rendering; as
-    /// there are few looks, each at several times the samples of the one before, this is far below what the degrees of
-    /// freedom allow for (tests/unit/verify/sample_plan_test.cpp has the rate of false alarms).
+    /// The decision to stop depends on the spreads only, not on the difference of the means, which is tested once at
+    /// the end. For independent normal values mean and variance are independent, so the final mean has the same
+    /// distribution as with a fixed number of samples [Stein 1945]. The values are means of runs with at least
+    /// kEnoughContributions on each side, hence nearly normal. The final variance is slightly too small, since a small
+    /// estimate ends the rendering. There are few decisions, each with several times the samples of the previous one,
+    /// so the effect is far smaller than the uncertainty already covered by the degrees of freedom
+    /// (tests/unit/verify/sample_plan_test.cpp measures the rate of false alarms).
     VerifyReport render_until(double size, const SeriesRenderer::Report& progress);
 
 private:
@@ -141,7 +143,7 @@ private:
                                 : kFirstSeconds;
     }
     MethodReport compare(size_t method) const;
-    /// Factors by which references, then methods, are to grow.
+    /// Factors by which the samples of references, then of methods, must grow.
     std::vector<double> growth(const VerifyReport& report, double size) const;
     std::vector<RunSeries*> series() {
         std::vector<RunSeries*> all;

@@ -1,13 +1,13 @@
 #pragma once
-// Statistical evidence that methods are unbiased: their means against those of references, from independent runs; of the
-// image, of its tiles, of path lengths, of classes of paths and of each technique alone. Every comparison is a Welch
-// test; together they raise a false alarm with the stated probability (Šidák).
+// Statistical evidence that methods are unbiased. Means over independent runs are compared with those of references: of
+// the image, its tiles, path lengths, classes of paths and single techniques. Every comparison is a Welch test; Šidák's
+// correction gives all of them together the stated probability of a false alarm.
 //
-// Two sides are compared on the paths that both can make, class by class (see common_classes.h), and that both find often
-// enough for a t-test to hold. What is left out is reported.
+// Two sides are compared on the classes of paths (see common_classes.h) that both can make and sample often enough for
+// a t-test. Classes that are left out are reported.
 //
-// Techniques alone: an unweighted connection has infinite variance where surfaces meet, its second moment being
-// ∝ 1/(shortest edge). So both sides are multiplied by [every edge ≥ δ], with a δ for each path length.
+// Single techniques: an unweighted connection has infinite variance where surfaces meet, since its second moment is
+// ∝ 1/(shortest edge). So both sides are multiplied by [every edge ≥ δ], with one δ per path length.
 
 #include <functional>
 #include <optional>
@@ -21,20 +21,21 @@ namespace etendue {
 struct VerifyOptions {
     int shortest = 1, longest = 8;  ///< Path lengths, in edges.
     int runs = 32;
-    double alpha = 0.01;  ///< Probability of a false alarm, of everything together.
+    double alpha = 0.01;  ///< Probability of a false alarm in all comparisons together.
     SamplerKind sampler = SamplerKind::Sobol;
-    /// Samples per pixel of one run; with `detect` of one of the renderings that a run is the mean of. Without, as many as
-    /// all runs of a method can take in `seconds`.
+    /// Samples per pixel of one run; with `detect` of each of the renderings whose mean a run is. If empty, `seconds`
+    /// determines them.
     std::optional<uint64_t> spp;
-    /// For each method, 30 without. With `detect` for everything, no limit without.
+    /// Time of all runs of one method, 30 if empty. With `detect` the time of the whole verification, unlimited if
+    /// empty.
     std::optional<double> seconds;
-    /// Renders until a relative error of this size, of the image or of a path length that holds at least kLargeShare of
-    /// the light, would be found with a probability of 90 %.
+    /// If given, renders until a relative error of this size in the image, or in a path length with at least
+    /// kLargeShare of the light, would be found with a probability of 90 %.
     std::optional<double> detect;
     uint64_t seed = 0;
-    int threads = 0;  ///< Runs at a time; 0: as many as the machine has cores.
-    int tiles = 4;    ///< Across the image.
-    /// Methods to compare with: the first one, and others for classes of paths that they know much better.
+    int threads = 0;  ///< Number of runs rendered at the same time; 0: one per core.
+    int tiles = 4;    ///< Number of tiles in each direction.
+    /// Methods to compare with: the first one, and the others for classes of paths that they sample much better.
     std::vector<IntegratorSpec> against{{"path", {}}, {"light", {}}};
 };
 
@@ -43,24 +44,24 @@ struct ReferenceImage {
     std::string name;
     std::vector<Rgb> pixels, variance;
     int64_t samples;
-    /// Variance of a mean over pixels, relative to what it were if they were independent; at least 1.
+    /// Ratio of the variance of a mean over pixels to that of independent pixels; at least 1.
     double correlation = 1;
 };
 
-/// Shares of the light: where more than these comes too rarely for a test, other tests lack rare contributions, too, and
-/// cannot be relied on: those of all tiles; the verdict.
+/// Largest shares of the light that may be too rare for a test. Beyond them the other tests lack rare contributions as
+/// well and are not reliable: the tests of tiles, and the verdict.
 inline constexpr double kTooMuchUntested = 0.05, kTooMuchTooRare = 0.1;
-/// Share of the light from which on a path length counts for `detect`.
+/// Share of the light above which a path length counts for `detect`.
 inline constexpr double kLargeShare = 0.02;
-/// Share of the light, and effective contributions, from which on a class of paths is tested on its own. An error of one
-/// class is a large one there and a small one of everything that holds the class.
+/// Share of the light and effective contributions above which a class of paths is tested on its own. An error in one
+/// class is large relative to the class, but small relative to lengths and images that include it.
 inline constexpr double kTestedShare = 1e-3, kEnoughOfClass = 1000;
 
 struct LengthReport {
     int edges = 0;
     float cut_off = 0;  ///< δ
     double share = 0;   ///< Of all light.
-    /// Shares of this length that only one side can make, or that one finds too rarely.
+    /// Shares of the light of this length that one side cannot make, or samples too rarely.
     double out_of_reach = 0, too_rare = 0;
     WelchTest comparison;
 };
@@ -72,7 +73,7 @@ struct ClassReport {
     WelchTest comparison;
 };
 
-/// A class that is not compared: an error there, as large as all its light, could hide.
+/// A class that is not compared; errors up to the size of its light are not detected.
 struct UntestedClass {
     PathClass path_class;
     double share = 0;  ///< Of all light.
@@ -82,12 +83,13 @@ struct UntestedClass {
 
 struct TechniqueReport {
     Technique technique;
-    /// Share of this length that is compared: classes the technique can make, edges ≥ δ, found often enough.
+    /// Share of the light of this length that is compared: of classes that the technique can make and that are sampled
+    /// often enough, with edges ≥ δ.
     double coverage = 0;
     WelchTest comparison;
 };
 
-/// Root mean square error over the pixels of the mean of n runs, the reference's own variance taken out.
+/// Root mean square error of the mean of n runs, without the reference's own variance.
 struct ErrorOfRuns {
     int runs;
     double rmse;
@@ -96,20 +98,20 @@ struct ErrorOfRuns {
 struct MethodReport {
     std::string method;
     Estimator estimator = Estimator::Unbiased;
-    uint64_t spp = 0;  ///< Of one run.
+    uint64_t spp = 0;  ///< Samples per pixel of one run.
     uint64_t rejected = 0;
     double out_of_reach = 0, too_rare = 0;  ///< Shares of the light, as in LengthReport.
     double untested_tiles = 0;     ///< Share of the compared light in tiles that are not tested.
     std::vector<WelchTest> image;  ///< By channel.
-    std::vector<WelchTest> tiles;  ///< Of channel c of tile i: [3 i + c].
+    std::vector<WelchTest> tiles;  ///< Channel c of tile i has index 3 i + c.
     std::vector<LengthReport> lengths;
-    std::vector<ClassReport> classes;     ///< Those that are tested on their own.
-    std::vector<UntestedClass> untested;  ///< By falling share.
+    std::vector<ClassReport> classes;     ///< Classes that are tested on their own.
+    std::vector<UntestedClass> untested;  ///< In decreasing order of share.
     std::vector<TechniqueReport> techniques;
     std::vector<ErrorOfRuns> errors;
-    std::optional<double> slope;  ///< Of log RMSE over log n; -0.5 where nothing is biased.
+    std::optional<double> slope;  ///< Of log RMSE over log n; -0.5 for an unbiased method.
 
-    /// Calls `use(test)` for all that were tested.
+    /// Calls `use(test)` for all comparisons with enough contributions for a test.
     template <class Use>
     void for_each_tested(const Use& use) const {
         const auto if_tested = [&](const WelchTest& t) {
@@ -126,15 +128,14 @@ struct MethodReport {
 enum class Verdict { Consistent, Deviates, Undecided };
 const char* to_string(Verdict verdict);
 
-/// Relative errors of the compared light that would have been found with a probability of 90 %.
+/// Smallest relative errors of the compared light that would have been found with a probability of 90 %. Path lengths
+/// count if at least kLargeShare of the light is within reach.
 struct Detectable {
-    std::optional<double> image;  ///< Nothing where the image was not tested.
-    std::optional<double>
-        length;  ///< Of any length with a large share of the light that was tested.
-    std::vector<int>
-        not_tested;  ///< Lengths with a large share, within reach, that were not tested.
+    std::optional<double> image;   ///< Empty where the image was not tested.
+    std::optional<double> length;  ///< The largest of all tested path lengths.
+    std::vector<int> not_tested;   ///< Path lengths that were not tested.
 
-    /// Whether an error of this size would be found everywhere.
+    /// Whether an error of this size would be found in the image and in every path length.
     bool reaches(double size) const {
         return image && *image <= size && length.value_or(0) <= size && not_tested.empty();
     }
@@ -143,17 +144,17 @@ struct Detectable {
 struct VerifyReport {
     std::string reference;
     int tests = 0;
-    double level = 0;  ///< Of each test.
+    double level = 0;  ///< Significance level of each test.
     std::vector<MethodReport> methods;
 
-    /// Undecided where less than nine tenths of the light could be compared.
+    /// Undecided where too much light is too rare for a test (kTooMuchTooRare).
     Verdict verdict(const MethodReport& method) const;
     bool deviates(const WelchTest& t) const { return t.is_tested() && t.p < level; }
     Detectable detectable(const MethodReport& method) const;
 };
 
-/// `progress` gets a line of text now and then, from one thread at a time. Throws std::runtime_error where a method's
-/// parameters are wrong, and whatever a rendering throws.
+/// `progress` receives lines of text, from one thread at a time. Throws std::runtime_error where a method's parameters
+/// are invalid, and rethrows exceptions of renderings.
 VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& methods,
                     const VerifyOptions& options,
                     const std::optional<ReferenceImage>& reference = {},

@@ -6,23 +6,24 @@
 namespace etendue {
 
 struct WelchTest {
-    /// Effective contributions (see Tally::effective_count()) that a t-test needs on either side.
+    /// Effective contributions (see Tally::effective_count()) that a t-test needs on each side.
     static constexpr double kEnoughContributions = 200;
-    /// What rounding may do to a mean, relative.
+    /// Relative error of a mean that is attributed to rounding in single precision.
     static constexpr double kRounding = 1e-4;
 
-    Moments method, reference;   ///< Over independent runs.
-    double effective_count = 0;  ///< Of the side that has fewer.
+    Moments method, reference;  ///< Over independent runs.
+    double effective_count =
+        0;  ///< Of the side with fewer contributions; below kEnoughContributions nothing is tested.
     double p = 1;
 
-    /// `effective_count` 0: no test.
+    /// Welch's test of the two means, with the tolerance kRounding.
     static WelchTest of(const Moments& method, const Moments& reference, double effective_count);
 
     bool is_tested() const;
     double ratio() const { return method.mean() / reference.mean(); }
     /// Standard error of the ratio.
     double ratio_error() const;
-    /// Relative error that a test at this level finds with a probability of 90 %.
+    /// Smallest relative error that a test at this significance level finds with a probability of 90 %.
     double detectable(double level) const;
 };
 

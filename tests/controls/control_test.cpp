@@ -1,5 +1,5 @@
-// What verify() says of code with a planted error, and of the same scenes without one. Which error is in the program
-// that runs is decided by CMakeLists.txt.
+// Results of verify() for code with a planted error, and for the same scenes without one. CMakeLists.txt determines
+// which error each program contains.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -13,15 +13,15 @@ namespace {
 
 constexpr int kSize = 16;
 
-/// Where an error shows.
+/// Parts of the report in which an error is found.
 enum Part : unsigned { Image = 1, Lengths = 2 /* and classes */, Techniques = 4, Densities = 8 };
 
 struct Planted {
     const char* name;
     std::string xml;
     std::string method;
-    unsigned shows;  ///< Parts that must find it.
-    unsigned clear;  ///< Parts that must not: the error is none to them.
+    unsigned must_find;      ///< Parts that must find it.
+    unsigned must_not_find;  ///< Parts that must not find it, since they are not affected.
     uint64_t spp = 64;
 };
 void PrintTo(const Planted& p, std::ostream* out) {
@@ -37,7 +37,7 @@ std::string large_lamp() {
                                               "value=\"2,2,2\"/></emitter>");
 }
 
-/// Light that begins in glass: elsewhere the η² of two refractions cancel.
+/// A lamp inside glass; for lamps outside, the η² of two refractions cancel.
 std::string lamp_in_glass() {
     return sphere("0,0,0", "0.6", kRoughGlass) +
            sphere("0,0,0", "0.3",
@@ -70,7 +70,7 @@ std::string smooth_mesh() {
            diffuse("0.8,0.6,0.4") + "</shape>";
 }
 
-/// A camera that sees nothing but a sphere, which fills little of the neighbourhoods about it.
+/// A camera that sees only a sphere, which covers a small part of the neighbourhoods around it.
 std::string small_sphere() {
     return sensor("0,0,3.4", "0,0,0", kSize, "1.4") +
            sphere("0,0,0", "0.06", diffuse("0.9,0.9,0.9"));
@@ -78,7 +78,7 @@ std::string small_sphere() {
 
 std::vector<Planted> planted() {
     const std::string lit_room = front_camera(kSize) + room() + area_lamp();
-    // Records know little of what lies behind a wall; with the choices of the paper.
+    // Records have little information about vertices behind a wall; parameters are those of the paper.
     const std::string by_paper =
         "pcbpt:roulette=0,record_fraction=0.02,direct=stored,uniform=0.1,pmf=contribution";
     const std::string divided_room =
@@ -86,7 +86,7 @@ std::vector<Planted> planted() {
                              "<translate x=\"-0.1\" y=\"-0.2\"/>",
                              diffuse("0.7,0.7,0.7"));
     const std::string softly_lit = front_camera(kSize) + room() + large_lamp();
-    // Light that a glass ball gathers on the floor, from a lamp that eye paths hit often enough.
+    // A caustic of a glass ball on the floor, from a lamp that eye paths hit often enough.
     const std::string by_glass = softly_lit + sphere("0,-0.2,0.1", "0.45", kGlass);
     return {
         {"EtaSquared", front_camera(kSize) + room() + lamp_in_glass(), "light",
@@ -120,7 +120,7 @@ std::vector<Planted> planted() {
     };
 }
 
-/// What was found, with a text that says what.
+/// The parts that found an error, with descriptions.
 struct Findings {
     unsigned parts = 0;
     std::string text;
@@ -159,7 +159,7 @@ Findings findings(const Planted& planted, SamplerKind sampler) {
                   fmt::format("s = {}, t = {}: {:.4f} ± {:.4f}", t.technique.s, t.technique.t,
                               t.comparison.ratio(), t.comparison.ratio_error()));
     EXPECT_GE(report.tests, 40) << "hardly anything was tested";
-    if ((planted.shows | planted.clear) & Densities)
+    if ((planted.must_find | planted.must_not_find) & Densities)
         for (const DensityTest& d : test_sample_densities(scene, planted.method))
             found.add(Densities, d.deviates,
                       fmt::format("density of s = {}, t = {}: {:.4f}", d.technique.s, d.technique.t,
@@ -172,8 +172,8 @@ class NoError : public ::testing::TestWithParam<std::tuple<Planted, SamplerKind>
 
 TEST_P(Control, IsFound) {
     const Findings found = findings(GetParam(), SamplerKind::Independent);
-    EXPECT_EQ(found.parts & GetParam().shows, GetParam().shows) << found.text;
-    EXPECT_EQ(found.parts & GetParam().clear, 0u) << found.text;
+    EXPECT_EQ(found.parts & GetParam().must_find, GetParam().must_find) << found.text;
+    EXPECT_EQ(found.parts & GetParam().must_not_find, 0u) << found.text;
     RecordProperty("found", found.text);
 }
 
@@ -192,8 +192,8 @@ INSTANTIATE_TEST_SUITE_P(Planted, Control, ::testing::ValuesIn(planted()),
                          [](const auto& p) { return std::string(p.param.name); });
 INSTANTIATE_TEST_SUITE_P(Clean, NoError,
                          ::testing::Combine(::testing::ValuesIn(planted()), kSamplers), kName);
-// Two roulettes of one pair, which need numbers of their own. With few samples the rare joins that roulette spares are
-// missing from some tile, and Sobol' points leave too little other noise to hide that.
+// Two roulettes of one pair, which need separate random numbers. With few samples, the rare joins that survive roulette
+// are missing from some tiles, and Sobol' points leave too little other noise to hide this.
 INSTANTIATE_TEST_SUITE_P(
     CleanPairs, NoError,
     ::testing::Combine(::testing::Values(Planted{

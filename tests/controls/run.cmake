@@ -1,5 +1,5 @@
 # Builds the control TARGET in the build folder BUILD, then runs its PROGRAM with the one test FILTER.
-file(LOCK ${BUILD}/controls.lock GUARD PROCESS)  # Two builds at once would disturb each other.
+file(LOCK ${BUILD}/controls.lock GUARD PROCESS)  # Two concurrent builds would interfere.
 execute_process(COMMAND ${CMAKE_COMMAND} --build ${BUILD} --target ${TARGET}
                 RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
 file(LOCK ${BUILD}/controls.lock RELEASE)

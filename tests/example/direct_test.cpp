@@ -1,4 +1,4 @@
-// The integrator of docs/adding-an-integrator.md does what the page says.
+// The integrator of docs/adding-an-integrator.md works as described there.
 
 #include <cstring>
 #include <string>

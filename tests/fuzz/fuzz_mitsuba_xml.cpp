@@ -1,6 +1,5 @@
-// Any bytes as a Mitsuba scene: a description or a SceneError, nothing else, and no file is
-// touched. The included files are the text itself and a spectrum, so that these elements are
-// reached, too.
+// Any bytes as a Mitsuba scene: the result must be a description or a SceneError, and no file is accessed. Included
+// files are the text itself and a spectrum, so that these elements are reached as well.
 
 #include <cstdint>
 #include <string_view>

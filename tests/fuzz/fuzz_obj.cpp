@@ -1,4 +1,4 @@
-// Any bytes as an .obj file: a mesh or a SceneError, nothing else.
+// Any bytes as an .obj file: the result must be a mesh or a SceneError.
 
 #include "readers/obj.h"
 

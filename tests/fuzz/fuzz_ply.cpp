@@ -1,4 +1,4 @@
-// Any bytes as a .ply file: a mesh or a SceneError, nothing else.
+// Any bytes as a .ply file: the result must be a mesh or a SceneError.
 
 #include "readers/ply.h"
 

@@ -1,5 +1,5 @@
-// Any bytes as a .serialized file, and as the contents of a well-formed one (which mutations of
-// compressed data would hardly ever reach): a mesh or a SceneError, nothing else.
+// Any bytes as a .serialized file, and as the uncompressed contents of a well-formed one, which mutations of compressed
+// data rarely reach: the result must be a mesh or a SceneError.
 
 #include <zlib.h>
 

@@ -1,4 +1,4 @@
-// `etendue compare` from its command line: what it writes, and what it refuses.
+// The command line of `etendue compare`: its output, and refused input.
 
 #include <filesystem>
 #include <fstream>
@@ -38,7 +38,7 @@ protected:
     fs::path report = folder.path() / "report";
 };
 
-TEST_F(CompareTest, JudgesInnerPathsAlone) {
+TEST_F(CompareTest, ComparesInnerPathsOnly) {
     const ProgramResult r =
         run({scene, "--methods", "bdpt", "pcbpt:direct=next_event", "--spp", "4", "--reference-spp",
              "64", "--resolution", "32x24", "--paths", "inner", "--techniques-max-depth", "2"});
@@ -51,14 +51,14 @@ TEST_F(CompareTest, JudgesInnerPathsAlone) {
     EXPECT_FALSE(fs::exists(report / "cornell/bdpt-techniques/length02_s02_t01.png"));
 }
 
-TEST_F(CompareTest, RefusesInnerPathsOfOtherWeights) {
+TEST_F(CompareTest, RefusesInnerPathsWithDifferentWeights) {
     expect_refusal(
         {scene, "--methods", "bdpt", "pcbpt:direct=both", "--spp", "1", "--paths", "inner"},
-        "\"pcbpt:direct=both\" weighs its techniques otherwise than \"bdpt");
+        "\"pcbpt:direct=both\" weights its techniques differently than the reference \"bdpt");
     expect_refusal({scene, "--methods", "bdpt", "--spp", "1", "--paths", "outer"}, "outer");
 }
 
-TEST_F(CompareTest, JudgesPathsOfGivenLengths) {
+TEST_F(CompareTest, ComparesPathsOfGivenLengths) {
     const auto mean = [&](const std::string& lengths) {
         const ProgramResult r =
             run({scene, "--methods", "bdpt", "--spp", "64", "--reference-spp", "256",
@@ -124,7 +124,7 @@ TEST_F(CompareTest, WritesAReport) {
         EXPECT_EQ(page.find(outside), std::string::npos) << outside;
 }
 
-TEST_F(CompareTest, TakesAReferenceAndSeveralScenes) {
+TEST_F(CompareTest, ReadsReferencesForSeveralScenes) {
     const fs::path image = folder.path() / "image.exr";
     ASSERT_EQ(Program(ETENDUE_PROGRAM,
                       {"render", scene, "-o", image.string(), "--spp", "4", "--resolution", "16x16",
@@ -159,7 +159,7 @@ TEST_F(CompareTest, RefusesBadCommandLines) {
     expect_refusal({scene, "--methods", "path", "--spp", "1", "--runs", "0"}, "runs");
     expect_refusal({scene, "--methods", "path", "--spp", "1", "--reference", none}, "none.exr");
     expect_refusal({scene, "--methods", "path", "--spp", "1", "--reference", none, none},
-                   "one image a scene");
+                   "one image per scene");
     expect_refusal(
         {scene, "--methods", "path", "--spp", "1", "--reference", none, "--reference-time", "1"},
         "--reference-time");

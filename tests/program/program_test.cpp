@@ -1,4 +1,4 @@
-// The program from its command line: what it refuses and how it says so, what it leaves alone, what it writes.
+// The program's command line: refused input and its messages, files that must not change, and output.
 
 #include <algorithm>
 #include <filesystem>
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 const fs::path kBroken = fs::path(ETENDUE_SOURCE_DIR) / "tests/scenes/broken";
 
-/// A small scene with a lamp, of `more` and film parameters.
+/// A small scene with a lamp, further objects `more`, and film parameters.
 std::string scene_text(const std::string& more = "") {
     return "<scene version=\"3.0.0\"><default name=\"size\" value=\"16\"/><integrator "
            "type=\"path\"/><sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/>"
@@ -40,7 +40,7 @@ protected:
         return Program(ETENDUE_PROGRAM, arguments, folder.path()).wait();
     }
 
-    /// The program must fail with one line that contains `message`, and leave the image of an earlier run as it is.
+    /// The program must fail with one line that contains `message`, and must not change the image of an earlier run.
     void expect_refusal(std::vector<std::string> arguments, const std::string& message) const {
         SCOPED_TRACE(fmt::format("etendue {}", fmt::join(arguments, " ")));
         write(image, "an earlier picture");
@@ -62,7 +62,7 @@ protected:
     fs::path scene = folder.path() / "scene.xml", image = folder.path() / "image.exr";
 };
 
-/// What the file's `<!-- expect: ... -->` says; empty without one.
+/// The text of `<!-- expect: ... -->` in the file; empty without one.
 std::string expected_message(const fs::path& file) {
     const std::string text = read_text(file), mark = "<!-- expect: ";
     const size_t begin = text.find(mark);
@@ -162,7 +162,7 @@ TEST_F(ProgramTest, RefusesOutputsThatCannotBeWritten) {
         "folder.exr");
 }
 
-TEST_F(ProgramTest, ReadsImagesOnlyIfTheyAre) {
+TEST_F(ProgramTest, RefusesFilesThatAreNotImages) {
     const std::string s = scene.string(), none = (folder.path() / "none.exr").string();
     for (const auto& arguments : {std::vector<std::string>{"diff", s, s},
                                   {"diff", none, none},
@@ -189,7 +189,7 @@ TEST_F(ProgramTest, WritesImageWithLayersAndMetadataAndStatistics) {
     for (const char* layer : {"", "albedo", "normal", "depth", "variance"})
         EXPECT_NE(std::find(layers.begin(), layers.end(), layer), layers.end())
             << "layer \"" << layer << "\"";
-    // The sphere fills the middle: grey, turned to the camera, three units away.
+    // The sphere is in the centre: grey, facing the camera, at distance 3.
     const size_t middle = 12 * 6 + 6;
     EXPECT_NEAR(rgb_pixels(out, "albedo")[middle].r, 0.5f, 0.01f);
     EXPECT_NEAR(rgb_pixels(out, "depth")[middle].r, 3, 0.1f);
@@ -247,6 +247,18 @@ TEST_F(ProgramTest, WritesEveryFormat) {
     }
 }
 
+TEST_F(ProgramTest, DiffIgnoresTheCaseOfExtensions) {
+    const std::string a = (folder.path() / "a.EXR").string(),
+                      map = (folder.path() / "map.PNG").string();
+    write_image(a, rgb_image(2, 1, std::vector<Rgb>{Rgb(1), Rgb(0.5f)}));
+    const ProgramResult r = run({"diff", a, a, "--map", map});
+    ASSERT_EQ(r.status, 0) << r.errors;
+    EXPECT_NE(r.output.find("FLIP (HDR)"), std::string::npos) << r.output;
+    // False colours: no error is nearly black, but has some blue.
+    const std::vector<Rgb> pixels = read_rgb(map).pixels;
+    EXPECT_GT(pixels.at(0).b, pixels.at(0).r);
+}
+
 TEST_F(ProgramTest, WritesTechniqueImages) {
     const fs::path techniques = folder.path() / "techniques";
     const ProgramResult r =
@@ -271,7 +283,7 @@ TEST_F(ProgramTest, EndsWithAnImageWhenInterrupted) {
         ETENDUE_PROGRAM,
         {"render", scene.string(), "-o", image.string(), "--time", "60", "--stats", stats.string()},
         folder.path());
-    // The first line of progress says that a pass is made.
+    // The first line of progress is printed after the first pass.
     for (int i = 0; i < 1000 && program.errors().find("spp") == std::string::npos; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     program.interrupt();
@@ -283,8 +295,8 @@ TEST_F(ProgramTest, EndsWithAnImageWhenInterrupted) {
     EXPECT_EQ(nlohmann::json::parse(read_text(stats))["stopped_by"], "interrupted");
 }
 
-// That limits are held, and that images do not depend on threads, is tested with the renderer (tests/statistical).
-TEST_F(ProgramTest, PassesItsLimitsOn) {
+// The renderer's own tests (tests/statistical) check that limits are met and that images do not depend on threads.
+TEST_F(ProgramTest, AppliesLimits) {
     const fs::path stats = folder.path() / "stats.json";
     for (const auto& [option, value, reason] : {std::array{"--spp", "3", "samples"},
                                                 {"--time", "0.1", "time"},
@@ -315,7 +327,7 @@ TEST_F(ProgramTest, VerifiesMethods) {
     EXPECT_EQ(j["methods"][2]["lengths"].size(), 4u);
     EXPECT_GT(j["tests"], 20);
 
-    // A picture of this scene, and one whose lamp is another.
+    // An image of this scene, and one of a scene with another lamp.
     const auto picture = [&](const std::string& name, const std::string& more) {
         const fs::path other = folder.path() / (name + ".xml");
         write(other, scene_text(more));
@@ -346,7 +358,7 @@ TEST_F(ProgramTest, VerifiesMethods) {
              {{"--against", "path", "--reference", same}, "--reference"},
              {{"--detect", "0.5%", "--reference", same}, "--reference"},
              {{"--detect", "0.5 percent"}, "--detect must be a share"},
-             {{"--sampler", "random"}, "--sampler is \"random\""},
+             {{"--sampler", "random"}, "--sampler must be independent or sobol, but is \"random\""},
              {{"--time", "1"}, "--time and --spp exclude each other"}}) {
         const ProgramResult refused = with(arguments);
         EXPECT_TRUE(refused.status == 1 || refused.status == 2) << refused.status;
@@ -355,7 +367,7 @@ TEST_F(ProgramTest, VerifiesMethods) {
     }
 }
 
-TEST_F(ProgramTest, TellsAboutItselfAndItsScenes) {
+TEST_F(ProgramTest, PrintsHelpVersionListsAndInfo) {
     for (const auto& arguments : {std::vector<std::string>{"--help"},
                                   {"--version"},
                                   {"list"},

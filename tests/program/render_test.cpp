@@ -1,4 +1,4 @@
-// `render` where something goes wrong: files that cannot be written, passes that fail, interrupts.
+// Failures of `render`: files that cannot be written, passes that fail, interrupts.
 
 #include <algorithm>
 #include <chrono>
@@ -26,7 +26,7 @@ protected:
         std::vector<std::string> all = {"render", scene,     "-o",           image,  "--stats",
                                         stats,    "--quiet", "--resolution", "16x16"};
         for (const std::string& a : arguments) {
-            // The last of several counts for no option, so that these are replaced.
+            // Options must not be repeated, so the default is replaced.
             const auto given = std::find(all.begin(), all.end(), a);
             if (given != all.end() && a.starts_with("-"))
                 all.erase(given, given + 1 + (a != "--quiet"));
@@ -92,7 +92,7 @@ TEST_F(RenderTest, RefusesCropsAndSizesThatCannotBe) {
     }
 }
 
-/// A limit of memory that pass 0 holds but not every pass.
+/// A memory limit that pass 0 meets, but a later pass exceeds.
 TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
     const auto vcm = [&](int light_paths, int spp, int seed) {
         std::ofstream(image) << kEarlier;
@@ -104,7 +104,7 @@ TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
         const int light_paths = (fits + fails) / 2;
         (vcm(light_paths, 1, 0).status == 0 ? fits : fails) = light_paths;
     }
-    // In the first pass: nothing is written.
+    // A failure in the first pass: nothing is written.
     const ProgramResult first = vcm(fails, 4, 0);
     EXPECT_EQ(first.status, 1);
     EXPECT_TRUE(has_earlier_image());
@@ -126,7 +126,7 @@ TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
         EXPECT_EQ(j["stopped_by"], "failure");
         EXPECT_NE(j["failure"].get<std::string>().find("MiB"), std::string::npos);
         EXPECT_EQ(j["pass_seconds"].size(), size_t(passes));
-        // It is the image of so many passes.
+        // The image is that of the passes before the failure.
         const std::vector<float> pixels = read_image(image).data;
         ASSERT_EQ(vcm(fits, passes, seed).status, 0);
         EXPECT_EQ(read_image(image).data, pixels);
@@ -180,7 +180,7 @@ TEST_F(InterruptTest, ThePassIsDroppedAfterTheGrace) {
 TEST_F(InterruptTest, ThePassesBeforeTheDroppedOneAreWritten) {
     const Program program = start({"-i", "bdpt", "--resolution", "300x200", "--threads", "1",
                                    "--time", "600", "--grace", "0"});
-    // A pass and more: each takes part of a second.
+    // Long enough for more than one pass; each takes a fraction of a second.
     wait_for_start(program);
     wait(4);
     program.interrupt();

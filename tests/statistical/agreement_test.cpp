@@ -1,5 +1,5 @@
-// The integrators agree with path tracing, tile by tile. Every scene has only light that path tracing finds too: no
-// emitter without extent lies in view or behind mirrors and glass.
+// The integrators agree with path tracing, tile by tile. Path tracing can sample all paths of these scenes: no delta
+// emitter is visible directly or through mirrors and glass.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -65,7 +65,7 @@ const std::string kTinted =
     "type=\"homogeneous\" name=\"interior\">"
     "<rgb name=\"sigma_t\" value=\"0.5,1.5,4\"/><float name=\"albedo\" value=\"0\"/></medium>";
 
-/// Vertex normals that are far from the faces': an icosahedron shaded as a sphere.
+/// Vertex normals that differ much from face normals: an icosahedron shaded like a sphere.
 std::string smooth_mesh(const std::string& bsdf) {
     return "<shape type=\"obj\"><string name=\"filename\" value=\"" ETENDUE_SOURCE_DIR
            "/tests/scenes/icosahedron.obj\"/>"
@@ -87,7 +87,7 @@ std::vector<AgreementCase> cases() {
         {"point", front + room() + two + point_light("0.4,0.8,3.6", "30,20,10"), false},
         {"point_on_diffuse", front + room() + point_light("0.4,0.8,3.6", "30,20,10"), true},
         {"spot", front + room() + two + kSpot, true},
-        // Light tracing alone shows rough glass before an environment by rare bright splats: too few for a t-test.
+        // Light tracing samples rough glass in front of an environment by rare bright splats, too few for a t-test.
         {"constant", front + room() + two + environment("3,2,1"), false},
         {"constant_on_diffuse", front + room() + environment("3,2,1"), true},
         {"directional", front + room() + two + kSun, true},
@@ -117,8 +117,8 @@ std::vector<AgreementCase> cases() {
 
 class Agreement : public ::testing::TestWithParam<AgreementCase> {
 protected:
-    /// `path` finds the lamp through rough glass by few bright samples, and means of few of them are no normal variables:
-    /// it has `path_factor` times as many.
+    /// `path` has `path_factor` times as many samples: it finds the lamp through rough glass by few bright samples,
+    /// whose mean would not be normally distributed otherwise.
     void expect_agreement(uint64_t factor, uint64_t path_factor) {
         const AgreementCase& c = GetParam();
         const Scene scene = build(c.xml);
@@ -139,7 +139,7 @@ protected:
 };
 class LongAgreement : public Agreement {};
 
-/// Every choice of gathers is as unbiased as the default.
+/// All parameters of gathers give unbiased methods.
 TEST(GatherChoices, AgreeWithPathTracing) {
     const Scene scene = build(mixed_room(front_camera(kSize)));
     const Tiles path = render_tiles(scene, "path", {400, 4, 1});

@@ -1,4 +1,4 @@
-// Scenes whose image is known in closed form, by every integrator that can render them.
+// Scenes whose image is known in closed form, rendered by every integrator that can.
 
 #include <functional>
 
@@ -42,7 +42,7 @@ std::string camera_above(const std::string& type, float half) {
            size + "\"/><integer name=\"height\" value=\"" + size +
            "\"/><rfilter type=\"box\"/></film></sensor>";
 }
-/// Point of z = 0 that the film point shows. Looking down -z with y up, x of the world grows to the right of the film.
+/// The point of z = 0 at a film point. With the view along -z and y up, x increases to the right of the film.
 Vec3 on_plane(float half, float x, float y) {
     return {half * (2 * x / kSize - 1), half * (1 - 2 * y / kSize), 0};
 }
@@ -108,7 +108,7 @@ INSTANTIATE_TEST_SUITE_P(
         FurnaceCase{"thinlens", furnace("sphere", "thinlens",
                                         "<float name=\"aperture_radius\" value=\"0.2\"/><float "
                                         "name=\"focus_distance\" value=\"0.7\"/>")},
-        // What neither absorbs nor emits cannot be seen in a furnace.
+        // A lossless object that does not emit is invisible in a furnace.
         FurnaceCase{"glass", furnace("sphere") + sphere("-0.4,0,0.2", "0.3", kGlass), false},
         FurnaceCase{
             "mirror",
@@ -210,7 +210,7 @@ TEST_P(OverFloor, SphereLamp) {
         0.03);
 }
 
-/// A strong light, and one of a hundredth of its power beside the view, so near to the floor that it shows.
+/// A strong light, and one with a hundredth of its power that is close enough to the floor to be noticeable.
 TEST_P(OverFloor, PointLightsOfUnequalPower) {
     const auto light = [](const char* position, const char* intensity) {
         return fmt::format("<emitter type=\"point\"><point name=\"position\" value=\"{}\"/><rgb "
@@ -242,7 +242,7 @@ INSTANTIATE_TEST_SUITE_P(Cameras, OverFloor,
 
 class InOtherUnits : public ::testing::TestWithParam<const char*> {};
 
-/// The same picture 10⁴ units away, where positions are known to 0.001.
+/// The same image 10⁴ units from the origin, where positions are rounded to 0.001.
 TEST_P(InOtherUnits, FarFromTheOrigin) {
     const auto moved = [](float x, float y, float z) {
         return fmt::format("{},{},{}", 10000 + x, -20000 + y, 5000 + z);
@@ -296,7 +296,8 @@ TEST(ClosedForm, EnvironmentOnDiffuseSphere) {
         0.07);
 }
 
-/// Nothing but the environment, from behind a small sphere: every technique that a sensor has not must not be weighed.
+/// Only the environment, and a small sphere behind the camera. MIS weights must not count techniques that the sensor
+/// does not support.
 TEST(ClosedForm, EnvironmentSeenDirectly) {
     for (const char* type : {"perspective", "orthographic", "thinlens"}) {
         const Scene scene =
@@ -319,7 +320,7 @@ TEST(ClosedForm, EnvironmentOnMirror) {
 
 // ---- Transmission.
 
-/// exp(-σ d) through matter without surfaces, (1-F)² e^{-σd} / (1 - F² e^{-2σd}) through a slab of glass.
+/// exp(-σ d) through a medium without surfaces, (1-F)² e^{-σd} / (1 - F² e^{-2σd}) through a slab of glass.
 TEST(ClosedForm, AbsorbingSlab) {
     const Vec3 sigma{0.2f, 1.0f, 3.0f};
     const Rgb Tr{std::exp(-0.5f * sigma.x), std::exp(-0.5f * sigma.y), std::exp(-0.5f * sigma.z)};
@@ -360,7 +361,7 @@ TEST(ClosedForm, MaskBeforeEmitter) {
         0.045);
 }
 
-/// Matter in a box that has no surface of its own, or half a one, before an emitter and over a lit floor.
+/// A medium in a box with a `null` or half-opaque `mask` surface, in front of an emitter and over a lit floor.
 TEST(ClosedForm, AbsorptionBehindOpenBoundaries) {
     const Rgb sigma{0.2f, 1, 3};
     const auto absorbed = [&](float distance) { return exp(sigma * -distance); };
@@ -392,7 +393,7 @@ TEST(ClosedForm, AbsorptionBehindOpenBoundaries) {
         expect_image(
             emitter, all, 2048, [&](float, float) { return Rgb(3, 2, 1) * absorbed(0.5f) * pass; },
             0.045);
-        // Amid the matter, which it names as its exterior.
+        // Inside the medium, which is its exterior.
         const Scene inside = build(camera_above("orthographic", 0.5f) + box(b.bsdf) +
                                    rectangle("<scale value=\"3\"/><translate z=\"1\"/>",
                                              lambert(Rgb(0)) + matter("exterior") +
@@ -415,8 +416,8 @@ TEST(ClosedForm, AbsorptionBehindOpenBoundaries) {
     }
 }
 
-/// Directional light through a glass plate onto the floor, seen from between them: only light paths find it. Paths of the
-/// fewest edges, so that nothing is reflected to and fro.
+/// Directional light through a glass plate onto the floor, seen from below the plate: only light paths sample it. Path
+/// lengths are limited to the shortest, without interreflection.
 TEST(ClosedForm, DirectionalLightThroughGlass) {
     const std::string light =
         "<emitter type=\"directional\"><vector name=\"direction\" value=\"0.6,0,-0.8\"/><rgb "

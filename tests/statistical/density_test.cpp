@@ -1,4 +1,4 @@
-// Each technique makes as many samples, and where, as its weights claim.
+// The samples of each technique have the density that its MIS weights assume.
 
 #include "sample_densities.h"
 #include "test_scenes.h"
@@ -16,8 +16,8 @@ void PrintTo(const Densities& d, std::ostream* out) {
     *out << d.name;
 }
 
-/// Light leaves through smooth glass: all densities but those of hits are of paths with a refraction, and the lamp's
-/// distance to the glass is not that of the glass to what it lights.
+/// A lamp behind smooth glass: all paths except those of hits have a refraction, with different distances on both sides
+/// of the glass.
 std::string lamp_in_glass() {
     return front_camera(16) + room() + sphere("0.1,-0.2,0.3", "0.6", kGlass) +
            sphere("0.1,-0.2,0.3", "0.45",

@@ -11,7 +11,7 @@
 namespace etendue::test {
 namespace {
 
-/// Two tent pixels' reach, so that splats of many light paths meet in each pixel; several chunks of work.
+/// A tent filter with a radius of two pixels, so that splats of many light paths overlap; several chunks of work.
 Scene scene_with_tent() {
     std::string camera = lens_camera(40);
     const std::string box = "<rfilter type=\"box\"/>";

@@ -22,8 +22,8 @@ std::string lit_floor(const std::string& film) {
 
 class Filters : public ::testing::TestWithParam<const char*> {};
 
-/// Eye paths drawn from the filter and splats weighted with it estimate one image, up to the border, where the filter
-/// reaches over it, and in a crop as in the whole. Every pixel is a tile.
+/// Eye paths sampled from the filter and splats weighted with it estimate the same image, also at the border and in a
+/// crop. Every pixel is a tile.
 TEST_P(Filters, OfEyePathsAndSplatsAgree) {
     const std::string filter = fmt::format("<rfilter type=\"{}\"/>", GetParam());
     const Scene scene = build(lit_floor(filter));
@@ -57,8 +57,8 @@ INSTANTIATE_TEST_SUITE_P(All, Filters,
 
 class ErrorEstimates : public ::testing::TestWithParam<const char*> {};
 
-/// Film::error() against the spread of 40 images, with I from their mean. Means of both over the runs are compared;
-/// they may differ by the bias of 1/(I² + …) where I is that of one run.
+/// Compares the mean of Film::error() with the spread of 40 images, where I is their mean. The two may differ by the
+/// bias of 1/(I² + …) with I of a single run.
 TEST_P(ErrorEstimates, EqualTheTrueError) {
     const Scene scene = build(front_camera(12) + room() + "<emitter type=\"constant\"/>");
     constexpr int kRuns = 40, kPasses = 64;

@@ -1,4 +1,4 @@
-// Density estimates: where they are exact, and that their bias falls with the radius.
+// Density estimates: exact cases, and the decrease of their bias with the radius.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -11,10 +11,10 @@ namespace {
 
 constexpr int kSize = 8;
 
-// ---- Where a disc is the truth.
+// ---- Cases where the disc is exact.
 
-/// A closed sphere of albedo ½ that emits L_e = 1. A ball around a point of a sphere cuts off a cap of area π r²; and the
-/// density of a diffuse event is the same everywhere, so that even the disc's approximation of p_c is exact.
+/// A closed sphere of albedo ½ that emits L_e = 1. A ball around a point of a sphere cuts off a cap of area π r²; and
+/// the density of a diffuse event is the same everywhere, so that even the disc's approximation of p_c is exact.
 Scene furnace() {
     return build(
         sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kSize, "70") +
@@ -114,7 +114,7 @@ TEST(PhotonBias, OfAnEdgeIsProportionalToTheRadius) {
         }
 }
 
-// ---- Where it is an approximation.
+// ---- Cases where the disc is an approximation.
 
 struct ApproximationCase {
     const char *name, *reference;
@@ -151,7 +151,7 @@ std::vector<ApproximationCase> cases() {
          front + room() + area_lamp() + point + sphere("0,-0.4,0", "0.5", kRoughMetal) +
              "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>",
          "", "", 512, 0.22},
-        // Light that reaches a glossy surface by delta events alone, from a point.
+        // Light from a point that reaches a glossy surface by delta events only.
         {"glossy_behind_glass", "light",
          front + rectangle("<scale value=\"2\"/><rotate x=\"1\" angle=\"-50\"/>", glossy) +
              rectangle("<scale value=\"1.4\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"2\"/>",
@@ -200,8 +200,8 @@ std::vector<Rgb> image(const Scene& scene, const std::string& integrator, uint64
     return variance ? renderer.film().variance() : renderer.film().image();
 }
 
-/// Before the eye paths come round again it is stochastic progressive photon mapping; afterwards what needs no light
-/// stays the same.
+/// Before the eye paths repeat, it is stochastic progressive photon mapping; afterwards contributions that need no
+/// light paths stay the same.
 TEST(ProgressivePhotonMapping, RepeatsItsEyePaths) {
     const Scene room_scene = build(front_camera(16) + room() + area_lamp());
     EXPECT_EQ(image(room_scene, "ppm:eye_paths=5", 5), image(room_scene, "sppm", 5));

@@ -1,4 +1,4 @@
-// Roulette before shadow rays is at work wherever it is a parameter.
+// Russian roulette before shadow rays has an effect in every integrator that has the parameter.
 
 #include <algorithm>
 #include <string>

@@ -1,5 +1,5 @@
-// Every technique alone. In a closed diffuse sphere that emits L_e the paths of k edges bring L_e ρ^(k-1) to every pixel,
-// whichever technique makes them; G is constant there, so that no connection has infinite variance.
+// Every technique alone. In a closed diffuse sphere that emits L_e, paths of k edges contribute L_e ρ^(k-1) to every
+// pixel for every technique; G is constant there, so that no connection has infinite variance.
 
 #include <map>
 #include <tuple>
@@ -62,13 +62,13 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         for (const TechniqueImages::Entry& e : renderer.techniques()->images()) {
             const Technique& q = e.technique;
             Moments& m = alone[{q.strategy, q.s, q.t}];
-            while (m.count() < run) m.add(0);  // runs in which it made nothing
+            while (m.count() < run) m.add(0);  // runs without contributions
             m.add(mean(e.unweighted));
             length_sum[q.vertices() - 1] += mean(e.weighted);
             for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
         }
         for (const auto& [length, value] : length_sum) together[length].add(value);
-        // The weighted images are the picture's parts.
+        // The weighted images sum to the image.
         const std::vector<Rgb> image = renderer.film().image();
         for (size_t i = 0; i < sum.size(); ++i)
             ASSERT_NEAR(sum[i].g, image[i].g, 1e-4f * image[i].g) << "pixel " << i;
@@ -85,7 +85,7 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
                           (both && k >= 2);
     EXPECT_EQ(alone.size(), expected_count) << "a technique made nothing";
     const double level = sidak(0.01, int(alone.size() + together.size()));
-    // Few light paths meet the lens.
+    // Few light paths hit the lens.
     const auto expect_mean = [&](const Moments& m, int length, bool is_rare,
                                  const std::string& what) {
         const double exact = std::pow(0.5, length - 1);
@@ -104,7 +104,7 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
         expect_mean(m, length, false, fmt::format("length {}, weighted", length));
 }
 
-/// An image of some paths alone is the sum of their techniques' parts of the whole.
+/// An image of selected paths is the sum of the weighted images of their techniques.
 TEST(PathSelection, ImagesAreTheSumOfTheirTechniques) {
     const Scene scene = build(front_camera(kSize) + room() + area_lamp());
     const auto render = [&](const PathSelection& shown) {

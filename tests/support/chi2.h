@@ -34,8 +34,8 @@ inline double gamma_q(double a, double x) {
 }
 
 /// ∫∫ f over [x0, x1] × [y0, y1] to about the absolute error `tolerance`: 2×2 against 4 × (2×2)
-/// Gauss points, subdivided where they differ. `min_depth` levels are always taken, so that narrow
-/// peaks are not stepped over; what has no integral ends the subdivision by its cost.
+/// Gauss points, subdivided where they differ. The subdivision has at least `min_depth` levels, so that narrow peaks
+/// are not missed; a limit on its cost ends it where the integral diverges.
 template <class F>
 double integrate_2d(const F& f, double x0, double x1, double y0, double y1, double tolerance,
                     int min_depth = 1) {
@@ -73,9 +73,9 @@ struct Chi2Result {
     double total_probability = 0;  ///< Σ of the cells' probabilities.
 };
 
-/// Pearson's test of `counts` out of `samples` draws against cell probabilities; what fell in no
-/// cell forms one more. Cells expecting fewer than five are pooled; a pool that is still that small
-/// passes unless it holds too many.
+/// Pearson's test of `counts` among `samples` draws against cell probabilities; draws outside all cells form one more
+/// cell. Cells that expect fewer than five draws are pooled; a pool that is still that small passes unless it contains
+/// too many.
 inline Chi2Result chi2_test(const std::vector<int64_t>& counts,
                             const std::vector<double>& probabilities, int64_t samples) {
     struct Cell {
@@ -112,7 +112,7 @@ inline Chi2Result chi2_test(const std::vector<int64_t>& counts,
             pool = {0, 0};
         }
     }
-    // A remnant that expects next to nothing: Poisson tail instead of a term of the sum.
+    // A remaining pool that expects almost none is tested by the Poisson tail instead of a term of the sum.
     double pool_p = 1;
     if (pool.observed > 0)
         pool_p = pool.expected > 0 ? 1 - gamma_q(pool.observed, pool.expected) : 0;
@@ -133,7 +133,7 @@ public:
         const int i = cell(x, x0_, x1_, nx_), j = cell(y, y0_, y1_, ny_);
         if (i >= 0 && j >= 0) ++counts_[size_t(j) * size_t(nx_) + size_t(i)];
     }
-    /// A draw that gave nothing, or something that the density does not describe.
+    /// Counts a draw without a result, or one that the density does not describe.
     void add_outside() { ++samples_; }
 
     /// `density(x, y)` integrates over the domain to the probability that a draw falls inside.

@@ -6,7 +6,7 @@
 
 namespace etendue {
 
-/// What every reader promises of a mesh.
+/// Checks the guarantees of every mesh reader.
 inline void expect_well_formed(const MeshData& m) {
     EXPECT_FALSE(m.triangles.empty());
     EXPECT_TRUE(m.normals.empty() || m.normals.size() == m.positions.size());

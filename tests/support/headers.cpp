@@ -1,1 +1,1 @@
-// Nothing: the precompiled headers of all tests belong to the target of this file.
+// Empty: the target of this file owns the precompiled headers of all tests.

@@ -14,7 +14,7 @@
 
 namespace etendue::testing {
 
-/// Random numbers as integrators hand them to lobes: multiples of 2^-24 in [0, 1).
+/// Random numbers as integrators pass them to lobes: multiples of 2^-24 in [0, 1).
 class LobeRandom {
 public:
     explicit LobeRandom(uint64_t seed) : engine_(seed) {}
@@ -50,14 +50,13 @@ inline std::string describe(Vec3 w) {
            ")";
 }
 
-/// Polar coordinates (t, φ) about an axis with θ = π t^p: p > 1 puts the cells where a sharp lobe
-/// is.
+/// Polar coordinates (t, φ) about an axis with θ = π t^p: p > 1 concentrates the cells around the axis of a sharp lobe.
 struct PolarMap {
     Frame frame;
     double power = 1;
 
     double t(Vec3 w) const {
-        // From the chord, because acos has no digits left near the axis.
+        // From the chord, since acos is inaccurate near the axis.
         return std::pow(2 * std::asin(std::min(1.0, 0.5 * double(length(w - frame.n)))) / M_PI,
                         1 / power);
     }
@@ -73,7 +72,7 @@ struct PolarMap {
     }
 };
 
-/// Coordinates fitted to what the lobe samples from `wo` into one hemisphere, from a pilot run.
+/// Coordinates fitted to the samples of the lobe for `wo` in one hemisphere, from a pilot run.
 template <class L>
 PolarMap fit_polar_map(const L& lobe, Vec3 wo, bool upper) {
     LobeRandom random(1);
@@ -143,8 +142,8 @@ inline bool nearly(Rgb a, Rgb b, double relative, double absolute) {
            nearly(a.b, b.b, relative, absolute);
 }
 
-/// What sample() says of itself: a unit direction, weight = f/pdf, and the densities and η of
-/// eval(), within the bound of max_pdf(). `relative` allows for what one rounding of a direction does to a sharp lobe.
+/// Consistency of sample(): a unit direction, weight = f/pdf, the densities and η of eval(), and a density within the
+/// bound of max_pdf(). `relative` allows for the effect of rounding a direction on a sharp lobe.
 template <class L>
 void expect_sample_agrees_with_eval(const L& lobe, Vec3 wo, double relative = 1e-3,
                                     int samples = 2000) {
@@ -171,7 +170,7 @@ void expect_sample_agrees_with_eval(const L& lobe, Vec3 wo, double relative = 1e
         ASSERT_TRUE(nearly(e.f, s->weight * s->pdf, relative, 1e-6))
             << where << ": f " << e.f.g << " weight·pdf " << s->weight.g * s->pdf;
         ASSERT_FLOAT_EQ(e.eta, s->eta) << where;
-        // Cones about the direction, of all sizes, that hold it.
+        // Cones of all sizes that contain the direction.
         const float angle = kPi * std::pow(random.next(), 4.0f);
         const Frame frame = Frame::from_normal(s->wi);
         const float off = angle * random.next(), phi = 2 * kPi * random.next();
@@ -234,7 +233,7 @@ void expect_delta_events_reverse(const L& lobe, Vec3 wo, int samples = 200) {
                 << describe(wo);
             ASSERT_NEAR(s->eta * back->eta, 1, 1e-5);
         }
-        // An event of tiny probability may be missed by a thousand strata.
+        // A thousand strata may miss an event of very small probability.
         ASSERT_TRUE(found || s->pdf_rev < 2e-3f) << describe(wo);
     }
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The end points that a join brings with it, as vertices for the slow definitions of path_pdfs.h.
+// End points that are sampled by joins, as vertices for the reference definitions of path_pdfs.h.
 
 #include "pathspace/join.h"
 

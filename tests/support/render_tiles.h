@@ -1,5 +1,5 @@
 #pragma once
-// Renderings as means over tiles with their spread, and the tests that hold two of them together.
+// Renderings as means over tiles with their spread, and tests that compare two of them.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 
 namespace etendue::test {
 
-/// Means of tiles × tiles parts of the image by channel, then those of the whole image.
+/// Means of tiles × tiles parts of the image by channel, followed by those of the whole image.
 struct Tiles {
     int across = 1;
     std::vector<Moments> values;  ///< Of channel c of part i: [3 i + c].
@@ -72,7 +72,7 @@ inline Tiles render_tiles(const Scene& scene, const std::string& integrator, con
     return tiles;
 }
 
-/// What an image is known to be: `radiance(x, y)` at film points in pixels, averaged over pixels.
+/// A known image: `radiance(x, y)` at film points in pixels, averaged over pixels.
 template <class Radiance>
 Tiles exact_tiles(const FilmGeometry& g, int tiles, const Radiance& radiance) {
     constexpr int kPoints = 8;
@@ -91,12 +91,12 @@ Tiles exact_tiles(const FilmGeometry& g, int tiles, const Radiance& radiance) {
     return out;
 }
 
-/// What rounding may do to a mean, relative.
+/// Relative error of a mean that is attributed to rounding.
 inline constexpr double kRounding = 1e-4;
 
-/// Welch's test of every tile and of the whole image, by channel; a false alarm in 0.01 % of all calls with fresh seeds,
-/// and so in 1 % of all suites of a hundred calls. The test must be able to see a relative error of `resolution` of the image's mean: four standard
-/// errors have to be less.
+/// Welch's test of every tile and of the whole image, by channel; a false alarm in 0.01 % of all calls with fresh
+/// seeds, and so in 1 % of all suites of a hundred calls. The test must be able to see a relative error of `resolution`
+/// of the image's mean: four standard errors have to be less.
 inline void expect_same_image(const Tiles& a, const Tiles& b, double resolution,
                               const std::string& what) {
     ASSERT_EQ(a.across, b.across);

@@ -1,5 +1,5 @@
 #pragma once
-// Runs a program and catches what it says.
+// Runs a program and captures its output.
 
 #include <fcntl.h>
 #include <signal.h>
@@ -55,7 +55,7 @@ public:
         return at != std::string::npos &&
                (std::stoull(status.substr(at + mark.size(), 16), nullptr, 16) >> (SIGINT - 1) & 1);
     }
-    /// What it has said so far on its standard error.
+    /// Its output on standard error so far.
     std::string errors() const { return read_text(err_); }
 
     ProgramResult wait() const {

@@ -1,12 +1,12 @@
 #pragma once
-// The densities n·p that weights claim, against the histogram of the samples that are made. A sum of weights of 1 does not
-// see a wrong n, nor do images: it costs only variance.
+// Comparison of the densities n·p assumed by MIS weights with histograms of the samples. A wrong n changes neither the
+// sum of the weights nor the image, only the variance.
 //
 // Samples of two techniques i, j that make the same paths, of densities n_i p_i and n_j p_j, satisfy for every cell B
 //     E[ Σ_{x ~ i, x ∈ B} n_j p_j / (n_i p_i + n_j p_j) ] = ∫_B n_i p_i · n_j p_j / (n_i p_i + n_j p_j) dx
 //                                                         = E[ Σ_{x ~ j, x ∈ B} n_i p_i / (n_i p_i + n_j p_j) ],
-// summands at most 1. Here j are the next events of `path`, its hits where no next event can make the path, and B are tiles
-// of the film.
+// with terms of at most 1. Here j are the next events of `path`, or its hits where no next event can make the path, and
+// B are tiles of the film.
 
 #include <array>
 #include <map>
@@ -74,7 +74,7 @@ public:
             const double other = double(counts.of(partner)) * pdfs.density(partner);
             cells_[{n, s}][cell] += other / (own + other);
         };
-        // As a sample of its own technique, and as one of those that all others are compared with.
+        // As a sample of its own technique, and as one of the technique j that all others are compared with.
         const Technique reference = reference_technique(pdfs);
         add(q.s, reference, others_);
         if (q == reference)

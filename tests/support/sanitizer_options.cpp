@@ -1,4 +1,5 @@
-// What the sanitizers must not report, in every program that has them: matters of libraries that are not instrumented.
+// Suppressions of sanitizer reports that are caused by libraries without instrumentation, for every instrumented
+// program.
 
 extern "C" {
 
@@ -6,11 +7,11 @@ const char* __tsan_default_suppressions();
 const char* __lsan_default_suppressions();
 const char* __asan_default_options();
 
-/// Tasks of TBB are handed from thread to thread inside libtbb, whose order the sanitizer cannot see. What precedes and
-/// follows a loop it is told (tsan/tbb/parallel_for.h); what is left are accesses by TBB's own inline functions, which call
-/// no code of ours (fold_tree) or of which only the innermost frame counts, and atomics of the types that only TBB uses.
-/// Embree builds its trees on threads of its own, which call back for bounds and memory and use the program's copies of
-/// standard functions.
+/// libtbb passes tasks between threads, and the sanitizer does not see their order. tsan/tbb/parallel_for.h declares
+/// the order before and after a loop. The remaining reports are accesses by TBB's inline functions, which call none of
+/// our code (fold_tree) or of which only the innermost frame counts, and atomics of types used by TBB only. Embree
+/// builds its trees on its own threads, which call back for bounds and memory and use the program's copies of standard
+/// functions.
 const char* __tsan_default_suppressions() {
     return "race_top:/oneapi/tbb/\n"
            "race_top:std::__atomic_base<bool>\n"
@@ -22,13 +23,13 @@ const char* __tsan_default_suppressions() {
            "called_from_lib:libembree3.so\n";
 }
 
-/// Where a file ends too early OpenImageIO 2.4 hands libpng the text of the error, and libpng leaves by longjmp(): the
-/// text is never freed.
+/// For a truncated file OpenImageIO 2.4 passes the error text to libpng, which leaves by longjmp(), so that the text is
+/// never freed.
 const char* __lsan_default_suppressions() {
     return "leak:PNGInput::PngReadCallback\n";
 }
 
-/// Else the stack of this leak ends in the standard library.
+/// Otherwise the stack of this leak ends in the standard library.
 const char* __asan_default_options() {
     return "fast_unwind_on_malloc=0";
 }

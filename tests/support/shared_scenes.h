@@ -1,5 +1,5 @@
 #pragma once
-// The scenes that tests share: in $ETENDUE_SCENES, or beside the project.
+// Scenes used by several tests, in $ETENDUE_SCENES or beside the project.
 
 #include <algorithm>
 #include <cstdlib>

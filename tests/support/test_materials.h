@@ -1,5 +1,5 @@
 #pragma once
-// Materials from a description written in the test, made by the registry's own makers.
+// Materials from a description written in the test, constructed through the registry.
 
 #include <functional>
 #include <list>

@@ -38,7 +38,7 @@ inline Scene build(const std::string& body) {
         parse_mitsuba_xml("<scene version=\"3.0.0\">" + body + "</scene>", "test.xml"));
 }
 
-/// The room [-1, 1]³, closed but for the front where the camera stands, its walls coloured.
+/// The room [-1, 1]³ with coloured walls, open at the front, where the camera is.
 inline std::string room() {
     return rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>",
                      diffuse("0.7,0.7,0.7")) +

@@ -1,4 +1,4 @@
-// The test of tests: χ² helpers accept what is right and reject what is slightly wrong.
+// Tests of the χ² helpers: they accept correct densities and reject slightly wrong ones.
 
 #include "chi2.h"
 

@@ -1,4 +1,4 @@
-// Parameters of conductors and dielectrics: defaults, names, and what is refused.
+// Parameters of conductors and dielectrics: defaults, names, and refused values.
 
 #include <gtest/gtest.h>
 

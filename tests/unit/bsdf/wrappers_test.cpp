@@ -138,7 +138,7 @@ TEST(TwoSided, RefusesWhatLetsLightPass) {
 
 // ---- mask, null
 
-TEST(Mask, TellsItsOpacityAndLeavesTheNestedMaterialAlone) {
+TEST(Mask, HasItsOpacityAndDoesNotScaleTheNestedMaterial) {
     TestMaterials m;
     const int diffuse = m.bsdf("diffuse", reflectance(Rgb(0.8f)));
     FunctionTexture ramp;

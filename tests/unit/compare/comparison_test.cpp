@@ -94,7 +94,7 @@ TEST(ReferenceVariance, ComesFromTheLayerOfAFile) {
     EXPECT_THROW(read_reference(file, FilmGeometry{16, 8, 0, 0, 16, 8}), std::runtime_error);
 }
 
-TEST(MadeReference, IsKeptUntilALongerOneIsAskedFor) {
+TEST(MadeReference, IsCachedUntilALongerOneIsRequested) {
     const TemporaryFolder folder;
     const Scene scene = small_scene();
     RenderSettings how;
@@ -125,7 +125,7 @@ TEST(MadeReference, IsKeptUntilALongerOneIsAskedFor) {
     EXPECT_FALSE(make(1).reused) << "other paths";
 }
 
-TEST(MadeReference, IsNotHalfMadeWhenInterrupted) {
+TEST(MadeReference, IsNotStoredWhenInterrupted) {
     const TemporaryFolder folder;
     const Scene scene = small_scene();
     RenderSettings how;
@@ -136,7 +136,7 @@ TEST(MadeReference, IsNotHalfMadeWhenInterrupted) {
     EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
-TEST(Fingerprint, KnowsParametersAndTheContentsOfFiles) {
+TEST(Fingerprint, DependsOnParametersAndContentsOfFiles) {
     const TemporaryFolder folder;
     const std::string file = (folder.path() / "scene.xml").string(),
                       mesh = (folder.path() / "mesh.obj").string();
@@ -237,7 +237,7 @@ TEST(Turns, RunsHaveSeedsOfTheirOwn) {
     EXPECT_FALSE(summary.reference_share) << "the white image has no known variance";
 }
 
-TEST(Turns, MethodsThatAreWrongOrTheSameAreRefused) {
+TEST(Turns, RefuseUnknownAndRepeatedMethods) {
     const auto specs = [](const std::vector<std::string>& methods) {
         return settings_of(methods, 1).methods;
     };

@@ -1,4 +1,4 @@
-// When a kept reference may be used again, and by what methods it may judge.
+// Conditions for reusing cached references, and for comparing inner paths with a reference.
 
 #include <filesystem>
 #include <fstream>
@@ -12,7 +12,7 @@
 namespace etendue::test {
 namespace {
 
-TEST(Fingerprint, KnowsWhatIncludedFilesSayToTheLastBit) {
+TEST(Fingerprint, DependsOnAllBitsOfIncludedFiles) {
     const TemporaryFolder folder;
     const std::string file = (folder.path() / "scene.xml").string();
     const auto fingerprint = [&](const std::string& x) {
@@ -28,8 +28,8 @@ TEST(Fingerprint, KnowsWhatIncludedFilesSayToTheLastBit) {
     EXPECT_NE(fingerprint("1"), fingerprint("1.0000001"));
 }
 
-// Learned weights are those of one rendering; another of the same method learns others.
-TEST(InnerPaths, AreNotJudgedByMethodsThatLearnTheirWeights) {
+// Learned MIS weights differ between renderings by the same method.
+TEST(InnerPaths, RefuseReferencesWithLearnedWeights) {
     const Scene scene = build(mixed_room(front_camera(16)));
     const auto check = [&](const char* method, const char* reference) {
         check_inner_paths(scene, {{method, IntegratorSpec::parse(method)}},

@@ -1,4 +1,4 @@
-// What the report is made of: packed images, plots, memory.
+// Parts of the report: embedded images, plots, memory.
 
 #include "compare/report.h"
 
@@ -85,7 +85,7 @@ TEST(EmbeddedImage, ReducesByAverages) {
     EXPECT_EQ(reduced(4, 1, pixels, 100).pixels.size(), 4u);
 }
 
-TEST(Plot, DrawsWhatALogarithmShows) {
+TEST(Plot, DrawsPositiveValuesOnly) {
     LogLogPlot plot{"a < b", "time", "error", {}};
     EXPECT_NE(plot.svg().find("</svg>"), std::string::npos) << "without curves";
     plot.curves.push_back({"m & n", {{1, 1}, {10, 0.1}, {100, -1}, {0, 1}}, PowerLaw{-1, 1, 2}});
@@ -99,7 +99,7 @@ TEST(Plot, DrawsWhatALogarithmShows) {
     EXPECT_EQ(circles, 2u);
 }
 
-/// Memory that the system gives and takes back at once, unlike an allocator, above all that of a sanitizer.
+/// Memory from the system, which becomes resident and is returned at once, unlike that of an allocator.
 class Pages {
 public:
     explicit Pages(size_t bytes)

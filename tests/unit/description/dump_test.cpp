@@ -36,7 +36,7 @@ TEST(Dump, SortsParametersAndPrintsEveryType) {
                            "  z: boolean true\n");
 }
 
-TEST(Dump, NamesSharedObjectsOnce) {
+TEST(Dump, PrintsSharedObjectsOnce) {
     SceneDescription scene;
     scene.objects = {object("bsdf", "diffuse", "m"), object("shape", "cube"),
                      object("bsdf", "mask")};

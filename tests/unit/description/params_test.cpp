@@ -66,7 +66,7 @@ TEST(Params, RefusesWrongTypesAndRanges) {
     const SceneDescription scene = example();
     const Params p(scene, 0);
     EXPECT_EQ(error_of([&] { p.flag("count", false); }),
-              "f:3: parameter \"count\" of bsdf \"x\" must be a boolean, but is a integer");
+              "f:3: parameter \"count\" of bsdf \"x\" must be a boolean, but is an integer");
     EXPECT_NE(error_of([&] { p.integer("count", 0, 0, 6); }).find("f:3: "), std::string::npos);
     EXPECT_NE(error_of([&] { p.number("size", 0, 1, 2); }).find("must lie in [1, 2]"),
               std::string::npos);
@@ -96,7 +96,7 @@ TEST(Params, ChecksAgainstTheTable) {
     check_params(scene, 0, info, report);
     ASSERT_EQ(reports.size(), 2u);
     EXPECT_EQ(reports[0],
-              "f:4: parameter \"size\" of bsdf \"x\" must be a integer, but is a float");
+              "f:4: parameter \"size\" of bsdf \"x\" must be an integer, but is a float");
     EXPECT_EQ(reports[1], "f:7: bsdf \"x\" has no parameter \"colour\" (did you mean \"color\"?)");
 
     // A texture where a number must stand.

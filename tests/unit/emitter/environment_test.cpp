@@ -10,8 +10,8 @@
 namespace etendue {
 namespace {
 
-/// A lit upper and a dark lower half: numbers next to 1 lead to the border between them, where a direction, rounded, may
-/// lie in a cell without density.
+/// A bright upper and a dark lower half: random numbers close to 1 give directions at the border, which may be rounded
+/// into a cell of density zero.
 TEST(Environment, EverySampleHasADensity) {
     constexpr int kWidth = 8, kSamples = 2000;
     testing::Random random(1);

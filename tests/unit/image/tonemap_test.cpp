@@ -53,7 +53,7 @@ TEST(ToneMap, AcesCurve) {
     for (float x = 0; x < 10; x += 0.1f) EXPECT_LE(aces_curve(x), aces_curve(x + 0.1f));
 }
 
-TEST(ToneMap, InfinityIsWhiteAndNotANumberStays) {
+TEST(ToneMap, InfinityIsWhiteAndNanStaysNan) {
     for (const ToneOperator op : {ToneOperator::Srgb, ToneOperator::Reinhard, ToneOperator::Aces}) {
         EXPECT_EQ(mapped(Rgb(kInfinity), {.op = op}), Rgb(1));
         EXPECT_TRUE(std::isnan(mapped(Rgb(std::numeric_limits<float>::quiet_NaN()), {.op = op}).r));

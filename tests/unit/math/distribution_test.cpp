@@ -91,7 +91,7 @@ TEST(AliasTable, RareIndicesAreChosenAsOftenAsTheirProbabilitySays) {
 }
 
 /// A number that has chosen among a million still places a point finely.
-TEST(AliasTable, TheRestOfANumberIsFine) {
+TEST(AliasTable, RescaledNumbersAreFine) {
     const AliasTable table(std::vector<double>(1000000, 1.0));
     Random random(3);
     std::set<float> rests;
@@ -132,7 +132,7 @@ TEST(AliasTable, ExtremeNumbers) {
     }
 }
 
-TEST(AliasTable, NoWeightMeansNoTable) {
+TEST(AliasTable, ZeroWeightsGiveAnEmptyTable) {
     EXPECT_TRUE(AliasTable().empty());
     EXPECT_TRUE(AliasTable(std::vector<double>{}).empty());
     EXPECT_TRUE(AliasTable(std::vector<double>{0, 0}).empty());

@@ -43,7 +43,7 @@ TEST(Frame, FollowsTheTangent) {
     }
 }
 
-TEST(Frame, TangentsAlongTheNormalAreSurvived) {
+TEST(Frame, TangentsParallelToTheNormalGiveAValidFrame) {
     Random random(3);
     for (int i = 0; i < 1000; ++i) {
         const Vec3 n = random.unit_vector(), other = random.unit_vector();

@@ -55,7 +55,7 @@ TEST(Statistics, StudentQuantiles) {
             EXPECT_NEAR(student_tail(student_quantile(p, n), n) / p, 1, 1e-6) << p << ' ' << n;
 }
 
-TEST(Statistics, WelchFindsWhatDiffers) {
+TEST(Statistics, WelchDetectsDifferences) {
     Moments a, b;
     for (int i = 0; i < 32; ++i) {
         a.add(1 + 0.1 * (i % 5 - 2));

@@ -1,4 +1,4 @@
-// Joins and weights against the slow definitions, on random paths of scenes with all kinds of events.
+// Joins and MIS weights against the reference definitions of path_pdfs.h, on random paths with all kinds of events.
 
 #include <algorithm>
 #include <map>
@@ -60,7 +60,7 @@ std::vector<Case> cases() {
     };
 }
 
-/// What there is besides the connections of bidirectional path tracing; Variants: of the choices of gathers.
+/// Techniques in addition to those of bidirectional path tracing. Variants: other parameters of gathers.
 enum class Extra { None, Merges, Gathers, Variants, Stored };
 
 /// Shares of pairs between 1 and about 1/20, from cell to cell.
@@ -133,8 +133,8 @@ protected:
         ++checked;
     }
 
-    /// δ of the direction toward the light over that of the direction toward the eye, which evaluate_path() refers to, at a
-    /// delta event of an eye sub-path.
+    /// δ of the direction toward the light over that of the direction toward the eye, which evaluate_path() refers to,
+    /// at a delta event of an eye sub-path.
     static double eye_jacobian(const Vertex& z) {
         const auto to_light = z.bsdf.sample_delta(z.wo, z.event, TransportMode::Radiance);
         const auto to_eye = z.bsdf.sample_delta(to_light->wi, z.event, TransportMode::Importance);
@@ -175,7 +175,7 @@ protected:
         check(*j, x, density_of(y, s) * to_area(y.flight.pdf_sa, a, lens));
     }
 
-    /// Any two vertices taken for a pair: contribution and weight are those of the path without the dropped one.
+    /// Treats any two vertices as a pair: contribution and weight are those of the path without the dropped vertex.
     void check_gather(int s, int t) {
         if (!y[s - 1].is_connectible || !z[t - 1].is_connectible) return;
         for (const bool eye : {true, false})
@@ -244,8 +244,9 @@ protected:
         EXPECT_EQ(alone->contribution.g, j->contribution.g);
     }
 
-    /// Rays start a little off their surface, so on short edges the walk's directions differ from those between the stored
-    /// points: a few comparisons deviate by more than rounding. A wrong factor makes all of its strategy deviate.
+    /// Rays start a little off their surface, so on short edges the walk's directions differ from those between the
+    /// stored points: a few comparisons deviate by more than rounding. A wrong factor makes all of its strategy
+    /// deviate.
     struct Tally {
         int compared = 0, deviating = 0;
         void add(double fast, double slow) {

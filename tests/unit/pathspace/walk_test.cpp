@@ -1,4 +1,5 @@
-// Russian roulette of walks: who survives has the throughput of the walk without it over the probability of surviving.
+// Russian roulette of walks: the throughput of a surviving walk is that without roulette, divided by the probability of
+// survival.
 
 #include <gtest/gtest.h>
 
@@ -42,7 +43,7 @@ struct Walks : ::testing::Test {
                     ASSERT_NEAR(a[c] * q, b[c], 1e-4 * std::fabs(b[c])) << "vertex " << i;
                 if (i < kFirst || with[i].kind != Vertex::Kind::Surface) continue;
                 q *= double(with[i].survival.value());
-                // Who ends here ends by roulette where the walk without it goes on.
+                // A walk that ends here is ended by roulette if the walk without roulette continues.
                 if (i + 1 == without.size()) continue;
                 const double survival = double(with[i].survival.value());
                 survived += i + 1 < with.size();

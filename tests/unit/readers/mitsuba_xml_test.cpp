@@ -240,7 +240,7 @@ TEST(MitsubaXml, ReadsColours) {
               Rgb(1, 128 / 255.0f, 0));
 }
 
-TEST(MitsubaXml, SpectraTakeTheWhiteOfTheirRole) {
+TEST(MitsubaXml, SpectraUseTheIlluminantOfTheirRole) {
     const char* flat = R"(<{0}><spectrum name="{1}" value="300:0.5, 900:0.5"/></{2}>)";
     const auto colour = [&](const char* open, const char* name, const char* close) {
         return value<Rgb>(parse3(fmt::format(fmt::runtime(flat), open, name, close)), name);
@@ -404,7 +404,7 @@ TEST(MitsubaXml, TextInMemoryOpensNoFiles) {
               std::string::npos);
 }
 
-TEST(MitsubaXml, LenientDropsWhatIsUnknown) {
+TEST(MitsubaXml, LenientDropsUnknownElements) {
     ReadOptions options;
     options.lenient = true;
     const auto scene = parse3(
@@ -416,7 +416,7 @@ TEST(MitsubaXml, LenientDropsWhatIsUnknown) {
     EXPECT_EQ(scene.warnings[0], "s.xml:2: <shape> has no attribute \"colour\"; dropped");
     EXPECT_EQ(scene.warnings[1], "s.xml:3: unknown element <subsurface>; dropped");
     EXPECT_EQ(scene.warnings[2], "s.xml:4: a <transform> cannot contain a <shear>; dropped");
-    // What is malformed stays an error.
+    // Malformed input remains an error.
     EXPECT_NE(error3(R"(<shape type="cube"><float name="x" value="1a"/></shape>)", options),
               "no error");
 }
@@ -441,7 +441,7 @@ TEST(MitsubaXml, LimitsNesting) {
 }
 
 TEST(MitsubaXml, LimitsIncludes) {
-    // Each file includes the next one twice: 2^30 files, if nobody stopped.
+    // Each file includes the next one twice: 2^30 files without a limit.
     Files files;
     for (int i = 0; i < 30; ++i)
         files[fmt::format("{}.xml", i)] = fmt::format(
@@ -455,7 +455,8 @@ TEST(MitsubaXml, LimitsIncludes) {
     for (int i = 0; i < 100; ++i)
         files[fmt::format("{}.xml", i)] =
             fmt::format(R"(<scene version="3.0.0"><include filename="{}.xml"/></scene>)", i + 1);
-    EXPECT_NE(error3(R"(<include filename="0.xml"/>)", with_files(files)).find("more than 32 deep"),
+    EXPECT_NE(error3(R"(<include filename="0.xml"/>)", with_files(files))
+                  .find("more than 32 levels deep"),
               std::string::npos);
 }
 
@@ -466,7 +467,7 @@ TEST(MitsubaXml, LimitsSubstitution) {
     EXPECT_NE(error3(text).find("expand to more than"), std::string::npos);
 }
 
-TEST(MitsubaXml, ShortensWhatItQuotes) {
+TEST(MitsubaXml, ShortensQuotedText) {
     const std::string error = error3(fmt::format(
         R"(<shape type="s"><float name="x" value="{}"/></shape>)", std::string(100'000, 'x')));
     EXPECT_LT(error.size(), 200u);

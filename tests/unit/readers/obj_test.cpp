@@ -88,7 +88,7 @@ TEST(Obj, TextureCoordinatesFlipOnRequest) {
     EXPECT_EQ(parse(text, {.flip_tex_coords = true}).uvs[0].y, 0.75f);
 }
 
-TEST(Obj, EverythingElseIsPassedOver) {
+TEST(Obj, OtherStatementsAreIgnored) {
     const MeshData m = parse(
         "# comment\nmtllib a.mtl\no object\ng one two\ns off\nusemtl m\n\n   \n"
         "v 0 0 0 1.0\nv 1 0 0 1 0.5 0.5 0.5\n\tv  0\t1  0  # here\nvt 0.5 # only u\nvt 0 1 0\n"

@@ -66,8 +66,7 @@ TEST(Ply, NamesOfTextureCoordinates) {
     }
 }
 
-/// The same mesh in both byte orders, with every type of number, and with elements and properties
-/// to be passed over.
+/// The same mesh in both byte orders, with every type of number, and with elements and properties that are ignored.
 class PlyBinary : public ::testing::TestWithParam<bool> {};
 
 TEST_P(PlyBinary, AllTypesInAnyOrder) {
@@ -109,7 +108,7 @@ TEST_P(PlyBinary, AllTypesInAnyOrder) {
     EXPECT_TRUE(m.uvs.empty());
     EXPECT_TRUE(m.normals.empty());
 
-    // Whatever byte the file ends at, it is an error and nothing worse.
+    // A file truncated at any byte is an error.
     const size_t body = bytes.find("end_header\n") + 11;
     for (size_t n = body; n < bytes.size(); ++n)
         EXPECT_THROW(parse(std::string_view(bytes).substr(0, n)), SceneError) << n;

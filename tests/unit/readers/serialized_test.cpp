@@ -134,7 +134,7 @@ TEST(SerializedErrors, DamagedContents) {
     expect_scene_error(0, "refers to vertex 4", [&] { parse(bytes, 2); });
 }
 
-TEST(SerializedErrors, NumbersThatTheDataDoesNotHold) {
+TEST(SerializedErrors, CountsBeyondTheData) {
     for (const uint64_t vertices : {uint64_t(1) << 32, uint64_t(0xFFFFFFFF)}) {
         Writer w;
         std::string plain;

@@ -1,4 +1,4 @@
-// Passes that fail or are dropped leave nothing behind, and the rendering can go on.
+// Passes that fail or are dropped have no effect on the image, and the rendering can continue.
 
 #include <functional>
 #include <span>
@@ -11,7 +11,7 @@
 namespace etendue::test {
 namespace {
 
-/// Another integrator, with something done at moments of its passes.
+/// Wraps another integrator and calls functions at certain points of its passes.
 class Disturbed final : public Integrator {
 public:
     struct Hooks {

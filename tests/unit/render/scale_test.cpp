@@ -1,4 +1,4 @@
-// Images do not depend on the unit of radiance: emitters times a power of two give the image times it, to the bit.
+// Images do not depend on the unit of radiance: scaling all emitters by a power of two scales every pixel exactly.
 
 #include <cctype>
 #include <cmath>

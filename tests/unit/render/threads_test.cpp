@@ -1,4 +1,4 @@
-// Every renderer has as many threads as it was given, whatever others in the same process have.
+// Every renderer uses the number of threads it was given, independent of other renderers in the same process.
 
 #include <condition_variable>
 #include <mutex>

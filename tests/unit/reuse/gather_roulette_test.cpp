@@ -1,4 +1,4 @@
-// What pairs are expected to bring, by the lengths of their sub-paths.
+// Expected contributions of pairs, by the lengths of their sub-paths.
 
 #include "reuse/gather_roulette.h"
 
@@ -36,11 +36,11 @@ float before_any() {
 TEST(GatherRoulette, IsTheRootMeanSquareOfTheRatios) {
     const float one = worth_after(1, 3, 4);
     EXPECT_NEAR(worth_after(0.1f, 3, 4) / one, 0.1f, 0.001f);
-    // Half of them ratio nothing; before any join, an eighth is assumed.
+    // Half of the ratios are zero; before any join the ratio is 1/8.
     EXPECT_NEAR(one / before_any(), std::sqrt(0.5f) / 0.125f, 0.01f);
 }
 
-TEST(GatherRoulette, TakesWhatIsNoNumberForNothing) {
+TEST(GatherRoulette, CountsNanAsZero) {
     GatherSums none, nan;
     GatherRoulette::observe(3, 4, 0, none);
     GatherRoulette::observe(3, 4, std::numeric_limits<float>::quiet_NaN(), nan);
@@ -50,7 +50,7 @@ TEST(GatherRoulette, TakesWhatIsNoNumberForNothing) {
     EXPECT_EQ(a.of(3, 4), b.of(3, 4));
 }
 
-TEST(GatherRoulette, TellsLengthsApartUpToALimit) {
+TEST(GatherRoulette, DistinguishesLengthsUpToALimit) {
     EXPECT_EQ(worth_after(1, 4, 3), before_any());
     EXPECT_EQ(worth_after(1, 3, 5), before_any());
     GatherRoulette worth;
@@ -61,7 +61,7 @@ TEST(GatherRoulette, TellsLengthsApartUpToALimit) {
     EXPECT_GT(worth.of(30, 40), before_any());
 }
 
-TEST(GatherRoulette, SearchesFollowTheLengthThatBringsMost) {
+TEST(GatherRoulette, SearchFactorIsThatOfTheLargestRatio) {
     GatherSums stats;
     for (int i = 0; i < 1000; ++i) GatherRoulette::observe(3, 4, 2, stats);
     GatherRoulette worth;

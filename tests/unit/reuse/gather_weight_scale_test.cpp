@@ -1,4 +1,4 @@
-// How far gathers are believed in, where it is known how many there are.
+// The scale of the sample counts of gathers, where the number of pairs found is known.
 
 #include "reuse/gather_weight_scale.h"
 
@@ -7,8 +7,8 @@
 namespace etendue {
 namespace {
 
-/// What is chosen after pairs that are found with a `covered` part of the disc's probability, the weight of a gather being
-/// `weight` for the count with which it begins.
+/// The scale chosen after pairs whose probability is the fraction `covered` of that of the disc, where `weight` is the
+/// MIS weight of a gather for the initial scale.
 float chosen(double covered, double weight) {
     constexpr double kFound = 0.01;
     GatherSums stats;
@@ -23,14 +23,14 @@ float chosen(double covered, double weight) {
     return next.value();
 }
 
-TEST(GatherWeightScale, BeginsWithOneHalf) {
+TEST(GatherWeightScale, StartsWithOneHalf) {
     GatherWeightScale count;
     count.learn({});
     EXPECT_EQ(count.value(), 0.5f);
 }
 
-/// The second moment w²/κ + (1-w)²/ρ of a gather that covers the part κ of its disc, and of others with the density ρ, is
-/// least for odds κ/ρ of the gather. Here ρ = 1, so that its odds are c².
+/// The second moment w²/κ + (1-w)²/ρ of a gather that covers the part κ of its disc, and of others with the density ρ,
+/// is least for odds κ/ρ of the gather. Here ρ = 1, so that its odds are c².
 TEST(GatherWeightScale, FollowsTheLeastSecondMoment) {
     const double odds_at_half = 0.25;
     EXPECT_EQ(chosen(1, odds_at_half / (1 + odds_at_half)), 1);
@@ -39,7 +39,7 @@ TEST(GatherWeightScale, FollowsTheLeastSecondMoment) {
     EXPECT_EQ(chosen(0.02, odds_at_half / (1 + odds_at_half)), 0.25f);
 }
 
-TEST(GatherWeightScale, LeavesOutWhatNothingElseMakes) {
+TEST(GatherWeightScale, IgnoresPathsWithoutOtherTechniques) {
     GatherSums stats;
     GatherWeightScale().observe(1, 1, 0.01, 100, 1, stats);
     for (const uint64_t m : stats.second_moments) EXPECT_EQ(m, 0u);

@@ -1,4 +1,4 @@
-// What is drawn from a mixture follows the mass function that it states, bit by bit, and leaves nothing out.
+// Samples of a mixture follow its probability mass function exactly, and every vertex can be sampled.
 
 #include "reuse/importance_records.h"
 
@@ -22,13 +22,13 @@ std::vector<float> cdf_of(std::vector<float> masses) {
     return masses;
 }
 
-TEST(ToCdf, IsNothingWithoutMass) {
+TEST(ToCdf, FailsWithoutMass) {
     std::vector<float> none(5, 0.0f);
     EXPECT_FALSE(to_cdf(none));
 }
 
 /// Equally spaced numbers fall to a vertex as often as its pmf says, up to one at each end of the intervals they meet.
-TEST(VertexMixture, DrawsWhatItStates) {
+TEST(VertexMixture, SamplesItsPmf) {
     constexpr uint32_t kVertices = 200, kDraws = 1 << 22;
     testing::Random random(3);
     VertexMixture mixture(kVertices);
@@ -72,7 +72,7 @@ TEST(VertexMixture, EndsOfTheRange) {
     EXPECT_EQ(uniform.pmf(2), 0.2);
 }
 
-TEST(ImportanceRecords, MixThoseThatAreNearAndAlike) {
+TEST(ImportanceRecords, MixNearbySimilarRecords) {
     ImportanceRecords records;
     std::vector<ImportanceRecords::Chunk> chunks(2);
     const auto add = [](ImportanceRecords::Chunk& chunk, const Vertex& z,
@@ -90,9 +90,9 @@ TEST(ImportanceRecords, MixThoseThatAreNearAndAlike) {
     EXPECT_NEAR(near.pmf(0) + near.pmf(2), 0.95, 1e-9);
     EXPECT_NEAR(near.pmf(1), 0.025, 1e-9);
     EXPECT_NEAR(near.pmf(3), 0.025, 1e-9);
-    // Nothing looks that way.
+    // No record has such a direction.
     EXPECT_EQ(records.mixture(place({0, 0, 0}, {1, 0, 0}), 6, 0.1).pmf(3), 0.25);
-    // A record at the very place does not push the others out.
+    // A record at distance 0 does not suppress the others.
     EXPECT_GT(records.mixture(place({0, 0, 0}), 6, 0.1).pmf(2), 0.03);
 
     records.assemble({}, 4);

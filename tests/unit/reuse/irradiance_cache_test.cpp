@@ -44,7 +44,7 @@ IrradianceRecord record(const DiscLamp& lamp, Vec3 p, Vec3 n) {
     return measure_irradiance(p, n, 100'000, sampler, [&](Vec3 d) { return lamp.radiance(p, d); });
 }
 
-// In a corner a surface begins at the point itself, or within the smallest float of it.
+// In a corner the distance to the nearest surface is 0 or the smallest float.
 TEST(IrradianceCache, GradientsAreNumbersInCorners) {
     Sampler sampler(SamplerKind::Independent, 3);
     sampler.start(0, 0);

@@ -1,4 +1,4 @@
-// Light paths that are kept are those that were walked.
+// Stored light paths are restored as they were walked.
 
 #include <algorithm>
 #include <cmath>
@@ -33,7 +33,8 @@ protected:
         trace_light_path({scene, counts, stats, {8, 3}}, sampler, y);
     }
 
-    /// The walk's ray leaves the predecessor at an offset, see offset_origin(); what is restored looks at the point itself.
+    /// The walk's ray leaves the predecessor at an offset, see offset_origin(); what is restored looks at the point
+    /// itself.
     static float direction_error(const SubPath& path, int i) {
         if (path[i - 1].is_infinite) return 1e-6f;
         const Vec3 p = path[i - 1].p;
@@ -42,7 +43,7 @@ protected:
         return 1e-6f + offset / length(path[i].p - p);
     }
 
-    /// What joins with vertex i read of it and of those before.
+    /// Compares the data of vertex i and of earlier vertices that joins with vertex i read.
     static void expect_same(const SubPath& a, const SubPath& b, int i, bool has_bsdf) {
         SCOPED_TRACE(::testing::Message() << "vertex " << i);
         const Vertex &v = a[i], &w = b[i];

@@ -16,7 +16,7 @@ double share(const PairDensity& density, Vec3 p) {
     return pair_share(density.pair_level(p));
 }
 
-TEST(PairDensity, CountsPairsForLittleBeforeItIsBuilt) {
+TEST(PairDensity, HasTheSmallestShareBeforeLearning) {
     EXPECT_LT(share(PairDensity(), {0, 0, 0}), 1e-4);
 }
 
@@ -32,7 +32,7 @@ TEST(PairDensity, IsThatOfThePlane) {
         points.push_back({{random.next_1d(), random.next_1d(), 0.01f}, 0});
     PointGrid grid;
     grid.build(points, 1.4f * kRadius);
-    const PairDensity density(grid, kRadius, kCorrelation);
+    const PairDensity density(grid.counts(), kRadius, kCorrelation);
     double partners[2] = {};
     constexpr int kPlaces = 2000;
     for (int i = 0; i < kPlaces; ++i)

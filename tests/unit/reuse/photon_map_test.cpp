@@ -49,7 +49,7 @@ TEST(PhotonMap, FindsTheNearest) {
             }
 }
 
-TEST(PhotonMap, FindsNothingInNothing) {
+TEST(PhotonMap, FindsNothingInAnEmptyMap) {
     PhotonMap map;
     PhotonMap::Neighbours found;
     map.find({}, 8, 1, found);

@@ -21,7 +21,7 @@ std::vector<PointGrid::Entry> points(int count, uint64_t seed) {
 }
 
 /// Few points have fewer buckets than a ball meets cells; none must be found twice.
-TEST(PointGrid, FindsWhatALoopFinds) {
+TEST(PointGrid, AgreesWithALoop) {
     PointGrid grid;
     for (int count : {0, 1, 3, 5000}) {
         const auto entries = points(count, 1);
@@ -43,7 +43,7 @@ TEST(PointGrid, FindsWhatALoopFinds) {
     }
 }
 
-TEST(PointGrid, LooksAtFewThatAreFar) {
+TEST(PointGrid, TestsFewDistantPoints) {
     PointGrid grid;
     grid.build(points(20000, 1), kRadius);
     double candidates = 0, found = 0;

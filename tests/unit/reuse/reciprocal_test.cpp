@@ -1,5 +1,5 @@
-// Trials of unbiased photon gathering against the walk itself: the frequency with which a walk finds a partner, times the
-// mean of r, is one. False-alarm rate: 0.1 % for all configurations of a case together.
+// Trials of unbiased photon gathering against the walk itself: the frequency with which a walk finds a partner, times
+// the mean of r, is one. False-alarm rate: 0.1 % for all configurations of a case together.
 
 #include "reuse/reciprocal.h"
 
@@ -73,7 +73,7 @@ protected:
     void trace(SubPath& path, uint32_t index) {
         const TechniqueCounts counts{
             .hit = 1, .next_event = 1, .connect = 1, .splat = 64, .gather = 64};
-        // Roulette early, so that survival enters.
+        // Roulette starts early, so that survival is included.
         const WalkContext walk{scene, counts, stats, {5, 2}};
         sampler.start(0, index);
         if (mode == TransportMode::Radiance)
@@ -124,7 +124,7 @@ protected:
                 const Vertex &from = path[i], &next = path[i + 1];
                 if (from.is_delta || next.kind != Vertex::Kind::Surface || !next.is_connectible)
                     continue;
-                // Off the surface, as other vertices near it are.
+                // Offset from the surface, like other vertices near it.
                 const Vec3 center = next.p + (next.p - path[0].p) * 0.01f;
                 for (const auto& [bound, flatness] : kShapes)
                     compare({from,
@@ -190,8 +190,8 @@ TEST_P(Reciprocal, IsThatOfTheWalk) {
     RecordProperty("trials_per_pair", std::to_string(double(stats.trials) / (kWalks / 8 * n)));
 }
 
-/// Only a strip of 2w × 2d of the neighbourhood is seen through a slit of width w half way: about one trial of a hundred
-/// hits, and a cap on their number shows. p_c = ∫ cos²θ / (π |v|²) = ∫ H² / (π |v|⁴) over the strip.
+/// Only a strip of 2w × 2d of the neighbourhood is seen through a slit of width w half way: about one trial of a
+/// hundred hits, and a cap on their number shows. p_c = ∫ cos²θ / (π |v|²) = ∫ H² / (π |v|⁴) over the strip.
 TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
     constexpr double w = 0.0016, d = 0.2, H = 2;
     const auto plate = [](const char* x) {
@@ -238,7 +238,7 @@ TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
 }
 
 constexpr int kEstimates = 40000;
-/// That the mean of r is 1/p_c.
+/// Checks that the mean of r is 1/p_c.
 RenderStats expect_reciprocal(const Scene& scene, const PairEvent& event, double p_c) {
     Sampler sampler(SamplerKind::Independent, 3);
     sampler.start(0, 0);

@@ -1,4 +1,4 @@
-// Regions of Bernoulli trials: their density, their bounds, and that they hold what they are made for.
+// Regions of Bernoulli trials: their density and bounds, and that they contain the slab.
 
 #include "reuse/seen_region.h"
 
@@ -48,7 +48,7 @@ double integral(const Region& region, const Pdf& pdf) {
     return sum * region.measure() / (kSteps * kSteps);
 }
 
-TEST(SeenDisc, KnowsItsShareOfACosine) {
+TEST(SeenDisc, CosineMassIsTheIntegral) {
     for (const Viewer& v : kAbove) {
         const SlabView view = view_of(v);
         const SeenDisc disc(view);
@@ -67,7 +67,7 @@ TEST(SeenDisc, KnowsItsShareOfACosine) {
     }
 }
 
-/// Solid angle for area of the unit square: |∂d/∂u × ∂d/∂v|, against the region's own word.
+/// Compares |∂d/∂u × ∂d/∂v|, the ratio of solid angle to area in the unit square, with RegionPoint::scale.
 template <class Region>
 void expect_jacobian(const Region& region) {
     constexpr float kStep = 1e-3f;
@@ -85,12 +85,12 @@ void expect_jacobian(const Region& region) {
     }
 }
 
-TEST(SeenRegions, TellTheirDensity) {
+TEST(SeenRegions, HaveTheStatedScale) {
     for (const Viewer& v : kAbove) expect_jacobian(SeenDisc(view_of(v)));
     for (const Viewer& v : kAnywhere) expect_jacobian(SeenBand(view_of(v)));
 }
 
-/// Directions to points of the slab are among those of the region: the cells of a fine division hold them.
+/// Directions to points of the slab are in the region: the cells of a fine division contain them.
 template <class Region>
 void expect_holds(const Region& region, const SlabView& view, const char* what) {
     constexpr int kCells = 40;
@@ -113,7 +113,7 @@ void expect_holds(const Region& region, const SlabView& view, const char* what) 
     }
 }
 
-TEST(SeenRegions, HoldTheSlab) {
+TEST(SeenRegions, ContainTheSlab) {
     for (const Viewer& v : kAbove) expect_holds(SeenDisc(view_of(v)), view_of(v), "disc");
     for (const Viewer& v : kAnywhere) expect_holds(SeenBand(view_of(v)), view_of(v), "band");
 }

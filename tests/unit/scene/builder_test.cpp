@@ -1,4 +1,4 @@
-// What the scene builder refuses.
+// Limits and defaults of the scene builder.
 
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ TEST(SceneBuilder, RefusesMoreMediaThanThereAreIds) {
     for (int i = 0; i <= 0x7fff; ++i)
         media += "<medium type=\"homogeneous\"><float name=\"albedo\" value=\"0\"/></medium>";
     const std::string error = error_of([&] { build(front_camera(4) + room() + media); });
-    EXPECT_NE(error.find("a scene has at most 32767 media"), std::string::npos) << error;
+    EXPECT_NE(error.find("a scene can have at most 32767 media"), std::string::npos) << error;
 }
 
 TEST(SceneBuilder, RefusesCropsBeyondTheImage) {
@@ -36,6 +36,29 @@ TEST(SceneBuilder, RefusesCropsBeyondTheImage) {
         const std::string error = error_of([&] { build_scene(scene, options); });
         EXPECT_NE(error.find("does not lie within the image"), std::string::npos) << error;
     }
+}
+
+TEST(SceneBuilder, DefaultFilterIsGaussianWithAndWithoutAFilm) {
+    const std::string lamp = "<emitter type=\"constant\"/>";
+    EXPECT_EQ(build("<sensor type=\"perspective\"/>" + lamp).filter().name(), "gaussian");
+    EXPECT_EQ(build("<sensor type=\"perspective\"><film type=\"hdrfilm\"/></sensor>" + lamp)
+                  .filter()
+                  .name(),
+              "gaussian");
+}
+
+// The default of diffuse is 0.5.
+TEST(SceneBuilder, UnknownTextureIsReplacedByTheDefault) {
+    BuildOptions options;
+    options.lenient = true;
+    const Scene scene =
+        build_scene(parse_mitsuba_xml("<scene version=\"3.0.0\">" + front_camera(4) +
+                                          "<shape type=\"sphere\"><bsdf type=\"diffuse\">"
+                                          "<texture type=\"no_such\" name=\"reflectance\"/>"
+                                          "</bsdf></shape></scene>",
+                                      "test.xml"),
+                    options);
+    EXPECT_EQ(scene.shapes().at(0).material->mean_albedo(), Rgb(0.5f));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Daylight as a scene file asks for it.
+// Daylight in scene files.
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ Rgb radiance(const Scene& scene, Vec3 d) {
     return sum;
 }
 
-// Every direction that the sun makes has its density, which integrates to 1 over a disc of exactly its size.
+// Every direction sampled by the sun has its density, which integrates to 1 over a disc of exactly its size.
 TEST(Sun, HasTheDensityOfItsSamples) {
     for (const double aperture : {0.01, 0.5358, 20.0}) {
         const Scene scene =

@@ -1,4 +1,4 @@
-// Shapes as a scene file asks for them.
+// Shapes in scene files.
 
 #include <cmath>
 

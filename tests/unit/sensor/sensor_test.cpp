@@ -120,7 +120,7 @@ TEST_P(Sensors, MeasureWhatHitsALens) {
     }
 }
 
-/// One over what a pixel's rays cover: solid angle, or the area of a parallel projection.
+/// The density is the inverse of the solid angle of a pixel's rays, or of their area in a parallel projection.
 TEST_P(Sensors, HaveTheDensityOfTheirRays) {
     constexpr float kHalf = 0.25f;
     for (int i = 0; i < 100; ++i) {

@@ -1,4 +1,4 @@
-// Look-ups against Mitsuba 3.9.1 (scalar_rgb) on the same pixels, and what only this project promises.
+// Look-ups compared with Mitsuba 3.9.1 (scalar_rgb) on the same pixels, and features of this project.
 
 #include "texture/bitmap.h"
 

@@ -68,7 +68,7 @@ protected:
         scene_.objects.insert(scene_.objects.begin(), std::move(root));
         return *builder_.build(0);
     }
-    /// What the maker says about an object.
+    /// The message of the error for an object; "" without one.
     std::string error(SceneObject root) {
         try {
             build(std::move(root));
@@ -173,8 +173,7 @@ TEST_F(TextureRegistry, BadImagesAreExplained) {
     EXPECT_NE(message.find("broken.png"), std::string::npos) << message;
     write("nan.exr", {Rgb(std::numeric_limits<float>::quiet_NaN()), Rgb(1)});
     message = error(object("bitmap", {{"filename", std::string("nan.exr")}}));
-    EXPECT_NE(message.find("3 values that are infinite or not a number"), std::string::npos)
-        << message;
+    EXPECT_NE(message.find("3 values that are infinite or NaN"), std::string::npos) << message;
     write("opaque.png", {Rgb(1)});
     message = error(
         object("bitmap", {{"filename", std::string("opaque.png")}, {"channel", std::string("a")}}));
@@ -201,6 +200,12 @@ TEST(TextureCache, LoadsEachImageOnce) {
     EXPECT_THROW(cache.load(path + "no", false), std::runtime_error);
     EXPECT_EQ(cache.memory_bytes(), 12u);
     std::filesystem::remove(path);
+}
+
+TEST(TextureRef, ScalarOfAConstantIsItsLuminance) {
+    const Rgb colour(0.9f, 0.2f, 0.4f);
+    EXPECT_EQ(TextureRef(colour).eval_scalar({}), luminance(colour));
+    EXPECT_EQ(TextureRef(Rgb(0.3f)).eval_scalar({}), 0.3f);
 }
 
 TEST(TextureDefaults, GradientIsByCentralDifferences) {

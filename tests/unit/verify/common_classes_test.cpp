@@ -1,4 +1,4 @@
-// Which classes are compared: a class that one side loses must not be excused as too rare.
+// Choice of the compared classes: a class lost by one side must not count as too rare.
 
 #include "verify/common_classes.h"
 
@@ -50,7 +50,7 @@ TEST(CommonClasses, LostClassIsADeviation) {
     EXPECT_GT(report.lengths[1].comparison.p, 1e-3);
 }
 
-/// What the reference itself finds too seldom to know how often the method should: 32 runs of 30, a tenth of them.
+/// The reference has too few contributions to imply enough for the method: a tenth of 30 in each of 32 runs.
 TEST(CommonClasses, LostClassIsTooRareWhereTheReferenceFindsItSeldom) {
     const std::vector<RunSeries> references{
         series("path", kPath, {{kDirect, 1000}, {kCaustic, 30}})};
@@ -63,7 +63,7 @@ TEST(CommonClasses, LostClassIsTooRareWhereTheReferenceFindsItSeldom) {
                     .contains(kCaustic));
 }
 
-/// Light tracing has other techniques than path tracing: nothing tells how seldom it may make what that finds often.
+/// Light tracing has other techniques than path tracing, so that contributions of one imply nothing for the other.
 TEST(CommonClasses, OtherTechniquesMayFindAClassSeldom) {
     const std::vector<RunSeries> references{
         series("path", kPath, {{kDirect, 1000}, {kCaustic, 300}})};
@@ -76,7 +76,7 @@ TEST(CommonClasses, OtherTechniquesMayFindAClassSeldom) {
     EXPECT_EQ(left.out_of_reach, 0);
 }
 
-/// A class that the first reference hardly knows is compared with another one, but not with the method itself.
+/// A class that the first reference samples badly is compared with another one, but not with the method itself.
 TEST(CommonClasses, LaterReferencesServeWhereTheyAreMuchBetter) {
     const PathClass caustic{.edges = 4, .delta_events = 0b0110};
     const std::vector<RunSeries> references{

@@ -1,5 +1,5 @@
-// What is verified is what is rendered: an observer changes nothing. Integrators restore whole light paths for it instead
-// of their last vertices.
+// An observer does not change the image, although integrators restore whole light paths for it instead of the last
+// vertices only.
 
 #include <cstring>
 

@@ -1,4 +1,4 @@
-// Classes of paths agree with what techniques are seen to make.
+// can_make() agrees with the paths that techniques make in renderings.
 
 #include "verify/path_class.h"
 
@@ -13,7 +13,7 @@
 namespace etendue::test {
 namespace {
 
-/// What a rendering made, by class and s.
+/// Contributions of a rendering, by class and s.
 class ClassObserver final : public ContributionObserver {
 public:
     explicit ClassObserver(const Scene& scene) : scene_(scene) {}
@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, PathClasses,
                          ::testing::Values("diffuse", "mixed", "lens", "point"),
                          [](const auto& p) { return std::string(p.param); });
 
-/// Light tracing with a pinhole cannot make what is seen in a mirror; path tracing cannot make a point light in one.
+/// Light tracing with a pinhole cannot make paths to mirrors; path tracing cannot make the reflection of a point light.
 TEST(PathClass, SaysWhatAMethodCannotMake) {
     const TechniqueCounts path{.hit = 1, .next_event = 1}, light{.splat = 9};
     PathClass c{.edges = 3};
@@ -97,7 +97,7 @@ TEST(PathClass, SaysWhatAMethodCannotMake) {
     EXPECT_TRUE(can_make(connection_technique(3, 1), c));
 }
 
-/// A technique without light vertices has no last one: its place must not be asked for.
+/// A technique without light vertices has no last light vertex.
 TEST(PathClass, KnowsTechniquesWithoutLightVertices) {
     for (int edges = 1; edges <= PathClass::kMostEdges; ++edges) {
         const Technique hit = connection_technique(0, edges + 1),
@@ -118,7 +118,7 @@ TEST(PathClass, HasAName) {
               "L*DSE");
 }
 
-/// A pair may drop the one and the other vertex, unless a neighbour cannot sample it again.
+/// A pair may drop either vertex, unless its neighbour cannot sample it again.
 TEST(PathClass, SaysHowOftenAPairMakesAPath) {
     const Technique middle{Strategy::Gather, 3, 3}, at_lens{Strategy::Gather, 4, 2};
     const PathClass diffuse{.edges = 4}, by_mirror{.edges = 4, .delta_events = 1u << 1};

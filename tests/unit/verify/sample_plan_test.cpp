@@ -1,4 +1,4 @@
-// How many samples are rendered: at the least cost, and without a word about the difference that is tested.
+// Planning of samples: the least cost, and no influence on the rate of false alarms.
 
 #include "verify/sample_plan.h"
 
@@ -30,7 +30,7 @@ TEST(SamplePlan, ReachesTheErrorAtTheLeastCost) {
     }
 }
 
-TEST(SamplePlan, LeavesAloneWhatIsExactEnough) {
+TEST(SamplePlan, KeepsSeriesThatArePreciseEnough) {
     const WantedPrecision mean{{100, 1e-3, 0}, 10};
     const auto growth = sample_growth(std::vector{mean}, std::vector{1.0, 5.0, 1.0});
     EXPECT_NEAR(growth[0], 100 / (10 - 1e-3), 1e-9);
@@ -45,9 +45,9 @@ TEST(SamplePlan, TakesTheLargestOfSeveral) {
     EXPECT_EQ(sample_growth(means, std::vector{1.0, 1.0}), (std::vector<double>{4, 9}));
 }
 
-/// Means that are equal, rendered until an error of a size at the edge of what each look can find would be found: false
-/// alarms stay at the level of the test.
-TEST(SamplePlan, LooksAtTheSpreadDoNotRaiseFalseAlarms) {
+/// Equal means, with samples added until an error at the limit of detection would be found: the rate of false alarms
+/// remains at the level of the test.
+TEST(SamplePlan, StoppingBySpreadDoesNotRaiseFalseAlarms) {
     constexpr int kTrials = 20000, kRuns = 32;
     constexpr double kLevel = 0.01;
     std::mt19937_64 random(7);
@@ -65,7 +65,7 @@ TEST(SamplePlan, LooksAtTheSpreadDoNotRaiseFalseAlarms) {
                     sides[side].add(100 + sum / samples);
                 }
             const WelchTest test{sides[0], sides[1], 1e9, welch_p(sides[0], sides[1], 0)};
-            // An error of which about half of all looks at three times the samples say that it would be found.
+            // An error that would be found according to about half of all estimates with three times the samples.
             if (test.detectable(kLevel) > 0.0056 && more < 16) continue;
             alarms += test.p < kLevel;
             break;

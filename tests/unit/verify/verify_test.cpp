@@ -22,7 +22,7 @@ VerifyOptions quick_options() {
     return options;
 }
 
-/// An exception of a rendering reaches the caller; it must not end the program.
+/// An exception of a rendering reaches the caller and does not terminate the program.
 TEST(Verify, ThrowsWhatARenderingThrows) {
     const Scene scene = build(lit_room(8));
     VerifyOptions options = quick_options();
@@ -50,7 +50,7 @@ TEST(Verify, SamplersGiveTheSameMeans) {
     EXPECT_NEAR(means[0] / means[1], 1, 0.05);
 }
 
-/// Rendering goes on until the error asked for would be found, and no longer than it may.
+/// Rendering continues until the requested error would be found, within the time limit.
 TEST(Verify, RendersUntilAnErrorWouldBeFound) {
     const Scene scene = build(lit_room(8));
     VerifyOptions options = quick_options();
@@ -72,7 +72,7 @@ TEST(Verify, RendersUntilAnErrorWouldBeFound) {
     EXPECT_FALSE(unfinished.detectable(unfinished.methods[0]).reaches(1e-4));
 }
 
-/// Light of a mirror is out of reach of `light`; the report names its classes and how much light they hold.
+/// Light seen in a mirror is out of reach of `light`; the report names these classes and their share of the light.
 TEST(Verify, NamesWhatIsNotCompared) {
     const Scene scene =
         build(lit_room(12) + sphere("0,-0.3,0.2", "0.6",
@@ -92,7 +92,7 @@ TEST(Verify, NamesWhatIsNotCompared) {
     EXPECT_GT(m.out_of_reach, 0.01);
 }
 
-/// Pixels that are correlated make the error of a reference's mean larger.
+/// Correlated pixels increase the error of a reference's mean.
 TEST(Verify, AllowsForCorrelatedPixelsOfAReference) {
     const Scene scene = build(lit_room(8));
     VerifyOptions options = quick_options();

@@ -1,8 +1,8 @@
 #pragma once
 #pragma GCC system_header  // #include_next
-// Stands before TBB's own header where the thread sanitizer is at work. It cannot see how libtbb, which is not
-// instrumented, hands work from thread to thread. Here it is told: what precedes a loop happens before every call of its
-// body, and every call before what follows the loop. Nothing is said about two calls, so races between them are found.
+// Replaces TBB's header for the thread sanitizer, which does not see how libtbb, without instrumentation, passes work
+// between threads. This header declares that everything before a loop happens before every call of its body, and every
+// call before everything after the loop. It declares no order between two calls, so races between them are found.
 
 #define parallel_for parallel_for_of_tbb
 #include_next <tbb/parallel_for.h>
@@ -17,7 +17,7 @@ struct AnnotatedBody {
     const Body* body;
     char *begin, *end;
 
-    // Not looked into: the copy at hand was made by another thread, before anything is acquired.
+    // Not instrumented: this copy was made by another thread, before anything is acquired.
     __attribute__((no_sanitize("thread"))) void operator()(Index i) const {
         __tsan_acquire(begin);
         (*body)(i);
