@@ -40,9 +40,9 @@ protected:
 
 // Options of Mitsuba 3.7's bump and normal maps that are known but not supported.
 inline constexpr const char* kFlipInvalidNormalsDoc =
-    "Turning normals toward the view; must be false.";
+    "Would turn normals toward the viewer; must be false.";
 inline constexpr const char* kShadowingFunctionDoc =
-    "Softening the terminator of the light; must be false.";
+    "Would soften the shadow terminator; must be false.";
 
 /// Refuses these options: they make the material depend on which of the two directions is the
 /// view's.
