@@ -62,13 +62,13 @@ private:
 }  // namespace
 
 MaterialEntry blendbsdf_entry() {
-    return {
-        {"bsdf",
-         "blendbsdf",
-         "Linear blend of two materials.",
-         {{"weight", ParamKind::Texture, "", "Share of the second material, in [0, 1]; required."},
-          {"bsdf", ParamKind::Object, "", "The two nested materials."}}},
-        make_material<BlendBsdf>};
+    return {{"bsdf",
+             "blendbsdf",
+             "Linear blend of two materials.",
+             {{"weight", ParamKind::Texture, "",
+               "Fraction of the second material, in [0, 1]; required."},
+              {"bsdf", ParamKind::Object, "", "The two nested materials."}}},
+            make_material<BlendBsdf>};
 }
 
 }  // namespace etendue

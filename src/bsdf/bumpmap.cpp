@@ -46,18 +46,18 @@ private:
 }  // namespace
 
 MaterialEntry bumpmap_entry() {
-    return {
-        {"bsdf",
-         "bumpmap",
-         "Shades a material with the normals of a displaced surface [Blinn 1978].",
-         {{"displacement", ParamKind::Texture, "",
-           "Heights in units of the scene; an unnamed texture will do."},
-          {"arbitrary", ParamKind::Texture, "", "As displacement: the name in Mitsuba's manual."},
-          {"scale", ParamKind::Float, "1", "Factor of the heights."},
-          {"flip_invalid_normals", ParamKind::Bool, "false", kFlipInvalidNormalsDoc},
-          {"use_shadowing_function", ParamKind::Bool, "false", kShadowingFunctionDoc},
-          {"bsdf", ParamKind::Object, "", "The nested material."}}},
-        make_material<BumpMap>};
+    return {{"bsdf",
+             "bumpmap",
+             "Shades a material with the normals of a displaced surface [Blinn 1978].",
+             {{"displacement", ParamKind::Texture, "",
+               "Heights in scene units; the texture may be unnamed."},
+              {"arbitrary", ParamKind::Texture, "",
+               "The same as displacement; the name in Mitsuba's manual."},
+              {"scale", ParamKind::Float, "1", "Factor on the heights."},
+              {"flip_invalid_normals", ParamKind::Bool, "false", kFlipInvalidNormalsDoc},
+              {"use_shadowing_function", ParamKind::Bool, "false", kShadowingFunctionDoc},
+              {"bsdf", ParamKind::Object, "", "The nested material."}}},
+            make_material<BumpMap>};
 }
 
 }  // namespace etendue

@@ -31,7 +31,8 @@ MaterialEntry diffuse_entry() {
     return {{"bsdf",
              "diffuse",
              "Ideal diffuse (Lambertian) reflection.",
-             {{"reflectance", ParamKind::Texture, "0.5", "Share of light reflected, in [0, 1]."}}},
+             {{"reflectance", ParamKind::Texture, "0.5",
+               "Fraction of light that is reflected, in [0, 1]."}}},
             make_material<Diffuse>};
 }
 

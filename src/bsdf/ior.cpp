@@ -118,8 +118,8 @@ std::vector<ParamInfo> dielectric_params() {
         {"int_ior", ParamKind::FloatOrName, "bk7",
          "Index of refraction behind the surface, above 0."},
         {"ext_ior", ParamKind::FloatOrName, "air", "Index of refraction in front of it, above 0."},
-        {"specular_reflectance", ParamKind::Texture, "1", "Factor of the reflection."},
-        {"specular_transmittance", ParamKind::Texture, "1", "Factor of the transmission."}};
+        {"specular_reflectance", ParamKind::Texture, "1", "Factor on the reflection."},
+        {"specular_transmittance", ParamKind::Texture, "1", "Factor on the transmission."}};
 }
 
 std::vector<ParamInfo> conductor_params() {
@@ -127,8 +127,9 @@ std::vector<ParamInfo> conductor_params() {
              "Named metal (Au, Cu, Ag, ...), or none for a perfect mirror."},
             {"eta", ParamKind::Texture, "0",
              "Real part of the index of refraction relative to the outside."},
-            {"k", ParamKind::Texture, "1", "Imaginary part of it."},
-            {"specular_reflectance", ParamKind::Texture, "1", "Factor of the reflectance."}};
+            {"k", ParamKind::Texture, "1",
+             "Imaginary part of the index of refraction relative to the outside."},
+            {"specular_reflectance", ParamKind::Texture, "1", "Factor on the reflectance."}};
 }
 
 std::vector<ParamInfo> roughness_params() {
@@ -137,7 +138,7 @@ std::vector<ParamInfo> roughness_params() {
             {"alpha", ParamKind::Texture, "0.1",
              "Roughness: RMS slope of the facets, clamped to [0.0001, 100]."},
             {"alpha_u", ParamKind::Texture, "",
-             "Roughness along the first tangent; with alpha_v, instead of alpha."},
+             "Roughness along the first tangent; together with alpha_v, instead of alpha."},
             {"alpha_v", ParamKind::Texture, "", "Roughness along the second tangent."},
             {"sample_visible", ParamKind::Bool, "true",
              "Accepted; visible normals are always sampled."}};

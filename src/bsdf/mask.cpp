@@ -36,7 +36,7 @@ MaterialEntry mask_entry() {
              "mask",
              "Lets light pass through a material where its opacity is below one.",
              {{"opacity", ParamKind::Texture, "0.5",
-               "Probability that a ray meets the surface, in [0, 1]."},
+               "Probability that a ray hits the surface, in [0, 1]."},
               {"bsdf", ParamKind::Object, "", "The nested material."}}},
             make_material<Mask>};
 }

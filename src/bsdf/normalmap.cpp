@@ -34,15 +34,16 @@ private:
 }  // namespace
 
 MaterialEntry normalmap_entry() {
-    return {{"bsdf",
-             "normalmap",
-             "Shades a material with normals from a texture.",
-             {{"normalmap", ParamKind::Texture, "",
-               "Raw texture of (n + 1)/2 in the shading frame; required."},
-              {"flip_invalid_normals", ParamKind::Bool, "false", kFlipInvalidNormalsDoc},
-              {"use_shadowing_function", ParamKind::Bool, "false", kShadowingFunctionDoc},
-              {"bsdf", ParamKind::Object, "", "The nested material."}}},
-            make_material<NormalMap>};
+    return {
+        {"bsdf",
+         "normalmap",
+         "Shades a material with normals from a texture.",
+         {{"normalmap", ParamKind::Texture, "",
+           "Raw texture that holds (n + 1)/2, with the normal n in the shading frame; required."},
+          {"flip_invalid_normals", ParamKind::Bool, "false", kFlipInvalidNormalsDoc},
+          {"use_shadowing_function", ParamKind::Bool, "false", kShadowingFunctionDoc},
+          {"bsdf", ParamKind::Object, "", "The nested material."}}},
+        make_material<NormalMap>};
 }
 
 }  // namespace etendue

@@ -75,8 +75,8 @@ MaterialEntry phong_entry() {
     return {
         {"bsdf",
          "phong",
-         "Modified Phong model: diffuse, and a cosine lobe about the mirror direction [Lafortune & "
-         "Willems 1994].",
+         "Modified Phong model: a diffuse part and a cosine lobe about the mirror direction "
+         "[Lafortune & Willems 1994].",
          {{"diffuse_reflectance", ParamKind::Texture, "0.5",
            "Albedo of the diffuse part, in [0, 1]."},
           {"specular_reflectance", ParamKind::Texture, "0.2",

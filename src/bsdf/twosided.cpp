@@ -47,13 +47,14 @@ private:
 }  // namespace
 
 MaterialEntry twosided_entry() {
-    return {{"bsdf",
-             "twosided",
-             "Makes one reflecting material visible from both sides, or puts two on the front and "
-             "the back.",
-             {{"bsdf", ParamKind::Object, "",
-               "One or two nested materials without transmission; front, then back."}}},
-            make_material<TwoSided>};
+    return {
+        {"bsdf",
+         "twosided",
+         "Shows one reflecting material on both sides, or one material on the front and another on "
+         "the back.",
+         {{"bsdf", ParamKind::Object, "",
+           "One or two nested materials without transmission: first the front, then the back."}}},
+        make_material<TwoSided>};
 }
 
 }  // namespace etendue

@@ -40,9 +40,9 @@ protected:
 
 // Options of the bump and normal maps of Mitsuba 3.7, which are known but not supported.
 inline constexpr const char* kFlipInvalidNormalsDoc =
-    "Turning normals toward the view; must be false.";
+    "Would turn normals toward the viewer; must be false.";
 inline constexpr const char* kShadowingFunctionDoc =
-    "Softening the terminator of the light; must be false.";
+    "Would soften the shadow terminator; must be false.";
 
 /// Throws SceneError where one of these options is set: they make a material depend on which of the two directions is
 /// that of the view.

@@ -110,7 +110,7 @@ std::unique_ptr<Emitter> make_area_emitter(const Shape& shape, TextureRef radian
 EmitterEntry area_entry() {
     return {{"emitter",
              "area",
-             "Radiance from the front of a shape.",
+             "Emission from the front of a shape.",
              {{"radiance", ParamKind::Texture, "1", "Radiance in W/(m² sr)."}}},
             [](const Params& p, EmitterContext& c) {
                 if (!c.shape()) p.fail("emitter \"area\" must be nested in a shape");

@@ -128,11 +128,12 @@ std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb
 EmitterEntry envmap_entry() {
     return {{"emitter",
              "envmap",
-             "Environment as a latitude-longitude image, importance-sampled.",
-             {{"filename", ParamKind::String, "", "Image, any format; up is its upper edge."},
-              {"scale", ParamKind::Float, "1", "Factor of the radiance."},
+             "Environment map given as a latitude-longitude image; importance-sampled.",
+             {{"filename", ParamKind::String, "",
+               "Latitude-longitude image of any supported format; its upper edge is the zenith."},
+              {"scale", ParamKind::Float, "1", "Factor on the radiance."},
               {"to_world", ParamKind::Transform, "identity",
-               "Rotation of the environment; its own up is +y."},
+               "Rotation of the environment; its own up direction is +y."},
               {"mis_compensation", ParamKind::Bool, "false", "Accepted; without effect."}}},
             [](const Params& p, EmitterContext&) {
                 const std::string path = resolve_file(p);

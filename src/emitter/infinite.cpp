@@ -84,7 +84,7 @@ std::vector<std::unique_ptr<Emitter>> one(std::unique_ptr<Emitter> e) {
 EmitterEntry constant_entry() {
     return {{"emitter",
              "constant",
-             "The same radiance from every direction.",
+             "Environment with the same radiance from every direction.",
              {{"radiance", ParamKind::Rgb, "1", "Radiance in W/(m² sr)."}}},
             [](const Params& p, EmitterContext&) {
                 return one(std::make_unique<ConstantEmitter>(p.rgb("radiance", Rgb(1))));

@@ -91,7 +91,7 @@ EmitterEntry point_entry() {
          "point",
          "Isotropic point light.",
          {{"intensity", ParamKind::Rgb, "1", "Radiant intensity in W/sr."},
-          {"position", ParamKind::Vector, "0, 0, 0", "Instead of to_world."},
+          {"position", ParamKind::Vector, "0, 0, 0", "Position of the light, instead of to_world."},
           {"to_world", ParamKind::Transform, "identity", "Its origin is the light's position."}}},
         [](const Params& p, EmitterContext&) {
             if (p.has("position") && p.has("to_world"))
@@ -106,12 +106,13 @@ EmitterEntry spot_entry() {
     return {{"emitter",
              "spot",
              "Spot light along +z.",
-             {{"intensity", ParamKind::Rgb, "1", "Radiant intensity in the beam, W/sr."},
+             {{"intensity", ParamKind::Rgb, "1", "Radiant intensity within the beam, in W/sr."},
               {"cutoff_angle", ParamKind::Float, "20",
                "Half-angle in degrees beyond which nothing is emitted."},
               {"beam_width", ParamKind::Float, "3/4 of cutoff_angle",
-               "Half-angle in degrees of full intensity."},
-              {"to_world", ParamKind::Transform, "identity", "Position, and +z as axis."}}},
+               "Half-angle in degrees up to which the intensity is full."},
+              {"to_world", ParamKind::Transform, "identity",
+               "Its origin is the light's position, and its +z axis is that of the beam."}}},
             [](const Params& p, EmitterContext&) {
                 const Transform t = p.transform("to_world");
                 const float cutoff = p.number("cutoff_angle", 20, 0.01f, 179.9f);

@@ -98,14 +98,14 @@ const std::vector<FilterEntry>& filter_registry() {
         {{"rfilter",
           "tent",
           "Linear ramp from the pixel's centre.",
-          {{"radius", ParamKind::Float, "1", "Half width in pixels, above 0 and at most 16."}}},
+          {{"radius", ParamKind::Float, "1", "Half the width in pixels, above 0 and at most 16."}}},
          [](const Params& p) {
              const float r = p.number("radius", 1, 0.01f, 16);
              return ReconstructionFilter("tent", r, tent_shape, r);
          }},
         {{"rfilter",
           "gaussian",
-          "Gaussian cut off, and lowered to zero, at four standard deviations.",
+          "Gaussian, truncated at four standard deviations and shifted to be zero there.",
           {{"stddev", ParamKind::Float, "0.5", "Standard deviation in pixels."}}},
          [](const Params& p) {
              const float sigma = p.number("stddev", 0.5f, 0.01f, 4);
@@ -116,8 +116,8 @@ const std::vector<FilterEntry>& filter_registry() {
           "Mitchell and Netravali's cubic; has negative lobes.",
           {{"b", ParamKind::Float, "0.333333", "Blur."},
            {"c", ParamKind::Float, "0.333333", "Ringing."},
-           {"B", ParamKind::Float, "0.333333", "As b."},
-           {"C", ParamKind::Float, "0.333333", "As c."}}},
+           {"B", ParamKind::Float, "0.333333", "The same as b."},
+           {"C", ParamKind::Float, "0.333333", "The same as c."}}},
          [](const Params& p) {
              const float third = 1.0f / 3;
              return ReconstructionFilter("mitchell", 2, mitchell_shape,

@@ -142,12 +142,13 @@ private:
 
 IntegratorEntry bdpt_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back({"connections", ParamKind::String, "path",
-                      "What eye vertices are connected to: path (the light path of the pixel) or "
-                      "cache (random vertices of all light paths of the pass)."});
+    params.push_back(
+        {"connections", ParamKind::String, "path",
+         "Light vertices to which eye vertices are connected: path (those of the pixel's own light "
+         "path) or cache (random vertices of all light paths of the pass)."});
     params.push_back({"cache_draws", ParamKind::Int, "0",
-                      "Connections of each eye vertex to the cache; 0: as many as a light path has "
-                      "vertices."});
+                      "Number of connections from each eye vertex to the cache; 0: as many as a "
+                      "light path has connectible vertices on average."});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     return {{"integrator", "bdpt",
              "Bidirectional path tracing with all connections and MIS. Unbiased.", params},

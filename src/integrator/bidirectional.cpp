@@ -9,15 +9,15 @@ namespace etendue {
 
 std::vector<ParamInfo> Bidirectional::params() {
     std::vector<ParamInfo> params = depth_params();
-    params.push_back({"roulette", ParamKind::Float, "0.15",
-                      "Joins that would add less than this share of the pixel's luminance (as "
-                      "earlier passes have it) are tested "
-                      "with a probability proportional to what they add; 0: all are tested."});
     params.push_back(
-        {"eorr", ParamKind::Bool, "false",
-         "Efficiency-optimised roulette: joins that would add less to their pixel than "
-         "the root of its variance over the rays of a sample (as earlier passes have "
-         "both), instead of `roulette`, which must not be 0."});
+        {"roulette", ParamKind::Float, "0.15",
+         "Threshold of the Russian roulette before shadow rays, as a fraction of the pixel's "
+         "luminance in earlier passes: a join that would contribute less is tested with a "
+         "probability proportional to its contribution; 0: all joins are tested."});
+    params.push_back({"eorr", ParamKind::Bool, "false",
+                      "Efficiency-optimised roulette: the threshold is √(V/T) instead, where V is "
+                      "the variance of the pixel and T the number of rays of a sample, both from "
+                      "earlier passes. Has no effect if `roulette` is 0."});
     return params;
 }
 

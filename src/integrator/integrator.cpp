@@ -169,10 +169,12 @@ DepthOptions DepthOptions::from(const IntegratorParams& params) {
 }
 
 std::vector<ParamInfo> depth_params() {
-    return {{"max_depth", ParamKind::Int, "-1",
-             "Edges of the longest path (1: directly visible light); -1 for no limit."},
-            {"rr_depth", ParamKind::Int, "5",
-             "Russian roulette begins at the sub-path's vertex with this index."}};
+    return {
+        {"max_depth", ParamKind::Int, "-1",
+         "Number of edges of the longest paths (1: only directly visible light); -1: no limit."},
+        {"rr_depth", ParamKind::Int, "5",
+         "Index of the first vertex of a sub-path at which Russian roulette is applied; the lens "
+         "or emitter has index 0."}};
 }
 
 }  // namespace etendue

@@ -47,13 +47,13 @@ private:
 }  // namespace
 
 IntegratorEntry light_entry() {
-    return {
-        {"integrator", "light",
-         "Light tracing: light paths connected to the lens. Unbiased for the paths it can make.",
-         depth_params()},
-        [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-            return std::make_unique<LightIntegrator>(DepthOptions::from(p));
-        }};
+    return {{"integrator", "light",
+             "Light tracing: connects light paths to the lens. Unbiased for the paths that it can "
+             "make.",
+             depth_params()},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                return std::make_unique<LightIntegrator>(DepthOptions::from(p));
+            }};
 }
 
 }  // namespace etendue

@@ -6,11 +6,10 @@ namespace etendue {
 
 std::vector<ParamInfo> LightPathOptions::params() {
     return {{"light_paths", ParamKind::Int, "0",
-             "Light paths of a pass; a pixel's own is that with its number modulo light_paths. 0: "
-             "one a "
-             "pixel, or as many as fit into `memory`."},
+             "Number of light paths in a pass; pixel i uses light path i modulo light_paths. 0: "
+             "one for each pixel, or as many as fit into `memory`."},
             {"memory", ParamKind::Int, "6144",
-             "Most that the light vertices of a pass may take, in MiB."}};
+             "Largest memory for the light vertices of a pass, in MiB."}};
 }
 
 LightPathOptions::LightPathOptions(const IntegratorParams& p)

@@ -43,7 +43,7 @@ private:
 
 IntegratorEntry path_entry() {
     return {{"integrator", "path",
-             "Path tracing with next event estimation and MIS; the reference. Unbiased.",
+             "Path tracing with next event estimation and MIS; the reference method. Unbiased.",
              depth_params()},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PathIntegrator>(DepthOptions::from(p));

@@ -8,10 +8,9 @@ namespace etendue {
 
 std::vector<ParamInfo> PhotonMapping::params() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back(
-        {"roughness", ParamKind::Float, "0.1",
-         "Surfaces whose sharpest smooth lobe is at least as rough (α of GGX; diffuse: 1) "
-         "are diffuse enough for photons; elsewhere eye paths go on."});
+    params.push_back({"roughness", ParamKind::Float, "0.1",
+                      "Photons are used at surfaces whose sharpest smooth lobe is at least this "
+                      "rough (α of GGX; diffuse: 1); at other surfaces eye paths continue."});
     return params;
 }
 

@@ -275,26 +275,27 @@ private:
 
 IntegratorEntry pm_entry() {
     std::vector<ParamInfo> params = PhotonMapping::params();
-    params.push_back(
-        {"light_paths", ParamKind::Int, "500000", "Light paths whose photons are kept."});
-    params.push_back({"memory", ParamKind::Int, "6144", "Most that the photons may take, in MiB."});
+    params.push_back({"light_paths", ParamKind::Int, "500000",
+                      "Number of light paths whose photons are stored."});
+    params.push_back({"memory", ParamKind::Int, "6144", "Largest memory for the photons, in MiB."});
     params.push_back(
         {"retrace", ParamKind::Bool, "false",
-         "Whether every pass traces photons of its own; else all use the first pass's."});
-    params.push_back({"nearest", ParamKind::Int, "60",
-                      "Photons of a density estimate; the farthest tells the radius."});
+         "Whether every pass traces new photons; otherwise all passes use those of the first."});
+    params.push_back(
+        {"nearest", ParamKind::Int, "60",
+         "Number of photons in a density estimate; the farthest only determines the radius."});
     params.push_back(
         {"radius", ParamKind::Float, "0",
          "Largest radius of a density estimate, in scene units; 0: 3 % of the radius of "
          "the scene's bounds."});
     params.push_back({"gather_rays", ParamKind::Int, "16",
-                      "Final gather rays of an eye path in a pass; 0: photons are seen directly."});
-    params.push_back(
-        {"cache_error", ParamKind::Float, "0",
-         "Error that the irradiance cache allows (a of Ward et al., 0.1 to 0.4); 0: no "
-         "cache."});
-    params.push_back(
-        {"cache_rays", ParamKind::Int, "256", "Final gather rays of a record of the cache."});
+                      "Number of final gather rays for each eye path in a pass; 0: the photons are "
+                      "seen directly."});
+    params.push_back({"cache_error", ParamKind::Float, "0",
+                      "Error allowed by the irradiance cache (a in [Ward et al. 1988], usually 0.1 "
+                      "to 0.4); 0: no cache."});
+    params.push_back({"cache_rays", ParamKind::Int, "256",
+                      "Number of final gather rays for each record of the irradiance cache."});
     return {{"integrator", "pm", "Photon mapping with final gathering. Biased.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PmIntegrator>(p);

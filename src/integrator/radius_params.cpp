@@ -9,8 +9,8 @@ namespace etendue {
 std::vector<ParamInfo> radius_params(const char* doc) {
     return {{"radius", ParamKind::Float, "0", doc},
             {"alpha", ParamKind::Float, "0.75",
-             "The radius of pass i is radius·i^((alpha-1)/2); 1: it does not shrink, and the image "
-             "stays biased."}};
+             "Controls how fast the radius shrinks: in pass i it is radius·i^((alpha-1)/2). 1: it "
+             "stays constant, and the image stays biased."}};
 }
 
 RadiusParams::RadiusParams(const IntegratorParams& p, float share)

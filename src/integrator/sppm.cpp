@@ -106,14 +106,13 @@ private:
 
 std::vector<ParamInfo> params() {
     std::vector<ParamInfo> params = PhotonMapping::params();
-    for (const ParamInfo& p : radius_params("Distance within which photons are merged in the first "
-                                            "pass, in scene units; 0: 1 % of the radius of the "
-                                            "scene's bounds."))
+    for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
+                                            "1 % of the radius of the scene's bounds."))
         params.push_back(p);
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back({"next_event", ParamKind::Bool, "true",
-                      "Whether direct light comes by shadow rays; else by photons, and at glossy "
-                      "surfaces by chance."});
+                      "Whether direct light is computed by shadow rays; otherwise by photons, and "
+                      "at glossy surfaces by chance hits."});
     return params;
 }
 
@@ -133,17 +132,16 @@ IntegratorEntry sppm_entry() {
 IntegratorEntry ppm_entry() {
     std::vector<ParamInfo> all = params();
     all.push_back({"eye_paths", ParamKind::Int, "16",
-                   "Eye paths of each pixel; pass i merges at the number i modulo eye_paths."});
-    return {
-        {"integrator", "ppm",
-         "Progressive photon mapping: the same eye paths over and over. Consistent for what these "
-         "see; biased with a fixed radius.",
-         all},
-        [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-            const int eye_paths = p.integer("eye_paths");
-            if (eye_paths < 1) throw std::runtime_error("ppm: eye_paths must be 1 or more");
-            return std::make_unique<SppmIntegrator>(p, eye_paths);
-        }};
+                   "Number of eye paths of each pixel; pass i uses eye path i modulo eye_paths."});
+    return {{"integrator", "ppm",
+             "Progressive photon mapping: all passes share a fixed set of eye paths. Consistent "
+             "for the light that these eye paths see; biased with a fixed radius.",
+             all},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                const int eye_paths = p.integer("eye_paths");
+                if (eye_paths < 1) throw std::runtime_error("ppm: eye_paths must be 1 or more");
+                return std::make_unique<SppmIntegrator>(p, eye_paths);
+            }};
 }
 
 }  // namespace etendue

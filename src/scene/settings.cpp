@@ -15,13 +15,13 @@ const std::vector<FilmEntry>& film_registry() {
             {"crop_height", ParamKind::Int, "height", "Height of the part that is rendered."},
             {"rfilter", ParamKind::Object, "gaussian", "Reconstruction filter."},
             {"file_format", ParamKind::String, "", "Accepted; the output's name decides."},
-            {"pixel_format", ParamKind::String, "", "Accepted; colours are written."},
+            {"pixel_format", ParamKind::String, "", "Accepted; RGB is always written."},
             {"component_format", ParamKind::String, "", "Accepted; floats are written."},
             {"banner", ParamKind::Bool, "", "Accepted; without effect."},
             {"high_quality_edges", ParamKind::Bool, "",
-             "Accepted; edges are always as with this on."},
+             "Accepted; pixels at the edge are always as with this option on."},
             {"sample_border", ParamKind::Bool, "", "Accepted; borders are always sampled."},
-            {"compensate", ParamKind::Bool, "", "Accepted; sums are in double."},
+            {"compensate", ParamKind::Bool, "", "Accepted; sums are always in double precision."},
             {"attach_log", ParamKind::Bool, "", "Accepted; without effect."},
             {"gamma", ParamKind::Float, "", "Accepted; output is linear."},
             {"exposure", ParamKind::Float, "", "Accepted; output is linear."},
@@ -64,15 +64,17 @@ const std::vector<SamplerEntry>& sampler_registry() {
         std::vector<SamplerEntry> all;
         const std::vector<ParamInfo> params = {
             {"sample_count", ParamKind::Int, "4",
-             "Samples per pixel, unless the command line says."},
-            {"seed", ParamKind::Int, "", "Accepted; the command line's seed counts."},
+             "Samples per pixel, unless the command line sets a limit."},
+            {"seed", ParamKind::Int, "", "Accepted; the option --seed is used instead."},
             {"dimension", ParamKind::Int, "", "Accepted; there is no limit."},
             {"scramble", ParamKind::Int, "", "Accepted; points are always scrambled."},
             {"jitter", ParamKind::Bool, "", "Accepted; points are always jittered."}};
         for (const char* name : {"independent", "sobol", "ldsampler", "stratified", "multijitter",
                                  "orthogonal", "halton", "hammersley"})
             all.push_back(
-                {{"sampler", name, "Taken for its sample count; see --sampler.", params}});
+                {{"sampler", name,
+                  "Only the sample count is used; the option --sampler selects the random numbers.",
+                  params}});
         return all;
     }();
     return entries;
@@ -81,8 +83,10 @@ const std::vector<SamplerEntry>& sampler_registry() {
 const std::vector<IntegratorAlias>& integrator_aliases() {
     static const std::vector<IntegratorAlias> entries = [] {
         const std::vector<ParamInfo> params = {
-            {"max_depth", ParamKind::Int, "-1", "Edges of the longest path; -1: no limit."},
-            {"rr_depth", ParamKind::Int, "5", "Where Russian roulette begins."},
+            {"max_depth", ParamKind::Int, "-1",
+             "Number of edges of the longest paths; -1: no limit."},
+            {"rr_depth", ParamKind::Int, "5",
+             "Index of the first vertex of a sub-path at which Russian roulette is applied."},
             {"hide_emitters", ParamKind::Bool, "", "Accepted; emitters are never hidden."},
             {"strict_normals", ParamKind::Bool, "", "Accepted; normals are always strict."},
             {"light_image", ParamKind::Bool, "", "Accepted; splats are always made."},
@@ -102,12 +106,12 @@ const PluginInfo& medium_info() {
     static const PluginInfo info = {
         "medium",
         "homogeneous",
-        "Absorbing medium: attenuation along the segment. Its albedo must be 0.",
-        {{"sigma_t", ParamKind::Rgb, "1", "Extinction, 1/length."},
-         {"sigma_a", ParamKind::Rgb, "", "Absorption, instead of sigma_t."},
-         {"sigma_s", ParamKind::Rgb, "0", "Scattering; must be 0."},
-         {"albedo", ParamKind::Rgb, "0.75", "Must be given as 0."},
-         {"scale", ParamKind::Float, "1", "Factor of sigma_t."},
+        "Absorbing medium, which attenuates light along segments. Its albedo must be 0.",
+        {{"sigma_t", ParamKind::Rgb, "1", "Extinction coefficient in 1/length."},
+         {"sigma_a", ParamKind::Rgb, "", "Absorption coefficient in 1/length, instead of sigma_t."},
+         {"sigma_s", ParamKind::Rgb, "0", "Scattering coefficient; must be 0."},
+         {"albedo", ParamKind::Rgb, "0.75", "Single-scattering albedo; must be set to 0."},
+         {"scale", ParamKind::Float, "1", "Factor on sigma_t."},
          {"sample_emitters", ParamKind::Bool, "", "Accepted; without effect."}}};
     return info;
 }

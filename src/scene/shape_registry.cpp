@@ -18,23 +18,24 @@ namespace {
 using Warn = std::function<void(const std::string&)>;
 
 std::vector<ParamInfo> with_common(std::vector<ParamInfo> params) {
-    params.push_back({"to_world", ParamKind::Transform, "identity", "Object to world."});
-    params.push_back({"flip_normals", ParamKind::Bool, "false", "Turns the shape inside out."});
+    params.push_back({"to_world", ParamKind::Transform, "identity", "Object-to-world transform."});
+    params.push_back({"flip_normals", ParamKind::Bool, "false",
+                      "Reverses the normals, so that the shape is turned inside out."});
     params.push_back({"bsdf", ParamKind::Object, "diffuse",
-                      "Material; black where the shape emits and names none."});
+                      "Material; without one, a shape that emits is black."});
     params.push_back({"emitter", ParamKind::Object, "", "An area emitter."});
     params.push_back({"interior", ParamKind::Object, "", "Medium behind the surface."});
-    params.push_back({"exterior", ParamKind::Object, "", "Medium before the surface."});
+    params.push_back({"exterior", ParamKind::Object, "", "Medium in front of the surface."});
     return params;
 }
 
 std::vector<ParamInfo> mesh_params(const char* flip) {
     return with_common(
         {{"filename", ParamKind::String, "", "Mesh file."},
-         {"face_normals", ParamKind::Bool, "false", "Flat shading: vertex normals are dropped."},
-         {"flip_tex_coords", ParamKind::Bool, flip, "v becomes 1 - v."},
-         {"collapse", ParamKind::Bool, "false", "Accepted; a file is always one shape."},
-         {"shape_index", ParamKind::Int, "0", "Which mesh of a .serialized file."},
+         {"face_normals", ParamKind::Bool, "false", "Flat shading: vertex normals are ignored."},
+         {"flip_tex_coords", ParamKind::Bool, flip, "Replaces v by 1 - v."},
+         {"collapse", ParamKind::Bool, "false", "Accepted; a file is always a single shape."},
+         {"shape_index", ParamKind::Int, "0", "Index of the mesh in a .serialized file."},
          {"max_smooth_angle", ParamKind::Float, "", "Accepted; without effect."},
          {"srgb", ParamKind::Bool, "false", "Accepted; vertex colours are not used."}});
 }
@@ -195,7 +196,7 @@ const std::vector<ShapeEntry>& shape_registry() {
          [](const Params& p, const Warn& w) { return make_file_mesh<read_obj>(p, w, true); }},
         {{"shape", "ply", "PLY mesh, ascii or binary.", mesh_params("false")},
          [](const Params& p, const Warn& w) { return make_file_mesh<read_ply>(p, w, false); }},
-        {{"shape", "serialized", "Mitsuba 0.6's compressed meshes.", mesh_params("false")},
+        {{"shape", "serialized", "Compressed mesh of Mitsuba 0.6.", mesh_params("false")},
          [](const Params& p, const Warn& w) {
              return finish(read_serialized(resolve_file(p),
                                            int(p.integer("shape_index", 0, 0, 1 << 24)),
@@ -229,7 +230,7 @@ const std::vector<PluginInfo>& group_infos() {
         {"shape",
          "instance",
          "A copy of a shapegroup.",
-         {{"to_world", ParamKind::Transform, "identity", "Group to world."},
+         {{"to_world", ParamKind::Transform, "identity", "Group-to-world transform."},
           {"shapegroup", ParamKind::Object, "", "Reference to the group."}}}};
     return infos;
 }

@@ -59,7 +59,7 @@ SensorEntry orthographic_entry() {
              "orthographic",
              "Parallel projection; the image spans [-1, 1] in x of camera space.",
              {{"to_world", ParamKind::Transform, "identity",
-               "Camera to world; its scale sets the size of the view."},
+               "Camera-to-world transform; its scale sets the size of the view."},
               {"near_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
               {"far_clip", ParamKind::Float, "", "Accepted; rays are not clipped."}}},
             [](const Params& p, const SensorContext& c) -> std::unique_ptr<Sensor> {

@@ -193,11 +193,11 @@ std::unique_ptr<Sensor> make(const Params& params, const SensorContext& context,
 std::vector<ParamInfo> shared_params(std::vector<ParamInfo> more) {
     std::vector<ParamInfo> all = {
         {"to_world", ParamKind::Transform, "identity",
-         "Camera to world; looks along +z, x to the left, y up."},
+         "Camera-to-world transform; the camera looks along +z, with +x to the left and +y up."},
         {"fov", ParamKind::Float, "", "Field of view in degrees along fov_axis."},
-        {"fov_axis", ParamKind::String, "x", "x, y, diagonal, smaller or larger."},
+        {"fov_axis", ParamKind::String, "x", "Axis of fov: x, y, diagonal, smaller or larger."},
         {"focal_length", ParamKind::String, "50mm",
-         "Instead of fov: focal length for a 35 mm film."},
+         "Focal length for a 35 mm film, instead of fov."},
         {"principal_point_offset_x", ParamKind::Float, "0",
          "Shift of the image centre, as a fraction of the width."},
         {"principal_point_offset_y", ParamKind::Float, "0",
@@ -226,9 +226,9 @@ SensorEntry perspective_entry() {
 SensorEntry thinlens_entry() {
     return {{"sensor", "thinlens", "Perspective camera with a finite round lens.",
              shared_params(
-                 {{"aperture_radius", ParamKind::Float, "", "Radius of the lens, world units."},
+                 {{"aperture_radius", ParamKind::Float, "", "Radius of the lens in world units."},
                   {"focus_distance", ParamKind::Float, "",
-                   "Distance of the plane in focus along +z, world units."}})},
+                   "Distance of the plane in focus along +z, in world units."}})},
             [](const Params& p, const SensorContext& c) { return make(p, c, true); }};
 }
 

@@ -50,9 +50,10 @@ private:
 TextureEntry checkerboard_entry() {
     return {{"texture",
              "checkerboard",
-             "Two by two squares of two colours to the unit square.",
-             {{"color0", ParamKind::Texture, "0.4", "The squares of the diagonal from (0, 0)."},
-              {"color1", ParamKind::Texture, "0.2", "The other squares."},
+             "Checkerboard of two colours, with two by two squares in the unit square of (u, v).",
+             {{"color0", ParamKind::Texture, "0.4",
+               "Colour of the squares on the diagonal from (0, 0)."},
+              {"color1", ParamKind::Texture, "0.2", "Colour of the other squares."},
               {"to_uv", ParamKind::Transform, "identity", "Affine map of (u, v)."}}},
             [](const Params& params, TextureContext& context) -> std::unique_ptr<Texture> {
                 return std::make_unique<Checkerboard>(params, context);

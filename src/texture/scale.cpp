@@ -48,7 +48,7 @@ TextureEntry scale_entry() {
     return {{"texture",
              "scale",
              "Product of a texture and a number, a colour or another texture.",
-             {{"value", ParamKind::Texture, "", "The texture to scale; an unnamed one will do."},
+             {{"value", ParamKind::Texture, "", "The texture to scale; it may be unnamed."},
               {"scale", ParamKind::Texture, "1", "The factor."}}},
             [](const Params& params, TextureContext& context) -> std::unique_ptr<Texture> {
                 return std::make_unique<Scale>(params, context);
