@@ -38,7 +38,9 @@ bool same_param(const ParamInfo& a, const ParamInfo& b) {
            std::strcmp(a.fallback, b.fallback) == 0 && std::strcmp(a.doc, b.doc) == 0;
 }
 
-void add(std::vector<Entry>& entries, const PluginInfo& p, const std::string& doc) {
+void add(std::vector<Entry>& entries, PluginInfo p, const std::string& doc) {
+    // What a user needs comes first.
+    std::ranges::stable_partition(p.params, [](const ParamInfo& q) { return !q.is_experimental; });
     if (!entries.empty()) {
         Entry& last = entries.back();
         if (last.category == p.category && last.doc == doc &&
@@ -92,8 +94,9 @@ void print_text(const std::vector<Entry>& entries) {
         if (e.category != category) fmt::print("{}\n", category = e.category);
         fmt::print("  {}\n      {}\n", fmt::join(e.names, ", "), e.doc);
         for (const ParamInfo& q : e.params)
-            fmt::print("      - {} ({}{}): {}\n", q.name, kind_name(q.kind),
-                       *q.fallback ? fmt::format(", default {}", q.fallback) : "", q.doc);
+            fmt::print("      - {} ({}{}{}): {}\n", q.name, kind_name(q.kind),
+                       *q.fallback ? fmt::format(", default {}", q.fallback) : "",
+                       q.is_experimental ? ", experimental" : "", q.doc);
     }
 }
 
@@ -107,8 +110,8 @@ void print_parameter_table(const std::vector<ParamInfo>& params) {
     if (params.empty()) return;
     fmt::print("\n| parameter | type | default | meaning |\n| --- | --- | --- | --- |\n");
     for (const ParamInfo& q : params)
-        fmt::print("| `{}` | {} | {} | {} |\n", q.name, kind_name(q.kind), cell(q.fallback),
-                   cell(q.doc));
+        fmt::print("| `{}` | {} | {} | {}{} |\n", q.name, kind_name(q.kind), cell(q.fallback),
+                   q.is_experimental ? "*Experimental.* " : "", cell(q.doc));
 }
 
 /// `headings` is false where the command line names one plug-in, whose page has its own heading.
@@ -135,6 +138,7 @@ void print_json(const std::vector<Entry>& entries) {
             nlohmann::ordered_json p = {
                 {"name", q.name}, {"type", kind_name(q.kind)}, {"doc", q.doc}};
             if (*q.fallback) p["default"] = q.fallback;
+            if (q.is_experimental) p["experimental"] = true;
             params.push_back(p);
         }
         for (const std::string& name : e.names)

@@ -33,6 +33,7 @@ struct ParamInfo {
     const char*
         fallback;     ///< Default as printed; "" where it is required or has no single default.
     const char* doc;  ///< One sentence with unit and range.
+    bool is_experimental = false;  ///< For comparisons with other methods and figures only.
 };
 
 /// One plug-in of one category, as `etendue list` prints it and check_params() uses it.

@@ -145,10 +145,12 @@ IntegratorEntry bdpt_entry() {
     params.push_back(
         {"connections", ParamKind::String, "path",
          "Light vertices to which eye vertices are connected: path (those of the pixel's own light "
-         "path) or cache (random vertices of all light paths of the pass)."});
+         "path) or cache (random vertices of all light paths of the pass).",
+         true});
     params.push_back({"cache_draws", ParamKind::Int, "0",
                       "Number of connections from each eye vertex to the cache; 0: as many as a "
-                      "light path has connectible vertices on average."});
+                      "light path has connectible vertices on average.",
+                      true});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     return {{"integrator", "bdpt",
              "Bidirectional path tracing with all connections and MIS. Unbiased.", params},

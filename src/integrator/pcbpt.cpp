@@ -234,31 +234,39 @@ private:
 
 IntegratorEntry pcbpt_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back({"light_paths", ParamKind::Int, "100",
-                      "M: light paths of a pass whose vertices all eye vertices may connect to."});
-    params.push_back({"memory", ParamKind::Int, "6144",
-                      "Most that these paths, and the importance records, may each take, in MiB."});
-    params.push_back({"connections", ParamKind::Float, "0",
-                      "K: connections of each eye vertex, on average; 0: as many as bdpt has time "
-                      "for, less that of the records, but at least 0.125."});
-    params.push_back({"record_fraction", ParamKind::Float, "0.001",
-                      "Eye paths along which importance records are made, over the pixels."});
-    params.push_back({"neighbours", ParamKind::Int, "6",
-                      "Records between which the mass function is interpolated, at most 16."});
+    params.push_back(
+        {"light_paths", ParamKind::Int, "100",
+         "M: number of light paths of a pass to whose vertices eye vertices may be connected."});
+    params.push_back(
+        {"memory", ParamKind::Int, "6144",
+         "Largest memory for these paths, and for the importance records, each in MiB."});
+    params.push_back(
+        {"connections", ParamKind::Float, "0",
+         "K: average number of connections of each eye vertex; 0: as many as cost what the "
+         "connections of bdpt do, less the cost of the records, but at least 0.125."});
+    params.push_back(
+        {"record_fraction", ParamKind::Float, "0.001",
+         "Number of eye paths that create importance records, divided by the number of pixels."});
+    params.push_back(
+        {"neighbours", ParamKind::Int, "6",
+         "Number of records between which the mass function is interpolated, at most 16."});
     params.push_back({"uniform", ParamKind::Float, "0.5",
-                      "Share of connections that are drawn uniformly, at least 0.001."});
+                      "Fraction of connections drawn uniformly, at least 0.001."});
     params.push_back({"weights", ParamKind::String, "upper",
-                      "upper: connections count 1 in the weights, since all pixels share the light "
-                      "paths; standard: they count M."});
+                      "Count of a connection in the weights: upper (1, since all pixels share the "
+                      "light paths) or standard (M).",
+                      true});
     params.push_back({"direct", ParamKind::String, "next_event",
-                      "How C(1,t) are made: stored (connections to the light paths' own y_0), "
-                      "next_event, or both."});
+                      "How C(1,t) is made: stored (connections to the y_0 of the stored light "
+                      "paths), next_event, or both."});
     params.push_back({"cache", ParamKind::Bool, "true",
-                      "false: the mass function is evaluated at every eye vertex instead of "
-                      "interpolated; slow, for comparison."});
+                      "Whether the mass function is interpolated from records; false evaluates it "
+                      "at every eye vertex, which is slow.",
+                      true});
     params.push_back({"pmf", ParamKind::String, "weighted",
-                      "What the mass function follows: contribution, or weighted, which has the "
-                      "MIS weight too."});
+                      "What the mass function follows: contribution, or weighted (contribution "
+                      "times MIS weight).",
+                      true});
     return {{"integrator", "pcbpt",
              "Bidirectional path tracing with probabilistic connections. Unbiased.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {

@@ -17,23 +17,11 @@
 #include "integrator/bidirectional.h"
 #include "integrator/light_path_options.h"
 #include "reuse/gather.h"
+#include "reuse/gather_constants.h"
 #include "reuse/gather_weight_scale.h"
 
 namespace etendue {
 namespace {
-
-/// Of neighbourhoods, with the bound `slab`: what trials aim at is flat then, and nearly all of it is met where the
-/// surface is smooth.
-constexpr float kFlatness = 0.02f;
-
-/// Of the default radius: pairs of an eye path, and its largest share of the radius of the scene's bounds.
-constexpr double kPairs = 8;
-constexpr float kLargest = 0.02f;
-
-/// Correlation of the pairs of one vertex, see PairDensity. What competes with a gather shares most of the eye path too,
-/// hence far less than 1: of 0.05, 0.2, 0.5 and 1, 0.2 had the least errors on scenes with few and with many partners
-/// (veach-ajar, staircase2, veach-bidir, living-room).
-constexpr double kCorrelation = 0.2;
 
 constexpr std::array<Choice<TrialBound>, 3> kBounds{
     {{"box", TrialBound::Box}, {"cone", TrialBound::Cone}, {"slab", TrialBound::Slab}}};
@@ -47,8 +35,9 @@ public:
     UpgIntegrator(const IntegratorParams& p, bool connects)
         : paths_(p), given_radius_(p.number("radius")), connects_(connects), light_(p),
           bound_(p.choice("bound", kBounds)),
-          flatness_(bound_ == TrialBound::Slab ? kFlatness : 1.0f), rule_(p.choice("drop", kRules)),
-          short_rate_(p.number("short_rate")), clamps_(p.flag("clamp")) {
+          flatness_(bound_ == TrialBound::Slab ? kGatherConstants.flatness : 1.0f),
+          rule_(p.choice("drop", kRules)), short_rate_(p.number("short_rate")),
+          clamps_(p.flag("clamp")) {
         if (!(given_radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));
@@ -64,7 +53,8 @@ public:
         choose_radius(pass);
         // The first pass's weights know of no density, so that what is learned from it is of no use for the scale.
         learned_.learns_weight_scale = connects_ && pass.index > 0;
-        if (pass.index > 0) density_ = PairDensity(cells(), learned_.radius, kCorrelation);
+        if (pass.index > 0)
+            density_ = PairDensity(cells(), learned_.radius, kGatherConstants.correlation);
     }
     void save(LearnedState& to) const override {
         paths_.save(to);
@@ -188,13 +178,14 @@ private:
                                       seen, GatherSums::of(work));
     }
 
-    /// Such that an eye path finds kPairs pairs, as far as the passes since the last choice tell.
+    /// Such that an eye path finds GatherConstants::pairs pairs, as far as the passes since the last choice tell.
     void choose_radius(const LearnContext& pass) {
         if (given_radius_ > 0) {
             learned_.radius = given_radius_;
             return;
         }
-        const float size = pass.scene.bounds().radius(), largest = kLargest * size;
+        const float size = pass.scene.bounds().radius(),
+                    largest = kGatherConstants.largest_radius * size;
         const double pairs = learned_.gathers.expected_pairs - learned_.pairs_so_far,
                      paths = double(pass.so_far.eye_paths - learned_.eye_paths_so_far);
         learned_.pairs_so_far = learned_.gathers.expected_pairs;
@@ -203,7 +194,8 @@ private:
             pass.index == 0
                 ? size / std::sqrt(float(pass.light_paths))
                 : learned_.radius *
-                      float(std::clamp(std::sqrt(kPairs * paths / (pairs + 1)), 0.25, 4.0));
+                      float(std::clamp(std::sqrt(kGatherConstants.pairs * paths / (pairs + 1)),
+                                       0.25, 4.0));
         learned_.radius = std::min(largest, wanted);
     }
 
@@ -239,23 +231,23 @@ private:
 
 std::vector<ParamInfo> params() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back(
-        {"radius", ParamKind::Float, "0",
-         "Distance within which vertices form pairs, in scene units; 0: chosen by what earlier "
-         "passes found, such that an eye path finds about eight."});
+    params.push_back({"radius", ParamKind::Float, "0",
+                      "Largest distance between the vertices of a pair, in scene units; 0: chosen "
+                      "from earlier passes so that an eye path finds about eight pairs."});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back(
         {"bound", ParamKind::String, "slab",
-         "Directions that Bernoulli trials propose: slab (partners lie near the "
-         "tangent plane), cone (in a ball), or box (in a ball; boxes of random numbers "
-         "at diffuse vertices)."});
+         "Directions that Bernoulli trials propose: slab (pairs lie near the tangent plane), cone "
+         "(in a ball) or box (in a ball; boxes of random numbers at diffuse vertices).",
+         true});
     params.push_back({"drop", ParamKind::String, "gloss",
-                      "Which vertex of a pair is dropped: gloss (that sampled from the less glossy "
-                      "vertex), eye, light, or both, for a path each."});
+                      "Vertex of a pair that is dropped: gloss (the one sampled from the less "
+                      "glossy vertex), eye, light, or both (one path for each).",
+                      true});
     params.push_back({"short_rate", ParamKind::Float, "1",
-                      "Share of the pairs that are used for paths of three edges."});
+                      "Fraction of the pairs used for paths of three edges.", true});
     params.push_back({"clamp", ParamKind::Bool, "true",
-                      "Whether weights take the probability of a pair for at most 1."});
+                      "Whether the weights limit the probability of a pair to 1.", true});
     return params;
 }
 
@@ -263,7 +255,7 @@ std::vector<ParamInfo> params() {
 
 IntegratorEntry upg_entry() {
     return {{"integrator", "upg",
-             "Unbiased photon gathering alone. Unbiased for the paths it can make.", params()},
+             "Unbiased photon gathering alone. Unbiased for the paths that it can make.", params()},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<UpgIntegrator>(p, false);
             }};

@@ -13,17 +13,13 @@
 #include "integrator/light_path_options.h"
 #include "integrator/radius_params.h"
 #include "reuse/gather.h"
+#include "reuse/gather_constants.h"
 
 namespace etendue {
 namespace {
 
 /// Of the scene's.
 constexpr float kDefaultRadius = 0.003f;
-
-/// Correlation of the pairs of one vertex, see PairDensity. More than 1, since a light path leaves several vertices where it is
-/// caught, and an eye path merges at several. Of 0.2, 1, 2, 5 and 20, 5 had nearly the least errors on scenes/ring.xml,
-/// glass-caustic, demo and lantern: ring alone is better with 20, demo and lantern have fewer outliers with less.
-constexpr double kCorrelation = 5;
 
 class VcmIntegrator final : public Integrator {
 public:
@@ -39,7 +35,8 @@ public:
         paths_.learn(pass);
         roulette_.learn(gathers_);
         const float radius = radius_params_.schedule(pass.scene).radius(pass.index);
-        if (merges_ && pass.index > 0) density_ = PairDensity(cells(), radius, kCorrelation);
+        if (merges_ && pass.index > 0)
+            density_ = PairDensity(cells(), radius, kGatherConstants.merge_correlation);
     }
     void save(LearnedState& to) const override {
         paths_.save(to);
@@ -181,19 +178,18 @@ private:
 
 IntegratorEntry vcm_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    for (const ParamInfo& p :
-         radius_params("Distance within which vertices are merged in the first "
-                       "pass, in scene units; 0: 0.3 % of the radius of the "
-                       "scene's bounds."))
+    for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
+                                            "0.3 % of the radius of the scene's bounds."))
         params.push_back(p);
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back({"connections", ParamKind::Bool, "true",
-                      "Whether sub-paths are connected, to emitters and the lens too."});
-    params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged."});
+                      "Whether sub-paths are connected to each other, to emitters and to the lens.",
+                      true});
+    params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged.", true});
     params.push_back(
         {"exact", ParamKind::Bool, "false",
-         "Whether the paths of merges are true ones, with a shadow ray and the BSDFs of "
-         "both ends; their probability stays that of a disc [Bekaert et al. 2003]."});
+         "Whether merges form true paths, with a shadow ray and the BSDFs at both ends; the "
+         "probability of a pair is still that of a disc [Bekaert et al. 2003]."});
     return {{"integrator", "vcm",
              "Vertex connection and merging. Consistent; biased with a fixed radius.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {

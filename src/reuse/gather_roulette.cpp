@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "reuse/gather_constants.h"
+
 namespace etendue {
 namespace {
 
@@ -13,16 +15,14 @@ constexpr double kUnit = 0x1p24;
 void GatherRoulette::learn(const GatherTotals& totals) {
     // Prior: kJoins joins with the ratio kFirst.
     constexpr double kFirst = 0.125, kJoins = 16;
-    // Found by experiment on four scenes; a factor of two in either has little effect.
-    constexpr float kPair = 2, kSearch = 0.7f;
     search_factors_.fill(0);
     for (size_t i = 0; i < factors_.size(); ++i) {
         const GatherTotals::Joins& joins = totals.joins[i];
         const float rms = float(
             std::sqrt((joins.squares / kUnit + kJoins * sqr(kFirst)) / (joins.count + kJoins)));
-        factors_[i] = kPair * rms;
+        factors_[i] = kGatherConstants.pair_survival * rms;
         float& search = search_factors_[i % kGatherLengths];
-        search = std::max(search, kSearch * rms);
+        search = std::max(search, kGatherConstants.search_survival * rms);
     }
 }
 

@@ -3,17 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reuse/gather_constants.h"
+
 namespace etendue {
 
 void GatherWeightScale::learn(const GatherTotals& totals) {
     const auto& moments = totals.second_moments;
     const double least = *std::min_element(moments.begin(), moments.end());
     if (!(least > 0)) return;
-    // The moments of large c depend on few bright pairs, so a smaller c is chosen only if its moment is clearly
-    // smaller.
-    constexpr double kClear = 1.25;
     choice_ = 0;
-    while (moments[size_t(choice_)] > kClear * least) ++choice_;
+    while (moments[size_t(choice_)] > kGatherConstants.clear_gain * least) ++choice_;
 }
 
 void GatherWeightScale::observe(double luminance, double weight, double pair_probability, double r,
