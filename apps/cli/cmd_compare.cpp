@@ -154,6 +154,15 @@ void print_summary(const Comparison& c) {
     }
 }
 
+void print_warnings(const Comparison& c) {
+    const auto print = [&](const std::string& name, const std::vector<std::string>& warnings) {
+        for (const std::string& w : warnings)
+            fmt::print(stderr, "warning: {}: {}: {}\n", c.scene_file, name, w);
+    };
+    print("reference", c.reference.warnings);
+    for (const Method& m : c.methods) print(m.name(), m.warnings());
+}
+
 void CompareCommand::run() const {
     check();
     std::vector<Comparison> comparisons;
@@ -194,6 +203,7 @@ void CompareCommand::run() const {
             scene, *reference, s,
             [&](const std::string& text) { status.show(scenes[i] + ": " + text); }, interrupted));
         status.clear();
+        print_warnings(comparisons.back());
         if (!quiet) print_summary(comparisons.back());
     }
     if (comparisons.empty())

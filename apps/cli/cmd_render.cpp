@@ -20,6 +20,7 @@
 #include "preview.h"
 #include "render/aov.h"
 #include "render/renderer.h"
+#include "render/warnings.h"
 #include "scene_options.h"
 
 namespace etendue {
@@ -102,25 +103,6 @@ private:
     uint64_t pairs_before_ = 0;
 };
 
-/// Known or possible errors of the image.
-std::vector<std::string> warnings(const Renderer& r) {
-    std::vector<std::string> all;
-    const RenderStats& s = r.stats();
-    if (const uint64_t n = s.rejected + r.film().rejected(); n > 0)
-        all.push_back(fmt::format("{} contributions were not finite and were left out", n));
-    if (s.runaways > 0)
-        all.push_back(
-            fmt::format("{} pairs of vertices were abandoned after too many trials: their light is "
-                        "missing, and the image is darker than it should be",
-                        s.runaways));
-    if (s.bounds_exceeded > 0)
-        all.push_back(fmt::format(
-            "{} trials met a density above its assumed bound: the image may be biased there; "
-            "please report the scene",
-            s.bounds_exceeded));
-    return all;
-}
-
 /// `stopped_by`: a StopReason, or "failure".
 nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
                        const std::string& stopped_by, const PassLog& log) {
@@ -153,8 +135,8 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"eye_paths", s.eye_paths},
         {"light_paths", s.light_paths},
         {"vertices", s.vertices},
-        {"rejected_contributions", s.rejected + r.film().rejected()},
-        {"warnings", warnings(r)},
+        {"rejected_contributions", s.rejected},
+        {"warnings", warnings(s)},
         {"mean_luminance", mean.mean},
         {"mean_luminance_standard_error", mean.standard_error},
         {"pass_seconds", log.seconds},
@@ -300,7 +282,7 @@ void RenderCommand::run() const {
     if (!failure.empty()) report["failure"] = failure;
     write_outputs(renderer, s, report);
 
-    for (const std::string& w : warnings(renderer)) fmt::print(stderr, "warning: {}\n", w);
+    for (const std::string& w : warnings(renderer.stats())) fmt::print(stderr, "warning: {}\n", w);
     if (!failure.empty())
         throw std::runtime_error(
             fmt::format("pass {} failed: {}; {} contains the {} before it", passes + 1, failure,

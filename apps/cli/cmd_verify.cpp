@@ -261,7 +261,6 @@ void print_verdict(const VerifyReport& report, const MethodReport& m,
         fmt::print("; {} of the light comes along paths too rare for a test, which could hide an "
                    "error of up to that size",
                    percent(m.too_rare));
-    if (m.rejected > 0) fmt::print("; {} contributions were not finite", m.rejected);
     fmt::print("\n\n");
 }
 
@@ -311,7 +310,9 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m
                              {"estimator", to_string(m.estimator)},
                              {"verdict", to_string(report.verdict(m))},
                              {"spp", m.spp},
-                             {"rejected_contributions", m.rejected},
+                             {"rejected_contributions", m.stats.rejected},
+                             {"runaways", m.stats.runaways},
+                             {"bounds_exceeded", m.stats.bounds_exceeded},
                              {"out_of_reach", m.out_of_reach},
                              {"too_rare", m.too_rare},
                              {"untested_tiles", m.untested_tiles}};
@@ -366,7 +367,8 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
                              {"sampler", sampler},
                              {"alpha", options.alpha},
                              {"tests", report.tests},
-                             {"level", report.level}};
+                             {"level", report.level},
+                             {"warnings", report.warnings}};
     if (options.detect) j["detect"] = *options.detect;
     for (const MethodReport& m : report.methods)
         j["methods"].push_back(to_json(report, m, options));
@@ -399,6 +401,7 @@ void VerifyCommand::run() {
     });
     if (!quiet && is_terminal) fmt::print(stderr, "\r\033[K");
 
+    for (const std::string& w : report.warnings) fmt::print(stderr, "warning: {}\n", w);
     if (!quiet) print_report(report, s, sampler, options);
     if (!json.empty())
         write_file_atomically(json, to_json(report, s, sampler, options).dump(2) + "\n");

@@ -9,6 +9,7 @@
 
 #include "compare/memory.h"
 #include "image/flip.h"
+#include "render/warnings.h"
 
 namespace etendue {
 namespace {
@@ -39,7 +40,6 @@ Run finished_run(const MethodRun& c, uint64_t seed, const Reference& reference) 
     run.spp = r.film().passes();
     run.seconds = r.seconds();
     run.stats = r.stats();
-    run.rejected = r.stats().rejected + r.film().rejected();
     run.mean = r.film().mean_luminance();
     run.checkpoints = c.checkpoints;
     run.uncorrected = image_errors(r.film().image(), reference.pixels);
@@ -143,6 +143,12 @@ std::optional<PowerLaw> mean_slope(const Method& m, const Get& get, std::vector<
 }
 
 }  // namespace
+
+std::vector<std::string> Method::warnings() const {
+    RenderStats all;
+    for (const Run& r : runs) all += r.stats;
+    return etendue::warnings(all);
+}
 
 void check_methods(const std::vector<MethodSpec>& methods) {
     for (size_t i = 0; i < methods.size(); ++i) {

@@ -43,7 +43,6 @@ struct Run {
     uint64_t seed = 0, spp = 0;
     double seconds = 0;
     RenderStats stats;
-    uint64_t rejected = 0;  ///< Contributions that were not finite.
     Film::MeanEstimate mean;
     std::vector<Checkpoint> checkpoints;  ///< The last one is that of the final image.
     ImageErrors uncorrected;              ///< Including the reference's variance.
@@ -64,6 +63,8 @@ struct Method {
     uint64_t technique_spp = 0;
 
     const std::string& name() const { return spec.name; }
+    /// See render/warnings.h; of all runs.
+    std::vector<std::string> warnings() const;
 };
 
 struct Comparison {

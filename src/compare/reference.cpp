@@ -10,6 +10,7 @@
 
 #include "image/image_io.h"
 #include "math/content_hash.h"
+#include "render/warnings.h"
 
 namespace etendue {
 namespace {
@@ -108,7 +109,7 @@ bool is_long_enough(const Reference& r, const RenderLimits& limits) {
            (!limits.seconds || r.seconds >= 0.95 * *limits.seconds);
 }
 
-void write_reference(const Reference& r) {
+void write_reference(const Reference& r, const RenderStats& stats) {
     Image image = rgb_image(r.width, r.height, r.pixels);
     add_rgb_layer(image, r.width, r.height, "first", r.first);
     add_rgb_layer(image, r.width, r.height, "second", r.second);
@@ -116,6 +117,10 @@ void write_reference(const Reference& r) {
     image.attributes["etendue.seconds"] = r.seconds;
     image.attributes["etendue.spp"] = double(r.spp);
     image.attributes["etendue.mean_relative_error"] = r.mean_relative_error;
+    // Named as in images that `render` writes.
+    image.attributes["etendue.rejected_contributions"] = double(stats.rejected);
+    image.attributes["etendue.runaways"] = double(stats.runaways);
+    image.attributes["etendue.bounds_exceeded"] = double(stats.bounds_exceeded);
     write_image(r.file, image);
 }
 
@@ -136,6 +141,11 @@ Reference read_reference(const std::string& file, const FilmGeometry& geometry) 
     r.seconds = number(image, "seconds");
     r.spp = uint64_t(number(image, "spp"));
     r.mean_relative_error = number(image, "mean_relative_error");
+    RenderStats stats;
+    stats.rejected = uint64_t(number(image, "rejected_contributions"));
+    stats.runaways = uint64_t(number(image, "runaways"));
+    stats.bounds_exceeded = uint64_t(number(image, "bounds_exceeded"));
+    r.warnings = warnings(stats);
     if (const double mean = number(image, "mean_luminance"); mean > 0)
         r.mean_relative_error = number(image, "mean_luminance_standard_error") / mean;
     if (image.channel("first.R") >= 0 && image.channel("second.R") >= 0) {
@@ -162,6 +172,7 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
     r.height = scene.film().crop_height;
     r.method = settings.render.integrator.to_string();
     double mean = 0, variance = 0;
+    RenderStats stats;
     for (int i = 0; i < 2; ++i) {
         RenderSettings half = settings.render;
         half.seed = kSeed + uint64_t(i);
@@ -172,13 +183,15 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
         (i == 0 ? r.first : r.second) = renderer.film().image();
         r.seconds += renderer.seconds();
         r.spp += renderer.film().passes();
+        stats += renderer.stats();
         const Film::MeanEstimate m = renderer.film().mean_luminance();
         mean += m.mean / 2;
         variance += m.standard_error * m.standard_error / 4;
     }
     r.pixels = mean_of(r.first, r.second);
     if (mean > 0) r.mean_relative_error = std::sqrt(variance) / mean;
-    write_reference(r);
+    r.warnings = warnings(stats);
+    write_reference(r, stats);
     return r;
 }
 

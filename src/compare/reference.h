@@ -24,7 +24,8 @@ struct Reference {
     std::string method;  ///< The integrator that rendered it; empty where it is unknown.
     double seconds = 0;
     uint64_t spp = 0;
-    bool reused = false;  ///< Whether it was cached by an earlier comparison.
+    bool reused = false;                ///< Whether it was cached by an earlier comparison.
+    std::vector<std::string> warnings;  ///< See render/warnings.h.
 
     bool has_variance() const { return !first.empty(); }
     /// i = 0: second argument of image_errors(); i = 1: its ErrorOptions::reference2.

@@ -56,7 +56,7 @@ Json to_json(const Run& r) {
             {"eye_paths", r.stats.eye_paths},
             {"light_paths", r.stats.light_paths},
             {"vertices", r.stats.vertices},
-            {"rejected_contributions", r.rejected},
+            {"rejected_contributions", r.stats.rejected},
             {"mean_luminance", r.mean.mean},
             {"mean_luminance_standard_error", r.mean.standard_error},
             {"errors", to_json(r.errors())},
@@ -92,6 +92,7 @@ Json to_json(const Method& m, const MethodSummary& summary) {
             {"flip", m.flip},
             {"peak_bytes", m.peak_bytes},
             {"technique_spp", m.technique_spp},
+            {"warnings", m.warnings()},
             {"runs", runs}};
 }
 
@@ -116,7 +117,8 @@ Json to_json(const Comparison& c) {
               {"variance_known", r.has_variance()},
               {"mse", c.reference_mse},
               {"rel_mse", c.reference_rel_mse},
-              {"mean_relative_error", r.mean_relative_error}}},
+              {"mean_relative_error", r.mean_relative_error},
+              {"warnings", r.warnings}}},
             {"methods", methods}};
 }
 

@@ -741,6 +741,9 @@ function sceneSection(scene, page) {
         element('p', {className: 'note', textContent: `${scene.file}, ${scene.width} × ${scene.height} pixels`})]);
     if (scene.interrupted)
         section.append(element('p', {className: 'warning', textContent: 'The comparison was interrupted, so the times of the methods differ.'}));
+    const warned = [['Reference', scene.reference], ...scene.methods.map(m => [m.name, m])];
+    section.append(...warned.flatMap(([name, of]) => of.warnings.map(
+        text => element('p', {className: 'warning', textContent: `${name}: ${text}.`}))));
     section.append(figuresTable(scene), referenceNote(scene), plotSection(page), holder);
     return section;
 }

@@ -170,6 +170,7 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
 Renderer::~Renderer() = default;
 
 void Renderer::pass(const std::atomic<bool>& drop) {
+    const uint64_t rejected_before = film_.rejected();
     try {
         workers_->arena.execute([&] { trace_pass(drop); });
     } catch (...) {
@@ -182,6 +183,7 @@ void Renderer::pass(const std::atomic<bool>& drop) {
         throw;
     }
     stats_ += workers_->take_stats();
+    stats_.rejected += film_.rejected() - rejected_before;
     integrator_->collect(workers_->take_sums());
 }
 

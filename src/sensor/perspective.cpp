@@ -62,7 +62,8 @@ public:
         const float t = -lo.z / ld.z;
         if (!(t > 0 && t < tmax)) return {};
         const Vec3 lens = lo + ld * t;
-        if (sqr(lens.x) + sqr(lens.y) > sqr(camera_.lens_radius)) return {};
+        // Not even where a ray meets a pinhole exactly.
+        if (!(sqr(lens.x) + sqr(lens.y) < sqr(camera_.lens_radius))) return {};
         return measure(o + d * t, -d);
     }
 

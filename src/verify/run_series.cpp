@@ -85,7 +85,7 @@ void IndependentRun::merge(const IndependentRun& other, uint64_t renderings) {
     const double its = 1 / double(renderings), own = 1 - its;
     for (size_t i = 0; i < pixels.size(); ++i)
         pixels[i] = pixels[i] * float(own) + other.pixels[i] * float(its);
-    rejected += other.rejected;
+    stats += other.stats;
 
     // Entries are sorted, see ContributionTally::entries().
     for (ContributionTally::Entry& e : entries)
@@ -117,9 +117,9 @@ void IndependentRun::merge(const IndependentRun& other, uint64_t renderings) {
     }
 }
 
-uint64_t RunSeries::rejected() const {
-    uint64_t sum = 0;
-    for (const IndependentRun& r : runs) sum += r.rejected;
+RenderStats RunSeries::stats() const {
+    RenderStats sum;
+    for (const IndependentRun& r : runs) sum += r.stats;
     return sum;
 }
 
@@ -182,11 +182,7 @@ IndependentRun SeriesRenderer::render(const IntegratorSpec& spec, uint64_t seed,
     Renderer r = renderer(spec, seed, spp, &tally);
     render_all(r);
     const double scale = 1 / (double(spp) * double(scene_.film().pixel_count()));
-    IndependentRun out{r.film().image(),
-                       tally.entries(),
-                       tally.tiles(),
-                       {},
-                       r.stats().rejected + r.film().rejected()};
+    IndependentRun out{r.film().image(), tally.entries(), tally.tiles(), {}, r.stats()};
     for (ContributionTally::Entry& e : out.entries) {
         e.weighted = e.weighted.scaled(scale), e.alone = e.alone.scaled(scale);
         out.classes[e.path_class.without_length_of_edges()] += e.weighted;

@@ -22,7 +22,7 @@ struct IndependentRun {
     /// Sums of every tile, and of the crop, by class; classes that differ only in has_short_edge are combined.
     std::map<PathClass, std::vector<ContributionTally::TileSum>> tiles;
     std::map<PathClass, Tally> classes;
-    uint64_t rejected = 0;
+    RenderStats stats;
 
     /// From the mean of `renderings` − 1 renderings to that of `renderings`, the last of which is `other`.
     void merge(const IndependentRun& other, uint64_t renderings);
@@ -44,7 +44,7 @@ struct RunSeries {
     std::vector<IndependentRun> runs;
 
     uint64_t samples() const { return spp * renderings; }  ///< Samples per pixel of one run.
-    uint64_t rejected() const;
+    RenderStats stats() const;                             ///< Sums over the runs.
     /// Sums over the runs.
     std::map<PathClass, Tally> classes() const;
     /// Mean and spread of `value(run)` over the runs.

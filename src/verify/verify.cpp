@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "render/warnings.h"
 #include "verify/comparisons.h"
 #include "verify/error_slope.h"
 #include "verify/sample_plan.h"
@@ -55,8 +56,13 @@ MethodReport start_report(const IntegratorSpec& spec, const RunSeries& series) {
     m.method = spec.to_string();
     m.estimator = series.estimator;
     m.spp = series.samples();
-    m.rejected = series.rejected();
+    m.stats = series.stats();
     return m;
+}
+
+void add_warnings(const RunSeries& series, VerifyReport& report) {
+    for (const std::string& w : warnings(series.stats()))
+        report.warnings.push_back(fmt::format("{}: {}", series.spec.to_string(), w));
 }
 
 void finish(VerifyReport& report, const VerifyOptions& options) {
@@ -80,6 +86,7 @@ VerifyReport verify_with_image(const std::vector<IntegratorSpec>& methods,
         m.errors = errors_of_runs(series, error_reference);
         m.slope = error_slope(m.errors);
         report.methods.push_back(std::move(m));
+        add_warnings(series, report);
     }
     finish(report, options);
     return report;
@@ -188,7 +195,10 @@ VerifyReport MethodVerification::report() const {
         if (m.out_of_reach == 0) m.errors = errors_of_runs(methods_[i], error_reference);
         m.slope = error_slope(m.errors);
         report.methods.push_back(std::move(m));
+        add_warnings(methods_[i], report);
+        if (unthinned_[i]) add_warnings(*unthinned_[i], report);
     }
+    for (const RunSeries& s : references_) add_warnings(s, report);
     finish(report, options_);
     return report;
 }

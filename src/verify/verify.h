@@ -99,7 +99,7 @@ struct MethodReport {
     std::string method;
     Estimator estimator = Estimator::Unbiased;
     uint64_t spp = 0;  ///< Samples per pixel of one run.
-    uint64_t rejected = 0;
+    RenderStats stats;
     double out_of_reach = 0, too_rare = 0;  ///< Shares of the light, as in LengthReport.
     double untested_tiles = 0;     ///< Share of the compared light in tiles that are not tested.
     std::vector<WelchTest> image;  ///< By channel.
@@ -146,6 +146,8 @@ struct VerifyReport {
     int tests = 0;
     double level = 0;  ///< Significance level of each test.
     std::vector<MethodReport> methods;
+    /// Of all renderings, references included: "METHOD: …", see render/warnings.h.
+    std::vector<std::string> warnings;
 
     /// Undecided where too much light is too rare for a test (kTooMuchTooRare).
     Verdict verdict(const MethodReport& method) const;

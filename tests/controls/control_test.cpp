@@ -14,7 +14,13 @@ namespace {
 constexpr int kSize = 16;
 
 /// Parts of the report in which an error is found.
-enum Part : unsigned { Image = 1, Lengths = 2 /* and classes */, Techniques = 4, Densities = 8 };
+enum Part : unsigned {
+    Image = 1,
+    Lengths = 2,  ///< And classes.
+    Techniques = 4,
+    Densities = 8,
+    Weights = 16,  ///< Of joins, against the explicit sum.
+};
 
 struct Planted {
     const char* name;
@@ -97,10 +103,12 @@ std::vector<Planted> planted() {
         {"Roulette", lit_room, "path:rr_depth=2", Image | Lengths | Techniques, 0},
         {"RouletteOfJoins", lit_room, "bdpt", Image | Lengths, 0},
         {"OwnCount", lit_room, "bdpt:roulette=0", Image | Lengths, Techniques},
-        {"CountEverywhere", lit_room, "bdpt:roulette=0", Densities, Image | Lengths | Techniques},
+        {"CountEverywhere", lit_room, "bdpt:roulette=0", Densities,
+         Image | Lengths | Techniques | Weights},
         {"PdfOfEvaluation", softly_lit, "path", Techniques, 0, 256},
         {"PdfOfSampling", softly_lit, "path", Techniques, 0},
-        {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques, 256},
+        {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques | Weights,
+         256},
         {"PmfOfOneRecord", divided_room, by_paper, Image | Lengths, 0, 512},
         {"NoUniformShare", divided_room, by_paper + ",neighbours=1", Image | Lengths, 0, 512},
         {"UniformDenominator", divided_room, by_paper, Image | Lengths, 0, 512},
@@ -114,7 +122,7 @@ std::vector<Planted> planted() {
         {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostSplats", by_glass, "bdpt:roulette=0", Image | Lengths, 0},
         {"GeometryBehindDelta", front_camera(kSize) + room() + lamp_in_smooth_glass(),
-         "bdpt:roulette=0", Densities, 0},
+         "bdpt:roulette=0", Weights, Image | Lengths | Techniques},
         {"FivePercentOfOneClass", lit_room + sphere("-0.2,-0.5,0", "0.45", kMirror),
          "bdpt:roulette=0", Lengths, 0, 256},
     };
@@ -159,11 +167,15 @@ Findings findings(const Planted& planted, SamplerKind sampler) {
                   fmt::format("s = {}, t = {}: {:.4f} ± {:.4f}", t.technique.s, t.technique.t,
                               t.comparison.ratio(), t.comparison.ratio_error()));
     EXPECT_GE(report.tests, 40) << "hardly anything was tested";
-    if ((planted.must_find | planted.must_not_find) & Densities)
-        for (const DensityTest& d : test_sample_densities(scene, planted.method))
+    if ((planted.must_find | planted.must_not_find) & (Densities | Weights)) {
+        const DensityTests densities = test_sample_densities(scene, planted.method);
+        for (const DensityTest& d : densities.tests)
             found.add(Densities, d.deviates,
                       fmt::format("density of s = {}, t = {}: {:.4f}", d.technique.s, d.technique.t,
                                   d.ratio));
+        found.add(Weights, densities.has_wrong_weights(),
+                  fmt::format("{:.3f} of the weights", densities.wrong_weights));
+    }
     return found;
 }
 

@@ -29,9 +29,11 @@ class SampleDensities : public ::testing::TestWithParam<Densities> {};
 
 TEST_P(SampleDensities, AreThoseOfTheWeights) {
     const Scene scene = build(GetParam().xml);
-    const std::vector<DensityTest> tests = test_sample_densities(scene, GetParam().method);
-    EXPECT_GE(tests.size(), GetParam().least_tests);
-    for (const DensityTest& d : tests) {
+    const DensityTests found = test_sample_densities(scene, GetParam().method);
+    EXPECT_FALSE(found.has_wrong_weights())
+        << "weights are not those of the counts: " << found.wrong_weights;
+    EXPECT_GE(found.tests.size(), GetParam().least_tests);
+    for (const DensityTest& d : found.tests) {
         EXPECT_FALSE(d.deviates) << "s = " << d.technique.s << ", t = " << d.technique.t
                                  << ": ratio " << d.ratio;
         EXPECT_LT(d.detectable, 0.25)

@@ -1,5 +1,6 @@
 // Russian roulette of walks: the throughput of a surviving walk is that without roulette, divided by the probability of
 // survival.
+// Also: walks that meet a surface edge-on.
 
 #include <gtest/gtest.h>
 
@@ -63,6 +64,43 @@ TEST_F(Walks, RouletteKeepsTheExpectedThroughputOfEyePaths) {
 
 TEST_F(Walks, RouletteKeepsTheExpectedThroughputOfLightPaths) {
     expect_expected_throughput<TransportMode::Importance>();
+}
+
+/// A unit sphere before a sky, which a ray along -x meets at the height `z`.
+struct Grazing : ::testing::Test {
+    const Scene scene = test::build(
+        test::front_camera(8) + test::sphere("0,0,0", "1", test::diffuse("0.5,0.5,0.5")) +
+        "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"1,1,1\"/></emitter>");
+    const TechniqueCounts counts{.hit = 1, .next_event = 1, .connect = 1, .splat = 64};
+    RenderStats stats;
+    SubPath path;
+
+    bool append_at(float z) {
+        path.clear();
+        Vertex& v = path.append();
+        v.kind = Vertex::Kind::Sensor;
+        v.p = {5, 0, z};
+        v.ng = {-1, 0, 0};
+        v.beta = Rgb(1);
+        Sampler sampler(SamplerKind::Independent, 1);
+        sampler.start(0, 0);
+        return append<TransportMode::Radiance>({scene, counts, stats, {}}, sampler,
+                                               {.wi = {-1, 0, 0}, .weight = Rgb(1), .pdf = 1},
+                                               path);
+    }
+};
+
+TEST_F(Grazing, ASurfaceMetEdgeOnEndsTheWalk) {
+    ASSERT_TRUE(append_at(0.5f));
+    EXPECT_EQ(path[1].kind, Vertex::Kind::Surface);
+    EXPECT_GT(path[1].pdf_fwd, 0);
+
+    EXPECT_FALSE(append_at(1)) << "the density of a vertex there is 0";
+    EXPECT_EQ(path.size(), 1);
+    EXPECT_LT(path.flight.length, kInf) << "the sky does not shine through";
+
+    ASSERT_TRUE(append_at(1.5f));
+    EXPECT_TRUE(path[1].is_infinite);
 }
 
 }  // namespace

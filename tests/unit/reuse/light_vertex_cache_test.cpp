@@ -142,5 +142,19 @@ TEST_F(KeptLightPaths, AreRestoredUpToAVertex) {
         }
 }
 
+/// N_L² times the fourth power of a ratio of densities: more than a float can hold.
+TEST_F(KeptLightPaths, KeepLargeSumsOfWeights) {
+    constexpr double kSum = 1e60;
+    walk(1);
+    ASSERT_GT(y.size(), 1);
+    y[1].weight_sum = kSum;
+    LightVertexCache one;
+    one.begin(1, LightVertexCache::kVertexBytes, uint64_t(1) << 30);
+    one.add(0, y);
+    one.assemble();
+    one.restore(scene, 0, restored);
+    EXPECT_NEAR(restored[1].weight_sum, kSum, 1e-6 * kSum);
+}
+
 }  // namespace
 }  // namespace etendue

@@ -1,36 +1,40 @@
 #pragma once
-#pragma GCC system_header  // #include_next
 // Replaces TBB's header for the thread sanitizer, which does not see how libtbb, without instrumentation, passes work
-// between threads. This header declares that everything before a loop happens before every call of its body, and every
-// call before everything after the loop. It declares no order between two calls, so races between them are found.
+// between threads: two loops, and their uses of the same stack, would seem unordered. Here every loop has its own threads,
+// of which the sanitizer sees everything. Nothing orders two calls of the body, so races between them are found.
 
-#define parallel_for parallel_for_of_tbb
-#include_next <tbb/parallel_for.h>
-#undef parallel_for
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
 
-#include <sanitizer/tsan_interface.h>
+#include <tbb/task_arena.h>
 
 namespace tbb {
 
 template <class Index, class Body>
-struct AnnotatedBody {
-    const Body* body;
-    char *begin, *end;
-
-    // Not instrumented: this copy was made by another thread, before anything is acquired.
-    __attribute__((no_sanitize("thread"))) void operator()(Index i) const {
-        __tsan_acquire(begin);
-        (*body)(i);
-        __tsan_release(end);
-    }
-};
-
-template <class Index, class Body>
 void parallel_for(Index first, Index last, const Body& body) {
-    char begin[8], end[8];
-    __tsan_release(begin);
-    parallel_for_of_tbb(first, last, AnnotatedBody<Index, Body>{&body, begin, end});
-    __tsan_acquire(end);
+    std::atomic<Index> next{first};
+    std::mutex mutex;
+    std::exception_ptr error;
+    const auto work = [&] {
+        for (Index i; (i = next.fetch_add(1, std::memory_order_relaxed)) < last;) {
+            try {
+                body(i);
+            } catch (...) {
+                const std::scoped_lock lock(mutex);
+                if (!error) error = std::current_exception();
+                next.store(last, std::memory_order_relaxed);
+            }
+        }
+    };
+    {
+        std::vector<std::jthread> threads;
+        for (int i = 1; i < this_task_arena::max_concurrency(); ++i) threads.emplace_back(work);
+        work();
+    }
+    if (error) std::rethrow_exception(error);
 }
 
 }  // namespace tbb

@@ -1,0 +1,57 @@
+// The radius that gathers choose is such that an eye path finds so many pairs, whatever Russian roulette leaves of them.
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "math/statistics.h"
+#include "render/renderer.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+struct Chosen {
+    double radius;
+    uint64_t pairs;  ///< That were looked at.
+};
+
+/// After the choice before pass 4, which passes 1 to 3 tell.
+Chosen chosen(const Scene& scene, const std::string& integrator, uint64_t seed) {
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(integrator);
+    settings.seed = seed;
+    settings.spp = 5;
+    Renderer renderer(scene, settings);
+    const std::atomic<bool> interrupted{false};
+    renderer.run([](const Progress&) {}, interrupted);
+    for (const auto& [name, value] : renderer.integrator().figures())
+        if (name == "radius") return {value, renderer.stats().pairs};
+    ADD_FAILURE() << "no radius";
+    return {};
+}
+
+TEST(GatherRadius, DoesNotDependOnRoulette) {
+    const Scene scene = build(front_camera(16) + room() + area_lamp());
+    const std::string integrator = "upg+bdpt:light_paths=60000,max_depth=5";
+    constexpr int kSeeds = 8;
+    // Radii are such that their squares are inversely proportional to the numbers of pairs: of these the mean is right,
+    // however much roulette spreads them.
+    Moments ratio;
+    double left = 0;
+    for (uint64_t seed = 0; seed < kSeeds; ++seed) {
+        const Chosen with = chosen(scene, integrator + ",roulette=0.5", seed),
+                     without = chosen(scene, integrator + ",roulette=0", seed);
+        ratio.add(sqr(without.radius / with.radius));
+        left += double(with.pairs) / double(without.pairs) / kSeeds;
+    }
+    EXPECT_LT(left, 0.6) << "roulette hardly plays";
+    const double error = std::sqrt(ratio.squared_error());
+    EXPECT_LT(error, 0.06) << "too few samples";
+    EXPECT_NEAR(ratio.mean(), 1, 4 * error);
+    EXPECT_GT(std::fabs(left - 1), 6 * error) << "the number after roulette could be taken for it";
+    RecordProperty("ratio", std::to_string(ratio.mean()) + " ± " + std::to_string(error));
+}
+
+}  // namespace
+}  // namespace etendue::test
