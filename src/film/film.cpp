@@ -29,15 +29,29 @@ void Film::average_blocks() {
         }
 }
 
-void Film::end_pass() {
-    fold(pass_.finish());
+void Film::set_groups(int count) {
+    group_sums_.assign(size_t(count), std::vector<float>(geometry_.pixel_count()));
+}
+
+void Film::end_pass(double splat_factor) {
+    if (has_groups()) keep_eye_values();
+    fold(pass_.finish(), splat_factor);
     rejected_ += pass_.rejected();
     pass_.clear();
 }
 
-void Film::fold(std::span<const Rgb> pass) {
+void Film::keep_eye_values() {
+    const std::span<const Rgb> eye = pass_.eye_values();
+    for_film_chunks(eye.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+        for (uint64_t i = begin; i < end; ++i)
+            previous_[i] = is_finite(eye[i]) ? luminance(eye[i]) : 0.0f;
+    });
+}
+
+void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     const uint64_t n = geometry_.pixel_count(), chunks = film_chunks(n);
-    const bool second = passes_ % 2 == 1;
+    const bool second = !has_groups() && passes_ % 2 == 1;
+    float* const group = has_groups() ? group_sums_[passes_ % group_sums_.size()].data() : nullptr;
     // All memory is taken before anything changes, so that what fails leaves the totals as they were.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks);
     for (std::vector<double>* list : {&pass_means_, &pair_errors_})
@@ -56,7 +70,11 @@ void Film::fold(std::span<const Rgb> pass) {
             expected_[i] =
                 luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / float(passes_);
             total[chunk] += expected_[i];
-            previous_[i] = second ? previous_[i] - y : y;
+            if (group)
+                group[i] +=
+                    float((1 - splat_factor) * double(previous_[i]) + splat_factor * double(y));
+            else
+                previous_[i] = second ? previous_[i] - y : y;
         }
     });
     double sum = 0, mean = 0;
@@ -88,6 +106,21 @@ std::vector<Rgb> Film::image() const {
 
 std::vector<Rgb> Film::variance() const {
     std::vector<Rgb> out(moments_.size());
+    if (has_groups()) {
+        if (!has_all_groups()) return out;
+        // Groups know the luminance; channels get what it has, relative to them.
+        const std::vector<Rgb> mean = image();
+        const size_t pairs = group_sums_.size() / 2;
+        for (size_t i = 0; i < out.size(); ++i) {
+            const double y = double(luminance(mean[i]));
+            if (!(y > 0)) continue;
+            double error2 = 0;
+            for (size_t pair = 0; pair < pairs; ++pair)
+                error2 += group_error2(pair, i) / double(pairs);
+            for (int c = 0; c < 3; ++c) out[i][c] = float(error2 * sqr(double(mean[i][c]) / y));
+        }
+        return out;
+    }
     if (passes_ < 2) return out;
     const double n = double(passes_);
     for (size_t i = 0; i < out.size(); ++i)
@@ -98,7 +131,44 @@ std::vector<Rgb> Film::variance() const {
     return out;
 }
 
+double Film::group_error2(size_t pair, size_t pixel) const {
+    const size_t a = 2 * pair, b = a + 1;
+    const double difference = double(group_sums_[a][pixel]) / double(passes_of_group(a)) -
+                              double(group_sums_[b][pixel]) / double(passes_of_group(b));
+    // Half its square is the variance of one group; the image is the mean of them all.
+    return 0.5 * sqr(difference) / double(group_sums_.size());
+}
+
+ErrorEstimate Film::group_error() const {
+    ErrorEstimate e;
+    if (!has_all_groups()) return e;
+    double mean = 0;
+    for (const Moments& m : moments_)
+        mean += luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2])));
+    mean /= double(passes_) * double(moments_.size());
+    etendue::Moments errors;
+    for (size_t pair = 0; pair < group_sums_.size() / 2; ++pair) {
+        double sum = 0;
+        for (size_t i = 0; i < moments_.size(); ++i) {
+            const Moments& m = moments_[i];
+            const double y =
+                luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / double(passes_);
+            const double scale2 = y * y + 0.01 * mean * mean;
+            if (scale2 > 0) sum += group_error2(pair, i) / scale2;
+        }
+        errors.add(sum / double(moments_.size()));
+    }
+    const double half =
+        student_quantile(0.05, double(errors.count() - 1)) * std::sqrt(errors.squared_error());
+    e.relative_rms = std::sqrt(errors.mean());
+    e.low = std::sqrt(std::max(0.0, errors.mean() - half));
+    e.high = std::sqrt(errors.mean() + half);
+    e.valid = errors.count() >= 2;
+    return e;
+}
+
 ErrorEstimate Film::error() const {
+    if (has_groups()) return group_error();
     ErrorEstimate e;
     // The first pairs were weighed with a mean that was still noise; they are left out once there are others.
     const size_t skip = std::min<size_t>(pair_errors_.size() / 4, 8);
@@ -126,6 +196,17 @@ Film::MeanEstimate Film::mean_luminance() const {
     if (pass_means_.empty()) return m;
     const double n = double(pass_means_.size());
     for (double v : pass_means_) m.mean += v / n;
+    if (has_groups()) {
+        if (!has_all_groups()) return m;
+        etendue::Moments means;
+        for (size_t g = 0; g < group_sums_.size(); ++g) {
+            double sum = 0;
+            for (const float y : group_sums_[g]) sum += double(y);
+            means.add(sum / (double(passes_of_group(g)) * double(moments_.size())));
+        }
+        m.standard_error = std::sqrt(means.squared_error());
+        return m;
+    }
     if (n < 2) return m;
     double square = 0;
     for (double v : pass_means_) square += sqr(v - m.mean);

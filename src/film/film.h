@@ -42,6 +42,18 @@ public:
         return {geometry_.pixel_center(index) + s.offset, s.weight};
     }
 
+    /// A film point anywhere in the crop grown by the filter's radius, uniformly; the weight is that area, in pixels. It is a
+    /// splat's: every pixel whose filter reaches the point gets its share.
+    PixelSample sample_anywhere(Vec2 u) const {
+        const FilmRegion r = reached_region(geometry_, filter_);
+        return {{r.low.x + u.x * r.size.x, r.low.y + u.y * r.size.y}, r.area()};
+    }
+
+    /// Passes depend on each other, as those of Markov chains do: pass i belongs to group i mod `count`, and groups are
+    /// independent. error(), variance() and the error of the mean then come from groups, and are unknown until every
+    /// group has had a pass. Even, and set before the first pass.
+    void set_groups(int count);
+
     // -- The pass in flight.
 
     /// Light paths that this pass traces (splats are divided by it); 0 where there are none.
@@ -53,8 +65,8 @@ public:
     void add_splat(Vec2 point, Rgb value) { pass_.add_splat(point, value); }
     /// Hints that a splat at `point` may follow.
     void prefetch_splat(Vec2 point) const { pass_.prefetch_splat(point); }
-    /// Folds the pass into the totals.
-    void end_pass();
+    /// Folds the pass into the totals. `splat_factor`: what splats count in the estimates of errors by groups.
+    void end_pass(double splat_factor = 1);
     /// Forgets the pass: the totals stay what they were before begin_pass().
     void drop_pass() { pass_.clear(); }
 
@@ -89,7 +101,17 @@ private:
 
     static constexpr int kBlock = 4;
 
-    void fold(std::span<const Rgb> pass);
+    bool has_groups() const { return !group_sums_.empty(); }
+    bool has_all_groups() const { return passes_ >= group_sums_.size(); }
+    uint64_t passes_of_group(size_t group) const {
+        return (passes_ + group_sums_.size() - 1 - group) / group_sums_.size();
+    }
+    /// Keeps the luminance of what eye paths added in previous_.
+    void keep_eye_values();
+    /// Squared error of the luminance of pixel i, as two groups, 2·pair and the next, show it.
+    double group_error2(size_t pair, size_t pixel) const;
+    ErrorEstimate group_error() const;
+    void fold(std::span<const Rgb> pass, double splat_factor);
     uint64_t blocks_across() const { return uint64_t(geometry_.crop_width + kBlock - 1) / kBlock; }
     void average_blocks();
 
@@ -99,11 +121,13 @@ private:
     std::vector<Moments> moments_;
     std::vector<float> expected_;
     std::vector<float> expected_blocks_;  ///< Means of kBlock × kBlock pixels.
-    /// Luminance of the last pass with an even index; once the next is folded, what it differs by.
+    /// Luminance of the last pass with an even index; once the next is folded, what it differs by. With groups that of the
+    /// eye paths of the pass that is being folded.
     std::vector<float> previous_;
     std::vector<double>
         pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.
     std::vector<double> pass_means_;
+    std::vector<std::vector<float>> group_sums_;  ///< Of luminance, by group and pixel.
     uint64_t passes_ = 0, rejected_ = 0;
 };
 

@@ -43,6 +43,21 @@ private:
     static int cell(float x, int count) { return x > 0 ? int(std::min(x, float(count - 1))) : 0; }
 };
 
+/// The film points that some pixel's filter reaches.
+struct FilmRegion {
+    Vec2 low, size;
+
+    float area() const { return size.x * size.y; }
+    bool contains(Vec2 p) const {
+        return p.x >= low.x && p.x <= low.x + size.x && p.y >= low.y && p.y <= low.y + size.y;
+    }
+};
+inline FilmRegion reached_region(const FilmGeometry& g, const ReconstructionFilter& filter) {
+    const float r = filter.radius() - 0.5f;  // beyond the pixels on the edge
+    return {{float(g.crop_x) - r, float(g.crop_y) - r},
+            {float(g.crop_width) + 2 * r, float(g.crop_height) + 2 * r}};
+}
+
 /// Calls `use(pixel index, h)` for every pixel of the crop whose filter reaches the film point.
 template <class Use>
 void for_each_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point,

@@ -27,6 +27,8 @@ public:
     void prefetch_splat(Vec2 point) const { splats_->prefetch(geometry_.pixel_at(point)); }
     bool has_splats() const { return splats_ != nullptr; }
 
+    /// What eye paths added, until finish().
+    std::span<const Rgb> eye_values() const { return pixels_; }
     /// The finished image. Pixels that are not finite become 0, and count as rejected.
     std::span<const Rgb> finish();
     /// Values that were not finite and were left out.

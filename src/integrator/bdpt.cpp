@@ -49,23 +49,10 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
-        const SubPath &y = work.y, &z = work.z;
-        if (!uses_cache_) paths_.trace_light_path(c, n, work);  // C(s,1), C(s,0)
-
-        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work);
-        for (int t = 2; t <= z.size(); ++t) {
-            paths_.add_hits(c, n, t, work);  // C(0,t)
-            if (!paths_.is_joinable(z, t)) continue;
-            paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
-            const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
-            if (uses_cache_) {
-                connect_to_cache(c, n, t, work);
-                continue;
-            }
-            for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
-                paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
-        }
+        if (uses_cache_)
+            paths_.add_eye_path(c, n, work, [&](int t) { connect_to_cache(c, n, t, work); });
+        else
+            paths_.add_sample(c, n, work);
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {

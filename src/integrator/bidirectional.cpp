@@ -44,10 +44,67 @@ void Bidirectional::trace_light_path(const SampleContext& c, const TechniqueCoun
     }
 }
 
+namespace {
+
+void start_eye_path(const SampleContext& c, const WalkContext& walk, SubPath& z) {
+    c.sampler.seek(Stream::Eye, 0);
+    const Film::PixelSample at = c.film_sample(c.sampler.next_2d());
+    etendue::start_eye_path(walk, at, c.sampler.next_2d(), c.sampler, z);
+}
+
+}  // namespace
+
 void Bidirectional::trace_eye_path(const SampleContext& c, const TechniqueCounts& counts,
                                    Workspace& work, const LearnedPlaces* learned) const {
-    etendue::trace_eye_path(eye_walk(c.scene, counts, work.stats, learned), c.film, c.pixel,
-                            c.sampler, work.z);
+    const WalkContext walk = eye_walk(c.scene, counts, work.stats, learned);
+    start_eye_path(c, walk, work.z);
+    while (extend<TransportMode::Radiance>(walk, c.sampler, work.z)) {
+    }
+}
+
+void Bidirectional::add_sample(const SampleContext& c, const TechniqueCounts& counts,
+                               Workspace& work) const {
+    const bool has_light_path = counts.uses_light_paths();
+    if (has_light_path) trace_light_path(c, counts, work);  // C(s,1), C(s,0)
+    add_eye_path(c, counts, work, [&](int t) {
+        if (!has_light_path) return;
+        for (int s = 2; s <= work.y.size() && s + t - 1 <= max_depth(); ++s)
+            add(c, join_connect(c.scene, work.y, s, work.z, t, counts), work);
+    });
+}
+
+void Bidirectional::add_technique(const SampleContext& c, const TechniqueCounts& counts, int s,
+                                  int t, float factor, Workspace& work) const {
+    SubPath &y = work.y, &z = work.z;
+    // The last flight of C(s,0) ends on the lens; the surface that lies beyond it is not needed, but met.
+    const WalkContext light{c.scene, counts, work.stats, {s, depth_.rr_depth}};
+    const WalkContext eye{c.scene, counts, work.stats, {t, depth_.rr_depth}};
+    if (s >= 2) {
+        if (!start_light_path(light, c.sampler, y)) return;
+        // Not beyond: another step would forget the flight.
+        while (y.size() < s && extend<TransportMode::Importance>(light, c.sampler, y)) {
+        }
+        if (t == 0 && y.size() >= s - 1) {
+            add(c, join_hit_lens(c.scene, y, s - 1, counts), work, factor);
+            return;
+        }
+        if (y.size() < s) return;
+        if (t == 1) {
+            add(c, join_splat(c.scene, y, s, c.sampler, counts), work, factor);
+            return;
+        }
+    }
+    start_eye_path(c, eye, z);
+    while (extend<TransportMode::Radiance>(eye, c.sampler, z)) {
+    }
+    if (z.size() < t) return;
+    if (s == 0)
+        add_hits(c, counts, t, work, factor);
+    else if (is_joinable(z, t))
+        add(c,
+            s == 1 ? join_next_event(c.scene, z, t, c.sampler, counts)
+                   : join_connect(c.scene, y, s, z, t, counts),
+            work, factor);
 }
 
 void Bidirectional::learn(const LearnContext& pass) {
@@ -116,7 +173,7 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
 
 void Bidirectional::add(const SampleContext& c, const std::optional<Join>& j, Workspace& work,
                         float factor, uint32_t draw) const {
-    if (!j) return;
+    if (!j || j->technique.vertices() - 1 < shortest_) return;
     const float scale = j->technique.t <= 1 ? c.splat_scale : std::fabs(work.z.film_weight);
     const uint64_t number = join_number(j->technique.s, j->technique.t, draw);
     if (const auto value = test(c, *j, scale * factor, number, work))

@@ -10,6 +10,9 @@ class Bidirectional {
 public:
     static std::vector<ParamInfo> params();
     explicit Bidirectional(const IntegratorParams& params);
+    /// Without roulette of joins; paths of less than `shortest` edges are left out.
+    Bidirectional(const DepthOptions& depth, int shortest)
+        : depth_(depth), shortest_(shortest), roulette_(0), is_optimised_(false) {}
 
     /// Counts of bidirectional path tracing, without pairs.
     static TechniqueCounts counts(const Scene& scene, uint64_t light_paths) {
@@ -57,12 +60,33 @@ public:
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& counts, uint64_t kept,
                            LightVertexCache& cache, const LearnedPlaces* learned = nullptr) const;
 
+    /// Everything that the sub-paths of one sample bring: bidirectional path tracing.
+    void add_sample(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
+    /// The eye sub-path, C(0,t) and C(1,t); `connect(t)` adds C(s,t), s ≥ 2.
+    template <class Connect>
+    void add_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
+                      const Connect& connect) const {
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        trace_eye_path(c, counts, work);
+        const SubPath& z = work.z;
+        for (int t = 2; t <= z.size(); ++t) {
+            add_hits(c, counts, t, work);
+            if (!is_joinable(z, t)) continue;
+            add(c, join_next_event(c.scene, z, t, c.sampler, counts), work);
+            const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
+            connect(t);
+        }
+    }
+    /// C(s,t) alone, times `factor`, with sub-paths no longer than it needs.
+    void add_technique(const SampleContext& c, const TechniqueCounts& counts, int s, int t,
+                       float factor, Workspace& work) const;
+
     /// C(0,t).
     void add_hits(const SampleContext& c, const TechniqueCounts& counts, int t,
-                  const Workspace& work) const {
-        if (counts.hit > 0)
+                  const Workspace& work, float factor = 1) const {
+        if (counts.hit > 0 && t - 1 >= shortest_)
             for_each_hit(c.scene, work.z, t, counts,
-                         [&](const Join& j) { c.sink.add(j, j.contribution); });
+                         [&](const Join& j) { c.sink.add(j, j.contribution * factor); });
     }
     /// Adds a join, where there is one and it passes test(). Where z_{t-1} draws several of one technique each is added
     /// times `factor`, and `draw` (from 1 on) tells them apart.
@@ -83,6 +107,7 @@ private:
     float threshold(const SampleContext& c, const Vec2* splat) const;
 
     DepthOptions depth_;
+    int shortest_ = 1;  ///< Edges.
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
     bool is_optimised_;              ///< The thresholds below instead.
     std::vector<float> thresholds_;  ///< By pixel, of this pass; empty until there are some.

@@ -9,9 +9,11 @@
 
 #include "integrator/bdpt.h"
 #include "integrator/light.h"
+#include "integrator/mmlt.h"
 #include "integrator/path.h"
 #include "integrator/pcbpt.h"
 #include "integrator/pm.h"
+#include "integrator/pssmlt.h"
 #include "integrator/sppm.h"
 #include "integrator/upg.h"
 #include "integrator/vcm.h"
@@ -20,8 +22,8 @@ namespace etendue {
 
 const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
-        path_entry(), light_entry(), bdpt_entry(), pm_entry(),       ppm_entry(),
-        sppm_entry(), vcm_entry(),   upg_entry(),  upg_bdpt_entry(), pcbpt_entry()};
+        path_entry(), light_entry(), bdpt_entry(),     pm_entry(),    ppm_entry(),    sppm_entry(),
+        vcm_entry(),  upg_entry(),   upg_bdpt_entry(), pcbpt_entry(), pssmlt_entry(), mmlt_entry()};
     return entries;
 }
 
@@ -160,12 +162,18 @@ std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec) {
         near.empty() ? "" : fmt::format("did you mean \"{}\"? ", near), fmt::join(known, ", ")));
 }
 
-DepthOptions DepthOptions::from(const IntegratorParams& params) {
-    const int max_depth = params.integer("max_depth"), rr_depth = params.integer("rr_depth");
+DepthOptions DepthOptions::without_roulette(const IntegratorParams& params) {
+    const int max_depth = params.integer("max_depth");
     if (max_depth < -1 || max_depth == 0)
         throw std::runtime_error("max_depth must be -1 (unlimited) or at least 1");
-    if (rr_depth < 1) throw std::runtime_error("rr_depth must be at least 1");
-    return {max_depth < 0 ? kUnlimited : std::min(max_depth, kUnlimited), rr_depth};
+    return {max_depth < 0 ? kUnlimited : std::min(max_depth, kUnlimited), kUnlimited};
+}
+
+DepthOptions DepthOptions::from(const IntegratorParams& params) {
+    DepthOptions depth = without_roulette(params);
+    depth.rr_depth = params.integer("rr_depth");
+    if (depth.rr_depth < 1) throw std::runtime_error("rr_depth must be at least 1");
+    return depth;
 }
 
 std::vector<ParamInfo> depth_params() {

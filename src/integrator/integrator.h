@@ -44,11 +44,20 @@ public:
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
     /// Samples of each strategy per eye sub-path, as the weights have it, where a pass traces `light_paths`.
     virtual TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const = 0;
+    /// Whether it makes paths by this technique.
+    virtual bool uses(const Technique& q, const Scene& scene, uint64_t light_paths) const {
+        return counts(scene, light_paths).of(q) > 0;
+    }
     /// N_L, light paths of a pass; 0 where it traces none.
     virtual uint64_t light_paths(const Scene& scene) const = 0;
     /// Whether contributions come with the sub-paths they were made of, so that `verify` can tell their paths.
     virtual bool keeps_paths() const { return true; }
     virtual Estimator estimator() const = 0;
+    /// Where passes depend on each other: of how many independent groups they are, pass i of group i modulo their number.
+    /// 0 where each pass is independent.
+    virtual int error_groups() const { return 0; }
+    /// What splats of the pass just traced count in estimates of errors by groups, see Film::end_pass().
+    virtual double splat_error_factor() const { return 1; }
     /// What a run tells of the integrator's own structures, by name; as of the last pass.
     virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
@@ -111,6 +120,8 @@ struct DepthOptions {
     int rr_depth;
 
     static DepthOptions from(const IntegratorParams& params);
+    /// The same without roulette.
+    static DepthOptions without_roulette(const IntegratorParams& params);
     /// Vertices of a sub-path that can still be joined.
     WalkOptions walk() const {
         return {max_depth == kUnlimited ? kUnlimited : max_depth + 1, rr_depth};

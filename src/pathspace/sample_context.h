@@ -38,13 +38,18 @@ struct SampleContext {
     float splat_scale;     ///< 1 / N_L: factor of splats.
     Sampler& sampler;
     ContributionSink& sink;
+    bool is_of_whole_film = false;  ///< The eye path belongs to no pixel.
 
+    /// Film point of the eye path, and the factor of its contribution.
+    Film::PixelSample film_sample(Vec2 u) const {
+        return is_of_whole_film ? film.sample_anywhere(u) : film.sample_pixel(pixel, u);
+    }
     /// Index of the light path of this pixel; pixels share light paths where there are fewer paths than pixels.
     uint64_t own_light_path() const { return pixel % light_paths; }
 
     /// The same sample with other random numbers and another sink.
     SampleContext with(Sampler& numbers, ContributionSink& to) const {
-        return {scene, film, pixel, chunk, light_paths, splat_scale, numbers, to};
+        return {scene, film, pixel, chunk, light_paths, splat_scale, numbers, to, is_of_whole_film};
     }
 };
 
@@ -64,6 +69,7 @@ struct PassContext {
     uint32_t index;        ///< Of the pass, from 0.
     uint64_t light_paths;  ///< N_L.
     uint64_t pixels;
+    uint64_t seed;
     /// Calls `use(context, work)` for the samples 0 … count-1 in parallel. Only splats may be added.
     using Use = std::function<void(const SampleContext&, Workspace&)>;
     std::function<void(uint64_t count, const Use& use)> for_each_sample;
@@ -72,6 +78,11 @@ struct PassContext {
     /// must call Sampler::start(); path numbers from `pixels` on are unused by samples.
     using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;
     std::function<void(uint64_t count, const Task& task)> for_each_other_path;
+
+    /// Calls `task(i, splats, work)` for i < count in parallel, each a task of its own: Markov chains. Where
+    /// work.is_observed, splats.tell() must have the joins.
+    using ChainTask = std::function<void(uint64_t, SplatSink&, Workspace&)>;
+    std::function<void(uint64_t count, const ChainTask& task)> for_each_chain;
 
     void for_each_light_path(const Use& use) const { for_each_sample(light_paths, use); }
 };

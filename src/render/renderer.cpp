@@ -82,6 +82,49 @@ private:
     Rgb sum_;
 };
 
+/// The sink of Markov chains: the film, and who else wants to know of joins.
+class FilmSplats final : public SplatSink {
+public:
+    FilmSplats(Film& film, TechniqueImages* techniques, const RenderSettings& settings,
+               float splat_scale, Workspace& work)
+        : film_(film), techniques_(techniques), observer_(settings.observer),
+          shown_(settings.shown), splat_scale_(splat_scale), work_(work) {}
+
+    void add(Vec2 film, Rgb value) override {
+        if (shows_all()) film_.add_splat(film, value);
+    }
+    void tell(const Join& join, Rgb contribution, float factor) override {
+        if (!shown_.contains(join.technique) || !is_finite(contribution)) return;
+        if (!shows_all()) film_.add_splat(join.film, contribution * (join.mis_weight * factor));
+        const float share = splat_scale_ * factor;
+        if (techniques_)
+            techniques_->add_splat(join.film, join.technique, contribution, join.mis_weight, share);
+        if (observer_) observe(join, contribution, share);
+    }
+    /// Whether anybody but the film asks for joins.
+    bool needs_joins() const { return techniques_ || observer_ || !shows_all(); }
+
+private:
+    bool shows_all() const { return !shown_.inner_only && shown_.has_all_lengths(); }
+    void observe(const Join& join, Rgb contribution, float share) {
+        if (join.technique.t <= 1) {
+            observer_->observe(join, contribution, share, 0, work_);
+            return;
+        }
+        // The eye path has no pixel: it belongs to all that its film point reaches.
+        for_each_pixel(film_.geometry(), film_.filter(), join.film, [&](uint64_t pixel, float h) {
+            observer_->observe(join, contribution, share * h, pixel, work_);
+        });
+    }
+
+    Film& film_;
+    TechniqueImages* techniques_;
+    ContributionObserver* observer_;
+    PathSelection shown_;
+    float splat_scale_;
+    Workspace& work_;
+};
+
 }  // namespace
 
 const char* to_string(StopReason reason) {
@@ -162,6 +205,7 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
       film_(scene.film(), scene.filter(), typical_radiance(scene)),
       workers_(std::make_unique<Workers>(settings.threads)) {
     light_paths_ = integrator_->light_paths(scene);
+    if (integrator_->error_groups() > 0) film_.set_groups(integrator_->error_groups());
     if (settings.technique_depth > 0)
         techniques_ = std::make_unique<TechniqueImages>(
             scene.film(), scene.filter(), settings.technique_depth, typical_radiance(scene));
@@ -238,6 +282,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
                         .index = index,
                         .light_paths = light_paths,
                         .pixels = pixels,
+                        .seed = seed,
                         .for_each_sample =
                             [&](uint64_t count, const PassContext::Use& use) {
                                 for_each_sample(count, [&](const SampleContext& c, Workspace& work,
@@ -253,13 +298,24 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
                                     work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
                                     task(i, sampler, work);
                                 });
+                            },
+                        .for_each_chain =
+                            [&](uint64_t count, const PassContext::ChainTask& task) {
+                                tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                                    go_on();
+                                    Workspace& work = workspace();
+                                    FilmSplats splats(film_, techniques_.get(), settings_,
+                                                      splat_scale, work);
+                                    work.is_observed = splats.needs_joins();
+                                    task(i, splats, work);
+                                });
                             }});
     for_each_sample(pixels, [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
         sink.begin(c.pixel);
         integrator_->sample(c, work);
         sink.end();
     });
-    film_.end_pass();
+    film_.end_pass(integrator_->splat_error_factor());
     if (techniques_) techniques_->end_pass();
 }
 

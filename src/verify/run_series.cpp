@@ -197,7 +197,7 @@ IndependentRun SeriesRenderer::render(const IntegratorSpec& spec, uint64_t seed,
 
 RunSeries SeriesRenderer::begin(const IntegratorSpec& spec, uint64_t stream,
                                 std::optional<uint64_t> spp, double seconds) const {
-    const auto integrator = make_integrator(spec);
+    const std::shared_ptr<Integrator> integrator = make_integrator(spec);
     if (!integrator->keeps_paths())
         throw std::runtime_error(fmt::format(
             "{} cannot be verified, since its photons do not store their paths; use compare",
@@ -205,7 +205,11 @@ RunSeries SeriesRenderer::begin(const IntegratorSpec& spec, uint64_t stream,
     RunSeries series;
     series.spec = spec;
     series.stream = stream;
-    series.counts = integrator->counts(scene_, integrator->light_paths(scene_));
+    const uint64_t light_paths = integrator->light_paths(scene_);
+    series.counts = integrator->counts(scene_, light_paths);
+    series.uses = [this, integrator, light_paths](const Technique& q) {
+        return integrator->uses(q, scene_, light_paths);
+    };
     series.estimator = integrator->estimator();
     series.runs.resize(size_t(options_.runs));
     if (spp) {

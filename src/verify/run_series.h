@@ -37,6 +37,7 @@ struct RunSeries {
     IntegratorSpec spec;
     uint64_t stream = 0;  ///< Distinguishes its random numbers from those of other series.
     TechniqueCounts counts;
+    std::function<bool(const Technique&)> uses;  ///< Integrator::uses()
     Estimator estimator = Estimator::Unbiased;
     uint64_t spp = 0;         ///< Samples per pixel of one rendering.
     uint64_t renderings = 0;  ///< Renderings per run.

@@ -178,7 +178,7 @@ MethodReport MethodVerification::compare(size_t i) const {
     compare_classes(sides, m);
     for (int edges = options_.shortest; edges <= options_.longest; ++edges)
         for (const Technique& q : techniques_of_length(edges))
-            if (series.counts.of(q) > 0)
+            if (series.uses(q))
                 m.techniques.push_back(
                     compare_technique(q, sides, unthinned_[i] ? *unthinned_[i] : series));
     return m;

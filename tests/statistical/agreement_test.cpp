@@ -132,6 +132,12 @@ protected:
              {"pcbpt:connections=2,record_fraction=0.02", "bdpt:connections=cache"})
             expect_same_image(render_tiles(scene, method, {factor * c.passes, 4, 5}), path,
                               1.5 * resolution, std::string(method) + " against path");
+        if (factor == 1)
+            // A group for each pass, so that passes are independent, and start-up bias were at its largest.
+            for (const char* method : {"pssmlt:chains=16,groups=", "mmlt:chains=48,groups="})
+                expect_same_image(
+                    render_tiles(scene, fmt::format("{}{}", method, c.passes), {c.passes, 4, 6}),
+                    path, 1.5 * resolution, std::string(method) + " against path");
         if (c.light)
             expect_same_image(render_tiles(scene, "light", {2 * factor * c.passes, 4, 3}), path,
                               2 * resolution, "light against path");

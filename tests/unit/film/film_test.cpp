@@ -162,6 +162,56 @@ TEST(Film, ErrorIsThatOfTheMean) {
     EXPECT_GT(film.error().high, film.error().relative_rms);
 }
 
+/// Passes of a group share what they have: more of them make the image no better.
+TEST(Film, ErrorIsThatOfGroups) {
+    constexpr int kGroups = 16, kPasses = 40, kFilms = 30;
+    Moments relative;
+    Moments variance, mean_error2;
+    for (int f = 0; f < kFilms; ++f) {
+        Film film({100, 20, 0, 0, 100, 20}, ReconstructionFilter::box());
+        film.set_groups(kGroups);
+        for (int pass = 0; pass < kPasses; ++pass) {
+            EXPECT_EQ(film.error().valid, pass >= kGroups) << pass;
+            film.begin_pass(0);
+            std::mt19937 random(unsigned(1000 * f + pass % kGroups));
+            std::uniform_real_distribution<float> value(0, 2);
+            for (uint64_t i = 0; i < 2000; ++i) film.add_eye(i, Rgb(value(random)));
+            film.end_pass();
+        }
+        relative.add(sqr(film.error().relative_rms));
+        EXPECT_LT(film.error().low, film.error().relative_rms);
+        EXPECT_GT(film.error().high, film.error().relative_rms);
+        for (const Rgb& v : film.variance()) variance.add(double(v.g));
+        mean_error2.add(sqr(film.mean_luminance().standard_error));
+    }
+    // 1/3 of a group. Of 40 passes eight groups have three and eight two; the difference of two of them is not smaller for
+    // it.
+    const double expected = 1.0 / 3 / kGroups;
+    // Noise of I adds 3 Var(I), where the image weighs groups 3 to 2.
+    const double noise = 3 * (1.0 / 3) * (8 * 9 + 8 * 4) / sqr(double(kPasses));
+    EXPECT_NEAR(relative.mean(), (1 + noise) * expected / 1.01, 0.04 * expected);
+    EXPECT_NEAR(variance.mean(), expected, 0.03 * expected);
+    EXPECT_NEAR(mean_error2.mean(), expected / 2000, 0.25 * expected / 2000);
+}
+
+/// Splats count in the errors by a factor of their own, eye paths do not.
+TEST(Film, ErrorByGroupsScalesSplats) {
+    const auto error = [](double splat_factor) {
+        Film film({4, 4, 0, 0, 4, 4}, ReconstructionFilter::box());
+        film.set_groups(2);
+        for (int pass = 0; pass < 4; ++pass) {
+            film.begin_pass(1);
+            for (uint64_t i = 0; i < 16; ++i) film.add_eye(i, Rgb(1));
+            if (pass % 2 == 1) film.add_splat({1.5f, 1.5f}, Rgb(3));
+            film.end_pass(splat_factor);
+        }
+        return film.variance()[5].g;
+    };
+    EXPECT_GT(error(1), 0);
+    EXPECT_NEAR(error(0.5), 0.25 * error(1), 1e-6);
+    EXPECT_EQ(error(0), 0);
+}
+
 TEST(Film, BlackPassesHaveNoError) {
     Film film(kGeometry, ReconstructionFilter::box());
     for (int pass = 0; pass < 10; ++pass) {

@@ -46,6 +46,8 @@ public:
     }
     uint64_t light_paths(const Scene& scene) const override { return inner_->light_paths(scene); }
     Estimator estimator() const override { return inner_->estimator(); }
+    int error_groups() const override { return inner_->error_groups(); }
+    double splat_error_factor() const override { return inner_->splat_error_factor(); }
     const std::vector<uint32_t>& learned() const { return learned_; }
 
 private:
@@ -184,7 +186,8 @@ TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
 
 INSTANTIATE_TEST_SUITE_P(Integrators, DropPass,
                          ::testing::Values("path", "light", "bdpt", "vcm:radius=0.3", "upg+bdpt",
-                                           "sppm", "pcbpt"),
+                                           "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
+                                           "mmlt:groups=2,chains=48"),
                          [](const auto& p) {
                              const std::string name = p.param;
                              return name.substr(0, name.find_first_of(":+"));

@@ -1,0 +1,98 @@
+#include "integrator/markov.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace etendue {
+
+std::vector<ParamInfo> MarkovIntegrator::params() {
+    return {{"p_large", ParamKind::Float, "0.3",
+             "Probability of a large step, which is an independent sample and counts as one too."},
+            {"chains", ParamKind::Int, "256", "Chains of a group, whatever the number of threads."},
+            {"groups", ParamKind::Int, "16",
+             "Independent groups of chains, an even number: they take turns, pass by pass, and "
+             "tell the error, once each has had one."}};
+}
+
+MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions& depth)
+    : options_{.groups = p.integer("groups", 2, 1024),
+               .chains = p.integer("chains", 1, 1 << 20),
+               .p_large = double(p.number("p_large", 0.01f, 1.0f))},
+      paths_(depth, kShortest),
+      direct_({std::min(depth.max_depth, kShortest - 1), depth.rr_depth}, 1) {
+    if (options_.groups % 2 != 0)
+        throw std::runtime_error(
+            fmt::format("{}: groups must be even, but is {}", p.integrator(), options_.groups));
+}
+
+uint64_t MarkovIntegrator::whole_film_paths(const Scene& scene) {
+    return std::max(uint64_t(1),
+                    uint64_t(std::llround(reached_region(scene.film(), scene.filter()).area())));
+}
+
+PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene) const {
+    const TechniqueCounts n = counts(scene, 0);
+    return
+        [this, n](int, const SampleContext& c, Workspace& work) { paths_.add_sample(c, n, work); };
+}
+
+void MarkovIntegrator::trace(const PassContext& pass) {
+    if (paths_.max_depth() < kShortest || !pass.scene.has_emitters()) return;
+    if (!has_begun_) {
+        Pilot pilot = run_pilot(pass, bidirectional_sample(pass.scene));
+        pilot_samples_ = pilot.samples;
+        Chains chains = begin(pass, std::move(pilot));
+        pool_ = 0;
+        for (const ClassPlan& plan : chains.plan) pool_ += plan.pool;
+        groups_.reset();
+        space_ = std::move(chains.space);
+        groups_ = std::make_unique<ChainGroups>(*space_, options_, std::move(chains.plan));
+    }
+    groups_->advance(pass);
+}
+
+TechniqueCounts MarkovIntegrator::direct_counts(const Scene& scene, uint64_t light_paths) {
+    const auto& emitters = scene.emitters();
+    const bool has_points =
+        std::any_of(emitters.begin(), emitters.end(), [](const auto& e) { return e->is_delta(); });
+    return has_points ? Bidirectional::counts(scene, light_paths)
+                      : TechniqueCounts{.hit = 1, .next_event = 1};
+}
+
+void MarkovIntegrator::sample(const SampleContext& c, Workspace& work) const {
+    direct_.add_sample(c, direct_counts(c.scene, c.light_paths), work);
+}
+
+std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {
+    if (!groups_) return {};
+    std::vector<std::pair<std::string, double>> out{
+        {"normalisation", groups_->b()},
+        {"normalisation_relative_error", groups_->relative_error_of_b()},
+        {"pilot_samples", pilot_samples_},
+        {"pool_samples", pool_},
+        {"longest_stay", groups_->stats().longest_stay}};
+    std::vector<const char*> names{"large"};
+    for (const char* name : space_->mutations()) names.push_back(name);
+    const auto add = [&](const std::string& name, const StepCounts& n) {
+        if (n.proposed == 0) return;
+        const double proposed = double(n.proposed);
+        out.push_back({name + "_proposed", proposed});
+        out.push_back({name + "_failed", double(n.failed) / proposed});
+        out.push_back({name + "_zero", double(n.zero) / proposed});
+        out.push_back({name + "_accepted", n.accepted / proposed});
+    };
+    for (size_t m = 0; m < names.size(); ++m) {
+        const auto& by_length = groups_->stats().steps[m];
+        StepCounts sum;
+        for (const StepCounts& n : by_length) sum += n;
+        add(names[m], sum);
+        for (size_t k = kShortest; k < by_length.size(); ++k)
+            add(fmt::format("{}_length_{}", names[m], k), by_length[k]);
+    }
+    return out;
+}
+
+}  // namespace etendue

@@ -1,0 +1,69 @@
+#pragma once
+// What the integrators with Markov chains share: options, the pilot, direct light apart, statistics.
+
+#include "integrator/bidirectional.h"
+#include "mcmc/chain_groups.h"
+#include "mcmc/pilot.h"
+
+namespace etendue {
+
+class MarkovIntegrator : public Integrator {
+public:
+    /// Edges of the shortest path that chains make. Shorter ones are taken by independent samples, one a pixel and pass.
+    static constexpr int kShortest = 3;
+
+    /// Of chains; `rr_depth` where walks have roulette.
+    static std::vector<ParamInfo> params();
+
+    void trace(const PassContext& pass) final;
+    void collect(std::span<const std::unique_ptr<PassSums>>) final {
+        if (!groups_) return;
+        groups_->commit();
+        has_begun_ = true;
+    }
+    void sample(const SampleContext& context, Workspace& work) const final;
+
+    /// Of the chains; all that they make can be made in all these ways.
+    TechniqueCounts counts(const Scene& scene, uint64_t) const final {
+        return Bidirectional::counts(scene, whole_film_paths(scene));
+    }
+    bool uses(const Technique& q, const Scene& scene, uint64_t light_paths) const final {
+        const bool is_direct = q.vertices() - 1 < kShortest;
+        return (is_direct ? direct_counts(scene, light_paths) : counts(scene, 0)).of(q) > 0;
+    }
+    uint64_t light_paths(const Scene& scene) const final { return scene.film().pixel_count(); }
+    Estimator estimator() const final { return Estimator::Unbiased; }
+    int error_groups() const final { return options_.groups; }
+    double splat_error_factor() const final { return groups_ ? groups_->own_scale() : 1.0; }
+    std::vector<std::pair<std::string, double>> figures() const final;
+
+protected:
+    MarkovIntegrator(const IntegratorParams& params, const DepthOptions& depth);
+
+    /// States, and how chains are shared among their classes.
+    struct Chains {
+        std::unique_ptr<StateSpace> space;
+        std::vector<ClassPlan> plan;
+    };
+    virtual Chains begin(const PassContext& pass, Pilot pilot) = 0;
+
+    /// A sample of all techniques, as of `bdpt`.
+    PrimarySample bidirectional_sample(const Scene& scene) const;
+    /// N_L of the weights: the film's eye paths are spread over so many pixels.
+    static uint64_t whole_film_paths(const Scene& scene);
+
+    ChainOptions options_;
+    Bidirectional paths_;
+
+private:
+    /// Of the shorter paths. Eye paths make all of them, unless some emitter has no extent.
+    static TechniqueCounts direct_counts(const Scene& scene, uint64_t light_paths);
+
+    Bidirectional direct_;
+    std::unique_ptr<StateSpace> space_;
+    std::unique_ptr<ChainGroups> groups_;  ///< Once the first pass has begun.
+    bool has_begun_ = false;               ///< A pass stayed. Until then each begins anew.
+    uint64_t pilot_samples_ = 0, pool_ = 0;
+};
+
+}  // namespace etendue

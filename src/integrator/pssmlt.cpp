@@ -1,0 +1,46 @@
+// Primary sample space Metropolis light transport [Kelemen et al. 2002], over samples of bidirectional path tracing: a
+// state is the numbers of an eye and a light sub-path, and brings all joins of the two. Unbiased.
+//
+// Direct light is apart. Small steps move every number, block steps draw those of some vertices again.
+
+#include "integrator/pssmlt.h"
+
+#include <algorithm>
+
+#include "integrator/markov.h"
+
+namespace etendue {
+namespace {
+
+class PssmltIntegrator final : public MarkovIntegrator {
+public:
+    explicit PssmltIntegrator(const IntegratorParams& p)
+        : MarkovIntegrator(p, DepthOptions::from(p)) {}
+
+protected:
+    Chains begin(const PassContext& pass, Pilot pilot) override {
+        const ClassPlan plan{
+            .chains = options_.chains, .pool = pool_samples(pilot.samples, options_), .c = pilot.b};
+        return {std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene),
+                                               std::move(pilot.map)),
+                {plan}};
+    }
+};
+
+}  // namespace
+
+IntegratorEntry pssmlt_entry() {
+    std::vector<ParamInfo> params = depth_params();
+    for (ParamInfo& p : params)
+        if (p.name == std::string("rr_depth")) p.fallback = "10";
+    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
+    return {{"integrator", "pssmlt",
+             "Metropolis light transport over the numbers of bidirectional path tracing. "
+             "Unbiased.",
+             params},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                return std::make_unique<PssmltIntegrator>(p);
+            }};
+}
+
+}  // namespace etendue

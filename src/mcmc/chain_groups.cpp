@@ -1,0 +1,163 @@
+#include "mcmc/chain_groups.h"
+
+#include <cmath>
+#include <numeric>
+
+#include "math/hash.h"
+#include "math/statistics.h"
+#include "mcmc/whole_film.h"
+
+namespace etendue {
+namespace {
+
+/// What random numbers of a group are for.
+enum Purpose : uint64_t { kPool, kResampling, kSteps };
+
+}  // namespace
+
+std::vector<size_t> resample(std::span<const double> weights, size_t count, double u) {
+    const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
+    std::vector<size_t> out;
+    if (!(total > 0)) return out;
+    size_t item = 0;
+    double sum = weights[0];
+    for (size_t i = 0; i < count; ++i) {
+        const double at = (double(i) + u) / double(count) * total;
+        while (sum <= at && item + 1 < weights.size()) sum += weights[++item];
+        // Rounding may leave the last item one without weight.
+        size_t chosen = item;
+        while (!(weights[chosen] > 0)) --chosen;
+        out.push_back(chosen);
+    }
+    return out;
+}
+
+ChainGroups::ChainGroups(const StateSpace& space, const ChainOptions& options,
+                         std::vector<ClassPlan> plan)
+    : space_(space), options_(options), plan_(std::move(plan)), groups_(size_t(options.groups)) {
+    for (size_t k = 0; k < plan_.size(); ++k)
+        class_of_chain_.insert(class_of_chain_.end(), size_t(plan_[k].chains), int(k));
+    for (const int k : class_of_chain_) working_.chains.emplace_back(space_, k);
+}
+
+void ChainGroups::start(const PassContext& pass, uint64_t key, Group& group) const {
+    group.normalisation.assign(plan_.size(), {});
+    group.steps = 0;
+    size_t first = 0;
+    for (size_t k = 0; k < plan_.size(); ++k) {
+        const ClassPlan& plan = plan_[k];
+        const uint64_t pool_key = hash_combine(hash_combine(key, kPool), k);
+        std::vector<double> importance(plan.pool);
+        pass.for_each_other_path(plan.pool, [&](uint64_t i, Sampler&, Workspace& work) {
+            const WholeFilm whole(pass);
+            const auto state = space_.make_state();
+            space_.draw(int(k), hash_combine(pool_key, i), {whole.sample, work}, *state);
+            importance[i] = state->importance();
+        });
+        Normalisation& n = group.normalisation[k];
+        n.pool = plan.pool;
+        for (const double v : importance) n.pool_sum += v;
+
+        const double u = to_unit_double(hash_combine(hash_combine(key, kResampling), k));
+        const std::vector<size_t> seeds = resample(importance, size_t(plan.chains), u);
+        for (int i = 0; i < plan.chains; ++i) group.chains[first + size_t(i)].start_black();
+        pass.for_each_other_path(seeds.size(), [&](uint64_t i, Sampler&, Workspace& work) {
+            const WholeFilm whole(pass);
+            group.chains[first + i].start(hash_combine(pool_key, seeds[i]), {whole.sample, work});
+        });
+        first += size_t(plan.chains);
+    }
+}
+
+double ChainGroups::scale(size_t g, const Group& group, int chain_class) const {
+    const size_t k = size_t(chain_class);
+    double shift = 0;
+    for (size_t h = 0; h < groups_.size(); ++h) {
+        if (h == g || groups_[h].normalisation.empty()) continue;
+        const Normalisation& n = groups_[h].normalisation[k];
+        shift += (n.later_b() - n.b()) / double(groups_.size() - 1);
+    }
+    return group.normalisation[k].b() + shift;
+}
+
+void ChainGroups::advance(const PassContext& pass) {
+    const size_t g = pass.index % groups_.size();
+    const uint64_t key = hash_combine(hash_combine(pass.seed, 0x636861696e), g);
+    working_group_ = g;
+    if (groups_[g].chains.empty()) {
+        start(pass, key, working_);
+    } else {
+        for (size_t i = 0; i < working_.chains.size(); ++i)
+            working_.chains[i].copy(groups_[g].chains[i]);
+        working_.normalisation = groups_[g].normalisation;
+        working_.steps = groups_[g].steps;
+    }
+
+    const size_t chains = working_.chains.size();
+    const uint64_t steps = (pass.pixels + chains - 1) / chains;
+    std::vector<double> scales;
+    for (size_t k = 0; k < plan_.size(); ++k) scales.push_back(scale(g, working_, int(k)));
+    std::vector<ChainStats> stats(chains);
+    pass.for_each_chain(chains, [&](uint64_t i, SplatSink& splats, Workspace& work) {
+        const WholeFilm whole(pass);
+        const size_t k = size_t(class_of_chain_[i]);
+        const double mean = 1 / (double(steps) * double(plan_[k].chains));
+        working_.chains[i].advance({options_.p_large, plan_[k].c}, scales[k],
+                                   mean * double(pass.light_paths),
+                                   hash_combine(hash_combine(key, kSteps), i), working_.steps,
+                                   steps, {whole.sample, work}, splats, stats[i]);
+    });
+
+    working_stats_ = {};
+    double own = 0, all = 0;
+    for (size_t i = 0; i < chains; ++i) {
+        const size_t k = size_t(class_of_chain_[i]);
+        const ChainStats& s = stats[i];
+        const double chain_light = s.chain_light / double(plan_[k].chains),
+                     large_light = s.large_light / double(plan_[k].chains);
+        all += chain_light + large_light;
+        own +=
+            large_light +
+            (scales[k] != 0 ? chain_light * working_.normalisation[k].later_b() / scales[k] : 0.0);
+        working_stats_ += s;
+    }
+    own_scale_ = all > 0 ? own / all : 1.0;
+    for (size_t i = 0; i < chains; ++i) {
+        Normalisation& n = working_.normalisation[size_t(class_of_chain_[i])];
+        n.large_sum += stats[i].large_sum;
+        n.large += stats[i].large_steps;
+    }
+    working_.steps += steps;
+}
+
+void ChainGroups::commit() {
+    Group& group = groups_[working_group_];
+    if (group.chains.empty())
+        for (const int k : class_of_chain_) group.chains.emplace_back(space_, k);
+    group.chains.swap(working_.chains);
+    group.normalisation = working_.normalisation;
+    group.steps = working_.steps;
+    stats_ += working_stats_;
+}
+
+double ChainGroups::later_b(const Group& group) const {
+    double sum = 0;
+    for (const Normalisation& n : group.normalisation) sum += n.later_b();
+    return sum;
+}
+
+double ChainGroups::b() const {
+    Moments m;
+    for (const Group& g : groups_)
+        if (!g.normalisation.empty()) m.add(later_b(g));
+    return m.mean();
+}
+
+double ChainGroups::relative_error_of_b() const {
+    Moments m;
+    for (const Group& g : groups_)
+        if (!g.normalisation.empty()) m.add(later_b(g));
+    return m.count() > 1 && m.mean() > 0 ? std::sqrt(m.squared_error()) / m.mean() : 0.0;
+}
+
+}  // namespace etendue

@@ -1,0 +1,78 @@
+#include "mcmc/pilot.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/statistics.h"
+#include "mcmc/whole_film.h"
+
+namespace etendue {
+namespace {
+
+struct PilotSplat {
+    Vec2 film;
+    float luminance;
+    int edges, s;
+};
+
+}  // namespace
+
+double Pilot::of_length(int edges) const {
+    double sum = 0;
+    for (const auto& [technique, value] : by_technique)
+        if (technique.first == edges) sum += value;
+    return sum;
+}
+
+uint64_t pool_samples(uint64_t pilot_samples, const ChainOptions& options) {
+    return std::max(pilot_samples / 4, uint64_t(4 * options.chains));
+}
+
+Pilot run_pilot(const PassContext& pass, const PrimarySample& sample) {
+    constexpr uint64_t kFewest = 1024, kMost = uint64_t(1) << 18;
+    constexpr double kPrecision = 0.02;
+    const uint64_t most = std::clamp(2 * pass.pixels, kFewest, kMost);
+    const uint64_t seed = hash_combine(pass.seed, 0x70696c6f74);
+    std::vector<std::vector<PilotSplat>> splats;
+    Pilot pilot{.map = TargetMap(pass.film.geometry()), .by_technique = {}};
+    while (true) {
+        const uint64_t done = splats.size();
+        splats.resize(std::min(most, std::max(kFewest, 2 * done)));
+        const auto trace = [&](uint64_t i, Sampler&, Workspace& work) {
+            const WholeFilm whole(pass);
+            NumberTable numbers;
+            NumberSource source(NumberStep::Fresh, hash_combine(seed, done + i), nullptr, &numbers);
+            ChainState state;
+            SplatCollector collector(pass.film, nullptr, state, work);
+            collector.observer = [&](const Join& j, double luminance) {
+                splats[done + i].push_back(
+                    {j.film, float(luminance), j.technique.vertices() - 1, j.technique.s});
+            };
+            evaluate_sample(sample, 0, source, {whole.sample, work}, collector);
+        };
+        pass.for_each_other_path(splats.size() - done, trace);
+        for (uint64_t i = done; i < splats.size(); ++i)
+            for (const PilotSplat& s : splats[i]) pilot.map.add({s.film, double(s.luminance)});
+        pilot.map.learn(splats.size());
+
+        Moments target;
+        pilot.by_technique.clear();
+        for (const auto& of_sample : splats) {
+            double sum = 0;
+            for (const PilotSplat& s : of_sample) {
+                const double value = double(s.luminance) * pilot.map(s.film);
+                sum += value;
+                pilot.by_technique[{s.edges, s.s}] += value / double(splats.size());
+            }
+            target.add(sum);
+        }
+        pilot.samples = splats.size();
+        pilot.b = target.mean();
+        pilot.relative_variance = pilot.b > 0 ? target.variance() / sqr(pilot.b) : 0;
+        // As many again have the same error.
+        const double error = std::sqrt(pilot.relative_variance / double(pilot.samples));
+        if (pilot.samples >= most || (pilot.b > 0 && error <= kPrecision)) return pilot;
+    }
+}
+
+}  // namespace etendue

@@ -1,0 +1,71 @@
+#pragma once
+// Chains in primary sample space [Kelemen et al. 2002]: a state is the numbers that a sample reads, and all that the sample
+// brings.
+
+#include <functional>
+
+#include "mcmc/numbers.h"
+#include "mcmc/state.h"
+#include "mcmc/target_map.h"
+
+namespace etendue {
+
+/// The sample, as a function of its numbers (context.sampler) and its class: adds joins to context.sink.
+using PrimarySample = std::function<void(int chain_class, const SampleContext&, Workspace&)>;
+
+/// Collects the joins of one sample of the whole film.
+class SplatCollector final : public ContributionSink {
+public:
+    /// Replaces what is in `state`. `map` may be nullptr: then the target is the luminance.
+    SplatCollector(const Film& film, const TargetMap* map, ChainState& state, Workspace& work);
+    void add(const Join& join, Rgb contribution) override;
+    /// Gets every join's luminance too, as it is before W.
+    std::function<void(const Join&, double luminance)> observer;
+
+private:
+    FilmRegion region_;
+    const TargetMap* map_;
+    ChainState& state_;
+    Workspace& work_;
+    double largest_ = 0;
+};
+
+/// Evaluates `sample` with the numbers of `source`; contributions go to `sink`.
+void evaluate_sample(const PrimarySample& sample, int chain_class, NumberSource& source,
+                     const ChainContext& c, ContributionSink& sink);
+
+class PrimarySpace final : public StateSpace {
+public:
+    enum Mutation { Small, Block };
+
+    PrimarySpace(int classes, PrimarySample sample, TargetMap map)
+        : classes_(classes), sample_(std::move(sample)), map_(std::move(map)) {}
+
+    int classes() const override { return classes_; }
+    std::span<const char* const> mutations() const override { return kMutations; }
+    std::unique_ptr<ChainState> make_state() const override { return std::make_unique<State>(); }
+    void copy(const ChainState& from, ChainState& to) const override {
+        static_cast<State&>(to) = static_cast<const State&>(from);
+    }
+    void draw(int chain_class, uint64_t key, const ChainContext& c, ChainState& y) const override;
+    Proposal propose(int chain_class, const ChainState& x, uint64_t key, const ChainContext& c,
+                     ChainState& y) const override;
+    void repeat(int chain_class, const ChainState& x, const ChainContext& c,
+                ContributionSink& sink) const override;
+
+private:
+    static constexpr std::array<const char*, 2> kMutations{"small", "block"};
+    static constexpr double kBlockShare = 0.25;  ///< Of the mutations.
+
+    struct State final : ChainState {
+        NumberTable numbers;
+    };
+    void evaluate(int chain_class, NumberSource& source, const ChainContext& c,
+                  ChainState& y) const;
+
+    int classes_;
+    PrimarySample sample_;
+    TargetMap map_;
+};
+
+}  // namespace etendue

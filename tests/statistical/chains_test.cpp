@@ -1,0 +1,81 @@
+// Markov chains: filters and crops, path lengths, and the same image from few groups as from many.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "render_tiles.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+std::string part_of_film(const std::string& filter) {
+    return "<sensor type=\"perspective\"><float name=\"fov\" value=\"45\"/><transform "
+           "name=\"to_world\"><lookat origin=\"0,0,3.4\" target=\"0,0,0\" up=\"0,1,0\"/>"
+           "</transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"12\"/><integer "
+           "name=\"height\" value=\"12\"/><integer name=\"crop_offset_x\" value=\"3\"/><integer "
+           "name=\"crop_offset_y\" value=\"2\"/><integer name=\"crop_width\" "
+           "value=\"8\"/><integer name=\"crop_height\" value=\"8\"/><rfilter type=\"" +
+           filter + "\"/></film></sensor>";
+}
+
+class ChainFilms : public ::testing::TestWithParam<const char*> {};
+
+/// The film point is drawn from the crop and what filters reach beyond it. Every pixel is a tile.
+TEST_P(ChainFilms, AreThoseOfBidirectionalPathTracing) {
+    const Scene scene = build(part_of_film(GetParam()) + room() + area_lamp() +
+                              sphere("-0.4,-0.5,0", "0.4", kGlass));
+    const Tiles bdpt = render_tiles(scene, "bdpt", {2048, 8, 1});
+    for (const char* method : {"pssmlt:chains=8,groups=1024", "mmlt:chains=48,groups=512"})
+        expect_same_image(
+            render_tiles(scene, method, {std::string(method)[0] == 'p' ? 1024u : 512u, 8, 2}), bdpt,
+            0.15, method);
+}
+
+INSTANTIATE_TEST_SUITE_P(Filters, ChainFilms, ::testing::Values("box", "tent", "lanczos"),
+                         [](const auto& p) { return std::string(p.param); });
+
+class ChainLengths : public ::testing::TestWithParam<const char*> {};
+
+/// The longest path, whether or not it has a class of its own, and unlimited ones in one class.
+TEST_P(ChainLengths, EndWhereTheyShould) {
+    const Scene scene = build(front_camera(12) + room() + area_lamp());
+    const std::string method = GetParam();
+    const size_t at = method.find("max_depth");
+    const std::string depth = at == std::string::npos ? "" : ":" + method.substr(at);
+    expect_same_image(render_tiles(scene, method, {256, 4, 2}),
+                      render_tiles(scene, "bdpt" + depth, {512, 4, 1}), 0.1, method);
+}
+
+INSTANTIATE_TEST_SUITE_P(Depths, ChainLengths,
+                         ::testing::Values("pssmlt:chains=16,groups=256,max_depth=2",
+                                           "pssmlt:chains=16,groups=256,max_depth=4",
+                                           "mmlt:chains=16,groups=256,max_depth=3",
+                                           "mmlt:chains=16,groups=256,max_depth=5",
+                                           "mmlt:chains=16,groups=256,lengths=2,max_depth=6",
+                                           "mmlt:chains=16,groups=256,lengths=1"));
+
+/// A few chains that go on for long agree with many that only start, by runs with seeds of their own.
+TEST(Chains, GoOnAsTheyBegan) {
+    const Scene scene = build(mixed_room(front_camera(12)));
+    for (const char* name : {"pssmlt", "mmlt"}) {
+        std::array<Tiles, 2> tiles{Tiles(4), Tiles(4)};
+        for (uint64_t run = 0; run < 40; ++run)
+            for (size_t i = 0; i < 2; ++i) {
+                RenderSettings settings;
+                settings.integrator = IntegratorSpec::parse(
+                    fmt::format("{}:chains={},groups={}", name, i == 0 ? 24 : 48, i == 0 ? 2 : 16));
+                settings.seed = 2 * run + i;
+                settings.threads = 1;
+                settings.spp = i == 0 ? 64 : 16;
+                Renderer renderer(scene, settings);
+                renderer.run([](const Progress&) {}, std::atomic<bool>{false});
+                const auto means = tile_means(renderer.film().image(), scene.film(), 4);
+                for (size_t k = 0; k < means.size(); ++k) tiles[i].values[k].add(means[k]);
+            }
+        expect_same_image(tiles[0], tiles[1], 0.1, name);
+    }
+}
+
+}  // namespace
+}  // namespace etendue::test
