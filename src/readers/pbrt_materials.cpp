@@ -247,6 +247,14 @@ int make_conductor(PbrtScene& scene, const PbrtArguments& args) {
     return reflecting(scene, args, add_metal(scene, args, r, r.is_mirror()));
 }
 
+/// There is no model of a coated metal.
+int make_coatedconductor(PbrtScene& scene, const PbrtArguments& args) {
+    scene.refuse(args.where(), fmt::format("the material {} is not supported", quote(args.name())),
+                 "the metal without its coat");
+    const PbrtRoughness r = read_roughness(scene, args, 0, "conductor.");
+    return reflecting(scene, args, add_metal(scene, args, r, r.is_mirror(), "conductor."));
+}
+
 int make_dielectric(PbrtScene& scene, const PbrtArguments& args) {
     const PbrtRoughness r = read_roughness(scene, args, 0);
     const float eta = read_eta(scene, args, "eta", 1.5f);
@@ -511,7 +519,23 @@ std::vector<PbrtEntry> make_entries() {
                                     {"scale", ParamKind::Float, "1", "Factor of both."}} +
              maps(),
          make_diffusetransmission},
-        {"coatedconductor", kV4, "Rejected: there is no model of a coated metal.", {}, nullptr},
+        {"coatedconductor", kV4,
+         "Rejected: there is no model of a coated metal. --lenient takes the metal without its "
+         "coat.",
+         std::vector<PbrtParamInfo>{
+             texture("conductor.eta", "copper", "Real part of the metal's index of refraction."),
+             texture("conductor.k", "copper", "Imaginary part of it."),
+             texture("reflectance", "", "Instead of both: reflectance at normal incidence."),
+             texture("conductor.roughness", "0", "Roughness of the metal."),
+             texture("conductor.uroughness", "conductor.roughness", "Along the first tangent."),
+             texture("conductor.vroughness", "conductor.roughness", "Along the second tangent."),
+             texture("interface.roughness", "0", "Roughness of the coat."),
+             texture("interface.uroughness", "interface.roughness", "Along the first tangent."),
+             texture("interface.vroughness", "interface.roughness", "Along the second tangent."),
+             texture("interface.eta", "1.5", "Index of refraction of the coat."),
+             {"remaproughness", ParamKind::Bool, "true", "As that of other materials."}} +
+             coat + maps(),
+         make_coatedconductor},
         {"measured", kV4, "Rejected: measured BSDFs are not supported.", {}, nullptr},
         {"matte", kV3, "Becomes diffuse.",
          std::vector<PbrtParamInfo>{texture("Kd", "0.5", "Albedo."), sigma} + maps(), make_matte},

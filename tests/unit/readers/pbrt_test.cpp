@@ -547,6 +547,12 @@ TEST(Pbrt, LenientReplacesWhatIsRefused) {
     ASSERT_EQ(scene.warnings.size(), 1u);
     EXPECT_EQ(scene.warnings[0], "s.pbrt:2: Material \"fourier\": measured BSDFs are not "
                                  "supported; a grey diffuse one instead");
+    const auto coated = parse4("Material \"coatedconductor\" \"float conductor.roughness\" 0.04 " +
+                                   std::string(kSphere),
+                               lenient);
+    EXPECT_EQ(material(coated).type, "roughconductor");
+    ASSERT_EQ(coated.warnings.size(), 1u);
+    EXPECT_NE(coated.warnings[0].find("the metal without its coat instead"), std::string::npos);
     const auto curve =
         parse4("Shape \"curve\"\n" + std::string(kSphere) + "Shape \"sphere\" \"float radios\" 2\n",
                lenient);
