@@ -120,7 +120,7 @@ Transform to_world(const SceneDescription& scene) {
 
 TEST(Pbrt, TransformsMultiplyFromTheRight) {
     const auto at = [](const std::string& directives) {
-        return transformed(to_world(parse4(directives + kSphere)), {1, 2, 3});
+        return transformed(to_world(parse4(directives + " " + kSphere)), {1, 2, 3});
     };
     expect_near(at("Translate 1 0 0 Scale 2 2 2"), {3, 4, 6});
     expect_near(at("Rotate 90 0 0 1"), {-2, 1, 3});
@@ -219,7 +219,7 @@ TEST(Pbrt, NormalsOfTessellatedSpheresPointOutward) {
     }
 }
 
-TEST(Pbrt, LoopSubdivisionOfAnOctahedronIsRound) {
+TEST(Pbrt, LoopSubdivisionOfAnOctahedronEndsOnItsLimit) {
     const auto scene =
         parse4("Shape \"loopsubdiv\" \"integer levels\" 3\n"
                "\"point3 P\" [1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1]\n"
@@ -231,8 +231,9 @@ TEST(Pbrt, LoopSubdivisionOfAnOctahedronIsRound) {
         least = std::min(least, length(p));
         most = std::max(most, length(p));
     }
-    EXPECT_GT(least, 0.5f);
-    EXPECT_LT(most / least, 1.1f);
+    // The limit of an original vertex p of valence 4 is p/2 plus an eighth of its neighbours, whose sum is zero.
+    EXPECT_NEAR(most, 0.5f, 1e-5);
+    EXPECT_GT(least, 0.4f);
 }
 
 TEST(Pbrt, BilinearMeshes) {
@@ -261,7 +262,7 @@ TEST(Pbrt, RoughnessIsRemappedByVersion) {
         alpha(parse4("Material \"conductor\" \"float roughness\" 0.04 " + std::string(kSphere))),
         0.2, 1e-6);
     EXPECT_NEAR(alpha(parse3("Material \"metal\" \"float roughness\" 0.1 " + std::string(kSphere))),
-                0.4498, 1e-3);
+                0.46176, 1e-4);
     EXPECT_NEAR(
         alpha(parse4(
             "Material \"conductor\" \"float roughness\" 0.04 \"bool remaproughness\" false " +
