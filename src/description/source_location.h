@@ -13,7 +13,7 @@ struct SourceLocation {
     bool operator==(const SourceLocation&) const = default;
 };
 
-/// The one exception of readers and of the scene builder. what() is "file:line: message".
+/// The exception thrown by readers and the scene builder. what() is "file:line: message".
 class SceneError : public std::runtime_error {
 public:
     SceneError(const SourceLocation& where, const std::string& message);
