@@ -11,6 +11,7 @@
 
 #include "commands.h"
 #include "integrator/integrator.h"
+#include "readers/pbrt.h"
 #include "render/aov.h"
 #include "scene/builder.h"
 #include "scene/settings.h"
@@ -62,6 +63,7 @@ std::vector<Entry> all_entries() {
         p.category = "scene-integrator";
         add(entries, p, fmt::format("In a scene file: rendered by {}.", a.integrator));
     }
+    for (const PluginInfo& p : pbrt_plugins()) add(entries, p, p.doc);
     for (const AovInfo& a : aov_registry()) add(entries, {"aov", a.name, a.doc, {}}, a.doc);
     return entries;
 }

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "readers/mitsuba_xml.h"
+#include "readers/pbrt.h"
 #include "scene/builder.h"
 
 namespace etendue {
@@ -36,7 +37,7 @@ std::vector<int> parse_integers(const std::string& text, char separator, size_t 
 }  // namespace
 
 void SceneOptions::add_to(CLI::App& command) {
-    command.add_option("SCENE", file, "Scene file (.xml)")->required();
+    command.add_option("SCENE", file, "Scene file (.xml, .pbrt)")->required();
     add_reading_options(command);
 }
 
@@ -66,12 +67,18 @@ SceneDescription read_scene(const SceneOptions& options) {
                 fmt::format("-D must have the form name=value, but is \"{}\"", d));
         read.defines[d.substr(0, equals)] = d.substr(equals + 1);
     }
-    const std::string extension = std::filesystem::path(options.file).extension().string();
-    if (extension != ".xml")
-        throw std::runtime_error(
-            fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3)",
-                        options.file, extension));
-    return read_mitsuba_xml(options.file, read);
+    std::filesystem::path path = options.file;
+    if (path.extension() == ".gz") path = path.stem();
+    const std::string extension = path.extension().string();
+    if (extension == ".xml") return read_mitsuba_xml(options.file, read);
+    if (extension == ".pbrt") {
+        if (!read.defines.empty())
+            throw std::runtime_error("-D: scenes of pbrt have no parameters");
+        return read_pbrt(options.file, read);
+    }
+    throw std::runtime_error(fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of "
+                                         "Mitsuba 0.6 and 3; .pbrt, of pbrt-v3 and v4)",
+                                         options.file, extension));
 }
 
 Scene build_scene(const SceneDescription& description, const SceneOptions& options) {

@@ -8,6 +8,9 @@
 #include "bsdf/conductor.h"
 #include "bsdf/dielectric.h"
 #include "bsdf/diffuse.h"
+#include "bsdf/diffusetransmission.h"
+#include "bsdf/fresnelblend.h"
+#include "bsdf/orennayar.h"
 #include "bsdf/phong.h"
 #include "bsdf/plastic.h"
 #include "bsdf/principled.h"
@@ -21,7 +24,8 @@ namespace etendue {
 /// The closed set of lobes; trivially copyable, at most 64 bytes each.
 using Lobe =
     std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, DielectricLobe, ThinDielectricLobe,
-                 RoughDielectricLobe, PlasticLobe, RoughPlasticLobe, PhongLobe, PrincipledLobe>;
+                 RoughDielectricLobe, PlasticLobe, RoughPlasticLobe, PhongLobe, PrincipledLobe,
+                 OrenNayarLobe, FresnelBlendLobe, DiffuseTransmissionLobe>;
 
 /// One lobe in its shading frame; a mixture is a list of them whose weights sum to one.
 struct BsdfComponent {

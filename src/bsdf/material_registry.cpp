@@ -10,6 +10,10 @@ MaterialEntry thindielectric_entry();
 MaterialEntry roughdielectric_entry();
 MaterialEntry plastic_entry();
 MaterialEntry roughplastic_entry();
+MaterialEntry orennayar_entry();
+MaterialEntry fresnelblend_entry();
+MaterialEntry lobesum_entry();
+MaterialEntry diffusetransmission_entry();
 MaterialEntry phong_entry();
 MaterialEntry principled_entry();
 MaterialEntry twosided_entry();
@@ -21,10 +25,16 @@ MaterialEntry null_entry();
 
 const std::vector<MaterialEntry>& material_registry() {
     static const std::vector<MaterialEntry> entries = {
-        diffuse_entry(),   conductor_entry(),      roughconductor_entry(),  dielectric_entry(),
-        plastic_entry(),   thindielectric_entry(), roughdielectric_entry(), roughplastic_entry(),
-        phong_entry(),     principled_entry(),     twosided_entry(),        mask_entry(),
-        blendbsdf_entry(), bumpmap_entry(),        normalmap_entry(),       null_entry(),
+        diffuse_entry(),         conductor_entry(),
+        roughconductor_entry(),  dielectric_entry(),
+        plastic_entry(),         thindielectric_entry(),
+        roughdielectric_entry(), roughplastic_entry(),
+        phong_entry(),           principled_entry(),
+        orennayar_entry(),       fresnelblend_entry(),
+        lobesum_entry(),         diffusetransmission_entry(),
+        twosided_entry(),        mask_entry(),
+        blendbsdf_entry(),       bumpmap_entry(),
+        normalmap_entry(),       null_entry(),
     };
     return entries;
 }

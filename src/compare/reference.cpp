@@ -48,6 +48,12 @@ private:
     }
 };
 
+template <class T>
+void add_array(ContentHash& hash, const std::vector<T>& values) {
+    hash.add(
+        std::string_view(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)));
+}
+
 /// Adds the contents of the file `name` in the scene's search paths, if there is one.
 void add_file(ContentHash& hash, const SceneDescription& description, const std::string& name) {
     if (name.empty()) return;
@@ -209,6 +215,12 @@ uint64_t scene_fingerprint(const SceneDescription& description) {
         }
         for (const SceneObject::Child& c : object.children)
             hash.add(c.name).add(uint64_t(c.object));
+    }
+    for (const MeshData& mesh : description.meshes) {
+        add_array(hash, mesh.positions);
+        add_array(hash, mesh.normals);
+        add_array(hash, mesh.uvs);
+        add_array(hash, mesh.triangles);
     }
     return hash.value();
 }

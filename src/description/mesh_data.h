@@ -1,12 +1,12 @@
 #pragma once
-// Triangle meshes as the readers of mesh files return them.
+// Triangle meshes as the readers of mesh and scene files return them.
 
 #include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "description/scene_description.h"
+#include "description/source_location.h"
 #include "math/vec.h"
 
 namespace etendue {

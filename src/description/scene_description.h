@@ -3,35 +3,17 @@
 // it, and only the scene builder interprets it. Names are those of Mitsuba 3 (snake_case), whatever the file's dialect.
 
 #include <cstdint>
-#include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "color/rgb.h"
+#include "description/mesh_data.h"
+#include "description/source_location.h"
 #include "math/transform.h"
 #include "math/vec.h"
 
 namespace etendue {
-
-struct SourceLocation {
-    std::string file;
-    int line = 0;  ///< Counted from 1; 0 where unknown.
-
-    bool operator==(const SourceLocation&) const = default;
-};
-
-/// The exception thrown by readers and the scene builder. what() is "file:line: message".
-class SceneError : public std::runtime_error {
-public:
-    SceneError(const SourceLocation& where, const std::string& message);
-    const SourceLocation& where() const { return where_; }
-    const std::string& message() const { return message_; }
-
-private:
-    SourceLocation where_;
-    std::string message_;
-};
 
 /// Type of a `ParamValue`, in the order of its alternatives.
 enum class ParamType { Bool, Int, Float, String, Vector, Rgb, Transform };
@@ -67,7 +49,8 @@ struct SceneObject {
 struct SceneDescription {
     std::vector<SceneObject> objects;  ///< In any order; the graph of children has no cycles.
     std::vector<int> roots;            ///< The scene's own children, in file order.
-    std::string file;                  ///< The scene file, as given.
+    std::vector<MeshData> meshes;  ///< Meshes that the scene file holds itself; see shape `mesh`.
+    std::string file;              ///< The scene file, as given.
     /// Directories in which relative file names are looked up, in order; the scene file's own comes first.
     std::vector<std::string> search_paths;
     /// What was dropped or replaced under `lenient`, one line each.

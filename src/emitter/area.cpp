@@ -1,6 +1,6 @@
-// Area emitter: radiance L_e(uv) from the front of a shape, the same in all directions. Sampling chooses a primitive
-// with probability proportional to area times mean radiance, a point uniform in area, and a direction with density cos
-// θ / π.
+// Area emitter: radiance L_e(uv) from the front of a shape, or from both sides, the same in all directions. Sampling
+// chooses a primitive with probability proportional to area times mean radiance, a point uniform in area, and a
+// direction with density cos θ / π, or |cos θ| / 2π.
 
 #include "emitter/area.h"
 
@@ -13,7 +13,8 @@ namespace {
 
 class AreaEmitter final : public Emitter {
 public:
-    AreaEmitter(const Shape& shape, TextureRef radiance) : shape_(shape), radiance_(radiance) {
+    AreaEmitter(const Shape& shape, TextureRef radiance, bool two_sided)
+        : shape_(shape), radiance_(radiance), two_sided_(two_sided) {
         const size_t n = shape.primitive_count();
         std::vector<double> weights(n), areas(n);
         double flux = 0;
@@ -40,7 +41,7 @@ public:
             }
             weights[i] = areas[i] * L;
         }
-        power_ = double(kPi) * flux;
+        power_ = double(kPi) * flux * (two_sided ? 2 : 1);
         choice_ = AliasTable(weights);
         pdf_.resize(n);
         for (size_t i = 0; i < n && !choice_.empty(); ++i)
@@ -49,13 +50,15 @@ public:
 
     EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const override {
         const ShapeSample s = sample_point(u_y0);
-        const Vec3 local = sample_cosine_hemisphere(u_d);
-        const Vec3 d = Frame::from_normal(s.ng).to_world(local);
-        return {s.p,  s.ng,  d, radiance_.eval(s.uv), pdf_[s.prim], pdf_cosine_hemisphere(local.z),
+        const Vec3 d = sample_direction(s.ng, u_d);
+        return {s.p,  s.ng,  d, radiance(s.uv), pdf_[s.prim], pdf_direction(emitted_cos(s.ng, d)),
                 s.uv, s.prim};
     }
     Vec3 sample_direction(Vec3 ng, Vec2 u) const override {
-        return Frame::from_normal(ng).to_world(sample_cosine_hemisphere(u));
+        if (!two_sided_) return Frame::from_normal(ng).to_world(sample_cosine_hemisphere(u));
+        const bool front = u.x < 0.5f;
+        u.x = std::min(front ? 2 * u.x : 2 * u.x - 1, kOneMinusEpsilon);
+        return Frame::from_normal(front ? ng : -ng).to_world(sample_cosine_hemisphere(u));
     }
 
     bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const override {
@@ -65,30 +68,42 @@ public:
         if (!(dist2 > 0)) return false;
         const float dist = std::sqrt(dist2);
         const Vec3 wi = v * (1 / dist);
-        const float cos = -dot(s.ng, wi);
+        const float cos = emitted_cos(s.ng, -wi);
         if (!(cos > 0)) return false;
         const float pdf = pdf_[s.prim];
-        out = {s.p, s.ng, wi, dist, radiance_.eval(s.uv), pdf, pdf, cos * kInvPi, s.uv, s.prim};
+        out = {s.p, s.ng, wi, dist, radiance(s.uv), pdf, pdf, pdf_direction(cos), s.uv, s.prim};
         return true;
     }
 
     EmitterHit eval_surface(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const override {
-        const float cos = dot(ng, w);
+        const float cos = emitted_cos(ng, w);
         if (!(cos > 0)) return {};
-        return {radiance_.eval(uv), pdf_[prim], pdf_[prim], cos * kInvPi};
+        return {radiance(uv), pdf_[prim], pdf_[prim], pdf_direction(cos)};
     }
 
     Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const override {
-        const float cos = dot(ng, w);
+        const float cos = emitted_cos(ng, w);
         if (!(cos > 0)) return {Rgb(), 0};
-        return {radiance_.eval(uv) * cos, cos * kInvPi};
+        return {radiance(uv) * cos, pdf_direction(cos)};
     }
 
+    void set_power(double power) {
+        if (!(power_ > 0)) return;
+        factor_ = float(power / power_);
+        power_ = power;
+    }
     double power() const override { return power_; }
     bool is_area() const override { return true; }
     float max_pdf_d() const override { return kInvPi; }
 
 private:
+    /// cos θ of light that leaves along `w`; at most zero where none does.
+    float emitted_cos(Vec3 ng, Vec3 w) const {
+        const float cos = dot(ng, w);
+        return two_sided_ ? std::fabs(cos) : cos;
+    }
+    float pdf_direction(float cos) const { return cos * kInvPi * (two_sided_ ? 0.5f : 1.0f); }
+    Rgb radiance(Vec2 uv) const { return radiance_.eval(uv) * factor_; }
     ShapeSample sample_point(FinePoint u) const {
         const auto choice = choice_.sample(u.x);
         return shape_.sample(choice.index, {to_float(choice.u), to_float(u.y)});
@@ -96,6 +111,8 @@ private:
 
     const Shape& shape_;
     TextureRef radiance_;
+    bool two_sided_;
+    float factor_ = 1;  ///< Of the radiance.
     AliasTable choice_;
     std::vector<float> pdf_;  ///< Area density of points, by primitive.
     double power_;
@@ -103,19 +120,27 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Emitter> make_area_emitter(const Shape& shape, TextureRef radiance) {
-    return std::make_unique<AreaEmitter>(shape, radiance);
+std::unique_ptr<Emitter> make_area_emitter(const Shape& shape, TextureRef radiance, bool two_sided,
+                                           double power) {
+    auto emitter = std::make_unique<AreaEmitter>(shape, radiance, two_sided);
+    if (power > 0) emitter->set_power(power);
+    return emitter;
 }
 
 EmitterEntry area_entry() {
     return {{"emitter",
              "area",
-             "Emission from the front of a shape.",
-             {{"radiance", ParamKind::Texture, "1", "Radiance in W/(m² sr)."}}},
+             "Emission from the front of a shape, or from both sides.",
+             {{"radiance", ParamKind::Texture, "1", "Radiance in W/(m² sr)."},
+              {"power", ParamKind::Float, "that of the radiance",
+               "Emitted power (luminance), to which the radiance is scaled."},
+              {"two_sided", ParamKind::Bool, "false", "Whether the back emits, too."}}},
             [](const Params& p, EmitterContext& c) {
                 if (!c.shape()) p.fail("emitter \"area\" must be nested in a shape");
                 std::vector<std::unique_ptr<Emitter>> made;
-                made.push_back(make_area_emitter(*c.shape(), c.texture(p, "radiance", Rgb(1))));
+                made.push_back(make_area_emitter(*c.shape(), c.texture(p, "radiance", Rgb(1)),
+                                                 p.flag("two_sided", false),
+                                                 p.number("power", 0, 0)));
                 return made;
             }};
 }

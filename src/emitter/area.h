@@ -4,7 +4,8 @@
 
 namespace etendue {
 
-std::unique_ptr<Emitter> make_area_emitter(const Shape& shape, TextureRef radiance);
+std::unique_ptr<Emitter> make_area_emitter(const Shape& shape, TextureRef radiance,
+                                           bool two_sided = false, double power = 0);
 EmitterEntry area_entry();
 
 }  // namespace etendue

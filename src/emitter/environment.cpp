@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "description/resolve_file.h"
 #include "image/image_io.h"
 #include "math/distribution.h"
@@ -128,10 +130,14 @@ std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb
 EmitterEntry envmap_entry() {
     return {{"emitter",
              "envmap",
-             "Environment map given as a latitude-longitude image; importance-sampled.",
+             "Environment map given as an image; importance-sampled.",
              {{"filename", ParamKind::String, "",
-               "Latitude-longitude image of any supported format; its upper edge is the zenith."},
+               "Image of any supported format; the upper edge of a latitude-longitude image is the "
+               "zenith."},
               {"scale", ParamKind::Float, "1", "Factor on the radiance."},
+              {"tint", ParamKind::Rgb, "1", "Factor on the radiance, by colour."},
+              {"projection", ParamKind::String, "latlong",
+               "latlong, or equalarea: a square image in pbrt-v4's octahedral projection, +z up."},
               {"to_world", ParamKind::Transform, "identity",
                "Rotation of the environment; its own up direction is +y."},
               {"mis_compensation", ParamKind::Bool, "false", "Accepted; without effect."}}},
@@ -143,7 +149,7 @@ EmitterEntry envmap_entry() {
                 } catch (const std::exception& e) {
                     p.fail("filename", e.what());
                 }
-                const float scale = p.number("scale", 1, 0);
+                const Rgb scale = p.rgb("tint", Rgb(1)) * p.number("scale", 1, 0);
                 for (Rgb& c : image.pixels) {
                     c *= scale;
                     if (!is_finite(c) || std::min({c.r, c.g, c.b}) < 0)
@@ -151,8 +157,17 @@ EmitterEntry envmap_entry() {
                                "image \"" + path + "\" has a pixel that is negative or not finite");
                 }
                 std::vector<std::unique_ptr<Emitter>> made;
-                made.push_back(make_environment(image.width, image.height, std::move(image.pixels),
-                                                p.transform("to_world")));
+                const Transform to_world = p.transform("to_world");
+                const bool equal_area = p.choice("projection", {"latlong", "equalarea"}, 0) == 1;
+                if (equal_area && image.width != image.height)
+                    p.fail("filename",
+                           fmt::format("{}: an image in the equal-area projection is square, "
+                                       "but this one has {} x {} pixels",
+                                       path, image.width, image.height));
+                made.push_back(equal_area ? make_equal_area_environment(
+                                                image.width, std::move(image.pixels), to_world)
+                                          : make_environment(image.width, image.height,
+                                                             std::move(image.pixels), to_world));
                 return made;
             }};
 }

@@ -12,4 +12,12 @@ namespace etendue {
 std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb> pixels,
                                           const Transform& to_world);
 
+/// The same as a square image of `size`² pixels in the equal-area octahedral projection of pbrt-v4 [Clarberg 2008]; each
+/// pixel is a region of one radiance.
+std::unique_ptr<Emitter> make_equal_area_environment(int size, std::vector<Rgb> pixels,
+                                                     const Transform& to_world);
+/// Direction at a point of the unit square in that projection, and back.
+Vec3 equal_area_direction(Vec2 square);
+Vec2 equal_area_square(Vec3 direction);
+
 }  // namespace etendue

@@ -1,5 +1,5 @@
 // Emitters at a point: `point`, with the same intensity in all directions, and `spot`, a cone whose intensity decreases
-// linearly with the angle between beam width and cut-off. y_0 is discrete, and G has no cosine there.
+// between beam width and cut-off. y_0 is discrete, and G has no cosine there.
 
 #include "emitter/point.h"
 
@@ -46,10 +46,15 @@ protected:
     Rgb intensity_;
 };
 
+/// Intensity between cut-off and beam: linear in the angle (Mitsuba); or of x, the cosine's way from the one to the
+/// other, x²(3 − 2x) (pbrt-v4) or x⁴ (pbrt-v3).
+enum class Falloff { Angle, Smooth, Quartic };
+
 class SpotEmitter final : public PointEmitter {
 public:
-    SpotEmitter(Vec3 p, Vec3 axis, Rgb intensity, float cutoff_degrees, float beam_degrees)
-        : PointEmitter(p, intensity), frame_(Frame::from_normal(axis)),
+    SpotEmitter(Vec3 p, Vec3 axis, Rgb intensity, float cutoff_degrees, float beam_degrees,
+                Falloff falloff)
+        : PointEmitter(p, intensity), falloff_(falloff), frame_(Frame::from_normal(axis)),
           cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
           cos_cutoff_(std::cos(cutoff_)), cos_beam_(std::cos(beam_)) {}
 
@@ -58,8 +63,9 @@ public:
     }
     float max_pdf_d() const override { return pdf_uniform_cone(cos_cutoff_); }
     double power() const override {
+        const double share = falloff_ == Falloff::Quartic ? 0.2 : 0.5;  // of the ring, on average
         return 2 * double(kPi) * luminance(intensity_) *
-               (1 - 0.5 * (double(cos_cutoff_) + cos_beam_));
+               ((1 - double(cos_beam_)) + share * (double(cos_beam_) - cos_cutoff_));
     }
 
 private:
@@ -67,12 +73,18 @@ private:
         const float c = dot(d, frame_.n);
         if (c <= cos_cutoff_) return Rgb();
         if (c >= cos_beam_) return intensity_;
-        return intensity_ * ((cutoff_ - std::acos(c)) / (cutoff_ - beam_));
+        const float x = (c - cos_cutoff_) / (cos_beam_ - cos_cutoff_);
+        switch (falloff_) {
+        case Falloff::Smooth: return intensity_ * (sqr(x) * (3 - 2 * x));
+        case Falloff::Quartic: return intensity_ * sqr(sqr(x));
+        default: return intensity_ * ((cutoff_ - std::acos(c)) / (cutoff_ - beam_));
+        }
     }
     float pdf_direction(Vec3 d) const override {
         return dot(d, frame_.n) > cos_cutoff_ ? pdf_uniform_cone(cos_cutoff_) : 0.0f;
     }
 
+    Falloff falloff_;
     Frame frame_;
     float cutoff_, beam_, cos_cutoff_, cos_beam_;
 };
@@ -111,6 +123,9 @@ EmitterEntry spot_entry() {
                "Half-angle in degrees beyond which nothing is emitted."},
               {"beam_width", ParamKind::Float, "3/4 of cutoff_angle",
                "Half-angle in degrees up to which the intensity is full."},
+              {"falloff", ParamKind::String, "angle",
+               "Decrease from beam_width to cutoff_angle: angle (linear in it), or, of the cosine, "
+               "smooth (x² (3 - 2x), pbrt-v4) or quartic (x⁴, pbrt-v3)."},
               {"to_world", ParamKind::Transform, "identity",
                "Its origin is the light's position, and its +z axis is that of the beam."}}},
             [](const Params& p, EmitterContext&) {
@@ -119,9 +134,9 @@ EmitterEntry spot_entry() {
                 const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
                 if (beam > cutoff)
                     p.fail("beam_width", "\"beam_width\" must not exceed \"cutoff_angle\"");
-                return one(std::make_unique<SpotEmitter>(t.point({0, 0, 0}),
-                                                         normalize(t.vector({0, 0, 1})),
-                                                         p.rgb("intensity", Rgb(1)), cutoff, beam));
+                return one(std::make_unique<SpotEmitter>(
+                    t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})), p.rgb("intensity", Rgb(1)),
+                    cutoff, beam, Falloff(p.choice("falloff", {"angle", "smooth", "quartic"}, 0))));
             }};
 }
 

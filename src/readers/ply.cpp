@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "readers/file_bytes.h"
+#include "readers/gzip.h"
 #include "readers/text_cursor.h"
 
 namespace etendue {
@@ -391,7 +392,8 @@ MeshData parse_ply(std::string_view bytes, const std::string& name, const MeshOp
 }
 
 MeshData read_ply(const std::string& path, const MeshOptions& options) {
-    return parse_ply(read_file_bytes(path), path, options);
+    const std::string bytes = read_file_bytes(path);
+    return parse_ply(is_gzip(bytes) ? unpack_gzip(bytes, path) : bytes, path, options);
 }
 
 }  // namespace etendue

@@ -97,6 +97,7 @@ const std::vector<IntegratorAlias>& integrator_aliases() {
         for (const char* name : {"ptracer", "light"})
             all.push_back({{"integrator", name, "Light tracing.", params}, "light"});
         all.push_back({{"integrator", "bdpt", "Bidirectional path tracing.", params}, "bdpt"});
+        all.push_back({{"integrator", "sppm", "Photon mapping.", params}, "sppm"});
         return all;
     }();
     return entries;

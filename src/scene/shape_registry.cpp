@@ -29,10 +29,20 @@ std::vector<ParamInfo> with_common(std::vector<ParamInfo> params) {
     return params;
 }
 
+// What formats need whose meshes without vertex normals are flat.
+constexpr ParamInfo kComputeNormals = {
+    "compute_normals", ParamKind::Bool, "true",
+    "A mesh without vertex normals gets smooth ones; else it is flat, and a to_world that mirrors "
+    "does not turn its faces around."};
+constexpr ParamInfo kFlipFlatNormals = {"flip_flat_normals", ParamKind::Bool, "false",
+                                        "Turns a mesh that is flat inside out."};
+
 std::vector<ParamInfo> mesh_params(const char* flip) {
     return with_common(
         {{"filename", ParamKind::String, "", "Mesh file."},
          {"face_normals", ParamKind::Bool, "false", "Flat shading: vertex normals are ignored."},
+         kComputeNormals,
+         kFlipFlatNormals,
          {"flip_tex_coords", ParamKind::Bool, flip, "Replaces v by 1 - v."},
          {"collapse", ParamKind::Bool, "false", "Accepted; a file is always a single shape."},
          {"shape_index", ParamKind::Int, "0", "Index of the mesh in a .serialized file."},
@@ -47,17 +57,20 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
                          params.text("filename", data.name), data.dropped_degenerate,
                          data.dropped_degenerate == 1 ? "" : "s"));
     const Transform t = params.transform("to_world");
-    const bool flat = params.flag("face_normals", false) || data.face_normals;
-    if (flat)
-        data.normals.clear();
-    else if (data.normals.empty())
-        compute_vertex_normals(data);
+    const bool compute_normals = params.flag("compute_normals", true);
+    bool flat = params.flag("face_normals", false) || data.face_normals;
+    bool flip = params.flag("flip_normals", false);
+    if (data.normals.empty() && !flat && compute_normals) compute_vertex_normals(data);
+    if (flat) data.normals.clear();
+    flat = data.normals.empty();
+    if (flat && !compute_normals && t.determinant3() < 0) flip = !flip;
+    if (flat && params.flag("flip_flat_normals", false)) flip = !flip;
     auto mesh = std::make_unique<TriangleMesh>();
     if (!t.is_identity()) {
         for (Vec3& p : data.positions) p = t.point(p);
         for (Vec3& n : data.normals) n = normalize(t.normal(n));
     }
-    if (params.flag("flip_normals", false)) {
+    if (flip) {
         for (Vec3& n : data.normals) n = -n;
         if (flat)
             for (auto& tri : data.triangles) std::swap(tri[1], tri[2]);
@@ -81,6 +94,14 @@ std::unique_ptr<Shape> make_file_mesh(const Params& params, const Warn& warn,
     return finish(read(resolve_file(params),
                        {.flip_tex_coords = params.flag("flip_tex_coords", flip_by_default)}),
                   params, warn);
+}
+
+std::unique_ptr<Shape> make_own_mesh(const Params& params, const Warn& warn) {
+    const auto count = int64_t(params.scene().meshes.size());
+    if (!params.has("mesh") || count == 0)
+        params.fail("shape \"mesh\" needs a mesh, which only some formats can hold");
+    return finish(params.scene().meshes[size_t(params.integer("mesh", 0, 0, count - 1))], params,
+                  warn);
 }
 
 struct Corner {
@@ -196,6 +217,13 @@ const std::vector<ShapeEntry>& shape_registry() {
          [](const Params& p, const Warn& w) { return make_file_mesh<read_obj>(p, w, true); }},
         {{"shape", "ply", "PLY mesh, ascii or binary.", mesh_params("false")},
          [](const Params& p, const Warn& w) { return make_file_mesh<read_ply>(p, w, false); }},
+        {{"shape", "mesh", "Triangles that the scene file holds itself.",
+          with_common({{"mesh", ParamKind::Int, "", "Number of the mesh among those of the file."},
+                       {"face_normals", ParamKind::Bool, "false",
+                        "Flat shading: vertex normals are ignored."},
+                       kComputeNormals,
+                       kFlipFlatNormals})},
+         make_own_mesh},
         {{"shape", "serialized", "Compressed mesh of Mitsuba 0.6.", mesh_params("false")},
          [](const Params& p, const Warn& w) {
              return finish(read_serialized(resolve_file(p),

@@ -140,7 +140,8 @@ Transform rigid(const Params& params) {
 
 /// Sets the half extents of the image on the plane z = 1.
 void set_field_of_view(const Params& params, PerspectiveCamera& camera) {
-    const double aspect = double(camera.film.width) / camera.film.height;
+    const double aspect = params.has("aspect") ? double(params.number("aspect", 1, 1e-6f, 1e6f))
+                                               : double(camera.film.width) / camera.film.height;
     double half_width;
     const std::string focal = params.text("focal_length", "");
     if (!params.has("fov")) {
@@ -197,6 +198,8 @@ std::vector<ParamInfo> shared_params(std::vector<ParamInfo> more) {
          "Camera-to-world transform; the camera looks along +z, with +x to the left and +y up."},
         {"fov", ParamKind::Float, "", "Field of view in degrees along fov_axis."},
         {"fov_axis", ParamKind::String, "x", "Axis of fov: x, y, diagonal, smaller or larger."},
+        {"aspect", ParamKind::Float, "that of the film",
+         "Width over height of the view; pixels are not square if it differs from the film's."},
         {"focal_length", ParamKind::String, "50mm",
          "Focal length for a 35 mm film, instead of fov."},
         {"principal_point_offset_x", ParamKind::Float, "0",

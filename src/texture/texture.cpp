@@ -5,6 +5,9 @@ namespace etendue {
 TextureEntry bitmap_entry();
 TextureEntry checkerboard_entry();
 TextureEntry scale_entry();
+TextureEntry mix_entry();
+TextureEntry bilerp_entry();
+TextureEntry roughness_to_alpha_entry();
 
 Vec2 Texture::gradient(Vec2 uv) const {
     int width, height;
@@ -16,7 +19,8 @@ Vec2 Texture::gradient(Vec2 uv) const {
 
 const std::vector<TextureEntry>& texture_registry() {
     static const std::vector<TextureEntry> entries = {bitmap_entry(), checkerboard_entry(),
-                                                      scale_entry()};
+                                                      scale_entry(),  mix_entry(),
+                                                      bilerp_entry(), roughness_to_alpha_entry()};
     return entries;
 }
 

@@ -7,6 +7,7 @@
 
 #include "expect_mesh.h"
 #include "expect_scene_error.h"
+#include "readers/gzip.h"
 #include "shared_scenes.h"
 
 namespace etendue {
@@ -142,6 +143,18 @@ TEST(Ply, SharedScenesLoad) {
         SCOPED_TRACE(file);
         expect_well_formed(read_ply(file));
     }
+}
+
+TEST(Ply, FilesPackedByGzipAreUnpacked) {
+    // "ply" and what follows it as `gzip -9n` packs them.
+    EXPECT_TRUE(is_gzip(std::string_view("\x1f\x8b\x08", 3)));
+    EXPECT_FALSE(is_gzip("ply\n"));
+    const std::string packed("\x1f\x8b\x08\x00\x00\x00\x00\x00\x02\x03\x2b\xc8\xa9\xe4"
+                             "\x02\x00\x65\x66\x9e\x15\x04\x00\x00\x00",
+                             24);
+    EXPECT_EQ(unpack_gzip(packed, "a.ply.gz"), "ply\n");
+    expect_scene_error(0, "damaged or cut short",
+                       [&] { unpack_gzip(packed.substr(0, 12), "a.ply.gz"); });
 }
 
 }  // namespace

@@ -218,5 +218,33 @@ TEST(TextureDefaults, GradientIsByCentralDifferences) {
     EXPECT_NEAR(g.y, 3, 1e-4);
 }
 
+TEST_F(TextureRegistry, MixTakesItsWeightFromTheSecond) {
+    const Texture& mix = build(object(
+        "mix", {{"value0", Rgb(1, 0, 0)}, {"value1", Rgb(0, 1, 0)}, {"weight", Rgb(0.25f)}}));
+    EXPECT_EQ(mix.eval({0.3f, 0.7f}), Rgb(0.75f, 0.25f, 0));
+    EXPECT_EQ(mix.mean(), Rgb(0.75f, 0.25f, 0));
+}
+
+TEST_F(TextureRegistry, BilerpMeetsItsCorners) {
+    const Texture& t = build(object("bilerp", {{"v00", Rgb(1, 0, 0)},
+                                               {"v01", Rgb(0, 1, 0)},
+                                               {"v10", Rgb(0, 0, 1)},
+                                               {"v11", Rgb(1, 1, 1)}}));
+    EXPECT_EQ(t.eval({0, 0}), Rgb(1, 0, 0));
+    EXPECT_EQ(t.eval({0, 1}), Rgb(0, 1, 0));
+    EXPECT_EQ(t.eval({1, 0}), Rgb(0, 0, 1));
+    EXPECT_EQ(t.eval({0.5f, 0.5f}), Rgb(0.5f));
+}
+
+TEST_F(TextureRegistry, RoughnessBecomesAlphaAsInItsVersionOfPbrt) {
+    EXPECT_FLOAT_EQ(
+        build(object("roughness_to_alpha", {{"roughness", Rgb(0.04f)}})).eval_scalar({}), 0.2f);
+    // The polynomial of pbrt-v3 at 0.1.
+    EXPECT_NEAR(build(object("roughness_to_alpha",
+                             {{"roughness", Rgb(0.1f)}, {"curve", std::string("pbrt3")}}))
+                    .eval_scalar({}),
+                0.46176f, 1e-4);
+}
+
 }  // namespace
 }  // namespace etendue

@@ -1,0 +1,113 @@
+// Sum of simple lobes, each with a factor of its own and none that knows of the others: `uber`, `plastic` and
+// `translucent` of pbrt-v3.
+//   diffuse_reflectance (0.25), diffuse_transmittance (0)      diffuse
+//   glossy_reflectance (0.25), glossy_transmittance (0)        microfacets with a dielectric's Fresnel term
+//   specular_reflectance (0), specular_transmittance (0)       the same, smooth
+//   distribution (beckmann), alpha (0.1), or alpha_u, alpha_v  of the microfacets
+//   eta (1.5)                                                  η below the surface over η above
+// Colours or textures. Reflects on both sides. More light than there is may be reflected where the factors say so.
+
+#include "bsdf/ior.h"
+
+namespace etendue {
+namespace {
+
+class LobeSum final : public Material {
+public:
+    LobeSum(const Params& params, MaterialContext& context)
+        : roughness_(params, context), eta_(params.number("eta", 1.5f, 0.01f, 100)),
+          diffuse_(context.texture(params, "diffuse_reflectance", Rgb(0.25f), 1)),
+          diffuse_transmission_(context.texture(params, "diffuse_transmittance", Rgb(0), 1)),
+          glossy_(context.texture(params, "glossy_reflectance", Rgb(0.25f), 1)),
+          glossy_transmission_(context.texture(params, "glossy_transmittance", Rgb(0), 1)),
+          specular_(context.texture(params, "specular_reflectance", Rgb(0), 1)),
+          specular_transmission_(context.texture(params, "specular_transmittance", Rgb(0), 1)) {
+        if (may_have(glossy_transmission_) && eta_ == 1)
+            params.fail("eta", "rough transmission needs an eta other than 1");
+    }
+
+    void append(const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const override {
+        const Vec2 uv = point.uv;
+        const Rgb d = diffuse_.eval(uv), dt = diffuse_transmission_.eval(uv), g = glossy_.eval(uv),
+                  gt = glossy_transmission_.eval(uv), s = specular_.eval(uv),
+                  st = specular_transmission_.eval(uv);
+        // Shares of the samples, by what the lobes reflect at 60°.
+        const float F = fresnel_dielectric(0.5f, eta_).R;
+        const float share_d = d.mean() + dt.mean(), share_g = F * g.mean() + (1 - F) * gt.mean(),
+                    share_s = F * s.mean() + (1 - F) * st.mean();
+        const float sum = share_d + share_g + share_s;
+        if (!(sum > 0)) return;
+        const auto add = [&](const Frame& f, float share, const auto& make_lobe) {
+            if (share > 0) list.add(f, make_lobe(sum / share), weight * share / sum);
+        };
+        // As in a two-sided material, reflection looks the same from behind.
+        const bool is_front = (dot(point.wo, point.ng) < 0) == (dot(frame.n, point.ng) < 0);
+        const Frame reflecting = is_front ? frame : frame.flipped();
+        if (dt.is_zero())
+            add(reflecting, share_d, [&](float k) { return DiffuseLobe{d * k}; });
+        else
+            add(frame, share_d, [&](float k) { return DiffuseTransmissionLobe{d * k, dt * k}; });
+        if (gt.is_zero())
+            add(reflecting, share_g, [&](float k) {
+                return RoughConductorLobe{roughness_.eval(uv), Rgb(eta_), Rgb(0), g * k};
+            });
+        else
+            add(frame, share_g, [&](float k) {
+                return RoughDielectricLobe{roughness_.eval(uv), eta_, g * k, gt * k};
+            });
+        if (st.is_zero())
+            add(reflecting, share_s, [&](float k) {
+                return ConductorLobe{Rgb(eta_), Rgb(0), s * k};
+            });
+        else
+            add(frame, share_s, [&](float k) { return DielectricLobe{eta_, s * k, st * k}; });
+    }
+    bool is_transmissive() const override {
+        return may_have(diffuse_transmission_) || may_have(glossy_transmission_) ||
+               may_have(specular_transmission_);
+    }
+    bool is_two_sided() const override { return true; }
+    bool may_be_smooth() const override {
+        return may_have(diffuse_) || may_have(diffuse_transmission_) || may_have(glossy_) ||
+               may_have(glossy_transmission_);
+    }
+    Rgb mean_albedo() const override {
+        const float F = fresnel_dielectric(1, eta_).R;
+        return diffuse_.mean() + diffuse_transmission_.mean() +
+               (glossy_.mean() + specular_.mean()) * F +
+               (glossy_transmission_.mean() + specular_transmission_.mean()) * (1 - F);
+    }
+
+private:
+    static bool may_have(const TextureRef& t) { return !t.is_constant() || !t.mean().is_zero(); }
+
+    Roughness roughness_;
+    float eta_;
+    TextureRef diffuse_, diffuse_transmission_, glossy_, glossy_transmission_, specular_,
+        specular_transmission_;
+};
+
+}  // namespace
+
+MaterialEntry lobesum_entry() {
+    return {
+        {"bsdf", "lobesum", "Sum of diffuse, glossy and specular lobes with factors of their own.",
+         concat(
+             {{"diffuse_reflectance", ParamKind::Texture, "0.25",
+               "Albedo of the diffuse reflection."},
+              {"diffuse_transmittance", ParamKind::Texture, "0",
+               "Albedo of the diffuse transmission."},
+              {"glossy_reflectance", ParamKind::Texture, "0.25",
+               "Factor of the reflection of rough facets."},
+              {"glossy_transmittance", ParamKind::Texture, "0", "Factor of their transmission."},
+              {"specular_reflectance", ParamKind::Texture, "0", "Factor of the mirror reflection."},
+              {"specular_transmittance", ParamKind::Texture, "0",
+               "Factor of the clear transmission."},
+              {"eta", ParamKind::Float, "1.5",
+               "Index of refraction below the surface over that above."}},
+             roughness_params())},
+        make_material<LobeSum>};
+}
+
+}  // namespace etendue

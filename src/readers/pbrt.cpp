@@ -1,0 +1,71 @@
+#include "readers/pbrt.h"
+
+#include <deque>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "readers/file_bytes.h"
+#include "readers/gzip.h"
+#include "readers/pbrt_reader.h"
+
+namespace etendue {
+namespace {
+
+std::optional<std::string> read_from_disk(const std::string& path) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) return {};
+    return read_file_bytes(path);
+}
+
+}  // namespace
+
+SceneDescription read_pbrt(const std::string& file, const ReadOptions& options) {
+    ReadOptions with_disk = options;
+    if (!with_disk.read_file) with_disk.read_file = read_from_disk;
+    const auto text = with_disk.read_file(file);
+    if (!text) throw SceneError({file, 0}, "cannot read the scene file");
+    return parse_pbrt(is_gzip(*text) ? unpack_gzip(*text, file) : *text, file, with_disk);
+}
+
+SceneDescription parse_pbrt(std::string_view text, const std::string& file,
+                            const ReadOptions& options) {
+    return PbrtReader(file, options).read(text);
+}
+
+const std::vector<PluginInfo>& pbrt_plugins() {
+    static std::deque<std::string> texts;  // of descriptions that begin with a version
+    static const std::vector<PluginInfo> infos = [] {
+        std::vector<PluginInfo> all;
+        const auto with_version = [&](int versions, const char* doc) {
+            if (versions == kV3And4) return doc;
+            return texts.emplace_back(fmt::format("v{}: {}", versions == kV3 ? 3 : 4, doc)).c_str();
+        };
+        const auto add = [&](const char* category, const std::vector<PbrtEntry>& entries) {
+            for (const PbrtEntry& e : entries) {
+                if (!*e.name) continue;
+                PluginInfo info{category, e.name, with_version(e.versions, e.doc), {}};
+                for (const PbrtParamInfo& p : e.params)
+                    info.params.push_back(
+                        {p.name, p.kind, p.fallback,
+                         p.versions == e.versions ? p.doc : with_version(p.versions, p.doc)});
+                all.push_back(std::move(info));
+            }
+        };
+        add("pbrt-shape", pbrt_shapes());
+        add("pbrt-material", pbrt_materials());
+        add("pbrt-texture", pbrt_textures());
+        add("pbrt-light", pbrt_lights());
+        add("pbrt-area-light", pbrt_area_lights());
+        add("pbrt-medium", pbrt_media());
+        add("pbrt-camera", pbrt_cameras());
+        add("pbrt-film", pbrt_films());
+        add("pbrt-filter", pbrt_filters());
+        add("pbrt-sampler", pbrt_samplers());
+        add("pbrt-integrator", pbrt_integrators());
+        return all;
+    }();
+    return infos;
+}
+
+}  // namespace etendue

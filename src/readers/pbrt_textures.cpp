@@ -1,0 +1,228 @@
+// pbrt's textures. Their (u, v) = (0, 0) is the lower left corner of an image, etendue's the upper left one.
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "readers/mitsuba_values.h"
+#include "readers/pbrt_scene.h"
+
+namespace etendue {
+namespace {
+
+bool is_float(const PbrtArguments& args) {
+    return args.kind() == "float Texture";
+}
+
+/// The texture's own map of (u, v).
+Transform mapping(PbrtScene& scene, const PbrtArguments& args) {
+    if (const std::string m = args.text("mapping", "uv"); m != "uv")
+        scene.refuse(
+            args.find("mapping")->where(),
+            fmt::format("the mapping {} is not supported: textures are functions of (u, v)",
+                        quote(m)),
+            "\"uv\"");
+    return Transform::translate({args.number("udelta", 0), args.number("vdelta", 0), 0}) *
+           Transform::scale({args.number("uscale", 1), args.number("vscale", 1), 1});
+}
+
+void set_to_uv(PbrtScene& scene, int texture, const Transform& to_uv) {
+    if (!to_uv.is_identity()) scene.set(texture, "to_uv", to_uv);
+}
+
+void bind(PbrtScene& scene, int texture, const char* to, const PbrtArguments& args,
+          const char* name, float fallback) {
+    if (is_float(args))
+        scene.bind_float(texture, to, args, name, fallback);
+    else
+        scene.bind(texture, to, args, name, Rgb(fallback), PbrtSpectrum::Unbounded);
+}
+
+int make_constant(PbrtScene& scene, const PbrtArguments& args) {
+    const int texture = scene.add("texture", "constant", args.where());
+    bind(scene, texture, "value", args, "value", 1);
+    return texture;
+}
+
+/// Whether an image's codes are linear, not sRGB.
+bool is_raw(PbrtScene& scene, const PbrtArguments& args) {
+    if (scene.is_v3()) {
+        const bool srgb = args.flag("gamma", true);
+        return !srgb;
+    }
+    const std::string encoding = args.text("encoding", "sRGB");
+    if (encoding == "linear") return true;
+    if (encoding != "sRGB" && encoding != "gamma 2.2")
+        scene.refuse(
+            args.find("encoding")->where(),
+            fmt::format("the encoding {} is not supported (known: sRGB, linear)", quote(encoding)),
+            "\"sRGB\"");
+    return false;
+}
+
+int make_imagemap(PbrtScene& scene, const PbrtArguments& args) {
+    const int image = scene.add("texture", "bitmap", args.where());
+    scene.set(image, "filename", args.text("filename", ""));
+    const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1});
+    set_to_uv(scene, image, flip * mapping(scene, args));
+    const std::string wrap = args.text("wrap", "repeat");
+    if (wrap == "black")
+        scene.refuse(args.find("wrap")->where(), "the wrap mode \"black\" is not supported",
+                     "\"clamp\"");
+    else if (wrap != "repeat" && wrap != "clamp")
+        args.fail("wrap",
+                  fmt::format("unknown wrap mode {} (known: repeat, clamp, black)", quote(wrap)));
+    if (wrap != "repeat") scene.set(image, "wrap_mode", std::string("clamp"));
+    if (args.text("filter", "bilinear") == "point")
+        scene.set(image, "filter_type", std::string("nearest"));
+    if (is_raw(scene, args)) scene.set(image, "raw", true);
+    if (args.flag("invert", false))
+        scene.reject(args.find("invert")->where(), "inverted images are not supported");
+    const float scale = args.number("scale", 1);
+    if (scale == 1) return image;
+    const int scaled = scene.add("texture", "scale", args.where());
+    scene.add_child(scaled, "value", image);
+    scene.set(scaled, "scale", Rgb(scale));
+    return scaled;
+}
+
+int make_scale(PbrtScene& scene, const PbrtArguments& args) {
+    const char* names[2] = {scene.is_v3() || args.has("tex1") ? "tex1" : "tex",
+                            scene.is_v3() || args.has("tex2") ? "tex2" : "scale"};
+    const bool floats = is_float(args);
+    const auto constant = [&](const char* name) -> std::optional<Rgb> {
+        if (!floats) return scene.constant(args, name, Rgb(1), PbrtSpectrum::Unbounded);
+        if (const int t = scene.texture(args, name, true);
+            t >= 0 && scene.object(t).type != "constant")
+            return {};
+        return Rgb(*scene.constant(args, name, 1.0f));
+    };
+    const std::optional<Rgb> a = constant(names[0]), b = constant(names[1]);
+    if (a && b) {
+        const int product = scene.add("texture", "constant", args.where());
+        scene.set(product, "value", *a * *b);
+        return product;
+    }
+    const int texture = scene.add("texture", "scale", args.where());
+    // The value of a product is the texture of the two.
+    bind(scene, texture, "value", args, names[a ? 1 : 0], 1);
+    if (floats || !a)
+        bind(scene, texture, "scale", args, names[a ? 0 : 1], 1);
+    else
+        scene.set(texture, "scale", *a);
+    return texture;
+}
+
+int make_mix(PbrtScene& scene, const PbrtArguments& args) {
+    const int texture = scene.add("texture", "mix", args.where());
+    bind(scene, texture, "value0", args, "tex1", 0);
+    bind(scene, texture, "value1", args, "tex2", 1);
+    scene.bind_float(texture, "weight", args, "amount", 0.5f);
+    return texture;
+}
+
+int make_checkerboard(PbrtScene& scene, const PbrtArguments& args) {
+    if (args.integer("dimension", 2, 2, 3) == 3)
+        scene.refuse(
+            args.find("dimension")->where(),
+            "a checkerboard of three dimensions is not supported: textures are functions of (u, v)",
+            "one of two");
+    const int texture = scene.add("texture", "checkerboard", args.where());
+    bind(scene, texture, "color0", args, "tex1", 1);
+    bind(scene, texture, "color1", args, "tex2", 0);
+    // One square to the unit of (u, v), not two.
+    set_to_uv(scene, texture, Transform::scale({0.5f, 0.5f, 1}) * mapping(scene, args));
+    return texture;
+}
+
+int make_bilerp(PbrtScene& scene, const PbrtArguments& args) {
+    const int texture = scene.add("texture", "bilerp", args.where());
+    for (const auto& [name, fallback] :
+         {std::pair("v00", 0.0f), {"v01", 1.0f}, {"v10", 0.0f}, {"v11", 1.0f}})
+        bind(scene, texture, name, args, name, fallback);
+    set_to_uv(scene, texture, mapping(scene, args));
+    return texture;
+}
+
+std::vector<PbrtParamInfo> with_mapping(std::vector<PbrtParamInfo> params) {
+    const std::vector<PbrtParamInfo> more = {
+        {"mapping", ParamKind::String, "uv", "Others than uv are rejected."},
+        {"uscale", ParamKind::Float, "1", "Factor of u."},
+        {"vscale", ParamKind::Float, "1", "Factor of v."},
+        {"udelta", ParamKind::Float, "0", "Added to u."},
+        {"vdelta", ParamKind::Float, "0", "Added to v."},
+        {"v1", ParamKind::Vector, "", "Of rejected mappings."},
+        {"v2", ParamKind::Vector, "", "Of rejected mappings."}};
+    params.insert(params.end(), more.begin(), more.end());
+    return params;
+}
+
+constexpr const char* kOfSpace =
+    "Rejected: textures are functions of (u, v), this one is of space.";
+
+}  // namespace
+
+const std::vector<PbrtEntry>& pbrt_textures() {
+    static const std::vector<PbrtEntry> entries = {
+        {"imagemap", kV3And4, "Becomes bitmap, turned upside down.",
+         with_mapping(
+             {{"filename", ParamKind::String, "", "Image."},
+              {"wrap", ParamKind::String, "repeat", "repeat or clamp; black is rejected."},
+              {"scale", ParamKind::Float, "1", "Factor of the values."},
+              {"gamma", ParamKind::Bool, "true", "Whether 8-bit codes are sRGB.", kV3},
+              {"trilinear", ParamKind::Bool, "", "Accepted; images are filtered bilinearly.", kV3},
+              {"encoding", ParamKind::String, "sRGB", "sRGB or linear.", kV4},
+              {"filter", ParamKind::String, "bilinear",
+               "point is nearest; all others are bilinear.", kV4},
+              {"maxanisotropy", ParamKind::Float, "", "Accepted; without effect."},
+              {"invert", ParamKind::Bool, "false", "Rejected unless false.", kV4}}),
+         make_imagemap},
+        {"constant",
+         kV3And4,
+         "Becomes the value.",
+         {{"value", ParamKind::Texture, "1", "The value."}},
+         make_constant},
+        {"scale",
+         kV3And4,
+         "Becomes scale.",
+         {{"tex", ParamKind::Texture, "1", "One factor.", kV4},
+          {"scale", ParamKind::Texture, "1", "The other one.", kV4},
+          {"tex1", ParamKind::Texture, "1", "One factor."},
+          {"tex2", ParamKind::Texture, "1", "The other one."}},
+         make_scale},
+        {"mix",
+         kV3And4,
+         "Becomes mix.",
+         {{"tex1", ParamKind::Texture, "0", "Where amount is 0."},
+          {"tex2", ParamKind::Texture, "1", "Where amount is 1."},
+          {"amount", ParamKind::Texture, "0.5", "Share of tex2."}},
+         make_mix},
+        {"checkerboard", kV3And4, "Becomes checkerboard.",
+         with_mapping({{"tex1", ParamKind::Texture, "1", "The squares of the diagonal."},
+                       {"tex2", ParamKind::Texture, "0", "The others."},
+                       {"dimension", ParamKind::Int, "2", "3 is rejected."},
+                       {"aamode", ParamKind::String, "", "Accepted; without effect.", kV3}}),
+         make_checkerboard},
+        {"bilerp", kV3And4, "Becomes bilerp.",
+         with_mapping({{"v00", ParamKind::Texture, "0", "Value at (0, 0)."},
+                       {"v01", ParamKind::Texture, "1", "At (0, 1)."},
+                       {"v10", ParamKind::Texture, "0", "At (1, 0)."},
+                       {"v11", ParamKind::Texture, "1", "At (1, 1)."}}),
+         make_bilerp},
+        {"dots", kV3And4, "Rejected: there is no such texture.", {}, nullptr},
+        {"uv", kV3, "Rejected: there is no such texture.", {}, nullptr},
+        {"directionmix",
+         kV4,
+         "Rejected: textures are functions of (u, v), this one is of the normal.",
+         {},
+         nullptr},
+        {"ptex", kV3And4, "Rejected: Ptex files are not supported.", {}, nullptr},
+        {"fbm", kV3And4, kOfSpace, {}, nullptr},
+        {"wrinkled", kV3And4, kOfSpace, {}, nullptr},
+        {"windy", kV3And4, kOfSpace, {}, nullptr},
+        {"marble", kV3And4, kOfSpace, {}, nullptr},
+    };
+    return entries;
+}
+
+}  // namespace etendue

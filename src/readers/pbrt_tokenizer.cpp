@@ -1,0 +1,78 @@
+#include "readers/pbrt_tokenizer.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "readers/mitsuba_values.h"
+
+namespace etendue {
+
+std::string_view PbrtTokenizer::word() {
+    skip_blanks();
+    const char* begin = at_;
+    while (!ends_word(at_)) ++at_;
+    return {begin, size_t(at_ - begin)};
+}
+
+std::string_view PbrtTokenizer::string() {
+    if (!skip('"')) fail(fmt::format("expected a string in quotes, found {}", quote(word())));
+    const char* begin = at_;
+    const int first_line = line_;
+    for (; at_ != end_ && *at_ != '"'; ++at_) {
+        if (*at_ == '\\' && at_ + 1 != end_) ++at_;
+        if (*at_ == '\n') ++line_;
+    }
+    if (at_ == end_) {
+        line_ = first_line;
+        fail("a string begins here that has no closing quote");
+    }
+    return {begin, size_t(at_++ - begin)};
+}
+
+void PbrtTokenizer::skip_comment() {
+    at_ = std::find(at_, end_, '\n');
+    if (at_ != end_) ++line_;
+}
+
+bool PbrtTokenizer::ends_word(const char* at) const {
+    return at == end_ || *at == ' ' || *at == '\n' || *at == '\t' || *at == '\r' || *at == ']' ||
+           *at == '[' || *at == '"' || *at == '#';
+}
+
+void PbrtTokenizer::fail_number(const char* expected) {
+    if (at_ == end_) fail(fmt::format("expected {}, but the file ends", expected));
+    if (*at_ == '"')
+        fail(fmt::format("expected {}, found the string {}", expected, quote(string())));
+    if (*at_ == '[' || *at_ == ']') fail(fmt::format("expected {}, found \"{}\"", expected, *at_));
+    fail(fmt::format("expected {}, found {}", expected, quote(word())));
+}
+
+std::string unescape(std::string_view text) {
+    if (text.find('\\') == text.npos) return std::string(text);
+    std::string plain;
+    for (size_t i = 0; i < text.size(); ++i) {
+        if (text[i] != '\\' || i + 1 == text.size()) {
+            plain += text[i];
+            continue;
+        }
+        const char c = text[++i];
+        plain += c == 'n' ? '\n' : c == 't' ? '\t' : c == 'r' ? '\r' : c == 'b' ? '\b' : c;
+    }
+    return plain;
+}
+
+bool ends_with_world_end(std::string_view text) {
+    constexpr std::string_view kWord = "WorldEnd";
+    while (!text.empty()) {
+        const size_t begin = text.rfind('\n') == text.npos ? 0 : text.rfind('\n') + 1;
+        std::string_view line = text.substr(begin);
+        line = line.substr(0, line.find('#'));
+        const size_t last = line.find_last_not_of(" \t\r");
+        if (last != line.npos) return line.substr(0, last + 1).ends_with(kWord);
+        text = text.substr(0, begin > 0 ? begin - 1 : 0);
+    }
+    return false;
+}
+
+}  // namespace etendue

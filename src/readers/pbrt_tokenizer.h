@@ -1,0 +1,80 @@
+#pragma once
+// The text of a pbrt file: words, strings, numbers and brackets between blanks and comments.
+
+#include <charconv>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "description/source_location.h"
+
+namespace etendue {
+
+class PbrtTokenizer {
+public:
+    PbrtTokenizer(std::string_view text, const std::string& file)
+        : at_(text.data()), end_(text.data() + text.size()), file_(&file) {}
+
+    /// The character that the next token begins with; 0 at the end of the text.
+    char peek() {
+        skip_blanks();
+        return at_ == end_ ? '\0' : *at_;
+    }
+    /// Whether the next token is this bracket, which is then passed over.
+    bool skip(char bracket) {
+        if (peek() != bracket) return false;
+        ++at_;
+        return true;
+    }
+    /// The characters up to the next blank, quote, bracket or comment.
+    std::string_view word();
+    /// What stands between the next two quotes, escapes as they are.
+    std::string_view string();
+    /// A finite number.
+    template <class T>
+    T number(const char* expected) {
+        skip_blanks();
+        const char* begin = at_ != end_ && *at_ == '+' ? at_ + 1 : at_;
+        T value{};
+        const auto [stop, error] = std::from_chars(begin, end_, value);
+        if (error != std::errc() || !ends_word(stop) || !is_finite(value)) fail_number(expected);
+        at_ = stop;
+        return value;
+    }
+
+    const std::string& file() const { return *file_; }
+    int line() const { return line_; }
+    SourceLocation where() const { return {*file_, line_}; }
+    [[noreturn]] void fail(const std::string& message) const { throw SceneError(where(), message); }
+
+private:
+    void skip_blanks() {
+        for (; at_ != end_; ++at_) {
+            if (*at_ == '\n')
+                ++line_;
+            else if (*at_ == '#')
+                skip_comment();
+            else if (*at_ != ' ' && *at_ != '\t' && *at_ != '\r')
+                return;
+            if (at_ == end_) return;
+        }
+    }
+    void skip_comment();
+    bool ends_word(const char* at) const;
+    template <class T>
+    static bool is_finite(T value) {
+        return value - value == 0;
+    }
+    [[noreturn]] void fail_number(const char* expected);
+
+    const char *at_, *end_;
+    const std::string* file_;
+    int line_ = 1;
+};
+
+/// `text` with its escapes (\n, \t, \", \\ ...) replaced.
+std::string unescape(std::string_view text);
+/// Whether the last word of a pbrt file is WorldEnd, which only pbrt-v3 has.
+bool ends_with_world_end(std::string_view text);
+
+}  // namespace etendue

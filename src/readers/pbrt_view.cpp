@@ -1,0 +1,413 @@
+// pbrt's cameras, films, filters, samplers and integrators: what is seen and how it is rendered.
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "readers/pbrt_scene.h"
+
+namespace etendue {
+namespace {
+
+// ---- Cameras
+
+/// Edges of the view on pbrt's screen: x to the right, y up.
+struct ScreenWindow {
+    double x0, x1, y0, y1;
+    bool is_given;
+
+    double aspect() const { return (x1 - x0) / (y1 - y0); }
+};
+
+ScreenWindow screen_window(const PbrtScene& scene, const PbrtArguments& args) {
+    const bool has_frame = args.has("frameaspectratio");
+    const double frame = has_frame ? double(args.number("frameaspectratio", 1, 1e-6f))
+                                   : double(scene.film_width) / scene.film_height;
+    if (const auto& w = args.numbers("screenwindow", 4); !w.empty()) {
+        if (w.size() != 4 || !(w[0] < w[1] && w[2] < w[3]))
+            args.fail("screenwindow", "expected four numbers: left, right, bottom, top");
+        return {w[0], w[1], w[2], w[3], true};
+    }
+    // The shorter side of the image spans [-1, 1].
+    const double x = std::max(frame, 1.0), y = x / frame;
+    return {-x, x, -y, y, has_frame};
+}
+
+/// The shutter's time is the exposure, as nothing moves; in pbrt-v3 it is without effect.
+void read_shutter(PbrtScene& scene, const PbrtArguments& args) {
+    const float time = args.number("shutterclose", 1) - args.number("shutteropen", 0);
+    if (scene.is_v3()) return;
+    if (!(time > 0)) args.fail("shutterclose", "the shutter must close after it opens");
+    scene.exposure *= time;
+}
+
+/// pbrt's camera looks along +z with x to the right, etendue's with x to the left.
+Transform to_world(const PbrtScene& scene) {
+    return scene.camera_to_world * Transform::scale({-1, 1, 1});
+}
+
+double degrees(double radians) {
+    return radians * 180 / double(kPi);
+}
+
+int make_perspective(PbrtScene& scene, const PbrtArguments& args) {
+    read_shutter(scene, args);
+    const float lens = args.number("lensradius", 0, 0);
+    const int sensor = scene.add("sensor", lens > 0 ? "thinlens" : "perspective", args.where());
+    scene.set(sensor, "to_world", to_world(scene));
+    const double fov = args.has("halffov") ? 2 * double(args.number("halffov", 45, 1e-3f, 89.9f))
+                                           : double(args.number("fov", 90, 1e-3f, 179.8f));
+    const ScreenWindow w = screen_window(scene, args);
+    if (!w.is_given) {
+        scene.set(sensor, "fov", fov);
+        scene.set(sensor, "fov_axis", std::string("smaller"));
+    } else {
+        const double half = std::tan(fov * double(kPi) / 360) * (w.x1 - w.x0) / 2;
+        scene.set(sensor, "fov", degrees(2 * std::atan(half)));
+        scene.set(sensor, "aspect", w.aspect());
+        scene.set(sensor, "principal_point_offset_x", (w.x0 + w.x1) / (2 * (w.x1 - w.x0)));
+        scene.set(sensor, "principal_point_offset_y", -(w.y0 + w.y1) / (2 * (w.y1 - w.y0)));
+    }
+    if (lens > 0) {
+        // Lengths are those of camera space.
+        const double unit = double(length(scene.camera_to_world.vector({0, 0, 1})));
+        scene.set(sensor, "aperture_radius", lens * unit);
+        scene.set(sensor, "focus_distance",
+                  double(args.number("focaldistance", 1e6f, 1e-6f)) * unit);
+    }
+    return sensor;
+}
+
+int make_orthographic(PbrtScene& scene, const PbrtArguments& args) {
+    read_shutter(scene, args);
+    if (args.number("lensradius", 0, 0) > 0)
+        scene.reject(args.find("lensradius")->where(),
+                     "an orthographic camera with a lens is not supported");
+    const int sensor = scene.add("sensor", "orthographic", args.where());
+    const ScreenWindow w = screen_window(scene, args);
+    const double film = double(scene.film_width) / scene.film_height;
+    scene.set(
+        sensor, "to_world",
+        scene.camera_to_world *
+            Transform::translate({float((w.x0 + w.x1) / 2), float((w.y0 + w.y1) / 2), 0}) *
+            Transform::scale({float(-(w.x1 - w.x0) / 2), float(film * (w.y1 - w.y0) / 2), 1}));
+    return sensor;
+}
+
+// ---- Films
+
+/// Half-open ranges of pixels that a film renders.
+void read_crop(const PbrtArguments& args, int width, int height, int (&crop)[4]) {
+    crop[0] = 0, crop[1] = width, crop[2] = 0, crop[3] = height;
+    if (const auto& b = args.integers("pixelbounds"); !b.empty()) {
+        if (b.size() != 4) args.fail("pixelbounds", "expected four integers: x0, x1, y0, y1");
+        for (int i = 0; i < 4; ++i) crop[i] = std::clamp(b[size_t(i)], 0, i < 2 ? width : height);
+    }
+    if (const auto& w = args.numbers("cropwindow", 4); !w.empty()) {
+        if (w.size() != 4) args.fail("cropwindow", "expected four numbers: x0, x1, y0, y1");
+        for (int i = 0; i < 4; ++i) {
+            const int size = i < 2 ? width : height;
+            crop[i] = int(std::ceil(float(size) * clamp(w[size_t(i)], 0, 1)));
+        }
+    }
+    if (crop[0] >= crop[1] || crop[2] >= crop[3]) args.fail("the film's crop has no pixels");
+}
+
+int make_film(PbrtScene& scene, const PbrtArguments& args) {
+    constexpr int kMost = 1 << 16;
+    scene.film_width = args.integer("xresolution", scene.is_v3() ? 640 : 1280, 1, kMost);
+    scene.film_height = args.integer("yresolution", scene.is_v3() ? 480 : 720, 1, kMost);
+    int crop[4];
+    read_crop(args, scene.film_width, scene.film_height, crop);
+    if (scene.is_v3()) {
+        scene.exposure *= args.number("scale", 1, 0);
+    } else {
+        scene.exposure *= args.number("iso", 100, 0) / 100;
+        if (const std::string sensor = args.text("sensor", "cie1931"); sensor != "cie1931")
+            scene.refuse(args.find("sensor")->where(),
+                         fmt::format("the measured sensor \"{}\" is not supported", sensor),
+                         "\"cie1931\"");
+        if (args.number("whitebalance", 0, 0) != 0)
+            scene.reject(args.find("whitebalance")->where(), "white balance is not supported");
+    }
+    const int film = scene.add("film", "hdrfilm", args.where());
+    scene.set(film, "width", int64_t(scene.film_width));
+    scene.set(film, "height", int64_t(scene.film_height));
+    if (crop[1] - crop[0] < scene.film_width || crop[3] - crop[2] < scene.film_height) {
+        scene.set(film, "crop_offset_x", int64_t(crop[0]));
+        scene.set(film, "crop_offset_y", int64_t(crop[2]));
+        scene.set(film, "crop_width", int64_t(crop[1] - crop[0]));
+        scene.set(film, "crop_height", int64_t(crop[3] - crop[2]));
+    }
+    return film;
+}
+
+// ---- Filters
+
+/// The filter's radius, which must be the same in x and y.
+float radius(const PbrtScene& scene, const PbrtArguments& args, float v3, float v4) {
+    const char* names[2] = {scene.is_v3() ? "xwidth" : "xradius",
+                            scene.is_v3() ? "ywidth" : "yradius"};
+    const float fallback = scene.is_v3() ? v3 : v4;
+    const float x = args.number(names[0], fallback, 0.01f, 16),
+                y = args.number(names[1], fallback, 0.01f, 16);
+    if (x != y) args.fail(names[0], "a filter must be as wide as it is high");
+    return x;
+}
+
+int make_box(PbrtScene& scene, const PbrtArguments& args) {
+    if (radius(scene, args, 0.5f, 0.5f) != 0.5f)
+        scene.refuse(args.where(), "a box filter must have the radius 0.5", "a box of one pixel");
+    return scene.add("rfilter", "box", args.where());
+}
+
+int make_triangle(PbrtScene& scene, const PbrtArguments& args) {
+    const int filter = scene.add("rfilter", "tent", args.where());
+    scene.set(filter, "radius", double(radius(scene, args, 2, 2)));
+    return filter;
+}
+
+int make_gaussian(PbrtScene& scene, const PbrtArguments& args) {
+    radius(scene, args, 2, 1.5f);
+    const float sigma = scene.is_v3() ? std::sqrt(0.5f / args.number("alpha", 2, 0.04f))
+                                      : args.number("sigma", 0.5f, 0.01f, 4);
+    const int filter = scene.add("rfilter", "gaussian", args.where());
+    scene.set(filter, "stddev", double(sigma));
+    return filter;
+}
+
+int make_mitchell(PbrtScene& scene, const PbrtArguments& args) {
+    if (radius(scene, args, 2, 2) != 2)
+        scene.refuse(args.where(), "a Mitchell filter must have the radius 2", "one of radius 2");
+    const int filter = scene.add("rfilter", "mitchell", args.where());
+    scene.set(filter, "b", double(args.number("B", 1 / 3.0f)));
+    scene.set(filter, "c", double(args.number("C", 1 / 3.0f)));
+    return filter;
+}
+
+int make_sinc(PbrtScene& scene, const PbrtArguments& args) {
+    radius(scene, args, 4, 4);
+    const int filter = scene.add("rfilter", "lanczos", args.where());
+    scene.set(filter, "lobes", int64_t(std::lround(args.number("tau", 3, 1, 8))));
+    return filter;
+}
+
+// ---- Samplers and integrators
+
+int make_sampler(PbrtScene& scene, const PbrtArguments& args) {
+    const int sampler = scene.add("sampler", "sobol", args.where());
+    constexpr int kMost = 1 << 30, kMostOnASide = 1 << 14;
+    int count = args.integer("pixelsamples", 16, 1, kMost);
+    if (args.name() == "stratified")
+        count = args.integer("xsamples", 4, 1, kMostOnASide) *
+                args.integer("ysamples", 4, 1, kMostOnASide);
+    scene.set(sampler, "sample_count", int64_t(count));
+    return sampler;
+}
+
+/// pbrt counts scatterings, etendue edges: one more.
+int make_integrator(PbrtScene& scene, const PbrtArguments& args, const char* type) {
+    const int integrator = scene.add("integrator", type, args.where());
+    constexpr int kMost = 1 << 19;
+    scene.set(integrator, "max_depth", int64_t(args.integer("maxdepth", 5, 0, kMost)) + 1);
+    return integrator;
+}
+template <const char* type>
+int make_integrator(PbrtScene& scene, const PbrtArguments& args) {
+    return make_integrator(scene, args, type);
+}
+constexpr char kPath[] = "path", kBdpt[] = "bdpt", kLight[] = "ptracer", kSppm[] = "sppm";
+
+int make_other_integrator(PbrtScene& scene, const PbrtArguments& args) {
+    scene.warn(args.where(),
+               fmt::format("the integrator \"{}\" is not one of etendue's; \"path\" instead",
+                           args.name()));
+    return make_integrator(scene, args, kPath);
+}
+
+// ---- Tables
+
+std::vector<PbrtParamInfo> operator+(std::vector<PbrtParamInfo> a,
+                                     const std::vector<PbrtParamInfo>& b) {
+    a.insert(a.end(), b.begin(), b.end());
+    return a;
+}
+
+std::vector<PbrtParamInfo> camera_params() {
+    return {{"frameaspectratio", ParamKind::Float, "that of the film",
+             "Width over height of the view."},
+            {"screenwindow", ParamKind::Vector, "shorter side [-1, 1]",
+             "Left, right, bottom, top of the view."},
+            {"lensradius", ParamKind::Float, "0", "Radius of the lens; 0: pinhole."},
+            {"focaldistance", ParamKind::Float, "1e6", "Distance of the plane in focus."},
+            {"shutteropen", ParamKind::Float, "0", "Nothing moves; the time is v4's exposure."},
+            {"shutterclose", ParamKind::Float, "1", "As shutteropen."}};
+}
+
+std::vector<PbrtParamInfo> film_params() {
+    return {
+        {"xresolution", ParamKind::Int, "1280 (v3: 640)", "Width in pixels."},
+        {"yresolution", ParamKind::Int, "720 (v3: 480)", "Height in pixels."},
+        {"cropwindow", ParamKind::Vector, "0 1 0 1", "Part that is rendered: x0, x1, y0, y1."},
+        {"pixelbounds", ParamKind::Int, "", "The same in pixels.", kV4},
+        {"filename", ParamKind::String, "", "Accepted; the command line names the output."},
+        {"diagonal", ParamKind::Float, "", "Accepted; only realistic cameras need it."},
+        {"scale", ParamKind::Float, "1", "Factor of the image; here of every light.", kV3},
+        {"maxsampleluminance", ParamKind::Float, "", "Accepted; samples are never clamped.", kV3},
+        {"iso", ParamKind::Float, "100",
+         "Sensitivity: the image is multiplied by iso/100; here every light.", kV4},
+        {"sensor", ParamKind::String, "cie1931", "Others than cie1931 are rejected.", kV4},
+        {"whitebalance", ParamKind::Float, "0", "Rejected unless 0.", kV4},
+        {"maxcomponentvalue", ParamKind::Float, "", "Accepted; samples are never clamped.", kV4},
+        {"savefp16", ParamKind::Bool, "", "Accepted; without effect.", kV4}};
+}
+
+std::vector<PbrtParamInfo> filter_params(const char* v3, const char* v4) {
+    return {{"xwidth", ParamKind::Float, v3, "Radius in pixels.", kV3},
+            {"ywidth", ParamKind::Float, v3, "The same.", kV3},
+            {"xradius", ParamKind::Float, v4, "Radius in pixels.", kV4},
+            {"yradius", ParamKind::Float, v4, "The same.", kV4}};
+}
+
+std::vector<PbrtParamInfo> integrator_params() {
+    std::vector<PbrtParamInfo> all = {
+        {"maxdepth", ParamKind::Int, "5",
+         "Scatterings of the longest path; etendue's max_depth is one more."}};
+    const char* floats[] = {"rrthreshold", "radius", "largestepprobability", "sigma",
+                            "maxdistance"};
+    const char* ints[] = {"pixelbounds",   "photonsperiteration", "iterations",
+                          "numiterations", "imagewritefrequency", "bootstrapsamples",
+                          "chains",        "mutationsperpixel",   "nsamples"};
+    const char* bools[] = {"regularize", "visualizestrategies", "visualizeweights",
+                           "samplebsdf", "samplelights",        "cossample"};
+    const char* strings[] = {"lightsampler", "lightsamplestrategy", "strategy"};
+    constexpr const char* kDoc = "Accepted; without effect.";
+    for (const char* name : floats) all.push_back({name, ParamKind::Float, "", kDoc});
+    for (const char* name : ints) all.push_back({name, ParamKind::Int, "", kDoc});
+    for (const char* name : bools) all.push_back({name, ParamKind::Bool, "", kDoc});
+    for (const char* name : strings) all.push_back({name, ParamKind::String, "", kDoc});
+    return all;
+}
+
+}  // namespace
+
+const std::vector<PbrtEntry>& pbrt_cameras() {
+    static const std::vector<PbrtEntry> entries = {
+        {"perspective", kV3And4, "Becomes perspective, or thinlens where it has a lens.",
+         std::vector<PbrtParamInfo>{
+             {"fov", ParamKind::Float, "90", "Field of view in degrees of the shorter side."},
+             {"halffov", ParamKind::Float, "", "Half of it, instead.", kV3}} +
+             camera_params(),
+         make_perspective},
+        {"orthographic", kV3And4, "Becomes orthographic.", camera_params(), make_orthographic},
+        {"realistic",
+         kV3And4,
+         "Rejected: cameras with systems of lenses are not supported.",
+         {},
+         nullptr},
+        {"spherical", kV4, "Rejected: there is no such sensor.", {}, nullptr},
+        {"environment", kV3, "Rejected: there is no such sensor.", {}, nullptr},
+    };
+    return entries;
+}
+
+const std::vector<PbrtEntry>& pbrt_films() {
+    static const std::vector<PbrtEntry> entries = {
+        {"image", kV3, "Becomes hdrfilm.", film_params(), make_film},
+        {"rgb", kV4, "Becomes hdrfilm.", film_params(), make_film},
+        {"gbuffer", kV4, "Becomes hdrfilm; see --aov for what else it shows.",
+         film_params() + std::vector<PbrtParamInfo>{{"coordinatesystem", ParamKind::String, "",
+                                                     "Accepted; without effect."}},
+         make_film},
+        {"spectral", kV4, "Becomes hdrfilm, in RGB.",
+         film_params() +
+             std::vector<PbrtParamInfo>{
+                 {"nbuckets", ParamKind::Int, "", "Accepted; without effect."},
+                 {"lambdamin", ParamKind::Float, "", "Accepted; without effect."},
+                 {"lambdamax", ParamKind::Float, "", "Accepted; without effect."}},
+         make_film},
+    };
+    return entries;
+}
+
+const std::vector<PbrtEntry>& pbrt_filters() {
+    static const std::vector<PbrtEntry> entries = {
+        {"box", kV3And4, "Becomes box, of one pixel.", filter_params("0.5", "0.5"), make_box},
+        {"triangle", kV3And4, "Becomes tent.", filter_params("2", "2"), make_triangle},
+        {"gaussian", kV3And4,
+         "Becomes gaussian, cut off at four standard deviations whatever the radius.",
+         filter_params("2", "1.5") +
+             std::vector<PbrtParamInfo>{
+                 {"alpha", ParamKind::Float, "2", "Of exp(-alpha x²).", kV3},
+                 {"sigma", ParamKind::Float, "0.5", "Standard deviation in pixels.", kV4}},
+         make_gaussian},
+        {"mitchell", kV3And4, "Becomes mitchell, of radius 2.",
+         filter_params("2", "2") +
+             std::vector<PbrtParamInfo>{{"B", ParamKind::Float, "1/3", "Blur."},
+                                        {"C", ParamKind::Float, "1/3", "Ringing."}},
+         make_mitchell},
+        {"sinc", kV3And4, "Becomes lanczos with tau lobes, whatever the radius.",
+         filter_params("4", "4") +
+             std::vector<PbrtParamInfo>{{"tau", ParamKind::Float, "3", "Width of the window."}},
+         make_sinc},
+    };
+    return entries;
+}
+
+const std::vector<PbrtEntry>& pbrt_samplers() {
+    static const std::vector<PbrtEntry> entries = [] {
+        std::vector<PbrtEntry> all;
+        const std::vector<PbrtParamInfo> shared = {
+            {"pixelsamples", ParamKind::Int, "16",
+             "Samples per pixel, unless the command line says."},
+            {"seed", ParamKind::Int, "", "Accepted; the command line's seed counts."},
+            {"dimensions", ParamKind::Int, "", "Accepted; without effect."},
+            {"jitter", ParamKind::Bool, "", "Accepted; without effect."},
+            {"samplepixelcenter", ParamKind::Bool, "", "Accepted; without effect."},
+            {"randomization", ParamKind::String, "", "Accepted; without effect."},
+            {"xsamples", ParamKind::Int, "4",
+             "Of stratified: samples of a pixel are xsamples·ysamples."},
+            {"ysamples", ParamKind::Int, "4", "As xsamples."}};
+        for (const auto& [name, versions] : {std::pair("halton", kV3And4),
+                                             {"sobol", kV3And4},
+                                             {"stratified", kV3And4},
+                                             {"independent", kV4},
+                                             {"paddedsobol", kV4},
+                                             {"zsobol", kV4},
+                                             {"pmj02bn", kV4},
+                                             {"random", kV3},
+                                             {"02sequence", kV3},
+                                             {"lowdiscrepancy", kV3},
+                                             {"maxmindist", kV3}})
+            all.push_back({name, versions, "Taken for its sample count; see --sampler.", shared,
+                           make_sampler});
+        return all;
+    }();
+    return entries;
+}
+
+const std::vector<PbrtEntry>& pbrt_integrators() {
+    static const std::vector<PbrtEntry> entries = [] {
+        std::vector<PbrtEntry> all;
+        const std::vector<PbrtParamInfo> shared = integrator_params();
+        for (const auto& [name, versions] : {std::pair("path", kV3And4),
+                                             {"volpath", kV3And4},
+                                             {"simplepath", kV4},
+                                             {"simplevolpath", kV4},
+                                             {"randomwalk", kV4},
+                                             {"directlighting", kV3},
+                                             {"whitted", kV3}})
+            all.push_back({name, versions, "Rendered by path.", shared, make_integrator<kPath>});
+        all.push_back({"bdpt", kV3And4, "Rendered by bdpt.", shared, make_integrator<kBdpt>});
+        all.push_back({"lightpath", kV4, "Rendered by light.", shared, make_integrator<kLight>});
+        all.push_back({"sppm", kV3And4, "Rendered by sppm.", shared, make_integrator<kSppm>});
+        for (const auto& [name, versions] :
+             {std::pair("mlt", kV3And4), {"ambientocclusion", kV3And4}, {"function", kV4}})
+            all.push_back({name, versions, "Rendered by path, with a warning.", shared,
+                           make_other_integrator});
+        return all;
+    }();
+    return entries;
+}
+
+}  // namespace etendue

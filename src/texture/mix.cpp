@@ -1,0 +1,53 @@
+// Linear mixture of two textures: (1 - weight)·value0 + weight·value1.
+//   value0 (0), value1 (1)   colours or textures
+//   weight (0.5)             number or texture
+
+#include <algorithm>
+
+#include "texture/texture.h"
+
+namespace etendue {
+namespace {
+
+class Mix final : public Texture {
+public:
+    Mix(const Params& params, TextureContext& context)
+        : value0_(context.texture(params, "value0", Rgb(0))),
+          value1_(context.texture(params, "value1", Rgb(1))),
+          weight_(context.texture(params, "weight", Rgb(0.5f), 1)) {}
+
+    Rgb eval(Vec2 uv) const override {
+        return lerp(weight_.eval_scalar(uv), value0_.eval(uv), value1_.eval(uv));
+    }
+    Rgb mean() const override {  // exact where the weight is constant
+        return lerp(luminance(weight_.mean()), value0_.mean(), value1_.mean());
+    }
+    void resolution(int& width, int& height) const override {
+        width = height = 1;
+        for (const TextureRef* part : {&value0_, &value1_, &weight_}) {
+            int w, h;
+            part->resolution(w, h);
+            width = std::max(width, w);
+            height = std::max(height, h);
+        }
+    }
+
+private:
+    TextureRef value0_, value1_, weight_;
+};
+
+}  // namespace
+
+TextureEntry mix_entry() {
+    return {{"texture",
+             "mix",
+             "Linear mixture of two textures.",
+             {{"value0", ParamKind::Texture, "0", "Where the weight is 0."},
+              {"value1", ParamKind::Texture, "1", "Where the weight is 1."},
+              {"weight", ParamKind::Texture, "0.5", "Share of value1, in [0, 1]."}}},
+            [](const Params& params, TextureContext& context) -> std::unique_ptr<Texture> {
+                return std::make_unique<Mix>(params, context);
+            }};
+}
+
+}  // namespace etendue

@@ -1,0 +1,82 @@
+// Sums of lobes with factors of their own.
+
+#include "bsdf/bsdf.h"
+#include "lobe_tests.h"
+#include "test_materials.h"
+
+namespace etendue {
+namespace {
+
+using namespace etendue::testing;
+
+/// Mean of sample()'s weights.
+double sampled_albedo(const Bsdf& bsdf, Vec3 wo) {
+    LobeRandom random(1);
+    constexpr int kSamples = 200000;
+    double sum = 0;
+    for (int i = 0; i < kSamples; ++i) {
+        const float u_lobe = random.next();
+        if (const auto s = bsdf.sample(wo, u_lobe, random.next_2d(), TransportMode::Importance))
+            sum += s->weight.g;
+    }
+    return sum / kSamples;
+}
+
+TEST(LobeSum, EveryLobeCountsInFull) {
+    TestMaterials m;
+    ComponentArena arena;
+    const Vec3 wo = direction(30, 0);
+    const Bsdf bsdf = m.make("lobesum", {{"diffuse_reflectance", 0.2},
+                                         {"diffuse_transmittance", 0.1},
+                                         {"glossy_reflectance", 0.0},
+                                         {"specular_reflectance", 0.5},
+                                         {"specular_transmittance", 0.3},
+                                         {"eta", 1.5}})
+                          .bsdf(plane_point(wo), arena);
+    const double F = fresnel_dielectric(wo.z, 1.5f).R;
+    EXPECT_NEAR(sampled_albedo(bsdf, wo), 0.3 + 0.5 * F + 0.3 * (1 - F), 3e-3);
+}
+
+TEST(LobeSum, DiffuseAndGlossyAddUp) {
+    TestMaterials m;
+    ComponentArena arena;
+    const Vec3 wo = direction(30, 0), wi = direction(20, 170);
+    const Bsdf bsdf = m.make("lobesum", {{"diffuse_reflectance", 0.2},
+                                         {"glossy_reflectance", 0.5},
+                                         {"distribution", std::string("ggx")},
+                                         {"alpha", 0.3},
+                                         {"eta", 1.5}})
+                          .bsdf(plane_point(wo), arena);
+    const Microfacet facets(Microfacet::Kind::Ggx, 0.3f, 0.3f);
+    const Rgb expected = DiffuseLobe{Rgb(0.2f)}.eval(wo, wi).f +
+                         RoughConductorLobe{facets, Rgb(1.5f), Rgb(0), Rgb(0.5f)}.eval(wo, wi).f;
+    EXPECT_TRUE(nearly(bsdf.eval(wo, wi, TransportMode::Importance).f, expected, 1e-5, 0));
+    // A metal without absorption has a dielectric's Fresnel term.
+    EXPECT_NEAR(fresnel_conductor(0.6f, Rgb(1.5f), Rgb(0)).g, fresnel_dielectric(0.6f, 1.5f).R,
+                1e-6);
+    EXPECT_NEAR(fresnel_conductor(0.3f, Rgb(1 / 1.5f), Rgb(0)).g, 1, 1e-6);
+}
+
+TEST(LobeSum, ReflectsTheSameFromBehind) {
+    TestMaterials m;
+    ComponentArena arena;
+    const Vec3 wo = direction(30, 0), wi = direction(20, 170);
+    const auto at = [&](Vec3 from, Vec3 to) {
+        const Bsdf bsdf =
+            m.make("lobesum", {{"diffuse_reflectance", 0.2}}).bsdf(plane_point(from), arena);
+        return bsdf.eval(from, to, TransportMode::Radiance).f;
+    };
+    EXPECT_TRUE(nearly(at(wo, wi), at({wo.x, wo.y, -wo.z}, {wi.x, wi.y, -wi.z}), 1e-5, 0));
+    EXPECT_TRUE(at(wo, {wi.x, wi.y, -wi.z}).is_zero());
+}
+
+TEST(LobeSum, WithoutContrastThereIsNoGloss) {
+    TestMaterials m;
+    ComponentArena arena;
+    const Bsdf bsdf = m.make("lobesum", {{"diffuse_reflectance", 0.4}, {"eta", 1.0}})
+                          .bsdf(plane_point({0, 0, 1}), arena);
+    EXPECT_TRUE(bsdf.diffuse_normal());
+}
+
+}  // namespace
+}  // namespace etendue
