@@ -31,10 +31,12 @@ class Overflowing final : public Integrator {
 public:
     void sample(const SampleContext& c, Workspace& work) const override {
         work.z.film_weight = 1;
-        if (c.pixel % 16 == 0) c.sink.add(Join{.technique = {Strategy::Hit, 0, 2}}, Rgb(kInf));
+        Join join{};
+        join.technique = {Strategy::Hit, 0, 2};
+        join.mis_weight = 1;
+        if (c.pixel % 16 == 0) c.sink.add(join, Rgb(kInf));
         if (c.pixel % 16 == 1)
-            for (int i = 0; i < 2; ++i)
-                c.sink.add(Join{.technique = {Strategy::Hit, 0, 2}, .mis_weight = 1}, Rgb(3e38f));
+            for (int i = 0; i < 2; ++i) c.sink.add(join, Rgb(3e38f));
     }
     TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
     uint64_t light_paths(const Scene&) const override { return 0; }
