@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -41,17 +42,45 @@ PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene) const {
 
 void MarkovIntegrator::trace(const PassContext& pass) {
     if (paths_.max_depth() < kShortest || !pass.scene.has_emitters()) return;
+    const bool is_loaded = !loaded_.empty();
     if (!has_begun_) {
-        Pilot pilot = run_pilot(pass, bidirectional_sample(pass.scene));
-        pilot_samples_ = pilot.samples;
-        Chains chains = begin(pass, std::move(pilot));
+        if (!is_loaded) pilot_ = run_pilot(pass, bidirectional_sample(pass.scene));
+        Chains chains = begin(pass, *pilot_);
         pool_ = 0;
         for (const ClassPlan& plan : chains.plan) pool_ += plan.pool;
         groups_.reset();
         space_ = std::move(chains.space);
         groups_ = std::make_unique<ChainGroups>(*space_, options_, std::move(chains.plan));
     }
+    if (is_loaded) {
+        LearnedState state(std::exchange(loaded_, {}));
+        groups_->load(state);
+        has_begun_ = true;
+    }
     groups_->advance(pass);
+}
+
+void MarkovIntegrator::save(LearnedState& to) const {
+    const bool has_chains = has_begun_ || !loaded_.empty();
+    to.put(has_chains);
+    if (!has_chains) return;
+    pilot_->save(to);
+    if (!has_begun_) {
+        to.put(loaded_);
+        return;
+    }
+    LearnedState groups;
+    groups_->save(groups);
+    to.put(groups.bytes());
+}
+
+void MarkovIntegrator::load(LearnedState& from) {
+    bool has_chains = false;
+    from.get(has_chains);
+    if (!has_chains) return;
+    pilot_.emplace();
+    pilot_->load(from);
+    from.get(loaded_);
 }
 
 TechniqueCounts MarkovIntegrator::direct_counts(const Scene& scene, uint64_t light_paths) {
@@ -71,7 +100,7 @@ std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {
     std::vector<std::pair<std::string, double>> out{
         {"normalisation", groups_->b()},
         {"normalisation_relative_error", groups_->relative_error_of_b()},
-        {"pilot_samples", pilot_samples_},
+        {"pilot_samples", pilot_->samples},
         {"pool_samples", pool_},
         {"longest_stay", groups_->stats().longest_stay}};
     std::vector<const char*> names{"large"};

@@ -1,6 +1,9 @@
 #pragma once
 // What the integrators with Markov chains share: options, the pilot, direct light apart, statistics.
 
+#include <cstddef>
+#include <optional>
+
 #include "integrator/bidirectional.h"
 #include "mcmc/chain_groups.h"
 #include "mcmc/pilot.h"
@@ -16,6 +19,9 @@ public:
     static std::vector<ParamInfo> params();
 
     void trace(const PassContext& pass) final;
+    /// Chains can be made only once the scene is known: until then what was loaded is kept as it is.
+    void save(LearnedState& to) const final;
+    void load(LearnedState& from) final;
     void collect(std::span<const std::unique_ptr<PassSums>>) final {
         if (!groups_) return;
         groups_->commit();
@@ -45,7 +51,7 @@ protected:
         std::unique_ptr<StateSpace> space;
         std::vector<ClassPlan> plan;
     };
-    virtual Chains begin(const PassContext& pass, Pilot pilot) = 0;
+    virtual Chains begin(const PassContext& pass, const Pilot& pilot) = 0;
 
     /// A sample of all techniques, as of `bdpt`.
     PrimarySample bidirectional_sample(const Scene& scene) const;
@@ -63,7 +69,9 @@ private:
     std::unique_ptr<StateSpace> space_;
     std::unique_ptr<ChainGroups> groups_;  ///< Once the first pass has begun.
     bool has_begun_ = false;               ///< A pass stayed. Until then each begins anew.
-    uint64_t pilot_samples_ = 0, pool_ = 0;
+    std::optional<Pilot> pilot_;
+    uint64_t pool_ = 0;
+    std::vector<std::byte> loaded_;  ///< Of the groups, until they are made.
 };
 
 }  // namespace etendue

@@ -95,7 +95,7 @@ public:
           lengths_(p.integer("lengths", 1, 64)) {}
 
 protected:
-    Chains begin(const PassContext& pass, Pilot pilot) override {
+    Chains begin(const PassContext& pass, const Pilot& pilot) override {
         const TechniqueCounts n = counts(pass.scene, 0);
         const auto& emitters = pass.scene.emitters();
         const bool hits = std::any_of(emitters.begin(), emitters.end(),
@@ -111,7 +111,7 @@ protected:
             paths_.add_technique(c, n, q.s, q.t, float(1 / q.pmf), work);
         };
         std::vector<ClassPlan> plan = shared_out(pilot, classes);
-        return {std::make_unique<PrimarySpace>(classes, std::move(sample), std::move(pilot.map)),
+        return {std::make_unique<PrimarySpace>(classes, std::move(sample), pilot.map),
                 std::move(plan)};
     }
 

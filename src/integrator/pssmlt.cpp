@@ -18,11 +18,10 @@ public:
         : MarkovIntegrator(p, DepthOptions::from(p)) {}
 
 protected:
-    Chains begin(const PassContext& pass, Pilot pilot) override {
+    Chains begin(const PassContext& pass, const Pilot& pilot) override {
         const ClassPlan plan{
             .chains = options_.chains, .pool = pool_samples(pilot.samples, options_), .c = pilot.b};
-        return {std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene),
-                                               std::move(pilot.map)),
+        return {std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene), pilot.map),
                 {plan}};
     }
 };

@@ -55,6 +55,18 @@ void Chain::copy(const Chain& from) {
     if (is_started_) space_.copy(*from.x_, *x_);
 }
 
+void Chain::save(LearnedState& to) const {
+    to.put(is_started_);
+    to.put(stay_);
+    if (is_started_) x_->save(to);
+}
+
+void Chain::load(LearnedState& from) {
+    from.get(is_started_);
+    from.get(stay_);
+    if (is_started_) x_->load(from);
+}
+
 void Chain::add(const ChainState& state, double chain_share, double large_share,
                 const ChainTerms& terms, double scale, const ChainContext& c, SplatSink& splats,
                 ChainStats& stats) const {

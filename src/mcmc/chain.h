@@ -59,8 +59,8 @@ public:
     void advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t first,
                  uint64_t count, const ChainContext& c, SplatSink& splats, ChainStats& stats);
 
-    const ChainState& state() const { return *x_; }
-    bool is_started() const { return is_started_; }
+    void save(LearnedState& to) const;
+    void load(LearnedState& from);
 
 private:
     void add(const ChainState& state, double chain_share, double large_share,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 
 #include "math/hash.h"
 #include "math/statistics.h"
@@ -138,6 +139,29 @@ void ChainGroups::commit() {
     group.normalisation = working_.normalisation;
     group.steps = working_.steps;
     stats_ += working_stats_;
+}
+
+void ChainGroups::save(LearnedState& to) const {
+    for (const Group& g : groups_) {
+        to.put(uint64_t(g.chains.size()));
+        to.put(g.normalisation);
+        to.put(g.steps);
+        for (const Chain& chain : g.chains) chain.save(to);
+    }
+}
+
+void ChainGroups::load(LearnedState& from) {
+    for (Group& g : groups_) {
+        uint64_t chains = 0;
+        from.get(chains);
+        from.get(g.normalisation);
+        from.get(g.steps);
+        if (chains != 0 && chains != class_of_chain_.size())
+            throw std::runtime_error("the learned state is of another number of chains");
+        g.chains.clear();
+        for (uint64_t i = 0; i < chains; ++i)
+            g.chains.emplace_back(space_, class_of_chain_[i]).load(from);
+    }
 }
 
 double ChainGroups::later_b(const Group& group) const {

@@ -34,6 +34,10 @@ public:
     void advance(const PassContext& pass);
     void commit();
 
+    /// All that later passes depend on. load() throws std::runtime_error where it is of other chains.
+    void save(LearnedState& to) const;
+    void load(LearnedState& from);
+
     /// Mean of b' over the groups that have begun, of all classes together, and its standard error relative to it.
     double b() const;
     double relative_error_of_b() const;

@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "pathspace/learned_state.h"
 #include "sampler/sampler.h"
 
 namespace etendue {
@@ -17,6 +18,14 @@ public:
     /// The number there, or nullptr where it has not been read.
     const uint32_t* find(Stream stream, uint64_t vertex, uint32_t slot) const;
     void set(Stream stream, uint64_t vertex, uint32_t slot, uint32_t bits);
+    void save(LearnedState& to) const {
+        to.put(epoch_);
+        for (const auto& table : tables_) to.put(table);
+    }
+    void load(LearnedState& from) {
+        from.get(epoch_);
+        for (auto& table : tables_) from.get(table);
+    }
 
 private:
     static constexpr uint32_t kSlots = 8;  ///< At most, of a vertex.

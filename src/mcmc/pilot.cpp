@@ -17,11 +17,33 @@ struct PilotSplat {
 
 }  // namespace
 
-double Pilot::of_length(int edges) const {
-    double sum = 0;
-    for (const auto& [technique, value] : by_technique)
-        if (technique.first == edges) sum += value;
-    return sum;
+void Pilot::save(LearnedState& to) const {
+    map.save(to);
+    to.put(b);
+    to.put(relative_variance);
+    to.put(samples);
+    to.put(uint64_t(by_technique.size()));
+    for (const auto& [technique, value] : by_technique) {
+        to.put(technique.first);
+        to.put(technique.second);
+        to.put(value);
+    }
+}
+
+void Pilot::load(LearnedState& from) {
+    map.load(from);
+    from.get(b);
+    from.get(relative_variance);
+    from.get(samples);
+    uint64_t techniques = 0;
+    from.get(techniques);
+    by_technique.clear();
+    for (uint64_t i = 0; i < techniques; ++i) {
+        std::pair<int, int> technique;
+        from.get(technique.first);
+        from.get(technique.second);
+        from.get(by_technique[technique]);
+    }
 }
 
 uint64_t pool_samples(uint64_t pilot_samples, const ChainOptions& options) {
@@ -52,7 +74,7 @@ Pilot run_pilot(const PassContext& pass, const PrimarySample& sample) {
         };
         pass.for_each_other_path(splats.size() - done, trace);
         for (uint64_t i = done; i < splats.size(); ++i)
-            for (const PilotSplat& s : splats[i]) pilot.map.add({s.film, double(s.luminance)});
+            for (const PilotSplat& s : splats[i]) pilot.map.add(s.film, double(s.luminance));
         pilot.map.learn(splats.size());
 
         Moments target;

@@ -17,7 +17,8 @@ struct Pilot {
     /// Mean of the target by length and number of light vertices.
     std::map<std::pair<int, int>, double> by_technique;  ///< (edges, s)
 
-    double of_length(int edges) const;
+    void save(LearnedState& to) const;
+    void load(LearnedState& from);
 };
 
 /// Samples of `sample`'s class 0, doubled until as many again promise b within 2 %, at most two a pixel.

@@ -59,6 +59,15 @@ private:
 
     struct State final : ChainState {
         NumberTable numbers;
+
+        void save(LearnedState& to) const override {
+            ChainState::save(to);
+            numbers.save(to);
+        }
+        void load(LearnedState& from) override {
+            ChainState::load(from);
+            numbers.load(from);
+        }
     };
     void evaluate(int chain_class, NumberSource& source, const ChainContext& c,
                   ChainState& y) const;

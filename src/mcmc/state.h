@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "pathspace/learned_state.h"
 #include "pathspace/sample_context.h"
 
 namespace etendue {
@@ -25,6 +26,18 @@ struct ChainState {
     std::vector<Splat> splats;
 
     virtual ~ChainState() = default;
+    virtual void save(LearnedState& to) const {
+        to.put(target);
+        to.put(independent_density);
+        to.put(edges);
+        to.put(splats);
+    }
+    virtual void load(LearnedState& from) {
+        from.get(target);
+        from.get(independent_density);
+        from.get(edges);
+        from.get(splats);
+    }
     /// I/T, whose mean over independent states is b.
     double importance() const { return target / independent_density; }
 };

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "film/film_geometry.h"
+#include "pathspace/learned_state.h"
 
 namespace etendue {
 
@@ -11,17 +12,28 @@ namespace etendue {
 /// by relative errors. 1 everywhere until it has learned.
 class TargetMap {
 public:
-    /// `points`: film points with luminance, together from `samples` samples of the whole film.
-    struct Point {
-        Vec2 film;
-        double luminance;
-    };
-    explicit TargetMap(const FilmGeometry& geometry);
-    void add(const Point& p) { sums_[tile_at(p.film)] += p.luminance; }
-    /// Ends the run. What was added stays, and add() may go on.
+    explicit TargetMap(const FilmGeometry& geometry = {});
+    /// What samples of the whole film bring to a point.
+    void add(Vec2 film, double luminance) { sums_[tile_at(film)] += luminance; }
+    /// Sets L from the sums of so many samples. What was added stays, and add() may go on.
     void learn(uint64_t samples);
 
     double operator()(Vec2 film) const;
+
+    void save(LearnedState& to) const {
+        to.put(geometry_);
+        to.put(columns_);
+        to.put(rows_);
+        to.put(luminance_);
+        to.put(floor2_);
+    }
+    void load(LearnedState& from) {
+        from.get(geometry_);
+        from.get(columns_);
+        from.get(rows_);
+        from.get(luminance_);
+        from.get(floor2_);
+    }
 
 private:
     static constexpr int kTile = 16;  ///< Pixels, across.

@@ -26,13 +26,13 @@ TEST_P(ChainFilms, AreThoseOfBidirectionalPathTracing) {
     const Scene scene = build(part_of_film(GetParam()) + room() + area_lamp() +
                               sphere("-0.4,-0.5,0", "0.4", kGlass));
     const Tiles bdpt = render_tiles(scene, "bdpt", {2048, 8, 1});
-    for (const char* method : {"pssmlt:chains=8,groups=1024", "mmlt:chains=48,groups=512"})
+    for (const char* method : {"pssmlt:chains=128,groups=1024", "mmlt:chains=128,groups=512"})
         expect_same_image(
             render_tiles(scene, method, {std::string(method)[0] == 'p' ? 1024u : 512u, 8, 2}), bdpt,
             0.15, method);
 }
 
-INSTANTIATE_TEST_SUITE_P(Filters, ChainFilms, ::testing::Values("box", "tent", "lanczos"),
+INSTANTIATE_TEST_SUITE_P(LongFilters, ChainFilms, ::testing::Values("box", "tent", "lanczos"),
                          [](const auto& p) { return std::string(p.param); });
 
 class ChainLengths : public ::testing::TestWithParam<const char*> {};
@@ -56,7 +56,7 @@ INSTANTIATE_TEST_SUITE_P(Depths, ChainLengths,
                                            "mmlt:chains=16,groups=256,lengths=1"));
 
 /// A few chains that go on for long agree with many that only start, by runs with seeds of their own.
-TEST(Chains, GoOnAsTheyBegan) {
+TEST(LongChains, GoOnAsTheyBegan) {
     const Scene scene = build(mixed_room(front_camera(12)));
     for (const char* name : {"pssmlt", "mmlt"}) {
         std::array<Tiles, 2> tiles{Tiles(4), Tiles(4)};
