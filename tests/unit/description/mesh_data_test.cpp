@@ -119,7 +119,7 @@ TEST(FinishMesh, RejectsWhatCannotBeRendered) {
     expect_scene_error(7, "no triangles", [&] { finish_mesh(none, {}, where); });
     MeshData flat = bent_quad();
     flat.triangles = {{0, 0, 1}};
-    expect_scene_error(7, "none of the mesh's triangles has an area",
+    expect_scene_error(7, "all triangles of the mesh have zero area",
                        [&] { finish_mesh(flat, {}, where); });
 }
 

@@ -432,7 +432,7 @@ std::string repeat(const std::string& text, int n) {
 TEST(MitsubaXml, LimitsNesting) {
     const int deep = 200'000;
     EXPECT_NE(error3(repeat("<bsdf type=\"mask\">", deep) + repeat("</bsdf>", deep))
-                  .find("nest more than"),
+                  .find("nested more than"),
               std::string::npos);
     std::string chain = "<bsdf type=\"mask\" id=\"m0\"/>";
     for (int i = 1; i < 1000; ++i)

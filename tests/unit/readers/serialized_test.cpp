@@ -98,7 +98,7 @@ TEST_P(Serialized, EveryMeshOfAFile) {
     EXPECT_EQ(parse(bytes, 1).uvs[0], (Vec2{0, 0.25f}));
     EXPECT_EQ(parse(bytes, 1, {.flip_tex_coords = true}).uvs[0], (Vec2{0, 0.75f}));
     for (const int index : {-1, 3})
-        expect_scene_error(0, "of a file that has 3", [&] { parse(bytes, index); });
+        expect_scene_error(0, "the file has 3", [&] { parse(bytes, index); });
 }
 
 INSTANTIATE_TEST_SUITE_P(Versions, Serialized, ::testing::Values(3, 4),

@@ -47,7 +47,7 @@ Rendering render(float factor, const std::string& integrator) {
     RenderSettings settings;
     settings.integrator = IntegratorSpec::parse(integrator);
     settings.sampler = SamplerKind::Sobol;
-    settings.spp = 12;  // enough for an estimate of the error
+    settings.spp = 16;  // enough for an estimate of the error, from groups of chains too
     Renderer renderer(scene, settings);
     const std::atomic<bool> interrupted{false};
     renderer.run([](const Progress&) {}, interrupted);
