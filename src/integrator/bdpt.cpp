@@ -50,7 +50,8 @@ public:
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         if (uses_cache_)
-            paths_.add_eye_path(c, n, work, [&](int t) { connect_to_cache(c, n, t, work); });
+            paths_.add_eye_path(c, n, work, nullptr,
+                                [&](int t) { connect_to_cache(c, n, t, work); });
         else
             paths_.add_sample(c, n, work);
     }
@@ -94,6 +95,7 @@ private:
     void connect_to_cache(const SampleContext& c, const TechniqueCounts& n, int t,
                           Workspace& work) const {
         if (connectible_.empty()) return;
+        const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
         const float factor =
             float(double(connectible_.size()) / (double(draws_) * double(c.light_paths)));
         for (int i = 0; i < draws_; ++i) {

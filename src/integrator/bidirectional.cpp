@@ -66,10 +66,8 @@ void Bidirectional::add_sample(const SampleContext& c, const TechniqueCounts& co
                                Workspace& work) const {
     const bool has_light_path = counts.uses_light_paths();
     if (has_light_path) trace_light_path(c, counts, work);  // C(s,1), C(s,0)
-    add_eye_path(c, counts, work, [&](int t) {
-        if (!has_light_path) return;
-        for (int s = 2; s <= work.y.size() && s + t - 1 <= max_depth(); ++s)
-            add(c, join_connect(c.scene, work.y, s, work.z, t, counts), work);
+    add_eye_path(c, counts, work, nullptr, [&](int t) {
+        if (has_light_path) add_connections(c, counts, t, work);
     });
 }
 

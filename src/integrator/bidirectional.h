@@ -62,20 +62,27 @@ public:
 
     /// Everything that the sub-paths of one sample bring: bidirectional path tracing.
     void add_sample(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
-    /// The eye sub-path, C(0,t) and C(1,t); `connect(t)` adds C(s,t), s ≥ 2.
-    template <class Connect>
+    /// The eye sub-path, C(0,t) and C(1,t); `join(t)` adds what else z_{t-1} is joined to.
+    template <class JoinMore>
     void add_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                      const Connect& connect) const {
+                      const LearnedPlaces* learned, const JoinMore& join) const {
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        trace_eye_path(c, counts, work);
+        trace_eye_path(c, counts, work, learned);
         const SubPath& z = work.z;
         for (int t = 2; t <= z.size(); ++t) {
             add_hits(c, counts, t, work);
             if (!is_joinable(z, t)) continue;
-            add(c, join_next_event(c.scene, z, t, c.sampler, counts), work);
-            const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
-            connect(t);
+            if (counts.next_event > 0)
+                add(c, join_next_event(c.scene, z, t, c.sampler, counts), work);
+            join(t);
         }
+    }
+    /// C(s,t), s ≥ 2, with the light sub-path work.y.
+    void add_connections(const SampleContext& c, const TechniqueCounts& counts, int t,
+                         Workspace& work) const {
+        const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
+        for (int s = 2; s <= work.y.size() && s + t - 1 <= max_depth(); ++s)
+            add(c, join_connect(c.scene, work.y, s, work.z, t, counts), work);
     }
     /// C(s,t) alone, times `factor`, with sub-paths no longer than it needs.
     void add_technique(const SampleContext& c, const TechniqueCounts& counts, int s, int t,

@@ -87,11 +87,6 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
-        const SubPath &y = work.y, &z = work.z;
-        if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
-
-        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work, &density_);
         const GatherSearch search{c,
                                   n,
                                   cache_,
@@ -102,18 +97,12 @@ public:
                                   flatness_,
                                   paths_.threshold(c),
                                   work};
-        for (int t = 2; t <= z.size(); ++t) {
-            paths_.add_hits(c, n, t, work);  // C(0,t)
-            if (!paths_.is_joinable(z, t)) continue;
-            if (connects_) {
-                paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
-                const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
-                for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
-                    paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
-            }
+        if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
+        paths_.add_eye_path(c, n, work, &density_, [&](int t) {    // C(0,t), C(1,t)
+            if (connects_) paths_.add_connections(c, n, t, work);  // C(s,t)
             search.for_each_pair(
                 t, [&](const GatherPair& pair) { gather(c, n, search, pair, work); });  // U(s,t)
-        }
+        });
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
