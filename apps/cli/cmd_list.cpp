@@ -41,7 +41,8 @@ bool same_param(const ParamInfo& a, const ParamInfo& b) {
 
 void add(std::vector<Entry>& entries, PluginInfo p, const std::string& doc) {
     // What a user needs comes first.
-    std::ranges::stable_partition(p.params, [](const ParamInfo& q) { return !q.is_experimental; });
+    std::stable_partition(p.params.begin(), p.params.end(),
+                          [](const ParamInfo& q) { return !q.is_experimental; });
     if (!entries.empty()) {
         Entry& last = entries.back();
         if (last.category == p.category && last.doc == doc &&
