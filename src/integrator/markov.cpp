@@ -8,6 +8,12 @@
 #include <fmt/format.h>
 
 namespace etendue {
+namespace {
+
+/// First vertex at which the pilot's walks have roulette, at the latest. Without it they would not end in a closed room.
+constexpr int kPilotRoulette = 10;
+
+}  // namespace
 
 std::vector<ParamInfo> MarkovIntegrator::params() {
     return {{"p_large", ParamKind::Float, "0.3",
@@ -23,7 +29,8 @@ MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions
                .chains = p.integer("chains", 1, 1 << 20),
                .p_large = double(p.number("p_large", 0.01f, 1.0f))},
       paths_(depth, kShortest),
-      direct_({std::min(depth.max_depth, kShortest - 1), depth.rr_depth}, 1) {
+      direct_({std::min(depth.max_depth, kShortest - 1), depth.rr_depth}, 1),
+      pilot_paths_({depth.max_depth, std::min(depth.rr_depth, kPilotRoulette)}, kShortest) {
     if (options_.groups % 2 != 0)
         throw std::runtime_error(
             fmt::format("{}: groups must be even, but is {}", p.integrator(), options_.groups));
@@ -34,17 +41,18 @@ uint64_t MarkovIntegrator::whole_film_paths(const Scene& scene) {
                     uint64_t(std::llround(reached_region(scene.film(), scene.filter()).area())));
 }
 
-PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene) const {
+PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
+                                                     const Bidirectional& paths) const {
     const TechniqueCounts n = counts(scene, 0);
     return
-        [this, n](int, const SampleContext& c, Workspace& work) { paths_.add_sample(c, n, work); };
+        [&paths, n](int, const SampleContext& c, Workspace& work) { paths.add_sample(c, n, work); };
 }
 
 void MarkovIntegrator::trace(const PassContext& pass) {
     if (paths_.max_depth() < kShortest || !pass.scene.has_emitters()) return;
     const bool is_loaded = !loaded_.empty();
     if (!has_begun_) {
-        if (!is_loaded) pilot_ = run_pilot(pass, bidirectional_sample(pass.scene));
+        if (!is_loaded) pilot_ = run_pilot(pass, bidirectional_sample(pass.scene, pilot_paths_));
         Chains chains = begin(pass, *pilot_);
         pool_ = 0;
         for (const ClassPlan& plan : chains.plan) pool_ += plan.pool;

@@ -53,8 +53,8 @@ protected:
     };
     virtual Chains begin(const PassContext& pass, const Pilot& pilot) = 0;
 
-    /// A sample of all techniques, as of `bdpt`.
-    PrimarySample bidirectional_sample(const Scene& scene) const;
+    /// A sample of all techniques, as of `bdpt`, by the walks of `paths`.
+    PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;
     /// N_L of the weights: the film's eye paths are spread over so many pixels.
     static uint64_t whole_film_paths(const Scene& scene);
 
@@ -66,6 +66,7 @@ private:
     static TechniqueCounts direct_counts(const Scene& scene, uint64_t light_paths);
 
     Bidirectional direct_;
+    Bidirectional pilot_paths_;  ///< With roulette, even where the chains' walks have none.
     std::unique_ptr<StateSpace> space_;
     std::unique_ptr<ChainGroups> groups_;  ///< Once the first pass has begun.
     bool has_begun_ = false;               ///< A pass stayed. Until then each begins anew.

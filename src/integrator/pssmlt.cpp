@@ -21,8 +21,9 @@ protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         const ClassPlan plan{
             .chains = options_.chains, .pool = pool_samples(pilot.samples, options_), .c = pilot.b};
-        return {std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene), pilot.map),
-                {plan}};
+        return {
+            std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene, paths_), pilot.map),
+            {plan}};
     }
 };
 
