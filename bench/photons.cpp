@@ -298,6 +298,7 @@ private:
                 .index = 0,
                 .light_paths = light_paths,
                 .pixels = scene_.film().pixel_count(),
+                .seed = 0,
                 .for_each_sample =
                     [this, light_paths](uint64_t count, const PassContext::Use& use) {
                         for (uint64_t i = 0; i < count; ++i) {
@@ -308,7 +309,8 @@ private:
                         }
                     },
                 .chunks = [](uint64_t samples) { return (samples + kChunk - 1) / kChunk; },
-                .for_each_other_path = {}};
+                .for_each_other_path = {},
+                .for_each_chain = {}};
     }
 
     struct NoSink final : ContributionSink {
