@@ -60,16 +60,13 @@ public:
         paths_.save(to);
         to.put(learned_);
         density_.save(to);
-        const CellCounts vertices = cells();
-        to.put(vertices.cells);
-        to.put(vertices.counts);
+        cells().save(to);
     }
     void load(LearnedState& from) override {
         paths_.load(from);
         from.get(learned_);
         density_.load(from);
-        from.get(loaded_.cells);
-        from.get(loaded_.counts);
+        loaded_.load(from);
     }
     bool is_learning() const override { return true; }
     std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }

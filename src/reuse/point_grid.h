@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "pathspace/learned_state.h"
 #include "reuse/cell_hash.h"
 
 namespace etendue {
@@ -12,6 +13,15 @@ namespace etendue {
 struct CellCounts {
     CellHash cells;
     std::vector<uint32_t> counts;  ///< By bucket; empty where nothing is known.
+
+    void save(LearnedState& to) const {
+        to.put(cells);
+        to.put(counts);
+    }
+    void load(LearnedState& from) {
+        from.get(cells);
+        from.get(counts);
+    }
 };
 
 class PointGrid {
