@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -158,12 +159,13 @@ double typical_radiance(const Scene& scene) {
 }
 
 /// TBB runs as many threads as the hardware has, in all arenas together, unless more are allowed. The limit is that of the
-/// whole process and the least that anybody sets, so it is only ever raised, to a number with room for other renderers.
+/// whole process and lasts as long as a renderer asks for it, so every renderer that needs more asks for itself. TBB takes the
+/// least number that anybody asks for: it has room for other renderers.
 std::unique_ptr<tbb::global_control> allow_threads(int threads) {
-    constexpr auto kLimit = tbb::global_control::max_allowed_parallelism;
     constexpr size_t kRoom = 256;
-    if (size_t(std::max(threads, 0)) <= tbb::global_control::active_value(kLimit)) return nullptr;
-    return std::make_unique<tbb::global_control>(kLimit, std::max(size_t(threads), kRoom));
+    if (threads <= tbb::info::default_concurrency()) return nullptr;
+    return std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                 std::max(size_t(threads), kRoom));
 }
 
 /// Ends a pass that is to be dropped.

@@ -48,16 +48,34 @@ private:
     Meeting& meeting_;
 };
 
-/// Threads that a rendering had at once, and in all.
+/// A rendering of one pass whose threads are counted.
+class CountedRendering {
+public:
+    CountedRendering(const Scene& scene, int threads)
+        : meeting_(size_t(threads)),
+          renderer_(scene, settings(threads), std::make_unique<MeetingIntegrator>(meeting_)) {}
+
+    /// Threads that it had at once.
+    size_t run() {
+        const std::atomic<bool> interrupted{false};
+        renderer_.run([](const Progress&) {}, interrupted);
+        return meeting_.threads();
+    }
+
+private:
+    static RenderSettings settings(int threads) {
+        RenderSettings s;
+        s.threads = threads;
+        s.spp = 1;
+        return s;
+    }
+
+    Meeting meeting_;
+    Renderer renderer_;
+};
+
 size_t threads_of_rendering(const Scene& scene, int threads) {
-    Meeting meeting{size_t(threads)};
-    RenderSettings settings;
-    settings.threads = threads;
-    settings.spp = 1;
-    Renderer renderer(scene, settings, std::make_unique<MeetingIntegrator>(meeting));
-    const std::atomic<bool> interrupted{false};
-    renderer.run([](const Progress&) {}, interrupted);
-    return meeting.threads();
+    return CountedRendering(scene, threads).run();
 }
 
 TEST(Threads, AreAsManyAsAskedFor) {
@@ -74,6 +92,15 @@ TEST(Threads, OfSeveralRenderersAtOnceAreTheirOwn) {
         callers.emplace_back([&, i] { had[i] = threads_of_rendering(scene, wanted[i]); });
     for (std::thread& c : callers) c.join();
     for (size_t i = 0; i < wanted.size(); ++i) EXPECT_EQ(had[i], wanted[i]) << i;
+}
+
+TEST(Threads, OutliveThoseOfRenderersThatEnded) {
+    const Scene scene = build(front_camera(64) + room() + area_lamp());
+    auto earlier = std::make_unique<CountedRendering>(scene, 7);
+    CountedRendering later(scene, 5);
+    EXPECT_EQ(earlier->run(), 7);
+    earlier.reset();
+    EXPECT_EQ(later.run(), 5);
 }
 
 }  // namespace
