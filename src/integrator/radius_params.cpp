@@ -1,6 +1,9 @@
 #include "integrator/radius_params.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -13,12 +16,34 @@ std::vector<ParamInfo> radius_params(const char* doc) {
              "stays constant, and the image stays biased."}};
 }
 
-RadiusParams::RadiusParams(const IntegratorParams& p, float share)
-    : first(p.number("radius")), alpha(p.number("alpha")), default_share(share) {
+RadiusParams::RadiusParams(const IntegratorParams& p)
+    : first(p.number("radius")), alpha(p.number("alpha")) {
     if (!(first >= 0))
         throw std::runtime_error(fmt::format("{}: radius must not be negative", p.integrator()));
     if (!(alpha > 0 && alpha <= 1))
         throw std::runtime_error(fmt::format("{}: alpha must lie in (0, 1]", p.integrator()));
+}
+
+float pixel_radius(const Scene& scene) {
+    constexpr int kRays = 64;  // each way
+    const FilmGeometry& film = scene.film();
+    std::vector<float> areas;
+    for (int row = 0; row < kRays; ++row)
+        for (int column = 0; column < kRays; ++column) {
+            const Vec2 point{(float(column) + 0.5f) * (float(film.width) / kRays),
+                             (float(row) + 0.5f) * (float(film.height) / kRays)};
+            const SensorRay ray = scene.sensor().sample_ray(point, {0.5f, 0.5f});
+            SurfaceHit hit;
+            Passage passage{kVacuum};
+            if (!scene.intersect({ray.p, ray.d, kInf}, 0.5f, hit, passage)) continue;
+            const float to_area = abs_dot(hit.geometry.ng, ray.d) /
+                                  (scene.sensor().is_orthographic() ? 1.0f : sqr(hit.t));
+            if (to_area > 0) areas.push_back(1 / (ray.pdf_dir * to_area));
+        }
+    if (areas.empty()) return 0;
+    const auto median = areas.begin() + std::ptrdiff_t(areas.size() / 2);
+    std::nth_element(areas.begin(), median, areas.end());
+    return std::sqrt(*median / kPi);
 }
 
 }  // namespace etendue

@@ -24,13 +24,14 @@ class SppmIntegrator final : public Integrator {
 public:
     /// `eye_paths`: how many each pixel has; 0: new ones in every pass.
     SppmIntegrator(const IntegratorParams& p, int eye_paths)
-        : mapping_(p, p.flag("next_event")), radius_params_(p, kDefaultRadius), light_(p),
+        : mapping_(p, p.flag("next_event")), radius_params_(p), light_(p),
           eye_paths_(uint32_t(eye_paths)) {}
 
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
-        radius_ = radius_params_.schedule(pass.scene).radius(pass.index);
+        radius_ = radius_params_.schedule(kDefaultRadius * pass.scene.bounds().radius())
+                      .radius(pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
         mapping_.paths().trace_light_paths(pass, {}, pass.light_paths, cache_);
         cache_.assemble();
@@ -77,16 +78,17 @@ private:
             if (y.s < mapping_.shortest() || y.s + t - 2 > max_depth) return {};
             return Chosen{};
         };
-        grid_.for_each_near(work.z[t - 1].p, choose, [&](const GatherCandidate& y, Chosen) {
-            const Photon photon = cache_.photon(y.vertex);
-            if (!is_diffuse &&
-                !(photon.emitter->is_delta() && cache_.came_by_delta_events(y.vertex)))
-                return;
-            const auto join = join_photon(photon, work.z, t, disc());
-            if (!join) return;
-            if (work.is_observed) cache_.restore_first(c.scene, y.vertex, y.s, true, work.pair);
-            c.sink.add(*join, join->contribution * c.splat_scale);
-        });
+        grid_.for_each_near(
+            work.z[t - 1].p, radius_, choose, [&](const GatherCandidate& y, Chosen) {
+                const Photon photon = cache_.photon(y.vertex);
+                if (!is_diffuse &&
+                    !(photon.emitter->is_delta() && cache_.came_by_delta_events(y.vertex)))
+                    return;
+                const auto join = join_photon(photon, work.z, t, disc());
+                if (!join) return;
+                if (work.is_observed) cache_.restore_first(c.scene, y.vertex, y.s, true, work.pair);
+                c.sink.add(*join, join->contribution * c.splat_scale);
+            });
     }
 
     static constexpr uint64_t kVertexBytes =

@@ -18,14 +18,17 @@
 namespace etendue {
 namespace {
 
-/// Of the scene's.
-constexpr float kDefaultRadius = 0.003f;
+/// In radii of a pixel's disc (pixel_radius()). Less is noisier on caustics, more blurs them.
+constexpr float kDefaultRadius = 6;
+/// The radius of merges behind a diffuse or glossy eye vertex, over that of others. Such merges share a random eye path, so
+/// each of them is worth less; they matter for light that no other technique finds.
+constexpr float kInnerRadius = 0.3f;
 
 class VcmIntegrator final : public Integrator {
 public:
     explicit VcmIntegrator(const IntegratorParams& p)
-        : paths_(p), radius_params_(p, kDefaultRadius), connects_(p.flag("connections")),
-          merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p) {
+        : paths_(p), radius_params_(p), connects_(p.flag("connections")), merges_(p.flag("merges")),
+          is_exact_(p.flag("exact")), light_(p) {
         if (!connects_ && !merges_)
             throw std::runtime_error("vcm: connections and merges cannot both be off");
         if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact needs merges");
@@ -34,9 +37,10 @@ public:
     void learn(const LearnContext& pass) override {
         paths_.learn(pass);
         roulette_.learn(gathers_);
-        const float radius = radius_params_.schedule(pass.scene).radius(pass.index);
         if (merges_ && pass.index > 0)
-            density_ = PairDensity(cells(), radius, kGatherConstants.merge_correlation);
+            density_ = PairDensity(cells(),
+                                   radius(pass.scene, pass.index) * (is_exact_ ? 1 : kInnerRadius),
+                                   kGatherConstants.merge_correlation);
     }
     void save(LearnedState& to) const override {
         paths_.save(to);
@@ -59,7 +63,7 @@ public:
     }
 
     void trace(const PassContext& pass) override {
-        radius_ = radius_params_.schedule(pass.scene).radius(pass.index);
+        radius_ = radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
@@ -83,6 +87,7 @@ public:
         if (merges_) {
             (is_exact_ ? n.gather : n.merge) = float(light_paths);
             n.pairs.disc = kPi * sqr(radius_);
+            n.pairs.inner_disc = n.pairs.disc * sqr(kInnerRadius);
             n.pairs.clamps = false;
         }
         return n;
@@ -97,6 +102,12 @@ public:
     }
 
 private:
+    /// Of pass `index`.
+    float radius(const Scene& scene, uint32_t index) {
+        if (radius_params_.first == 0 && !default_radius_)
+            default_radius_ = kDefaultRadius * pixel_radius(scene);
+        return radius_params_.schedule(default_radius_.value_or(0)).radius(index);
+    }
     /// Of the light vertices of the pass before.
     CellCounts cells() const {
         return grid_.points().is_empty() ? loaded_ : grid_.points().counts();
@@ -110,8 +121,9 @@ private:
             if (y.s + t - 2 > paths_.max_depth() || !side.admits(y.side)) return {};
             return Chosen{};
         };
-        grid_.for_each_near(z.p, choose, [&](const GatherCandidate& y, Chosen) {
-            cache_.restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair);
+        const float radius = z.sees_lens ? radius_ : kInnerRadius * radius_;
+        grid_.for_each_near(z.p, radius, choose, [&](const GatherCandidate& y, Chosen) {
+            cache_.restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair, false);
             const auto join = join_merge(work.pair, y.s, work.z, t, n);
             if (!join) return;
             ++work.stats.pairs;
@@ -148,6 +160,8 @@ private:
     bool connects_, merges_, is_exact_;
     LightPathOptions light_;
 
+    std::optional<float> default_radius_;  ///< In scene units.
+
     // Learned.
     GatherTotals gathers_;
     PairDensity density_;
@@ -165,7 +179,10 @@ private:
 IntegratorEntry vcm_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
     for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
-                                            "0.3 % of the radius of the scene's bounds."))
+                                            "that of a disc with the area of 36 pixels, as the "
+                                            "median pixel sees the scene. Eye vertices that the "
+                                            "film point does not determine merge within 0.3 times "
+                                            "this radius."))
         params.push_back(p);
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back({"connections", ParamKind::Bool, "true",

@@ -213,16 +213,18 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
     // Relative to the split after x_m, which has p_L(x_m) but not p_E(x_m).
     const double total =
         split_squares<Side::Eye>(z, t - 1, false, counts) +
-        outward_sum<Side::Light>(y, s - 1, false, {b.pdf_fwd, f.pdf * a.to_predecessor, 0, edges},
-                                 counts) +
+        outward_sum<Side::Light>(
+            y, s - 1, false,
+            {b.pdf_fwd, f.pdf * a.to_predecessor, b.sees_lens ? kLensGloss : uint8_t(0), edges},
+            counts) +
         sqr(f.pdf_rev * b.to_predecessor / z[t - 2].pdf_fwd) *
             (squares_at<Side::Eye>(z, t - 2, z[t - 2].is_delta, 0, 0, edges, counts) +
              b.weight_sum);
-    const double np =
-        counts.weighed_merges(a.pair_level) * double(counts.pairs.disc) * double(b.pdf_fwd);
+    const double np = counts.merge_area(a.pair_level, b.sees_lens) * double(b.pdf_fwd);
+    const float disc = b.sees_lens ? counts.pairs.disc : counts.pairs.inner_disc;
     return Join{.technique = {Strategy::Merge, s, t},
                 .emitter = y[0].emitter,
-                .contribution = density_estimate(a.beta, a.wo, f, b, counts.pairs.disc),
+                .contribution = density_estimate(a.beta, a.wo, f, b, disc),
                 .mis_weight = float(sqr(np) / total),
                 .film = z.film,
                 .needs_test = false};

@@ -56,8 +56,11 @@ inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, 
                            const TechniqueCounts& n) {
     if (i == 0 || !v[i].is_connectible || edges < n.pairs.min_edges) return 0;
     const double fwd = v[i].pdf_fwd;
-    if (n.merge > 0) return sqr(n.weighed_merges(v[i].pair_level) * double(n.pairs.disc) * fwd);
     constexpr bool eye = side == Side::Eye;
+    if (n.merge > 0) {
+        const bool sees_lens = eye ? v[i].sees_lens : inward == kLensGloss;  // see join_merge()
+        return sqr(n.merge_area(v[i].pair_level, sees_lens) * fwd);
+    }
     const uint8_t outward = gloss(v[i - 1], v[i - 1].is_delta);
     const uint8_t before = eye ? inward : outward, after = eye ? outward : inward;
     double sum = 0;

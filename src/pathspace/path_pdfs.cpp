@@ -44,8 +44,7 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     for (int i = 0; i < m; ++i) others *= light[i];
     for (int i = m + 1; i <= k; ++i) others *= eye[i];
     if (q.strategy == Strategy::Merge)
-        return counts.weighed_merges(pair_level[m]) * others * light[m] * eye[m] *
-               counts.pairs.disc;
+        return counts.merge_area(pair_level[m], sees_lens[m]) * others * light[m] * eye[m];
     if (!drops(counts.pairs.rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
     const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
     return counts.weighed_gathers(pair_level[m], k) * others * kept *
@@ -83,6 +82,10 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.eye.assign(size_t(n), 1);
     p.is_delta = delta;
     for (int i = 0; i < n; ++i) p.pair_level.push_back(x[size_t(i)]->pair_level);
+    p.sees_lens.assign(size_t(n), false);
+    for (int i = k - 1; i >= 1; --i)
+        p.sees_lens[i] = i == k - 1 || (p.sees_lens[i + 1] && delta[size_t(i) + 1] &&
+                                        !scene.sensor().has_finite_lens());
     for (int i = 0; i < n; ++i)
         p.gloss.push_back(i == 0 ? gloss_of_emitter(x[0]->emitter->is_area())
                                  : gloss(*x[i], delta[size_t(i)]));

@@ -16,6 +16,7 @@ struct PathPdfs {
     std::vector<bool> is_delta;       ///< Whether the path scatters by a delta event.
     std::vector<uint8_t> gloss;       ///< See gloss.h.
     std::vector<uint8_t> pair_level;  ///< See Vertex.
+    std::vector<bool> sees_lens;      ///< See Vertex.
     double next_event = 0;            ///< p_NE(x_0), sampled from x_1.
     bool can_hit_emitter = true;
     bool can_connect_ends = true;  ///< False where both ends are at infinity.

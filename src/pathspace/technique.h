@@ -73,8 +73,10 @@ struct PathSelection {
 
 /// Pairs of light and eye vertices near each other.
 struct PairModel {
-    float disc = 0;        ///< π d², the area of the disc in which partners are searched.
-    int min_edges = 2;     ///< Length, in edges, of the shortest paths made from pairs.
+    float disc = 0;  ///< π d², the area of the disc in which partners are searched.
+    float inner_disc =
+        0;              ///< The same for merges of eye vertices that do not see the lens (Vertex).
+    int min_edges = 2;  ///< Length, in edges, of the shortest paths made from pairs.
     float short_rate = 1;  ///< Share of gathers made for paths of three edges.
     PairRule rule = PairRule::Gloss;
     bool clamps = true;  ///< Whether weights clamp probabilities to 1 [Qin et al. 2015, eq. 24].
@@ -120,8 +122,11 @@ struct TechniqueCounts {
     double weighed_gathers(uint8_t pair_level, int edges) const {
         return double(gathers(edges)) * pair_share(pair_level);
     }
-    double weighed_merges(uint8_t pair_level) const {
-        return double(merge) * pair_share(pair_level);
+    /// Of merges at an x_m, the count in MIS weights times the area of the disc. All merges of an eye vertex share its eye
+    /// path; where x_m sees the lens (Vertex), that is no random choice, and they count in full.
+    double merge_area(uint8_t pair_level, bool sees_lens) const {
+        return sees_lens ? double(merge) * double(pairs.disc)
+                         : double(merge) * pair_share(pair_level) * double(pairs.inner_disc);
     }
     float of(const Technique& q) const {
         switch (q.strategy) {

@@ -55,11 +55,14 @@ struct Vertex {
     bool is_infinite = false;     ///< Whether it is at infinity; p is a direction then.
     bool has_cosine = true;       ///< Whether |cos θ| is part of G here, as on surfaces.
     bool is_connectible = false;  ///< Whether it has a smooth lobe or is an end point.
-    MediumId medium = kVacuum;    ///< On the edge to the predecessor.
-    Survival survival;            ///< Of Russian roulette before the walk left this vertex.
-    uint8_t gloss = 0;            ///< Of the emitter or the material, see gloss.h.
-    uint8_t pair_level = 0;       ///< Argument of pair_share().
-    uint8_t event = 0;            ///< Number of a delta event, see Bsdf::sample_delta().
+    /// Of an eye path: whether its film point determines it. It does where the lens is a point or at infinity, through
+    /// delta events alone; with a finite lens, z_1 counts as determined.
+    bool sees_lens = false;
+    MediumId medium = kVacuum;  ///< On the edge to the predecessor.
+    Survival survival;          ///< Of Russian roulette before the walk left this vertex.
+    uint8_t gloss = 0;          ///< Of the emitter or the material, see gloss.h.
+    uint8_t pair_level = 0;     ///< Argument of pair_share().
+    uint8_t event = 0;          ///< Number of a delta event, see Bsdf::sample_delta().
     const SceneShape* shape = nullptr;
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or of the surface.
     SurfaceLocation location;          ///< On a surface; for y_0 only `prim` is set.
@@ -151,7 +154,7 @@ struct SubPath {
         v.pdf_rev = 0;
         v.weight_sum = 0;
         v.next_event_ratio = 1;
-        v.is_delta = v.is_infinite = v.is_connectible = false;
+        v.is_delta = v.is_infinite = v.is_connectible = v.sees_lens = false;
         v.has_cosine = true;
         v.medium = kVacuum;
         v.survival = {};

@@ -37,6 +37,8 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, con
     v.beta = beta;
     // hit.t is the distance from the offset origin of the ray; densities need the distance between the vertices.
     const Vertex& previous = path[path.size() - 2];
+    v.sees_lens = previous.kind == Vertex::Kind::Sensor ||
+                  (previous.sees_lens && previous.is_delta && !scene.sensor().has_finite_lens());
     const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
     v.pdf_fwd = pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
     v.to_predecessor = previous.has_cosine && !previous.is_infinite

@@ -79,21 +79,23 @@ struct GatherSearch {
                 return {};
             return choice;
         };
-        grid.for_each_near(z.p, choose, [&](const GatherCandidate& y, const Choice& choice) {
-            for (const bool eye : {true, false}) {
-                if (!(eye ? choice.drops_eye : choice.drops_light)) continue;
-                cache.restore_first(c.scene, y.vertex, eye ? y.s : y.s - 1, work.is_observed,
-                                    work.pair);
-                const Neighbourhood kept = eye ? near(work.pair[y.s - 1], y.side) : near_eye;
-                if (eye && !kept.contains(near_eye.p, near_eye.side)) continue;
-                use(GatherPair{.technique = {Strategy::Gather, y.s, t, eye},
-                               .kept = kept,
-                               .number = pair_number(y.vertex, t, eye ? kDropsEye : kDropsLight),
-                               .estimate = choice.estimate,
-                               .survival = choice.survival,
-                               .rate = choice.rate});
-            }
-        });
+        grid.for_each_near(
+            z.p, grid.radius(), choose, [&](const GatherCandidate& y, const Choice& choice) {
+                for (const bool eye : {true, false}) {
+                    if (!(eye ? choice.drops_eye : choice.drops_light)) continue;
+                    cache.restore_first(c.scene, y.vertex, eye ? y.s : y.s - 1, work.is_observed,
+                                        work.pair);
+                    const Neighbourhood kept = eye ? near(work.pair[y.s - 1], y.side) : near_eye;
+                    if (eye && !kept.contains(near_eye.p, near_eye.side)) continue;
+                    use(GatherPair{.technique = {Strategy::Gather, y.s, t, eye},
+                                   .kept = kept,
+                                   .number =
+                                       pair_number(y.vertex, t, eye ? kDropsEye : kDropsLight),
+                                   .estimate = choice.estimate,
+                                   .survival = choice.survival,
+                                   .rate = choice.rate});
+                }
+            });
     }
 
     /// Factor from the contribution of a gather to the pixel's value, without r and roulette.

@@ -114,15 +114,22 @@ void LightVertexCache::restore_head(uint64_t index, SubPath& y) const {
     y0.beta = head.beta;
 }
 
+namespace {
+
+/// From a vertex toward its predecessor.
+Vec3 arrival_direction(const LightVertex& v, const Vertex& predecessor) {
+    return predecessor.is_infinite ? predecessor.p : normalize(predecessor.p - v.p);
+}
+
+}  // namespace
+
 void LightVertexCache::restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, SubPath& y,
                                       int i) const {
     const LightVertex& stored = vertices_[vertex];
     Vertex& v = y[i];
     if (bsdf) {
-        const Vertex& previous = y[i - 1];
-        const Vec3 wo = previous.is_infinite ? previous.p : normalize(previous.p - stored.p);
         v.set_surface(scene.shape(stored.location.shape), stored.location,
-                      scene.surface(stored.location), wo, y.arena);
+                      scene.surface(stored.location), arrival_direction(stored, y[i - 1]), y.arena);
     } else {
         v.kind = Vertex::Kind::Surface;
         v.p = stored.p;
@@ -159,17 +166,19 @@ uint8_t LightVertexCache::gloss_before(uint32_t vertex) const {
 }
 
 void LightVertexCache::restore_first(const Scene& scene, uint32_t vertex, int size, bool whole,
-                                     SubPath& y) const {
+                                     SubPath& y, bool with_bsdf) const {
     const uint64_t path = vertices_[vertex].path;
     const uint32_t begin = heads_[path].begin;
+    const int last = size - 1;
     y.clear();
     restore_head(path, y);
     for (int i = 1; i < size; ++i) {
         y.append();
-        // The BSDF of a vertex needs the position of its predecessor.
-        if (whole || i >= size - 3)
-            restore_vertex(scene, begin + uint32_t(i) - 1, i == size - 1, y, i);
+        // The direction at a vertex needs the position of its predecessor.
+        if (whole || i >= last - 2)
+            restore_vertex(scene, begin + uint32_t(i) - 1, i == last && with_bsdf, y, i);
     }
+    if (!with_bsdf && last >= 1) y[last].wo = arrival_direction(vertices_[vertex], y[last - 1]);
 }
 
 Photon LightVertexCache::photon(uint32_t vertex) const {

@@ -63,8 +63,10 @@ public:
     /// For the vertex y_i: the gloss of y_{i-1}, or kDeltaGloss after a delta event.
     uint8_t gloss_before(uint32_t vertex) const;
     /// Restores the first `size` vertices of the path of `vertex`. Only the vertices needed for joins with the last one
-    /// are set, y_0 and the last three, or all of them if `whole`; only the last one has a BSDF.
-    void restore_first(const Scene& scene, uint32_t vertex, int size, bool whole, SubPath& y) const;
+    /// are set, y_0 and the last three, or all of them if `whole`; only the last one has a BSDF, if `with_bsdf`: merges
+    /// read none.
+    void restore_first(const Scene& scene, uint32_t vertex, int size, bool whole, SubPath& y,
+                       bool with_bsdf = true) const;
 
     /// The flux that arrives at `vertex`.
     Photon photon(uint32_t vertex) const;

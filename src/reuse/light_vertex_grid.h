@@ -35,10 +35,10 @@ public:
     float mean_flux() const { return mean_flux_; }
     const PointGrid& points() const { return grid_; }
 
-    /// Calls use(candidate, choice) for the light vertices within the radius of `p` for which
+    /// Calls use(candidate, choice) for the light vertices within `radius` of `p`, at most that of build(), for which
     /// `choose(candidate) -> std::optional<Choice>` returns a choice.
     template <class Choose, class Use>
-    void for_each_near(Vec3 p, const Choose& choose, const Use& use) const {
+    void for_each_near(Vec3 p, float radius, const Choose& choose, const Use& use) const {
         constexpr int kBatch = 32;
         using Choice = typename decltype(choose(GatherCandidate{}))::value_type;
         struct Found {
@@ -52,7 +52,7 @@ public:
             for (size_t i = 0; i < count; ++i) use(batch[i].candidate, batch[i].choice);
             count = 0;
         };
-        grid_.for_each_near(p, radius_, [&](const PointGrid::Entry& e) {
+        grid_.for_each_near(p, radius, [&](const PointGrid::Entry& e) {
             Found& found = batch[count];
             found.candidate = {.p = e.p,
                                .vertex = e.index,

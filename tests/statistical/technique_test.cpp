@@ -139,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(TechniqueCase{"perspective", "perspective", "bdpt:"},
                       TechniqueCase{"thinlens", "thinlens", "bdpt:"},
                       TechniqueCase{"gathers", "perspective", "upg+bdpt:radius=0.4,", 3},
-                      TechniqueCase{"merges", "perspective", "vcm:radius=0.2,", 2},
+                      TechniqueCase{"merges", "perspective", "vcm:radius=0.35,", 2},
                       TechniqueCase{"exact_merges", "perspective", "vcm:exact=true,radius=0.2,", 2},
                       TechniqueCase{"cache", "perspective", "bdpt:connections=cache,"},
                       TechniqueCase{"stored", "perspective",

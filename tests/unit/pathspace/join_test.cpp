@@ -90,6 +90,7 @@ protected:
             (extra() == Extra::Merges ? counts.merge : counts.gather) = N;
             // Large enough for the clamp of gathers to matter now and then.
             counts.pairs.disc = 0.3f;
+            counts.pairs.inner_disc = 0.1f;
             counts.pairs.min_edges = extra() == Extra::Merges ? 2 : 3;
             if (extra() == Extra::Variants) {
                 counts.pairs.rule = PairRule::Both;
@@ -232,15 +233,15 @@ protected:
         const auto x = path_vertices(merged, s, z, t - 1);
         const auto delta = delta_events(x, s - 1, s - 1);
         const PathValue value = evaluate_path(scene, x, delta);
-        const double p = density_of(merged, s) * density_of(z, t) * double(counts.pairs.disc) *
-                         eye_jacobian(x, delta, s);
+        const float disc = b.sees_lens ? counts.pairs.disc : counts.pairs.inner_disc;
+        const double p =
+            density_of(merged, s) * density_of(z, t) * double(disc) * eye_jacobian(x, delta, s);
         Tally& tally = tally_of(Strategy::Merge, delta);
         for (int c = 0; c < 3; ++c)
             if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);
         tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
         // The same flux without its path.
-        const auto alone =
-            join_photon({a.p, a.wo, a.beta, y[0].emitter, s}, z, t, counts.pairs.disc);
+        const auto alone = join_photon({a.p, a.wo, a.beta, y[0].emitter, s}, z, t, disc);
         EXPECT_EQ(alone->contribution.g, j->contribution.g);
     }
 
