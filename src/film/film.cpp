@@ -67,8 +67,7 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
             }
             const float y = luminance(v);
             luminance_sum[chunk] += y;
-            expected_[i] =
-                luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / float(passes_);
+            expected_[i] = m.luminance_sum() / float(passes_);
             total[chunk] += expected_[i];
             if (group)
                 group[i] +=
@@ -143,16 +142,13 @@ ErrorEstimate Film::group_error() const {
     ErrorEstimate e;
     if (!has_all_groups()) return e;
     double mean = 0;
-    for (const Moments& m : moments_)
-        mean += luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2])));
+    for (const Moments& m : moments_) mean += double(m.luminance_sum());
     mean /= double(passes_) * double(moments_.size());
     etendue::Moments errors;
     for (size_t pair = 0; pair < group_sums_.size() / 2; ++pair) {
         double sum = 0;
         for (size_t i = 0; i < moments_.size(); ++i) {
-            const Moments& m = moments_[i];
-            const double y =
-                luminance(Rgb(float(m.sum[0]), float(m.sum[1]), float(m.sum[2]))) / double(passes_);
+            const double y = double(moments_[i].luminance_sum()) / double(passes_);
             const double scale2 = y * y + 0.01 * mean * mean;
             if (scale2 > 0) sum += group_error2(pair, i) / scale2;
         }

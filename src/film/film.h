@@ -97,6 +97,10 @@ public:
 private:
     struct Moments {
         double sum[3] = {0, 0, 0}, square[3] = {0, 0, 0};
+
+        float luminance_sum() const {
+            return luminance(Rgb(float(sum[0]), float(sum[1]), float(sum[2])));
+        }
     };
 
     static constexpr int kBlock = 4;

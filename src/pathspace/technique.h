@@ -68,7 +68,7 @@ struct PathSelection {
         const int edges = q.vertices() - 1;
         return edges >= shortest && edges <= longest && (!inner_only || is_inner(q));
     }
-    bool has_all_lengths() const { return shortest <= 1 && longest == kNoLimit; }
+    bool contains_all() const { return !inner_only && shortest <= 1 && longest == kNoLimit; }
 };
 
 /// Pairs of light and eye vertices near each other.

@@ -31,99 +31,101 @@ struct LearningStep {
     }
 };
 
-/// The sink of a rendering: the film, and who else wants to know.
+/// What receives the contributions of a rendering: the film, and on request technique images and an observer.
+struct Receivers {
+    Receivers(Film& film, TechniqueImages* techniques, const RenderSettings& settings,
+              float splat_scale, Workspace& work)
+        : film(film), techniques(techniques), observer(settings.observer), shown(settings.shown),
+          splat_scale(splat_scale), work(work) {}
+
+    Film& film;
+    TechniqueImages* techniques;
+    ContributionObserver* observer;
+    PathSelection shown;
+    float splat_scale;
+    Workspace& work;
+};
+
+/// The sink of samples.
 class FilmSink final : public ContributionSink {
 public:
-    FilmSink(Film& film, TechniqueImages* techniques, const RenderSettings& settings,
-             float splat_scale, Workspace& work)
-        : film_(film), techniques_(techniques), observer_(settings.observer),
-          shown_(settings.shown), splat_scale_(splat_scale), work_(work) {}
+    explicit FilmSink(const Receivers& to) : to_(to) {}
 
     void begin(uint64_t pixel) {
         pixel_ = pixel;
         sum_ = Rgb();
     }
-    void end() { film_.add_eye(pixel_, sum_); }
+    void end() { to_.film.add_eye(pixel_, sum_); }
 
     void add(const Join& join, Rgb contribution) override {
-        if (!shown_.contains(join.technique)) return;
+        if (!to_.shown.contains(join.technique)) return;
         const bool is_splat = join.technique.t <= 1;
         const Rgb value = contribution * join.mis_weight;
         if (!is_finite(value)) {
-            ++work_.stats.rejected;
+            ++to_.work.stats.rejected;
             return;
         }
         if (is_splat)
-            film_.add_splat(join.film, value);
+            to_.film.add_splat(join.film, value);
         else
-            sum_ += value * work_.z.film_weight;
-        if (techniques_) add_to_techniques(join, contribution);
-        if (observer_)
-            observer_->observe(join, contribution, is_splat ? splat_scale_ : work_.z.film_weight,
-                               pixel_, work_);
+            sum_ += value * to_.work.z.film_weight;
+        if (to_.techniques) add_to_techniques(join, contribution);
+        if (to_.observer)
+            to_.observer->observe(join, contribution,
+                                  is_splat ? to_.splat_scale : to_.work.z.film_weight, pixel_,
+                                  to_.work);
     }
 
 private:
     void add_to_techniques(const Join& join, Rgb contribution) {
         if (join.technique.t <= 1)
-            techniques_->add_splat(join.film, join.technique, contribution, join.mis_weight,
-                                   splat_scale_);
+            to_.techniques->add_splat(join.film, join.technique, contribution, join.mis_weight,
+                                      to_.splat_scale);
         else
-            techniques_->add_eye(pixel_, join.technique, contribution * work_.z.film_weight,
-                                 join.mis_weight);
+            to_.techniques->add_eye(pixel_, join.technique, contribution * to_.work.z.film_weight,
+                                    join.mis_weight);
     }
 
-    Film& film_;
-    TechniqueImages* techniques_;
-    ContributionObserver* observer_;
-    PathSelection shown_;
-    float splat_scale_;
-    Workspace& work_;
+    Receivers to_;
     uint64_t pixel_ = 0;
     Rgb sum_;
 };
 
-/// The sink of Markov chains: the film, and who else wants to know of joins.
+/// The sink of Markov chains.
 class FilmSplats final : public SplatSink {
 public:
-    FilmSplats(Film& film, TechniqueImages* techniques, const RenderSettings& settings,
-               float splat_scale, Workspace& work)
-        : film_(film), techniques_(techniques), observer_(settings.observer),
-          shown_(settings.shown), splat_scale_(splat_scale), work_(work) {}
+    explicit FilmSplats(const Receivers& to) : to_(to) {}
 
     void add(Vec2 film, Rgb value) override {
-        if (shows_all()) film_.add_splat(film, value);
+        if (to_.shown.contains_all()) to_.film.add_splat(film, value);
     }
     void tell(const Join& join, Rgb contribution, float factor) override {
-        if (!shown_.contains(join.technique) || !is_finite(contribution)) return;
-        if (!shows_all()) film_.add_splat(join.film, contribution * (join.mis_weight * factor));
-        const float share = splat_scale_ * factor;
-        if (techniques_)
-            techniques_->add_splat(join.film, join.technique, contribution, join.mis_weight, share);
-        if (observer_) observe(join, contribution, share);
+        if (!to_.shown.contains(join.technique) || !is_finite(contribution)) return;
+        if (!to_.shown.contains_all())
+            to_.film.add_splat(join.film, contribution * (join.mis_weight * factor));
+        const float share = to_.splat_scale * factor;
+        if (to_.techniques)
+            to_.techniques->add_splat(join.film, join.technique, contribution, join.mis_weight,
+                                      share);
+        if (to_.observer) observe(join, contribution, share);
     }
-    /// Whether anybody but the film asks for joins.
-    bool needs_joins() const { return techniques_ || observer_ || !shows_all(); }
+    /// Whether tell() does anything.
+    bool needs_joins() const { return to_.techniques || to_.observer || !to_.shown.contains_all(); }
 
 private:
-    bool shows_all() const { return !shown_.inner_only && shown_.has_all_lengths(); }
     void observe(const Join& join, Rgb contribution, float share) {
         if (join.technique.t <= 1) {
-            observer_->observe(join, contribution, share, 0, work_);
+            to_.observer->observe(join, contribution, share, 0, to_.work);
             return;
         }
         // The eye path has no pixel: it belongs to all that its film point reaches.
-        for_each_pixel(film_.geometry(), film_.filter(), join.film, [&](uint64_t pixel, float h) {
-            observer_->observe(join, contribution, share * h, pixel, work_);
-        });
+        for_each_pixel(to_.film.geometry(), to_.film.filter(), join.film,
+                       [&](uint64_t pixel, float h) {
+                           to_.observer->observe(join, contribution, share * h, pixel, to_.work);
+                       });
     }
 
-    Film& film_;
-    TechniqueImages* techniques_;
-    ContributionObserver* observer_;
-    PathSelection shown_;
-    float splat_scale_;
-    Workspace& work_;
+    Receivers to_;
 };
 
 }  // namespace
@@ -258,7 +260,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
             go_on();
             Workspace& work = workspace();
             Sampler sampler(settings_.sampler, seed);
-            FilmSink sink(film_, techniques_.get(), settings_, splat_scale, work);
+            FilmSink sink({film_, techniques_.get(), settings_, splat_scale, work});
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
                 sampler.start(step.pass, pixel);
@@ -279,39 +281,40 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
                                 .so_far = stats_});
         ++learned_passes_;
     }
-    integrator_->trace({.scene = scene_,
-                        .film = film_,
-                        .index = index,
-                        .light_paths = light_paths,
-                        .pixels = pixels,
-                        .seed = seed,
-                        .for_each_sample =
-                            [&](uint64_t count, const PassContext::Use& use) {
-                                for_each_sample(count, [&](const SampleContext& c, Workspace& work,
-                                                           FilmSink&) { use(c, work); });
-                            },
-                        .chunks = chunks,
-                        .for_each_other_path =
-                            [&](uint64_t count, const PassContext::Task& task) {
-                                tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
-                                    go_on();
-                                    Sampler sampler(settings_.sampler, seed);
-                                    Workspace& work = workspace();
-                                    work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
-                                    task(i, sampler, work);
-                                });
-                            },
-                        .for_each_chain =
-                            [&](uint64_t count, const PassContext::ChainTask& task) {
-                                tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
-                                    go_on();
-                                    Workspace& work = workspace();
-                                    FilmSplats splats(film_, techniques_.get(), settings_,
-                                                      splat_scale, work);
-                                    work.is_observed = splats.needs_joins();
-                                    task(i, splats, work);
-                                });
-                            }});
+    integrator_->trace(
+        {.scene = scene_,
+         .film = film_,
+         .index = index,
+         .light_paths = light_paths,
+         .pixels = pixels,
+         .seed = seed,
+         .for_each_sample =
+             [&](uint64_t count, const PassContext::Use& use) {
+                 for_each_sample(count, [&](const SampleContext& c, Workspace& work, FilmSink&) {
+                     use(c, work);
+                 });
+             },
+         .chunks = chunks,
+         .for_each_other_path =
+             [&](uint64_t count, const PassContext::Task& task) {
+                 tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                     go_on();
+                     Sampler sampler(settings_.sampler, seed);
+                     Workspace& work = workspace();
+                     work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
+                     task(i, sampler, work);
+                 });
+             },
+         .for_each_chain =
+             [&](uint64_t count, const PassContext::ChainTask& task) {
+                 tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                     go_on();
+                     Workspace& work = workspace();
+                     FilmSplats splats({film_, techniques_.get(), settings_, splat_scale, work});
+                     work.is_observed = splats.needs_joins();
+                     task(i, splats, work);
+                 });
+             }});
     for_each_sample(pixels, [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
         sink.begin(c.pixel);
         integrator_->sample(c, work);
