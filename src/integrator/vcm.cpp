@@ -7,6 +7,7 @@
 
 #include "integrator/vcm.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "integrator/bidirectional.h"
@@ -20,6 +21,8 @@ namespace {
 
 /// In radii of a pixel's disc (pixel_radius()). Less is noisier on caustics, more blurs them.
 constexpr float kDefaultRadius = 6;
+/// The largest default, of the radius of the scene's bounds: small images of small scenes would be blurred.
+constexpr float kLargestRadius = 0.01f;
 /// The radius of merges behind a diffuse or glossy eye vertex, over that of others. Such merges share a random eye path, so
 /// each of them is worth less; they matter for light that no other technique finds.
 constexpr float kInnerRadius = 0.3f;
@@ -105,7 +108,8 @@ private:
     /// Of pass `index`.
     float radius(const Scene& scene, uint32_t index) {
         if (radius_params_.first == 0 && !default_radius_)
-            default_radius_ = kDefaultRadius * pixel_radius(scene);
+            default_radius_ = std::min(kDefaultRadius * pixel_radius(scene),
+                                       kLargestRadius * scene.bounds().radius());
         return radius_params_.schedule(default_radius_.value_or(0)).radius(index);
     }
     /// Of the light vertices of the pass before.
@@ -180,7 +184,8 @@ IntegratorEntry vcm_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
     for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
                                             "that of a disc with the area of 36 pixels, as the "
-                                            "median pixel sees the scene. Eye vertices that the "
+                                            "median pixel sees the scene, but at most 1 % of the "
+                                            "radius of the scene's bounds. Eye vertices that the "
                                             "film point does not determine merge within 0.3 times "
                                             "this radius."))
         params.push_back(p);
