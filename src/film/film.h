@@ -1,5 +1,5 @@
 #pragma once
-// The film: what integrators add to, pass by pass, and what the image and its variance are read from. All normalisation
+// The film: integrators add contributions to it pass by pass; it gives the image and its variance. All normalisation
 // (number of light paths, crop, filter) is here.
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace etendue {
 
-/// Statistics of the passes' spread.
+/// The image's error, estimated from the differences between passes.
 struct ErrorEstimate {
     double relative_rms =
         0;  ///< sqrt(mean over pixels of variance / (I² + 0.01·mean(I)²)), of the mean of all passes.
@@ -19,11 +19,12 @@ struct ErrorEstimate {
     bool valid = false;        ///< False until there are enough passes.
 };
 
-/// Accumulates passes: the image of the pass in flight, which can be dropped, and totals of the finished ones, into which
-/// it is folded. Within a pass, eye contributions of a pixel come from one thread at a time; splats from any.
+/// Accumulates passes. The image of the current pass is kept apart, so that the pass can be dropped; a finished pass is
+/// added to the totals. Within a pass, eye contributions of a pixel come from one thread at a time; splats from any.
 class Film {
 public:
-    /// `typical_radiance`: of the scene, to an order of magnitude or three; the precision of small splats is relative to it.
+    /// `typical_radiance`: an estimate of the scene's radiance, right within a factor of 1000 or so. The absolute precision of
+    /// splats is 2^-40 of it.
     Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
          double typical_radiance = 1);
     Film(const Film&) = delete;
@@ -54,7 +55,7 @@ public:
     /// group has had a pass. Even, and set before the first pass.
     void set_groups(int count);
 
-    // -- The pass in flight.
+    // -- The current pass.
 
     /// Light paths that this pass traces (splats are divided by it); 0 where there are none.
     void begin_pass(uint64_t light_paths);
@@ -65,18 +66,19 @@ public:
     void add_splat(Vec2 point, Rgb value) { pass_.add_splat(point, value); }
     /// Hints that a splat at `point` may follow.
     void prefetch_splat(Vec2 point) const { pass_.prefetch_splat(point); }
-    /// Folds the pass into the totals. `splat_factor`: what splats count in the estimates of errors by groups.
+    /// Adds the pass to the totals. `splat_factor`: the factor of splats in the groups' sums, from which errors are
+    /// estimated.
     void end_pass(double splat_factor = 1);
-    /// Forgets the pass: the totals stay what they were before begin_pass().
+    /// Drops the pass; the totals stay as they were before begin_pass().
     void drop_pass() { pass_.clear(); }
 
-    // -- Totals of the finished passes; they do not depend on the pass in flight.
+    // -- Totals of the finished passes; they do not include the current pass.
 
     uint64_t passes() const { return passes_; }
-    /// Luminance that earlier passes lead to expect of a pixel, at least a tenth of the image's mean; 0 in the first pass.
+    /// Mean luminance of a pixel in the finished passes, at least a tenth of the image's mean; 0 in the first pass.
     float expected_luminance(uint64_t pixel) const { return expected_[pixel]; }
-    /// The same about a film point (clamped to the crop): the mean of a block of pixels, since splats land anywhere and
-    /// would wait for the memory of single ones.
+    /// The same at a film point (clamped to the crop), averaged over a block of pixels: the blocks fit into a cache, and
+    /// splats read them in random order.
     float expected_luminance(Vec2 point) const {
         const auto [x, y] = geometry_.pixel_near(point);
         return expected_blocks_[uint64_t(y / kBlock) * blocks_across() + uint64_t(x / kBlock)];
@@ -110,9 +112,9 @@ private:
     uint64_t passes_of_group(size_t group) const {
         return (passes_ + group_sums_.size() - 1 - group) / group_sums_.size();
     }
-    /// Keeps the luminance of what eye paths added in previous_.
+    /// Stores the luminance of the eye paths' contributions in previous_.
     void keep_eye_values();
-    /// Squared error of the luminance of pixel i, as two groups, 2·pair and the next, show it.
+    /// Squared error of the mean luminance of a pixel, estimated from the groups 2·pair and 2·pair + 1.
     double group_error2(size_t pair, size_t pixel) const;
     ErrorEstimate group_error() const;
     void fold(std::span<const Rgb> pass, double splat_factor);
@@ -125,8 +127,8 @@ private:
     std::vector<Moments> moments_;
     std::vector<float> expected_;
     std::vector<float> expected_blocks_;  ///< Means of kBlock × kBlock pixels.
-    /// Luminance of the last pass with an even index; once the next is folded, what it differs by. With groups that of the
-    /// eye paths of the pass that is being folded.
+    /// Luminance of the last pass with an even index; after the next pass, the difference of the two. With groups: the
+    /// luminance of the eye paths of the pass that is being added.
     std::vector<float> previous_;
     std::vector<double>
         pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.

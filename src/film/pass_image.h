@@ -11,7 +11,7 @@
 
 namespace etendue {
 
-/// The image of the pass in flight, apart from the film's totals, so that the pass can be dropped. Eye contributions of a
+/// The image of the current pass, apart from the film's totals, so that the pass can be dropped. Eye contributions of a
 /// pixel come from one thread at a time; splats from any. `geometry` and `filter` must outlive it.
 class PassImage {
 public:
@@ -27,7 +27,7 @@ public:
     void prefetch_splat(Vec2 point) const { splats_->prefetch(geometry_.pixel_at(point)); }
     bool has_splats() const { return splats_ != nullptr; }
 
-    /// What eye paths added, until finish().
+    /// The contributions of eye paths, until finish().
     std::span<const Rgb> eye_values() const { return pixels_; }
     /// The finished image. Pixels that are not finite become 0, and count as rejected.
     std::span<const Rgb> finish();

@@ -14,7 +14,7 @@ int unit_exponent(double typical_radiance) {
     return std::clamp(std::ilogb(typical_radiance) - kBits, -149, 127);
 }
 
-/// What is in a cell that no other thread is at; it becomes 0.
+/// Value of a cell that no other thread uses; sets it to 0.
 int64_t empty(std::atomic<int64_t>& cell) {
     const int64_t n = cell.load(std::memory_order_relaxed);
     cell.store(0, std::memory_order_relaxed);
@@ -35,7 +35,7 @@ void SplatBuffer::add_large(uint64_t cell, double units) {
 }
 
 void SplatBuffer::carry(size_t digit, uint64_t cell, Cell& from) {
-    // Another thread may have been here before; then there is little to take.
+    // Another thread may have carried the cell's value on already; then there is little left.
     const int64_t taken = from.exchange(0, std::memory_order_relaxed);
     const int64_t passed = taken >> kDigitBits;
     add(digit, cell, taken - (passed << kDigitBits));

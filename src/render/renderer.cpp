@@ -151,8 +151,8 @@ const char* to_string(Estimator estimator) {
 
 namespace {
 
-/// Radiance in the scene, to an order of magnitude or three: as if all emitted power left its bounding sphere evenly.
-/// Like the image, it is proportional to the emitters.
+/// An estimate of the scene's radiance, right within a factor of 1000 or so: as if all emitted power left the bounding
+/// sphere uniformly. Like the image, it is proportional to the emitters' radiance.
 double typical_radiance(const Scene& scene) {
     double power = 0;
     for (const auto& emitter : scene.emitters()) power += emitter->power();
@@ -180,14 +180,14 @@ struct Renderer::Workers {
         : allowed(allow_threads(threads)),
           arena(threads > 0 ? threads : tbb::task_arena::automatic) {}
 
-    /// The sum of all workers' statistics, which begin anew.
+    /// Returns the sum of all workers' statistics and resets them.
     RenderStats take_stats() {
         RenderStats sum;
         for (Workspace& w : spaces) sum += std::exchange(w.stats, {});
         return sum;
     }
 
-    /// Every worker's sums for the integrator, which begin anew.
+    /// Returns every worker's sums for the integrator and resets them.
     std::vector<std::unique_ptr<PassSums>> take_sums() {
         std::vector<std::unique_ptr<PassSums>> taken;
         for (Workspace& w : spaces)
@@ -271,7 +271,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
             }
         });
     };
-    // A pass that was dropped and is traced again is learned for once.
+    // A dropped pass is traced again; its learning step is not repeated.
     if (learned_passes_ == index) {
         if (LearningStep::of(index).pass == 0)
             integrator_->learn({.scene = scene_,
@@ -328,7 +328,7 @@ std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
                                             const ErrorEstimate& error) const {
     if (film_.passes() == 0) return {};
     if (limits.spp && film_.passes() >= *limits.spp) return StopReason::Samples;
-    // The next pass is begun only if its larger part fits.
+    // A pass is begun only if at least half of it is expected to fit.
     if (limits.seconds && seconds_ + 0.5 * seconds_ / double(film_.passes()) > *limits.seconds)
         return StopReason::Time;
     if (limits.error && error.valid && error.relative_rms <= *limits.error)

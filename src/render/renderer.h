@@ -47,25 +47,24 @@ const char* to_string(Estimator estimator);
 
 class Renderer {
 public:
-    /// Throws std::runtime_error where the integrator's parameters are wrong. The scene must outlive the renderer.
+    /// Throws std::runtime_error if the integrator's parameters are wrong. The scene must outlive the renderer.
     Renderer(const Scene& scene, const RenderSettings& settings);
     /// With this integrator instead of the settings'.
     Renderer(const Scene& scene, const RenderSettings& settings,
              std::unique_ptr<Integrator> integrator);
     ~Renderer();
 
-    /// Renders until a limit is reached or `interrupted` is set; the pass in flight is then finished, unless `drop` is set
-    /// too. `progress` is called after every pass, from the calling thread.
+    /// Renders until a limit is reached or `interrupted` is set. The current pass is finished, unless `drop` is set too. `progress` is called after every pass, from the calling thread.
     ///
-    /// A pass is dropped where `drop` is set, and where anything in it throws, which goes on to the caller: film, technique
-    /// images and statistics are then as after the pass before.
+    /// A pass is dropped if `drop` is set or if it throws an exception, which the caller receives. Film, technique images
+    /// and statistics are then as they were after the pass before.
     StopReason run(const std::function<void(const Progress&)>& progress,
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop) {
         return run(settings_, progress, interrupted, drop);
     }
-    /// The same up to other limits. Limits count from the first pass on, and what is rendered in several calls is what
-    /// one call renders: a renderer goes on where it stopped.
+    /// The same with other limits. Limits count from the first pass on. Several calls render the same image as one call:
+    /// each continues where the last one stopped.
     StopReason run(const RenderLimits& limits, const std::function<void(const Progress&)>& progress,
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop);
