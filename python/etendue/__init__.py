@@ -26,6 +26,8 @@ from ._reports import CompareReport, VerifyReport, compare, verify
 from ._scenes import (load, load_dict, load_string, look_at, plugins, rotate, scale, translate)
 from ._show import show
 
+SceneError.__module__ = "etendue"
+
 __all__ = [
     "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Progress", "Result", "Scene", "SceneError",
     "VerifyReport", "compare", "core", "diff", "load", "load_dict", "load_string", "look_at", "plugins", "read_image",

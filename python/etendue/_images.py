@@ -2,6 +2,7 @@
 
 import json
 from os import PathLike, fspath
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -37,7 +38,16 @@ def read_image(file: str | PathLike[str], layer: str = "") -> Image:
 
 
 def write_image(file: str | PathLike[str], image: ArrayLike) -> None:
-    """Writes linear RGB of shape (H, W, 3) as .exr, .pfm, .hdr or .png (sRGB, clamped to [0, 1])."""
+    """Writes linear RGB of shape (H, W, 3) as .exr, .pfm, .hdr or .png (sRGB, clamped to [0, 1]); or 8-bit sRGB codes of
+    that shape, as tonemap() makes them, as .png.
+    """
+    if isinstance(image, np.ndarray) and image.dtype == np.uint8:
+        if Path(file).suffix.lower() != ".png":
+            raise ValueError(f"8-bit codes can be written as .png only, not as {fspath(file)}")
+        unfinished = Path(f"{fspath(file)}.part")
+        unfinished.write_bytes(_etendue.png(np.ascontiguousarray(image)))
+        unfinished.replace(file)
+        return
     _etendue.write_image(fspath(file), _pixels(image))
 
 

@@ -66,12 +66,13 @@ def vertex_at(scene: Scene, o: Vector, d: Vector) -> Vertex | None:
 
 
 def join(
-    scene: Scene, y: SubPath | None, s: int, z: SubPath | None, t: int, *, seed: int = 0, counts: Counts = _BDPT
+    scene: Scene, y: SubPath | None, s: int, z: SubPath | None, t: int, *, seed: int = 0, counts: Counts | None = None
 ) -> list[Join]:
     """The paths that the first s vertices of y and the first t of z make, after the shadow ray: none where the
     contribution is zero, one, or for s = 0 one for each emitter at infinity. t is at least 1.
 
-    seed: of the point that s = 1 samples on an emitter, and t = 1 on a finite lens.
+    seed: of the point that s = 1 samples on an emitter, and t = 1 on a finite lens. counts: those that the sub-paths were
+    walked with, whose MIS weights are right; None: those.
     """
     return _etendue.join(scene, y, s, z, t, seed, counts)
 

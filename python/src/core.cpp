@@ -485,12 +485,18 @@ void bind_core(nb::module_& m) {
             },
             nb::kw_only(), "hit"_a = 0.0f, "next_event"_a = 0.0f, "connect"_a = 0.0f,
             "splat"_a = 0.0f)
-        .def_ro("hit", &F::hit, "Samples of C(0,t), the eye path hits an emitter; a number for each eye path.")
-        .def_ro("next_event", &F::next_event, "Samples of C(1,t), a point sampled on an emitter; a number for each eye path.")
-        .def_ro("connect", &F::connect, "Samples of C(s,t), connections of two vertices; a number for each eye path.")
-        .def_ro("splat", &F::splat, "Samples of C(s,1), connections to the lens: the number of light paths.")
-        .def_ro("hit_lens", &F::hit_lens, "Samples of C(s,0), hits of a finite lens: the number of light paths.")
-        .def_ro("merge", &F::merge, "Samples of M(s,t), merges of near vertices: the number of light paths.")
+        .def_ro("hit", &F::hit,
+                "Samples of C(0,t), the eye path hits an emitter; a number for each eye path.")
+        .def_ro("next_event", &F::next_event,
+                "Samples of C(1,t), a point sampled on an emitter; a number for each eye path.")
+        .def_ro("connect", &F::connect,
+                "Samples of C(s,t), connections of two vertices; a number for each eye path.")
+        .def_ro("splat", &F::splat,
+                "Samples of C(s,1), connections to the lens: the number of light paths.")
+        .def_ro("hit_lens", &F::hit_lens,
+                "Samples of C(s,0), hits of a finite lens: the number of light paths.")
+        .def_ro("merge", &F::merge,
+                "Samples of M(s,t), merges of near vertices: the number of light paths.")
         .def_ro("gather", &F::gather, "Samples of U(s,t), gathers: the number of light paths.")
         .def("__repr__", [](const F& c) {
             return fmt::format("Counts(hit={}, next_event={}, connect={}, splat={})", c.hit,
@@ -528,11 +534,12 @@ void bind_core(nb::module_& m) {
     nb::class_<VertexHandle>(m, "Vertex",
                              "A vertex of a path. It keeps its sub-path and scene alive.")
         .def_prop_ro(
-            "p", [vec](const VertexHandle& v) { return vec(v.vertex().p); }, nb::rv_policy::automatic,
+            "p", [vec](const VertexHandle& v) { return vec(v.vertex().p); },
+            nb::rv_policy::automatic,
             "Position, shape (3,), in scene units; at infinity the unit direction toward it.")
         .def_prop_ro(
-            "ng", [vec](const VertexHandle& v) { return vec(v.vertex().ng); }, nb::rv_policy::automatic,
-            "Unit geometric normal, shape (3,).")
+            "ng", [vec](const VertexHandle& v) { return vec(v.vertex().ng); },
+            nb::rv_policy::automatic, "Unit geometric normal, shape (3,).")
         .def_prop_ro(
             "ns",
             [vec](const VertexHandle& v) {
@@ -540,13 +547,16 @@ void bind_core(nb::module_& m) {
                 return vec(x.kind == Vertex::Kind::Surface && !x.is_infinite
                                ? x.bsdf.shading_normal()
                                : x.ng);
-            }, nb::rv_policy::automatic,
+            },
+            nb::rv_policy::automatic,
             "Unit shading normal, shape (3,); the geometric one at end points.")
         .def_prop_ro(
-            "wo", [vec](const VertexHandle& v) { return vec(v.vertex().wo); }, nb::rv_policy::automatic,
+            "wo", [vec](const VertexHandle& v) { return vec(v.vertex().wo); },
+            nb::rv_policy::automatic,
             "Unit direction toward the predecessor, shape (3,); undefined at the first vertex.")
         .def_prop_ro(
-            "beta", [](const VertexHandle& v) { return to_array(v.vertex().beta); }, nb::rv_policy::automatic,
+            "beta", [](const VertexHandle& v) { return to_array(v.vertex().beta); },
+            nb::rv_policy::automatic,
             "Throughput up to, not including, scattering here; linear RGB, shape (3,).")
         .def_prop_ro(
             "pdf_fwd", [](const VertexHandle& v) { return v.vertex().pdf_fwd; },
@@ -618,12 +628,13 @@ void bind_core(nb::module_& m) {
             "i"_a, "Vertex i, which keeps the sub-path alive.")
         .def_prop_ro(
             "p",
-            [](const Path& p) { return rows(p, 3, [](const Vertex& v) { return triple(v.p); }); }, nb::rv_policy::automatic,
+            [](const Path& p) { return rows(p, 3, [](const Vertex& v) { return triple(v.p); }); },
+            nb::rv_policy::automatic,
             "Positions, shape (n, 3), in scene units; at infinity unit directions.")
         .def_prop_ro(
             "ng",
-            [](const Path& p) { return rows(p, 3, [](const Vertex& v) { return triple(v.ng); }); }, nb::rv_policy::automatic,
-            "Unit geometric normals, shape (n, 3).")
+            [](const Path& p) { return rows(p, 3, [](const Vertex& v) { return triple(v.ng); }); },
+            nb::rv_policy::automatic, "Unit geometric normals, shape (n, 3).")
         .def_prop_ro(
             "ns",
             [](const Path& p) {
@@ -631,25 +642,28 @@ void bind_core(nb::module_& m) {
                     const bool is_surface = v.kind == Vertex::Kind::Surface && !v.is_infinite;
                     return triple(is_surface ? v.bsdf.shading_normal() : v.ng);
                 });
-            }, nb::rv_policy::automatic,
-            "Unit shading normals, shape (n, 3).")
+            },
+            nb::rv_policy::automatic, "Unit shading normals, shape (n, 3).")
         .def_prop_ro(
             "beta",
             [](const Path& p) {
                 return rows(p, 3, [](const Vertex& v) { return triple(v.beta); });
-            }, nb::rv_policy::automatic,
+            },
+            nb::rv_policy::automatic,
             "Throughputs up to, not including, scattering at the vertex; linear RGB, shape (n, 3).")
         .def_prop_ro(
             "pdf_fwd",
             [](const Path& p) {
                 return rows(p, 1, [](const Vertex& v) { return std::array{v.pdf_fwd}; });
-            }, nb::rv_policy::automatic,
+            },
+            nb::rv_policy::automatic,
             "Densities as sampled from the predecessor, per unit area, shape (n,).")
         .def_prop_ro(
             "pdf_rev",
             [](const Path& p) {
                 return rows(p, 1, [](const Vertex& v) { return std::array{v.pdf_rev}; });
-            }, nb::rv_policy::automatic,
+            },
+            nb::rv_policy::automatic,
             "Densities as sampled from the successor, per unit area, shape (n,); 0 at the last "
             "two.")
         .def_prop_ro(
@@ -667,7 +681,8 @@ void bind_core(nb::module_& m) {
             "technique", [](const JoinHandle& j) { return j.join.technique; },
             "How the path was made.")
         .def_prop_ro(
-            "contribution", [](const JoinHandle& j) { return to_array(j.contribution); }, nb::rv_policy::automatic,
+            "contribution", [](const JoinHandle& j) { return to_array(j.contribution); },
+            nb::rv_policy::automatic,
             "Unweighted contribution f / p after the shadow ray, linear RGB radiance, shape "
             "(3,); for t = 1 that of one light path.")
         .def_prop_ro(
@@ -703,7 +718,8 @@ void bind_core(nb::module_& m) {
     nb::class_<PathPdfs>(m, "PathPdfs",
                          "Densities of the vertices of a whole path, from both sides.")
         .def_prop_ro(
-            "light", [](const PathPdfs& p) { return vector_array(p.light); }, nb::rv_policy::automatic,
+            "light", [](const PathPdfs& p) { return vector_array(p.light); },
+            nb::rv_policy::automatic,
             "Density of each vertex as sampled from the light's side, per unit area, shape "
             "(n,); of x_0 the emitter's.")
         .def_prop_ro(
@@ -766,13 +782,14 @@ void bind_core(nb::module_& m) {
     m.def(
         "join",
         [](const ScenePtr& scene, const PathPtr& y, int s, const PathPtr& z, int t, uint64_t seed,
-           const TechniqueCounts& counts) {
+           const std::optional<TechniqueCounts>& counts) {
             Sampler sampler(SamplerKind::Independent, seed);
             sampler.start(0, 0);
             RenderStats stats;
-            return joins(scene->scene, scene, y, s, z, t, sampler, counts, stats);
+            const TechniqueCounts own = z ? z->counts : y ? y->counts : TechniqueCounts{};
+            return joins(scene->scene, scene, y, s, z, t, sampler, counts.value_or(own), stats);
         },
-        "scene"_a, "y"_a.none(), "s"_a, "z"_a.none(), "t"_a, "seed"_a, "counts"_a);
+        "scene"_a, "y"_a.none(), "s"_a, "z"_a.none(), "t"_a, "seed"_a, "counts"_a.none());
     m.def(
         "evaluate",
         [](const ScenePtr& scene, const std::vector<VertexHandle>& x,

@@ -282,7 +282,9 @@ Place find(const SceneDescription& scene, const std::string& path) {
         const SceneObject& o = scene.objects[size_t(at.object)];
         owner = fmt::format("{} \"{}\"", o.category, o.type);
         if (const PluginInfo* info = find_plugin(o.category, o.type))
-            for (const ParamInfo& p : info->params) known.push_back(p.name);
+            for (const ParamInfo& p : info->params)
+                if (std::find(known.begin(), known.end(), p.name) == known.end())
+                    known.push_back(p.name);
     }
     throw SceneError({path, 0}, fmt::format("{} has no {}{}", owner, quote(at.parameter),
                                             hint(at.parameter, known)));
@@ -495,7 +497,8 @@ void bind_description(nb::module_& m) {
             },
             "path"_a, "Whether the description has a parameter or object of this path.")
         .def(
-            "copy", [](const SceneDescription& d) { return d; }, "A copy, a description to be edited on its own.")
+            "copy", [](const SceneDescription& d) { return d; },
+            "A copy, a description to be edited on its own.")
         .def("__copy__", [](const SceneDescription& d) { return d; })
         .def(
             "__deepcopy__", [](const SceneDescription& d, nb::handle) { return d; }, "memo"_a)

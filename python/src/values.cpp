@@ -72,7 +72,8 @@ std::string printed(nb::handle value) {
 }
 
 [[noreturn]] void refuse(nb::handle value, const ValueContext& c, const char* expected) {
-    throw SceneError(c.where, fmt::format("expected {}, found {}", expected, quote(printed(value))));
+    throw SceneError(c.where,
+                     fmt::format("expected {}, found {}", expected, quote(printed(value))));
 }
 
 Rgb rgb_value(nb::handle value, const ValueContext& c) {

@@ -249,7 +249,7 @@ Contents read_png(const std::string& path) {
     for (size_t i = 0; i < values.size(); ++i) {
         uint16_t code = 0;
         std::memcpy(&code, bytes.data() + 2 * i, 2);
-        values[i] = float(code) / 65535.0f;
+        values[i] = float(code) * (1.0f / 65535.0f);
     }
     p.data = std::move(values);
     return c;
@@ -510,7 +510,7 @@ std::vector<float> to_floats(const Contents& c, bool keep_codes) {
             out.reserve(values.size());
             const bool is_code = c.largest_code > 1;
             for (const auto v : values)
-                out.push_back(is_code ? float(v) / float(c.largest_code) : float(v));
+                out.push_back(is_code ? float(v) * (1.0f / float(c.largest_code)) : float(v));
         },
         c.pixels.data);
     if (!c.is_linear && !keep_codes)

@@ -119,6 +119,13 @@ def test_images_survive_files(tmp_path: Path) -> None:
         et.write_image(tmp_path / name, image)
         np.testing.assert_allclose(et.read_image(tmp_path / name), image, rtol=0,
                                    atol=tolerance * float(image.max(axis=2).max()))
+    codes = et.tonemap(image)
+    et.write_image(tmp_path / "a.png", codes)
+    from PIL import Image
+
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.png")), codes)
+    with pytest.raises(ValueError, match="as .png only"):
+        et.write_image(tmp_path / "a.exr", codes)
     with pytest.raises(RuntimeError, match="must end in .exr"):
         et.write_image(tmp_path / "a.gif", image)
 
