@@ -17,7 +17,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = str(ROOT / "scenes" / "cornell.xml")
-FEW, MANY = 2, 66
+FEW, MANY = 2, 34
 
 CODE = """
 import sys, etendue as et
