@@ -134,11 +134,14 @@ def test_arrays_outlive_result_and_scene(scenes: Path) -> None:
 
 
 def test_half_widths_cover_the_truth(cornell: et.Scene) -> None:
-    """95 % of the pixels' intervals contain the mean of many more samples, to within the error of that share."""
-    truth = et.render(cornell, "path:max_depth=3", spp=4000, sampler="independent", seed=1).image
-    result = et.render(cornell, "path:max_depth=3", spp=128, sampler="independent", seed=2)
+    """95 % of the pixels' intervals contain the mean of many more samples, to within three standard errors of that share
+    and a percent for values that are not normal: 0.942. Planted factors of 0.8 and 1.25 give 0.867 and 0.977.
+    """
+    scene = cornell.description.build(resolution=(16, 12))
+    truth = et.render(scene, "path:max_depth=3", spp=16384, sampler="independent", seed=100).image
     lit = truth.mean(axis=2) > 0
-    share = (np.abs(result.image - truth) <= result.half_width)[lit].mean()
+    results = [et.render(scene, "path:max_depth=3", spp=512, sampler="independent", seed=seed) for seed in range(8)]
+    share = np.mean([(np.abs(r.image - truth) <= r.half_width)[lit].mean() for r in results])
     assert 0.92 < share < 0.97
     assert np.isnan(et.render(cornell, spp=1).half_width).all()
 
