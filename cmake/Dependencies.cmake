@@ -10,6 +10,12 @@ find_package(Imath REQUIRED)
 find_package(Boost REQUIRED)  # Boost.Math, header only
 find_path(XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
 
+if(ETENDUE_PYTHON)
+    find_package(OpenEXR REQUIRED)
+    find_package(PNG REQUIRED)
+    find_package(JPEG REQUIRED)
+endif()
+
 # Debian 12 has Embree 3.13; the code also compiles with Embree 4.
 find_package(embree 4 QUIET)
 if(NOT embree_FOUND)

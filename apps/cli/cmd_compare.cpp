@@ -12,10 +12,12 @@
 
 #include "commands.h"
 #include "compare/comparison.h"
+#include "compare/default_reference.h"
 #include "compare/report.h"
 #include "interrupt.h"
 #include "number_checks.h"
 #include "path_lengths.h"
+#include "render/defaults.h"
 #include "scene_options.h"
 
 namespace etendue {
@@ -37,8 +39,6 @@ private:
     void check() const;
     PathSelection shown() const;
     CompareSettings settings(const Scene& scene) const;
-    IntegratorSpec reference_integrator(const Scene& scene,
-                                        const std::vector<MethodSpec>& specs) const;
     RenderSettings reference_settings(const Scene& scene,
                                       const std::vector<MethodSpec>& specs) const;
 };
@@ -63,17 +63,6 @@ private:
     bool active_;
     Clock::time_point last_;
 };
-
-/// The integrator's max_depth as text: given in `spec`, or the default of its table.
-std::string max_depth(const IntegratorSpec& spec) {
-    if (const auto found = spec.params.find("max_depth"); found != spec.params.end())
-        return found->second;
-    for (const IntegratorEntry& e : integrator_registry())
-        if (spec.name == e.info.name)
-            for (const ParamInfo& p : e.info.params)
-                if (std::string(p.name) == "max_depth") return p.fallback;
-    return "";
-}
 
 void CompareCommand::check() const {
     if (seconds > 0 && spp > 0)
@@ -113,30 +102,21 @@ CompareSettings CompareCommand::settings(const Scene& scene) const {
     return s;
 }
 
-/// The method of --reference-method, or bdpt with the methods' max_depth where they agree on it.
-IntegratorSpec CompareCommand::reference_integrator(const Scene& scene,
-                                                    const std::vector<MethodSpec>& specs) const {
-    if (!reference_method.empty()) return choose_integrator(scene, reference_method);
-    IntegratorSpec spec = choose_integrator(scene, "bdpt");
-    if (std::ranges::all_of(specs, [&](const MethodSpec& s) {
-            return max_depth(s.integrator) == max_depth(specs.front().integrator);
-        }))
-        spec.params["max_depth"] = max_depth(specs.front().integrator);
-    return spec;
-}
-
-/// By default the reference takes ten times the time of a method, or 16 times its samples.
 RenderSettings CompareCommand::reference_settings(const Scene& scene,
                                                   const std::vector<MethodSpec>& specs) const {
     RenderSettings s;
-    s.integrator = reference_integrator(scene, specs);
+    s.integrator = reference_method.empty() ? reference_integrator(scene, specs)
+                                            : choose_integrator(scene, reference_method);
     s.sampler = parse_sampler(sampler);
     s.threads = threads;
     s.shown = shown();
     if (reference_seconds > 0) s.seconds = reference_seconds;
     if (reference_spp > 0) s.spp = reference_spp;
-    if (!s.seconds && !s.spp && seconds > 0) s.seconds = 10 * seconds;
-    if (!s.seconds && !s.spp) s.spp = 16 * spp;
+    if (!s.seconds && !s.spp)
+        static_cast<RenderLimits&>(s) =
+            reference_limits({.spp = spp > 0 ? std::optional(spp) : std::nullopt,
+                              .seconds = seconds > 0 ? std::optional(seconds) : std::nullopt,
+                              .error = {}});
     return s;
 }
 
@@ -183,12 +163,8 @@ void CompareCommand::run() const {
         } else {
             const RenderSettings how = reference_settings(scene, s.methods);
             if (s.shown.inner_only) check_inner_paths(scene, s.methods, how.integrator);
-            for (const MethodSpec& m : s.methods)
-                if (max_depth(m.integrator) != max_depth(how.integrator))
-                    fmt::print(stderr,
-                               "warning: {} has max_depth {}, the reference {}: errors include the "
-                               "difference\n",
-                               m.name, max_depth(m.integrator), max_depth(how.integrator));
+            for (const std::string& w : depth_warnings(s.methods, how.integrator))
+                fmt::print(stderr, "warning: {}\n", w);
             reference = make_reference(
                 scene,
                 {how, kept_references, scene_fingerprint(description), program_fingerprint()},

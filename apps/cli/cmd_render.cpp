@@ -19,6 +19,8 @@
 #include "number_checks.h"
 #include "preview.h"
 #include "render/aov.h"
+#include "render/defaults.h"
+#include "render/render_report.h"
 #include "render/renderer.h"
 #include "render/warnings.h"
 #include "scene_options.h"
@@ -86,83 +88,6 @@ private:
     double last_ = 0;
 };
 
-/// Seconds and pairs of vertices of each pass.
-struct PassLog {
-    std::vector<double> seconds;
-    std::vector<uint64_t> pairs;
-
-    void add(double seconds_so_far, uint64_t pairs_so_far) {
-        seconds.push_back(seconds_so_far - seconds_before_);
-        pairs.push_back(pairs_so_far - pairs_before_);
-        seconds_before_ = seconds_so_far;
-        pairs_before_ = pairs_so_far;
-    }
-
-private:
-    double seconds_before_ = 0;
-    uint64_t pairs_before_ = 0;
-};
-
-/// `stopped_by`: a StopReason, or "failure".
-nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
-                       const std::string& stopped_by, const PassLog& log) {
-    const RenderStats& s = r.stats();
-    const ErrorEstimate e = r.film().error();
-    const Film::MeanEstimate mean = r.film().mean_luminance();
-    nlohmann::json j{
-        {"scene", scene.file()},
-        {"integrator", settings.integrator.to_string()},
-        {"estimator", to_string(r.integrator().estimator())},
-        {"seed", settings.seed},
-        {"width", scene.film().crop_width},
-        {"height", scene.film().crop_height},
-        {"spp", r.film().passes()},
-        {"seconds", r.seconds()},
-        {"stopped_by", stopped_by},
-        {"samples_per_second",
-         double(r.film().passes()) * double(scene.film().pixel_count()) / r.seconds()},
-        {"rays_per_second", double(s.rays()) / r.seconds()},
-        {"walk_rays", s.walk_rays},
-        {"shadow_rays", s.shadow_rays},
-        {"visible_shadow_rays", s.visible},
-        {"pairs", s.pairs},
-        {"visible_pairs", s.visible_pairs},
-        {"trials", s.trials},
-        {"trial_rays", s.trial_rays},
-        {"pairs_by_trials", s.pairs_by_trials},
-        {"bounds_exceeded", s.bounds_exceeded},
-        {"runaways", s.runaways},
-        {"eye_paths", s.eye_paths},
-        {"light_paths", s.light_paths},
-        {"vertices", s.vertices},
-        {"rejected_contributions", s.rejected},
-        {"warnings", warnings(s)},
-        {"mean_luminance", mean.mean},
-        {"mean_luminance_standard_error", mean.standard_error},
-        {"pass_seconds", log.seconds},
-        {"pass_pairs", log.pairs},
-    };
-    const PhaseSeconds& p = s.phases;
-    j["phase_seconds"] = {{"light_paths", p.light_paths},
-                          {"records", p.records},
-                          {"eye_paths", p.eye_paths - p.connections},
-                          {"connections", p.connections}};
-    for (const auto& [name, value] : r.integrator().figures()) j[name] = value;
-    if (e.valid)
-        j["relative_error"] = {
-            {"estimate", e.relative_rms}, {"low_95", e.low}, {"high_95", e.high}};
-    return j;
-}
-
-void check_aovs(const std::vector<std::string>& names) {
-    std::vector<std::string> known;
-    for (const AovInfo& a : aov_registry()) known.push_back(a.name);
-    for (const std::string& n : names)
-        if (std::find(known.begin(), known.end(), n) == known.end())
-            throw std::runtime_error(
-                fmt::format("--aov: unknown layer \"{}\" (known: {})", n, fmt::join(known, ", ")));
-}
-
 void write_techniques(const Renderer& r, const Scene& scene, const std::string& folder) {
     for (const auto& t : r.techniques()->images()) {
         const bool is_stored = t.technique.strategy == Strategy::Connect && t.technique.s == 1;
@@ -188,7 +113,11 @@ void RenderCommand::check_options() const {
     if (!folder.empty() && std::filesystem::exists(folder) &&
         !std::filesystem::is_directory(folder))
         throw std::runtime_error(fmt::format("{}: {} is not a folder", output, folder.string()));
-    check_aovs(aovs);
+    try {
+        check_aovs(aovs);
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(fmt::format("--aov: {}", e.what()));
+    }
 }
 
 void RenderCommand::check_outputs() const {
@@ -206,8 +135,7 @@ RenderSettings RenderCommand::settings_for(const Scene& s) const {
     if (spp > 0) settings.spp = spp;
     if (seconds > 0) settings.seconds = seconds;
     if (error > 0) settings.error = error;
-    if (!settings.spp && !settings.seconds && !settings.error)
-        settings.spp = s.defaults().spp > 0 ? uint64_t(s.defaults().spp) : 64;
+    set_default_limit(settings, s);
     if (!techniques.empty()) settings.technique_depth = technique_depth;
     return settings;
 }
@@ -222,17 +150,7 @@ std::unique_ptr<Renderer> make_renderer(const Scene& s, const RenderSettings& se
 
 void RenderCommand::write_outputs(const Renderer& renderer, const Scene& s,
                                   const nlohmann::json& report) const {
-    Image image = rgb_image(s.film().crop_width, s.film().crop_height, renderer.film().image());
-    for (const auto& [key, value] : report.items())
-        if (value.is_string())
-            image.attributes["etendue." + key] = value.get<std::string>();
-        else if (value.is_number())
-            image.attributes["etendue." + key] = value.get<double>();
-    image.attributes["etendue.version"] = std::string(ETENDUE_VERSION);
-    for (const AovImage& a : render_aovs(s, aovs, 16, seed, threads))
-        add_rgb_layer(image, image.width, image.height, a.name, a.pixels);
-    if (std::find(aovs.begin(), aovs.end(), "variance") != aovs.end())
-        add_rgb_layer(image, image.width, image.height, "variance", renderer.film().variance());
+    const Image image = image_with_layers(renderer, s, seed, threads, aovs, report);
     write_image(output, image);
     if (!techniques.empty()) write_techniques(renderer, s, techniques);
     if (!stats.empty()) write_file_atomically(stats, report.dump(2) + "\n");

@@ -13,10 +13,11 @@
 
 #include "commands.h"
 #include "image/atomic_file.h"
-#include "image/image_io.h"
 #include "number_checks.h"
 #include "path_lengths.h"
 #include "scene_options.h"
+#include "verify/reference_image.h"
+#include "verify/report_json.h"
 #include "verify/verify.h"
 
 namespace etendue {
@@ -47,67 +48,6 @@ double parse_share(const std::string& text, const char* option) {
             "{} must be a share between 0.01% and 100%, such as 0.5% or 0.005, but is \"{}\"",
             option, text));
     return value;
-}
-
-/// Largest (Σ|h|)² / Σ h² over sub-pixel offsets, h being the filter's values at the pixels around a splat: the number
-/// of pixels over which a splat spreads its error, at most.
-double filter_correlation(const ReconstructionFilter& filter) {
-    const auto of = [&](float x, float y) {
-        double sum = 0, squares = 0;
-        const int r = int(std::ceil(filter.radius())) + 1;
-        for (int v = -r; v <= r; ++v)
-            for (int u = -r; u <= r; ++u) {
-                const double h = std::fabs(double(filter.eval({x - float(u), y - float(v)})));
-                sum += h, squares += h * h;
-            }
-        return squares > 0 ? sum * sum / squares : 1.0;
-    };
-    double largest = 1;
-    for (const float x : {0.0f, 0.25f, 0.499f})
-        for (const float y : {0.0f, 0.25f, 0.499f}) largest = std::max(largest, of(x, y));
-    return largest;
-}
-
-/// Ratio of the variance of the image's mean to that of independent pixels. Pixels are correlated by splats, which the
-/// filter spreads, and by light paths, which many pixels share. The spread of the passes' means includes both
-/// (attribute "etendue.mean_luminance_standard_error"). Without that attribute only the filter is accounted for.
-double pixel_correlation(const Image& image, const std::vector<Rgb>& variance, const Scene& scene) {
-    double correlation = filter_correlation(scene.filter());
-    const auto error = image.attributes.find("etendue.mean_luminance_standard_error");
-    const auto* standard_error =
-        error == image.attributes.end() ? nullptr : std::get_if<double>(&error->second);
-    if (!standard_error) return correlation;
-    // Channels are positively correlated, so this underestimates the error of luminance, and the factor is never too
-    // small.
-    const float r = luminance({1, 0, 0}), g = luminance({0, 1, 0}), b = luminance({0, 0, 1});
-    double independent = 0;
-    for (const Rgb& v : variance) independent += double(luminance({v.r * r, v.g * g, v.b * b}));
-    independent /= sqr(double(variance.size()));
-    return independent > 0 ? std::max(1.0, sqr(*standard_error) / independent) : correlation;
-}
-
-ReferenceImage read_reference(const std::string& path, const Scene& scene) {
-    const Image image = read_image(path);
-    const auto layers = image.layers();
-    if (std::find(layers.begin(), layers.end(), "variance") == layers.end())
-        throw std::runtime_error(fmt::format(
-            "{}: expected a layer \"variance\" beside the image, as render --aov variance writes",
-            path));
-    const auto spp = image.attributes.find("etendue.spp");
-    const auto* samples =
-        spp == image.attributes.end() ? nullptr : std::get_if<double>(&spp->second);
-    if (!samples || *samples < 2)
-        throw std::runtime_error(fmt::format(
-            "{}: expected the attribute \"etendue.spp\", samples per pixel, at least 2", path));
-    const FilmGeometry& film = scene.film();
-    if (image.width != film.crop_width || image.height != film.crop_height)
-        throw std::runtime_error(fmt::format("{}: has {} x {} pixels, but the scene has {} x {}",
-                                             path, image.width, image.height, film.crop_width,
-                                             film.crop_height));
-    ReferenceImage reference{path, rgb_pixels(image), rgb_pixels(image, "variance"),
-                             int64_t(*samples)};
-    reference.correlation = pixel_correlation(image, reference.variance, scene);
-    return reference;
 }
 
 // -- Text.
@@ -287,94 +227,6 @@ void print_report(const VerifyReport& report, const Scene& scene, const std::str
     }
 }
 
-// -- JSON.
-
-nlohmann::ordered_json to_json(const VerifyReport& report, const WelchTest& t) {
-    nlohmann::ordered_json j{{"tested", t.is_tested()},
-                             {"method", t.method.mean()},
-                             {"method_standard_error", std::sqrt(t.method.squared_error())},
-                             {"reference", t.reference.mean()},
-                             {"reference_standard_error", std::sqrt(t.reference.squared_error())},
-                             {"effective_count", t.effective_count}};
-    if (t.is_tested()) {
-        j["p"] = t.p;
-        j["deviates"] = report.deviates(t);
-        if (t.reference.mean() != 0) j["detectable"] = t.detectable(report.level);
-    }
-    return j;
-}
-
-nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m,
-                               const VerifyOptions& options) {
-    nlohmann::ordered_json j{{"method", m.method},
-                             {"estimator", to_string(m.estimator)},
-                             {"verdict", to_string(report.verdict(m))},
-                             {"spp", m.spp},
-                             {"rejected_contributions", m.stats.rejected},
-                             {"runaways", m.stats.runaways},
-                             {"bounds_exceeded", m.stats.bounds_exceeded},
-                             {"out_of_reach", m.out_of_reach},
-                             {"too_rare", m.too_rare},
-                             {"untested_tiles", m.untested_tiles}};
-    const Detectable detectable = report.detectable(m);
-    j["detectable"] = {{"lengths_not_tested", detectable.not_tested}};
-    if (detectable.image) j["detectable"]["image"] = *detectable.image;
-    if (detectable.length) j["detectable"]["length"] = *detectable.length;
-    if (options.detect) j["detectable"]["is_reached"] = detectable.reaches(*options.detect);
-    for (const WelchTest& t : m.image) j["image"].push_back(to_json(report, t));
-    for (const WelchTest& t : m.tiles) j["tiles"].push_back(to_json(report, t));
-    for (const LengthReport& l : m.lengths) {
-        j["lengths"].push_back(to_json(report, l.comparison));
-        j["lengths"].back().update(nlohmann::ordered_json{{"edges", l.edges},
-                                                          {"cut_off", l.cut_off},
-                                                          {"share", l.share},
-                                                          {"out_of_reach", l.out_of_reach},
-                                                          {"too_rare", l.too_rare}});
-    }
-    for (const ClassReport& c : m.classes) {
-        j["classes"].push_back(to_json(report, c.comparison));
-        j["classes"].back().update(nlohmann::ordered_json{
-            {"class", to_string(c.path_class)}, {"share", c.share}, {"against", c.reference}});
-    }
-    for (const UntestedClass& c : m.untested)
-        j["not_compared"].push_back({{"class", to_string(c.path_class)},
-                                     {"share", c.share},
-                                     {"out_of_reach", c.is_out_of_reach},
-                                     {"method_effective_count", c.method_count},
-                                     {"reference_effective_count", c.reference_count}});
-    for (const TechniqueReport& t : m.techniques) {
-        j["techniques"].push_back(to_json(report, t.comparison));
-        j["techniques"].back().update(
-            nlohmann::ordered_json{{"is_pair", is_pair(t.technique.strategy)},
-                                   {"s", t.technique.s},
-                                   {"t", t.technique.t},
-                                   {"coverage", t.coverage}});
-    }
-    for (const ErrorOfRuns& e : m.errors)
-        j["errors"].push_back({{"runs", e.runs}, {"rmse", e.rmse}});
-    if (m.slope) j["slope"] = *m.slope;
-    return j;
-}
-
-nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
-                               const std::string& sampler, const VerifyOptions& options) {
-    nlohmann::ordered_json j{{"scene", scene.file()},
-                             {"width", scene.film().crop_width},
-                             {"height", scene.film().crop_height},
-                             {"reference", report.reference},
-                             {"runs", options.runs},
-                             {"seed", options.seed},
-                             {"sampler", sampler},
-                             {"alpha", options.alpha},
-                             {"tests", report.tests},
-                             {"level", report.level},
-                             {"warnings", report.warnings}};
-    if (options.detect) j["detect"] = *options.detect;
-    for (const MethodReport& m : report.methods)
-        j["methods"].push_back(to_json(report, m, options));
-    return j;
-}
-
 void VerifyCommand::run() {
     const PathSelection selected = parse_lengths(lengths, PathClass::kMostEdges);
     options.shortest = selected.shortest;
@@ -394,7 +246,7 @@ void VerifyCommand::run() {
     const Scene s = load_scene(scene);
     for (const std::string& w : s.warnings()) fmt::print(stderr, "warning: {}\n", w);
     std::optional<ReferenceImage> image;
-    if (!reference.empty()) image = read_reference(reference, s);
+    if (!reference.empty()) image = read_reference_image(reference, s);
     const bool is_terminal = isatty(STDERR_FILENO) != 0;
     const VerifyReport report = verify(s, specs, options, image, [&](const std::string& line) {
         if (!quiet && is_terminal) fmt::print(stderr, "\r{}\033[K", line);

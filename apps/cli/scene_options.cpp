@@ -1,13 +1,12 @@
 #include "scene_options.h"
 
 #include <charconv>
-#include <filesystem>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "readers/mitsuba_xml.h"
-#include "readers/pbrt.h"
+#include "readers/scene_file.h"
+#include "render/defaults.h"
 #include "scene/builder.h"
 
 namespace etendue {
@@ -53,11 +52,7 @@ void SceneOptions::add_reading_options(CLI::App& command) {
 }
 
 SceneDescription read_scene(const SceneOptions& options) {
-    if (!std::filesystem::exists(options.file))
-        throw std::runtime_error(fmt::format("{}: there is no such file", options.file));
-    if (std::filesystem::is_directory(options.file))
-        throw std::runtime_error(
-            fmt::format("{}: this is a folder, not a scene file", options.file));
+    check_scene_file(options.file);
     ReadOptions read;
     read.lenient = options.lenient;
     for (const std::string& d : options.defines) {
@@ -67,18 +62,11 @@ SceneDescription read_scene(const SceneOptions& options) {
                 fmt::format("-D must have the form name=value, but is \"{}\"", d));
         read.defines[d.substr(0, equals)] = d.substr(equals + 1);
     }
-    std::filesystem::path path = options.file;
-    if (path.extension() == ".gz") path = path.stem();
-    const std::string extension = path.extension().string();
-    if (extension == ".xml") return read_mitsuba_xml(options.file, read);
-    if (extension == ".pbrt") {
-        if (!read.defines.empty())
-            throw std::runtime_error("-D: scenes of pbrt have no parameters");
-        return read_pbrt(options.file, read);
+    try {
+        return read_scene_file(options.file, read);
+    } catch (const UnusedDefines& e) {
+        throw std::runtime_error(fmt::format("-D: {}", e.what()));
     }
-    throw std::runtime_error(fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of "
-                                         "Mitsuba 0.6 and 3; .pbrt, of pbrt-v3 and v4)",
-                                         options.file, extension));
 }
 
 Scene build_scene(const SceneDescription& description, const SceneOptions& options) {
@@ -104,24 +92,13 @@ Scene load_scene(const SceneOptions& options) {
     return build_scene(read_scene(options), options);
 }
 
-IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
-    const RenderDefaults& defaults = scene.defaults();
-    IntegratorSpec spec =
-        IntegratorSpec::parse(!text.empty()                 ? text
-                              : defaults.integrator.empty() ? "path"
-                                                            : defaults.integrator);
-    for (const auto& [name, value] : defaults.integrator_params) spec.params.emplace(name, value);
-    return spec;
-}
-
 void add_sampler_option(CLI::App& command, std::string& name, const std::string& more) {
     name = "sobol";
     command.add_option("--sampler", name, "independent or sobol" + more)->capture_default_str();
 }
 
 SamplerKind parse_sampler(const std::string& name) {
-    if (name == "independent") return SamplerKind::Independent;
-    if (name == "sobol") return SamplerKind::Sobol;
+    if (const auto kind = sampler_kind(name)) return *kind;
     throw std::runtime_error(
         fmt::format("--sampler must be independent or sobol, but is \"{}\"", name));
 }

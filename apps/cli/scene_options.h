@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "integrator/integrator.h"
 #include "sampler/sampler.h"
 #include "scene/scene.h"
 
@@ -30,10 +29,6 @@ SceneDescription read_scene(const SceneOptions& options);
 Scene build_scene(const SceneDescription& description, const SceneOptions& options);
 /// Reads and builds the scene.
 Scene load_scene(const SceneOptions& options);
-
-/// The integrator that `text` names, or the scene's where `text` is empty. Parameters missing from `text` are taken
-/// from the scene's integrator.
-IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
 
 /// Adds --sampler and sets `name` to its default. `more` is appended to the option's description.
 void add_sampler_option(CLI::App& command, std::string& name, const std::string& more = "");

@@ -5,8 +5,6 @@
 
 #include "image/image.h"
 
-#include <OpenImageIO/strutil.h>
-
 namespace etendue {
 namespace {
 
@@ -29,7 +27,19 @@ std::string png_data_uri(const std::string& png) {
 }  // namespace
 
 std::string base64(std::string_view bytes) {
-    return OIIO::Strutil::base64_encode({bytes.data(), bytes.size()});
+    constexpr std::string_view kDigits =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string out;
+    out.reserve((bytes.size() + 2) / 3 * 4);
+    for (size_t i = 0; i < bytes.size(); i += 3) {
+        const size_t count = std::min<size_t>(3, bytes.size() - i);
+        uint32_t group = 0;
+        for (size_t k = 0; k < 3; ++k)
+            group = group << 8 | (k < count ? uint8_t(bytes[i + k]) : 0u);
+        for (size_t k = 0; k < 4; ++k)
+            out += k <= count ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+    }
+    return out;
 }
 
 std::string radiance_data_uri(int width, int height, std::span<const Rgb> pixels) {

@@ -225,8 +225,8 @@ uint64_t scene_fingerprint(const SceneDescription& description) {
     return hash.value();
 }
 
-uint64_t program_fingerprint() {
-    return ContentHash().add(contents_of("/proc/self/exe")).value();
+uint64_t program_fingerprint(const std::string& file) {
+    return ContentHash().add(contents_of(file)).value();
 }
 
 }  // namespace etendue

@@ -54,7 +54,7 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
 /// Hash of the scene's contents: all bits of the description, and the bytes of every mesh, texture and other file that
 /// it names.
 uint64_t scene_fingerprint(const SceneDescription& description);
-/// Hash of the executable file, since another build may render another image.
-uint64_t program_fingerprint();
+/// Hash of the file with the program, since another build may render another image.
+uint64_t program_fingerprint(const std::string& file = "/proc/self/exe");
 
 }  // namespace etendue

@@ -96,32 +96,6 @@ Json to_json(const Method& m, const MethodSummary& summary) {
             {"runs", runs}};
 }
 
-Json to_json(const Comparison& c) {
-    const Reference& r = c.reference;
-    Json methods = Json::array();
-    const std::vector<MethodSummary> summaries = summarize(c);
-    for (size_t i = 0; i < c.methods.size(); ++i)
-        methods.push_back(to_json(c.methods[i], summaries[i]));
-    return {{"file", c.scene_file},
-            {"width", c.film.crop_width},
-            {"height", c.film.crop_height},
-            {"crop", {c.film.crop_x, c.film.crop_y, c.film.crop_width, c.film.crop_height}},
-            {"interrupted", c.interrupted},
-            {"scene_bytes", c.scene_bytes},
-            {"reference",
-             {{"file", r.file},
-              {"method", r.method},
-              {"spp", r.spp},
-              {"seconds", r.seconds},
-              {"reused", r.reused},
-              {"variance_known", r.has_variance()},
-              {"mse", c.reference_mse},
-              {"rel_mse", c.reference_rel_mse},
-              {"mean_relative_error", r.mean_relative_error},
-              {"warnings", r.warnings}}},
-            {"methods", methods}};
-}
-
 Json to_json(const CompareSettings& s) {
     return {{"seconds", s.limits.seconds ? Json(*s.limits.seconds) : Json()},
             {"spp", s.limits.spp ? Json(*s.limits.spp) : Json()},
@@ -318,6 +292,32 @@ std::string script_json(const Json& json) {
 }
 
 }  // namespace
+
+Json to_json(const Comparison& c) {
+    const Reference& r = c.reference;
+    Json methods = Json::array();
+    const std::vector<MethodSummary> summaries = summarize(c);
+    for (size_t i = 0; i < c.methods.size(); ++i)
+        methods.push_back(to_json(c.methods[i], summaries[i]));
+    return {{"file", c.scene_file},
+            {"width", c.film.crop_width},
+            {"height", c.film.crop_height},
+            {"crop", {c.film.crop_x, c.film.crop_y, c.film.crop_width, c.film.crop_height}},
+            {"interrupted", c.interrupted},
+            {"scene_bytes", c.scene_bytes},
+            {"reference",
+             {{"file", r.file},
+              {"method", r.method},
+              {"spp", r.spp},
+              {"seconds", r.seconds},
+              {"reused", r.reused},
+              {"variance_known", r.has_variance()},
+              {"mse", c.reference_mse},
+              {"rel_mse", c.reference_rel_mse},
+              {"mean_relative_error", r.mean_relative_error},
+              {"warnings", r.warnings}}},
+            {"methods", methods}};
+}
 
 std::string file_stem(const std::string& text) {
     std::string out = text;

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "compare/comparison.h"
 
 namespace etendue {
@@ -16,6 +18,9 @@ struct ReportOptions {
 /// (.exr and .png), error maps (.png) and convergence plots (.svg). Throws std::runtime_error where a file cannot be
 /// written.
 void write_report(const std::vector<Comparison>& comparisons, const ReportOptions& options);
+
+/// All results of one comparison, as in report.json.
+nlohmann::ordered_json to_json(const Comparison& comparison);
 
 /// `text` as part of a file name: characters other than letters, digits and "._=-" become '_'.
 std::string file_stem(const std::string& text);

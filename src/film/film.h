@@ -96,7 +96,7 @@ public:
     /// Contributions that were not finite and were left out.
     uint64_t rejected() const { return rejected_; }
 
-private:
+    /// Sums over the finished passes of a pixel's value, and of its square, by channel.
     struct Moments {
         double sum[3] = {0, 0, 0}, square[3] = {0, 0, 0};
 
@@ -104,7 +104,10 @@ private:
             return luminance(Rgb(float(sum[0]), float(sum[1]), float(sum[2])));
         }
     };
+    /// Of all pixels, row by row.
+    std::span<const Moments> moments() const { return moments_; }
 
+private:
     static constexpr int kBlock = 4;
 
     bool has_groups() const { return !group_sums_.empty(); }

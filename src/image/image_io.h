@@ -10,7 +10,7 @@
 
 namespace etendue {
 
-/// Reads any format supported by OpenImageIO. Integer formats are decoded from sRGB, except alpha and files declared
+/// Reads any format supported by OpenImageIO, or, in the Python package, .exr, .png, .jpg, .hdr and .pfm. Integer formats are decoded from sRGB, except alpha and files declared
 /// linear.
 Image read_image(const std::string& path);
 
@@ -33,6 +33,9 @@ enum class ExrPrecision { Float, Half };
 /// floats.
 void write_image(const std::string& path, const Image& image,
                  ExrPrecision precision = ExrPrecision::Float);
+
+/// The 8-bit sRGB codes that write_image() stores in a .png: colours are clamped, NaN is magenta.
+std::vector<uint8_t> srgb_codes(std::span<const Rgb> pixels);
 
 /// The bytes of a PNG file with these 8-bit sRGB codes, of one (grey) or three channels.
 std::string encode_png(int width, int height, std::span<const uint8_t> codes);

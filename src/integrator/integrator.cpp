@@ -151,6 +151,7 @@ float IntegratorParams::number(const char* name, float low, float high) const {
 }
 
 std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec) {
+    if (spec.make) return spec.make(spec.params);
     std::vector<std::string> known;
     for (const IntegratorEntry& e : integrator_registry()) {
         if (spec.name == e.info.name) return e.make(IntegratorParams(spec, e.info));

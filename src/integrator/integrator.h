@@ -2,6 +2,7 @@
 // Integrators: which sub-paths are traced, which techniques join them, how many samples each takes. Nothing else.
 
 #include <array>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -62,10 +63,13 @@ public:
     virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
 
-/// The text after an integrator's name: `bdpt:max_depth=12,rr_depth=5`. Checked against the integrator's table.
+/// An integrator with its parameters, as text: `bdpt:max_depth=12,rr_depth=5`. Checked against the integrator's table.
 struct IntegratorSpec {
     std::string name;
     std::map<std::string, std::string> params;
+    /// Makes an integrator that is not in the registry; otherwise empty.
+    std::function<std::unique_ptr<Integrator>(const std::map<std::string, std::string>& params)>
+        make = nullptr;
 
     /// Throws std::runtime_error with one clear message.
     static IntegratorSpec parse(const std::string& text);

@@ -73,6 +73,29 @@ std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath&
     return x;
 }
 
+Vertex emitter_end(const Join& join, const Vertex& next) {
+    Vertex x0;
+    x0.kind = Vertex::Kind::Emitter;
+    x0.emitter = join.emitter;
+    x0.p = join.b;
+    x0.ng = join.ng_b;
+    x0.is_infinite = join.to_infinity;
+    x0.has_cosine = join.emitter->is_area();
+    if (!x0.has_cosine) x0.ng = x0.is_infinite ? -x0.p : normalize(next.p - x0.p);
+    return x0;
+}
+
+Vertex lens_end(const Scene& scene, const Join& join) {
+    Vertex lens;
+    lens.kind = Vertex::Kind::Sensor;
+    lens.is_infinite = scene.sensor().is_orthographic();
+    const SensorRay ray = scene.sensor().sample_ray(join.film, {0.5f, 0.5f});
+    lens.ng = ray.ng;
+    lens.p = lens.is_infinite ? -ray.ng : join.a;
+    lens.pdf_fwd = ray.pdf_pos;
+    return lens;
+}
+
 PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
                         const std::vector<bool>& delta) {
     const int n = int(x.size()), k = n - 1;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "pathspace/join.h"
 #include "pathspace/technique.h"
 #include "pathspace/vertex.h"
 
@@ -36,6 +37,11 @@ double mis_weight(const PathPdfs& pdfs, const Technique& technique, const Techni
 std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t,
                                          const Vertex* emitter_point = nullptr,
                                          const Vertex* lens_point = nullptr);
+
+/// x_0 of a next event; `next` is x_1.
+Vertex emitter_end(const Join& join, const Vertex& next);
+/// x_k of a splat.
+Vertex lens_end(const Scene& scene, const Join& join);
 
 /// Measurement contribution f(x̄), without visibility and attenuation, and the densities. Events at the vertices of
 /// `delta` (one flag a vertex) are the delta events Vertex::event; f and all densities leave out the factor δ of the

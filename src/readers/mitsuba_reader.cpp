@@ -9,6 +9,7 @@
 
 #include "readers/mitsuba_upgrade.h"
 #include "readers/mitsuba_values.h"
+#include "readers/nesting.h"
 #include "readers/object_graph.h"
 
 namespace etendue {
@@ -20,55 +21,6 @@ constexpr size_t kDeepestInclude = 32;
 constexpr int kMostIncludes = 10'000;
 constexpr int kMostElements = 20'000'000;
 constexpr size_t kLongestName = 1024;
-
-/// The categories of objects, and those that may stand in each.
-struct Nesting {
-    const char* category;
-    const char* children;
-};
-constexpr Nesting kNesting[] = {
-    {"bsdf", "bsdf texture"},
-    {"emitter", "texture medium"},
-    {"film", "rfilter"},
-    {"integrator", "integrator sampler"},
-    {"medium", "phase texture volume"},
-    {"phase", "phase texture"},
-    {"rfilter", ""},
-    {"sampler", ""},
-    {"sensor", "film medium sampler"},
-    {"shape", "bsdf emitter medium sensor shape texture"},
-    {"texture", "texture"},
-    {"volume", "texture volume"},
-    {"spectrum", ""},
-};
-
-const Nesting* find_nesting(std::string_view category) {
-    const auto it = std::find_if(std::begin(kNesting), std::end(kNesting),
-                                 [&](const Nesting& n) { return n.category == category; });
-    return it == std::end(kNesting) ? nullptr : it;
-}
-
-bool is_category(std::string_view element) {
-    return element != "spectrum" && find_nesting(element);
-}
-
-bool has_word(std::string_view words, std::string_view word) {
-    for (size_t at = words.find(word); at != words.npos; at = words.find(word, at + 1)) {
-        const size_t end = at + word.size();
-        if ((at == 0 || words[at - 1] == ' ') && (end == words.size() || words[end] == ' '))
-            return true;
-    }
-    return false;
-}
-
-void check_nesting(std::string_view parent, std::string_view child, const SourceLocation& where) {
-    if (parent == "scene") return;
-    const char* allowed = find_nesting(parent)->children;
-    if (has_word(allowed, child)) return;
-    throw SceneError(where, *allowed ? fmt::format("a <{}> cannot stand in a <{}>, which takes: {}",
-                                                   child, parent, allowed)
-                                     : fmt::format("a <{}> cannot stand in a <{}>", child, parent));
-}
 
 std::vector<std::string> words(std::string_view list) {
     std::vector<std::string> found;
@@ -250,7 +202,7 @@ void MitsubaReader::read_element(const pugi::xml_node& node, Scope& scope) {
     if (std::any_of(kTransformSteps.begin(), kTransformSteps.end(), same_name))
         throw SceneError(locate(node), fmt::format("a <{}> can only stand in a <transform>", name));
     std::vector<std::string> known;
-    for (const Nesting& n : kNesting) known.push_back(n.category);
+    for (const std::string& c : object_categories()) known.push_back(c);
     for (const Rule& r : kRules) known.push_back(r.element);
     reject(locate(node), fmt::format("unknown element <{}>", name.substr(0, kLongestName)),
            hint(name, known));

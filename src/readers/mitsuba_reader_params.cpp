@@ -35,14 +35,6 @@ const std::vector<MitsubaReader::Rule> MitsubaReader::kTransformSteps = {
 
 namespace {
 
-SpectrumRole role_of(const std::string& category, const std::string& parameter, bool in_emitter) {
-    if (in_emitter) return SpectrumRole::Emission;
-    const bool ratio =
-        parameter == "eta" || parameter == "k" || parameter == "int_ior" || parameter == "ext_ior";
-    return (category == "bsdf" || category == "texture") && !ratio ? SpectrumRole::Reflectance
-                                                                   : SpectrumRole::Ratio;
-}
-
 /// Checks the attribute `intent`, which matters to spectral renderers only and is ignored here.
 void check_intent(const Element& e) {
     const std::string* intent = e.find("intent");
@@ -134,7 +126,7 @@ void MitsubaReader::read_spectrum(const Element& e, const pugi::xml_node& node, 
         throw SceneError(
             e.where, "<spectrum> needs one of the attributes \"value\", \"filename\" and \"type\"");
     const std::string name = source_->old_dialect ? snake_case(e["name"]) : e["name"];
-    const SpectrumRole role = role_of(scope.category, name, scope.in_emitter);
+    const SpectrumRole role = spectrum_role(scope.category, name, scope.in_emitter);
     if (type) {
         add_param(e, scope, spectrum_from_plugin(e, node, scope, role));
         return;

@@ -83,6 +83,14 @@ Rgb regular(ParameterReader& params, SpectrumRole role, const SourceLocation& wh
 
 }  // namespace
 
+SpectrumRole spectrum_role(std::string_view category, std::string_view parameter, bool in_emitter) {
+    if (in_emitter) return SpectrumRole::Emission;
+    const bool ratio =
+        parameter == "eta" || parameter == "k" || parameter == "int_ior" || parameter == "ext_ior";
+    return (category == "bsdf" || category == "texture") && !ratio ? SpectrumRole::Reflectance
+                                                                   : SpectrumRole::Ratio;
+}
+
 Rgb spectrum_colour(const SpectrumSamples& samples, SpectrumRole role) {
     const Illuminant seen_by =
         role == SpectrumRole::Emission ? Illuminant::EqualEnergy : Illuminant::D65;

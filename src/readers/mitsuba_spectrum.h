@@ -12,6 +12,9 @@ enum class SpectrumRole {
     Ratio,  ///< A ratio without an upper bound (such as an index of refraction), seen under D65.
 };
 
+/// The role of a spectrum that is a parameter of an object of this category.
+SpectrumRole spectrum_role(std::string_view category, std::string_view parameter, bool in_emitter);
+
 Rgb spectrum_colour(const SpectrumSamples& samples, SpectrumRole role);
 
 /// The colour of <spectrum type="...">: blackbody, uniform, d65, irregular, regular or srgb. Throws SceneError for

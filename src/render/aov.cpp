@@ -1,5 +1,9 @@
 #include "render/aov.h"
 
+#include <algorithm>
+#include <stdexcept>
+
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -33,6 +37,15 @@ const std::vector<AovInfo>& aov_registry() {
         {"variance", "Variance of the pixel's mean, from the spread of the passes."},
     };
     return entries;
+}
+
+void check_aovs(const std::vector<std::string>& names) {
+    std::vector<std::string> known;
+    for (const AovInfo& a : aov_registry()) known.push_back(a.name);
+    for (const std::string& n : names)
+        if (std::find(known.begin(), known.end(), n) == known.end())
+            throw std::runtime_error(
+                fmt::format("unknown layer \"{}\" (known: {})", n, fmt::join(known, ", ")));
 }
 
 std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names,

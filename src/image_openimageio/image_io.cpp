@@ -14,7 +14,7 @@
 #include <fmt/format.h>
 
 #include "color/srgb.h"
-#include "image/atomic_file.h"
+#include "image/image_codecs.h"
 
 namespace etendue {
 namespace {
@@ -26,10 +26,6 @@ constexpr float kMaxHalf = 65504;
 [[noreturn]] void fail_read(const std::string& path, const std::string& why) {
     throw std::runtime_error(fmt::format("cannot read \"{}\": {}", path, why));
 }
-[[noreturn]] void fail_write(const std::string& path, const std::string& why) {
-    throw std::runtime_error(fmt::format("cannot write \"{}\": {}", path, why));
-}
-
 // OpenImageIO's reports may have several lines and end in a newline.
 std::string one_line(std::string s) {
     while (!s.empty() && std::isspace(static_cast<unsigned char>(s.back()))) s.pop_back();
@@ -106,14 +102,6 @@ void read_attributes(Image& image, const OIIO::ImageSpec& spec) {
 
 // ------------------------------------------------------------------------------------------------------- writing
 
-std::vector<Rgb> colours(const PendingFile& file, const Image& image) {
-    try {
-        return rgb_pixels(image);
-    } catch (const std::runtime_error& e) {
-        file.fail(e.what());
-    }
-}
-
 void write_with_oiio(const PendingFile& file, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
                      const void* pixels) {
     const auto output = OIIO::ImageOutput::create(file.temporary());
@@ -123,6 +111,8 @@ void write_with_oiio(const PendingFile& file, const OIIO::ImageSpec& spec, OIIO:
     const std::string why = written ? "" : one_line(output->geterror());
     if (!output->close() || !written) file.fail(written ? one_line(output->geterror()) : why);
 }
+
+}  // namespace
 
 void write_exr(const PendingFile& file, const Image& image, ExrPrecision precision) {
     const bool half = precision == ExrPrecision::Half;
@@ -146,82 +136,25 @@ void write_exr(const PendingFile& file, const Image& image, ExrPrecision precisi
     write_with_oiio(file, spec, OIIO::TypeFloat, clamped.data());
 }
 
-// Portable float map: rows from the bottom, little-endian where the scale is negative.
-void write_pfm(const PendingFile& file, const Image& image, ExrPrecision) {
-    static_assert(std::endian::native == std::endian::little);
-    const bool grey = image.channels.size() == 1;
-    const std::vector<Rgb> pixels = colours(file, image);
-    errno = 0;
-    std::ofstream out(file.temporary(), std::ios::binary);
-    out << fmt::format("{}\n{} {}\n-1.0\n", grey ? "Pf" : "PF", image.width, image.height);
-    std::vector<float> row;
-    for (int y = image.height - 1; y >= 0; --y) {
-        row.clear();
-        for (int x = 0; x < image.width; ++x)
-            for (int c = 0; c < (grey ? 1 : 3); ++c)
-                row.push_back(pixels[size_t(y) * image.width + x][c]);
-        out.write(reinterpret_cast<const char*>(row.data()),
-                  std::streamsize(row.size() * sizeof(float)));
-    }
-    out.close();
-    if (!out) file.fail(std::generic_category().message(errno));
-}
-
-void write_hdr(const PendingFile& file, const Image& image, ExrPrecision) {
-    const std::vector<Rgb> pixels = colours(file, image);
+void write_rgbe(const PendingFile& file, int width, int height, std::span<const Rgb> pixels) {
     static_assert(sizeof(Rgb) == 3 * sizeof(float));
-    write_with_oiio(file, OIIO::ImageSpec(image.width, image.height, 3, OIIO::TypeFloat),
-                    OIIO::TypeFloat, pixels.data());
-}
-
-uint8_t srgb_code(float v) {
-    return uint8_t(linear_to_srgb(std::clamp(v, 0.0f, 1.0f)) * 255 + 0.5f);
+    write_with_oiio(file, OIIO::ImageSpec(width, height, 3, OIIO::TypeFloat), OIIO::TypeFloat,
+                    pixels.data());
 }
 
 // Whether the file contains these pixels: OpenImageIO's PNG writer does not report a full disk.
-bool holds(const std::string& path, const std::vector<uint8_t>& codes) try {
-    return std::get<std::vector<uint8_t>>(read_pixels(path, true).data) == codes;
+static bool holds(const std::string& path, std::span<const uint8_t> codes) try {
+    return std::ranges::equal(std::get<std::vector<uint8_t>>(read_pixels(path, true).data), codes);
 } catch (const std::runtime_error&) {
     return false;
 }
 
-void write_png(const PendingFile& file, const Image& image, ExrPrecision) {
-    std::vector<uint8_t> codes;
-    for (const Rgb c : colours(file, image)) {
-        if (std::isnan(c.r) || std::isnan(c.g) || std::isnan(c.b))
-            codes.insert(codes.end(), {255, 0, 255});
-        else
-            codes.insert(codes.end(), {srgb_code(c.r), srgb_code(c.g), srgb_code(c.b)});
-    }
-    OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeUInt8);
+void write_png(const PendingFile& file, int width, int height, std::span<const uint8_t> codes) {
+    OIIO::ImageSpec spec(width, height, 3, OIIO::TypeUInt8);
     spec["oiio:ColorSpace"] = "sRGB";
     write_with_oiio(file, spec, OIIO::TypeUInt8, codes.data());
     if (!holds(file.temporary(), codes))
         file.fail("the file differs when read back; the disk may be full");
-}
-
-struct Writer {
-    const char* extension;
-    void (*write)(const PendingFile& file, const Image& image, ExrPrecision precision);
-};
-constexpr Writer kWriters[] = {
-    {".exr", write_exr}, {".pfm", write_pfm}, {".hdr", write_hdr}, {".png", write_png}};
-
-const Writer& writer_for(const std::string& path) {
-    const std::string e = image_extension(path);
-    for (const Writer& w : kWriters)
-        if (e == w.extension) return w;
-    fail_write(path,
-               fmt::format("its name must end in .exr, .pfm, .hdr or .png, not in \"{}\"", e));
-}
-
-}  // namespace
-
-std::string image_extension(const std::string& path) {
-    std::string e = fs::path(path).extension().string();
-    std::transform(e.begin(), e.end(), e.begin(),
-                   [](unsigned char c) { return char(std::tolower(c)); });
-    return e;
 }
 
 Image read_image(const std::string& path) {
@@ -235,15 +168,6 @@ Image read_image(const std::string& path) {
     if (holds_srgb(spec)) linearize(image.data, spec);
     read_attributes(image, spec);
     return image;
-}
-
-RgbImage read_rgb(const std::string& path, std::string_view layer) {
-    const Image image = read_image(path);
-    try {
-        return {image.width, image.height, rgb_pixels(image, layer)};
-    } catch (const std::runtime_error& e) {
-        fail_read(path, e.what());
-    }
 }
 
 PixelBuffer read_pixels(const std::string& path, bool raw) {
@@ -278,20 +202,6 @@ std::string encode_png(int width, int height, std::span<const uint8_t> codes) {
         throw std::runtime_error("cannot encode a PNG: " +
                                  one_line(output ? output->geterror() : OIIO::geterror()));
     return {bytes.begin(), bytes.end()};
-}
-
-void check_image_extension(const std::string& path) {
-    writer_for(path);
-}
-
-void write_image(const std::string& path, const Image& image, ExrPrecision precision) {
-    const Writer& writer = writer_for(path);
-    if (image.pixel_count() == 0 ||
-        image.data.size() != image.pixel_count() * image.channels.size())
-        fail_write(path, "the image is empty");
-    PendingFile file(path);
-    writer.write(file, image, precision);
-    file.commit();
 }
 
 }  // namespace etendue

@@ -1,0 +1,35 @@
+"""Unbiased light transport with reused light paths.
+
+A scene is loaded as a `Description`, which is plain data and can be edited; `Description.build` makes a `Scene` of it;
+`render` makes a `Result`, whose images are NumPy arrays:
+
+    import etendue as et
+    d = et.load("scenes/demo.xml")
+    d["glass.center"] = (0.6, 0.42, 0.8)
+    result = et.render(d.build(resolution=(320, 240)), "upg+bdpt:max_depth=12", time=10)
+    result.save("demo.exr")
+
+Images are arrays of shape (H, W, 3), float32, linear sRGB; the first row is the top one. The same seed gives the same
+bits as the program `etendue`.
+"""
+
+from ._cpu import check_cpu as _check_cpu
+
+_check_cpu()
+
+from . import core
+from ._etendue import Description, Scene, SceneError, __version__
+from ._images import Diff, diff, read_image, tonemap, write_image
+from ._integrator import Integrator
+from ._render import FilmView, Progress, Result, render
+from ._reports import CompareReport, VerifyReport, compare, verify
+from ._scenes import (load, load_dict, load_string, look_at, plugins, rotate, scale, translate)
+from ._show import show
+
+SceneError.__module__ = "etendue"
+
+__all__ = [
+    "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Progress", "Result", "Scene", "SceneError",
+    "VerifyReport", "compare", "core", "diff", "load", "load_dict", "load_string", "look_at", "plugins", "read_image",
+    "render", "rotate", "scale", "show", "tonemap", "translate", "verify", "write_image",
+]

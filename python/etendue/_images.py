@@ -1,0 +1,103 @@
+"""Images: files, tone mapping, errors."""
+
+import json
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _etendue
+from ._html import image_html, table_html
+
+Image = NDArray[np.float32]
+ImageLike = ArrayLike | str | PathLike[str]
+ToneOperator = Literal["aces", "reinhard", "srgb"]
+
+
+def _pixels(image: Any) -> Image:
+    if isinstance(image, (str, PathLike)):
+        return read_image(image)
+    if hasattr(image, "image"):  # a Result
+        image = image.image
+    pixels = np.ascontiguousarray(image, dtype=np.float32)
+    if pixels.ndim == 2:
+        pixels = np.repeat(pixels[:, :, None], 3, axis=2)
+    if pixels.ndim != 3 or pixels.shape[2] != 3:
+        raise ValueError(f"an image has the shape (H, W, 3) or (H, W), but this one has {pixels.shape}")
+    return pixels
+
+
+def read_image(file: str | PathLike[str], layer: str = "") -> Image:
+    """Reads an image of radiance: .exr, .hdr, .pfm, .png (decoded from sRGB) or .jpg. Linear RGB, shape (H, W, 3).
+
+    layer: this layer of an .exr, such as "albedo", instead of the image.
+    """
+    return _etendue.read_image(fspath(file), layer)
+
+
+def write_image(file: str | PathLike[str], image: ArrayLike) -> None:
+    """Writes linear RGB of shape (H, W, 3) as .exr, .pfm, .hdr or .png (sRGB, clamped to [0, 1]); or 8-bit sRGB codes of
+    that shape, as tonemap() makes them, as .png.
+    """
+    if isinstance(image, np.ndarray) and image.dtype == np.uint8:
+        if Path(file).suffix.lower() != ".png":
+            raise ValueError(f"8-bit codes can be written as .png only, not as {fspath(file)}")
+        unfinished = Path(f"{fspath(file)}.part")
+        unfinished.write_bytes(_etendue.png(np.ascontiguousarray(image)))
+        unfinished.replace(file)
+        return
+    _etendue.write_image(fspath(file), _pixels(image))
+
+
+def tonemap(
+    image: ImageLike, operator: ToneOperator = "aces", *, exposure: float = 0, white: float = 0
+) -> NDArray[np.uint8]:
+    """Converts radiance, shape (H, W, 3), for displays: 8-bit sRGB codes of the same shape, as `etendue tonemap`.
+
+    operator: "aces", "reinhard", or "srgb", which only clamps.
+    exposure: in stops; radiance is multiplied by 2^exposure first.
+    white: luminance that reinhard maps to white; 0: the largest of the image.
+    """
+    return _etendue.tonemap(_pixels(image), operator, exposure, white)
+
+
+class Diff(dict[str, float]):
+    """Errors of an image by name, as `etendue diff --json` prints them: rmse and l1 in units of radiance; rel_mse,
+    rel_mse_trimmed, mape, smape, spike, flip_hdr or flip_ldr, and mean_ratio dimensionless; pixels, not_finite and
+    ignored are counts.
+    """
+
+    flip_map: Image | None
+    """FLIP of each pixel, in [0, 1], shape (H, W); None where FLIP was not asked for."""
+    rel_se_map: Image
+    """Each pixel's term of rel_mse, dimensionless, shape (H, W)."""
+
+    def _repr_html_(self) -> str:
+        shown = self.rel_se_map if self.flip_map is None else self.flip_map
+        colours = _etendue.magma(np.ascontiguousarray(shown))
+        return image_html(colours, "srgb") + table_html([{k: v for k, v in self.items()}])
+
+
+def diff(
+    image: ImageLike,
+    reference: ImageLike,
+    reference2: ImageLike | None = None,
+    *,
+    flip: Literal["hdr", "ldr", "none"] = "hdr",
+    ignore_above: float = float("inf"),
+) -> Diff:
+    """Compares an image with a reference of the same shape (H, W, 3), as `etendue diff`. Images are arrays, files or
+    Results, in linear RGB.
+
+    reference2: a second, independent reference, which removes the noise of both from squared errors.
+    flip: the variant of FLIP.
+    ignore_above: leaves out pixels whose reference is brighter than this radiance, such as lamps.
+    """
+    second = None if reference2 is None else _pixels(reference2)
+    text, flip_map, rel_se_map = _etendue.diff(_pixels(image), _pixels(reference), second, flip, ignore_above)
+    result = Diff(json.loads(text))
+    result.flip_map = flip_map
+    result.rel_se_map = rel_se_map
+    return result

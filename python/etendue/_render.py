@@ -1,0 +1,320 @@
+"""Rendering, and its results."""
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _etendue
+from ._etendue import Scene
+from ._html import image_html, png_of
+from ._integrator import Integrator
+
+Image = NDArray[np.float32]
+
+
+class FilmView:
+    """Sums over the passes, as views of the film's own memory: read-only, and never copied."""
+
+    def __init__(self, rendering: _etendue.Rendering):
+        self._rendering = rendering
+
+    @property
+    def sums(self) -> NDArray[np.float64]:
+        """Sum of each pixel's radiance over the passes, shape (H, W, 3)."""
+        return self._rendering.sums()
+
+    @property
+    def squares(self) -> NDArray[np.float64]:
+        """Sum of the squares of each pixel's radiance over the passes, shape (H, W, 3)."""
+        return self._rendering.squares()
+
+    @property
+    def passes(self) -> int:
+        """Number of passes, which is the number of samples per pixel."""
+        return self._rendering.passes
+
+
+@dataclass(frozen=True)
+class Progress:
+    """A rendering between two passes, for callbacks."""
+
+    passes: int
+    """Number of finished passes, which is the number of samples per pixel."""
+    seconds: float
+    """Time spent on them, in seconds."""
+    fraction: float | None
+    """Share of the work that is done, in [0, 1]; None where no limit tells."""
+    rays_per_second: float
+    """Rays per second."""
+    error: float | None
+    """Estimated relative error of the image, dimensionless; None before there are enough passes."""
+    film: FilmView
+    """The film's sums. They are valid while the callback runs, and after the rendering."""
+    _rendering: _etendue.Rendering
+
+    @property
+    def image(self) -> Image:
+        """The image so far: radiance, linear RGB, shape (H, W, 3)."""
+        return self._rendering.image()
+
+
+@dataclass(frozen=True)
+class TechniqueImage:
+    """The image of one technique."""
+
+    s: int
+    """Number of light vertices."""
+    t: int
+    """Number of eye vertices."""
+    kind: str
+    """hit, next_event, connect, stored, splat, hit_lens, merge or gather."""
+    weighted: Image
+    """Contribution times MIS weight: radiance, shape (H, W, 3). The images of all techniques sum to the image."""
+    unweighted: Image
+    """Contribution of the technique alone: radiance, shape (H, W, 3)."""
+
+
+class Result:
+    """What a rendering leaves. Arrays are made once, when they are first asked for, and own their memory."""
+
+    def __init__(self, rendering: _etendue.Rendering, stopped_by: str, aovs: Sequence[str]):
+        self._rendering = rendering
+        self._aov_names = tuple(aovs)
+        self._cache: dict[str, Any] = {}
+        self.stopped_by = stopped_by
+        """Why it ended: "samples", "time", "error", "interrupted" (by Ctrl-C) or "callback" (which returned False)."""
+
+    def _cached(self, name: str, make: Callable[[], Any]) -> Any:
+        if name not in self._cache:
+            self._cache[name] = make()
+        return self._cache[name]
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, which the result keeps alive."""
+        return self._rendering.scene
+
+    @property
+    def image(self) -> Image:
+        """Radiance, linear RGB, shape (H, W, 3)."""
+        image: Image = self._cached("image", self._rendering.image)
+        return image
+
+    @property
+    def variance(self) -> Image:
+        """Variance of each pixel's mean, in units of radiance squared, shape (H, W, 3); 0 with fewer than two passes. With
+        the sampler "sobol" it is an upper bound.
+        """
+        variance: Image = self._cached("variance", self._rendering.variance)
+        return variance
+
+    @property
+    def half_width(self) -> Image:
+        """Half width of each pixel's 95 % confidence interval (Student's t), in units of radiance, shape (H, W, 3); NaN
+        with fewer than two passes.
+        """
+        half_width: Image = self._cached("half_width", self._rendering.half_width)
+        return half_width
+
+    @property
+    def film(self) -> FilmView:
+        """Sums and sums of squares over the passes, without copies, of shape (H, W, 3)."""
+        return FilmView(self._rendering)
+
+    @property
+    def aov(self) -> dict[str, Image]:
+        """Auxiliary images by name, those that render() was asked for: linear values of the first surface, averaged over a
+        pixel, shape (H, W, 3); "depth" and "position" in scene units, "variance" as Result.variance.
+        """
+
+        def make() -> dict[str, Image]:
+            images: dict[str, Image] = self._rendering.aovs([n for n in self._aov_names if n != "variance"])
+            if "variance" in self._aov_names:
+                images["variance"] = self.variance
+            return images
+
+        aov: dict[str, Image] = self._cached("aov", make)
+        return aov
+
+    @property
+    def techniques(self) -> list[TechniqueImage]:
+        """The images of all techniques, by path length and s; empty unless render() was asked for them."""
+        techniques: list[TechniqueImage] = self._cached(
+            "techniques", lambda: [TechniqueImage(*t) for t in self._rendering.techniques()]
+        )
+        return techniques
+
+    def technique(self, s: int, t: int, kind: str | None = None) -> TechniqueImage:
+        """The images of the technique with s light and t eye vertices.
+
+        kind: "merge", "gather" or "stored" (s = 1 with y_0 of a light path), where another technique has the same s
+        and t.
+        """
+        special = ("merge", "gather", "stored")
+        found = [q for q in self.techniques if q.s == s and q.t == t]
+        matching = [q for q in found if q.kind == kind or (kind is None and q.kind not in special)]
+        if not matching:
+            known = ", ".join(f"({q.s}, {q.t}, {q.kind})" for q in self.techniques)
+            raise KeyError(f"there is no image of the technique ({s}, {t}, {kind}); there are: {known or 'none'}")
+        return matching[0]
+
+    @property
+    def error(self) -> float | None:
+        """Estimated relative error of the image, dimensionless: the root of the mean over pixels of variance / (I² + 0.01
+        mean(I)²). None with too few passes.
+        """
+        error = self._rendering.error()
+        return None if error is None else error[0]
+
+    @property
+    def error_interval(self) -> tuple[float, float] | None:
+        """95 % confidence interval of Result.error, dimensionless."""
+        error = self._rendering.error()
+        return None if error is None else (error[1], error[2])
+
+    @property
+    def estimator(self) -> str:
+        """What the method is, a text: "unbiased", "consistent" or "biased"."""
+        return self._rendering.estimator
+
+    @property
+    def passes(self) -> int:
+        """Number of passes, which is the number of samples per pixel."""
+        return self._rendering.passes
+
+    @property
+    def seconds(self) -> float:
+        """Time spent on the passes, in seconds."""
+        return self._rendering.seconds
+
+    @property
+    def warnings(self) -> list[str]:
+        """What may be wrong with the image, one sentence each."""
+        return self._rendering.warnings
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        """Statistics with the keys of `etendue render --stats`: counts, and times in seconds."""
+        stats: dict[str, Any] = self._cached("stats", lambda: json.loads(self._rendering.stats()))
+        return stats
+
+    def save(self, file: str | PathLike[str]) -> None:
+        """Writes the image, and to .exr also its auxiliary images and statistics, as `etendue render -o`."""
+        self._rendering.save(fspath(file), list(self._aov_names))
+
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        error = "" if self.error is None else f", relative error {self.error:.4f}"
+        return (
+            f"<Result {width} x {height}, {self._rendering.integrator}, {self.passes} spp in {self.seconds:.1f} s"
+            f"{error}, stopped by {self.stopped_by}>"
+        )
+
+    def _repr_png_(self) -> bytes:
+        return png_of(self.image)
+
+    def _repr_html_(self) -> str:
+        error = "" if self.error is None else f", relative error {self.error:.4f}"
+        text = f"{self._rendering.integrator}: {self.passes} spp in {self.seconds:.1f} s{error}"
+        return f"<figure>{image_html(self.image, title=text)}<figcaption>{text}</figcaption></figure>"
+
+
+class _Bar:
+    """A bar of tqdm, where it is installed."""
+
+    def __init__(self, rendering: _etendue.Rendering, wanted: bool | None):
+        self._rendering = rendering
+        self._bar: Any = None
+        in_notebook = "ipykernel" in sys.modules
+        if wanted is False or (wanted is None and not (in_notebook or sys.stderr.isatty())):
+            return
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            return
+        self._bar = tqdm(total=1.0, bar_format="{l_bar}{bar}| {elapsed}<{remaining}{postfix}", leave=False)
+
+    def update(self) -> None:
+        now = self._rendering.now()
+        if self._bar is None or now is None:
+            return
+        passes, _, fraction, _, error = now
+        self._bar.n = fraction or 0.0
+        self._bar.set_postfix_str(f"{passes} spp" + ("" if error is None else f", error {error:.4f}"))
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def render(
+    scene: Scene,
+    integrator: str | Integrator = "",
+    *,
+    spp: int | None = None,
+    time: float | None = None,
+    error: float | None = None,
+    seed: int = 0,
+    sampler: str = "sobol",
+    threads: int = 0,
+    aovs: Sequence[str] = (),
+    techniques: bool | int = False,
+    callback: Callable[[Progress], object] | None = None,
+    progress: bool | None = None,
+    live: bool = False,
+) -> Result:
+    """Renders a scene, with the same bits as the program for the same seed.
+
+    integrator: a name with parameters, such as "upg+bdpt:max_depth=12"; "" for the scene's own; or an Integrator.
+    spp, time, error: when to stop, at whichever comes first: samples per pixel, seconds, relative error of the image.
+        Without any, the scene's samples per pixel, or 64.
+    seed, sampler, threads: of the random numbers, "sobol" or "independent", and 0 for one thread per core.
+    aovs: auxiliary images to keep: albedo, normal, depth, position, uv, variance.
+    techniques: keeps an image of each technique, up to paths of this many edges; True: 6.
+    callback: called between passes with a Progress; the rendering stops where it returns False, and what it raises goes
+        on to the caller.
+    progress: shows a bar by tqdm; None: in notebooks and on terminals, where tqdm is installed.
+    live: shows the image while it renders, in notebooks; see show().
+
+    Ctrl-C drops the pass in flight and returns what there is, with stopped_by "interrupted"; before the first pass is
+    done it raises KeyboardInterrupt. Other threads of Python run on meanwhile. A process that was forked cannot render;
+    use the start method "spawn".
+    """
+    _etendue.check_aovs(list(aovs))
+    depth = 6 if techniques is True else int(techniques)
+    rendering = _etendue.Rendering(scene, integrator, spp, time, error, seed, sampler, threads, depth)
+
+    widget: Any = None
+    if live:
+        from ._show import LiveView
+
+        widget = LiveView()
+
+    def between_passes() -> object:
+        now = rendering.now()
+        assert now is not None
+        if widget is not None:
+            widget.update(rendering.image())
+        if callback is None:
+            return None
+        return callback(Progress(*now, film=FilmView(rendering), _rendering=rendering))
+
+    wants_calls = callback is not None or live
+    interval = 0.0 if callback is not None else 0.5
+    bar = _Bar(rendering, progress)
+    try:
+        stopped_by = rendering.run(bar.update, between_passes if wants_calls else None, interval)
+    finally:
+        bar.close()
+    if rendering.passes == 0:
+        raise KeyboardInterrupt("interrupted in the first pass")
+    result = Result(rendering, stopped_by, aovs)
+    if widget is not None:
+        widget.update(result.image, is_last=True)
+    return result

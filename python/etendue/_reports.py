@@ -1,0 +1,279 @@
+"""Comparison and verification of methods."""
+
+import json
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _etendue
+from ._etendue import Description, Scene
+from ._html import auto_exposure, frame_of, image_html, table_html
+from ._integrator import Integrator
+from ._scenes import load
+
+SceneLike = Scene | Description | str | PathLike[str]
+Method = str | Integrator
+Image = NDArray[np.float32]
+
+
+def _scene(scene: SceneLike) -> Scene:
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, Description):
+        return scene.build()
+    return load(scene).build()
+
+
+def _methods(methods: Method | Sequence[Method]) -> list[Method]:
+    return [methods] if isinstance(methods, (str, Integrator)) else list(methods)
+
+
+def _status(progress: bool | None) -> tuple[Callable[[str], None] | None, Callable[[], None]]:
+    """A listener that rewrites one line, and what ends it."""
+    if progress is False or (progress is None and not sys.stderr.isatty()):
+        return None, lambda: None
+
+    def show(text: str) -> None:
+        sys.stderr.write(f"\r{text}\033[K")
+        sys.stderr.flush()
+
+    return show, lambda: show("") or sys.stderr.write("\r") and None
+
+
+class CompareReport:
+    """Errors of methods on scenes, at equal time or equal samples."""
+
+    def __init__(self, comparisons: Any, data: Mapping[str, Any]):
+        self._comparisons = comparisons
+        self.data: list[dict[str, Any]] = data["scenes"]
+        """All results, one dict for each scene, as in report.json of `etendue compare`."""
+        self.warnings: list[str] = list(data["warnings"])
+        """What to know when reading them, one sentence each."""
+        for scene in self.data:
+            for method in scene["methods"]:
+                self.warnings += [f"{method['name']}: {w}" for w in method["warnings"]]
+
+    def _rows(self) -> list[dict[str, Any]]:
+        rows = []
+        for scene in self.data:
+            for method in scene["methods"]:
+                s = method["summary"]
+                rows.append({
+                    "scene": scene["file"], "method": method["name"], "spp": s["spp"], "seconds": s["seconds"],
+                    "rmse": s["rmse"], "rel_mse": s["rel_mse"], "rel_mse_trimmed": s["rel_mse_trimmed"],
+                    "flip": method["flip"], "mean_ratio": s["mean_ratio"]["value"],
+                    "efficiency": s["efficiency"]["value"] if s["efficiency"] else None,
+                })
+        return rows
+
+    def frame(self) -> Any:
+        """One row for each scene and method, as a pandas.DataFrame, or a list of dicts without pandas. seconds is time;
+        rmse is in units of radiance; rel_mse, flip, mean_ratio and efficiency (relative to the first method) are
+        dimensionless.
+        """
+        return frame_of(self._rows())
+
+    def convergence(self) -> Any:
+        """Errors over time: one row for each scene, method, run and checkpoint, with seconds, spp, rmse (units of radiance)
+        and rel_mse (dimensionless); a DataFrame, or a list of dicts.
+        """
+        return frame_of([
+            {
+                "scene": scene["file"], "method": method["name"], "seed": run["seed"], "spp": c["spp"],
+                "seconds": c["seconds"], "rmse": c["errors"]["rmse"], "rel_mse": c["errors"]["rel_mse"],
+            }
+            for scene in self.data for method in scene["methods"] for run in method["runs"]
+            for c in run["checkpoints"]
+        ])
+
+    def image(self, method: int = 0, scene: int = 0) -> Image:
+        """Image of a method's first run: radiance, linear RGB, shape (H, W, 3)."""
+        return self._comparisons.image(scene, method)  # type: ignore[no-any-return]
+
+    def flip_map(self, method: int = 0, scene: int = 0) -> Image:
+        """FLIP of this image, in [0, 1], shape (H, W)."""
+        return self._comparisons.flip_map(scene, method)  # type: ignore[no-any-return]
+
+    def reference(self, scene: int = 0) -> Image:
+        """The reference: radiance, linear RGB, shape (H, W, 3)."""
+        return self._comparisons.reference(scene)  # type: ignore[no-any-return]
+
+    def save(self, folder: str | PathLike[str]) -> None:
+        """Writes report.html, report.json and the images to a folder, as `etendue compare --report`."""
+        self._comparisons.save(fspath(folder))
+
+    def __repr__(self) -> str:
+        return "\n".join(
+            f"{r['scene']}: {r['method']}: relMSE {r['rel_mse']:.3e}, {r['spp']:.0f} spp, {r['seconds']:.2f} s"
+            for r in self._rows()
+        )
+
+    def _repr_html_(self) -> str:
+        pictures = ""
+        for i, scene in enumerate(self.data):
+            stops = auto_exposure(self.reference(i))
+            pictures += image_html(self.reference(i), exposure=stops, title="reference")
+            for k, method in enumerate(scene["methods"]):
+                pictures += image_html(self.image(k, i), exposure=stops, title=method["name"])
+        return pictures + table_html(self._rows())
+
+
+class VerifyReport:
+    """Whether methods are unbiased: comparisons with references, of the image, its tiles, path lengths, classes of paths
+    and techniques, with a common probability of a false alarm.
+    """
+
+    def __init__(self, data: dict[str, Any]):
+        self.data = data
+        """All results, as `etendue verify --json` writes them."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What may be wrong with the renderings, one sentence each."""
+        return list(self.data["warnings"])
+
+    @property
+    def verdicts(self) -> dict[str, str]:
+        """A text for each method: "consistent", "deviates" or "undecided"."""
+        return {m["method"]: m["verdict"] for m in self.data["methods"]}
+
+    def _rows(self) -> list[dict[str, Any]]:
+        rows = []
+        for m in self.data["methods"]:
+            tests = [t for t in m.get("image", []) if t["tested"]]
+            worst = min((t["p"] for t in tests), default=None)
+            ratio = sum(t["method"] for t in tests) / sum(t["reference"] for t in tests) if tests else None
+            rows.append({
+                "method": m["method"], "claims": m["estimator"], "verdict": m["verdict"], "spp": m["spp"],
+                "image_ratio": ratio, "image_p": worst, "detectable": m["detectable"].get("image"),
+                "out_of_reach": m["out_of_reach"], "too_rare": m["too_rare"], "slope": m.get("slope"),
+            })
+        return rows
+
+    def frame(self) -> Any:
+        """One row for each method, as a pandas.DataFrame, or a list of dicts without pandas. All dimensionless:
+        image_ratio to the reference, image_p its least p-value of three channels, detectable the smallest relative error
+        of the image that would have been found with 90 % probability, out_of_reach and too_rare shares of the light, slope
+        of log error over log samples.
+        """
+        return frame_of(self._rows())
+
+    def lengths(self) -> Any:
+        """One row for each method and path length (edges), with the share of the light, the ratio to the reference and the
+        p-value, all dimensionless; a DataFrame, or a list of dicts.
+        """
+        return frame_of([
+            {
+                "method": m["method"], "edges": x["edges"], "share": x["share"],
+                "ratio": x["method"] / x["reference"] if x["reference"] else None, "p": x.get("p"),
+                "deviates": x.get("deviates"),
+            }
+            for m in self.data["methods"] for x in m.get("lengths", [])
+        ])
+
+    def save(self, folder: str | PathLike[str]) -> None:
+        """Writes verify.json and verify.html to a folder, which is created."""
+        path = Path(folder)
+        path.mkdir(parents=True, exist_ok=True)
+        (path / "verify.json").write_text(json.dumps(self.data, indent=2) + "\n")
+        (path / "verify.html").write_text(f"<!DOCTYPE html><meta charset=utf-8>{self._repr_html_()}\n")
+
+    def __repr__(self) -> str:
+        return "\n".join(
+            f"{r['method']}: {r['verdict']} (claims to be {r['claims']})"
+            + ("" if r["image_ratio"] is None else f", image {r['image_ratio']:.4f} of the reference")
+            for r in self._rows()
+        )
+
+    def _repr_html_(self) -> str:
+        return table_html(self._rows())
+
+
+def compare(
+    scenes: SceneLike | Sequence[SceneLike],
+    methods: Sequence[Method],
+    *,
+    time: float | None = None,
+    spp: int | None = None,
+    runs: int = 1,
+    seed: int = 0,
+    sampler: str = "sobol",
+    threads: int = 0,
+    paths: Literal["all", "inner"] = "all",
+    lengths: tuple[int, int | None] = (1, None),
+    reference: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
+    reference_method: Method | None = None,
+    reference_time: float | None = None,
+    reference_spp: int | None = None,
+    references: str | PathLike[str] = "out/references",
+    techniques: int = 5,
+    progress: bool | None = None,
+) -> CompareReport:
+    """Compares methods at equal time (seconds) or equal samples (spp) a pixel, as `etendue compare`.
+
+    scenes: files, Descriptions or Scenes, or one of them. methods: names with parameters, or Integrators.
+    runs, seed: independent runs with consecutive seeds.
+    paths, lengths: which paths the images show; lengths in edges, None for no limit.
+    reference: image files, one for each scene. Otherwise references are rendered by reference_method (bdpt) in
+        reference_time seconds (10 times time) or with reference_spp (16 times spp), and kept in the folder references.
+    techniques: longest path with technique images, in edges; 0: none.
+    progress: shows a status line; None: on terminals.
+
+    Ctrl-C ends the comparison with what was rendered until then.
+    """
+    wanted = [scenes] if isinstance(scenes, (Scene, Description, str, PathLike)) else list(scenes)
+    images = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
+    listener, end = _status(progress)
+    try:
+        comparisons, text = _etendue.compare(
+            [_scene(s) for s in wanted], _methods(methods), time, spp, runs, seed, sampler, threads, techniques, paths,
+            lengths[0], lengths[1], reference_method, reference_time, reference_spp, [fspath(i) for i in images],
+            fspath(references), listener,
+        )
+    finally:
+        end()
+    return CompareReport(comparisons, json.loads(text))
+
+
+def verify(
+    scene: SceneLike,
+    methods: Method | Sequence[Method],
+    *,
+    time: float | None = None,
+    spp: int | None = None,
+    detect: float | None = None,
+    lengths: tuple[int, int] = (1, 8),
+    runs: int = 32,
+    alpha: float = 0.01,
+    against: Sequence[str] = ("path", "light"),
+    tiles: int = 4,
+    seed: int = 0,
+    sampler: str = "sobol",
+    threads: int = 0,
+    progress: bool | None = None,
+) -> VerifyReport:
+    """Tests whether methods are unbiased, as `etendue verify`: means over independent runs against those of references.
+
+    methods: names with parameters, or Integrators, without max_depth, which lengths determines.
+    time: seconds for all runs of one method (30 where spp is not given); with detect, for the whole verification.
+    spp: samples per pixel of one run. detect: renders until a relative error of this size would be found.
+    lengths: shortest and longest path, in edges. runs: independent renderings, at least 8.
+    alpha: probability of a false alarm in all comparisons together.
+    tiles: number of tiles across and down the image.
+
+    Ctrl-C ends it after the run in flight, by KeyboardInterrupt.
+    """
+    listener, end = _status(progress)
+    try:
+        text = _etendue.verify(
+            _scene(scene), _methods(methods), spp, time, detect, lengths[0], lengths[1], runs, alpha, list(against), tiles,
+            seed, sampler, threads, listener,
+        )
+    finally:
+        end()
+    return VerifyReport(json.loads(text))

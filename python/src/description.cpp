@@ -1,0 +1,606 @@
+// Descriptions of scenes: reading, dicts, edits by path; and scenes built from them.
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+#include <fmt/format.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+#include <nlohmann/json.hpp>
+
+#include "bindings.h"
+#include "readers/mitsuba_values.h"
+#include "readers/mitsuba_xml.h"
+#include "readers/nesting.h"
+#include "readers/object_graph.h"
+#include "readers/scene_file.h"
+#include "render/plugin_list.h"
+#include "scene/builder.h"
+#include "values.h"
+
+namespace etendue::python {
+namespace {
+
+constexpr int kDeepestNesting = 64;
+
+std::string text(nb::handle value) {
+    return nb::cast<std::string>(value);
+}
+
+/// Whether the key stands for an object without a name: its category, with a number where there are several ("shape",
+/// "shape_2").
+bool is_automatic(std::string_view key, std::string_view category) {
+    if (!key.starts_with(category)) return false;
+    key.remove_prefix(category.size());
+    if (key.empty()) return true;
+    if (key.front() != '_' || key.size() == 1) return false;
+    key.remove_prefix(1);
+    return std::all_of(key.begin(), key.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// Reads dicts as mi.load_dict() takes them.
+class DictReader {
+public:
+    explicit DictReader(SceneDescription& scene) : scene_(scene) {}
+
+    void read_scene(nb::dict d) {
+        if (d.contains("type") &&
+            !(nb::isinstance<nb::str>(d["type"]) && text(d["type"]) == "scene"))
+            throw SceneError({"dict", 0}, "the outermost \"type\" must be \"scene\"");
+        for (const auto& [key, value] : d) {
+            const std::string name = key_of(key, "");
+            if (name == "type") continue;
+            if (!nb::isinstance<nb::dict>(value) || is_value(value))
+                throw SceneError(at(name), "expected an object, a dict with a \"type\"");
+            read_child(-1, name, value, name, false, 0);
+        }
+        finish();
+    }
+    /// Adds the object under `name` to `parent`, -1 for the scene itself.
+    void add(int parent, const std::string& name, nb::handle value, bool in_emitter) {
+        for (size_t i = 0; i < scene_.objects.size(); ++i)
+            if (const std::string& id = scene_.objects[i].id; !id.empty()) ids_[id] = int(i);
+        read_child(parent, name, value, name, in_emitter, 0);
+        finish();
+    }
+
+private:
+    struct Reference {
+        int parent;
+        size_t slot;
+        std::string id;
+        SourceLocation where;
+    };
+
+    static SourceLocation at(const std::string& path) { return {"dict: " + path, 0}; }
+    static std::string key_of(nb::handle key, const std::string& path) {
+        if (!nb::isinstance<nb::str>(key))
+            throw SceneError(at(path),
+                             fmt::format("the key {} is not a text", text(nb::repr(key))));
+        return text(key);
+    }
+    void finish() {
+        for (const Reference& r : references_) {
+            const auto found = ids_.find(r.id);
+            if (found == ids_.end()) {
+                std::vector<std::string> known;
+                for (const auto& [id, object] : ids_) known.push_back(id);
+                throw SceneError(r.where, fmt::format("no object has the id {}{}", quote(r.id),
+                                                      hint(r.id, known)));
+            }
+            if (r.parent < 0) {
+                scene_.roots[r.slot] = found->second;
+                continue;
+            }
+            SceneObject& parent = scene_.objects[size_t(r.parent)];
+            check_nesting(parent.category, scene_.objects[size_t(found->second)].category, r.where);
+            parent.children[r.slot].object = found->second;
+        }
+        references_.clear();
+        check_object_graph(scene_, kDeepestNesting);
+    }
+
+    void read_child(int parent, const std::string& key, nb::handle value, const std::string& path,
+                    bool in_emitter, int depth) {
+        if (depth > kDeepestNesting) throw SceneError(at(path), "objects are nested too deeply");
+        const auto d = nb::borrow<nb::dict>(value);
+        if (!d.contains("type") || !nb::isinstance<nb::str>(d["type"]))
+            throw SceneError(at(path), "expected a \"type\", the name of a plug-in");
+        const std::string type = text(d["type"]);
+        if (type == "ref") {
+            if (!d.contains("id") || d.size() != 2)
+                throw SceneError(at(path), "a \"ref\" has an \"id\" and nothing else");
+            add_to(parent, is_any_automatic(key) || parent < 0 ? "" : key, -1, path);
+            references_.push_back({parent, slots(parent) - 1, text(d["id"]), at(path)});
+            return;
+        }
+        const std::string category = category_of(type, at(path));
+        if (parent >= 0) check_nesting(scene_.objects[size_t(parent)].category, category, at(path));
+        const int index = int(scene_.objects.size());
+        scene_.objects.push_back({.category = category,
+                                  .type = type,
+                                  .id = {},
+                                  .where = at(path),
+                                  .params = {},
+                                  .children = {}});
+        const bool is_named = !is_automatic(key, category);
+        if (d.contains("id"))
+            declare(text(d["id"]), index, path);
+        else if (parent < 0 && is_named)
+            declare(key, index, path);
+        add_to(parent, parent >= 0 && is_named ? key : "", index, path);
+        const bool inside = in_emitter || category == "emitter";
+        for (const auto& [inner_key, inner] : d) {
+            const std::string name = key_of(inner_key, path);
+            if (name == "type" || name == "id") continue;
+            read_entry(index, name, inner, path + "/" + name, inside, depth + 1);
+        }
+    }
+    void read_entry(int index, const std::string& name, nb::handle value, const std::string& path,
+                    bool in_emitter, int depth) {
+        if (!is_value(value)) return read_child(index, name, value, path, in_emitter, depth);
+        SceneObject& object = scene_.objects[size_t(index)];
+        ValueContext context{object.category, name, {}, in_emitter, at(path)};
+        if (const PluginInfo* info = find_plugin(object.category, object.type))
+            for (const ParamInfo& p : info->params)
+                if (name == p.name) context.kind = p.kind;
+        object.params.push_back({name, to_value(value, context), at(path)});
+    }
+
+    static bool is_any_automatic(const std::string& key) {
+        for (const std::string& c : object_categories())
+            if (is_automatic(key, c)) return true;
+        return false;
+    }
+    size_t slots(int parent) const {
+        return parent < 0 ? scene_.roots.size() : scene_.objects[size_t(parent)].children.size();
+    }
+    void add_to(int parent, const std::string& name, int object, const std::string& path) {
+        if (parent < 0)
+            scene_.roots.push_back(object);
+        else
+            scene_.objects[size_t(parent)].children.push_back({name, object, at(path)});
+    }
+    void declare(const std::string& id, int index, const std::string& path) {
+        if (!ids_.emplace(id, index).second)
+            throw SceneError(at(path), fmt::format("the id {} is taken", quote(id)));
+        scene_.objects[size_t(index)].id = id;
+    }
+
+    SceneDescription& scene_;
+    std::map<std::string, int> ids_;
+    std::vector<Reference> references_;
+};
+
+struct Named {
+    std::string key;
+    int object;
+};
+
+/// The objects of the scene (-1) or of an object by the keys under which paths and dicts have them.
+std::vector<Named> children_of(const SceneDescription& scene, int index) {
+    std::vector<Named> all;
+    std::map<std::string, int> used;
+    const auto add = [&](const std::string& name, int object) {
+        if (!name.empty()) {
+            all.push_back({name, object});
+            return;
+        }
+        const std::string& category = scene.objects[size_t(object)].category;
+        const int number = ++used[category];
+        all.push_back({number == 1 ? category : fmt::format("{}_{}", category, number), object});
+    };
+    if (index < 0)
+        for (const int root : scene.roots) add(scene.objects[size_t(root)].id, root);
+    else
+        for (const auto& c : scene.objects[size_t(index)].children) add(c.name, c.object);
+    return all;
+}
+
+class DictWriter {
+public:
+    explicit DictWriter(const SceneDescription& scene)
+        : scene_(scene), is_written_(scene.objects.size()) {
+        if (!scene.meshes.empty())
+            throw SceneError({scene.file, 0}, "the scene file has meshes of its own, which a dict "
+                                              "cannot hold");
+    }
+    nb::dict scene() {
+        nb::dict d;
+        d["type"] = "scene";
+        for (const Named& c : children_of(scene_, -1)) d[c.key.c_str()] = object(c.object, true);
+        return d;
+    }
+    nb::dict object(int index, bool is_root) {
+        const SceneObject& o = scene_.objects[size_t(index)];
+        nb::dict d;
+        if (is_written_[size_t(index)]) {
+            d["type"] = "ref";
+            d["id"] = o.id;
+            return d;
+        }
+        is_written_[size_t(index)] = true;
+        d["type"] = o.type;
+        if (!o.id.empty() && !is_root) d["id"] = o.id;
+        for (const Param& p : o.params) d[p.name.c_str()] = to_python(p.value);
+        for (const Named& c : children_of(scene_, index))
+            d[c.key.c_str()] = object(c.object, false);
+        return d;
+    }
+
+private:
+    const SceneDescription& scene_;
+    std::vector<bool> is_written_;
+};
+
+/// What a path such as "ball.bsdf.reflectance" names: an object, or a parameter of one (`parameter` is not empty).
+struct Place {
+    int object = -1;  ///< -1: the scene.
+    std::string parameter;
+    int parent = -1;
+    size_t slot = 0;  ///< Of the object among those of its parent.
+    bool in_emitter = false;
+};
+
+Place find(const SceneDescription& scene, const std::string& path) {
+    Place at;
+    std::string_view rest = path;
+    while (!rest.empty()) {
+        const std::vector<Named> children = children_of(scene, at.object);
+        size_t best = 0, length = 0;
+        for (size_t i = 0; i < children.size(); ++i) {
+            const std::string& key = children[i].key;
+            const bool fits = rest == key || (rest.starts_with(key) && rest[key.size()] == '.');
+            if (fits && key.size() >= length) best = i, length = key.size();
+        }
+        if (length == 0) {
+            at.parameter = rest;
+            return at;
+        }
+        at.parent = at.object;
+        at.slot = best;
+        at.object = children[best].object;
+        at.in_emitter |= scene.objects[size_t(at.object)].category == "emitter";
+        rest.remove_prefix(std::min(rest.size(), length + 1));
+    }
+    return at;
+}
+
+/// Throws SceneError with what an object could have been asked for.
+[[noreturn]] void fail_unknown(const SceneDescription& scene, const std::string& path,
+                               const Place& at) {
+    std::vector<std::string> known;
+    for (const Named& c : children_of(scene, at.object)) known.push_back(c.key);
+    std::string owner = "the scene";
+    if (at.object >= 0) {
+        const SceneObject& o = scene.objects[size_t(at.object)];
+        owner = fmt::format("{} \"{}\"", o.category, o.type);
+        if (const PluginInfo* info = find_plugin(o.category, o.type))
+            for (const ParamInfo& p : info->params)
+                if (std::find(known.begin(), known.end(), p.name) == known.end())
+                    known.push_back(p.name);
+    }
+    throw SceneError({path, 0}, fmt::format("{} has no {}{}", owner, quote(at.parameter),
+                                            hint(at.parameter, known)));
+}
+
+nb::object get(const SceneDescription& scene, const std::string& path) {
+    const Place at = find(scene, path);
+    if (at.parameter.empty())
+        return at.object < 0 ? DictWriter(scene).scene()
+                             : DictWriter(scene).object(at.object, at.parent < 0);
+    if (at.object >= 0)
+        if (const Param* p = scene.objects[size_t(at.object)].find(at.parameter))
+            return to_python(p->value);
+    fail_unknown(scene, path, at);
+}
+
+void erase(SceneDescription& scene, const std::string& path) {
+    const Place at = find(scene, path);
+    if (at.parameter.empty() && at.object >= 0) {
+        if (at.parent < 0)
+            scene.roots.erase(scene.roots.begin() + std::ptrdiff_t(at.slot));
+        else {
+            auto& children = scene.objects[size_t(at.parent)].children;
+            children.erase(children.begin() + std::ptrdiff_t(at.slot));
+        }
+        return;
+    }
+    if (at.object >= 0)
+        if (std::erase_if(scene.objects[size_t(at.object)].params,
+                          [&](const Param& p) { return p.name == at.parameter; }) > 0)
+            return;
+    fail_unknown(scene, path, at);
+}
+
+/// Names of parameters are those of the plug-in's table, so that a misspelt one is an error at once.
+void check_name(const SceneDescription& scene, const std::string& path, const Place& at) {
+    if (at.object < 0) fail_unknown(scene, path, at);
+    const SceneObject& o = scene.objects[size_t(at.object)];
+    const PluginInfo* info = find_plugin(o.category, o.type);
+    if (!info) return;
+    for (const ParamInfo& p : info->params)
+        if (at.parameter == p.name) return;
+    fail_unknown(scene, path, at);
+}
+
+void set_in(SceneDescription& scene, const std::string& path, nb::handle value) {
+    const Place at = find(scene, path);
+    const SourceLocation where{path, 0};
+    if (!is_value(value)) {
+        // An object: in the place of the old one, or added.
+        const int parent = at.parameter.empty() ? at.parent : at.object;
+        const std::string key =
+            at.parameter.empty() ? children_of(scene, at.parent)[at.slot].key : at.parameter;
+        const bool replaces = at.parameter.empty() && at.object >= 0;
+        if (parent >= 0)
+            std::erase_if(scene.objects[size_t(parent)].params,
+                          [&](const Param& p) { return p.name == key; });
+        if (replaces && parent < 0) scene.objects[size_t(at.object)].id.clear();
+        DictReader(scene).add(parent, key, value, at.in_emitter);
+        if (!replaces) return;
+        // The new one is the last.
+        if (parent < 0) {
+            scene.roots[at.slot] = scene.roots.back();
+            scene.roots.pop_back();
+        } else {
+            auto& children = scene.objects[size_t(parent)].children;
+            children[at.slot] = children.back();
+            children.pop_back();
+        }
+        return;
+    }
+    Place target = at;
+    if (at.parameter.empty()) {
+        // A value in the place of an object, such as a colour in that of a texture.
+        if (at.object < 0 || at.parent < 0) throw SceneError(where, "expected an object");
+        target.object = at.parent;
+        target.parameter = children_of(scene, at.parent)[at.slot].key;
+    }
+    check_name(scene, path, target);
+    SceneObject& object = scene.objects[size_t(target.object)];
+    ValueContext context{object.category, target.parameter, {}, target.in_emitter, where};
+    if (const PluginInfo* info = find_plugin(object.category, object.type))
+        for (const ParamInfo& p : info->params)
+            if (target.parameter == p.name) context.kind = p.kind;
+    Param changed{target.parameter, to_value(value, context), where};
+    if (at.parameter.empty())
+        object.children.erase(object.children.begin() + std::ptrdiff_t(at.slot));
+    for (Param& p : object.params)
+        if (p.name == changed.name) {
+            p = std::move(changed);
+            return;
+        }
+    object.params.push_back(std::move(changed));
+}
+
+/// All or nothing: a value that is refused leaves the description as it was.
+void set(SceneDescription& scene, const std::string& path, nb::handle value) {
+    SceneDescription changed = scene;
+    set_in(changed, path, value);
+    if (const Place at = find(changed, path); at.object >= 0 && !at.parameter.empty()) {
+        // The type is that of the table.
+        const SceneObject& o = changed.objects[size_t(at.object)];
+        if (const PluginInfo* info = find_plugin(o.category, o.type))
+            check_params(changed, at.object, *info,
+                         [&](const SourceLocation& where, const std::string& message) {
+                             throw SceneError(where, message);
+                         });
+    }
+    scene = std::move(changed);
+}
+
+std::vector<std::string> paths(const SceneDescription& scene) {
+    std::vector<std::string> all;
+    const std::function<void(int, const std::string&, int)> visit =
+        [&](int index, const std::string& prefix, int depth) {
+            if (index >= 0)
+                for (const Param& p : scene.objects[size_t(index)].params)
+                    all.push_back(prefix + p.name);
+            for (const Named& c : children_of(scene, index)) {
+                all.push_back(prefix + c.key);
+                if (depth < kDeepestNesting) visit(c.object, prefix + c.key + ".", depth + 1);
+            }
+        };
+    visit(-1, "", 0);
+    return all;
+}
+
+ScenePtr build(const SceneDescription& description,
+               const std::optional<std::pair<int, int>>& resolution,
+               const std::optional<std::array<int, 4>>& crop, bool lenient, bool watertight) {
+    BuildOptions options;
+    options.lenient = lenient;
+    options.accelerator.is_watertight = watertight;
+    if (resolution) {
+        const auto [w, h] = *resolution;
+        if (w < 1 || h < 1 || w > 65536 || h > 65536)
+            throw nb::value_error("resolution must lie between (1, 1) and (65536, 65536)");
+        options.resolution = resolution;
+    }
+    options.crop = crop;
+    nb::gil_scoped_release no_gil;
+    Scene scene = build_scene(description, options);
+    return std::make_shared<SceneHandle>(description, std::move(scene));
+}
+
+nb::dict info(const SceneHandle& s) {
+    const Scene& scene = s.scene;
+    const Scene::Statistics& st = scene.statistics();
+    double power = 0;
+    for (const auto& e : scene.emitters()) power += e->power();
+    nb::dict d;
+    d["shapes"] = scene.shapes().size();
+    d["triangles"] = st.triangles;
+    d["quadrics"] = st.quadrics;
+    d["instances"] = st.instances;
+    d["materials"] = st.materials;
+    d["textures"] = st.textures;
+    d["emitters"] = scene.emitters().size();
+    d["emitters_at_infinity"] = scene.infinite_emitters().size();
+    d["emitted_power"] = power;
+    d["filter"] = scene.filter().name();
+    d["geometry_bytes"] = st.geometry_bytes;
+    d["texture_bytes"] = st.texture_bytes;
+    d["accelerator_bytes"] = st.accelerator_bytes;
+    return d;
+}
+
+ReadOptions read_options(const std::map<std::string, std::string>& defines, bool lenient) {
+    ReadOptions options;
+    options.defines = defines;
+    options.lenient = lenient;
+    return options;
+}
+
+nb::list matrix(const std::optional<Transform>& t) {
+    if (!t)
+        throw nb::value_error("origin and target must differ, and up must not point along the "
+                              "viewing direction");
+    return nb::cast<nb::list>(to_python(*t));
+}
+
+}  // namespace
+
+void bind_description(nb::module_& m) {
+    using namespace nb::literals;
+    nb::exception<SceneError>(m, "SceneError", PyExc_ValueError).attr("__doc__") =
+        "An invalid scene: the message says where, what was expected, and what is near.";
+
+    nb::class_<SceneDescription>(
+        m, "Description",
+        "The contents of a scene as plain data: objects with named parameters. Edit it by path, "
+        "and "
+        "build() scenes from it.\n\n"
+        "A path joins keys by dots: \"ball.bsdf.reflectance\". The key of an object is its id or "
+        "its "
+        "parameter name; without either its category (\"sensor\", \"shape\", \"shape_2\").")
+        .def("__getitem__", &get, "path"_a,
+             "The parameter or object that a path names: a number, a text, a list of 3 numbers, a "
+             "colour as {\"type\": \"rgb\"}, a 4x4 list, or a dict.")
+        .def("__setitem__", &set, "path"_a, "value"_a,
+             "Sets a parameter, or replaces or adds an object given as a dict. Raises SceneError "
+             "for "
+             "an unknown name or a value of the wrong type, and changes nothing then.")
+        .def("__delitem__", &erase, "path"_a, "Removes a parameter or an object.")
+        .def(
+            "__contains__",
+            [](const SceneDescription& d, const std::string& path) {
+                const std::vector<std::string> all = paths(d);
+                return std::find(all.begin(), all.end(), path) != all.end();
+            },
+            "path"_a, "Whether the description has a parameter or object of this path.")
+        .def(
+            "copy", [](const SceneDescription& d) { return d; },
+            "A copy, a description to be edited on its own.")
+        .def("__copy__", [](const SceneDescription& d) { return d; })
+        .def(
+            "__deepcopy__", [](const SceneDescription& d, nb::handle) { return d; }, "memo"_a)
+        .def("paths", &paths, "The paths of all objects and parameters, in order.")
+        .def(
+            "to_dict", [](const SceneDescription& d) { return DictWriter(d).scene(); },
+            "The description as nested dicts, which load_dict() takes.")
+        .def(
+            "dump", [](const SceneDescription& d) { return dump(d); },
+            "Canonical text: one line for each object and parameter. Equal for equal scenes, "
+            "whatever "
+            "they were read from.")
+        .def_prop_ro(
+            "file", [](const SceneDescription& d) { return d.file; },
+            "The file that it was read from; \"dict\" for dicts.")
+        .def_prop_ro(
+            "warnings", [](const SceneDescription& d) { return d.warnings; },
+            "What was left out under lenient=True, one sentence each.")
+        .def("build", &build, "resolution"_a.none() = nb::none(), "crop"_a.none() = nb::none(),
+             "lenient"_a = false, "watertight"_a = false,
+             "Builds a Scene, which later edits do not change.\n\n"
+             "resolution: (width, height) of the image in pixels, instead of the scene's.\n"
+             "crop: (x, y, width, height) of the part to render, in pixels from the upper left "
+             "corner.\n"
+             "lenient: turns unknown plug-ins and parameters into warnings.\n"
+             "watertight: lets no ray pass between adjacent triangles; slower.");
+
+    nb::class_<SceneHandle>(
+        m, "Scene",
+        "A scene that is ready to render. It never changes: edit its Description "
+        "and build another one.")
+        .def_prop_ro(
+            "file", [](const SceneHandle& s) { return s.scene.file(); },
+            "The file that the description was read from; \"dict\" for dicts.")
+        .def_prop_ro(
+            "width", [](const SceneHandle& s) { return s.scene.film().crop_width; },
+            "Width of the rendered part, in pixels.")
+        .def_prop_ro(
+            "height", [](const SceneHandle& s) { return s.scene.film().crop_height; },
+            "Height of the rendered part, in pixels.")
+        .def_prop_ro(
+            "warnings", [](const SceneHandle& s) { return s.scene.warnings(); },
+            "What may be wrong with the scene, one sentence each.")
+        .def_prop_ro(
+            "bounds",
+            [](const SceneHandle& s) {
+                const Bounds3& b = s.scene.bounds();
+                return std::array<std::array<float, 3>, 2>{
+                    {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}}};
+            },
+            "Corners of the bounding box, in scene units.")
+        .def_prop_ro(
+            "description", [](const SceneHandle& s) { return s.description; },
+            "A copy of the description that the scene was built from.")
+        .def("info", &info,
+             "Counts, memory in bytes and emitted power in watts, as `etendue info`.");
+
+    m.def(
+        "load",
+        [](const std::string& file, const std::map<std::string, std::string>& defines,
+           bool lenient) {
+            const ReadOptions options = read_options(defines, lenient);
+            nb::gil_scoped_release no_gil;
+            return read_scene_file(file, options);
+        },
+        "file"_a, "defines"_a, "lenient"_a);
+    m.def(
+        "load_string",
+        [](const std::string& xml, const std::map<std::string, std::string>& defines,
+           const std::string& name,
+           bool lenient) { return parse_mitsuba_xml(xml, name, read_options(defines, lenient)); },
+        "xml"_a, "defines"_a, "name"_a, "lenient"_a);
+    m.def(
+        "load_dict",
+        [](nb::dict d, const std::string& folder) {
+            SceneDescription scene;
+            scene.file = "dict";
+            scene.search_paths = {folder};
+            DictReader(scene).read_scene(d);
+            return scene;
+        },
+        "d"_a, "folder"_a);
+    m.def(
+        "plugins",
+        [](const std::string& category, const std::string& name) {
+            return to_json(choose_plugins(plugin_list(), category, name)).dump();
+        },
+        "category"_a, "name"_a);
+    const auto vec = [](const std::array<float, 3>& v) { return Vec3{v[0], v[1], v[2]}; };
+    m.def(
+        "look_at",
+        [vec](const std::array<float, 3>& origin, const std::array<float, 3>& target,
+              const std::array<float, 3>& up) {
+            return matrix(Transform::look_at(vec(origin), vec(target), vec(up)));
+        },
+        "origin"_a, "target"_a, "up"_a);
+    m.def(
+        "rotate",
+        [vec](const std::array<float, 3>& axis, double degrees) {
+            return matrix(Transform::rotate(vec(axis), degrees));
+        },
+        "axis"_a, "degrees"_a);
+}
+
+}  // namespace etendue::python

@@ -1,0 +1,12 @@
+#include "bindings.h"
+
+NB_MODULE(_etendue, m) {
+    using namespace etendue::python;
+    m.doc() = "The compiled part of etendue.";
+    m.attr("__version__") = ETENDUE_VERSION;
+    bind_description(m);
+    bind_images(m);
+    bind_core(m);
+    bind_render(m);
+    bind_reports(m);
+}

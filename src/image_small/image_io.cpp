@@ -1,0 +1,629 @@
+// image_io.h over OpenEXR, libpng and libjpeg: .exr, .png, .jpg, .hdr and .pfm. It loads in a fraction of the time of
+// OpenImageIO, and needs few other libraries.
+
+#include "image/image_io.h"
+
+#include <algorithm>
+#include <cmath>
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfDoubleAttribute.h>
+#include <OpenEXR/ImfFloatAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfIntAttribute.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <fmt/format.h>
+#include <jpeglib.h>
+#include <png.h>
+
+#include "color/srgb.h"
+#include "image/image_codecs.h"
+
+namespace etendue {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail_read(const std::string& path, const std::string& why) {
+    throw std::runtime_error(fmt::format("cannot read \"{}\": {}", path, why));
+}
+
+/// No codec compresses better than this. A header with a larger size is damaged, and would exhaust the memory.
+void check_size(const std::string& path, uint64_t width, uint64_t height, uint64_t pixel_bytes) {
+    constexpr uint64_t kBestRatio = 4096, kAlwaysFine = 256u << 20;
+    if (width < 1 || height < 1) fail_read(path, "it has no pixels");
+    const uint64_t bytes = width * height * pixel_bytes;
+    if (bytes > kAlwaysFine && bytes / kBestRatio > fs::file_size(path))
+        fail_read(path,
+                  fmt::format("its header claims {} x {} pixels, too many for the file's size",
+                              width, height));
+}
+
+/// What a file holds, before any conversion of colours.
+struct Contents {
+    PixelBuffer pixels;
+    std::vector<std::string> channels;
+    bool is_linear = true;    ///< Whether the values are linear, or sRGB codes.
+    double largest_code = 1;  ///< Of integer formats.
+    std::map<std::string, std::variant<std::string, double>> attributes;
+};
+
+std::vector<std::string> channel_names(int count) {
+    switch (count) {
+    case 1: return {"Y"};
+    case 2: return {"Y", "A"};
+    case 3: return {"R", "G", "B"};
+    default: return {"R", "G", "B", "A"};
+    }
+}
+
+// ------------------------------------------------------------------------------------------------------- OpenEXR
+
+/// Within each layer: R, G, B, A, and others after them.
+std::vector<std::string> ordered_channels(const Imf::ChannelList& list) {
+    std::vector<std::string> names;
+    for (auto it = list.begin(); it != list.end(); ++it) names.emplace_back(it.name());
+    const auto key = [](const std::string& name) {
+        const size_t dot = name.rfind('.');
+        const std::string layer = dot == std::string::npos ? "" : name.substr(0, dot);
+        const std::string last = name.substr(dot == std::string::npos ? 0 : dot + 1);
+        const size_t rank = std::string_view("RGBA").find(last);
+        return std::tuple(layer, last.size() == 1 ? std::min<size_t>(rank, 4) : 4, last);
+    };
+    std::stable_sort(names.begin(), names.end(),
+                     [&](const auto& a, const auto& b) { return key(a) < key(b); });
+    return names;
+}
+
+template <class T>
+std::vector<T> read_exr_pixels(Imf::InputFile& file, const std::vector<std::string>& names,
+                               Imf::PixelType type) {
+    const Imath::Box2i window = file.header().dataWindow();
+    const size_t width = size_t(window.max.x - window.min.x + 1);
+    const size_t height = size_t(window.max.y - window.min.y + 1);
+    std::vector<T> data(width * height * names.size());
+    const size_t pixel = names.size() * sizeof(T), row = width * pixel;
+    Imf::FrameBuffer buffer;
+    for (size_t i = 0; i < names.size(); ++i)
+        buffer.insert(names[i], Imf::Slice::Make(type, data.data() + i, window.min, int64_t(width),
+                                                 int64_t(height), pixel, row));
+    file.setFrameBuffer(buffer);
+    file.readPixels(window.min.y, window.max.y);
+    return data;
+}
+
+Contents read_exr(const std::string& path, bool as_floats) {
+    Imf::InputFile file(path.c_str());
+    const Imf::Header& header = file.header();
+    const Imath::Box2i window = header.dataWindow();
+    Contents c;
+    c.channels = ordered_channels(header.channels());
+    if (c.channels.empty()) fail_read(path, "it has no channels");
+    bool is_half = !as_floats;
+    for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
+        is_half = is_half && it.channel().type == Imf::HALF;
+        if (it.channel().xSampling != 1 || it.channel().ySampling != 1)
+            fail_read(path, "its channels differ in resolution");
+    }
+    PixelBuffer& p = c.pixels;
+    p.width = window.max.x - window.min.x + 1;
+    p.height = window.max.y - window.min.y + 1;
+    p.channels = int(c.channels.size());
+    check_size(path, uint64_t(p.width), uint64_t(p.height), c.channels.size() * 4);
+    const auto alpha = std::find(c.channels.begin(), c.channels.end(), "A");
+    if (alpha != c.channels.end()) p.alpha_channel = int(alpha - c.channels.begin());
+    if (is_half)
+        p.data = read_exr_pixels<Half>(file, c.channels, Imf::HALF);
+    else
+        p.data = read_exr_pixels<float>(file, c.channels, Imf::FLOAT);
+    for (auto it = header.begin(); it != header.end(); ++it) {
+        const Imf::Attribute& a = it.attribute();
+        if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&a))
+            c.attributes[it.name()] = text->value();
+        else if (const auto* real = dynamic_cast<const Imf::DoubleAttribute*>(&a))
+            c.attributes[it.name()] = real->value();
+        else if (const auto* single = dynamic_cast<const Imf::FloatAttribute*>(&a))
+            c.attributes[it.name()] = double(single->value());
+        else if (const auto* integer = dynamic_cast<const Imf::IntAttribute*>(&a))
+            c.attributes[it.name()] = double(integer->value());
+    }
+    return c;
+}
+
+// ------------------------------------------------------------------------------------------------------- PNG
+
+struct File {
+    File(const std::string& path, const char* mode) : handle(std::fopen(path.c_str(), mode)) {}
+    ~File() {
+        if (handle) std::fclose(handle);
+    }
+    File(const File&) = delete;
+    File& operator=(const File&) = delete;
+    /// Whether everything reached the disk.
+    bool close() {
+        const bool is_written = handle && std::fflush(handle) == 0 && !std::ferror(handle);
+        const bool is_closed = handle && std::fclose(handle) == 0;
+        handle = nullptr;
+        return is_written && is_closed;
+    }
+    FILE* handle;
+};
+
+/// Where libpng and libjpeg leave after an error, and what they said. No object with a destructor may be made between
+/// setjmp() and a call of the library.
+struct Escape {
+    std::jmp_buf place;
+    char message[200] = "";
+};
+
+void png_fails(png_structp png, png_const_charp message) {
+    auto& escape = *static_cast<Escape*>(png_get_error_ptr(png));
+    std::snprintf(escape.message, sizeof escape.message, "%s", message);
+    std::longjmp(escape.place, 1);
+}
+void png_warns(png_structp, png_const_charp) {}
+
+struct PngReader {
+    explicit PngReader(Escape& escape)
+        : png(png_create_read_struct(PNG_LIBPNG_VER_STRING, &escape, png_fails, png_warns)),
+          info(png_create_info_struct(png)) {}
+    ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
+    PngReader(const PngReader&) = delete;
+    PngReader& operator=(const PngReader&) = delete;
+    png_structp png;
+    png_infop info;
+};
+
+struct PngHeader {
+    uint32_t width, height;
+    int channels, depth;
+    bool is_linear;
+};
+
+bool read_png_header(PngReader& reader, FILE* file, Escape& escape, PngHeader& header) {
+    if (setjmp(escape.place)) return false;
+    png_structp png = reader.png;
+    png_infop info = reader.info;
+    png_init_io(png, file);
+    png_read_info(png, info);
+    const int type = png_get_color_type(png, info);
+    if (type == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);
+    if (type == PNG_COLOR_TYPE_GRAY && png_get_bit_depth(png, info) < 8)
+        png_set_expand_gray_1_2_4_to_8(png);
+    if (png_get_valid(png, info, PNG_INFO_tRNS)) png_set_tRNS_to_alpha(png);
+    double gamma = 0;
+    header.is_linear = png_get_gAMA(png, info, &gamma) && std::fabs(gamma - 1) < 1e-3;
+    png_set_interlace_handling(png);
+    if (png_get_bit_depth(png, info) == 16) png_set_swap(png);
+    png_read_update_info(png, info);
+    header.width = png_get_image_width(png, info);
+    header.height = png_get_image_height(png, info);
+    header.channels = png_get_channels(png, info);
+    header.depth = png_get_bit_depth(png, info);
+    return true;
+}
+
+bool read_png_rows(PngReader& reader, Escape& escape, png_bytepp rows) {
+    if (setjmp(escape.place)) return false;
+    png_read_image(reader.png, rows);
+    png_read_end(reader.png, nullptr);
+    return true;
+}
+
+Contents read_png(const std::string& path) {
+    File file(path, "rb");
+    Escape escape;
+    PngReader reader(escape);
+    PngHeader header{};
+    if (!read_png_header(reader, file.handle, escape, header)) fail_read(path, escape.message);
+    const size_t samples = size_t(header.width) * size_t(header.channels);
+    check_size(path, header.width, header.height, size_t(header.channels * header.depth / 8));
+    Contents c;
+    PixelBuffer& p = c.pixels;
+    p.width = int(header.width), p.height = int(header.height), p.channels = header.channels;
+    c.channels = channel_names(p.channels);
+    if (p.channels == 2 || p.channels == 4) p.alpha_channel = p.channels - 1;
+    c.is_linear = header.is_linear;
+    const bool is_deep = header.depth == 16;
+    std::vector<uint8_t> bytes(samples * header.height * (is_deep ? 2 : 1));
+    std::vector<png_bytep> rows(header.height);
+    for (size_t y = 0; y < rows.size(); ++y)
+        rows[y] = bytes.data() + y * samples * (is_deep ? 2 : 1);
+    if (!read_png_rows(reader, escape, rows.data())) fail_read(path, escape.message);
+    if (!is_deep) {
+        c.largest_code = 255;
+        p.data = std::move(bytes);
+        return c;
+    }
+    std::vector<float> values(samples * header.height);
+    for (size_t i = 0; i < values.size(); ++i) {
+        uint16_t code = 0;
+        std::memcpy(&code, bytes.data() + 2 * i, 2);
+        values[i] = float(code) * (1.0f / 65535.0f);
+    }
+    p.data = std::move(values);
+    return c;
+}
+
+/// Where the bytes of a PNG go.
+struct PngTarget {
+    std::string* bytes;
+    FILE* file;
+};
+
+void append_bytes(png_structp png, png_bytep data, size_t size) {
+    const auto& target = *static_cast<PngTarget*>(png_get_io_ptr(png));
+    if (target.bytes)
+        target.bytes->append(reinterpret_cast<const char*>(data), size);
+    else if (std::fwrite(data, 1, size, target.file) != size)
+        png_error(png, "the disk may be full");
+}
+void flush_nothing(png_structp) {}
+
+bool encode_rows(png_structp png, png_infop info, Escape& escape, PngTarget& target, int width,
+                 int height, int channels, const uint8_t* codes) {
+    if (setjmp(escape.place)) return false;
+    png_set_write_fn(png, &target, append_bytes, flush_nothing);
+    png_set_IHDR(png, info, png_uint_32(width), png_uint_32(height), 8,
+                 channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+    png_write_info(png, info);
+    for (int y = 0; y < height; ++y)
+        png_write_row(png, codes + size_t(y) * size_t(width * channels));
+    png_write_end(png, nullptr);
+    return true;
+}
+
+/// Empty, or what went wrong.
+std::string encode(PngTarget target, int width, int height, std::span<const uint8_t> codes) {
+    Escape escape;
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &escape, png_fails, png_warns);
+    png_infop info = png_create_info_struct(png);
+    const int channels = int(codes.size() / (size_t(width) * size_t(height)));
+    const bool is_good =
+        encode_rows(png, info, escape, target, width, height, channels, codes.data());
+    png_destroy_write_struct(&png, &info);
+    return is_good ? "" : escape.message;
+}
+
+// ------------------------------------------------------------------------------------------------------- JPEG
+
+struct JpegErrors {
+    jpeg_error_mgr manager;
+    Escape escape;
+};
+
+void jpeg_fails(j_common_ptr info) {
+    auto& errors = *reinterpret_cast<JpegErrors*>(info->err);
+    char message[JMSG_LENGTH_MAX];
+    info->err->format_message(info, message);
+    std::snprintf(errors.escape.message, sizeof errors.escape.message, "%.199s", message);
+    std::longjmp(errors.escape.place, 1);
+}
+void jpeg_warns(j_common_ptr, int) {}
+
+bool read_jpeg_header(jpeg_decompress_struct& jpeg, FILE* file, JpegErrors& errors) {
+    if (setjmp(errors.escape.place)) return false;
+    jpeg_create_decompress(&jpeg);
+    jpeg_stdio_src(&jpeg, file);
+    jpeg_read_header(&jpeg, TRUE);
+    jpeg_start_decompress(&jpeg);
+    return true;
+}
+
+bool read_jpeg_rows(jpeg_decompress_struct& jpeg, JpegErrors& errors, uint8_t* to, size_t row) {
+    if (setjmp(errors.escape.place)) return false;
+    while (jpeg.output_scanline < jpeg.output_height) {
+        JSAMPROW at = to + size_t(jpeg.output_scanline) * row;
+        jpeg_read_scanlines(&jpeg, &at, 1);
+    }
+    jpeg_finish_decompress(&jpeg);
+    return true;
+}
+
+Contents read_jpeg(const std::string& path) {
+    File file(path, "rb");
+    JpegErrors errors;
+    jpeg_decompress_struct jpeg{};
+    jpeg.err = jpeg_std_error(&errors.manager);
+    errors.manager.error_exit = jpeg_fails;
+    errors.manager.emit_message = jpeg_warns;
+    struct Cleanup {
+        jpeg_decompress_struct& of;
+        ~Cleanup() { jpeg_destroy_decompress(&of); }
+    } cleanup{jpeg};
+    if (!read_jpeg_header(jpeg, file.handle, errors)) fail_read(path, errors.escape.message);
+    const int channels = jpeg.output_components;
+    if (channels != 1 && channels != 3) fail_read(path, "a JPEG must be grey or RGB");
+    check_size(path, jpeg.output_width, jpeg.output_height, size_t(channels));
+    Contents c;
+    c.pixels.width = int(jpeg.output_width), c.pixels.height = int(jpeg.output_height);
+    c.pixels.channels = channels;
+    c.channels = channel_names(channels);
+    c.is_linear = false;
+    c.largest_code = 255;
+    const size_t row = size_t(jpeg.output_width) * size_t(channels);
+    std::vector<uint8_t> bytes(row * jpeg.output_height);
+    if (!read_jpeg_rows(jpeg, errors, bytes.data(), row)) fail_read(path, errors.escape.message);
+    c.pixels.data = std::move(bytes);
+    return c;
+}
+
+// ------------------------------------------------------------------------------------------------------- HDR, PFM
+
+/// The bytes of a file, read in order.
+class Bytes {
+public:
+    explicit Bytes(const std::string& path) : path_(path) {
+        std::ifstream in(path, std::ios::binary);
+        bytes_.assign(std::istreambuf_iterator<char>(in), {});
+    }
+    uint8_t next() {
+        if (at_ >= bytes_.size()) fail_read(path_, "the file ends too early");
+        return uint8_t(bytes_[at_++]);
+    }
+    std::string line() {
+        const size_t end = bytes_.find('\n', at_);
+        if (end == std::string::npos) fail_read(path_, "the header is incomplete");
+        std::string text = bytes_.substr(at_, end - at_);
+        at_ = end + 1;
+        return text;
+    }
+    /// The next word of a header; exactly one blank follows it.
+    std::string word() {
+        while (at_ < bytes_.size() && std::isspace(static_cast<unsigned char>(bytes_[at_]))) ++at_;
+        std::string text;
+        while (!std::isspace(next())) text += bytes_[at_ - 1];
+        return text;
+    }
+    size_t left() const { return bytes_.size() - at_; }
+    const char* here() const { return bytes_.data() + at_; }
+
+private:
+    std::string path_, bytes_;
+    size_t at_ = 0;
+};
+
+Contents radiance_of(int width, int height, int channels, std::vector<float> values) {
+    Contents c;
+    c.pixels.width = width, c.pixels.height = height, c.pixels.channels = channels;
+    c.channels = channel_names(channels);
+    c.pixels.data = std::move(values);
+    return c;
+}
+
+/// One row of Radiance's format, with or without run lengths [Ward 1991].
+void read_rgbe_row(Bytes& bytes, const std::string& path, size_t width, std::vector<uint8_t>& row) {
+    row.resize(4 * width);
+    uint8_t start[4];
+    for (uint8_t& b : start) b = bytes.next();
+    const bool has_runs = start[0] == 2 && start[1] == 2 && start[2] < 128;
+    if (!has_runs) {
+        std::copy(start, start + 4, row.begin());
+        for (size_t i = 4; i < row.size(); ++i) row[i] = bytes.next();
+        return;
+    }
+    if (size_t(start[2]) << 8 != width - start[3])
+        fail_read(path, "a row has another length than the image");
+    for (size_t c = 0; c < 4; ++c)
+        for (size_t x = 0; x < width;) {
+            const uint8_t count = bytes.next();
+            const size_t run = count > 128 ? count - 128u : count;
+            if (run == 0 || x + run > width) fail_read(path, "a run is longer than its row");
+            uint8_t value = count > 128 ? bytes.next() : uint8_t(0);
+            for (size_t i = 0; i < run; ++i, ++x) {
+                if (count <= 128) value = bytes.next();
+                row[4 * x + c] = value;
+            }
+        }
+}
+
+Contents read_rgbe(const std::string& path) {
+    Bytes bytes(path);
+    if (!bytes.line().starts_with("#?")) fail_read(path, "it does not begin with \"#?\"");
+    while (!bytes.line().empty()) {
+    }
+    int width = 0, height = 0;
+    const std::string size = bytes.line();
+    if (std::sscanf(size.c_str(), "-Y %d +X %d", &height, &width) != 2 || width < 1 || height < 1)
+        fail_read(path, "expected a size of the form \"-Y HEIGHT +X WIDTH\"");
+    check_size(path, uint64_t(width), uint64_t(height), 12);
+    std::vector<float> values;
+    values.reserve(size_t(width) * size_t(height) * 3);
+    std::vector<uint8_t> row;
+    for (int y = 0; y < height; ++y) {
+        read_rgbe_row(bytes, path, size_t(width), row);
+        for (size_t x = 0; x < size_t(width); ++x) {
+            const uint8_t* c = &row[4 * x];
+            const float scale = c[3] > 0 ? std::ldexp(1.0f, int(c[3]) - 136) : 0.0f;
+            for (int i = 0; i < 3; ++i) values.push_back(float(c[i]) * scale);
+        }
+    }
+    return radiance_of(width, height, 3, std::move(values));
+}
+
+Contents read_pfm(const std::string& path) {
+    Bytes bytes(path);
+    const std::string kind = bytes.word();
+    if (kind != "PF" && kind != "Pf") fail_read(path, "it does not begin with \"PF\" or \"Pf\"");
+    const int channels = kind == "PF" ? 3 : 1;
+    const int width = std::atoi(bytes.word().c_str()), height = std::atoi(bytes.word().c_str());
+    const double scale = std::atof(bytes.word().c_str());
+    if (width < 1 || height < 1 || scale == 0) fail_read(path, "its header is invalid");
+    check_size(path, uint64_t(width), uint64_t(height), 4 * size_t(channels));
+    const size_t row = size_t(width) * size_t(channels);
+    if (bytes.left() < row * size_t(height) * 4) fail_read(path, "the file ends too early");
+    std::vector<float> values(row * size_t(height));
+    for (size_t y = 0; y < size_t(height); ++y)
+        std::memcpy(&values[(size_t(height) - 1 - y) * row], bytes.here() + y * row * 4, row * 4);
+    if (scale > 0)  // big-endian
+        for (float& v : values) {
+            uint32_t b = 0;
+            std::memcpy(&b, &v, 4);
+            b = __builtin_bswap32(b);
+            std::memcpy(&v, &b, 4);
+        }
+    return radiance_of(width, height, channels, std::move(values));
+}
+
+// -------------------------------------------------------------------------------------------------------
+
+/// By the first bytes, as a name may be wrong.
+Contents read_contents(const std::string& path, bool as_floats) {
+    std::error_code error;
+    const fs::file_status status = fs::status(path, error);
+    if (!fs::exists(status)) fail_read(path, "there is no such file");
+    if (!fs::is_regular_file(status)) fail_read(path, "it is not a regular file");
+    char start[8] = {};
+    std::ifstream(path, std::ios::binary).read(start, sizeof start);
+    const std::string_view magic(start, sizeof start);
+    try {
+        if (magic.starts_with("\x76\x2f\x31\x01")) return read_exr(path, as_floats);
+        if (magic.starts_with("\x89PNG")) return read_png(path);
+        if (magic.starts_with("\xff\xd8\xff")) return read_jpeg(path);
+        if (magic.starts_with("#?")) return read_rgbe(path);
+        if (magic.starts_with("PF") || magic.starts_with("Pf")) return read_pfm(path);
+    } catch (const std::bad_alloc&) {
+        fail_read(path, "its pixels do not fit into memory");
+    } catch (const Iex::BaseExc& e) {
+        fail_read(path, e.what());
+    }
+    fail_read(path, "its format is none of EXR, PNG, JPEG, HDR and PFM, which this build reads");
+}
+
+/// Codes become numbers in [0, 1], and those of colours linear.
+std::vector<float> to_floats(const Contents& c, bool keep_codes) {
+    std::vector<float> out;
+    std::visit(
+        [&](const auto& values) {
+            out.reserve(values.size());
+            const bool is_code = c.largest_code > 1;
+            for (const auto v : values)
+                out.push_back(is_code ? float(v) * (1.0f / float(c.largest_code)) : float(v));
+        },
+        c.pixels.data);
+    if (!c.is_linear && !keep_codes)
+        for (size_t i = 0; i < out.size(); ++i)
+            if (int(i % size_t(c.pixels.channels)) != c.pixels.alpha_channel)
+                out[i] = srgb_to_linear(out[i]);
+    return out;
+}
+
+void to_rgbe(const Rgb& c, uint8_t* code) {
+    const float largest = std::isfinite(c.max()) ? std::max(c.max(), 0.0f) : 0.0f;
+    std::fill(code, code + 4, uint8_t(0));
+    if (!(largest > 1e-32f)) return;
+    int exponent = 0;
+    const float scale = std::frexp(largest, &exponent) * 256 / largest;
+    for (int i = 0; i < 3; ++i) code[i] = uint8_t(std::max(c[i], 0.0f) * scale);
+    code[3] = uint8_t(exponent + 128);
+}
+
+}  // namespace
+
+Image read_image(const std::string& path) {
+    Contents c = read_contents(path, true);
+    Image image;
+    image.width = c.pixels.width, image.height = c.pixels.height;
+    image.data = to_floats(c, false);
+    image.channels = std::move(c.channels);
+    image.attributes = std::move(c.attributes);
+    return image;
+}
+
+PixelBuffer read_pixels(const std::string& path, bool raw) {
+    Contents c = read_contents(path, false);
+    const bool is_deep = std::holds_alternative<std::vector<float>>(c.pixels.data);
+    if (is_deep && !c.is_linear && !raw) c.pixels.data = to_floats(c, false);
+    return std::move(c.pixels);
+}
+
+std::string encode_png(int width, int height, std::span<const uint8_t> codes) {
+    std::string bytes;
+    if (const std::string why = encode({&bytes, nullptr}, width, height, codes); !why.empty())
+        throw std::runtime_error("cannot encode a PNG: " + why);
+    return bytes;
+}
+
+void write_png(const PendingFile& file, int width, int height, std::span<const uint8_t> codes) {
+    File out(file.temporary(), "wb");
+    if (!out.handle) file.fail("it cannot be opened");
+    const std::string why = encode({nullptr, out.handle}, width, height, codes);
+    if (!out.close() || !why.empty()) file.fail(why.empty() ? "the disk may be full" : why);
+}
+
+void write_rgbe(const PendingFile& file, int width, int height, std::span<const Rgb> pixels) {
+    std::ofstream out(file.temporary(), std::ios::binary);
+    out << fmt::format("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", height, width);
+    // With run lengths, all of them runs of different bytes, since a plain row could look as if it had them.
+    const bool has_runs = width >= 8 && width < 32768;
+    std::vector<uint8_t> row(4 * size_t(width));
+    std::string bytes;
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x)
+            to_rgbe(pixels[size_t(y) * size_t(width) + size_t(x)], &row[4 * size_t(x)]);
+        bytes.clear();
+        if (has_runs) {
+            for (const int b : {2, 2, width >> 8, width & 255}) bytes += char(b);
+            for (size_t c = 0; c < 4; ++c)
+                for (size_t x = 0; x < size_t(width); x += 128) {
+                    const size_t end = std::min(x + 128, size_t(width));
+                    bytes += char(end - x);
+                    for (size_t i = x; i < end; ++i) bytes += char(row[4 * i + c]);
+                }
+        } else {
+            bytes.assign(row.begin(), row.end());
+        }
+        out.write(bytes.data(), std::streamsize(bytes.size()));
+    }
+    out.close();
+    if (!out) file.fail("the disk may be full");
+}
+
+void write_exr(const PendingFile& file, const Image& image, ExrPrecision precision) {
+    constexpr float kMaxHalf = 65504;
+    const bool is_half = precision == ExrPrecision::Half;
+    Imf::Header header(image.width, image.height);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    for (const std::string& name : image.channels)
+        header.channels().insert(name, Imf::Channel(is_half ? Imf::HALF : Imf::FLOAT));
+    for (const auto& [name, value] : image.attributes) {
+        if (const auto* text = std::get_if<std::string>(&value))
+            header.insert(name, Imf::StringAttribute(*text));
+        else
+            header.insert(name, Imf::DoubleAttribute(std::get<double>(value)));
+    }
+    std::vector<Half> halves;
+    if (is_half)
+        for (const float v : image.data)
+            halves.emplace_back(std::isfinite(v) ? std::clamp(v, -kMaxHalf, kMaxHalf) : v);
+    const size_t size = is_half ? sizeof(Half) : sizeof(float);
+    const size_t pixel = size * image.channels.size();
+    char* base = is_half ? reinterpret_cast<char*>(halves.data())
+                         : reinterpret_cast<char*>(const_cast<float*>(image.data.data()));
+    try {
+        Imf::OutputFile out(file.temporary().c_str(), header);
+        Imf::FrameBuffer buffer;
+        for (size_t i = 0; i < image.channels.size(); ++i)
+            buffer.insert(image.channels[i],
+                          Imf::Slice(is_half ? Imf::HALF : Imf::FLOAT, base + i * size, pixel,
+                                     pixel * size_t(image.width)));
+        out.setFrameBuffer(buffer);
+        out.writePixels(image.height);
+    } catch (const Iex::BaseExc& e) {
+        file.fail(e.what());
+    }
+}
+
+}  // namespace etendue

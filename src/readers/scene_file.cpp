@@ -1,0 +1,34 @@
+#include "readers/scene_file.h"
+
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "readers/mitsuba_xml.h"
+#include "readers/pbrt.h"
+
+namespace etendue {
+
+void check_scene_file(const std::string& file) {
+    if (!std::filesystem::exists(file))
+        throw std::runtime_error(fmt::format("{}: there is no such file", file));
+    if (std::filesystem::is_directory(file))
+        throw std::runtime_error(fmt::format("{}: this is a folder, not a scene file", file));
+}
+
+SceneDescription read_scene_file(const std::string& file, const ReadOptions& options) {
+    check_scene_file(file);
+    std::filesystem::path path = file;
+    if (path.extension() == ".gz") path = path.stem();
+    const std::string extension = path.extension().string();
+    if (extension == ".xml") return read_mitsuba_xml(file, options);
+    if (extension == ".pbrt") {
+        if (!options.defines.empty()) throw UnusedDefines("scenes of pbrt have no parameters");
+        return read_pbrt(file, options);
+    }
+    throw std::runtime_error(fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of "
+                                         "Mitsuba 0.6 and 3; .pbrt, of pbrt-v3 and v4)",
+                                         file, extension));
+}
+
+}  // namespace etendue

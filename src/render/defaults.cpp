@@ -1,0 +1,26 @@
+#include "render/defaults.h"
+
+namespace etendue {
+
+IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
+    const RenderDefaults& defaults = scene.defaults();
+    IntegratorSpec spec =
+        IntegratorSpec::parse(!text.empty()                 ? text
+                              : defaults.integrator.empty() ? "path"
+                                                            : defaults.integrator);
+    for (const auto& [name, value] : defaults.integrator_params) spec.params.emplace(name, value);
+    return spec;
+}
+
+void set_default_limit(RenderLimits& limits, const Scene& scene) {
+    if (limits.spp || limits.seconds || limits.error) return;
+    limits.spp = scene.defaults().spp > 0 ? uint64_t(scene.defaults().spp) : 64;
+}
+
+std::optional<SamplerKind> sampler_kind(std::string_view name) {
+    if (name == "independent") return SamplerKind::Independent;
+    if (name == "sobol") return SamplerKind::Sobol;
+    return {};
+}
+
+}  // namespace etendue

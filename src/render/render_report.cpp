@@ -1,0 +1,79 @@
+#include "render/render_report.h"
+
+#include <algorithm>
+
+#include <nlohmann/json.hpp>
+
+#include "render/aov.h"
+#include "render/warnings.h"
+
+namespace etendue {
+
+nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
+                       const std::string& stopped_by, const PassLog& log) {
+    const RenderStats& s = r.stats();
+    const ErrorEstimate e = r.film().error();
+    const Film::MeanEstimate mean = r.film().mean_luminance();
+    nlohmann::json j{
+        {"scene", scene.file()},
+        {"integrator", settings.integrator.to_string()},
+        {"estimator", to_string(r.integrator().estimator())},
+        {"seed", settings.seed},
+        {"width", scene.film().crop_width},
+        {"height", scene.film().crop_height},
+        {"spp", r.film().passes()},
+        {"seconds", r.seconds()},
+        {"stopped_by", stopped_by},
+        {"samples_per_second",
+         double(r.film().passes()) * double(scene.film().pixel_count()) / r.seconds()},
+        {"rays_per_second", double(s.rays()) / r.seconds()},
+        {"walk_rays", s.walk_rays},
+        {"shadow_rays", s.shadow_rays},
+        {"visible_shadow_rays", s.visible},
+        {"pairs", s.pairs},
+        {"visible_pairs", s.visible_pairs},
+        {"trials", s.trials},
+        {"trial_rays", s.trial_rays},
+        {"pairs_by_trials", s.pairs_by_trials},
+        {"bounds_exceeded", s.bounds_exceeded},
+        {"runaways", s.runaways},
+        {"eye_paths", s.eye_paths},
+        {"light_paths", s.light_paths},
+        {"vertices", s.vertices},
+        {"rejected_contributions", s.rejected},
+        {"warnings", warnings(s)},
+        {"mean_luminance", mean.mean},
+        {"mean_luminance_standard_error", mean.standard_error},
+        {"pass_seconds", log.seconds},
+        {"pass_pairs", log.pairs},
+    };
+    const PhaseSeconds& p = s.phases;
+    j["phase_seconds"] = {{"light_paths", p.light_paths},
+                          {"records", p.records},
+                          {"eye_paths", p.eye_paths - p.connections},
+                          {"connections", p.connections}};
+    for (const auto& [name, value] : r.integrator().figures()) j[name] = value;
+    if (e.valid)
+        j["relative_error"] = {
+            {"estimate", e.relative_rms}, {"low_95", e.low}, {"high_95", e.high}};
+    return j;
+}
+
+Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
+                        const std::vector<std::string>& aovs, const nlohmann::json& report) {
+    Image image =
+        rgb_image(scene.film().crop_width, scene.film().crop_height, renderer.film().image());
+    for (const auto& [key, value] : report.items())
+        if (value.is_string())
+            image.attributes["etendue." + key] = value.get<std::string>();
+        else if (value.is_number())
+            image.attributes["etendue." + key] = value.get<double>();
+    image.attributes["etendue.version"] = std::string(ETENDUE_VERSION);
+    for (const AovImage& a : render_aovs(scene, aovs, kAovSamples, seed, threads))
+        add_rgb_layer(image, image.width, image.height, a.name, a.pixels);
+    if (std::find(aovs.begin(), aovs.end(), "variance") != aovs.end())
+        add_rgb_layer(image, image.width, image.height, "variance", renderer.film().variance());
+    return image;
+}
+
+}  // namespace etendue

@@ -1,0 +1,39 @@
+#pragma once
+// What is written down about a rendering: statistics as JSON, and the image with its layers and metadata.
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "image/image.h"
+#include "render/renderer.h"
+
+namespace etendue {
+
+/// Seconds and pairs of vertices of each pass.
+struct PassLog {
+    std::vector<double> seconds;
+    std::vector<uint64_t> pairs;
+
+    void add(double seconds_so_far, uint64_t pairs_so_far) {
+        seconds.push_back(seconds_so_far - seconds_before_);
+        pairs.push_back(pairs_so_far - pairs_before_);
+        seconds_before_ = seconds_so_far;
+        pairs_before_ = pairs_so_far;
+    }
+
+private:
+    double seconds_before_ = 0;
+    uint64_t pairs_before_ = 0;
+};
+
+/// Statistics of a rendering by name. `stopped_by`: a StopReason, or "failure".
+nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
+                       const std::string& stopped_by, const PassLog& log);
+
+/// The image, the layers of aov_registry() that `aovs` names, and the texts and numbers of `report` as metadata.
+Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
+                        const std::vector<std::string>& aovs, const nlohmann::json& report);
+
+}  // namespace etendue

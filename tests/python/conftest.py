@@ -1,0 +1,33 @@
+import os
+from pathlib import Path
+
+import pytest
+
+import etendue as et
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "long: takes minutes; chosen by -m long")
+
+
+@pytest.fixture(scope="session")
+def program() -> str:
+    """The command line, of the same build."""
+    return os.environ["ETENDUE_PROGRAM"]
+
+
+@pytest.fixture(scope="session")
+def scenes() -> Path:
+    return ROOT / "scenes"
+
+
+@pytest.fixture(scope="session")
+def cornell(scenes: Path) -> et.Scene:
+    return et.load(scenes / "cornell.xml").build(resolution=(32, 24))
+
+
+@pytest.fixture(scope="session")
+def demo(scenes: Path) -> et.Scene:
+    return et.load(scenes / "demo.xml").build(resolution=(40, 30))

@@ -1,0 +1,66 @@
+"""Documentation and types."""
+
+import inspect
+import re
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+import etendue as et
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Words that tell shape, measure or unit.
+UNITS = re.compile(
+    r"shape|pixel|unit|radiance|second|stop|degree|meter|watt|byte|MiB|steradian|density|dimensionless|number|count|share"
+    r"|text|sentence|file|folder|row|dict|name|matrix|whether|vertex|vertices|path|linear|None|scene|description|HTML|image", re.IGNORECASE)
+
+
+def public_names() -> list[tuple[str, object]]:
+    found: list[tuple[str, object]] = []
+    for module in (et, et.core):
+        found.append((module.__name__, module))
+        for name in module.__all__:
+            value = getattr(module, name)
+            found.append((f"{module.__name__}.{name}", value))
+            if not inspect.isclass(value):
+                continue
+            for member, m in vars(value).items():
+                is_documented = isinstance(m, (property, types.FunctionType, staticmethod)) or "nb_method" in type(
+                    m).__name__
+                if not member.startswith("_") and is_documented:
+                    found.append((f"{module.__name__}.{name}.{member}", m))
+    return found
+
+
+@pytest.mark.parametrize("name, value", public_names(), ids=lambda v: v if isinstance(v, str) else "")
+def test_every_public_name_has_a_docstring_with_shape_or_unit(name: str, value: object) -> None:
+    doc = inspect.getdoc(value) or ""
+    lines = [line for line in doc.splitlines() if line.strip()]
+    text = " ".join(line for line in lines if not re.match(rf"{name.split('.')[-1]}\(", line))
+    assert len(text) > 15, f"{name} has no docstring"
+    if isinstance(value, property) or (callable(value) and not inspect.isclass(value)):
+        assert UNITS.search(text), f"the docstring of {name} names neither shape nor unit: {text}"
+
+
+def test_the_test_finds_names() -> None:
+    names = [name for name, _ in public_names()]
+    for expected in ("etendue.render", "etendue.Result.image", "etendue.core.Vertex.pdf_fwd", "etendue.Description.build"):
+        assert expected in names
+
+
+def test_every_public_name_is_listed() -> None:
+    for module in (et, et.core):
+        public = {n for n, v in vars(module).items() if not n.startswith("_") and not inspect.ismodule(v)}
+        assert {n for n in public if getattr(vars(module)[n], "__module__", "").startswith("etendue")} <= set(module.__all__) | set(et.__all__)
+
+
+def test_types_of_package_tests_and_examples() -> None:
+    files = [str(ROOT / "python" / "etendue"), str(ROOT / "tests" / "python" / "typed_examples.py"),
+             *map(str, sorted((ROOT / "examples").glob("*.py")))]
+    run = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(ROOT / "build" / "mypy"), *files[1:]],
+                         capture_output=True, text=True, cwd=ROOT)
+    assert run.returncode == 0, run.stdout + run.stderr

@@ -1,0 +1,55 @@
+"""The notebooks run, each in less than a minute, and are stored without their outputs."""
+
+import time
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+NOTEBOOKS = sorted(EXAMPLES.glob("*.ipynb"))
+
+
+def test_there_are_notebooks() -> None:
+    assert len(NOTEBOOKS) >= 7
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda f: f.stem)
+def test_outputs_are_stripped(file: Path) -> None:
+    for cell in nbformat.read(file, as_version=4).cells:
+        if cell.cell_type == "code":
+            assert not cell.outputs and cell.execution_count is None
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda f: f.stem)
+def test_a_notebook_runs_in_a_minute(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    monkeypatch.setenv("JUPYTER_DATA_DIR", str(tmp_path))
+    notebook = nbformat.read(file, as_version=4)
+    begin = time.monotonic()
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(EXAMPLES)}}).execute()
+    seconds = time.monotonic() - begin
+    executed = Path("build") / "notebooks" / file.name
+    executed.parent.mkdir(parents=True, exist_ok=True)
+    nbformat.write(notebook, executed)
+    print(f"{file.stem}: {seconds:.0f} s")
+    assert seconds < 60 * 2  # twice, since the machine may be busy
+
+
+def test_runs_on_a_cluster_are_merged_exactly(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import numpy as np
+    from dask.distributed import Client, LocalCluster
+
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    monkeypatch.setenv("PYTHONPATH", str(EXAMPLES), prepend=":")
+    import dask_cluster
+
+    file = str(scenes / "cornell.xml")
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        total = dask_cluster.render_on(client, file, "bdpt", 4, spp=2, size=(16, 16))
+    parts = [dask_cluster.run(file, "bdpt", seed, 2, (16, 16)) for seed in range(4)]
+    expected = parts[0] + parts[1] + parts[2] + parts[3]
+    np.testing.assert_array_equal(total.sums, expected.sums)
+    np.testing.assert_array_equal(total.squares, expected.squares)
+    assert total.passes == 8 and (total.standard_error >= 0).all()

@@ -1,0 +1,176 @@
+"""Comparison, verification, image errors, tone mapping, notebooks."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import etendue as et
+
+
+@pytest.fixture(scope="module")
+def comparison(cornell: et.Scene, tmp_path_factory: pytest.TempPathFactory) -> et.CompareReport:
+    folder = tmp_path_factory.mktemp("references")
+    return et.compare(cornell, ["path", "bdpt"], spp=4, runs=2, references=folder)
+
+
+def test_compare_has_the_figures_of_the_command_line(
+        program: str, scenes: Path, tmp_path: Path, comparison: et.CompareReport) -> None:
+    subprocess.run([program, "compare", str(scenes / "cornell.xml"), "--resolution", "32x24", "-m", "path", "bdpt", "--spp",
+                    "4", "--runs", "2", "--references", str(tmp_path / "r"), "--report", str(tmp_path / "report"), "--quiet"],
+                   check=True)
+    expected = json.loads((tmp_path / "report" / "report.json").read_text())["scenes"][0]
+    for mine, other in zip(comparison.data[0]["methods"], expected["methods"], strict=True):
+        assert mine["name"] == other["name"] and mine["flip"] == other["flip"]
+        for key in ("spp", "rel_mse", "rmse", "mean_ratio"):
+            assert mine["summary"][key] == other["summary"][key]
+
+
+def test_the_report_of_a_comparison(comparison: et.CompareReport, tmp_path: Path) -> None:
+    frame = comparison.frame()
+    assert list(frame["method"]) == ["path", "bdpt"] and (frame["rel_mse"] > 0).all()
+    assert len(comparison.convergence()) == 2 * 2 * 3  # methods, runs, checkpoints at 1, 2, 4 samples
+    assert comparison.image(1).shape == (24, 32, 3) and comparison.flip_map(1).shape == (24, 32)
+    assert comparison.reference().shape == (24, 32, 3)
+    comparison.save(tmp_path / "report")
+    assert (tmp_path / "report" / "report.html").exists()
+    assert "<table>" in comparison._repr_html_() and "data:image/png" in comparison._repr_html_()
+
+
+def test_compare_takes_integrators_in_python(scenes: Path, tmp_path: Path) -> None:
+    class Hits(et.Integrator):
+        def counts(self, light_paths: int) -> et.core.Counts:
+            return et.core.Counts(hit=1)
+
+        def sample(self, c: et.core.Sample) -> None:
+            z = c.eye_path(max_vertices=4)
+            for t in range(2, len(z) + 1):
+                for x in c.join(0, t):
+                    c.add(x)
+
+    scene = et.load(scenes / "cornell.xml").build(resolution=(8, 8))
+    report = et.compare(scene, ["path:max_depth=3", Hits()], spp=2, references=tmp_path, reference_spp=64)
+    assert [m["name"] for m in report.data[0]["methods"]] == ["path:max_depth=3", "Hits"]
+
+
+def test_verify_has_the_figures_of_the_command_line(program: str, scenes: Path, tmp_path: Path) -> None:
+    command = [program, "verify", str(scenes / "cornell.xml"), "--resolution", "16x16", "--methods", "bdpt", "--lengths",
+               "1..3", "--spp", "4", "--runs", "8", "--json", str(tmp_path / "v.json"), "--quiet"]
+    subprocess.run(command, check=True)
+    scene = et.load(scenes / "cornell.xml").build(resolution=(16, 16))
+    report = et.verify(scene, "bdpt", spp=4, runs=8, lengths=(1, 3))
+    assert report.data == json.loads((tmp_path / "v.json").read_text())
+    assert report.verdicts == {"bdpt": "consistent"}
+    assert list(report.frame()["verdict"]) == ["consistent"] and len(report.lengths()) == 3
+    report.save(tmp_path / "out")
+    assert (tmp_path / "out" / "verify.html").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [({"runs": 2}, "runs must be at least 8"), ({"lengths": (3, 2)}, "lengths must be"),
+     ({"methods": "bdp"}, 'there is no integrator "bdp"'), ({"spp": 1, "time": 1.0}, "exclude each other")])
+def test_wrong_arguments_of_verify(cornell: et.Scene, arguments: dict[str, object], message: str) -> None:
+    with pytest.raises((RuntimeError, ValueError), match=message):
+        et.verify(cornell, **{"methods": "path", **arguments})  # type: ignore[arg-type]
+
+
+def test_wrong_arguments_of_compare(cornell: et.Scene) -> None:
+    with pytest.raises(ValueError, match="give either time, in seconds, or spp"):
+        et.compare(cornell, ["path"])
+    with pytest.raises(RuntimeError, match="given twice"):
+        et.compare(cornell, ["path", "path"], spp=1)
+
+
+def test_diff_has_the_figures_of_the_command_line(program: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    a, b = (rng.random((20, 30, 3), dtype=np.float32) for _ in range(2))
+    et.write_image(tmp_path / "a.exr", a)
+    et.write_image(tmp_path / "b.exr", b)
+    printed = subprocess.run([program, "diff", str(tmp_path / "a.exr"), str(tmp_path / "b.exr"), "--json"],
+                             capture_output=True, check=True).stdout
+    expected = {k: v for k, v in json.loads(printed).items() if k not in ("image", "reference")}
+    result = et.diff(a, b)
+    assert dict(result) == pytest.approx(expected, rel=1e-6)
+    assert dict(et.diff(tmp_path / "a.exr", tmp_path / "b.exr")) == dict(result)
+    assert result.flip_map is not None and result.flip_map.shape == (20, 30)
+    assert result.rel_se_map.shape == (20, 30)
+    with pytest.raises(ValueError, match="differ in size"):
+        et.diff(a, b[:10])
+
+
+@pytest.mark.parametrize("operator", ["aces", "reinhard", "srgb"])
+def test_tonemap_has_the_codes_of_the_command_line(program: str, tmp_path: Path, operator: str) -> None:
+    from PIL import Image
+
+    image = np.random.default_rng(2).exponential(size=(20, 30, 3)).astype(np.float32)
+    et.write_image(tmp_path / "a.exr", image)
+    subprocess.run([program, "tonemap", str(tmp_path / "a.exr"), str(tmp_path / "a.png"), "--operator", operator,
+                    "--exposure", "0.5"], check=True)
+    expected = np.asarray(Image.open(tmp_path / "a.png"))
+    np.testing.assert_array_equal(et.tonemap(image, operator, exposure=0.5), expected)  # type: ignore[arg-type]
+
+
+def test_images_survive_files(tmp_path: Path) -> None:
+    image = np.random.default_rng(3).exponential(size=(5, 40, 3)).astype(np.float32)
+    for name, tolerance in [("a.exr", 0), ("a.pfm", 0), ("a.hdr", 1 / 128)]:
+        et.write_image(tmp_path / name, image)
+        np.testing.assert_allclose(et.read_image(tmp_path / name), image, rtol=0,
+                                   atol=tolerance * float(image.max(axis=2).max()))
+    codes = et.tonemap(image)
+    et.write_image(tmp_path / "a.png", codes)
+    from PIL import Image
+
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.png")), codes)
+    with pytest.raises(ValueError, match="as .png only"):
+        et.write_image(tmp_path / "a.exr", codes)
+    with pytest.raises(RuntimeError, match="must end in .exr"):
+        et.write_image(tmp_path / "a.gif", image)
+
+
+def test_results_show_themselves_in_notebooks(cornell: et.Scene) -> None:
+    result = et.render(cornell, spp=2)
+    assert result._repr_png_().startswith(b"\x89PNG")
+    assert ": 2 spp in" in result._repr_html_()
+    assert "stopped by samples" in repr(result)
+    widget = et.show(result)
+    half = np.frombuffer(widget.pixels, dtype="<f2").reshape(24, 32, 3)
+    np.testing.assert_allclose(half, result.image, rtol=1e-3, atol=1e-6)
+    assert (widget.width, widget.height) == (32, 24)
+
+
+def test_without_anywidget_a_picture_is_shown(cornell: et.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    assert et.show(et.render(cornell, spp=1))._repr_png_().startswith(b"\x89PNG")
+
+
+def test_without_pandas_frames_are_dicts(
+        comparison: et.CompareReport, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    assert [row["method"] for row in comparison.frame()] == ["path", "bdpt"]
+
+
+def test_the_viewer_maps_tones_as_the_library_does(tmp_path: Path) -> None:
+    import shutil
+
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("there is no node")
+    image = np.random.default_rng(4).exponential(size=(4, 5, 3)).astype(np.float32)
+    source = Path(et.__file__).with_name("_viewer.js").read_text()
+    (tmp_path / "viewer.mjs").write_text(source)
+    (tmp_path / "run.mjs").write_text(
+        "import { toneMapped } from './viewer.mjs';\n"
+        f"const rgb = Float32Array.from({json.dumps(image.ravel().tolist())});\n"
+        "console.log(JSON.stringify(['aces', 'reinhard', 'srgb'].map(o => Array.from(toneMapped(rgb, 0.5, o)))));\n")
+    printed = subprocess.run([node, str(tmp_path / "run.mjs")], capture_output=True, check=True, text=True).stdout
+    for name, codes in zip(["aces", "reinhard", "srgb"], json.loads(printed), strict=True):
+        mine = np.array(codes).reshape(4, 5, 4)[:, :, :3]
+        expected = et.tonemap(image, name, exposure=0.5).astype(int)  # type: ignore[arg-type]
+        assert np.abs(mine - expected).max() <= 1

@@ -1,0 +1,180 @@
+"""Descriptions: files, dicts, edits, errors."""
+
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import etendue as et
+
+XML = """<scene version="3.0.0">
+    <sensor type="perspective">
+        <float name="fov" value="35"/>
+        <transform name="to_world"><lookat origin="0, 2, 7" target="0, 1, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film>
+    </sensor>
+    <bsdf type="diffuse" id="white"><rgb name="reflectance" value="0.8, 0.7, 0.6"/></bsdf>
+    <shape type="rectangle" id="floor">
+        <transform name="to_world"><rotate x="1" angle="-90"/><scale value="8"/></transform>
+        <ref id="white"/>
+    </shape>
+    <shape type="sphere" id="ball">
+        <point name="center" x="0" y="1" z="0"/>
+        <bsdf type="roughplastic"><ref name="nested" id="white"/>
+            <texture type="checkerboard" name="diffuse_reflectance"><float name="color0" value="0.25"/></texture>
+        </bsdf>
+    </shape>
+    <shape type="sphere">
+        <point name="center" x="-2" y="4" z="-1"/><float name="radius" value="0.3"/>
+        <emitter type="area"><blackbody name="radiance" temperature="3000K" scale="2"/></emitter>
+    </shape>
+    <shape type="sphere">
+        <point name="center" x="2" y="4" z="-1"/><float name="radius" value="0.3"/>
+        <emitter type="area"><spectrum name="radiance" value="400:1, 500:2, 700:3"/></emitter>
+    </shape>
+    <emitter type="constant"><rgb name="radiance" value="0.1, 0.15, 0.2"/></emitter>
+</scene>"""
+
+DICT = {
+    "type": "scene",
+    "sensor": {
+        "type": "perspective", "fov": 35, "to_world": et.look_at((0, 2, 7), (0, 1, 0)),
+        "film": {"type": "hdrfilm", "width": 16, "height": 12},
+    },
+    "white": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.8, 0.7, 0.6]}},
+    "floor": {
+        "type": "rectangle", "to_world": et.scale(8) @ et.rotate((1, 0, 0), -90),
+        "bsdf": {"type": "ref", "id": "white"},
+    },
+    "ball": {
+        "type": "sphere", "center": [0, 1, 0],
+        "bsdf": {
+            "type": "roughplastic", "nested": {"type": "ref", "id": "white"},
+            "diffuse_reflectance": {"type": "checkerboard", "color0": 0.25},
+        },
+    },
+    "shape": {
+        "type": "sphere", "center": (-2, 4, -1), "radius": np.float64(0.3),
+        "emitter": {"type": "area", "radiance": {"type": "blackbody", "temperature": 3000, "scale": 2}},
+    },
+    "shape_2": {
+        "type": "sphere", "center": np.array([2, 4, -1]), "radius": 0.3,
+        "emitter": {"type": "area", "radiance": {"type": "spectrum", "value": [(400, 1), (500, 2), (700, 3)]}},
+    },
+    "emitter": {"type": "constant", "radiance": {"type": "rgb", "value": [0.1, 0.15, 0.2]}},
+}
+
+
+def test_a_dict_and_its_xml_give_the_same_dump() -> None:
+    assert et.load_dict(DICT).dump() == et.load_string(XML).dump()
+
+
+@pytest.mark.parametrize(
+    "name", ["ajar", "cornell", "demo", "environment", "furnace", "glass-caustic", "lantern", "leak", "many-lights", "ring",
+             "slit", "two-rooms"])
+def test_every_scene_survives_the_way_through_a_dict(scenes: Path, name: str) -> None:
+    d = et.load(scenes / f"{name}.xml")
+    assert et.load_dict(d.to_dict(), folder=scenes).dump() == d.dump()
+
+
+def test_names_of_plugins_tell_their_category() -> None:
+    """Otherwise a dict could mean two things."""
+    categories: dict[str, set[str]] = {}
+    for p in et.plugins():
+        if not p["category"].startswith("pbrt") and p["category"] not in ("integrator", "aov"):
+            categories.setdefault(p["name"], set()).add(p["category"])
+    assert {name: c for name, c in categories.items() if len(c) > 1} == {}
+
+
+def test_plugins_are_those_of_the_program(program: str) -> None:
+    listed = subprocess.run([program, "list", "--json"], capture_output=True, check=True).stdout
+    assert et.plugins() == json.loads(listed)
+    assert [p["name"] for p in et.plugins("bsdf", "diffuse")] == ["diffuse"]
+
+
+def test_edits_by_path() -> None:
+    d = et.load_string(XML)
+    d["ball.center"] = (1, 2, 3)
+    assert d["ball.center"] == [1, 2, 3]
+    d["white.reflectance"] = (0.5, 0.25, 0.125)
+    assert d["white.reflectance"] == {"type": "rgb", "value": [0.5, 0.25, 0.125]}
+    assert d["floor.bsdf.reflectance"] == d["white.reflectance"]
+    d["ball.bsdf.diffuse_reflectance.color0"] = 1
+    assert d["ball.bsdf.diffuse_reflectance.color0"] == 1.0
+    d["ball.bsdf.diffuse_reflectance"] = "#ff0000"
+    assert d["ball.bsdf.diffuse_reflectance"] == {"type": "rgb", "value": [1, 0, 0]}
+    d["ball.bsdf"] = {"type": "dielectric", "int_ior": 1.5}
+    assert d["ball.bsdf"] == {"type": "dielectric", "int_ior": 1.5}
+    d["lamp"] = {"type": "point", "position": [0, 3, 0]}
+    assert "lamp.position" in d.paths() and "lamp" in d
+    d["sensor.film.width"] = np.int64(20)
+    assert d.build().width == 20
+    del d["lamp"]
+    assert "lamp" not in d
+    before = d.dump()
+    copy = d.copy()
+    copy["ball.radius"] = 2
+    assert d.dump() == before
+
+
+@pytest.mark.parametrize(
+    "path, value, message",
+    [
+        ("ball.radus", 1, 'ball.radus: shape "sphere" has no "radus" (did you mean "radius"?)'),
+        ("bal.radius", 1, 'bal.radius: the scene has no "bal.radius" (known: '),
+        ("ball.radius", "big", 'ball.radius: parameter "radius" of shape "sphere" must be a float, but is a string'),
+        ("ball.center", (1, 2), "ball.center: expected a number, a text, three numbers, or a 4x4 matrix, found"),
+        ("ball.bsdf", {"type": "difuse"}, 'dict: bsdf: unknown plug-in "difuse" (did you mean "diffuse"?)'),
+        ("ball.bsdf", {"type": "area"}, "dict: bsdf: "),
+    ])
+def test_a_wrong_edit_says_what_is_near_and_changes_nothing(path: str, value: object, message: str) -> None:
+    d = et.load_string(XML)
+    before = d.dump()
+    if path == "ball.bsdf" and value == {"type": "area"}:
+        d[path] = value  # another object beside it: an emitter may stand in a shape
+        return
+    with pytest.raises(et.SceneError, match="^" + re.escape(message)):
+        d[path] = value
+    assert d.dump() == before
+
+
+@pytest.mark.parametrize(
+    "d, message",
+    [
+        ({"type": "scene", "ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": [1, 2]}}},
+         "dict: ball/bsdf/reflectance: expected"),
+        ({"type": "scene", "ball": {"type": "sphere", "sensor": {"type": "diffuse", "bsdf": {"type": "sphere"}}}},
+         "dict: ball/sensor/bsdf: a <shape> cannot stand in a <bsdf>"),
+        ({"type": "scene", "ball": {"bsdf": {}}}, 'dict: ball: expected a "type"'),
+        ({"type": "scene", "ball": {"type": "sphere", "bsdf": {"type": "ref", "id": "whit"}}, "white": {"type": "diffuse"}},
+         'dict: ball/bsdf: no object has the id "whit" (did you mean "white"?)'),
+        ({"type": "scenes"}, 'dict: the outermost "type" must be "scene"'),
+    ])
+def test_a_wrong_dict_says_where(d: dict[str, object], message: str) -> None:
+    with pytest.raises(et.SceneError, match="^" + re.escape(message)):
+        et.load_dict(d)
+
+
+def test_parameters_are_checked_when_the_scene_is_built() -> None:
+    d = et.load_dict({"type": "scene", "ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectanc": 1.0}}})
+    with pytest.raises(et.SceneError, match=r'^dict: ball/bsdf/reflectanc: bsdf "diffuse" has no parameter "reflectanc" '
+                                            r'\(did you mean "reflectance"\?\)'):
+        d.build()
+
+
+def test_errors_of_files_are_those_of_the_program(tmp_path: Path, program: str) -> None:
+    file = tmp_path / "bad.xml"
+    file.write_text('<scene version="3.0.0">\n<bsdf type="difuse"/>\n<sensor type="perspective"/></scene>')
+    printed = subprocess.run([program, "info", str(file)], capture_output=True, text=True).stderr
+    with pytest.raises(et.SceneError) as error:
+        et.load(file).build()
+    assert printed == f"etendue: {error.value}\n"
+    with pytest.raises(RuntimeError, match="there is no such file"):
+        et.load(tmp_path / "none.xml")
+
+
+def test_defines(scenes: Path) -> None:
+    assert et.load(scenes / "demo.xml", {"width": 20, "height": 10}).build().width == 20
