@@ -1,0 +1,55 @@
+// Metropolis light transport in path space [Veach 1997, ch. 11]: a state is a full path, and mutations replace a part of it,
+// or move it a little. Unbiased.
+//
+// Large steps are paths of one technique, as in mmlt, and seeds are such paths too. Direct light is apart.
+
+#include "integrator/mlt.h"
+
+#include <algorithm>
+
+#include "integrator/markov.h"
+#include "mcmc/path_space.h"
+
+namespace etendue {
+namespace {
+
+class MltIntegrator final : public MarkovIntegrator {
+public:
+    explicit MltIntegrator(const IntegratorParams& p)
+        : MarkovIntegrator(p, DepthOptions::without_roulette(p)) {}
+
+protected:
+    Chains begin(const PassContext& pass, const Pilot& pilot) override {
+        constexpr int kTabulated = 24;  // Lengths whose techniques the pilot may have learned.
+        const Scene& scene = pass.scene;
+        const TechniqueCounts n = counts(scene, 0);
+        const int longest = paths_.max_depth();
+        PathTarget target{
+            PathMeasure(scene, reached_region(scene.film(), scene.filter()), kShortest, longest),
+            pilot.map, LengthChoice(kShortest, longest, pilot),
+            TechniqueChoice(kShortest, std::min(kTabulated, longest - kShortest + 1),
+                            hits_emitters(scene), n.hit_lens > 0, pilot)};
+        const ClassPlan plan{.chains = options_.chains,
+                             .pool = pool_samples(4 * pilot.samples, options_),
+                             .c = pilot.b};
+        return {std::make_unique<PathSpace>(std::move(target), PathMutations{}, n), {plan}};
+    }
+};
+
+}  // namespace
+
+IntegratorEntry mlt_entry() {
+    std::vector<ParamInfo> params{depth_params()[0]};
+    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
+    for (ParamInfo& p : params)
+        if (p.name == std::string("p_large")) p.fallback = "0.15";
+    return {{"integrator", "mlt",
+             "Metropolis light transport on paths, which mutations change in part, or move a "
+             "little. Unbiased.",
+             params},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                return std::make_unique<MltIntegrator>(p);
+            }};
+}
+
+}  // namespace etendue
