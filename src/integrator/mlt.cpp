@@ -16,7 +16,9 @@ namespace {
 class MltIntegrator final : public MarkovIntegrator {
 public:
     explicit MltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::without_roulette(p)) {}
+        : MarkovIntegrator(p, DepthOptions::without_roulette(p)),
+          user_paths_(p.string("user_paths")),
+          user_ratio_(double(p.number("user_ratio", 0.01f, 100.0f))) {}
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
@@ -32,8 +34,18 @@ protected:
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(4 * pilot.samples, options_),
                              .c = pilot.b};
-        return {std::make_unique<PathSpace>(std::move(target), PathMutations{}, n), {plan}};
+        PathMutations mutations;
+        if (!user_paths_.empty()) {
+            mutations.user_paths = UserPaths::load(scene, user_paths_);
+            mutations.weights[PathMutations::UserPath] =
+                user_ratio_ * mutations.weights[PathMutations::Bidirectional];
+        }
+        return {std::make_unique<PathSpace>(std::move(target), mutations, n), {plan}};
     }
+
+private:
+    std::string user_paths_;  ///< File; empty: none.
+    double user_ratio_;
 };
 
 }  // namespace
@@ -43,6 +55,11 @@ IntegratorEntry mlt_entry() {
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     for (ParamInfo& p : params)
         if (p.name == std::string("p_large")) p.fallback = "0.15";
+    params.push_back({"user_paths", ParamKind::String, "",
+                      "JSON file of light paths that matter, as `etendue paths` makes and checks "
+                      "them; proposals near them are mixed with bidirectional mutations."});
+    params.push_back({"user_ratio", ParamKind::Float, "1",
+                      "Proposals near user paths for each bidirectional mutation."});
     return {{"integrator", "mlt",
              "Metropolis light transport on paths, which mutations change in part, or move a "
              "little. Unbiased.",

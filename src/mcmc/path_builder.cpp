@@ -99,6 +99,12 @@ bool PathBuilder::start_light(const Emitter& emitter, const EmissionSample& e) {
     return work_.y.size() == 2;
 }
 
+bool PathBuilder::follow(const UserPaths& paths) {
+    if (!paths.sample(walk_, sampler_, work_.y)) return false;
+    new_light_ = work_.y.size();
+    return true;
+}
+
 bool PathBuilder::sample_light(int count, bool ends_at_lens) {
     if (count == 0) return true;
     ends_at_lens_ = ends_at_lens;

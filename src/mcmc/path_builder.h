@@ -2,6 +2,7 @@
 // Makes a full path from what is kept of another one, and vertices sampled from either end of the gap.
 
 #include "mcmc/path_state.h"
+#include "mcmc/user_paths.h"
 
 namespace etendue {
 
@@ -24,6 +25,8 @@ public:
     bool start_eye_anywhere();
     /// The light sub-path from the kept x_0, or a new one, up to its first surface.
     bool start_light(const Emitter& emitter, const EmissionSample& e);
+    /// The light sub-path close to one of the user's.
+    bool follow(const UserPaths& paths);
     /// One more vertex where the last one has delta events alone.
     bool sample_eye_delta();
     /// One more vertex by a given event.

@@ -4,6 +4,7 @@
 #include "mcmc/mutation/caustic.h"
 #include "mcmc/mutation/eye_chain.h"
 #include "mcmc/mutation/lens_subpath.h"
+#include "mcmc/mutation/user_path.h"
 
 namespace etendue {
 
@@ -17,6 +18,9 @@ PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, Techniqu
     mutations_[PathMutations::MultiChain] =
         std::make_unique<EyeChain>(EyeChain::Kind::MultiChain, measure);
     mutations_[PathMutations::LensSubpath] = std::make_unique<LensSubpathMutation>();
+    if (options_.user_paths)
+        mutations_[PathMutations::UserPath] =
+            std::make_unique<UserPathMutation>(measure, *options_.user_paths);
 }
 
 void PathSpace::draw(int, uint64_t key, const ChainContext& c, ChainState& state) const {
@@ -39,14 +43,23 @@ std::array<double, PathMutations::kCount> PathSpace::choices(const PathState& x)
     double sum = 0;
     for (size_t i = 0; i < p.size(); ++i)
         if (options_.weights[i] > 0 && mutations_[i]->suits(x)) sum += p[i] = options_.weights[i];
-    for (double& v : p) v /= sum;
+    if (sum > 0)
+        for (double& v : p) v /= sum;
     return p;
 }
 
 double PathSpace::Q(Kind kind, const PathState& x, const PathState& y,
                     const MutationWay& way) const {
-    const double p = choices(x)[kind];
-    return p > 0 ? p * mutations_[kind]->Q(x, y, way) : 0.0;
+    const auto p = choices(x);
+    const auto density = [&](Kind of) {
+        return p[of] > 0 ? p[of] * mutations_[of]->Q(x, y, way) : 0.0;
+    };
+    const bool is_either = (kind == PathMutations::Bidirectional ||
+                            kind == PathMutations::UserPath) &&
+                           UserPathMutation::is_way(x, way);
+    if (is_either)
+        return density(PathMutations::Bidirectional) + density(PathMutations::UserPath);
+    return density(kind);
 }
 
 Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const ChainContext& c,
@@ -68,7 +81,7 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
     y.set_black();
     const MutationContext context{target_.measure, c, sampler};
     MutationWay way;
-    if (!mutations_[size_t(kind)]->propose(x, context, y, way)) {
+    if (!(p[size_t(kind)] > 0) || !mutations_[size_t(kind)]->propose(x, context, y, way)) {
         proposal.has_failed = true;
         return proposal;
     }
