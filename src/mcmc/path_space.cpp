@@ -54,11 +54,10 @@ double PathSpace::Q(Kind kind, const PathState& x, const PathState& y,
     const auto density = [&](Kind of) {
         return p[of] > 0 ? p[of] * mutations_[of]->Q(x, y, way) : 0.0;
     };
-    const bool is_either = (kind == PathMutations::Bidirectional ||
-                            kind == PathMutations::UserPath) &&
-                           UserPathMutation::is_way(x, way);
-    if (is_either)
-        return density(PathMutations::Bidirectional) + density(PathMutations::UserPath);
+    const bool is_either =
+        (kind == PathMutations::Bidirectional || kind == PathMutations::UserPath) &&
+        UserPathMutation::is_way(x, way);
+    if (is_either) return density(PathMutations::Bidirectional) + density(PathMutations::UserPath);
     return density(kind);
 }
 

@@ -9,8 +9,8 @@ namespace etendue {
 /// Mutations in path space, and how often each is chosen where all suit.
 struct PathMutations {
     enum Kind : int { Bidirectional, Lens, Caustic, MultiChain, LensSubpath, UserPath, kCount };
-    static constexpr std::array<const char*, kCount> kNames{"bidirectional", "lens", "caustic",
-                                                            "multi_chain", "lens_subpath", "user_path"};
+    static constexpr std::array<const char*, kCount> kNames{
+        "bidirectional", "lens", "caustic", "multi_chain", "lens_subpath", "user_path"};
     std::array<double, kCount> weights{2, 2, 2, 2, 1, 0};
     std::optional<UserPaths> user_paths{};  ///< Needed where their weight is not 0.
 };

@@ -58,8 +58,9 @@ GivenPath parse_path(const json& from, const std::string& file, size_t index) {
         } else if (key == "radius") {
             path.radius = positive_number(value, file, where + ": \"radius\"", kInf);
         } else {
-            refuse(file, fmt::format("{} has \"{}\", but only name, points, cone and radius are known",
-                                     where, key));
+            refuse(file,
+                   fmt::format("{} has \"{}\", but only name, points, cone and radius are known",
+                               where, key));
         }
     }
     const size_t segments = path.points.size() - 1;
@@ -79,11 +80,12 @@ std::vector<GivenPath> parse_user_paths(const std::string& text, const std::stri
     try {
         document = json::parse(text);
     } catch (const json::parse_error& e) {
-        const auto line = 1 + std::count(text.begin(),
-                                         text.begin() + long(std::min(e.byte, text.size())), '\n');
-        throw std::runtime_error(fmt::format("{}:{}: not valid JSON: expected a list of paths, like "
-                                             "[{{\"points\": [[0, 1, 0], [0, 0, 0]]}}]",
-                                             file, line));
+        const auto line =
+            1 + std::count(text.begin(), text.begin() + long(std::min(e.byte, text.size())), '\n');
+        throw std::runtime_error(
+            fmt::format("{}:{}: not valid JSON: expected a list of paths, like "
+                        "[{{\"points\": [[0, 1, 0], [0, 0, 0]]}}]",
+                        file, line));
     }
     if (!document.is_array()) refuse(file, "must be a list of paths, [{\"points\": …}, …]");
     std::vector<GivenPath> paths;
@@ -190,16 +192,18 @@ private:
     void place(size_t i) {
         const Vec3 p = given_.points[i];
         UserPath::Point& point = path_.points.emplace_back();
-        const float cone = given_.cones[given_.cones.size() == 1 ? 0 : std::min(i, given_.cones.size() - 1)];
+        const float cone =
+            given_.cones[given_.cones.size() == 1 ? 0 : std::min(i, given_.cones.size() - 1)];
         point.versine = 2 * sqr(std::sin(cone * kPi / 360));
         if (i == 0 && place_on_point_emitter(p)) return;
         const Nearest at = nearest_surface(scene_, p, tolerance_);
         if (!std::isfinite(at.distance)) return refuse(i, "there is no surface near it");
         const SceneShape& shape = *at.hit.shape;
         if (at.distance > tolerance_)
-            return refuse(i, fmt::format("is {:.3g} from the nearest surface, {}; at most {:.3g} is "
-                                         "allowed",
-                                         at.distance, name_of(scene_, shape), tolerance_));
+            return refuse(i,
+                          fmt::format("is {:.3g} from the nearest surface, {}; at most {:.3g} is "
+                                      "allowed",
+                                      at.distance, name_of(scene_, shape), tolerance_));
         const SurfaceGeometry& g = at.hit.geometry;
         point.p = g.p, point.ng = g.ng;
         shapes_.push_back(&shape);
@@ -234,8 +238,9 @@ private:
         SurfaceHit hit;
         const Vec3 o = shapes_[i] ? offset_origin(a.p, a.ng, d) : a.p;
         if (!scene_.intersect({o, d, kInf}, 0.5f, hit) || hit.t > distance - tolerance_) return;
-        refuse(i + 1, fmt::format("cannot be reached from the point before it: {} at {} is in the way",
-                                  name_of(scene_, *hit.shape), to_text(hit.geometry.p)));
+        refuse(i + 1,
+               fmt::format("cannot be reached from the point before it: {} at {} is in the way",
+                           name_of(scene_, *hit.shape), to_text(hit.geometry.p)));
     }
 
     Vec3 toward(size_t from, size_t to) const {
@@ -257,31 +262,32 @@ private:
         v.set_surface(shape, locations_[i], scene_.surface(locations_[i]), to_light, arena);
         if (is_last) {
             if (!v.is_connectible)
-                refuse(i, fmt::format("is on {}, a mirror or clear glass; a path must end where light "
-                                      "scatters in all directions",
-                                      name_of(scene_, shape)));
+                refuse(i,
+                       fmt::format("is on {}, a mirror or clear glass; a path must end where light "
+                                   "scatters in all directions",
+                                   name_of(scene_, shape)));
             return;
         }
         const Vec3 to_eye = toward(i, i + 1);
         if (!v.bsdf.eval(to_light, to_eye, TransportMode::Importance).f.is_zero()) return;
         double nearest = 360;
         for (int event = 0; event < 16; ++event) {
-            const auto s =
-                v.bsdf.sample_delta(to_light, uint8_t(event), TransportMode::Importance);
+            const auto s = v.bsdf.sample_delta(to_light, uint8_t(event), TransportMode::Importance);
             if (!s || s->weight.is_zero() || !(degrees(s->wi, to_eye) < nearest)) continue;
             nearest = degrees(s->wi, to_eye);
             point.is_delta = true;
             point.event = s->event;
         }
         if (!point.is_delta)
-            refuse(i, fmt::format("{} scatters nothing from the point before it to the point after it",
-                                  name_of(scene_, shape)));
+            refuse(i,
+                   fmt::format("{} scatters nothing from the point before it to the point after it",
+                               name_of(scene_, shape)));
         else if (nearest > kLawTolerance)
-            refuse(i, fmt::format("on {}, the path is {:.3g} degrees off the law of {}; at most {} are "
-                                  "allowed",
-                                  name_of(scene_, shape), nearest,
-                                  point.event % 2 == 1 ? "refraction" : "reflection",
-                                  kLawTolerance));
+            refuse(i, fmt::format(
+                          "on {}, the path is {:.3g} degrees off the law of {}; at most {} are "
+                          "allowed",
+                          name_of(scene_, shape), nearest,
+                          point.event % 2 == 1 ? "refraction" : "reflection", kLawTolerance));
     }
 
     const Scene& scene_;
@@ -330,8 +336,8 @@ namespace {
 /// Uniform in solid angle within the cone about `axis`.
 Vec3 sample_cone(Vec3 axis, float versine, Vec2 u) {
     const float v = versine * u.x, s = safe_sqrt(v * (2 - v)), azimuth = 2 * kPi * u.y;
-    return normalize(Frame::from_normal(axis).to_world(
-        {s * std::cos(azimuth), s * std::sin(azimuth), 1 - v}));
+    return normalize(
+        Frame::from_normal(axis).to_world({s * std::cos(azimuth), s * std::sin(azimuth), 1 - v}));
 }
 double pdf_cone(float versine) {
     return 1 / (2 * double(kPi) * double(versine));

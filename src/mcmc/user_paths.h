@@ -19,10 +19,11 @@ namespace etendue {
 struct GivenPath {
     static constexpr float kCone = 1;  ///< Half-angle, degrees.
 
-    std::string name;            ///< May be empty.
-    std::vector<Vec3> points;    ///< World space, from the emitter on.
-    std::vector<float> cones;    ///< Half-angles in degrees: one for all segments, or one each.
-    std::optional<float> radius;  ///< Of the disc about the first point; a hundredth of the scene's if not given.
+    std::string name;          ///< May be empty.
+    std::vector<Vec3> points;  ///< World space, from the emitter on.
+    std::vector<float> cones;  ///< Half-angles in degrees: one for all segments, or one each.
+    std::optional<float>
+        radius;  ///< Of the disc about the first point; a hundredth of the scene's if not given.
 };
 
 /// Reads the JSON text of `file`. Throws std::runtime_error with file and place.

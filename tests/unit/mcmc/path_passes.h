@@ -25,11 +25,8 @@ public:
         for (const auto& e : scene_.emitters()) hits |= !e->is_delta();
         const Pilot pilot{.map = TargetMap(scene_.film()), .by_technique = {}};
         const float N = float(scene_.film().pixel_count());
-        const TechniqueCounts counts{.hit = 1,
-                                     .next_event = 1,
-                                     .connect = 1,
-                                     .splat = N,
-                                     .hit_lens = hits_lens ? N : 0.0f};
+        const TechniqueCounts counts{
+            .hit = 1, .next_event = 1, .connect = 1, .splat = N, .hit_lens = hits_lens ? N : 0.0f};
         return std::make_unique<PathSpace>(
             PathTarget{measure(), pilot.map, LengthChoice(kShortest, kLongest, pilot),
                        TechniqueChoice(kShortest, 8, hits, hits_lens, pilot)},

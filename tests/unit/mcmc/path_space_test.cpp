@@ -26,16 +26,17 @@ std::vector<Case> cases() {
     const std::string sky = room() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
                             sphere("0.1,0.2,-0.1", "0.3", kGlass) + kConstant;
     const std::string lens_scene = mixed_room(lens_camera(kPixels));
-    return {{"mixed", mixed_room(front_camera(kPixels))},
-            {"thinlens", lens_scene},
-            {"orthographic", mixed_room(sensor("0,0,3.4", "0,0,0", kPixels, "", "", "orthographic"))},
-            {"sky", front_camera(kPixels) + sky},
-            {"several", mixed_room(front_camera(kPixels)) + kConstant +
-                            "<emitter type=\"point\"><point name=\"position\" "
-                            "value=\"0,0.7,0.5\"/></emitter>"},
-            {"sun", front_camera(kPixels) + room() + sphere("0.1,0.2,-0.1", "0.4", kGlass) +
-                        "<emitter type=\"directional\"><vector name=\"direction\" "
-                        "value=\"0.2,-0.4,-1\"/></emitter>"}};
+    return {
+        {"mixed", mixed_room(front_camera(kPixels))},
+        {"thinlens", lens_scene},
+        {"orthographic", mixed_room(sensor("0,0,3.4", "0,0,0", kPixels, "", "", "orthographic"))},
+        {"sky", front_camera(kPixels) + sky},
+        {"several", mixed_room(front_camera(kPixels)) + kConstant +
+                        "<emitter type=\"point\"><point name=\"position\" "
+                        "value=\"0,0.7,0.5\"/></emitter>"},
+        {"sun", front_camera(kPixels) + room() + sphere("0.1,0.2,-0.1", "0.4", kGlass) +
+                    "<emitter type=\"directional\"><vector name=\"direction\" "
+                    "value=\"0.2,-0.4,-1\"/></emitter>"}};
 }
 
 class Paths : public ::testing::TestWithParam<Case> {
@@ -66,9 +67,9 @@ TEST_P(Paths, HaveTheValueAndDensitiesOfTheirVertices) {
             if (s == n && !passes.scene().sensor().has_finite_lens()) continue;
             const Technique q = connection_technique(s, n - s);
             // Where there are several emitters at infinity, an eye path that leaves the scene chooses one.
-            const double choice =
-                s == 0 && state[0].v.is_infinite ? double(passes.scene().infinite_emitters().size())
-                                                 : 1.0;
+            const double choice = s == 0 && state[0].v.is_infinite
+                                      ? double(passes.scene().infinite_emitters().size())
+                                      : 1.0;
             const double expected =
                 value.pdfs.density(q) * units / ((n - s >= 2 ? A : 1.0) * choice);
             ASSERT_NEAR(state.density(s), expected, 1e-3 * expected) << "s = " << s;
@@ -143,7 +144,11 @@ std::vector<double> features(const PathState& x) {
         if (i < k) cosines += double(abs_dot(x[i].v.ng, direction(x[i].v, x[i + 1].v)));
     }
     const Vertex &seen = x[k - 1].v, &first = x[1].v;
-    return {double(x.film.x), double(x.film.y), double(k), edges, cosines,
+    return {double(x.film.x),
+            double(x.film.y),
+            double(k),
+            edges,
+            cosines,
             double(first.is_infinite ? 0.0f : first.p.y),
             double(seen.is_infinite ? 0.0f : seen.p.z),
             double(abs_dot(seen.ng, direction(seen, x[k].v))),
@@ -182,12 +187,13 @@ TEST_P(Paths, MutationsKeepDetailedBalance) {
         }
         if (moves < 200) continue;
         const double level = sidak(1e-3, change.size());
-        for (size_t f = 0; f < change.size(); ++f)
-            if (change[f].variance() > 0)
-                EXPECT_GT(welch_p(change[f], Moments::exact(0), 0), level)
-                    << PathMutations::kNames[size_t(kind)] << ", feature " << f << ": "
-                    << change[f].mean() << " ± " << std::sqrt(change[f].squared_error()) << " of "
-                    << moves << " moves";
+        for (size_t f = 0; f < change.size(); ++f) {
+            if (!(change[f].variance() > 0)) continue;
+            EXPECT_GT(welch_p(change[f], Moments::exact(0), 0), level)
+                << PathMutations::kNames[size_t(kind)] << ", feature " << f << ": "
+                << change[f].mean() << " ± " << std::sqrt(change[f].squared_error()) << " of "
+                << moves << " moves";
+        }
     }
 }
 
