@@ -51,7 +51,7 @@ endfunction()
 # etendue_layer(NAME [DEPENDS layers or targets...]): every *.cpp of the folder.
 function(etendue_layer name)
     cmake_parse_arguments(ARG "" "" "DEPENDS;PRIVATE" ${ARGN})
-    file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cpp)
+    file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cpp)
     set(include ${ETENDUE_LAYER_INCLUDES}/${name})
     file(MAKE_DIRECTORY ${include})
     file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR}/${name} ${include}/${name} SYMBOLIC)

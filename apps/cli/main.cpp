@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
     etendue::add_compare_command(app);
     etendue::add_diff_command(app);
     etendue::add_tonemap_command(app);
+    etendue::add_paths_command(app);
     etendue::add_list_command(app);
     etendue::add_verify_command(app);
     try {

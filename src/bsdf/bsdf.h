@@ -71,6 +71,7 @@ public:
 
 private:
     friend class ComponentList;
+    friend class ComponentArena;
 
     Vec3 ng_;
     bool has_smooth_ = false;

@@ -30,9 +30,19 @@ public:
         store_[used_] = c;
         return &store_[used_++];
     }
+    /// Stores the further components of a copied BSDF, which has read them from another arena.
+    void adopt(Bsdf& bsdf) { bsdf.first_.next = copy_of(bsdf.first_.next); }
     void reset() { used_ = 0; }
 
 private:
+    /// In the same order.
+    const BsdfComponent* copy_of(const BsdfComponent* c) {
+        if (!c) return nullptr;
+        BsdfComponent copy = *c;
+        copy.next = copy_of(c->next);
+        return keep(copy);
+    }
+
     std::deque<BsdfComponent> store_;
     size_t used_ = 0;
 };

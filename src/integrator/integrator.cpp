@@ -9,6 +9,7 @@
 
 #include "integrator/bdpt.h"
 #include "integrator/light.h"
+#include "integrator/mlt.h"
 #include "integrator/mmlt.h"
 #include "integrator/path.h"
 #include "integrator/pcbpt.h"
@@ -22,8 +23,9 @@ namespace etendue {
 
 const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
-        path_entry(), light_entry(), bdpt_entry(),     pm_entry(),    ppm_entry(),    sppm_entry(),
-        vcm_entry(),  upg_entry(),   upg_bdpt_entry(), pcbpt_entry(), pssmlt_entry(), mmlt_entry()};
+        path_entry(),   light_entry(), bdpt_entry(), pm_entry(),       ppm_entry(),
+        sppm_entry(),   vcm_entry(),   upg_entry(),  upg_bdpt_entry(), pcbpt_entry(),
+        pssmlt_entry(), mmlt_entry(),  mlt_entry()};
     return entries;
 }
 

@@ -90,6 +90,7 @@ public:
     int integer(const char* name) const;
     float number(const char* name) const;
     bool flag(const char* name) const;
+    const std::string& string(const char* name) const { return text(name); }
     template <class T, size_t N>
     T choice(const char* name, const std::array<Choice<T>, N>& choices) const {
         std::vector<std::string> known;

@@ -41,6 +41,11 @@ uint64_t MarkovIntegrator::whole_film_paths(const Scene& scene) {
                     uint64_t(std::llround(reached_region(scene.film(), scene.filter()).area())));
 }
 
+bool MarkovIntegrator::hits_emitters(const Scene& scene) {
+    return std::any_of(scene.emitters().begin(), scene.emitters().end(),
+                       [](const auto& e) { return !e->is_delta(); });
+}
+
 PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
                                                      const Bidirectional& paths) const {
     const TechniqueCounts n = counts(scene, 0);

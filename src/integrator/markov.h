@@ -58,6 +58,9 @@ protected:
     /// N_L of the weights: the film's eye paths are spread over so many pixels.
     static uint64_t whole_film_paths(const Scene& scene);
 
+    /// Whether eye paths can hit any.
+    static bool hits_emitters(const Scene& scene);
+
     ChainOptions options_;
     Bidirectional paths_;
 

@@ -11,32 +11,17 @@
 #include <cmath>
 
 #include "integrator/markov.h"
+#include "mcmc/technique_choice.h"
 
 namespace etendue {
 namespace {
 
-/// Which technique makes the path, by length.
-class TechniqueChoice {
+/// Length and technique of a path.
+class PathChoice {
 public:
     /// Classes are the lengths from `shortest` on, the last one all that are longer too, up to `longest`.
-    TechniqueChoice(int shortest, int classes, int longest, bool hits, bool hits_lens,
-                    const Pilot& pilot)
-        : shortest_(shortest), classes_(classes), longest_(longest), hits_(hits),
-          hits_lens_(hits_lens) {
-        for (int k = shortest; k < shortest + classes + kTabulated; ++k) {
-            std::vector<double> p(size_t(k) + 2);
-            const int allowed = k + hits + hits_lens;
-            double energy = 0;
-            for (int s = 0; s <= k + 1; ++s) energy += energy_of(pilot, k, s);
-            const double uniform = energy > 0 ? kUniform : 1.0;
-            for (int s = 0; s <= k + 1; ++s)
-                if (is_allowed(k, s))
-                    p[size_t(s)] =
-                        uniform / allowed +
-                        (energy > 0 ? (1 - uniform) * energy_of(pilot, k, s) / energy : 0.0);
-            pmf_.push_back(std::move(p));
-        }
-    }
+    PathChoice(int shortest, int classes, int longest, const TechniqueChoice& technique)
+        : shortest_(shortest), classes_(classes), longest_(longest), technique_(technique) {}
 
     struct Chosen {
         int s, t;
@@ -53,39 +38,20 @@ public:
             pmf = std::pow(kLonger, j) * (j == most ? 1 : 1 - kLonger);
             k += j;
         }
-        const size_t row = size_t(k - shortest_);
-        if (row >= pmf_.size()) {
-            const int allowed = k + hits_ + hits_lens_;
-            const int i = std::min(int(u_s * allowed), allowed - 1);
-            const int s = hits_ ? i : i + 1;
-            return {s, k + 1 - s, pmf / allowed};
-        }
-        const std::vector<double>& p = pmf_[row];
-        int s = 0, chosen = 0;
-        for (double rest = u_s; s <= k + 1; rest -= p[size_t(s)], ++s) {
-            if (p[size_t(s)] > 0) chosen = s;
-            if (rest < p[size_t(s)]) break;
-        }
-        return {chosen, k + 1 - chosen, pmf * p[size_t(chosen)]};
+        const int s = technique_.choose(k, u_s);
+        return {s, k + 1 - s, pmf * technique_.pmf(k, s)};
     }
     bool has_length_choice(int chain_class) const {
         return chain_class == classes_ - 1 && shortest_ + chain_class < longest_;
     }
+    /// Lengths of the last class whose techniques a pilot may have learned.
+    static constexpr int kTabulated = 16;
 
 private:
-    static constexpr double kUniform = 0.2, kLonger = 0.75;
-    static constexpr int kTabulated =
-        16;  ///< Lengths of the last class; beyond, all are as likely.
-
-    bool is_allowed(int k, int s) const { return s == 0 ? hits_ : s == k + 1 ? hits_lens_ : true; }
-    double energy_of(const Pilot& pilot, int k, int s) const {
-        const auto found = pilot.by_technique.find({k, s});
-        return found == pilot.by_technique.end() || !is_allowed(k, s) ? 0.0 : found->second;
-    }
+    static constexpr double kLonger = 0.75;
 
     int shortest_, classes_, longest_;
-    bool hits_, hits_lens_;
-    std::vector<std::vector<double>> pmf_;  ///< By length, then s.
+    TechniqueChoice technique_;
 };
 
 class MmltIntegrator final : public MarkovIntegrator {
@@ -97,13 +63,12 @@ public:
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         const TechniqueCounts n = counts(pass.scene, 0);
-        const auto& emitters = pass.scene.emitters();
-        const bool hits = std::any_of(emitters.begin(), emitters.end(),
-                                      [](const auto& e) { return !e->is_delta(); });
         const int longest = paths_.max_depth();
         const int classes = std::min(lengths_, longest - kShortest + 1);
-        const auto choice = std::make_shared<TechniqueChoice>(kShortest, classes, longest, hits,
-                                                              n.hit_lens > 0, pilot);
+        const auto choice = std::make_shared<PathChoice>(
+            kShortest, classes, longest,
+            TechniqueChoice(kShortest, classes + PathChoice::kTabulated, hits_emitters(pass.scene),
+                            n.hit_lens > 0, pilot));
         PrimarySample sample = [this, n, choice](int k, const SampleContext& c, Workspace& work) {
             c.sampler.seek(Stream::Selection, 0);
             const double u_length = c.sampler.next_1d_fine_if(choice->has_length_choice(k));

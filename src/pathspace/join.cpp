@@ -1,19 +1,14 @@
 #include "pathspace/join.h"
 
 namespace etendue {
-namespace {
-
-/// Attenuation along the edge from y_{s-1} to z_{t-1} by the medium that their surfaces define. If these differ
-/// although no surface lies between them (an inconsistent scene), the choice does not depend on the order of the two
-/// vertices.
 Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b) {
+    // If the two differ although no surface lies between them (an inconsistent scene), the choice does not depend on
+    // the order of the vertices.
     const MediumId at_a = a.medium_toward(a_to_b), at_b = b.medium_toward(-a_to_b);
     const MediumId medium = scene.has_open_boundaries() ? at_b : std::min(at_a, at_b);
     if (a.is_infinite) return scene.attenuation_to_infinity(medium, b.p, b.ng, a.p);
     return scene.attenuation(medium, b.p, b.ng, a.p, a.has_cosine ? a.ng : Vec3{});
 }
-
-}  // namespace
 
 float visibility(const Scene& scene, const Join& join, RenderStats& stats) {
     if (!join.needs_test) return 1;

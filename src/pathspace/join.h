@@ -29,6 +29,8 @@ inline float join_survival(float contribution, float threshold) {
     return contribution < threshold ? contribution / threshold : 1.0f;
 }
 
+/// Attenuation along the edge from `a`, which may be at infinity, to `b` by the medium that their surfaces define.
+Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b);
 /// Transmittance of the join's edge: 0 where it is blocked.
 float visibility(const Scene& scene, const Join& join, RenderStats& stats);
 

@@ -7,13 +7,6 @@
 namespace etendue {
 namespace {
 
-/// Unit direction from a to b; at infinity their own.
-Vec3 direction(const Vertex& a, const Vertex& b) {
-    if (b.is_infinite) return b.p;
-    if (a.is_infinite) return -a.p;
-    return normalize(b.p - a.p);
-}
-
 double inverse_square(const Vertex& a, const Vertex& b) {
     return a.is_infinite || b.is_infinite ? 1.0 : 1.0 / double(length2(b.p - a.p));
 }

@@ -175,6 +175,13 @@ private:
     int size_ = 0;
 };
 
+/// Unit direction from one vertex to another; at infinity their own.
+inline Vec3 direction(const Vertex& from, const Vertex& to) {
+    if (to.is_infinite) return to.p;
+    if (from.is_infinite) return -from.p;
+    return normalize(to.p - from.p);
+}
+
 /// Converts a solid-angle density at `from` to an area density at `to`: p_A = p_σ |cos θ_to| / d². It is unchanged
 /// where `to` is at infinity.
 inline float to_area(float pdf_sa, const Vertex& from, const Vertex& to) {

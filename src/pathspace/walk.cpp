@@ -79,12 +79,15 @@ void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, S
 
 void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
                     Sampler& sampler, SubPath& z) {
-    const Sensor& sensor = walk.scene.sensor();
+    start_eye_path(walk, at, walk.scene.sensor().sample_ray(at.point, u_lens), sampler, z);
+}
+
+void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
+                    Sampler& sampler, SubPath& z) {
     ++walk.stats.eye_paths;
     z.clear();
     z.film = at.point;
     z.film_weight = at.weight;
-    const SensorRay ray = sensor.sample_ray(z.film, u_lens);
 
     Vertex& lens = z.append();
     lens.kind = Vertex::Kind::Sensor;
@@ -92,7 +95,7 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u
     lens.pdf_fwd = ray.pdf_pos;
     lens.beta = Rgb(1 / ray.pdf_pos);
     lens.is_connectible = true;
-    lens.is_infinite = sensor.is_orthographic();
+    lens.is_infinite = walk.scene.sensor().is_orthographic();
     lens.p = lens.is_infinite ? -ray.d : ray.p;
 
     const Ray start{ray.p, ray.d, kInf};
@@ -106,14 +109,20 @@ bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
     const Scene& scene = walk.scene;
     y.clear();
     if (!scene.has_emitters()) return false;
-    ++walk.stats.light_paths;
     sampler.seek(Stream::Light, 0);
     const Emitter& emitter =
         scene.sample_emitter(sampler.next_1d_fine_if(scene.has_emitter_choice()));
     const FinePoint u_y0 = sampler.next_2d_fine();
     const EmissionSample e = emitter.sample_emission(u_y0, sampler.next_2d());
     if (!(e.pdf_y0 > 0)) return false;
+    start_light_path(walk, emitter, e, sampler, y);
+    return true;
+}
 
+void start_light_path(const WalkContext& walk, const Emitter& emitter, const EmissionSample& e,
+                      Sampler& sampler, SubPath& y) {
+    ++walk.stats.light_paths;
+    y.clear();
     Vertex& y0 = y.append();
     y0.kind = Vertex::Kind::Emitter;
     y0.emitter = &emitter;
@@ -129,14 +138,13 @@ bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
     y0.pdf_fwd = emitter.selection_pmf * e.pdf_y0;
     y0.beta = Rgb(1 / y0.pdf_fwd);
 
-    if (!(e.pdf_d > 0)) return true;
+    if (!(e.pdf_d > 0)) return;
     const Vec3 origin = y0.has_cosine ? offset_origin(e.p, e.ng, e.d) : e.p;
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
     Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
     if (append_surface(walk, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, y0.medium) ==
         Met::Surface)
         y[1].next_event_ratio = next_event_ratio(y[0], e.d);
-    return true;
 }
 
 template <TransportMode mode>

@@ -40,8 +40,14 @@ void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, S
 /// numbers used for these two.
 void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
                     Sampler& sampler, SubPath& z);
+/// The same along a given ray.
+void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
+                    Sampler& sampler, SubPath& z);
 /// Makes y_0 on an emitter and, if the ray hits a surface, y_1. False where no emitter has power.
 bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y);
+/// The same for a given start.
+void start_light_path(const WalkContext& walk, const Emitter& emitter, const EmissionSample& e,
+                      Sampler& sampler, SubPath& y);
 
 /// p_NE / p_L of y_0 for a next vertex along `w`.
 float next_event_ratio(const Vertex& y0, Vec3 w);

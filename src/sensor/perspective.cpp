@@ -35,25 +35,22 @@ public:
     }
 
     SensorRay sample_ray(Vec2 film, Vec2 u_lens) const override {
-        const Vec2 on_plane = film_to_plane(film);
-        Vec3 target{on_plane.x, on_plane.y, 1}, lens = origin_;
-        if (has_finite_lens()) {
-            const Vec2 u = sample_lens(u_lens);
-            lens = to_world({u.x, u.y, 0}) + origin_;
-            target = target * camera_.focus_distance - Vec3{u.x, u.y, 0};
-        }
-        const Vec3 d = normalize(target);
-        return {lens, forward_, to_world(d), pdf_pos_, pdf_of_cosine(d.z)};
+        return has_finite_lens() ? ray_through(sample_lens(u_lens), film) : ray_through({}, film);
+    }
+    SensorRay ray_from(Vec3 lens, Vec2 film) const override {
+        if (!has_finite_lens()) return ray_through({}, film);
+        const Vec3 local = to_local(lens - origin_);
+        return ray_through({local.x, local.y}, film);
     }
 
     std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity,
                                                   Vec2 u_lens) const override {
-        Vec3 lens = origin_;
-        if (has_finite_lens()) {
-            const Vec2 u = sample_lens(u_lens);
-            lens = to_world({u.x, u.y, 0}) + origin_;
-        }
-        return measure(lens, from_infinity ? from : from - lens);
+        return measure(has_finite_lens() ? lens_point(sample_lens(u_lens)) : origin_, from,
+                       from_infinity);
+    }
+    std::optional<SensorSample> connection_to(Vec3 lens, Vec3 from,
+                                              bool from_infinity) const override {
+        return measure(has_finite_lens() ? lens : origin_, from, from_infinity);
     }
 
     std::optional<SensorSample> hit_lens(Vec3 o, Vec3 d, float tmax) const override {
@@ -93,6 +90,20 @@ private:
                     (1 - 2 * (film.y / float(camera_.film.height) + camera_.offset.y))};
     }
 
+    Vec3 lens_point(Vec2 on_lens) const { return to_world({on_lens.x, on_lens.y, 0}) + origin_; }
+    SensorRay ray_through(Vec2 on_lens, Vec2 film) const {
+        const Vec2 on_plane = film_to_plane(film);
+        Vec3 target{on_plane.x, on_plane.y, 1}, lens = origin_;
+        if (has_finite_lens()) {
+            lens = lens_point(on_lens);
+            target = target * camera_.focus_distance - Vec3{on_lens.x, on_lens.y, 0};
+        }
+        const Vec3 d = normalize(target);
+        return {lens, forward_, to_world(d), pdf_pos_, pdf_of_cosine(d.z)};
+    }
+    std::optional<SensorSample> measure(Vec3 lens, Vec3 from, bool from_infinity) const {
+        return measure(lens, from_infinity ? from : from - lens);
+    }
     /// The measurement of light that arrives at `lens` along -v; v points from the lens into the scene.
     std::optional<SensorSample> measure(Vec3 lens, Vec3 v) const {
         const float dist2 = length2(v);

@@ -40,10 +40,17 @@ public:
 
     /// Ray through a film point, in pixels; `u_lens` chooses the point on a finite lens.
     virtual SensorRay sample_ray(Vec2 film, Vec2 u_lens) const = 0;
+    /// The same from a given point of a finite lens, which other sensors ignore.
+    virtual SensorRay ray_from(Vec3 /*lens*/, Vec2 film) const { return sample_ray(film, {}); }
     /// Connection from `from`, a point or the direction to one at infinity, to the lens; empty outside the crop,
     /// extended by the filter's radius.
     virtual std::optional<SensorSample> sample_connection(Vec3 from, bool from_infinity,
                                                           Vec2 u_lens) const = 0;
+    /// The same to a given point of a finite lens, which other sensors ignore.
+    virtual std::optional<SensorSample> connection_to(Vec3 /*lens*/, Vec3 from,
+                                                      bool from_infinity) const {
+        return sample_connection(from, from_infinity, {});
+    }
     /// The measurement of a light ray o + t·d, t in (0, tmax), that crosses a finite lens from its front; empty
     /// otherwise.
     virtual std::optional<SensorSample> hit_lens(Vec3 o, Vec3 d, float tmax) const;

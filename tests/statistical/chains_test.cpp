@@ -26,7 +26,8 @@ TEST_P(ChainFilms, AreThoseOfBidirectionalPathTracing) {
     const Scene scene = build(part_of_film(GetParam()) + room() + area_lamp() +
                               sphere("-0.4,-0.5,0", "0.4", kGlass));
     const Tiles bdpt = render_tiles(scene, "bdpt", {2048, 8, 1});
-    for (const char* method : {"pssmlt:chains=128,groups=1024", "mmlt:chains=128,groups=512"})
+    for (const char* method : {"pssmlt:chains=128,groups=1024", "mmlt:chains=128,groups=512",
+                               "mlt:chains=128,groups=512"})
         expect_same_image(
             render_tiles(scene, method, {std::string(method)[0] == 'p' ? 1024u : 512u, 8, 2}), bdpt,
             0.15, method);
@@ -53,12 +54,14 @@ INSTANTIATE_TEST_SUITE_P(Depths, ChainLengths,
                                            "mmlt:chains=16,groups=256,max_depth=3",
                                            "mmlt:chains=16,groups=256,max_depth=5",
                                            "mmlt:chains=16,groups=256,lengths=2,max_depth=6",
-                                           "mmlt:chains=16,groups=256,lengths=1"));
+                                           "mmlt:chains=16,groups=256,lengths=1",
+                                           "mlt:chains=16,groups=256,max_depth=3",
+                                           "mlt:chains=16,groups=256,max_depth=5"));
 
 /// A few chains that go on for long agree with many that only start, by runs with seeds of their own.
 TEST(LongChains, GoOnAsTheyBegan) {
     const Scene scene = build(mixed_room(front_camera(12)));
-    for (const char* name : {"pssmlt", "mmlt"}) {
+    for (const char* name : {"pssmlt", "mmlt", "mlt"}) {
         std::array<Tiles, 2> tiles{Tiles(4), Tiles(4)};
         for (uint64_t run = 0; run < 40; ++run)
             for (size_t i = 0; i < 2; ++i) {

@@ -66,7 +66,8 @@ INSTANTIATE_TEST_SUITE_P(
                                          "upg+bdpt", "sppm", "ppm:eye_paths=2",
                                          "pm:light_paths=2000",
                                          "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
-                                         "pssmlt:groups=2,chains=24", "mmlt:groups=2,chains=48"),
+                                         "pssmlt:groups=2,chains=24", "mmlt:groups=2,chains=48",
+                                         "mlt:groups=2,chains=48"),
                        ::testing::Values(SamplerKind::Independent, SamplerKind::Sobol)),
     [](const auto& p) {
         std::string name = std::get<0>(p.param);

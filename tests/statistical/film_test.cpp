@@ -100,7 +100,8 @@ TEST_P(ErrorEstimates, EqualTheTrueError) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Integrators, ErrorEstimates,
-                         ::testing::Values("path", "bdpt", "pssmlt:chains=16", "mmlt:chains=48"),
+                         ::testing::Values("path", "bdpt", "pssmlt:chains=16", "mmlt:chains=48",
+                                           "mlt:chains=48"),
                          [](const auto& p) {
                              const std::string name = p.param;
                              return name.substr(0, name.find(':'));

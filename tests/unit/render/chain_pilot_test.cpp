@@ -14,7 +14,8 @@ TEST(ChainPilot, EndsInAClosedRoom) {
               sphere("0.3,0.2,-0.4", "0.1",
                      diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
                                               "value=\"1,1,1\"/></emitter>"));
-    for (const char* name : {"pssmlt:groups=2,chains=16", "mmlt:groups=2,chains=16"}) {
+    for (const char* name :
+         {"pssmlt:groups=2,chains=16", "mmlt:groups=2,chains=16", "mlt:groups=2,chains=16"}) {
         RenderSettings settings;
         settings.integrator = IntegratorSpec::parse(name);
         settings.spp = 1;

@@ -187,7 +187,7 @@ TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
 INSTANTIATE_TEST_SUITE_P(Integrators, DropPass,
                          ::testing::Values("path", "light", "bdpt", "vcm:radius=0.3", "upg+bdpt",
                                            "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
-                                           "mmlt:groups=2,chains=48"),
+                                           "mmlt:groups=2,chains=48", "mlt:groups=2,chains=48"),
                          [](const auto& p) {
                              const std::string name = p.param;
                              return name.substr(0, name.find_first_of(":+"));

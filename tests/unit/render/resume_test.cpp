@@ -87,7 +87,7 @@ INSTANTIATE_TEST_SUITE_P(Integrators, Resume,
                          ::testing::Values("bdpt:eorr=true", "bdpt:connections=cache",
                                            "vcm:radius=0.3", "vcm:exact=true", "upg", "upg+bdpt",
                                            "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
-                                           "mmlt:groups=4,chains=48"),
+                                           "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48"),
                          [](const auto& p) {
                              std::string name = p.param;
                              std::replace_if(

@@ -1,0 +1,84 @@
+#include <stdexcept>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "commands.h"
+#include "image/atomic_file.h"
+#include "mcmc/pick_paths.h"
+#include "scene_options.h"
+
+namespace etendue {
+namespace {
+
+struct PathsCommand {
+    SceneOptions scene;
+    PickOptions pick;
+    int count = 0;
+    std::vector<int> pixel;
+    std::string output, check;
+
+    void run();
+};
+
+void check_paths(const Scene& scene, const std::string& file) {
+    const std::vector<GivenPath> given = read_user_paths(file);
+    size_t usable = 0;
+    for (size_t i = 0; i < given.size(); ++i) {
+        const CheckedPath checked = check_user_path(scene, given[i]);
+        usable += checked.path.has_value();
+        if (!checked.path) fmt::print("{}\n", to_string(checked, given[i], i, file));
+    }
+    fmt::print("{}: {} of {} paths can be used\n", file, usable, given.size());
+    if (usable < given.size() || given.empty())
+        throw std::runtime_error(given.empty() ? file + ": has no paths"
+                                               : file + ": some paths are refused");
+}
+
+void PathsCommand::run() {
+    if (check.empty() == (count == 0))
+        throw std::runtime_error("paths: give either --pick N or --check FILE");
+    if (count > 0 && (pixel.empty() || output.empty()))
+        throw std::runtime_error("paths: --pick needs --pixel x,y and -o FILE");
+    const Scene s = load_scene(scene);
+    if (count == 0) return check_paths(s, check);
+    pick.count = count;
+    pick.x = pixel[0], pick.y = pixel[1];
+    const std::vector<GivenPath> picked = pick_paths(s, pick);
+    write_file_atomically(output, to_json(picked));
+    fmt::print("{}: {} paths\n", output, picked.size());
+}
+
+}  // namespace
+
+void add_paths_command(CLI::App& app) {
+    auto options = std::make_shared<PathsCommand>();
+    CLI::App& c = *app.add_subcommand("paths", "Pick or check light paths for mlt:user_paths=FILE");
+    options->scene.add_to(c);
+    CLI::Option* pick =
+        c.add_option("--pick", options->count, "Save up to so many good paths of a short run")
+            ->check(CLI::Range(1, 10000));
+    c.add_option("--pixel", options->pixel, "Column and row of the pixel that they reach: x,y")
+        ->delimiter(',')
+        ->expected(2)
+        ->needs(pick);
+    c.add_option("--length", options->pick.length,
+                 "Edges of the full paths, from the emitter to the lens")
+        ->check(CLI::Range(2, 64))
+        ->capture_default_str()
+        ->needs(pick);
+    c.add_option("--samples", options->pick.samples, "Paths to try")
+        ->check(CLI::Range(uint64_t(1), uint64_t(1) << 40))
+        ->capture_default_str()
+        ->needs(pick);
+    c.add_option("--seed", options->pick.seed, "Seed of all random numbers")
+        ->capture_default_str()
+        ->needs(pick);
+    c.add_option("-o,--output", options->output, "JSON file to write")->needs(pick);
+    c.add_option("--check", options->check,
+                 "JSON file of paths: says of each that cannot be used why")
+        ->excludes(pick);
+    c.callback([options] { options->run(); });
+}
+
+}  // namespace etendue

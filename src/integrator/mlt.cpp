@@ -1,0 +1,72 @@
+// Metropolis light transport in path space [Veach 1997, ch. 11]: a state is a full path, and mutations replace a part of it,
+// or move it a little. Unbiased.
+//
+// Large steps are paths of one technique, as in mmlt, and seeds are such paths too. Direct light is apart.
+
+#include "integrator/mlt.h"
+
+#include <algorithm>
+
+#include "integrator/markov.h"
+#include "mcmc/path_space.h"
+
+namespace etendue {
+namespace {
+
+class MltIntegrator final : public MarkovIntegrator {
+public:
+    explicit MltIntegrator(const IntegratorParams& p)
+        : MarkovIntegrator(p, DepthOptions::without_roulette(p)),
+          user_paths_(p.string("user_paths")),
+          user_ratio_(double(p.number("user_ratio", 0.01f, 100.0f))) {}
+
+protected:
+    Chains begin(const PassContext& pass, const Pilot& pilot) override {
+        constexpr int kTabulated = 24;  // Lengths whose techniques the pilot may have learned.
+        const Scene& scene = pass.scene;
+        const TechniqueCounts n = counts(scene, 0);
+        const int longest = paths_.max_depth();
+        PathTarget target{
+            PathMeasure(scene, reached_region(scene.film(), scene.filter()), kShortest, longest),
+            pilot.map, LengthChoice(kShortest, longest, pilot),
+            TechniqueChoice(kShortest, std::min(kTabulated, longest - kShortest + 1),
+                            hits_emitters(scene), n.hit_lens > 0, pilot)};
+        const ClassPlan plan{.chains = options_.chains,
+                             .pool = pool_samples(4 * pilot.samples, options_),
+                             .c = pilot.b};
+        PathMutations mutations;
+        if (!user_paths_.empty()) {
+            mutations.user_paths = UserPaths::load(scene, user_paths_);
+            mutations.weights[PathMutations::UserPath] =
+                user_ratio_ * mutations.weights[PathMutations::Bidirectional];
+        }
+        return {std::make_unique<PathSpace>(std::move(target), mutations, n), {plan}};
+    }
+
+private:
+    std::string user_paths_;  ///< File; empty: none.
+    double user_ratio_;
+};
+
+}  // namespace
+
+IntegratorEntry mlt_entry() {
+    std::vector<ParamInfo> params{depth_params()[0]};
+    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
+    for (ParamInfo& p : params)
+        if (p.name == std::string("p_large")) p.fallback = "0.15";
+    params.push_back({"user_paths", ParamKind::String, "",
+                      "JSON file of light paths that matter, as `etendue paths` makes and checks "
+                      "them; proposals near them are mixed with bidirectional mutations."});
+    params.push_back({"user_ratio", ParamKind::Float, "1",
+                      "Proposals near user paths for each bidirectional mutation."});
+    return {{"integrator", "mlt",
+             "Metropolis light transport on paths, which mutations change in part, or move a "
+             "little. Unbiased.",
+             params},
+            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+                return std::make_unique<MltIntegrator>(p);
+            }};
+}
+
+}  // namespace etendue

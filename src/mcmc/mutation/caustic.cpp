@@ -1,0 +1,82 @@
+#include "mcmc/mutation/caustic.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace etendue {
+
+CausticMutation::CausticMutation(const PathMeasure& measure)
+    : measure_(measure), film_(film_range(measure)) {}
+
+int CausticMutation::first(const PathState& x) {
+    int i = x.last() - 2;
+    while (i > 0 && x[i].v.is_delta) --i;
+    return i;
+}
+
+LogRange CausticMutation::range(const PathState& x, int first) const {
+    constexpr float kLargestAngle = 1;
+    const int k = x.last();
+    const Vertex &lens = x[k].v, &seen = x[k - 1].v;
+    // How far x_{k-1} moves with a pixel: the density of directions is that of a pixel's.
+    const float pdf_dir = measure_.scene.sensor().pdf_direction(lens.p, direction(lens, seen));
+    const float distance = lens.is_infinite ? 1.0f : length(seen.p - lens.p);
+    float a_pixel = distance / std::sqrt(pdf_dir);
+    if (!x[first].v.is_infinite) {
+        float path = 0;
+        for (int i = first; i < k - 1; ++i) path += length(x[i + 1].v.p - x[i].v.p);
+        a_pixel = std::min(a_pixel / path, kLargestAngle / film_.high);
+    }
+    return {film_.low * a_pixel, film_.high * a_pixel};
+}
+
+bool CausticMutation::propose(const PathState& x, const MutationContext& c, PathState& y,
+                              MutationWay& way) const {
+    const int k = x.last(), l = first(x);
+    way = {.l = l, .m = k, .m_y = k};
+    c.sampler.seek(Stream::Selection, 1);
+    way.angle = range(x, l).sample(c.sampler.next_1d());
+    const float u = c.sampler.next_1d();
+    PathBuilder builder = c.builder(&x, l, k);
+    const Vertex& from = x[l].v;
+    const Vec3 old = direction(from, x[l + 1].v);
+    if (l > 0) {
+        const BsdfSample s{
+            .wi = turned(old, way.angle, u), .weight = Rgb(1), .pdf = 1, .pdf_rev = 1};
+        if (!builder.step_light(s)) return false;
+    } else {
+        const Emitter& emitter = x.emitter();
+        EmissionSample e{.p = from.p,
+                         .ng = from.ng,
+                         .d = old,
+                         .Le = Rgb(1),
+                         .pdf_y0 = 1,
+                         .pdf_d = 1,
+                         .uv = from.uv,
+                         .prim = from.location.prim};
+        if (from.is_infinite) {
+            const Frame frame = Frame::from_normal(from.p);
+            const float azimuth = 2 * kPi * u;
+            e.p = x[1].v.p + from.p * (2 * emitter.disc().radius) +
+                  (frame.s * std::cos(azimuth) + frame.t * std::sin(azimuth)) * way.angle;
+        } else {
+            e.d = turned(old, way.angle, u);
+        }
+        if (!builder.start_light(emitter, e)) return false;
+    }
+    for (int i = l + 1; i < k - 1; ++i) {
+        const auto s = follow(builder.light_end(), x[i].v, TransportMode::Importance);
+        if (!s || !builder.step_light(*s)) return false;
+    }
+    return builder.finish(y);
+}
+
+double CausticMutation::Q(const PathState& x, const PathState& y, const MutationWay& way) const {
+    // The logarithm of the angle is uniform over a range of the same length there and back, but not the same range.
+    if (!range(x, way.l).contains(way.angle)) return 0;
+    double p = y.geometry_from_light(way.l + 1);
+    for (int i = way.l + 2; i < y.last(); ++i) p *= y[i].light / double(y[i - 1].light_pmf);
+    return p;
+}
+
+}  // namespace etendue

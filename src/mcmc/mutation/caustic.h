@@ -1,0 +1,28 @@
+#pragma once
+// Caustic perturbation [Veach 1997, §11.4.3]: the direction from the emitter, or from the last vertex before a chain of
+// delta events, is turned a little; the light sub-path follows the same events as before, to the vertex that the lens sees.
+
+#include "mcmc/mutation/perturbation.h"
+
+namespace etendue {
+
+class CausticMutation final : public PathMutation {
+public:
+    explicit CausticMutation(const PathMeasure& measure);
+
+    bool suits(const PathState& x) const override { return !x[x.last() - 1].v.is_delta; }
+    bool propose(const PathState& x, const MutationContext& c, PathState& y,
+                 MutationWay& way) const override;
+    double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
+
+private:
+    /// The vertex whose direction is turned.
+    static int first(const PathState& x);
+    /// Angles, or from infinity distances, by which x_{k-1} moves as far as the film's range moves it.
+    LogRange range(const PathState& x, int first) const;
+
+    const PathMeasure& measure_;
+    LogRange film_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,35 @@
+#pragma once
+// Lens perturbation and multi-chain perturbation [Veach 1997, §11.4.2 and §11.4.4]: a film point moves a little, and the
+// eye sub-path from there follows the same delta events as before, up to a vertex that is joined to what is kept; or up to
+// the emitter. Where a vertex that is no delta event lies between two chains of delta events, its direction is turned a
+// little too.
+
+#include "mcmc/mutation/perturbation.h"
+
+namespace etendue {
+
+class EyeChainMutation final : public PathMutation {
+public:
+    enum class Kind {
+        Lens,       ///< One chain of delta events, or none.
+        MultiChain  ///< More than one.
+    };
+    EyeChainMutation(Kind kind, const PathMeasure& measure);
+
+    bool suits(const PathState& x) const override { return (chains(x).turns > 0) == is_multi_; }
+    bool propose(const PathState& x, const MutationContext& c, PathState& y,
+                 MutationWay& way) const override;
+    double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
+
+private:
+    struct Chains {
+        int end;    ///< x_end … x_{k-1} are replaced.
+        int turns;  ///< Vertices among them whose direction is turned.
+    };
+    static Chains chains(const PathState& x);
+
+    bool is_multi_;
+    LogRange range_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,33 @@
+#pragma once
+// User path proposals [Fan, Chenney & Lai 2005, §5.1]: a light sub-path close to one that a user has given replaces that of
+// the present path, up to the first vertex from the eye that is no delta event. Hardly any path could be made so again on
+// the way back; so their density is added to that of bidirectional mutations that keep the same [eq. 7], by PathSpace::Q().
+
+#include "mcmc/mutation/mutation.h"
+#include "mcmc/user_paths.h"
+
+namespace etendue {
+
+class UserPathMutation final : public PathMutation {
+public:
+    UserPathMutation(const PathMeasure& measure, const UserPaths& paths)
+        : measure_(measure), paths_(paths) {}
+
+    bool suits(const PathState& x) const override { return kept(x) > 0; }
+    bool propose(const PathState& x, const MutationContext& c, PathState& y,
+                 MutationWay& way) const override;
+    double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
+    /// Whether a mutation that goes this way keeps what proposals from user paths keep.
+    static bool is_way(const PathState& x, const MutationWay& way) {
+        return way.l == -1 && way.m == kept(x);
+    }
+
+private:
+    /// x_m … x_k are kept.
+    static int kept(const PathState& x);
+
+    const PathMeasure& measure_;
+    const UserPaths& paths_;
+};
+
+}  // namespace etendue

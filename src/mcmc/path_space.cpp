@@ -1,0 +1,101 @@
+#include "mcmc/path_space.h"
+
+#include "mcmc/mutation/bidirectional.h"
+#include "mcmc/mutation/caustic.h"
+#include "mcmc/mutation/eye_chain.h"
+#include "mcmc/mutation/lens_subpath.h"
+#include "mcmc/mutation/user_path.h"
+
+namespace etendue {
+
+PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, TechniqueCounts counts)
+    : target_(std::move(target)), options_(mutations), counts_(counts) {
+    const PathMeasure& measure = target_.measure;
+    using EyeChain = EyeChainMutation;
+    mutations_[PathMutations::Bidirectional] = std::make_unique<BidirectionalMutation>(measure);
+    mutations_[PathMutations::Lens] = std::make_unique<EyeChain>(EyeChain::Kind::Lens, measure);
+    mutations_[PathMutations::Caustic] = std::make_unique<CausticMutation>(measure);
+    mutations_[PathMutations::MultiChain] =
+        std::make_unique<EyeChain>(EyeChain::Kind::MultiChain, measure);
+    mutations_[PathMutations::LensSubpath] = std::make_unique<LensSubpathMutation>();
+    if (options_.user_paths)
+        mutations_[PathMutations::UserPath] =
+            std::make_unique<UserPathMutation>(measure, *options_.user_paths);
+}
+
+void PathSpace::draw(int, uint64_t key, const ChainContext& c, ChainState& state) const {
+    auto& y = static_cast<PathState&>(state);
+    Sampler sampler(SamplerKind::Independent, key);
+    sampler.start(0, 0);
+    sampler.seek(Stream::Selection, 0);
+    const int k = target_.lengths.choose(sampler.next_1d_fine());
+    const int s = target_.techniques.choose(k, sampler.next_1d_fine());
+    const MutationContext context{target_.measure, c, sampler};
+    PathBuilder builder = context.builder(nullptr, -1, 0);
+    y.set_black();
+    y.edges = k;
+    if (builder.sample_light(s, s == k + 1) && builder.sample_eye(k + 1 - s) && builder.finish(y))
+        y.finish();
+}
+
+std::array<double, PathMutations::kCount> PathSpace::choices(const PathState& x) const {
+    std::array<double, PathMutations::kCount> p{};
+    double sum = 0;
+    for (size_t i = 0; i < p.size(); ++i)
+        if (options_.weights[i] > 0 && mutations_[i]->suits(x)) sum += p[i] = options_.weights[i];
+    if (sum > 0)
+        for (double& v : p) v /= sum;
+    return p;
+}
+
+double PathSpace::Q(Kind kind, const PathState& x, const PathState& y,
+                    const MutationWay& way) const {
+    const auto p = choices(x);
+    const auto density = [&](Kind of) {
+        return p[of] > 0 ? p[of] * mutations_[of]->Q(x, y, way) : 0.0;
+    };
+    const bool is_either =
+        (kind == PathMutations::Bidirectional || kind == PathMutations::UserPath) &&
+        UserPathMutation::is_way(x, way);
+    if (is_either) return density(PathMutations::Bidirectional) + density(PathMutations::UserPath);
+    return density(kind);
+}
+
+Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const ChainContext& c,
+                            ChainState& to) const {
+    const auto& x = static_cast<const PathState&>(from);
+    auto& y = static_cast<PathState&>(to);
+    Sampler sampler(SamplerKind::Independent, key);
+    sampler.start(0, 0);
+    sampler.seek(Stream::Selection, 0);
+    double u = double(sampler.next_1d());
+    const auto p = choices(x);
+    int chosen = 0;
+    for (size_t i = 0; i < p.size(); u -= p[i], ++i) {
+        if (p[i] > 0) chosen = int(i);
+        if (u < p[i]) break;
+    }
+    const auto kind = Kind(chosen);
+    Proposal proposal{.mutation = chosen};
+    y.set_black();
+    const MutationContext context{target_.measure, c, sampler};
+    MutationWay way;
+    if (!(p[size_t(kind)] > 0) || !mutations_[size_t(kind)]->propose(x, context, y, way)) {
+        proposal.has_failed = true;
+        return proposal;
+    }
+    y.finish();
+    if (!(y.target > 0)) return proposal;
+    const double there = Q(kind, x, y, way), back = Q(kind, y, x, way.back());
+    // Targets are relative to the densities of large steps, Q is not.
+    proposal.Q_ratio =
+        there > 0 ? back * y.large_step_density() / (there * x.large_step_density()) : 0.0;
+    return proposal;
+}
+
+void PathSpace::repeat(int, const ChainState& x, const ChainContext& c,
+                       ContributionSink& sink) const {
+    static_cast<const PathState&>(x).tell(counts_, c.work, sink);
+}
+
+}  // namespace etendue

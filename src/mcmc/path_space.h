@@ -1,0 +1,47 @@
+#pragma once
+// The space of full paths for Markov chains [Veach 1997, ch. 11]: large steps sample a path by one technique, and mutations
+// change a part of it.
+
+#include "mcmc/mutation/mutation.h"
+
+namespace etendue {
+
+/// Mutations in path space, and how often each is chosen where all suit.
+struct PathMutations {
+    enum Kind : int { Bidirectional, Lens, Caustic, MultiChain, LensSubpath, UserPath, kCount };
+    static constexpr std::array<const char*, kCount> kNames{
+        "bidirectional", "lens", "caustic", "multi_chain", "lens_subpath", "user_path"};
+    std::array<double, kCount> weights{2, 2, 2, 2, 1, 0};
+    std::optional<UserPaths> user_paths{};  ///< Needed where their weight is not 0.
+};
+
+class PathSpace final : public StateSpace {
+public:
+    PathSpace(PathTarget target, const PathMutations& mutations, TechniqueCounts counts);
+
+    std::span<const char* const> mutations() const override { return PathMutations::kNames; }
+    std::unique_ptr<ChainState> make_state() const override {
+        return std::make_unique<PathState>(target_);
+    }
+    void copy(const ChainState& from, ChainState& to) const override {
+        static_cast<PathState&>(to).copy(static_cast<const PathState&>(from));
+    }
+    void draw(int chain_class, uint64_t key, const ChainContext& c, ChainState& y) const override;
+    Proposal propose(int chain_class, const ChainState& x, uint64_t key, const ChainContext& c,
+                     ChainState& y) const override;
+    void repeat(int chain_class, const ChainState& x, const ChainContext& c,
+                ContributionSink& sink) const override;
+
+private:
+    using Kind = PathMutations::Kind;
+    /// Probability of each mutation at x.
+    std::array<double, PathMutations::kCount> choices(const PathState& x) const;
+    double Q(Kind kind, const PathState& x, const PathState& y, const MutationWay& way) const;
+
+    PathTarget target_;
+    PathMutations options_;
+    std::array<std::unique_ptr<PathMutation>, PathMutations::kCount> mutations_;
+    TechniqueCounts counts_;  ///< Of the weights of joins, for those who want them.
+};
+
+}  // namespace etendue

@@ -1,0 +1,312 @@
+#include "mcmc/path_state.h"
+
+#include <algorithm>
+
+#include "pathspace/mis.h"
+#include "pathspace/path_pdfs.h"
+
+namespace etendue {
+namespace {
+
+double inverse_square(const Vertex& a, const Vertex& b) {
+    return a.is_infinite || b.is_infinite ? 1.0 : 1.0 / double(length2(b.p - a.p));
+}
+
+/// The normal of a vertex as shadow rays take it: none where it has no surface.
+Vec3 surface_normal(const Vertex& v) {
+    return v.kind != Vertex::Kind::Sensor && v.has_cosine ? v.ng : Vec3{};
+}
+
+}  // namespace
+
+PathMeasure::PathMeasure(const Scene& of, const FilmRegion& region, int shortest_path,
+                         int longest_path)
+    : scene(of), film(region), shortest(shortest_path), longest(longest_path), unit_area(1) {
+    const double radius = scene.bounds().is_empty() ? 0 : double(scene.bounds().radius());
+    if (radius > 0) unit_area = sqr(radius);
+}
+
+void PathState::append(const Vertex& v) {
+    x_.emplace_back().v = v;
+    Vertex& added = x_.back().v;
+    if (added.kind == Vertex::Kind::Surface) {
+        arena_.adopt(added.bsdf);
+        const Material& material = *added.shape->material;
+        x_.back().opacity = material.is_opaque() ? 1 : material.opacity(added.uv);
+    } else {
+        added.bsdf = {};
+    }
+}
+
+void PathState::append(const PathVertex& v) {
+    x_.push_back(v);
+    arena_.adopt(x_.back().v.bsdf);
+}
+
+void PathState::copy(const PathState& from) {
+    clear();
+    for (const PathVertex& v : from.x_) append(v);
+    target = from.target;
+    independent_density = from.independent_density;
+    edges = from.edges;
+    splats = from.splats;
+    film = from.film;
+    next_event_ = from.next_event_;
+    large_step_density_ = from.large_step_density_;
+    f_ = from.f_;
+}
+
+double PathState::geometry(int from, int to) const {
+    return measure_.unit_area * double(to_area(1, x_[size_t(from)].v, x_[size_t(to)].v));
+}
+
+void PathState::scatter(int i) {
+    PathVertex& x = x_[size_t(i)];
+    PathVertex &before = x_[size_t(i) - 1], &after = x_[size_t(i) + 1];
+    const Vec3 to_light = direction(x.v, before.v), to_eye = direction(x.v, after.v);
+    double pdf_light = 0, pdf_eye = 0;  // in solid angle
+    x.value = {};
+    if (x.v.is_delta) {
+        const auto event = x.v.bsdf.sample_delta(to_light, x.v.event, TransportMode::Importance);
+        const auto back = x.v.bsdf.sample_delta(to_eye, x.v.event, TransportMode::Radiance);
+        if (event && back) {
+            x.value = event->weight * event->pdf;
+            pdf_light = event->pdf, pdf_eye = event->pdf_rev;
+            x.light_pmf = event->pdf, x.eye_pmf = back->pdf;
+        }
+    } else {
+        const BsdfEval e = x.v.bsdf.eval(to_light, to_eye, TransportMode::Importance);
+        x.value = e.f;
+        pdf_light = e.pdf;
+        if (!e.f.is_zero()) pdf_eye = x.v.bsdf.eval(to_eye, to_light, TransportMode::Radiance).pdf;
+    }
+    after.light = pdf_light * geometry_from_light(i + 1);
+    before.eye = pdf_eye * geometry_from_eye(i - 1);
+    // An eye path that leaves the scene chooses among the emitters at infinity.
+    if (before.v.is_infinite) before.eye /= double(measure_.scene.infinite_emitters().size());
+    x.value *= float(measure_.unit_area * inverse_square(before.v, x.v) *
+                     double(abs_dot(x.v.ng, to_light))) *
+               x.opacity;
+}
+
+bool PathState::evaluate(int first, int last) {
+    const Scene& scene = measure_.scene;
+    const int k = this->last();
+    for (int i = std::max(first, 1); i <= std::min(last, k - 1); ++i) {
+        scatter(i);
+        if (x_[size_t(i)].value.is_zero()) return false;
+    }
+    if (first <= 0) {
+        PathVertex& x0 = x_[0];
+        const Emitter& e = emitter();
+        const Vec3 w = direction(x0.v, x_[1].v);
+        const Emitter::Emission emission = e.eval_emission(x0.v.ng, x0.v.uv, w);
+        x0.value = emission.Le_cos;
+        if (x0.value.is_zero()) return false;
+        x0.light = next_event_ = measure_.unit_area * double(e.selection_pmf);
+        if (!e.is_delta()) {
+            const EmitterHit hit = e.is_infinite()
+                                       ? e.eval_infinite(x0.v.p)
+                                       : e.eval_surface(x0.v.ng, x0.v.uv, x0.v.location.prim, w);
+            x0.light *= double(hit.pdf_y0);
+            next_event_ *= double(hit.pdf);
+        }
+        x_[1].light = emission.pdf_d * geometry_from_light(1);
+    }
+    if (last >= k) {
+        PathVertex& xk = x_[size_t(k)];
+        const float pdf_dir =
+            scene.sensor().pdf_direction(xk.v.p, direction(xk.v, x_[size_t(k) - 1].v));
+        xk.eye = measure_.unit_area * double(xk.v.pdf_fwd);
+        x_[size_t(k) - 1].eye = double(pdf_dir / measure_.film.area()) * geometry_from_eye(k - 1);
+        xk.value = Rgb(float(sqr(measure_.unit_area) * inverse_square(x_[size_t(k) - 1].v, xk.v) *
+                             double(pdf_dir * xk.v.pdf_fwd)));
+        if (xk.value.is_zero()) return false;
+    }
+    for (int i = std::max(first, 0); i < std::min(last, k); ++i) {
+        const Vertex &a = x_[size_t(i)].v, &b = x_[size_t(i) + 1].v;
+        Rgb& attenuation = x_[size_t(i)].attenuation;
+        attenuation = Rgb(1);
+        if (!scene.has_media()) continue;
+        const Vec3 w = direction(a, b);
+        if (i + 1 < k)
+            attenuation = edge_attenuation(scene, a, b, w);
+        else if (a.is_infinite)
+            attenuation = scene.attenuation_to_infinity(kVacuum, b.p, {}, a.p);
+        else
+            attenuation =
+                scene.attenuation(a.medium_toward(w), a.p, surface_normal(a), lens_point(), {});
+    }
+    return true;
+}
+
+Vec3 PathState::lens_point() const {
+    const Vertex& lens = x_.back().v;
+    if (!lens.is_infinite) return lens.p;
+    const auto at = measure_.scene.sensor().connection_to({}, x_[x_.size() - 2].v.p, false);
+    return at ? at->p : x_[x_.size() - 2].v.p;
+}
+
+bool PathState::trace_edge(int i, RenderStats& stats) {
+    const Scene& scene = measure_.scene;
+    const Vertex &a = x_[size_t(i)].v, &b = x_[size_t(i) + 1].v;
+    const Vec3 at = i + 1 == last() ? lens_point() : b.p, normal = surface_normal(b);
+    ++stats.shadow_rays;
+    float& Tr = x_[size_t(i)].transmittance;
+    Tr = a.is_infinite ? scene.transmittance_to_infinity(at, normal, a.p)
+                       : scene.transmittance(at, normal, a.p, surface_normal(a));
+    stats.visible += Tr > 0;
+    return Tr > 0;
+}
+
+double PathState::density(int s) const {
+    const int n = size(), k = n - 1;
+    if (s == 0 ? emitter().is_delta() : s < n && !is_connected_at(s - 1)) return 0;
+    double p = 1;
+    // A ray that samples a vertex passes the masks before it, and meets its surface.
+    for (int i = 0; i < s; ++i) {
+        const PathVertex& x = x_[size_t(i)];
+        p *= i == 0 ? (s == 1 ? next_event_ : x.light)
+                    : x.light * double(x_[size_t(i) - 1].transmittance * x.opacity);
+    }
+    for (int i = s; i <= k; ++i) {
+        const PathVertex& x = x_[size_t(i)];
+        p *= i == k ? x.eye : x.eye * double(x.transmittance * x.opacity);
+    }
+    return p;
+}
+
+void PathState::set_black() {
+    target = 0;
+    independent_density = 1;
+    splats.clear();
+}
+
+void PathState::finish() {
+    const int k = last();
+    set_black();
+    edges = k;
+    f_ = {1, 1, 1};
+    for (const PathVertex& x : x_)
+        for (int c = 0; c < 3; ++c)
+            f_[size_t(c)] *=
+                double(x.value[c]) *
+                (&x == &x_.back() ? 1.0 : double(x.attenuation[c]) * double(x.transmittance));
+    double T = 0;
+    for (int s = 0; s <= k + 1; ++s)
+        if (const double p = target_.techniques.pmf(k, s); p > 0) T += p * density(s);
+    large_step_density_ = T *= target_.lengths.pmf(k);
+    if (!(T > 0)) return;
+    const Rgb value(float(f_[0] / T), float(f_[1] / T), float(f_[2] / T));
+    const double I = double(luminance(value)) * target_.map(film);
+    if (!(I > 0) || !is_finite(value)) return;
+    target = I;
+    splats.push_back({film, value});
+}
+
+void PathState::tell(const TechniqueCounts& counts, Workspace& work, ContributionSink& sink) const {
+    SubPath &y = work.y, &z = work.z;
+    y.clear(), z.clear();
+    const int n = size();
+    for (int i = 0; i < n; ++i) y.append() = x_[size_t(i)].v;
+    for (int i = n; i-- > 0;) z.append() = x_[size_t(i)].v;
+    z.film = film, z.film_weight = 1;
+    // Counts refer to densities per pixel.
+    std::vector<double> squares(size_t(n) + 1);
+    double sum = 0;
+    for (int s = 0; s <= n; ++s) {
+        const double per_pixel = n - s >= 2 ? double(measure_.film.area()) : 1.0;
+        const double np = double(counts.of(connection_technique(s, n - s)));
+        sum += squares[size_t(s)] = sqr(np * density(s) * per_pixel);
+    }
+    for (int s = 0; s <= n; ++s) {
+        if (!(squares[size_t(s)] > 0)) continue;
+        Join join{.technique = connection_technique(s, n - s),
+                  .emitter = &emitter(),
+                  .contribution = splats[0].value,
+                  .mis_weight = float(squares[size_t(s)] / sum),
+                  .film = film,
+                  .needs_test = false};
+        if (s > 0 && s < n) {
+            const Vertex &a = x_[size_t(s) - 1].v, &b = x_[size_t(s)].v;
+            join.a = b.p, join.b = a.p, join.to_infinity = a.is_infinite;
+        }
+        sink.add(join, join.contribution);
+    }
+}
+
+namespace {
+
+/// What is saved of a vertex: BSDFs are made again.
+struct SavedVertex {
+    Vec3 p, ng, wo;
+    Vec2 uv;
+    SurfaceLocation location;
+    uint32_t emitter;  ///< Index.
+    float pdf_fwd, transmittance;
+    MediumId medium;
+    Vertex::Kind kind;
+    bool is_delta, is_infinite, has_cosine;
+    uint8_t event;
+};
+
+}  // namespace
+
+void PathState::save(LearnedState& to) const {
+    ChainState::save(to);
+    to.put(film);
+    std::vector<SavedVertex> saved;
+    const auto& emitters = measure_.scene.emitters();
+    for (const PathVertex& x : x_) {
+        const auto found = std::find_if(emitters.begin(), emitters.end(),
+                                        [&](const auto& e) { return e.get() == x.v.emitter; });
+        SavedVertex& v = saved.emplace_back();
+        std::memset(static_cast<void*>(&v), 0, sizeof v);  // no random bytes between the fields
+        v.p = x.v.p, v.ng = x.v.ng, v.wo = x.v.wo, v.uv = x.v.uv;
+        v.location = x.v.location;
+        v.emitter = uint32_t(found - emitters.begin());
+        v.pdf_fwd = x.v.pdf_fwd, v.transmittance = x.transmittance;
+        v.medium = x.v.medium, v.kind = x.v.kind, v.is_delta = x.v.is_delta;
+        v.is_infinite = x.v.is_infinite, v.has_cosine = x.v.has_cosine, v.event = x.v.event;
+    }
+    to.put(saved);
+}
+
+void PathState::load(LearnedState& from) {
+    ChainState::load(from);
+    from.get(film);
+    std::vector<SavedVertex> saved;
+    from.get(saved);
+    clear();
+    const Scene& scene = measure_.scene;
+    for (const SavedVertex& s : saved) {
+        Vertex v;
+        v.medium = s.medium;
+        if (s.kind == Vertex::Kind::Surface) {
+            if (s.location.shape >= scene.shapes().size())
+                throw std::runtime_error("the learned state is of another scene");
+            v.set_surface(scene.shape(s.location.shape), s.location, scene.surface(s.location),
+                          s.wo, arena_);
+        } else {
+            v.kind = s.kind;
+            v.p = s.p, v.ng = s.ng, v.wo = s.wo, v.uv = s.uv;
+            v.location = s.location;
+            v.is_connectible = true;
+            if (s.kind == Vertex::Kind::Emitter) {
+                if (s.emitter >= scene.emitters().size())
+                    throw std::runtime_error("the learned state is of another scene");
+                v.emitter = scene.emitters()[s.emitter].get();
+            }
+        }
+        v.pdf_fwd = s.pdf_fwd;
+        v.is_infinite = s.is_infinite, v.has_cosine = s.has_cosine;
+        v.is_delta = s.is_delta, v.event = s.event;
+        append(v);
+        x_.back().transmittance = s.transmittance;
+    }
+    const double saved_target = target;
+    if (size() >= 2 && evaluate(0, last())) finish();
+    if (target != saved_target) throw std::runtime_error("the learned state is of another scene");
+}
+
+}  // namespace etendue

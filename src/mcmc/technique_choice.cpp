@@ -1,0 +1,87 @@
+#include "mcmc/technique_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace etendue {
+namespace {
+
+constexpr double kUniform = 0.2;
+
+/// Index of the item that u in [0, 1) falls on.
+int pick(const std::vector<double>& shares, double u) {
+    int chosen = 0;
+    for (size_t i = 0; i < shares.size(); u -= shares[i], ++i) {
+        if (shares[i] > 0) chosen = int(i);
+        if (u < shares[i]) break;
+    }
+    return chosen;
+}
+
+}  // namespace
+
+TechniqueChoice::TechniqueChoice(int shortest, int lengths, bool hits, bool hits_lens,
+                                 const Pilot& pilot)
+    : shortest_(shortest), hits_(hits), hits_lens_(hits_lens) {
+    for (int k = shortest; k < shortest + lengths; ++k) {
+        const auto energy_of = [&](int s) {
+            const auto found = pilot.by_technique.find({k, s});
+            return found == pilot.by_technique.end() || !is_allowed(k, s) ? 0.0 : found->second;
+        };
+        std::vector<double> p(size_t(k) + 2);
+        double energy = 0;
+        for (int s = 0; s <= k + 1; ++s) energy += energy_of(s);
+        const double uniform = energy > 0 ? kUniform : 1.0;
+        for (int s = 0; s <= k + 1; ++s)
+            if (is_allowed(k, s))
+                p[size_t(s)] = uniform / allowed(k) +
+                               (energy > 0 ? (1 - uniform) * energy_of(s) / energy : 0.0);
+        pmf_.push_back(std::move(p));
+    }
+}
+
+double TechniqueChoice::pmf(int k, int s) const {
+    const size_t row = size_t(k - shortest_);
+    if (row < pmf_.size()) return pmf_[row][size_t(s)];
+    return is_allowed(k, s) ? 1.0 / allowed(k) : 0.0;
+}
+
+int TechniqueChoice::choose(int k, double u) const {
+    const size_t row = size_t(k - shortest_);
+    if (row < pmf_.size()) return pick(pmf_[row], u);
+    const int i = std::min(int(u * allowed(k)), allowed(k) - 1);
+    return hits_ ? i : i + 1;
+}
+
+LengthChoice::LengthChoice(int shortest, int longest, const Pilot& pilot)
+    : shortest_(shortest), longest_(longest) {
+    double sum = 0;
+    for (const auto& [technique, value] : pilot.by_technique) {
+        const int k = technique.first;
+        if (k < shortest || k > longest) continue;
+        if (size_t(k - shortest) >= energy_.size()) energy_.resize(size_t(k - shortest) + 1);
+        energy_[size_t(k - shortest)] += value;
+        sum += value;
+    }
+    if (!(sum > 0)) return;
+    by_energy_ = 1 - kUniform;
+    for (double& e : energy_) e /= sum;
+}
+
+double LengthChoice::geometric(int k) const {
+    return std::pow(kLonger, k - shortest_) * (k == longest_ ? 1 : 1 - kLonger);
+}
+
+double LengthChoice::pmf(int k) const {
+    const size_t i = size_t(k - shortest_);
+    return by_energy_ * (i < energy_.size() ? energy_[i] : 0.0) + (1 - by_energy_) * geometric(k);
+}
+
+int LengthChoice::choose(double u) const {
+    if (u < by_energy_) return shortest_ + pick(energy_, u / by_energy_);
+    const double v = (u - by_energy_) / (1 - by_energy_);
+    const double longer = std::log1p(-v) / std::log(kLonger);
+    return longer < longest_ - shortest_ ? shortest_ + int(longer) : longest_;
+}
+
+}  // namespace etendue

@@ -1,0 +1,204 @@
+// Paths as states: densities against the reference definitions of path_pdfs.h; mutations keep detailed balance.
+
+#include "mcmc/path_space.h"
+
+#include <gtest/gtest.h>
+
+#include "math/statistics.h"
+#include "mcmc/whole_film.h"
+#include "path_passes.h"
+#include "pathspace/path_pdfs.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+struct Case {
+    const char* name;
+    std::string xml;
+};
+
+const std::string kConstant =
+    "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>";
+
+std::vector<Case> cases() {
+    constexpr int kPixels = 8;
+    const std::string sky = room() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
+                            sphere("0.1,0.2,-0.1", "0.3", kGlass) + kConstant;
+    const std::string lens_scene = mixed_room(lens_camera(kPixels));
+    return {
+        {"mixed", mixed_room(front_camera(kPixels))},
+        {"thinlens", lens_scene},
+        {"orthographic", mixed_room(sensor("0,0,3.4", "0,0,0", kPixels, "", "", "orthographic"))},
+        {"sky", front_camera(kPixels) + sky},
+        {"several", mixed_room(front_camera(kPixels)) + kConstant +
+                        "<emitter type=\"point\"><point name=\"position\" "
+                        "value=\"0,0.7,0.5\"/></emitter>"},
+        {"sun", front_camera(kPixels) + room() + sphere("0.1,0.2,-0.1", "0.4", kGlass) +
+                    "<emitter type=\"directional\"><vector name=\"direction\" "
+                    "value=\"0.2,-0.4,-1\"/></emitter>"}};
+}
+
+class Paths : public ::testing::TestWithParam<Case> {
+protected:
+    Paths() : passes(build(GetParam().xml)) {}
+    PathPasses passes;
+};
+
+/// f and the densities of every technique, of states that were drawn and of those that mutations make.
+TEST_P(Paths, HaveTheValueAndDensitiesOfTheirVertices) {
+    const auto space = passes.space({});
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    const auto x = space->make_state(), y = space->make_state();
+    const double A = double(passes.measure().film.area()), unit = passes.measure().unit_area;
+    int tested = 0;
+    const auto check = [&](const PathState& state) {
+        std::vector<const Vertex*> vertices;
+        std::vector<bool> delta;
+        for (int i = 0; i < state.size(); ++i) {
+            vertices.push_back(&state[i].v);
+            delta.push_back(state[i].v.is_delta);
+        }
+        const PathValue value = evaluate_path(passes.scene(), vertices, delta);
+        const int n = state.size();
+        const double units = std::pow(unit, n);
+        for (int s = 0; s <= n; ++s) {
+            if (s == n && !passes.scene().sensor().has_finite_lens()) continue;
+            const Technique q = connection_technique(s, n - s);
+            // Where there are several emitters at infinity, an eye path that leaves the scene chooses one.
+            const double choice = s == 0 && state[0].v.is_infinite
+                                      ? double(passes.scene().infinite_emitters().size())
+                                      : 1.0;
+            const double expected =
+                value.pdfs.density(q) * units / ((n - s >= 2 ? A : 1.0) * choice);
+            ASSERT_NEAR(state.density(s), expected, 1e-3 * expected) << "s = " << s;
+        }
+        for (int i = 0; i < 3; ++i) {
+            const double expected = double(value.f[i]) * units / state.large_step_density();
+            ASSERT_NEAR(double(state.splats[0].value[i]), expected, 1e-3 * expected + 1e-12);
+        }
+        ++tested;
+    };
+    for (uint64_t i = 0; i < 6000; ++i) {
+        space->draw(0, hash_combine(1, i), c, *x);
+        if (!(x->target > 0)) continue;
+        check(static_cast<const PathState&>(*x));
+        space->propose(0, *x, hash_combine(2, i), c, *y);
+        if (y->target > 0) check(static_cast<const PathState&>(*y));
+    }
+    EXPECT_GT(tested, 300);
+}
+
+TEST_P(Paths, AreSavedToTheBit) {
+    const auto space = passes.space({});
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    const auto x = space->make_state(), again = space->make_state(), y = space->make_state(),
+               y_again = space->make_state();
+    for (uint64_t i = 0; i < 2000; ++i) {
+        space->draw(0, hash_combine(3, i), c, *x);
+        if (!(x->target > 0)) continue;
+        LearnedState saved;
+        x->save(saved);
+        LearnedState read(saved.bytes());
+        again->load(read);
+        LearnedState resaved;
+        again->save(resaved);
+        ASSERT_EQ(resaved.bytes(), saved.bytes());
+        space->propose(0, *x, i, c, *y);
+        space->propose(0, *again, i, c, *y_again);
+        ASSERT_EQ(y->target, y_again->target);
+    }
+}
+
+/// The joins of a state have its value, and weights with the sum 1.
+TEST_P(Paths, AreToldAsJoins) {
+    class Sum final : public ContributionSink {
+    public:
+        void add(const Join& join, Rgb contribution) override {
+            value += contribution * join.mis_weight;
+        }
+        Rgb value;
+    };
+    const auto space = passes.space({});
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    const auto x = space->make_state();
+    for (uint64_t i = 0; i < 2000; ++i) {
+        space->draw(0, hash_combine(4, i), c, *x);
+        if (!(x->target > 0)) continue;
+        Sum sum;
+        space->repeat(0, *x, c, sum);
+        for (int k = 0; k < 3; ++k)
+            ASSERT_NEAR(sum.value[k], x->splats[0].value[k], 1e-4f * x->splats[0].value[k]);
+    }
+}
+
+/// What a path is like: its mean must not change by a step from states that are distributed as the target.
+std::vector<double> features(const PathState& x) {
+    const int k = x.last();
+    double edges = 0, cosines = 0;
+    for (int i = 1; i <= k; ++i) {
+        edges += std::log(double(to_area(1, x[i - 1].v, x[i].v)));
+        if (i < k) cosines += double(abs_dot(x[i].v.ng, direction(x[i].v, x[i + 1].v)));
+    }
+    const Vertex &seen = x[k - 1].v, &first = x[1].v;
+    return {double(x.film.x),
+            double(x.film.y),
+            double(k),
+            edges,
+            cosines,
+            double(first.is_infinite ? 0.0f : first.p.y),
+            double(seen.is_infinite ? 0.0f : seen.p.z),
+            double(abs_dot(seen.ng, direction(seen, x[k].v))),
+            double(abs_dot(first.ng, direction(first, x[0].v)))};
+}
+
+/// Each mutation alone: Σ I(x) a(x→y) (h(y) - h(x)) over independent states x has the mean zero for any h.
+TEST_P(Paths, MutationsKeepDetailedBalance) {
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    constexpr uint64_t kSamples = 60000;
+    for (int kind = 0; kind < PathMutations::kCount; ++kind) {
+        PathMutations alone;
+        alone.weights.fill(0);
+        alone.weights[size_t(kind)] = 1;
+        const auto space = passes.space(alone);
+        const auto x = space->make_state(), y = space->make_state();
+        std::vector<Moments> change;
+        uint64_t moves = 0;
+        for (uint64_t i = 0; i < kSamples; ++i) {
+            space->draw(0, hash_combine(5, i), c, *x);
+            double rate = 0;
+            if (x->target > 0) {
+                const Proposal p = space->propose(0, *x, hash_combine(6, i), c, *y);
+                if (!p.has_failed) rate = std::min(x->target, y->target * p.Q_ratio);
+            }
+            std::vector<double> h(change.empty() ? 9 : change.size(), 0.0);
+            if (rate > 0) {
+                ++moves;
+                const auto before = features(static_cast<const PathState&>(*x)),
+                           after = features(static_cast<const PathState&>(*y));
+                for (size_t f = 0; f < h.size(); ++f) h[f] = rate * (after[f] - before[f]);
+            }
+            change.resize(h.size());
+            for (size_t f = 0; f < h.size(); ++f) change[f].add(h[f]);
+        }
+        if (moves < 200) continue;
+        const double level = sidak(1e-3, change.size());
+        for (size_t f = 0; f < change.size(); ++f) {
+            if (!(change[f].variance() > 0)) continue;
+            EXPECT_GT(welch_p(change[f], Moments::exact(0), 0), level)
+                << PathMutations::kNames[size_t(kind)] << ", feature " << f << ": "
+                << change[f].mean() << " ± " << std::sqrt(change[f].squared_error()) << " of "
+                << moves << " moves";
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Paths, ::testing::ValuesIn(cases()),
+                         [](const auto& p) { return std::string(p.param.name); });
+
+}  // namespace
+}  // namespace etendue::test
