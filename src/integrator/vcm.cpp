@@ -24,8 +24,9 @@ constexpr float kDefaultRadius = 0.003f;
 class VcmIntegrator final : public Integrator {
 public:
     explicit VcmIntegrator(const IntegratorParams& p)
-        : paths_(p), radius_params_(p, kDefaultRadius), connects_(p.flag("connections")),
-          merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p) {
+        : paths_(p, Guiding(p)), radius_params_(p, kDefaultRadius),
+          connects_(p.flag("connections")), merges_(p.flag("merges")), is_exact_(p.flag("exact")),
+          light_(p) {
         if (!connects_ && !merges_)
             throw std::runtime_error("vcm: connections and merges cannot both be off");
         if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact needs merges");
@@ -59,8 +60,10 @@ public:
     }
 
     void trace(const PassContext& pass) override {
+        paths_.train(pass);
         radius_ = radius_params_.schedule(pass.scene).radius(pass.index);
-        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
+        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
+                     paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
@@ -85,10 +88,16 @@ public:
             n.pairs.disc = kPi * sqr(radius_);
             n.pairs.clamps = false;
         }
+        n.guide = paths_.guiding().guide();
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
         return light_.count(scene, paths_.depth(), kVertexBytes);
+    }
+    std::vector<std::pair<std::string, double>> figures() const override {
+        std::vector<std::pair<std::string, double>> figures;
+        paths_.guiding().add_figures(figures);
+        return figures;
     }
     Estimator estimator() const override {
         return !merges_                   ? Estimator::Unbiased
@@ -171,6 +180,7 @@ IntegratorEntry vcm_entry() {
     params.push_back({"connections", ParamKind::Bool, "true",
                       "Whether sub-paths are connected to each other, to emitters and to the lens.",
                       true});
+    params.push_back(Guiding::param());
     params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged.", true});
     params.push_back(
         {"exact", ParamKind::Bool, "false",
