@@ -83,18 +83,17 @@ TEST_P(Resume, GivesTheSameBits) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Integrators, Resume,
-                         ::testing::Values("bdpt:eorr=true", "bdpt:connections=cache",
-                                           "vcm:radius=0.3", "vcm:exact=true", "upg", "upg+bdpt",
-                                           "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
-                                           "mmlt:groups=4,chains=48"),
-                         [](const auto& p) {
-                             std::string name = p.param;
-                             std::replace_if(
-                                 name.begin(), name.end(), [](char c) { return !std::isalnum(c); },
-                                 '_');
-                             return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Integrators, Resume,
+    ::testing::Values("path:guide=on", "bdpt:eorr=true", "bdpt:connections=cache",
+                      "upg+bdpt:guide=on", "vcm:radius=0.3", "vcm:exact=true", "upg", "upg+bdpt",
+                      "sppm", "pcbpt", "pssmlt:groups=2,chains=16", "mmlt:groups=4,chains=48"),
+    [](const auto& p) {
+        std::string name = p.param;
+        std::replace_if(
+            name.begin(), name.end(), [](char c) { return !std::isalnum(c); }, '_');
+        return name;
+    });
 
 TEST(LearnedState, OfAnotherIntegratorIsRefused) {
     LearnedState state;
