@@ -146,10 +146,19 @@ Guiding::Guiding(const IntegratorParams& p) {
     mode_ = p.choice("guide", kModes);
 }
 
-void Guiding::train(const PassContext& pass, const DepthOptions& depth) {
+bool Guiding::gains_little(bool has_light_walks) const {
+    constexpr float kLeastGain = 0.2f;  // nats
+    const auto is_little = [](const GuideTree& tree, TransportMode mode) {
+        return !(tree.gain(mode) >= kLeastGain);
+    };
+    return is_little(guide_->surfaces, TransportMode::Radiance) &&
+           (!has_light_walks || (is_little(guide_->surfaces, TransportMode::Importance) &&
+                                 is_little(guide_->emission, TransportMode::Importance)));
+}
+
+void Guiding::train(const PassContext& pass, const DepthOptions& depth, bool has_light_walks) {
     constexpr int kRounds = 4;
     constexpr uint64_t kFewestWalks = 1024;
-    constexpr float kLeastGain = 0.2f;
     // A pass that was dropped and is traced again is trained for once.
     if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > pass.index) return;
     const bool is_power_of_4 =
@@ -167,8 +176,7 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth) {
         const uint64_t first = std::max(kFewestWalks, std::min(pass.pixels, kMostWalks) >> kRounds);
         for (int round = 0; round < kRounds; ++round)
             guide_ = trained(pass, depth, first << round, hash_combine(seed, uint64_t(round)));
-        if (mode_ == Mode::Auto && guide_->surfaces.gain(TransportMode::Radiance) < kLeastGain &&
-            guide_->surfaces.gain(TransportMode::Importance) < kLeastGain) {
+        if (mode_ == Mode::Auto && gains_little(has_light_walks)) {
             is_given_up_ = true;
             guide_ = nullptr;
         }

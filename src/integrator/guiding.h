@@ -16,8 +16,8 @@ public:
 
     /// Trains before pass 0 and refits before passes 1, 4, 16, 64 …, from walks of its own: light walks show eye walks
     /// where radiance comes from, and eye walks show light walks where importance does. Each round is guided by the one
-    /// before. For Integrator::trace(), before it traces anything.
-    void train(const PassContext& pass, const DepthOptions& depth);
+    /// before. For Integrator::trace(), before it traces anything. `has_light_walks`: whether the method has them.
+    void train(const PassContext& pass, const DepthOptions& depth, bool has_light_walks = true);
     /// What guides walks until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
 
@@ -28,8 +28,8 @@ public:
 
 private:
     enum class Mode { Off, On, Auto, Random };
-    struct Round;
-
+    /// Whether it gains so little that it is not worth its time.
+    bool gains_little(bool has_light_walks) const;
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
                                    uint64_t walks, uint64_t seed) const;
 
