@@ -200,10 +200,13 @@ std::optional<Vec3> Bsdf::diffuse_normal() const {
     return first_.frame.n;
 }
 
-bool Bsdf::has_delta() const {
-    for (const BsdfComponent* c = &first_; c; c = c->next)
-        if (std::visit([](const auto& l) { return l.has_delta(); }, c->lobe)) return true;
-    return false;
+float Bsdf::sum_delta_probabilities(Vec3 wo, TransportMode mode) const {
+    float sum = 0;
+    int event = 0;
+    for (const BsdfComponent* c = &first_; c; c = c->next, event += 2)
+        for (const int transmits : {0, 1})
+            if (const auto s = sample_delta(wo, uint8_t(event + transmits), mode)) sum += s->pdf;
+    return sum;
 }
 
 float Bsdf::roughness() const {

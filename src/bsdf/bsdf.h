@@ -52,6 +52,11 @@ public:
     /// there is no such event. Numbers are those of BsdfSample::event: 2·(index of the component) + transmits.
     std::optional<BsdfSample> sample_delta(Vec3 wo, uint8_t event, TransportMode mode) const;
 
+    /// Probability that sample() gives a delta event for `wo`.
+    float delta_probability(Vec3 wo, TransportMode mode) const {
+        return has_delta_ ? sum_delta_probabilities(wo, mode) : 0.0f;
+    }
+
     /// Upper bound of eval(wo, w).pdf over the directions w of a cone; kInf where none is known.
     float max_pdf(Vec3 wo, const DirectionCone& cone) const;
     /// Shading normal where the only lobe is diffuse, so that sampling has density cos θ/π about it; empty otherwise.
@@ -59,7 +64,7 @@ public:
 
     /// Whether any lobe is smooth, so that connections are possible here.
     bool has_smooth() const { return has_smooth_; }
-    bool has_delta() const;
+    bool has_delta() const { return has_delta_; }
     /// Whether sample() reads u_lobe.
     bool uses_lobe_choice() const { return uses_lobe_choice_; }
     /// α of the sharpest smooth lobe; 0 where all lobes are delta.
@@ -72,9 +77,10 @@ public:
 private:
     friend class ComponentList;
     friend class ComponentArena;
+    float sum_delta_probabilities(Vec3 wo, TransportMode mode) const;
 
     Vec3 ng_;
-    bool has_smooth_ = false;
+    bool has_smooth_ = false, has_delta_ = false;
     bool uses_lobe_choice_ = false;
     BsdfComponent first_;
 };

@@ -34,6 +34,7 @@ struct BsdfSample {
     float eta = 1;  ///< As BsdfEval.
     bool is_delta = false;
     uint8_t event = 0;  ///< Number of a delta event, see Bsdf::sample_delta().
+    float gain = 1;     ///< `pdf` over that without guide, see Vertex::sample().
 };
 
 /// All directions within `angle` (radians, at most π) of `axis`.

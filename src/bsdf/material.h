@@ -81,7 +81,7 @@ class ComponentList {
 public:
     ComponentList(Vec3 ng, ComponentArena& arena, Bsdf& out) : arena_(&arena), out_(&out) {
         out.ng_ = ng;
-        out.has_smooth_ = false;
+        out.has_smooth_ = out.has_delta_ = false;
         out.uses_lobe_choice_ = false;
         out.first_.weight = 0;
         out.first_.next = nullptr;
@@ -90,6 +90,7 @@ public:
     void add(const Frame& frame, const L& lobe, float weight) {
         if (!(weight > 0)) return;
         out_->has_smooth_ |= lobe.has_smooth();
+        out_->has_delta_ |= lobe.has_delta();
         BsdfComponent& first = out_->first_;
         if (is_empty_) {
             first.frame = frame;

@@ -94,6 +94,7 @@ public:
 
     /// Probability that the scene chooses this emitter, for emission and for next event estimation.
     float selection_pmf = 0;
+    uint32_t index = 0;  ///< Among the emitters of the scene.
     /// MediumId of the medium in which its light starts; negative for none.
     int16_t medium = -1;
 };

@@ -21,7 +21,7 @@ constexpr std::array<Choice<bool>, 2> kUsesCache{{{"path", false}, {"cache", tru
 class BdptIntegrator final : public Integrator {
 public:
     explicit BdptIntegrator(const IntegratorParams& p)
-        : paths_(p), uses_cache_(p.choice("connections", kUsesCache)),
+        : paths_(p, Guiding(p)), uses_cache_(p.choice("connections", kUsesCache)),
           given_draws_(p.integer("cache_draws", 0, 1024)), light_(p) {}
 
     void learn(const LearnContext& pass) override { paths_.learn(pass); }
@@ -36,9 +36,11 @@ public:
         from.get(count_);
     }
     void trace(const PassContext& pass) override {
+        paths_.train(pass);
         if (!uses_cache_) return;
         if (draws_ == 0) choose_draws(pass);
-        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
+        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
+                     paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_);
         cache_.assemble();
@@ -59,6 +61,7 @@ public:
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n = Bidirectional::counts(scene, light_paths);
         if (uses_cache_) n.connect = count_;
+        n.guide = paths_.guiding().guide();
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
@@ -66,11 +69,14 @@ public:
     }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        if (!uses_cache_) return {};
-        return {{"cache_draws", draws_},
-                {"cached_vertices", connectible_.size()},
-                {"cache_bytes",
-                 cache_.memory_bytes() + connectible_.capacity() * sizeof(connectible_[0])}};
+        std::vector<std::pair<std::string, double>> figures;
+        paths_.guiding().add_figures(figures);
+        if (!uses_cache_) return figures;
+        figures.push_back({"cache_draws", draws_});
+        figures.push_back({"cached_vertices", connectible_.size()});
+        figures.push_back({"cache_bytes", cache_.memory_bytes() +
+                                              connectible_.capacity() * sizeof(connectible_[0])});
+        return figures;
     }
 
 private:
@@ -141,6 +147,7 @@ IntegratorEntry bdpt_entry() {
                       "light path has connectible vertices on average.",
                       true});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
+    params.push_back(Guiding::param());
     return {{"integrator", "bdpt",
              "Bidirectional path tracing with all connections and MIS. Unbiased.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {

@@ -21,8 +21,8 @@ std::vector<ParamInfo> Bidirectional::params() {
     return params;
 }
 
-Bidirectional::Bidirectional(const IntegratorParams& p)
-    : depth_(DepthOptions::from(p)), roulette_(p.number("roulette")),
+Bidirectional::Bidirectional(const IntegratorParams& p, Guiding guiding)
+    : depth_(DepthOptions::from(p)), guiding_(std::move(guiding)), roulette_(p.number("roulette")),
       is_optimised_(p.flag("eorr")) {
     if (!(roulette_ >= 0 && roulette_ <= 1))
         throw std::runtime_error(fmt::format("{}: roulette must lie in [0, 1]", p.integrator()));

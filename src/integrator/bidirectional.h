@@ -1,7 +1,7 @@
 #pragma once
 // What the bidirectional integrators share: both walks, and the roulette before shadow rays.
 
-#include "integrator/integrator.h"
+#include "integrator/guiding.h"
 #include "reuse/light_vertex_cache.h"
 
 namespace etendue {
@@ -9,7 +9,8 @@ namespace etendue {
 class Bidirectional {
 public:
     static std::vector<ParamInfo> params();
-    explicit Bidirectional(const IntegratorParams& params);
+    /// `guiding` has to be given where the integrator has Guiding::param().
+    explicit Bidirectional(const IntegratorParams& params, Guiding guiding = {});
     /// Without roulette of joins; paths of less than `shortest` edges are left out.
     Bidirectional(const DepthOptions& depth, int shortest)
         : depth_(depth), shortest_(shortest), roulette_(0), is_optimised_(false) {}
@@ -24,10 +25,20 @@ public:
                 .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
     }
 
+    /// Trains the guide for a pass, before anything of it is traced.
+    void train(const PassContext& pass) { guiding_.train(pass, depth_); }
+
     /// Sets the thresholds of efficiency-optimised roulette from what earlier passes brought.
     void learn(const LearnContext& pass);
-    void save(LearnedState& to) const { to.put(thresholds_); }
-    void load(LearnedState& from) { from.get(thresholds_); }
+    void save(LearnedState& to) const {
+        to.put(thresholds_);
+        guiding_.save(to);
+    }
+    void load(LearnedState& from) {
+        from.get(thresholds_);
+        guiding_.load(from);
+    }
+    const Guiding& guiding() const { return guiding_; }
 
     WalkContext eye_walk(const Scene& scene, const TechniqueCounts& counts, RenderStats& stats,
                          const LearnedPlaces* learned = nullptr) const {
@@ -114,6 +125,7 @@ private:
     float threshold(const SampleContext& c, const Vec2* splat) const;
 
     DepthOptions depth_;
+    Guiding guiding_;
     int shortest_ = 1;  ///< Edges.
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
     bool is_optimised_;              ///< The thresholds below instead.

@@ -5,12 +5,19 @@
 
 #include "integrator/light.h"
 
+#include "integrator/guiding.h"
+
 namespace etendue {
 namespace {
 
 class LightIntegrator final : public Integrator {
 public:
-    explicit LightIntegrator(const DepthOptions& depth) : depth_(depth) {}
+    explicit LightIntegrator(const IntegratorParams& p)
+        : depth_(DepthOptions::from(p)), guiding_(p) {}
+
+    void save(LearnedState& to) const override { guiding_.save(to); }
+    void load(LearnedState& from) override { guiding_.load(from); }
+    void trace(const PassContext& pass) override { guiding_.train(pass, depth_); }
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, c.light_paths);
@@ -35,24 +42,34 @@ public:
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         const float N = float(light_paths);
-        return {.splat = N, .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
+        return {.splat = N,
+                .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f,
+                .guide = guiding_.guide()};
     }
     uint64_t light_paths(const Scene& scene) const override { return scene.film().pixel_count(); }
+    std::vector<std::pair<std::string, double>> figures() const override {
+        std::vector<std::pair<std::string, double>> figures;
+        guiding_.add_figures(figures);
+        return figures;
+    }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:
     DepthOptions depth_;
+    Guiding guiding_;
 };
 
 }  // namespace
 
 IntegratorEntry light_entry() {
+    std::vector<ParamInfo> params = depth_params();
+    params.push_back(Guiding::param());
     return {{"integrator", "light",
              "Light tracing: connects light paths to the lens. Unbiased for the paths that it can "
              "make.",
-             depth_params()},
+             params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-                return std::make_unique<LightIntegrator>(DepthOptions::from(p));
+                return std::make_unique<LightIntegrator>(p);
             }};
 }
 

@@ -36,7 +36,7 @@ protected:
                              .c = pilot.b};
         PathMutations mutations;
         if (!user_paths_.empty()) {
-            mutations.user_paths = UserPaths::load(scene, user_paths_);
+            mutations.user_paths.emplace(UserPaths::load(scene, user_paths_));
             mutations.weights[PathMutations::UserPath] =
                 user_ratio_ * mutations.weights[PathMutations::Bidirectional];
         }

@@ -6,12 +6,19 @@
 
 #include "integrator/path.h"
 
+#include "integrator/guiding.h"
+
 namespace etendue {
 namespace {
 
 class PathIntegrator final : public Integrator {
 public:
-    explicit PathIntegrator(const DepthOptions& depth) : depth_(depth) {}
+    explicit PathIntegrator(const IntegratorParams& p)
+        : depth_(DepthOptions::from(p)), guiding_(p) {}
+
+    void save(LearnedState& to) const override { guiding_.save(to); }
+    void load(LearnedState& from) override { guiding_.load(from); }
+    void trace(const PassContext& pass) override { guiding_.train(pass, depth_, false); }
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, 0);
@@ -30,23 +37,31 @@ public:
     }
 
     TechniqueCounts counts(const Scene&, uint64_t /*light_paths*/) const override {
-        return {.hit = 1, .next_event = 1};
+        return {.hit = 1, .next_event = 1, .guide = guiding_.guide()};
     }
     uint64_t light_paths(const Scene&) const override { return 0; }
+    std::vector<std::pair<std::string, double>> figures() const override {
+        std::vector<std::pair<std::string, double>> figures;
+        guiding_.add_figures(figures);
+        return figures;
+    }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:
     DepthOptions depth_;
+    Guiding guiding_;
 };
 
 }  // namespace
 
 IntegratorEntry path_entry() {
+    std::vector<ParamInfo> params = depth_params();
+    params.push_back(Guiding::param());
     return {{"integrator", "path",
              "Path tracing with next event estimation and MIS; the reference method. Unbiased.",
-             depth_params()},
+             params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-                return std::make_unique<PathIntegrator>(DepthOptions::from(p));
+                return std::make_unique<PathIntegrator>(p);
             }};
 }
 

@@ -33,7 +33,7 @@ constexpr std::array<Choice<bool>, 2> kIsWeighted{{{"contribution", false}, {"we
 class PcbptIntegrator final : public Integrator {
 public:
     explicit PcbptIntegrator(const IntegratorParams& p)
-        : paths_(p), light_paths_(uint64_t(p.integer("light_paths", 1, 1 << 20))),
+        : paths_(p, Guiding(p)), light_paths_(uint64_t(p.integer("light_paths", 1, 1 << 20))),
           memory_(uint64_t(p.integer("memory", 1, 1 << 30)) << 20),
           given_connections_(p.number("connections", 0, 1024)),
           record_fraction_(p.number("record_fraction", 0, 1)),
@@ -46,6 +46,7 @@ public:
     void save(LearnedState& to) const override { paths_.save(to); }
     void load(LearnedState& from) override { paths_.load(from); }
     void trace(const PassContext& pass) override {
+        paths_.train(pass);
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
         trace_light_paths(pass, n);
         make_records(pass, n);
@@ -78,15 +79,19 @@ public:
         n.connect = is_standard_ ? float(kept(light_paths)) : 1.0f;
         if (direct_ != Direct::NextEvent) n.connect_emission = n.connect;
         if (direct_ == Direct::Stored) n.next_event = 0;
+        n.guide = paths_.guiding().guide();
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override { return scene.film().pixel_count(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        return {{"connections", connections_},
-                {"stored_vertices", vertices_.size()},
-                {"records", records_.size()},
-                {"record_bytes", records_.memory_bytes()}};
+        std::vector<std::pair<std::string, double>> figures{
+            {"connections", connections_},
+            {"stored_vertices", vertices_.size()},
+            {"records", records_.size()},
+            {"record_bytes", records_.memory_bytes()}};
+        paths_.guiding().add_figures(figures);
+        return figures;
     }
 
 private:
@@ -95,7 +100,8 @@ private:
 
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
         const uint64_t M = kept(pass.light_paths);
-        compact_.begin(pass.chunks(pass.light_paths), kVertexBytes, memory_);
+        compact_.begin(pass.chunks(pass.light_paths), kVertexBytes, memory_,
+                       paths_.guiding().guide());
         paths_.trace_light_paths(pass, n, M, compact_);
         compact_.assemble();
         stored_.resize(M);
@@ -252,6 +258,7 @@ IntegratorEntry pcbpt_entry() {
          "Number of records between which the mass function is interpolated, at most 16."});
     params.push_back({"uniform", ParamKind::Float, "0.5",
                       "Fraction of connections drawn uniformly, at least 0.001."});
+    params.push_back(Guiding::param());
     params.push_back({"weights", ParamKind::String, "upper",
                       "Count of a connection in the weights: upper (1, since all pixels share the "
                       "light paths) or standard (M).",

@@ -33,7 +33,7 @@ constexpr std::array<Choice<PairRule>, 4> kRules{{{"gloss", PairRule::Gloss},
 class UpgIntegrator final : public Integrator {
 public:
     UpgIntegrator(const IntegratorParams& p, bool connects)
-        : paths_(p), given_radius_(p.number("radius")), connects_(connects), light_(p),
+        : paths_(p, Guiding(p)), given_radius_(p.number("radius")), connects_(connects), light_(p),
           bound_(p.choice("bound", kBounds)),
           flatness_(bound_ == TrialBound::Slab ? kGatherConstants.flatness : 1.0f),
           rule_(p.choice("drop", kRules)), short_rate_(p.number("short_rate")),
@@ -75,7 +75,9 @@ public:
     }
 
     void trace(const PassContext& pass) override {
-        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
+        paths_.train(pass);
+        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
+                     paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
@@ -111,6 +113,7 @@ public:
                    .short_rate = short_rate_,
                    .rule = rule_,
                    .clamps = clamps_};
+        n.guide = paths_.guiding().guide();
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
@@ -118,8 +121,11 @@ public:
     }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        return {{"radius", learned_.radius},
-                {"weight_scale", connects_ ? learned_.weight_scale.value() : 1}};
+        std::vector<std::pair<std::string, double>> figures{
+            {"radius", learned_.radius},
+            {"weight_scale", connects_ ? learned_.weight_scale.value() : 1}};
+        paths_.guiding().add_figures(figures);
+        return figures;
     }
 
 private:
@@ -221,6 +227,7 @@ std::vector<ParamInfo> params() {
                       "Largest distance between the vertices of a pair, in scene units; 0: chosen "
                       "from earlier passes so that an eye path finds about eight pairs."});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
+    params.push_back(Guiding::param());
     params.push_back(
         {"bound", ParamKind::String, "slab",
          "Directions that Bernoulli trials propose: slab (pairs lie near the tangent plane), cone "

@@ -30,8 +30,8 @@ constexpr float kInnerRadius = 0.3f;
 class VcmIntegrator final : public Integrator {
 public:
     explicit VcmIntegrator(const IntegratorParams& p)
-        : paths_(p), radius_params_(p), connects_(p.flag("connections")), merges_(p.flag("merges")),
-          is_exact_(p.flag("exact")), light_(p) {
+        : paths_(p, Guiding(p)), radius_params_(p), connects_(p.flag("connections")),
+          merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p) {
         if (!connects_ && !merges_)
             throw std::runtime_error("vcm: connections and merges cannot both be off");
         if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact needs merges");
@@ -66,8 +66,10 @@ public:
     }
 
     void trace(const PassContext& pass) override {
+        paths_.train(pass);
         radius_ = radius(pass.scene, pass.index);
-        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
+        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
+                     paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
@@ -93,10 +95,16 @@ public:
             n.pairs.inner_disc = n.pairs.disc * sqr(kInnerRadius);
             n.pairs.clamps = false;
         }
+        n.guide = paths_.guiding().guide();
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
         return light_.count(scene, paths_.depth(), kVertexBytes);
+    }
+    std::vector<std::pair<std::string, double>> figures() const override {
+        std::vector<std::pair<std::string, double>> figures;
+        paths_.guiding().add_figures(figures);
+        return figures;
     }
     Estimator estimator() const override {
         return !merges_                   ? Estimator::Unbiased
@@ -193,6 +201,7 @@ IntegratorEntry vcm_entry() {
     params.push_back({"connections", ParamKind::Bool, "true",
                       "Whether sub-paths are connected to each other, to emitters and to the lens.",
                       true});
+    params.push_back(Guiding::param());
     params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged.", true});
     params.push_back(
         {"exact", ParamKind::Bool, "false",

@@ -79,7 +79,7 @@ bool PathBuilder::sample_step() {
     sampler_.seek(mode == TransportMode::Radiance ? Stream::Eye : Stream::Light,
                   uint64_t(path.size()));
     const float u_lobe = sampler_.next_1d();
-    const auto s = v.sample(u_lobe, sampler_.next_2d(), mode);
+    const auto s = v.sample_unguided(u_lobe, sampler_.next_2d(), mode);
     return s && step<mode>(*s);
 }
 

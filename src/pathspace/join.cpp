@@ -30,13 +30,15 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
     const double p_NE = double(emitter.selection_pmf) * e.pdf / v.pdf_fwd;
-    const double p_L = double(emitter.selection_pmf) * e.pdf_y0 / v.pdf_fwd;
+    const double p_L = double(emission_pmf(counts.guide, emitter)) * e.pdf_y0 / v.pdf_fwd;
     double others = 0;
     if (last >= 2 && !z[last - 1].is_delta)
         others += sqr(counts.next_event * p_NE) + sqr(counts.connect_emission * p_L);
     if (counts.uses_light_paths()) {
         const double rev_prev =
-            v.is_infinite ? to_area(e.pdf_d, v, z[last - 1]) : e.pdf_d * v.to_predecessor;
+            v.is_infinite
+                ? to_area(e.pdf_d, v, z[last - 1])
+                : emission_pdf(counts.guide, emitter, v.p, v.wo, e.pdf_d) * v.to_predecessor;
         double inner = squares_at<Side::Eye>(z, last - 1, z[last - 1].is_delta, rev_prev,
                                              gloss_of_emitter(emitter.is_area()), last, counts) +
                        sum_below<Side::Eye>(z, last, last, counts);
@@ -81,9 +83,10 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
 
     double others = emitter.is_delta() ? 0.0 : sqr(double(counts.hit) * f.pdf * to_x0 / p_NE);
     if (counts.uses_light_paths()) {
-        const double rev_last = double(d.pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
+        const float pdf_d = emission_pdf(counts.guide, emitter, d.p, -d.wi, d.pdf_d);
+        const double rev_last = double(pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
         const double rev_prev = f.pdf_rev * v.to_predecessor;
-        const double p_L = double(emitter.selection_pmf) * d.pdf_y0;
+        const double p_L = double(emission_pmf(counts.guide, emitter)) * d.pdf_y0;
         others += sqr(p_L / p_NE) *
                   (sqr(double(counts.connect_emission)) +
                    outward_sum<Side::Eye>(
@@ -129,8 +132,9 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     if (fb.f.is_zero()) return {};
     const BsdfEval fa = a.eval(edge.w, TransportMode::Importance);
     if (fa.f.is_zero()) return {};
-    const double squares = s == 1 ? emission_squares(double(next_event_ratio(a, edge.w)), counts)
-                                  : sqr(double(counts.connect));
+    const double squares =
+        s == 1 ? emission_squares(double(next_event_ratio(a, edge.w, counts.guide)), counts)
+               : sqr(double(counts.connect));
     edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
     if (scene.has_media()) edge.contribution *= edge_attenuation(scene, a, b, edge.w);
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "guide/guide.h"
 #include "pathspace/mis.h"
 
 namespace etendue {
@@ -90,7 +91,7 @@ Vertex lens_end(const Scene& scene, const Join& join) {
 }
 
 PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
-                        const std::vector<bool>& delta) {
+                        const std::vector<bool>& delta, const Guide* guide) {
     const int n = int(x.size()), k = n - 1;
     PathValue v;
     PathPdfs& p = v.pdfs;
@@ -115,12 +116,13 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
                                : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->location.prim, w0);
     p.can_hit_emitter = !emitter.is_delta();
     p.can_connect_ends = !(x[0]->is_infinite && x[k]->is_infinite);
-    p.light[0] = p.next_event = emitter.selection_pmf;
+    p.light[0] = emission_pmf(guide, emitter);
+    p.next_event = emitter.selection_pmf;
     if (p.can_hit_emitter) {
         p.light[0] *= hit.pdf_y0;
         p.next_event *= hit.pdf;
     }
-    p.light[1] = to_area(emission.pdf_d, *x[0], *x[1]);
+    p.light[1] = to_area(emission_pdf(guide, emitter, x[0]->p, w0, emission.pdf_d), *x[0], *x[1]);
     v.f = emission.Le_cos;
 
     // Sensor: x_k and the direction to x_{k-1}.
@@ -147,6 +149,13 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
             f = e.f;
             pdf_light = e.pdf;
             pdf_eye = x[i]->bsdf.eval(to_eye, to_light, TransportMode::Radiance).pdf;
+            if (guide && !guide->surfaces.is_empty()) {
+                const GuideCell& cell = guide->surfaces.cell(x[i]->p);
+                pdf_light =
+                    guided_pdf(*x[i], cell, to_light, to_eye, TransportMode::Importance, pdf_light);
+                pdf_eye =
+                    guided_pdf(*x[i], cell, to_eye, to_light, TransportMode::Radiance, pdf_eye);
+            }
         }
         p.light[i + 1] = to_area(pdf_light, *x[i], *x[i + 1]);
         p.eye[i - 1] = to_area(pdf_eye, *x[i], *x[i - 1]);

@@ -45,12 +45,12 @@ Vertex lens_end(const Scene& scene, const Join& join);
 
 /// Measurement contribution f(x̄), without visibility and attenuation, and the densities. Events at the vertices of
 /// `delta` (one flag a vertex) are the delta events Vertex::event; f and all densities leave out the factor δ of the
-/// direction toward the eye given that toward the light, which they share.
+/// direction toward the eye given that toward the light, which they share. `guide` guides the walks.
 struct PathValue {
     Rgb f;
     PathPdfs pdfs;
 };
 PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
-                        const std::vector<bool>& delta);
+                        const std::vector<bool>& delta, const Guide* guide = nullptr);
 
 }  // namespace etendue

@@ -8,6 +8,8 @@
 
 namespace etendue {
 
+class Guide;
+
 enum class Strategy : uint8_t {
     Hit,        ///< C(0,t): the eye path hits an emitter.
     NextEvent,  ///< C(1,t), t ≥ 2: a point sampled on an emitter for z_{t-1}.
@@ -107,6 +109,7 @@ struct TechniqueCounts {
     float merge = 0,
           gather = 0;  ///< For each inner vertex of the path; at least one of the two is 0.
     PairModel pairs{};
+    const Guide* guide = nullptr;  ///< Of both walks; nullptr where nothing guides them.
 
     friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
     bool uses_light_paths() const {

@@ -12,6 +12,9 @@
 
 namespace etendue {
 
+class Guide;
+struct GuideCell;
+
 /// A probability in steps of 2^-10, so that the compactly stored value is exactly the one used in the decision.
 class Survival {
 public:
@@ -67,6 +70,10 @@ struct Vertex {
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or of the surface.
     SurfaceLocation location;          ///< On a surface; for y_0 only `prim` is set.
     Vec2 uv;
+    const GuideCell* guide =
+        nullptr;  ///< Learned directions here; nullptr where nothing guides the walk.
+    float guide_rev =
+        0;  ///< Learned density of `wo` for walks in the other mode, which arrive from the successor.
     Bsdf bsdf;
 
     /// Makes this a surface vertex with the given wo.
@@ -84,10 +91,18 @@ struct Vertex {
         is_connectible = bsdf.has_smooth();
         gloss = gloss_of_roughness(bsdf.roughness());
     }
+    /// Makes `cell`, which holds p, guide walks in `mode` here, if it has learned anything for such a vertex. `both`:
+    /// whether the densities of walks in the other mode are needed.
+    void set_guide(const GuideCell& cell, TransportMode mode, bool both);
 
     /// A direction in which a walk in `mode` leaves, with weight f̃·|cos θ| / pdf (for emission L_e |cos θ| / pdf) and
-    /// both densities; empty where the walk ends. Not for emitters at infinity, whose direction is fixed.
-    std::optional<BsdfSample> sample(float u_lobe, Vec2 u, TransportMode mode) const {
+    /// both densities; empty where the walk ends. Not for emitters at infinity, whose direction is fixed. `u_guide` is
+    /// read where there is a guide.
+    std::optional<BsdfSample> sample(float u_lobe, Vec2 u, float u_guide,
+                                     TransportMode mode) const {
+        return guide ? sample_guided(u_lobe, u, u_guide, mode) : sample_unguided(u_lobe, u, mode);
+    }
+    std::optional<BsdfSample> sample_unguided(float u_lobe, Vec2 u, TransportMode mode) const {
         if (kind != Kind::Emitter) return bsdf.sample(wo, u_lobe, u, mode);
         const Vec3 w = emitter->sample_direction(ng, u);
         const Emitter::Emission e = emitter->eval_emission(ng, uv, w);
@@ -96,15 +111,23 @@ struct Vertex {
     }
     /// f̃·|cos θ| (for emission L_e |cos θ|) toward `w`, and the densities of sample(); of smooth lobes only.
     BsdfEval eval(Vec3 w, TransportMode mode) const {
+        BsdfEval e = eval_unguided(w, mode);
+        if (guide) mix_guide(w, mode, e.pdf, e.pdf_rev);
+        return e;
+    }
+    BsdfEval eval_unguided(Vec3 w, TransportMode mode) const {
         if (kind != Kind::Emitter) return bsdf.eval(wo, w, mode);
         const Emitter::Emission e = emitter->eval_emission(ng, uv, w);
         return {.f = e.Le_cos, .pdf = e.pdf_d};
     }
     /// Upper bound of eval(w).pdf over the directions of a cone; kInf where none is known.
-    float max_pdf(const DirectionCone& cone) const {
-        return kind == Kind::Emitter ? emitter->max_pdf_d() : bsdf.max_pdf(wo, cone);
+    float max_pdf(const DirectionCone& cone, TransportMode mode) const {
+        const float bound = max_pdf_unguided(cone);
+        return guide ? max_guided_pdf(bound, cone, mode) : bound;
     }
-    /// The normal n where directions have the density cos θ/π about n; empty for other densities.
+    /// Upper bound of eval_unguided(w).pdf.
+    float max_pdf_unguided(const DirectionCone& cone) const;
+    /// The normal n where directions without guide have the density cos θ/π about n; empty for other densities.
     std::optional<Vec3> cosine_normal() const {
         if (kind != Kind::Emitter) return bsdf.diffuse_normal();
         return emitter->is_area() ? std::optional(ng) : std::nullopt;
@@ -115,7 +138,30 @@ struct Vertex {
         if (!shape || !shape->is_interface) return medium;
         return shape->medium_toward(ng, w);
     }
+
+private:
+    std::optional<BsdfSample> sample_guided(float u_lobe, Vec2 u, float u_guide,
+                                            TransportMode mode) const;
+    /// Turns the densities of `w`, and of `wo` from `w`, into those of guided walks.
+    void mix_guide(Vec3 w, TransportMode mode, float& pdf, float& pdf_rev) const;
+    float max_guided_pdf(float unguided, const DirectionCone& cone, TransportMode mode) const;
 };
+
+/// The density of `w` for a walk in `mode` that arrives at `v` from `from`, where that without guide is `unguided`:
+///     [p_b > 0] ((1 - a) p_b + a (1 - P_δ) g),
+/// with the learned density g, its share a, and the probability P_δ of delta events.
+float guided_pdf(const Vertex& v, const GuideCell& cell, Vec3 from, Vec3 w, TransportMode mode,
+                 float unguided);
+
+/// Density p_d of emission along `w` from y_0 at `p`, where that without guide is `unguided`.
+float emission_pdf(const Guide* guide, const Emitter& emitter, Vec3 p, Vec3 w, float unguided);
+float guided_emission_pmf(const Guide& guide, const Emitter& emitter);
+/// Probability that light paths choose the emitter; next events choose it with Emitter::selection_pmf.
+inline float emission_pmf(const Guide* guide, const Emitter& emitter) {
+    return guide ? guided_emission_pmf(*guide, emitter) : emitter.selection_pmf;
+}
+/// The learned directions of emission at `p`, or nullptr.
+const GuideCell* emission_cell(const Guide* guide, const Emitter& emitter, Vec3 p);
 
 /// The last ray of a walk, whether or not it hit a surface; it may cross a finite lens.
 struct Flight {
@@ -135,6 +181,7 @@ struct SubPath {
         1;  ///< Factor of the reconstruction filter, for contributions to the own pixel.
     Flight flight;
     float eta2 = 1;  ///< Product of η² over the refractions of an eye sub-path.
+    float gain = 1;  ///< Product of BsdfSample::gain.
 
     SubPath() = default;
     /// Copies would read BSDFs from the arena of the original.
@@ -160,13 +207,14 @@ struct SubPath {
         v.survival = {};
         v.shape = nullptr;
         v.emitter = nullptr;
+        v.guide = nullptr;
         return v;
     }
     void truncate(int size) { size_ = size; }
     void clear() {
         size_ = 0;
         arena.reset();
-        eta2 = 1;
+        eta2 = gain = 1;
         flight.pdf_sa = 0;
     }
 

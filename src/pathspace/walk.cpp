@@ -2,13 +2,17 @@
 
 #include <algorithm>
 
+#include "guide/guide.h"
+
 namespace etendue {
 namespace {
 
 /// Survival of Russian roulette at the last vertex: its throughput relative to that of the first scattering vertex. The
-/// η² of refractions is removed, since it cancels when the path leaves the glass.
+/// η² of refractions is removed, since it cancels when the path leaves the glass. The throughput is that of a walk
+/// without guide, since the better the guide, the smaller the throughput of the paths that it prefers.
 Survival survival(const SubPath& path) {
-    const float left = path[path.size() - 1].beta.max() * path.eta2 / path[1].beta.max();
+    const float left =
+        path[path.size() - 1].beta.max() * path.eta2 * path.gain / path[1].beta.max();
     return Survival(left > 0 ? std::min(0.95f, left) : 0x1p-16f);
 }
 
@@ -17,8 +21,8 @@ enum class Met { Surface, Nothing, SurfaceEdgeOn };
 
 /// Traces a ray from the last vertex and appends the surface vertex that it hits. `beta` is the throughput along the
 /// ray and is multiplied by absorption; `pdf_sa` is the density of the direction, or the probability of a delta event.
-Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, const Ray& ray,
-                   Rgb& beta, float pdf_sa, MediumId medium) {
+Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, TransportMode mode,
+                   const Ray& ray, Rgb& beta, float pdf_sa, MediumId medium) {
     const Scene& scene = walk.scene;
     ++walk.stats.walk_rays;
     SurfaceHit hit;
@@ -33,6 +37,8 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, con
     Vertex& v = path.append();
     v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
     v.medium = passage.medium;
+    if (const Guide* guide = walk.counts.guide; guide && !guide->surfaces.is_empty())
+        v.set_guide(guide->surfaces.cell(v.p), mode, walk.counts.uses_light_paths());
     v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
     v.beta = beta;
     // hit.t is the distance from the offset origin of the ray; densities need the distance between the vertices.
@@ -63,11 +69,12 @@ void append_escape(SubPath& path, Vec3 d, Rgb beta, float pdf) {
 
 }  // namespace
 
-float next_event_ratio(const Vertex& y0, Vec3 w) {
+float next_event_ratio(const Vertex& y0, Vec3 w, const Guide* guide) {
     const EmitterHit e = y0.is_infinite
                              ? y0.emitter->eval_infinite(y0.p)
                              : y0.emitter->eval_surface(y0.ng, y0.uv, y0.location.prim, w);
-    return e.pdf_y0 > 0 ? e.pdf / e.pdf_y0 : 1.0f;
+    const float choices = y0.emitter->selection_pmf / emission_pmf(guide, *y0.emitter);
+    return e.pdf_y0 > 0 ? choices * e.pdf / e.pdf_y0 : choices;
 }
 
 void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, Sampler& sampler,
@@ -100,27 +107,28 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const 
 
     const Ray start{ray.p, ray.d, kInf};
     Rgb beta(1);
-    const Met met = append_surface(walk, sampler, z, start, beta, ray.pdf_dir, kVacuum);
+    const Met met = append_surface(walk, sampler, z, TransportMode::Radiance, start, beta,
+                                   ray.pdf_dir, kVacuum);
     if (met == Met::Nothing && !walk.scene.infinite_emitters().empty())
         append_escape(z, ray.d, beta, ray.pdf_dir);
 }
 
-bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
-    const Scene& scene = walk.scene;
-    y.clear();
-    if (!scene.has_emitters()) return false;
-    sampler.seek(Stream::Light, 0);
-    const Emitter& emitter =
-        scene.sample_emitter(sampler.next_1d_fine_if(scene.has_emitter_choice()));
-    const FinePoint u_y0 = sampler.next_2d_fine();
-    const EmissionSample e = emitter.sample_emission(u_y0, sampler.next_2d());
-    if (!(e.pdf_y0 > 0)) return false;
-    start_light_path(walk, emitter, e, sampler, y);
-    return true;
+namespace {
+
+/// Replaces the direction of emission by one of the guide or the emitter; its density is 0 where there is none.
+void guide_emission(Vertex& y0, Vec2 u_d, float u_guide, EmissionSample& e) {
+    const auto s = y0.sample(0, u_d, u_guide, TransportMode::Importance);
+    e.pdf_d = s ? s->pdf : 0;
+    if (!s) return;
+    e.d = s->wi;
+    if (!y0.has_cosine) y0.ng = e.d;
+    e.Le = y0.emitter->eval_emission(y0.ng, y0.uv, e.d).Le_cos;
+    if (y0.has_cosine) e.Le *= 1 / abs_dot(y0.ng, e.d);
 }
 
-void start_light_path(const WalkContext& walk, const Emitter& emitter, const EmissionSample& e,
-                      Sampler& sampler, SubPath& y) {
+/// Makes y_0, at the point of an emission.
+Vertex& append_emitter(const WalkContext& walk, const Emitter& emitter, const EmissionSample& e,
+                       SubPath& y) {
     ++walk.stats.light_paths;
     y.clear();
     Vertex& y0 = y.append();
@@ -135,16 +143,50 @@ void start_light_path(const WalkContext& walk, const Emitter& emitter, const Emi
     y0.is_connectible = true;
     y0.medium = MediumId(emitter.medium);
     y0.gloss = gloss_of_emitter(emitter.is_area());
-    y0.pdf_fwd = emitter.selection_pmf * e.pdf_y0;
+    y0.pdf_fwd = emission_pmf(walk.counts.guide, emitter) * e.pdf_y0;
     y0.beta = Rgb(1 / y0.pdf_fwd);
+    y0.guide = emission_cell(walk.counts.guide, emitter, y0.p);
+    return y0;
+}
 
+/// Makes y_1, in the direction of the emission, if its ray hits a surface.
+void leave_emitter(const WalkContext& walk, const EmissionSample& e, Sampler& sampler, SubPath& y) {
+    const Vertex& y0 = y[0];
     if (!(e.pdf_d > 0)) return;
     const Vec3 origin = y0.has_cosine ? offset_origin(e.p, e.ng, e.d) : e.p;
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
     Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
-    if (append_surface(walk, sampler, y, {origin, e.d, kInf}, beta, e.pdf_d, y0.medium) ==
-        Met::Surface)
-        y[1].next_event_ratio = next_event_ratio(y[0], e.d);
+    if (append_surface(walk, sampler, y, TransportMode::Importance, {origin, e.d, kInf}, beta,
+                       e.pdf_d, y0.medium) == Met::Surface)
+        y[1].next_event_ratio = next_event_ratio(y[0], e.d, walk.counts.guide);
+}
+
+}  // namespace
+
+bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
+    const Scene& scene = walk.scene;
+    y.clear();
+    if (!scene.has_emitters()) return false;
+    sampler.seek(Stream::Light, 0);
+    const Guide* guide = walk.counts.guide;
+    const double u_emitter = sampler.next_1d_fine_if(scene.has_emitter_choice());
+    const Emitter& emitter = guide && guide->chooses_emitters()
+                                 ? scene.emitter(guide->sample_emitter(u_emitter))
+                                 : scene.sample_emitter(u_emitter);
+    const FinePoint u_y0 = sampler.next_2d_fine();
+    const Vec2 u_d = sampler.next_2d();
+    EmissionSample e = emitter.sample_emission(u_y0, u_d);
+    if (!(e.pdf_y0 > 0)) return false;
+    Vertex& y0 = append_emitter(walk, emitter, e, y);
+    if (y0.guide) guide_emission(y0, u_d, sampler.next_1d(), e);
+    leave_emitter(walk, e, sampler, y);
+    return true;
+}
+
+void start_light_path(const WalkContext& walk, const Emitter& emitter, const EmissionSample& e,
+                      Sampler& sampler, SubPath& y) {
+    append_emitter(walk, emitter, e, y);
+    leave_emitter(walk, e, sampler, y);
 }
 
 template <TransportMode mode>
@@ -164,7 +206,9 @@ std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sa
         v.survival = survival(path);
         if (!(u_roulette < v.survival.value())) return {};
     }
-    return v.sample(u_lobe, u_direction, mode);
+    // The last slot, since a walk without guide reads none for it.
+    const float u_guide = v.guide ? sampler.next_1d() : 0.0f;
+    return v.sample(u_lobe, u_direction, u_guide, mode);
 }
 
 template <TransportMode mode>
@@ -176,11 +220,12 @@ bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubP
     v.event = s.event;
     if (last >= 1) path[last - 1].pdf_rev = s.pdf_rev * v.to_predecessor;
     if (eye) path.eta2 *= sqr(s.eta);
+    path.gain *= s.gain;
 
     Rgb beta = v.beta * s.weight * (1 / v.survival.value());
     const MediumId medium = v.medium_toward(s.wi);
     const Ray ray{offset_origin(v.p, v.ng, s.wi), s.wi, kInf};
-    const Met met = append_surface(walk, sampler, path, ray, beta, s.pdf, medium);
+    const Met met = append_surface(walk, sampler, path, mode, ray, beta, s.pdf, medium);
     if (met == Met::Surface) return true;
     if (!eye || met == Met::SurfaceEdgeOn || walk.scene.infinite_emitters().empty()) return false;
     append_escape(path, s.wi, beta, s.pdf);

@@ -9,8 +9,10 @@
 
 namespace etendue {
 
-void LightVertexCache::begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes) {
-    vertex_bytes_ = vertex_bytes;
+void LightVertexCache::begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes,
+                             bool is_guided) {
+    is_guided_ = is_guided;
+    vertex_bytes_ = vertex_bytes + (is_guided ? 3 * sizeof(LightVertexGuide) : 0);
     max_bytes_ = max_bytes;
     taken_bytes_ = 0;
     chunks_.resize(chunks);
@@ -18,6 +20,7 @@ void LightVertexCache::begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t ma
         c.heads.clear();
         c.vertices.clear();
         c.places.clear();
+        c.guides.clear();
     }
 }
 
@@ -35,6 +38,7 @@ void LightVertexCache::add(uint64_t chunk, const SubPath& y) {
                         max_bytes_ >> 20));
     const Vertex& y0 = y[0];
     head.emitter = y0.emitter;
+    head.guide = y0.guide;
     head.p = y0.p;
     head.ng = y0.ng;
     head.uv = y0.uv;
@@ -57,6 +61,7 @@ void LightVertexCache::add(uint64_t chunk, const SubPath& y) {
                               .survival_steps = v.survival.steps(),
                               .gloss = v.gloss});
         c.places.push_back({etendue::arrival_side(v), v.pair_level});
+        if (is_guided_) c.guides.push_back({v.guide, v.guide_rev});
     }
     head.end = uint32_t(c.vertices.size());
 }
@@ -77,11 +82,13 @@ void LightVertexCache::assemble() {
     heads_.resize(paths);
     vertices_.resize(total);
     places_.resize(total);
+    guides_.resize(is_guided_ ? total : 0);
     tbb::parallel_for(size_t(0), chunks_.size(), [&](size_t chunk) {
         const Chunk& c = chunks_[chunk];
         auto [path, first] = begins[chunk];
         std::copy(c.vertices.begin(), c.vertices.end(), vertices_.begin() + ptrdiff_t(first));
         std::copy(c.places.begin(), c.places.end(), places_.begin() + ptrdiff_t(first));
+        std::copy(c.guides.begin(), c.guides.end(), guides_.begin() + ptrdiff_t(first));
         for (Head head : c.heads) {
             head.begin += uint32_t(first), head.end += uint32_t(first);
             for (uint32_t i = head.begin; i < head.end; ++i)
@@ -93,7 +100,8 @@ void LightVertexCache::assemble() {
 
 size_t LightVertexCache::memory_bytes() const {
     return heads_.capacity() * sizeof(Head) + vertices_.capacity() * sizeof(LightVertex) +
-           places_.capacity() * sizeof(LightVertexPlace);
+           places_.capacity() * sizeof(LightVertexPlace) +
+           guides_.capacity() * sizeof(LightVertexGuide);
 }
 
 void LightVertexCache::restore_head(uint64_t index, SubPath& y) const {
@@ -112,6 +120,7 @@ void LightVertexCache::restore_head(uint64_t index, SubPath& y) const {
     y0.gloss = gloss_of_emitter(head.emitter->is_area());
     y0.pdf_fwd = head.pdf_fwd;
     y0.beta = head.beta;
+    y0.guide = head.guide;
 }
 
 namespace {
@@ -143,6 +152,10 @@ void LightVertexCache::restore_vertex(const Scene& scene, uint32_t vertex, bool 
     v.weight_sum = sqr(double(stored.root_of_weight_sum));
     v.is_delta = stored.is_delta;
     v.pair_level = places_[vertex].pair_level;
+    if (is_guided_) {
+        v.guide = guides_[vertex].cell;
+        v.guide_rev = guides_[vertex].rev;
+    }
     v.survival = Survival::from_steps(stored.survival_steps);
     if (i == 1) v.next_event_ratio = heads_[stored.path].next_event_ratio;
 }

@@ -31,11 +31,17 @@ struct LightVertexPlace {
     uint8_t pair_level;
 };
 
+/// The guide of y_i, as in Vertex.
+struct LightVertexGuide {
+    const GuideCell* cell;
+    float rev;
+};
+
 class LightVertexCache {
 public:
     /// Starts the collection of a pass's light paths in `chunks` chunks. `vertex_bytes`: memory per vertex, here and in
-    /// the caller's own structures; `max_bytes`: limit of the total.
-    void begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes);
+    /// the caller's own structures; `max_bytes`: limit of the total; `is_guided`: whether the walks have a guide.
+    void begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes, bool is_guided = false);
     /// Adds the next path of a chunk; each chunk belongs to one thread at a time. Throws std::runtime_error where the
     /// paths exceed `max_bytes`.
     void add(uint64_t chunk, const SubPath& y);
@@ -80,6 +86,7 @@ private:
     /// y_0, and the range of the other vertices.
     struct Head {
         const Emitter* emitter = nullptr;  ///< nullptr for a path without vertices.
+        const GuideCell* guide = nullptr;
         Vec3 p, ng;
         Vec2 uv;
         uint32_t prim = 0;
@@ -92,6 +99,7 @@ private:
         std::vector<Head> heads;
         std::vector<LightVertex> vertices;
         std::vector<LightVertexPlace> places;
+        std::vector<LightVertexGuide> guides;  ///< Empty without a guide.
     };
 
     void restore_head(uint64_t index, SubPath& y) const;
@@ -104,6 +112,8 @@ private:
     std::vector<Head> heads_;
     std::vector<LightVertex> vertices_;
     std::vector<LightVertexPlace> places_;
+    std::vector<LightVertexGuide> guides_;  ///< Empty without a guide.
+    bool is_guided_ = false;
 };
 
 }  // namespace etendue

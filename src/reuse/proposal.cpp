@@ -8,11 +8,6 @@
 namespace etendue {
 namespace {
 
-/// cos(acos c - a), at least 0.
-float cos_difference(float c, float a) {
-    return std::max(0.0f, c * std::cos(a) + safe_sqrt(1 - c * c) * std::sin(a));
-}
-
 /// Thinning: an event of density `pdf` is kept with probability pdf / bound.
 bool passes(float pdf, float bound, Sampler& sampler, RenderStats& stats) {
     if (pdf > bound * (1 + 1e-4f)) ++stats.bounds_exceeded;
@@ -42,17 +37,15 @@ std::optional<Vec3> where_positive(const WalkDensity& density, Vec3 w) {
 }  // namespace
 
 float WalkDensity::max_pdf(const DirectionCone& cone) const {
-    const auto normal = from.cosine_normal();
-    if (!normal) return from.max_pdf(cone);
-    const float cos = dot(cone.axis, *normal);
-    return cos > std::cos(cone.angle) ? kInvPi : kInvPi * cos_difference(cos, cone.angle);
+    return from.max_pdf(cone, mode);
 }
 
 std::optional<Vec3> WalkProposal::propose(const WalkDensity& density, Sampler& sampler,
                                           RenderStats&) const {
     const Vec2 u = sampler.next_2d();
     const float u_lobe = density.from.kind == Vertex::Kind::Emitter ? 0.0f : sampler.next_1d();
-    const auto s = density.from.sample(u_lobe, u, density.mode);
+    const float u_guide = density.from.guide ? sampler.next_1d() : 0.0f;
+    const auto s = density.from.sample(u_lobe, u, u_guide, density.mode);
     if (!s || s->is_delta) return {};
     return s->wi;
 }

@@ -208,6 +208,7 @@ private:
             if (s.emitter && s.is_interface) media[s.emitter] = s.exterior;
         std::vector<double> powers;
         for (auto& e : scene_.emitters_) {
+            e->index = uint32_t(powers.size());
             if (const auto it = media.find(e.get()); it != media.end()) e->medium = it->second;
             // The margin keeps bounding discs outside all objects.
             e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);

@@ -94,6 +94,7 @@ public:
     const Emitter& sample_emitter(double u) const {
         return *emitters_[emitters_.size() == 1 ? 0u : selection_.sample(u).index];
     }
+    const Emitter& emitter(uint32_t index) const { return *emitters_[index]; }
     bool has_emitters() const { return !selection_.empty(); }
     bool has_emitter_choice() const { return emitters_.size() > 1; }
     /// Whether any emitter is delta.

@@ -84,7 +84,8 @@ TEST_P(Resume, GivesTheSameBits) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Integrators, Resume,
-                         ::testing::Values("bdpt:eorr=true", "bdpt:connections=cache",
+                         ::testing::Values("path:guide=on", "bdpt:eorr=true",
+                                           "bdpt:connections=cache", "upg+bdpt:guide=on",
                                            "vcm:radius=0.3", "vcm:exact=true", "upg", "upg+bdpt",
                                            "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
                                            "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48"),

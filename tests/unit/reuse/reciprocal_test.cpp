@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "guide/random_guide.h"
 #include "math/statistics.h"
 #include "test_scenes.h"
 
@@ -61,18 +62,30 @@ std::vector<Case> cases() {
     };
 }
 
-class Reciprocal : public testing::TestWithParam<Case> {
+enum class Guided { No, Wide, Narrow };
+
+class Reciprocal : public testing::TestWithParam<std::tuple<Case, Guided>> {
 protected:
     Reciprocal()
-        : scene(test::build(test::front_camera(8) + test::room() + GetParam().light +
-                            test::sphere("-0.3,-0.5,0.3", "0.4", GetParam().bsdf) +
-                            test::sphere("0.5,0.3,-0.2", "0.45", GetParam().bsdf))),
-          film(scene.film(), scene.filter()), sampler(SamplerKind::Independent, 5) {}
+        : scene(test::build(test::front_camera(8) + test::room() + given().light +
+                            test::sphere("-0.3,-0.5,0.3", "0.4", given().bsdf) +
+                            test::sphere("0.5,0.3,-0.2", "0.45", given().bsdf))),
+          film(scene.film(), scene.filter()), sampler(SamplerKind::Independent, 5) {
+        if (const Guided guided = std::get<Guided>(GetParam()); guided != Guided::No)
+            guide = random_guide({}, 1.7f, std::vector<double>(scene.emitters().size(), 1),
+                                 guided == Guided::Wide ? 20.0f : 1000.0f, 3);
+    }
+
+    static const Case& given() { return std::get<Case>(GetParam()); }
 
     template <TransportMode mode>
     void trace(SubPath& path, uint32_t index) {
-        const TechniqueCounts counts{
-            .hit = 1, .next_event = 1, .connect = 1, .splat = 64, .gather = 64};
+        const TechniqueCounts counts{.hit = 1,
+                                     .next_event = 1,
+                                     .connect = 1,
+                                     .splat = 64,
+                                     .gather = 64,
+                                     .guide = guide.surfaces.is_empty() ? nullptr : &guide};
         // Roulette starts early, so that survival is included.
         const WalkContext walk{scene, counts, stats, {5, 2}};
         sampler.start(0, index);
@@ -82,29 +95,35 @@ protected:
             trace_light_path(walk, sampler, path);
     }
 
+    float u_guide(const Vertex& v) { return v.guide ? sampler.next_1d() : 0.0f; }
+
     /// A ray from y_0; at infinity from a point of the emitter's disc.
-    Ray emitted(const Vertex& y0) {
+    std::optional<Ray> emitted(const Vertex& y0) {
         const Vec2 u = sampler.next_2d();
         if (y0.is_infinite) {
             const Emitter::Disc disc = y0.emitter->disc();
             const Frame frame = Frame::from_normal(y0.p);
             const Vec2 at = sample_uniform_disk(u);
-            return {disc.center + (frame.s * at.x + frame.t * at.y + y0.p) * disc.radius, -y0.p,
-                    kInf};
+            return Ray{disc.center + (frame.s * at.x + frame.t * at.y + y0.p) * disc.radius, -y0.p,
+                       kInf};
         }
-        const auto s = y0.sample(0, u, TransportMode::Importance);
-        return {y0.has_cosine ? offset_origin(y0.p, y0.ng, s->wi) : y0.p, s->wi, kInf};
+        const auto s = y0.sample(0, u, u_guide(y0), TransportMode::Importance);
+        if (!s) return {};
+        return Ray{y0.has_cosine ? offset_origin(y0.p, y0.ng, s->wi) : y0.p, s->wi, kInf};
     }
 
     /// Whether one walk from `e.from` finds a partner.
     bool walk_finds(const PairEvent& e) {
         Ray ray;
         if (e.from.kind == Vertex::Kind::Emitter) {
-            ray = emitted(e.from);
+            const auto emission = emitted(e.from);
+            if (!emission) return false;
+            ray = *emission;
         } else {
             if (!(sampler.next_1d() < e.from.survival.value())) return false;
             const float u = sampler.next_1d();
-            const auto s = e.from.sample(u, sampler.next_2d(), e.mode);
+            const Vec2 u_direction = sampler.next_2d();
+            const auto s = e.from.sample(u, u_direction, u_guide(e.from), e.mode);
             if (!s || s->is_delta) return false;
             ray = {offset_origin(e.from.p, e.from.ng, s->wi), s->wi, kInf};
         }
@@ -161,6 +180,7 @@ protected:
     Scene scene;
     Film film;
     Sampler sampler;
+    Guide guide;  ///< Empty without one.
     RenderStats stats;
     Vertex scratch;
     uint32_t number = 0;
@@ -325,8 +345,16 @@ TEST(ReciprocalUnderALeaningNormal, EqualsTheIntegral) {
     expect_reciprocal(scene, event, p_c);
 }
 
-INSTANTIATE_TEST_SUITE_P(Starts, Reciprocal, testing::ValuesIn(cases()),
-                         [](const auto& p) { return std::string(p.param.name); });
+const auto kName = [](const testing::TestParamInfo<std::tuple<Case, Guided>>& given) {
+    const char* suffix[] = {"", "_guided", "_narrowly_guided"};
+    return std::get<Case>(given.param).name +
+           std::string(suffix[int(std::get<Guided>(given.param))]);
+};
+INSTANTIATE_TEST_SUITE_P(Starts, Reciprocal,
+                         testing::Combine(testing::ValuesIn(cases()),
+                                          testing::Values(Guided::No, Guided::Wide,
+                                                          Guided::Narrow)),
+                         kName);
 
 }  // namespace
 }  // namespace etendue

@@ -1,0 +1,87 @@
+#pragma once
+// Samples from which guides are learned, and the fit of one cell.
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "guide/mixture.h"
+
+namespace etendue {
+
+/// A direction in 32 bits, to about 10⁻⁴ radians.
+class PackedDirection {
+public:
+    PackedDirection() = default;
+    explicit PackedDirection(Vec3 w) {
+        // Octahedral mapping [Meyer et al. 2010].
+        const float scale = 1 / (std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z));
+        float a = w.x * scale, b = w.y * scale;
+        if (w.z < 0) {
+            const float fold = 1 - std::fabs(b);
+            b = std::copysign(1 - std::fabs(a), b);
+            a = std::copysign(fold, a);
+        }
+        a_ = int16_t(std::lround(a * kSteps));
+        b_ = int16_t(std::lround(b * kSteps));
+    }
+    Vec3 unpack() const {
+        float a = float(a_) / kSteps, b = float(b_) / kSteps;
+        const float z = 1 - std::fabs(a) - std::fabs(b);
+        if (z < 0) {
+            const float fold = 1 - std::fabs(b);
+            b = std::copysign(1 - std::fabs(a), b);
+            a = std::copysign(fold, a);
+        }
+        return normalize({a, b, z});
+    }
+
+private:
+    static constexpr float kSteps = 32767;
+    int16_t a_ = 0, b_ = 0;
+};
+
+/// Classes of surfaces by gloss (gloss.h); each cell learns its share of guided directions for each of them.
+inline constexpr int kGuideClasses = 3;
+inline int guide_class(uint8_t gloss) {
+    constexpr uint8_t kSomewhatGlossy = 30, kGlossy = 50;
+    return (gloss >= kSomewhatGlossy) + (gloss >= kGlossy);
+}
+
+/// A direction that walks of a mode are to be guided to, where it was found.
+struct GuideSample {
+    Vec3 p;
+    float inv_distance = 0;  ///< To the other end of the edge; 0 at infinity.
+    float weight = 0;        ///< Power along the direction.
+    float unguided_pdf = 0;  ///< Of the direction without guide, in solid angle; 0 where unknown.
+    PackedDirection direction;                  ///< From p.
+    int8_t normal[3] = {};                      ///< As GuideView::normal, to about a degree.
+    uint8_t mode : 4 = 0, gloss_class : 4 = 0;  ///< TransportMode of the walks; guide_class().
+
+    void set_normal(Vec3 n) {
+        for (int i = 0; i < 3; ++i) normal[i] = int8_t(std::lround(n[i] * 127));
+    }
+    /// Seen from the centre of a cell.
+    GuideView view(Vec3 center) const {
+        const Vec3 n{float(normal[0]), float(normal[1]), float(normal[2])};
+        return {center - p, length2(n) > 0 ? normalize(n) : n};
+    }
+};
+static_assert(sizeof(GuideSample) == 32);
+
+/// Mixture and shares of one cell and mode.
+struct GuideFit {
+    GuideMixture mixture;
+    /// Share of directions taken from the mixture, by guide_class(); 0 where that gains little.
+    std::array<float, kGuideClasses> share{};
+    float gain =
+        0;  ///< Mean of log(guided pdf / unguided pdf) over the light, in nats, at these shares.
+};
+
+/// Fits lobes by expectation maximisation with a prior [Ruppert et al. 2020], and the shares with the BSDF as one more
+/// component. Every fourth sample is kept for the shares, so that lobes that fit to noise have none. A function of the
+/// samples' order; `number` seeds its choices.
+GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number);
+
+}  // namespace etendue

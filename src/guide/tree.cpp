@@ -1,0 +1,143 @@
+#include "guide/tree.h"
+
+#include <algorithm>
+
+#include <tbb/parallel_for.h>
+
+#include "math/bounds.h"
+#include "math/hash.h"
+
+namespace etendue {
+namespace {
+
+/// Cells are split above this number of samples.
+constexpr size_t kMostSamples = 4000;
+/// A cell with fewer samples of a mode takes those of the smallest node around it that has so many.
+constexpr size_t kFewestSamples = 256;
+constexpr size_t kMostCells = size_t(1) << 15;
+
+/// Samples [begin, end) of the order.
+struct Range {
+    size_t begin, end;
+    size_t size() const { return end - begin; }
+};
+
+/// Area of a rectangle as large as the box's largest side: a rough guess of the surface in it.
+float surface_in(const Bounds3& box) {
+    const Vec3 d = box.hi - box.lo;
+    return std::max({d.x * d.y, d.y * d.z, d.z * d.x});
+}
+
+}  // namespace
+
+struct GuideTree::Builder {
+    struct Leaf {
+        Bounds3 box;
+        std::array<Range, 2> ranges;  ///< From which each mode is fitted.
+    };
+
+    GuideTree& tree;
+    const std::vector<GuideSample>& samples;
+    std::vector<uint32_t> order{};
+    std::vector<Leaf> leaves{};
+
+    void split(uint32_t node, Range range, std::array<Range, 2> ranges) {
+        Bounds3 box;
+        std::array<double, 3> sum{};
+        std::array<size_t, 2> count{};
+        for (size_t i = range.begin; i < range.end; ++i) {
+            const GuideSample& s = samples[order[i]];
+            box.extend(s.p);
+            for (int axis = 0; axis < 3; ++axis) sum[size_t(axis)] += double(s.p[axis]);
+            ++count[s.mode];
+        }
+        for (size_t m = 0; m < 2; ++m)
+            if (count[m] >= kFewestSamples) ranges[m] = range;
+        const Vec3 size = box.hi - box.lo;
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        const float at = float(sum[size_t(axis)] / double(range.size()));
+        // A plane through coincident points leaves one side empty.
+        if (range.size() > kMostSamples && leaves.size() < kMostCells && box.lo[axis] < at) {
+            const auto begin = order.begin();
+            const size_t middle = size_t(
+                std::stable_partition(begin + ptrdiff_t(range.begin), begin + ptrdiff_t(range.end),
+                                      [&](uint32_t i) { return samples[i].p[axis] < at; }) -
+                begin);
+            const auto child = uint32_t(tree.nodes_.size());
+            tree.nodes_.resize(child + 2);
+            tree.nodes_[node] = {at, uint32_t(axis) & 3, child & 0x3fffffffu};
+            split(child, {range.begin, middle}, ranges);
+            split(child + 1, {middle, range.end}, ranges);
+            return;
+        }
+        tree.nodes_[node] = {0, 3, uint32_t(leaves.size()) & 0x3fffffffu};
+        leaves.push_back({box, ranges});
+    }
+
+    /// Samples of a mode in a range, in the order of the samples, and no more of them than are needed.
+    std::vector<const GuideSample*> of_mode(Range range, size_t mode) const {
+        std::vector<uint32_t> found;
+        for (size_t i = range.begin; i < range.end; ++i)
+            if (const GuideSample& s = samples[order[i]]; s.mode == mode && s.weight > 0)
+                found.push_back(order[i]);
+        std::vector<const GuideSample*> kept;
+        const size_t step = (found.size() + kMostSamples - 1) / kMostSamples;
+        for (size_t i = 0; i < found.size(); i += step) kept.push_back(&samples[found[i]]);
+        return kept;
+    }
+
+    void fit(size_t leaf, uint64_t seed, std::array<GuideFit, 2>& fits) {
+        const Leaf& l = leaves[leaf];
+        GuideCell& cell = tree.cells_[leaf];
+        cell.center = l.box.center();
+        cell.surface = surface_in(l.box);
+        for (size_t m = 0; m < 2; ++m) {
+            const auto chosen = of_mode(l.ranges[m], m);
+            if (chosen.empty()) continue;
+            fits[m] = fit_guide(chosen, cell.center, hash_combine(seed, 2 * leaf + m));
+            cell.fields[m] = {fits[m].mixture, fits[m].share};
+        }
+    }
+};
+
+GuideTree::GuideTree(const std::vector<GuideSample>& samples, uint64_t seed) {
+    if (samples.empty()) return;
+    Builder builder{*this, samples};
+    builder.order.resize(samples.size());
+    for (size_t i = 0; i < samples.size(); ++i) builder.order[i] = uint32_t(i);
+    nodes_.resize(1);
+    const Range all{0, samples.size()};
+    builder.split(0, all, {all, all});
+    cells_.resize(builder.leaves.size());
+    std::vector<std::array<GuideFit, 2>> fits(cells_.size());
+    tbb::parallel_for(size_t(0), cells_.size(),
+                      [&](size_t leaf) { builder.fit(leaf, seed, fits[leaf]); });
+
+    // Where one of the two is nothing, the other does not matter.
+    std::vector<std::array<double, 2>> light(cells_.size());
+    std::array<size_t, 2> count{};
+    for (const GuideSample& s : samples)
+        light[index(s.p)][s.mode] += double(s.weight), ++count[s.mode];
+    const bool has_both = count[0] > 0 && count[1] > 0;
+    for (size_t m = 0; m < 2; ++m) {
+        double gain = 0, sum = 0;
+        for (size_t i = 0; i < cells_.size(); ++i) {
+            const double weight = has_both ? light[i][0] * light[i][1] : light[i][m];
+            gain += weight * double(fits[i][m].gain);
+            sum += weight;
+        }
+        gain_[m] = sum > 0 ? float(gain / sum) : 0.0f;
+    }
+}
+
+void GuideTree::set_importance(const std::vector<PlacedWeight>& weights) {
+    std::vector<std::array<double, 8>> sums(cells_.size());
+    for (const PlacedWeight& w : weights)
+        sums[index(w.p)][GuideCell::octant(w.n)] += double(w.weight);
+    for (size_t i = 0; i < cells_.size(); ++i)
+        for (size_t k = 0; k < sums[i].size(); ++k)
+            cells_[i].importance[k] =
+                cells_[i].surface > 0 ? float(sums[i][k] / double(cells_[i].surface)) : 0.0f;
+}
+
+}  // namespace etendue

@@ -1,0 +1,89 @@
+#pragma once
+// Cells of space, each with the learned directions of both kinds of walks: a k-d tree, so that one look-up serves both.
+
+#include <cstdint>
+#include <vector>
+
+#include "guide/training.h"
+
+namespace etendue {
+
+/// A weight at a place on a surface.
+struct PlacedWeight {
+    Vec3 p, n;  ///< n: normal on the side that is meant.
+    float weight;
+};
+
+/// The learned directions of a cell. The fields are indexed by the TransportMode of the walks that they guide.
+struct GuideCell {
+    struct Field {
+        GuideMixture mixture;
+        std::array<float, kGuideClasses> share{};  ///< See GuideFit.
+    };
+    Vec3 center;
+    float surface = 0;  ///< Rough area of the surfaces in it.
+    /// Per area, by octant of the normal, which tells the sides of a wall apart; see GuideTree::set_importance().
+    std::array<float, 8> importance{};
+    std::array<Field, 2> fields;
+
+    static size_t octant(Vec3 n) {
+        return size_t(n.x < 0) | size_t(n.y < 0) << 1 | size_t(n.z < 0) << 2;
+    }
+    const Field& field(TransportMode mode) const { return fields[size_t(mode)]; }
+};
+
+class GuideTree {
+public:
+    GuideTree() = default;
+    /// Fits the cells in parallel; a function of the samples and their order. `seed` seeds its choices.
+    GuideTree(const std::vector<GuideSample>& samples, uint64_t seed);
+    /// One cell for all places.
+    explicit GuideTree(const GuideCell& cell) : nodes_(1), cells_{cell} {}
+
+    /// Sums of the weights in each cell over its surface.
+    void set_importance(const std::vector<PlacedWeight>& weights);
+
+    bool is_empty() const { return cells_.empty(); }
+    /// The cell that holds `p`. Not where the tree is empty.
+    const GuideCell& cell(Vec3 p) const { return cells_[index(p)]; }
+    const std::vector<GuideCell>& cells() const { return cells_; }
+    /// Mean of GuideFit::gain for walks of a mode, weighted by the product of radiance and importance in the cells.
+    float gain(TransportMode mode) const { return gain_[size_t(mode)]; }
+    size_t memory_bytes() const {
+        return nodes_.capacity() * sizeof(Node) + cells_.capacity() * sizeof(GuideCell);
+    }
+
+    template <class State>
+    void save(State& to) const {
+        to.put(nodes_);
+        to.put(cells_);
+        to.put(gain_);
+    }
+    template <class State>
+    void load(State& from) {
+        from.get(nodes_);
+        from.get(cells_);
+        from.get(gain_);
+    }
+
+private:
+    struct Node {
+        float split = 0;
+        uint32_t axis : 2 = 3;    ///< 3: a leaf.
+        uint32_t child : 30 = 0;  ///< The first of two nodes, or the cell.
+    };
+    struct Builder;
+    /// Of the cell that holds `p`.
+    size_t index(Vec3 p) const {
+        uint32_t i = 0;
+        while (nodes_[i].axis < 3)
+            i = nodes_[i].child + (p[int(nodes_[i].axis)] >= nodes_[i].split);
+        return nodes_[i].child;
+    }
+
+    std::vector<Node> nodes_;
+    std::vector<GuideCell> cells_;
+    std::array<float, 2> gain_{};
+};
+
+}  // namespace etendue

@@ -1,0 +1,248 @@
+#include "integrator/guiding.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "guide/random_guide.h"
+#include "math/hash.h"
+
+namespace etendue {
+namespace {
+
+/// Walks of a block, which are recorded in order by one thread.
+constexpr uint64_t kBlock = 256;
+/// Samples of a round and of a walk, which limit its number of walks.
+constexpr uint64_t kMostSamples = uint64_t(1) << 21;
+constexpr int kMostVertices = 10;
+constexpr uint64_t kMostWalks = kMostSamples / (2 * kMostVertices);
+
+/// The start of a light walk, and its vertices with smooth lobes.
+struct EmissionRecord {
+    GuideSample sample;  ///< Of y_0, without weight.
+    uint32_t emitter;
+    bool is_infinite;
+    std::vector<PlacedWeight> reached;  ///< With the power that arrives there.
+};
+
+struct Block {
+    std::vector<GuideSample> samples;
+    std::vector<PlacedWeight> importons;  ///< That the lens sees.
+    std::vector<EmissionRecord> emission;
+};
+
+/// Normal on the side from which the walk came.
+Vec3 facing_normal(const Vertex& v) {
+    return dot(v.ng, v.wo) < 0 ? -v.ng : v.ng;
+}
+
+/// What walks in the other mode can learn at v_i of a walk in `mode`: the direction it came from. They would arrive from
+/// where it went on to.
+GuideSample sample_at(const SubPath& path, int i, TransportMode mode) {
+    constexpr float kLeastCos = 0.05f;
+    const Vertex &v = path[i], &previous = path[i - 1];
+    GuideSample s;
+    s.p = v.p;
+    s.inv_distance = previous.is_infinite ? 0.0f : 1 / length(previous.p - v.p);
+    s.direction = PackedDirection(v.wo);
+    s.weight = luminance(v.beta) / std::max(abs_dot(v.ng, v.wo), kLeastCos);
+    if (!v.shape->material->is_transmissive()) s.set_normal(facing_normal(v));
+    s.mode = uint8_t(mode == TransportMode::Radiance ? TransportMode::Importance
+                                                     : TransportMode::Radiance);
+    s.gloss_class = uint8_t(guide_class(v.gloss)) & 0xf;
+    if (i + 1 < path.size() && !v.is_delta)
+        s.unguided_pdf = v.eval_unguided(direction(v, path[i + 1]), mode).pdf_rev;
+    return s;
+}
+
+/// Share of the light from y_0 that hits bring, rather than next events.
+float share_of_hits(const SubPath& y, const GuideSample& at_y1) {
+    if (y[0].emitter->is_delta()) return 0;
+    const double hit = double(at_y1.unguided_pdf) * double(y[1].to_predecessor),
+                 next_event = double(y[0].pdf_fwd) * double(y[1].next_event_ratio);
+    return hit > 0 ? float(sqr(hit) / (sqr(hit) + sqr(next_event))) : 0.0f;
+}
+
+void record_light_walk(const SubPath& y, Block& block) {
+    for (int i = 1; i < y.size(); ++i) {
+        if (!y[i].is_connectible) continue;
+        GuideSample s = sample_at(y, i, TransportMode::Importance);
+        if (i == 1) s.weight *= share_of_hits(y, s);
+        if (s.weight > 0) block.samples.push_back(s);
+    }
+    if (y.size() < 2) return;
+    EmissionRecord r{{}, y[0].emitter->index, y[0].is_infinite, {}};
+    for (int i = 1; i < y.size(); ++i)
+        if (y[i].is_connectible)
+            r.reached.push_back({y[i].p, facing_normal(y[i]), luminance(y[i].beta)});
+    if (!y[0].is_infinite) {
+        const Vec3 w = direction(y[0], y[1]);
+        r.sample.p = y[0].p;
+        r.sample.inv_distance = 1 / length(y[1].p - y[0].p);
+        r.sample.direction = PackedDirection(w);
+        r.sample.mode = uint8_t(TransportMode::Importance);
+        r.sample.unguided_pdf = y[0].eval_unguided(w, TransportMode::Importance).pdf;
+    }
+    if (!r.reached.empty()) block.emission.push_back(std::move(r));
+}
+
+void record_eye_walk(const SubPath& z, Block& block) {
+    for (int i = 1; i < z.size(); ++i) {
+        if (!z[i].is_connectible || z[i].kind != Vertex::Kind::Surface) continue;
+        // Light walks are connected to the lens; few hit it.
+        if (i == 1) {
+            block.importons.push_back({z[i].p, facing_normal(z[i]), luminance(z[i].beta)});
+            continue;
+        }
+        if (const GuideSample s = sample_at(z, i, TransportMode::Radiance); s.weight > 0)
+            block.samples.push_back(s);
+    }
+}
+
+template <class T>
+void append(std::vector<T>& to, const std::vector<T>& more) {
+    to.insert(to.end(), more.begin(), more.end());
+}
+
+/// Emission is learned by what walks bring to the places that the lens sees: an estimate of their splats.
+void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& records, uint64_t seed,
+                    Guide& guide) {
+    constexpr double kByPower = 0.3;
+    std::vector<GuideSample> samples;
+    std::vector<double> by_emitter(scene.emitters().size());
+    double sum = 0;
+    for (const EmissionRecord& r : records) {
+        GuideSample s = r.sample;
+        for (const PlacedWeight& v : r.reached)
+            s.weight += v.weight * guide.surfaces.cell(v.p).importance[GuideCell::octant(v.n)];
+        if (!(s.weight > 0)) continue;
+        by_emitter[r.emitter] += double(s.weight);
+        sum += double(s.weight);
+        if (!r.is_infinite) samples.push_back(s);
+    }
+    guide.emission = GuideTree(samples, seed);
+    if (!(sum > 0) || !scene.has_emitter_choice()) return;
+    for (size_t i = 0; i < by_emitter.size(); ++i)
+        by_emitter[i] = kByPower * double(scene.emitters()[i]->selection_pmf) +
+                        (1 - kByPower) * by_emitter[i] / sum;
+    guide.set_emission(std::move(by_emitter));
+}
+
+}  // namespace
+
+ParamInfo Guiding::param() {
+    return {"guide", ParamKind::String, "off",
+            "Learned directions for the walks: off, on, or auto (on, unless the training shows "
+            "that it gains too little). random is a useless guide for tests."};
+}
+
+Guiding::Guiding(const IntegratorParams& p) {
+    constexpr std::array<Choice<Mode>, 4> kModes{
+        {{"off", Mode::Off}, {"on", Mode::On}, {"auto", Mode::Auto}, {"random", Mode::Random}}};
+    mode_ = p.choice("guide", kModes);
+}
+
+bool Guiding::gains_little(bool has_light_walks) const {
+    constexpr float kLeastGain = 0.2f;  // nats
+    const auto is_little = [](const GuideTree& tree, TransportMode mode) {
+        return !(tree.gain(mode) >= kLeastGain);
+    };
+    return is_little(guide_->surfaces, TransportMode::Radiance) &&
+           (!has_light_walks || (is_little(guide_->surfaces, TransportMode::Importance) &&
+                                 is_little(guide_->emission, TransportMode::Importance)));
+}
+
+void Guiding::train(const PassContext& pass, const DepthOptions& depth, bool has_light_walks) {
+    constexpr int kRounds = 4;
+    constexpr uint64_t kFewestWalks = 1024;
+    // A pass that was dropped and is traced again is trained for once.
+    if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > pass.index) return;
+    const bool is_power_of_4 =
+        std::has_single_bit(pass.index) && std::countr_zero(pass.index) % 2 == 0;
+    if (!pass.scene.has_emitters() || (pass.index > 0 && !is_power_of_4)) return;
+    const uint64_t seed = hash_combine(pass.seed, 0x67756964ull + pass.index);
+    if (mode_ == Mode::Random) {
+        constexpr float kKappa = 1000;
+        const Bounds3& bounds = pass.scene.bounds();
+        std::vector<double> pmf;
+        for (const auto& e : pass.scene.emitters()) pmf.push_back(double(e->selection_pmf));
+        guide_ = std::make_unique<Guide>(
+            random_guide(bounds.center(), bounds.radius(), std::move(pmf), kKappa, seed));
+    } else if (pass.index == 0) {
+        const uint64_t first = std::max(kFewestWalks, std::min(pass.pixels, kMostWalks) >> kRounds);
+        for (int round = 0; round < kRounds; ++round)
+            guide_ = trained(pass, depth, first << round, hash_combine(seed, uint64_t(round)));
+        if (mode_ == Mode::Auto && gains_little(has_light_walks)) {
+            is_given_up_ = true;
+            guide_ = nullptr;
+        }
+    } else {
+        constexpr uint64_t kFewest = 16 * kFewestWalks;
+        guide_ = trained(pass, depth, std::clamp(pass.pixels, kFewest, kMostWalks), seed);
+    }
+    trained_passes_ = pass.index + 1;
+}
+
+std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOptions& depth,
+                                        uint64_t walks, uint64_t seed) const {
+    // Of a method with both walks.
+    const TechniqueCounts counts{
+        .hit = 1, .next_event = 1, .connect = 1, .splat = 1, .guide = guide_.get()};
+    WalkOptions options = depth.walk();
+    options.max_vertices = std::min(options.max_vertices, kMostVertices + 1);
+    std::vector<Block> blocks((walks + kBlock - 1) / kBlock);
+    pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
+        Sampler sampler(SamplerKind::Independent, seed);
+        RenderStats stats;  // not of the image
+        const WalkContext walk{pass.scene, counts, stats, options};
+        for (uint64_t i = b * kBlock; i < std::min(walks, (b + 1) * kBlock); ++i) {
+            sampler.start(0, i);
+            trace_light_path(walk, sampler, work.y);
+            record_light_walk(work.y, blocks[b]);
+            trace_eye_path(walk, pass.film, mix64(seed + i) % pass.pixels, sampler, work.z);
+            record_eye_walk(work.z, blocks[b]);
+        }
+    });
+    Block all;
+    for (const Block& b : blocks) {
+        append(all.samples, b.samples);
+        append(all.importons, b.importons);
+        append(all.emission, b.emission);
+    }
+    auto guide = std::make_unique<Guide>();
+    guide->surfaces = GuideTree(all.samples, seed);
+    if (guide->surfaces.is_empty()) return guide;
+    guide->surfaces.set_importance(all.importons);
+    learn_emission(pass.scene, all.emission, hash_combine(seed, 1), *guide);
+    return guide;
+}
+
+void Guiding::save(LearnedState& to) const {
+    to.put(trained_passes_);
+    to.put(is_given_up_);
+    to.put(guide_ != nullptr);
+    if (guide_) guide_->save(to);
+}
+
+void Guiding::load(LearnedState& from) {
+    from.get(trained_passes_);
+    from.get(is_given_up_);
+    bool has_guide = false;
+    from.get(has_guide);
+    guide_ = has_guide ? std::make_unique<Guide>() : nullptr;
+    if (guide_) guide_->load(from);
+}
+
+void Guiding::add_figures(std::vector<std::pair<std::string, double>>& figures) const {
+    if (mode_ == Mode::Off) return;
+    figures.push_back({"guided", guide_ ? 1 : 0});
+    if (!guide_) return;
+    figures.push_back({"guide_cells", double(guide_->surfaces.cells().size())});
+    figures.push_back({"guide_gain_eye", double(guide_->surfaces.gain(TransportMode::Radiance))});
+    figures.push_back(
+        {"guide_gain_light", double(guide_->surfaces.gain(TransportMode::Importance))});
+    figures.push_back(
+        {"guide_gain_emission", double(guide_->emission.gain(TransportMode::Importance))});
+    figures.push_back({"guide_bytes", double(guide_->memory_bytes())});
+}
+
+}  // namespace etendue

@@ -1,0 +1,42 @@
+#pragma once
+// Guided walks, as all integrators have them: the option, the training before pass 0, and refits between passes.
+
+#include <memory>
+
+#include "guide/guide.h"
+#include "integrator/integrator.h"
+
+namespace etendue {
+
+class Guiding {
+public:
+    static ParamInfo param();
+    Guiding() = default;
+    explicit Guiding(const IntegratorParams& params);
+
+    /// Trains before pass 0 and refits before passes 1, 4, 16, 64 …, from walks of its own: light walks show eye walks
+    /// where radiance comes from, and eye walks show light walks where importance does. Each round is guided by the one
+    /// before. For Integrator::trace(), before it traces anything. `has_light_walks`: whether the method has them.
+    void train(const PassContext& pass, const DepthOptions& depth, bool has_light_walks = true);
+    /// What guides walks until the next call of train(); nullptr where nothing does.
+    const Guide* guide() const { return guide_.get(); }
+
+    void save(LearnedState& to) const;
+    void load(LearnedState& from);
+    /// See Integrator::figures().
+    void add_figures(std::vector<std::pair<std::string, double>>& figures) const;
+
+private:
+    enum class Mode { Off, On, Auto, Random };
+    /// Whether it gains so little that it is not worth its time.
+    bool gains_little(bool has_light_walks) const;
+    std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
+                                   uint64_t walks, uint64_t seed) const;
+
+    Mode mode_ = Mode::Off;
+    std::unique_ptr<Guide> guide_;
+    uint32_t trained_passes_ = 0;  ///< That train() was called for.
+    bool is_given_up_ = false;     ///< By Mode::Auto.
+};
+
+}  // namespace etendue

@@ -1,0 +1,120 @@
+#include "pathspace/vertex.h"
+
+#include "guide/guide.h"
+
+namespace etendue {
+namespace {
+
+constexpr TransportMode other(TransportMode mode) {
+    return mode == TransportMode::Radiance ? TransportMode::Importance : TransportMode::Radiance;
+}
+
+float share(const Vertex& v, const GuideCell& cell, TransportMode mode) {
+    const bool is_surface = v.kind == Vertex::Kind::Surface;
+    return cell.field(mode).share[is_surface ? size_t(guide_class(v.gloss)) : size_t(0)];
+}
+
+/// For a walk that arrives at `v` from `from`.
+GuideView view(const Vertex& v, const GuideCell& cell, Vec3 from) {
+    const bool leaves_on_its_side =
+        v.kind == Vertex::Kind::Surface && !v.shape->material->is_transmissive();
+    const Vec3 normal = !leaves_on_its_side ? Vec3{} : dot(v.ng, from) < 0 ? -v.ng : v.ng;
+    return {cell.center - v.p, normal};
+}
+
+float delta_probability(const Vertex& v, Vec3 from, TransportMode mode) {
+    return v.kind == Vertex::Kind::Surface ? v.bsdf.delta_probability(from, mode) : 0.0f;
+}
+
+}  // namespace
+
+void Vertex::set_guide(const GuideCell& cell, TransportMode mode, bool both) {
+    guide = nullptr;
+    if (!is_connectible) return;
+    const float rev_share = both ? share(*this, cell, other(mode)) : 0.0f;
+    if (!(share(*this, cell, mode) > 0 || rev_share > 0)) return;
+    guide = &cell;
+    guide_rev =
+        rev_share > 0 ? cell.field(other(mode)).mixture.pdf(view(*this, cell, wo), wo) : 0.0f;
+}
+
+float guided_pdf(const Vertex& v, const GuideCell& cell, Vec3 from, Vec3 w, TransportMode mode,
+                 float unguided) {
+    const float a = share(v, cell, mode);
+    if (!(a > 0 && unguided > 0)) return unguided;
+    return (1 - a) * unguided + a * (1 - delta_probability(v, from, mode)) *
+                                    cell.field(mode).mixture.pdf(view(v, cell, from), w);
+}
+
+void Vertex::mix_guide(Vec3 w, TransportMode mode, float& pdf, float& pdf_rev) const {
+    pdf = guided_pdf(*this, *guide, wo, w, mode, pdf);
+    const TransportMode rev = other(mode);
+    if (const float a = share(*this, *guide, rev); a > 0 && pdf_rev > 0)
+        pdf_rev = (1 - a) * pdf_rev + a * (1 - delta_probability(*this, w, rev)) * guide_rev;
+}
+
+std::optional<BsdfSample> Vertex::sample_guided(float u_lobe, Vec2 u, float u_guide,
+                                                TransportMode mode) const {
+    std::optional<BsdfSample> s = sample_unguided(u_lobe, u, mode);
+    if (s && s->is_delta) return s;
+    BsdfEval e;
+    const float a = share(*this, *guide, mode);
+    if (u_guide < a) {
+        const Vec3 w = guide->field(mode).mixture.sample(
+            view(*this, *guide, wo), std::fmin(u_guide / a, kOneMinusEpsilon), u);
+        e = eval_unguided(w, mode);
+        if (!(e.pdf > 0)) return {};
+        s.emplace();
+        s->wi = w;
+        s->eta = e.eta;
+    } else {
+        if (!s) return {};
+        e = {s->weight * s->pdf, s->pdf, s->pdf_rev, s->eta};
+    }
+    const float unguided = e.pdf;
+    mix_guide(s->wi, mode, e.pdf, e.pdf_rev);
+    s->weight = e.f / e.pdf;
+    s->pdf = e.pdf;
+    s->pdf_rev = e.pdf_rev;
+    constexpr float kMostGain = 1e6f;  // where the BSDF would hardly sample the direction
+    s->gain = std::fmin(e.pdf / unguided, kMostGain);
+    return s;
+}
+
+float Vertex::max_pdf_unguided(const DirectionCone& cone) const {
+    if (const auto normal = cosine_normal()) {
+        const float cos = dot(cone.axis, *normal), cos_cone = std::cos(cone.angle);
+        if (cos > cos_cone) return kInvPi;
+        // cos(acos(cos) - angle), at least 0.
+        return kInvPi *
+               std::fmax(0.0f, cos * cos_cone + safe_sqrt(1 - cos * cos) * std::sin(cone.angle));
+    }
+    return kind == Kind::Emitter ? emitter->max_pdf_d() : bsdf.max_pdf(wo, cone);
+}
+
+float Vertex::max_guided_pdf(float unguided, const DirectionCone& cone, TransportMode mode) const {
+    const float a = share(*this, *guide, mode);
+    if (!(a > 0)) return unguided;
+    const float guided = guide->field(mode).mixture.max_pdf(view(*this, *guide, wo), cone);
+    return (1 - a) * unguided + a * (1 - delta_probability(*this, wo, mode)) * guided;
+}
+
+float guided_emission_pmf(const Guide& guide, const Emitter& emitter) {
+    return guide.chooses_emitters() ? guide.emission_pmf(emitter.index) : emitter.selection_pmf;
+}
+
+const GuideCell* emission_cell(const Guide* guide, const Emitter& emitter, Vec3 p) {
+    if (!guide || guide->emission.is_empty() || emitter.is_infinite()) return nullptr;
+    const GuideCell& cell = guide->emission.cell(p);
+    return cell.field(TransportMode::Importance).share[0] > 0 ? &cell : nullptr;
+}
+
+float emission_pdf(const Guide* guide, const Emitter& emitter, Vec3 p, Vec3 w, float unguided) {
+    const GuideCell* cell = emission_cell(guide, emitter, p);
+    if (!cell || !(unguided > 0)) return unguided;
+    const GuideCell::Field& field = cell->field(TransportMode::Importance);
+    const float a = field.share[0];
+    return (1 - a) * unguided + a * field.mixture.pdf({cell->center - p, {}}, w);
+}
+
+}  // namespace etendue

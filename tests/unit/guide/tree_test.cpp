@@ -1,0 +1,152 @@
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "guide/guide.h"
+#include "math/frame.h"
+#include "math/warp.h"
+#include "random.h"
+
+namespace etendue {
+namespace {
+
+using testing::Random;
+
+constexpr auto kEye = TransportMode::Radiance, kLight = TransportMode::Importance;
+
+/// Places on a floor, lit by a small lamp above, for eye walks; and directions without structure, for light walks.
+std::vector<GuideSample> samples_under_lamp(int count) {
+    const Vec3 lamp{0.2f, 0.3f, 1};
+    Random random(3);
+    std::vector<GuideSample> samples;
+    for (int i = 0; i < count; ++i) {
+        GuideSample s;
+        const Vec2 at = random.next_2d();
+        s.p = {at.x, at.y, 0};
+        s.set_normal({0, 0, 1});
+        s.weight = 1;
+        const bool for_eye = i % 2 == 0;
+        const Vec3 jitter = sample_uniform_sphere(random.next_2d());
+        const Vec3 to =
+            for_eye ? lamp + jitter * 0.01f - s.p : sample_cosine_hemisphere(random.next_2d());
+        s.mode = uint8_t(for_eye ? kEye : kLight);
+        s.inv_distance = for_eye ? 1 / length(to) : 0.0f;
+        s.direction = PackedDirection(normalize(to));
+        s.unguided_pdf = s.direction.unpack().z * kInvPi;
+        samples.push_back(s);
+    }
+    return samples;
+}
+
+TEST(PackedDirection, IsPrecise) {
+    Random random(1);
+    for (int i = 0; i < 10000; ++i) {
+        const Vec3 w = sample_uniform_sphere(random.next_2d());
+        const Vec3 v = PackedDirection(w).unpack();
+        EXPECT_LT(length(v - w), 1e-4f);
+        EXPECT_NEAR(length(v), 1, 1e-6);
+    }
+}
+
+TEST(GuideTree, LearnsALampWithParallax) {
+    const GuideTree tree(samples_under_lamp(20000), 1);
+    EXPECT_GT(tree.cells().size(), 4u);
+    for (const Vec2 at : {Vec2{0.1f, 0.9f}, Vec2{0.5f, 0.5f}, Vec2{0.93f, 0.12f}}) {
+        const Vec3 p{at.x, at.y, 0};
+        const GuideCell& cell = tree.cell(p);
+        const Vec3 to_lamp = normalize(Vec3{0.2f, 0.3f, 1} - p);
+        EXPECT_GT(cell.field(kEye).mixture.pdf({cell.center - p, {0, 0, 1}}, to_lamp), 100);
+        EXPECT_GT(cell.field(kEye).share[0], 0.8f);
+        EXPECT_EQ(cell.field(kLight).share[0], 0) << "nothing can be gained";
+    }
+    EXPECT_GT(tree.gain(kEye), 3);
+    EXPECT_EQ(tree.gain(kLight), 0);
+}
+
+/// Writes and reads as LearnedState does.
+struct State {
+    std::vector<std::byte> bytes;
+    size_t at = 0;
+
+    template <class T>
+    void put(const T& value) {
+        const auto* from = reinterpret_cast<const std::byte*>(&value);
+        bytes.insert(bytes.end(), from, from + sizeof(T));
+    }
+    template <class T>
+    void put(const std::vector<T>& values) {
+        put(values.size());
+        for (const T& v : values) put(v);
+    }
+    template <class T>
+    void get(T& value) {
+        std::memcpy(&value, &bytes[at], sizeof(T));
+        at += sizeof(T);
+    }
+    template <class T>
+    void get(std::vector<T>& values) {
+        size_t size = 0;
+        get(size);
+        values.resize(size);
+        for (T& v : values) get(v);
+    }
+};
+
+/// Densities of many directions at many places.
+std::vector<float> densities(const GuideTree& tree) {
+    Random random(21);
+    std::vector<float> all;
+    for (int i = 0; i < 2000; ++i) {
+        const Vec2 at = random.next_2d();
+        const Vec3 p{at.x, at.y, 0};
+        const GuideCell& cell = tree.cell(p);
+        const Vec3 w = random.unit_vector();
+        for (const GuideCell::Field& f : cell.fields) {
+            all.push_back(f.mixture.pdf({cell.center - p, {0, 0, 1}}, w));
+            all.push_back(f.share[0]);
+        }
+    }
+    return all;
+}
+
+TEST(GuideTree, IsSavedAndLoaded) {
+    const GuideTree tree(samples_under_lamp(20000), 1);
+    State state;
+    tree.save(state);
+    GuideTree loaded;
+    loaded.load(state);
+    EXPECT_EQ(densities(tree), densities(loaded));
+    EXPECT_EQ(tree.gain(kEye), loaded.gain(kEye));
+}
+
+TEST(GuideTree, IsTheSameForAnyNumberOfThreads) {
+    const std::vector<GuideSample> samples = samples_under_lamp(30000);
+    const auto with = [&](size_t threads) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        return densities(GuideTree(samples, 5));
+    };
+    const auto one = with(1);
+    EXPECT_EQ(one, with(2));
+    EXPECT_EQ(one, with(7));
+}
+
+TEST(GuideTree, CoincidentSamplesAreOneCell) {
+    std::vector<GuideSample> samples = samples_under_lamp(10000);
+    for (GuideSample& s : samples) s.p = {1, 2, 3};
+    EXPECT_EQ(GuideTree(samples, 1).cells().size(), 1u);
+}
+
+TEST(GuideTree, FewSamplesMakeNoGuide) {
+    const GuideTree tree(samples_under_lamp(20), 1);
+    EXPECT_EQ(tree.cell({}).field(kEye).share[0], 0);
+    EXPECT_TRUE(GuideTree({}, 1).is_empty());
+}
+
+TEST(GuideTree, KeepsItsMemoryBound) {
+    const GuideTree tree(samples_under_lamp(1 << 21), 1);
+    EXPECT_LT(tree.memory_bytes() + (size_t(1) << 21) * sizeof(GuideSample), size_t(128) << 20);
+}
+
+}  // namespace
+}  // namespace etendue

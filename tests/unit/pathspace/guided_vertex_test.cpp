@@ -1,0 +1,200 @@
+// Directions of guided vertices against their density. False-alarm rate: 0.1 % for each case.
+
+#include <gtest/gtest.h>
+
+#include "chi2.h"
+#include "guide/guide.h"
+#include "math/warp.h"
+#include "pathspace/walk.h"
+#include "random.h"
+#include "test_scenes.h"
+
+namespace etendue {
+namespace {
+
+using testing::Random;
+
+constexpr auto kEye = TransportMode::Radiance, kLight = TransportMode::Importance;
+
+struct Case {
+    const char* name;
+    std::string bsdf;
+};
+
+std::vector<Case> cases() {
+    const auto two_sided = [](const std::string& b) {
+        return "<bsdf type=\"twosided\">" + b + "</bsdf>";
+    };
+    return {
+        {"diffuse", test::diffuse("0.7,0.6,0.5")},
+        {"plastic", two_sided(test::kPlastic)},
+        {"rough_metal", test::kRoughMetal},
+        {"rough_glass", test::kRoughGlass},
+        {"mirror_and_diffuse",
+         two_sided("<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.4\"/><bsdf "
+                   "type=\"diffuse\"/><bsdf type=\"conductor\"/></bsdf>")},
+    };
+}
+
+/// Wide enough lobes for a quadrature.
+Guide smooth_guide() {
+    Random random(5);
+    GuideCell cell;
+    for (GuideCell::Field& field : cell.fields) {
+        field.share = {0.3f, 0.6f, 0.8f};
+        for (int k = 0; k < 5; ++k) {
+            const Vec3 mean = random.unit_vector();
+            field.mixture.add({mean, random.next_1d(), random.between(2, 25), random.next_1d()});
+        }
+    }
+    Guide guide;
+    guide.surfaces = GuideTree(cell);
+    return guide;
+}
+
+class GuidedVertex : public ::testing::TestWithParam<Case> {
+protected:
+    GuidedVertex()
+        : scene(test::build(test::front_camera(8) + test::area_lamp() +
+                            test::sphere("0,0,0", "0.5", GetParam().bsdf))),
+          film(scene.film(), scene.filter()), guide(smooth_guide()) {}
+
+    /// z_1 on the sphere, seen by several pixels.
+    void trace(SubPath& z, uint32_t index) {
+        const TechniqueCounts counts{.hit = 1, .connect = 1, .guide = &guide};
+        const WalkContext walk{scene, counts, stats, {2, 1000}};
+        Sampler sampler(SamplerKind::Independent, 4);
+        sampler.start(index, 0);
+        start_eye_path(walk, film, 27 + 8 * (index % 2) + index / 2 % 2, sampler, z);
+        ASSERT_EQ(z.size(), 2);
+        ASSERT_NE(z[1].guide, nullptr);
+    }
+
+    Scene scene;
+    Film film;
+    Guide guide;
+    RenderStats stats;
+};
+
+TEST_P(GuidedVertex, SamplesItsDensity) {
+    for (uint32_t index = 0; index < 4; ++index) {
+        SubPath z;
+        trace(z, index);
+        const Vertex& v = z[1];
+        Random random(index);
+        testing::Chi2Grid grid(-1, 1, 16, -M_PI, M_PI, 32);
+        int delta = 0;
+        constexpr int kSamples = 200000;
+        for (int i = 0; i < kSamples; ++i) {
+            const float u_lobe = random.next_1d(), u_guide = random.next_1d();
+            const auto s = v.sample(u_lobe, random.next_2d(), u_guide, kEye);
+            if (!s || s->is_delta) {
+                delta += s.has_value();
+                grid.add_outside();
+                continue;
+            }
+            grid.add(double(s->wi.z), std::atan2(double(s->wi.y), double(s->wi.x)));
+            const BsdfEval e = v.eval(s->wi, kEye);
+            ASSERT_NEAR(s->pdf / e.pdf, 1, 1e-3);
+            ASSERT_NEAR(s->weight.g * s->pdf, e.f.g, 1e-3 * std::fmax(1.0f, e.f.g));
+            if (s->gain < 1e5f) {
+                ASSERT_NEAR(s->gain, s->pdf / v.eval_unguided(s->wi, kEye).pdf, 2e-3 * s->gain);
+            }
+        }
+        const auto result = grid.test(
+            [&](double cos, double phi) {
+                const double sin = std::sqrt(1 - cos * cos);
+                return double(
+                    v.eval({float(sin * std::cos(phi)), float(sin * std::sin(phi)), float(cos)},
+                           kEye)
+                        .pdf);
+            },
+            3);
+        EXPECT_GT(result.p_value, 1e-3 / 4) << result.total_probability;
+        const float P_delta = v.bsdf.delta_probability(v.wo, kEye);
+        EXPECT_LE(result.total_probability + double(P_delta), 1.001);
+        EXPECT_NEAR(double(delta) / kSamples, double(P_delta), 0.005);
+    }
+}
+
+/// The density of the reverse direction is that of the other walk, which looks the guide up itself.
+TEST_P(GuidedVertex, KnowsTheOtherWalk) {
+    Random random(11);
+    for (uint32_t index = 0; index < 20; ++index) {
+        SubPath z;
+        trace(z, index);
+        const Vertex& v = z[1];
+        int compared = 0;
+        for (int i = 0; i < 200; ++i) {
+            const Vec3 w = random.unit_vector();
+            const BsdfEval e = v.eval(w, kEye);
+            if (!(e.pdf_rev > 0)) continue;
+            ++compared;
+            Vertex back = v;
+            back.wo = w;
+            back.set_guide(guide.surfaces.cell(v.p), kLight, true);
+            const BsdfEval r = back.eval(v.wo, kLight);
+            EXPECT_NEAR(e.pdf_rev, r.pdf, 1e-4 * std::fmax(1.0f, r.pdf));
+            EXPECT_NEAR(e.pdf, r.pdf_rev, 1e-4 * std::fmax(1.0f, e.pdf));
+        }
+        EXPECT_GT(compared, 20);
+    }
+}
+
+TEST_P(GuidedVertex, IsBelowItsBound) {
+    Random random(13);
+    for (uint32_t index = 0; index < 10; ++index) {
+        SubPath z;
+        trace(z, index);
+        for (int i = 0; i < 200; ++i) {
+            const DirectionCone cone{random.unit_vector(), random.between(0.001f, 1)};
+            const float bound = z[1].max_pdf(cone, kEye);
+            for (int k = 0; k < 20; ++k) {
+                const Vec3 w = Frame::from_normal(cone.axis).to_world(
+                    sample_uniform_cone(random.next_2d(), std::cos(cone.angle)));
+                EXPECT_LE(z[1].eval(w, kEye).pdf, bound * 1.001f);
+            }
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Materials, GuidedVertex, ::testing::ValuesIn(cases()),
+                         [](const auto& p) { return std::string(p.param.name); });
+
+/// A guide that has learned nothing changes no bit of a walk.
+TEST(UntrainedGuide, LeavesWalksAsTheyAre) {
+    const Scene scene = test::build(test::mixed_room(test::front_camera(8)));
+    const Film film(scene.film(), scene.filter());
+    Guide guide;
+    GuideCell cell;
+    cell.fields[0].mixture.add({{0, 0, 1}, 0, 10, 1});
+    guide.surfaces = guide.emission = GuideTree(cell);
+    const TechniqueCounts without{.hit = 1, .connect = 1},
+        with{.hit = 1, .connect = 1, .guide = &guide};
+    RenderStats stats;
+    SubPath a, b;
+    for (uint32_t i = 0; i < 500; ++i) {
+        Sampler sampler(SamplerKind::Independent, 1);
+        sampler.start(i, i % 64);
+        const WalkContext plain{scene, without, stats, {}}, guided{scene, with, stats, {}};
+        const auto expect_same = [&] {
+            ASSERT_EQ(a.size(), b.size());
+            for (int k = 0; k < a.size(); ++k) {
+                EXPECT_EQ(a[k].p, b[k].p);
+                EXPECT_EQ(a[k].beta, b[k].beta);
+                EXPECT_EQ(a[k].pdf_fwd, b[k].pdf_fwd);
+                EXPECT_EQ(a[k].pdf_rev, b[k].pdf_rev);
+                EXPECT_EQ(a[k].weight_sum, b[k].weight_sum);
+            }
+        };
+        trace_light_path(plain, sampler, a);
+        trace_light_path(guided, sampler, b);
+        expect_same();
+        trace_eye_path(plain, film, i % 64, sampler, a);
+        trace_eye_path(guided, film, i % 64, sampler, b);
+        expect_same();
+    }
+}
+
+}  // namespace
+}  // namespace etendue
