@@ -88,7 +88,9 @@ INSTANTIATE_TEST_SUITE_P(Integrators, Resume,
                                            "bdpt:connections=cache", "upg+bdpt:guide=on",
                                            "vcm:radius=0.3", "vcm:exact=true", "upg", "upg+bdpt",
                                            "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
-                                           "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48"),
+                                           "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
+                                           "pm:light_paths=2000",
+                                           "pm:light_paths=2000,cache_error=0.3,cache_rays=32"),
                          [](const auto& p) {
                              std::string name = p.param;
                              std::replace_if(
