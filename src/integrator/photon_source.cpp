@@ -11,14 +11,14 @@ void PhotonMemory::add(uint64_t photons) {
     constexpr uint64_t kPhotonBytes = 3 * sizeof(MapPhoton) + 32 + sizeof(Rgb) + 1;
     const uint64_t more = photons * kPhotonBytes;
     if (bytes_.fetch_add(more, std::memory_order_relaxed) + more > max_bytes_)
-        throw std::runtime_error(fmt::format("the photons need more than {} MiB; give fewer "
-                                             "light_paths, limit max_depth, or raise "
+        throw std::runtime_error(fmt::format("the photons need more than {} MiB; make "
+                                             "fewer, limit max_depth, or raise "
                                              "the integrator's parameter \"memory\"",
                                              max_bytes_ >> 20));
 }
 
 MapPhotons TracedPhotons::trace(const PassContext& context, uint32_t pass,
-                                const std::function<std::vector<PhotonQuery>()>&) {
+                                const std::function<std::vector<Importon>()>&) {
     std::vector<std::vector<MapPhoton>> chunks(context.chunks(context.light_paths));
     PhotonMemory memory(max_bytes_);
     context.for_each_light_path([&](const SampleContext& c, Workspace& work) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "integrator/photon_mapping.h"
-#include "reuse/photon_map.h"
+#include "reuse/photon_importance.h"
 
 namespace etendue {
 
@@ -17,21 +17,13 @@ struct MapPhotons {
     std::vector<MapPhoton> global, caustic;
 };
 
-/// A place at which the rendering looks for photons.
-struct PhotonQuery {
-    Vec3 p;
-    ArrivalSide side;
-    float importance;  ///< Luminance in the image of one unit of radiance from there.
-    bool is_caustic;   ///< Which map.
-};
-
 class PhotonSource {
 public:
     virtual ~PhotonSource() = default;
-    /// Photons at the surfaces where density estimates are made. Their random numbers are those of pass `pass`. `queries`
+    /// Photons at the surfaces where density estimates are made. Their random numbers are those of pass `pass`. `importons`
     /// makes a sample of the places at which the rendering will look for them.
     virtual MapPhotons trace(const PassContext& context, uint32_t pass,
-                             const std::function<std::vector<PhotonQuery>()>& queries) = 0;
+                             const std::function<std::vector<Importon>()>& importons) = 0;
     /// Number of paths that are traced for the photons.
     virtual uint64_t light_paths() const = 0;
     virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
@@ -73,7 +65,7 @@ public:
     TracedPhotons(const PhotonMapping& mapping, uint64_t light_paths, uint64_t max_bytes)
         : mapping_(mapping), light_paths_(light_paths), max_bytes_(max_bytes) {}
     MapPhotons trace(const PassContext& context, uint32_t pass,
-                     const std::function<std::vector<PhotonQuery>()>& queries) override;
+                     const std::function<std::vector<Importon>()>& importons) override;
     uint64_t light_paths() const override { return light_paths_; }
     std::vector<std::pair<std::string, double>> figures() const override;
 

@@ -9,6 +9,8 @@
 
 #include "integrator/pm.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -47,10 +49,8 @@ public:
           source_(make_source(p, mapping_, uint64_t(p.integer("memory", 1, 1 << 30)) << 20)),
           nearest_(p.integer("nearest", 2, PhotonMap::kMostNeighbours)),
           gather_rays_(p.integer("gather_rays", 0, 1 << 20)), radius_(p.number("radius")),
-          irradiance_(mapping_.paths().max_depth() == DepthOptions::kUnlimited
-                          ? p.integer("irradiance", 0, 1 << 20)
-                          : 0),
-          retrace_(p.flag("retrace")), cache_error_(p.number("cache_error", 0, 1)),
+          irradiance_(p.integer("irradiance", 0, 1 << 20)), retrace_(p.flag("retrace")),
+          cache_error_(p.number("cache_error", 0, 1)),
           cache_rays_(p.integer("cache_rays", 16, 1 << 20)) {
         const auto refuse = [&](const char* why) {
             throw std::runtime_error(fmt::format("{}: {}", p.integrator(), why));
@@ -70,10 +70,15 @@ public:
         maps_pass_ = retrace_ ? pass.index : 0;
         max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();
         if (has_maps_ && !retrace_) return;
-        MapPhotons photons = source_->trace(pass, maps_pass_, [&] { return sample_queries(pass); });
+        pass_ = 0;  // Importons are those of the first pass.
+        MapPhotons photons =
+            source_->trace(pass, maps_pass_, [&] { return sample_importons(pass); });
+        pass_ = pass.index;
         global_.build(std::move(photons.global));
         caustic_.build(std::move(photons.caustic));
-        if (irradiance_ > 0) irradiances_.begin(global_, irradiance_, nearest_, max_radius_);
+        if (irradiance_ > 0)
+            irradiances_.begin(global_, irradiance_, nearest_, max_radius_,
+                               mapping_.paths().max_depth() + 2 - kGathered);
         if (cache_error_ > 0) fill_cache(pass);
         has_maps_ = true;
     }
@@ -166,6 +171,9 @@ private:
 
     bool add_irradiance(const SampleContext& c, int t, float scale, const SubPath& z) const {
         if (irradiance_ == 0) return false;
+        // It holds the light that paths of limited length bring to the end of a gather ray from z_1.
+        const bool is_limited = mapping_.paths().max_depth() != DepthOptions::kUnlimited;
+        if (is_limited && t != kGathered) return false;
         const auto n = irradiance_normal(z[t - 1]);
         if (!n) return false;
         const auto E = irradiances_.find(z[t - 1].p, *n);
@@ -210,17 +218,18 @@ private:
         }
     }
 
-    /// Of few pixels' samples, with random numbers of their own.
-    std::vector<PhotonQuery> sample_queries(const PassContext& pass) const {
-        constexpr uint64_t kSamples = 1 << 14;
-        const uint64_t step = (pass.pixels + kSamples - 1) / kSamples;
-        std::vector<std::vector<PhotonQuery>> chunks(pass.chunks(pass.pixels));
+    /// About kSamples places where samples look for photons, with random numbers of their own.
+    std::vector<Importon> sample_importons(const PassContext& pass) const {
+        constexpr uint64_t kSamples = 1 << 16;
+        const uint64_t step =
+            (pass.pixels * uint64_t(std::max(1, gather_rays_)) + kSamples - 1) / kSamples;
+        std::vector<std::vector<Importon>> chunks(pass.chunks(pass.pixels));
         pass.for_each_sample(pass.pixels, [&](const SampleContext& c, Workspace& work) {
             if (c.pixel % step != 0) return;
             const TechniqueCounts none;
             const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
             SubPath& z = work.z;
-            c.sampler.start(0, hash_combine(c.pixel, kQueries));
+            c.sampler.start(0, hash_combine(c.pixel, kImportons));
             Sampler of_walk = c.sampler;
             start_eye_path(walk, c.film, c.pixel, of_walk, z);
             for (int t = 2; t <= z.size(); ++t) {
@@ -228,17 +237,17 @@ private:
                 if (mapping_.paths().is_joinable(z, t))
                     for_each_look(c, t, is_diffuse, false, work,
                                   [&](Look look, int u, float scale) {
-                                      chunks[c.chunk].push_back(query(look, z, u, scale));
+                                      chunks[c.chunk].push_back(importon(look, z, u, scale));
                                   });
                 if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
             }
         });
-        std::vector<PhotonQuery> queries;
+        std::vector<Importon> importons;
         for (const auto& chunk : chunks)
-            queries.insert(queries.end(), chunk.begin(), chunk.end());
-        return queries;
+            importons.insert(importons.end(), chunk.begin(), chunk.end());
+        return importons;
     }
-    static PhotonQuery query(Look look, const SubPath& z, int t, float scale) {
+    static Importon importon(Look look, const SubPath& z, int t, float scale) {
         const Vertex& v = z[t - 1];
         return {.p = v.p,
                 .side = arrival_side(v),
@@ -345,7 +354,9 @@ private:
                    v.beta * v.eval(n, TransportMode::Radiance).f * E);
     }
 
-    static constexpr uint64_t kQueries = 0x71756572696573;  ///< Of random numbers.
+    /// Vertices of an eye path whose gather ray leaves z_1 and ends where it first meets a surface.
+    static constexpr int kGathered = 3;
+    static constexpr uint64_t kImportons = 0x696d706f72746f6e;  ///< Of random numbers.
 
     PhotonMapping mapping_;
     std::unique_ptr<PhotonSource> source_;
@@ -383,8 +394,8 @@ std::vector<ParamInfo> photon_map_params(const ParamInfo& paths) {
                       "seen directly."});
     params.push_back({"irradiance", ParamKind::Int, "4",
                       "On diffuse surfaces, gather rays use the irradiance at the nearest of every "
-                      "n-th photon, which is computed when it is first needed; 0, or with a "
-                      "limited max_depth: they make a density estimate of their own."});
+                      "n-th photon, which is computed when it is first needed; 0: they make a "
+                      "density estimate of their own."});
     params.push_back({"cache_error", ParamKind::Float, "0",
                       "Error allowed by the irradiance cache (a in [Ward et al. 1988], usually 0.1 "
                       "to 0.4); 0: no cache."});

@@ -68,8 +68,7 @@ void Chain::load(LearnedState& from) {
 }
 
 void Chain::add(const ChainState& state, double chain_share, double large_share,
-                const ChainTerms& terms, double scale, StateSink& states,
-                ChainStats& stats) const {
+                const ChainTerms& terms, double scale, StateSink& states, ChainStats& stats) const {
     const double inverse = state.target + terms.c * terms.p_large * state.independent_density;
     if (!(inverse > 0) || !(state.target > 0)) return;
     stats.chain_light += chain_share * state.target / inverse;

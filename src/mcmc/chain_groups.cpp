@@ -126,9 +126,10 @@ void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
         const double mean = 1 / (double(steps) * double(plan_[k].chains));
         const ChainContext c{whole.sample, work};
         const auto states = make_sink(i, class_of_chain_[i], c, splats);
-        working_.chains[i].advance(
-            {options_.p_large, plan_[k].c}, scales[k], mean * double(pass.light_paths),
-            hash_combine(hash_combine(key, kSteps), i), working_.steps, steps, c, *states, stats[i]);
+        working_.chains[i].advance({options_.p_large, plan_[k].c}, scales[k],
+                                   mean * double(pass.light_paths),
+                                   hash_combine(hash_combine(key, kSteps), i), working_.steps,
+                                   steps, c, *states, stats[i]);
     });
 
     working_stats_ = {};

@@ -57,7 +57,8 @@ namespace {
 template <class Accept>
 class NearestAccepted {
 public:
-    NearestAccepted(float radius, const Accept& accept) : dist2_(radius * radius), accept_(accept) {}
+    NearestAccepted(float radius, const Accept& accept)
+        : dist2_(radius * radius), accept_(accept) {}
     size_t size() const { return index ? 1 : 0; }
     bool full() const { return true; }
     bool addPoint(float dist2, uint32_t i) {
@@ -90,11 +91,13 @@ std::optional<uint32_t> PhotonMap::nearest_on_side(Vec3 p, Vec3 n, int step, flo
     return found.index;
 }
 
-void PhotonIrradiance::begin(const PhotonMap& photons, int step, int count, float radius) {
+void PhotonIrradiance::begin(const PhotonMap& photons, int step, int count, float radius,
+                             int longest) {
     photons_ = &photons;
     step_ = step;
     count_ = count;
     radius_ = radius;
+    longest_ = longest;
     const size_t places = photons.photons().size() / size_t(step) + 1;
     states_ = std::make_unique<std::atomic<uint8_t>[]>(places);
     values_.resize(places);
@@ -126,7 +129,7 @@ Rgb PhotonIrradiance::compute(uint32_t photon) const {
     Rgb sum;
     for (int i = 0; i < near.count; ++i) {
         const MapPhoton& other = photons_->photons()[near.index[size_t(i)]];
-        if (dot(other.wi, n) > 0) sum += other.power;
+        if (other.s <= longest_ && dot(other.wi, n) > 0) sum += other.power;
     }
     return sum * (1 / near.disc);
 }

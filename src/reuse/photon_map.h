@@ -61,8 +61,8 @@ private:
 /// photons lie where nothing looks.
 class PhotonIrradiance {
 public:
-    /// Density estimates as by find(count, radius). `photons` must outlive this.
-    void begin(const PhotonMap& photons, int step, int count, float radius);
+    /// Density estimates as by find(count, radius), of photons with at most `longest` vertices. `photons` must outlive this.
+    void begin(const PhotonMap& photons, int step, int count, float radius, int longest);
 
     /// Irradiance at the nearest of these photons on the side with the normal `n`; empty where none is within the radius.
     std::optional<Rgb> find(Vec3 p, Vec3 n) const;
@@ -71,7 +71,7 @@ private:
     Rgb compute(uint32_t photon) const;
 
     const PhotonMap* photons_ = nullptr;
-    int step_ = 1, count_ = 0;
+    int step_ = 1, count_ = 0, longest_ = 0;
     float radius_ = 0;
     enum State : uint8_t { Unknown, InWork, Known };
     std::unique_ptr<std::atomic<uint8_t>[]> states_;

@@ -90,7 +90,9 @@ INSTANTIATE_TEST_SUITE_P(Integrators, Resume,
                                            "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
                                            "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
                                            "pm:light_paths=2000",
-                                           "pm:light_paths=2000,cache_error=0.3,cache_rays=32"),
+                                           "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
+                                           "mps:mutations=2000,precision=0.2",
+                                           "mps:mutations=500,precision=0.2,retrace=true"),
                          [](const auto& p) {
                              std::string name = p.param;
                              std::replace_if(
