@@ -64,8 +64,8 @@ public:
                 const ReconstructionFilter& filter)
         : NumberSpace(1), mapping_(mapping), region_(reached_region(geometry, filter)) {}
 
-    std::optional<PhotonImportance> importance;  ///< Of target Importons.
-    Clamp clamp;                                 ///< Of target Path.
+    const PhotonImportance* importance = nullptr;  ///< Of target Importons.
+    Clamp clamp;                                   ///< Of target Path.
 
     std::unique_ptr<ChainState> make_state() const override {
         return std::make_unique<PhotonState>();
@@ -291,7 +291,7 @@ constexpr uint64_t kScaleSamples = 4096;
 
 /// The floor of importance: a share of its mean over the flux of photons, so that every look finds some.
 float importance_floor(const PassContext& context, const PhotonMapping& mapping,
-                       const PhotonSpace& space) {
+                       const PhotonSpace& space, const PhotonImportance& density) {
     constexpr double kShareOfMean = 0.02;
     std::vector<std::array<double, 2>> sums(kScaleSamples);
     for_each_independent(context, kScaleSamples, [&](uint64_t i, const ChainContext& c) {
@@ -300,7 +300,7 @@ float importance_floor(const PassContext& context, const PhotonMapping& mapping,
         for_each_photon(mapping, c.work.y, [&](const MapPhoton& photon) {
             const double flux = double(luminance(photon.power));
             sums[i][0] += flux;
-            sums[i][1] += flux * double((*space.importance)(photon));
+            sums[i][1] += flux * double(density(photon));
         });
     });
     double flux = 0, important = 0;
@@ -387,8 +387,12 @@ MapPhotons MetropolisPhotons::trace(const PassContext& context, uint32_t pass,
 
     PhotonSpace space(mapping_, context.film.geometry(), context.film.filter());
     if (options_.target == PhotonTarget::Importons) {
-        space.importance.emplace(importons(), kRadius * context.scene.bounds().radius());
-        space.importance->set_floor(importance_floor(context, mapping_, space));
+        if (!importance_) {
+            PhotonImportance density(importons(), kRadius * context.scene.bounds().radius());
+            density.set_floor(importance_floor(context, mapping_, space, density));
+            importance_ = std::move(density);
+        }
+        space.importance = &*importance_;
     } else {
         space.clamp = median_responses(context, space);
     }

@@ -46,6 +46,7 @@ private:
 
     const PhotonMapping& mapping_;
     MetropolisPhotonOptions options_;
+    std::optional<PhotonImportance> importance_;  ///< Once there is a map; the same for all.
 
     // Of the last trace.
     Pilot pilot_;

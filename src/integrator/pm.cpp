@@ -70,10 +70,8 @@ public:
         maps_pass_ = retrace_ ? pass.index : 0;
         max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();
         if (has_maps_ && !retrace_) return;
-        pass_ = 0;  // Importons are those of the first pass.
         MapPhotons photons =
             source_->trace(pass, maps_pass_, [&] { return sample_importons(pass); });
-        pass_ = pass.index;
         global_.build(std::move(photons.global));
         caustic_.build(std::move(photons.caustic));
         if (irradiance_ > 0)
@@ -95,9 +93,9 @@ public:
             mapping_.add_direct(c, t, work);  // C(0,t), C(1,t)
             const bool is_diffuse = mapping_.takes_photons(z, t);
             if (mapping_.paths().is_joinable(z, t))  // M(s,t)
-                for_each_look(c, t, is_diffuse, true, work, [&](Look look, int u, float scale) {
-                    add_photons(c, look, u, scale, z);
-                });
+                for_each_look(
+                    c, pass_, t, is_diffuse, true, work,
+                    [&](Look look, int u, float scale) { add_photons(c, look, u, scale, z); });
             if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
         }
     }
@@ -120,15 +118,15 @@ private:
     /// Calls use(look, u, scale) for the density estimates that bring light to z_{t-1}: there, where u = t, or at the end
     /// z_{u-1} of a gather ray.
     template <class Use>
-    void for_each_look(const SampleContext& c, int t, bool is_diffuse, bool uses_cache,
-                       Workspace& work, const Use& use) const {
+    void for_each_look(const SampleContext& c, uint32_t pass, int t, bool is_diffuse,
+                       bool uses_cache, Workspace& work, const Use& use) const {
         if (!is_diffuse) {
             if (c.scene.has_delta_emitters()) use(Look::DeltaCaustic, t, 1.0f);
         } else if (gather_rays_ == 0) {
             use(Look::Seen, t, 1.0f);
         } else {
             use(Look::Caustic, t, 1.0f);
-            if (!uses_cache || !add_cached(c, t, work.z)) final_gather(c, t, work, use);
+            if (!uses_cache || !add_cached(c, t, work.z)) final_gather(c, pass, t, work, use);
         }
     }
 
@@ -199,7 +197,8 @@ private:
 
     /// Calls use(look, u, scale) for the light that reaches z_{t-1} from another diffuse surface.
     template <class Use>
-    void final_gather(const SampleContext& c, int t, Workspace& work, const Use& use) const {
+    void final_gather(const SampleContext& c, uint32_t pass, int t, Workspace& work,
+                      const Use& use) const {
         const TechniqueCounts none;
         const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
         SubPath& z = work.z;
@@ -207,7 +206,7 @@ private:
         for (int ray = 0; ray < gather_rays_; ++ray) {
             // A sample of its own; the rays of all passes are successive points of one sequence.
             Sampler of_ray = c.sampler;
-            of_ray.start(pass_ * uint32_t(gather_rays_) + uint32_t(ray),
+            of_ray.start(pass * uint32_t(gather_rays_) + uint32_t(ray),
                          hash_combine(c.pixel, uint64_t(t)));
             const SampleContext gather = c.with(of_ray, c.sink);
             if (extend<TransportMode::Radiance>(walk, of_ray, z) && !z[t - 1].is_delta)
@@ -218,34 +217,41 @@ private:
         }
     }
 
-    /// About kSamples places where samples look for photons, with random numbers of their own.
+    /// At least kFewest places where samples look for photons, if any do, with random numbers of their own.
     std::vector<Importon> sample_importons(const PassContext& pass) const {
-        constexpr uint64_t kSamples = 1 << 16;
-        const uint64_t step =
-            (pass.pixels * uint64_t(std::max(1, gather_rays_)) + kSamples - 1) / kSamples;
+        constexpr uint64_t kFewest = 1 << 16;
+        const uint64_t rays = pass.pixels * uint64_t(std::max(1, gather_rays_)),
+                       rounds = (kFewest + rays - 1) / rays,
+                       step = std::max(uint64_t(1), rays / kFewest);
         std::vector<std::vector<Importon>> chunks(pass.chunks(pass.pixels));
         pass.for_each_sample(pass.pixels, [&](const SampleContext& c, Workspace& work) {
             if (c.pixel % step != 0) return;
-            const TechniqueCounts none;
-            const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
-            SubPath& z = work.z;
-            c.sampler.start(0, hash_combine(c.pixel, kImportons));
-            Sampler of_walk = c.sampler;
-            start_eye_path(walk, c.film, c.pixel, of_walk, z);
-            for (int t = 2; t <= z.size(); ++t) {
-                const bool is_diffuse = mapping_.takes_photons(z, t);
-                if (mapping_.paths().is_joinable(z, t))
-                    for_each_look(c, t, is_diffuse, false, work,
-                                  [&](Look look, int u, float scale) {
-                                      chunks[c.chunk].push_back(importon(look, z, u, scale));
-                                  });
-                if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
+            for (uint32_t round = 0; round < rounds; ++round) {
+                c.sampler.start(round, hash_combine(c.pixel, kImportons));
+                add_importons(c, round, chunks[c.chunk], work);
             }
         });
         std::vector<Importon> importons;
         for (const auto& chunk : chunks)
             importons.insert(importons.end(), chunk.begin(), chunk.end());
         return importons;
+    }
+    void add_importons(const SampleContext& c, uint32_t round, std::vector<Importon>& importons,
+                       Workspace& work) const {
+        const TechniqueCounts none;
+        const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
+        SubPath& z = work.z;
+        Sampler of_walk = c.sampler;
+        start_eye_path(walk, c.film, c.pixel, of_walk, z);
+        for (int t = 2; t <= z.size(); ++t) {
+            const bool is_diffuse = mapping_.takes_photons(z, t);
+            if (mapping_.paths().is_joinable(z, t))
+                for_each_look(c, round, t, is_diffuse, false, work,
+                              [&](Look look, int u, float scale) {
+                                  importons.push_back(importon(look, z, u, scale));
+                              });
+            if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
+        }
     }
     static Importon importon(Look look, const SubPath& z, int t, float scale) {
         const Vertex& v = z[t - 1];
