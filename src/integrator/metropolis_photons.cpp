@@ -447,8 +447,7 @@ Figures MetropolisPhotons::figures() const {
     if (options_.target == PhotonTarget::Path)
         out.push_back(
             {"trials_per_photon", deposits_ > 0 ? double(trials_) / double(deposits_) : 0.0});
-    constexpr std::array<const char*, 2> kMutations{"small", "block"};
-    add_step_figures(stats_, kMutations, 1, out);
+    add_step_figures(stats_, NumberSpace::kMutations, 1, out);
     return out;
 }
 

@@ -52,6 +52,7 @@ struct NumberState : ChainState {
 class NumberSpace : public StateSpace {
 public:
     enum Mutation { Small, Block };
+    static constexpr std::array<const char*, 2> kMutations{"small", "block"};
 
     explicit NumberSpace(int classes) : classes_(classes) {}
 
@@ -67,7 +68,6 @@ protected:
                           ChainState& y) const = 0;
 
 private:
-    static constexpr std::array<const char*, 2> kMutations{"small", "block"};
     static constexpr double kBlockShare = 0.25;  ///< Of the mutations.
 
     int classes_;
