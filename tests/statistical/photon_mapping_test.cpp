@@ -66,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(
                "pm:light_paths=500,retrace=true,nearest=512,radius=0.1,gather_rays=2,irradiance=0",
                256},
         Method{"mps_importons",
-               "mps:mutations=500,chains=16,precision=0.05,retrace=true,nearest=512,radius=0.1,"
+               "mps:mutations=2000,chains=16,precision=0.02,retrace=true,nearest=512,radius=0.1,"
                "gather_rays=2,irradiance=0",
                128},
         Method{"mps_path",
