@@ -26,7 +26,7 @@ const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
         path_entry(),   light_entry(), bdpt_entry(), pm_entry(),       ppm_entry(),
         sppm_entry(),   vcm_entry(),   upg_entry(),  upg_bdpt_entry(), pcbpt_entry(),
-        pssmlt_entry(), mmlt_entry(),  mlt_entry(),      mps_entry()};
+        pssmlt_entry(), mmlt_entry(),  mlt_entry(),  mps_entry()};
     return entries;
 }
 
