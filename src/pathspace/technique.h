@@ -14,10 +14,10 @@ enum class Strategy : uint8_t {
     Hit,        ///< C(0,t): the eye path hits an emitter.
     NextEvent,  ///< C(1,t), t ≥ 2: a point sampled on an emitter for z_{t-1}.
     Connect,    ///< C(s,t), s ≥ 2, t ≥ 2; for s = 1, with y_0 of a light path.
-    Splat,      ///< C(s,1): the light path is connected to the lens. Not C(1,1) where there are hits.
-    HitLens,    ///< C(s,0): the light path hits a finite lens.
-    Merge,      ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are treated as one vertex.
-    Gather,     ///< U(s,t): one vertex of such a pair is dropped; a shadow ray connects the rest.
+    Splat,    ///< C(s,1): the light path is connected to the lens. Not C(1,1) where there are hits.
+    HitLens,  ///< C(s,0): the light path hits a finite lens.
+    Merge,    ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are treated as one vertex.
+    Gather,   ///< U(s,t): one vertex of such a pair is dropped; a shadow ray connects the rest.
 };
 
 /// Whether y_{s-1} and z_{t-1} stand for one vertex of the full path.

@@ -201,6 +201,9 @@ private:
     void finish_emitters() {
         Bounds3 bounds = scene_.bounds_;
         bounds.extend(scene_.sensor_->lens_bounds());
+        // The errors of points near 0, wherever their rays come from. Large scenes may have small details.
+        scene_.least_offset_ =
+            std::ldexp(1.0f, std::clamp(std::ilogb(bounds.radius()), -120, 0) - 6);
         const float radius = std::max(bounds.radius(), 1e-6f);
         // Area emitters emit into the exterior medium.
         std::map<const Emitter*, MediumId> media;

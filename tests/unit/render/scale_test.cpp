@@ -1,4 +1,5 @@
-// Images do not depend on the unit of radiance: scaling all emitters by a power of two scales every pixel exactly.
+// Images do not depend on the units of radiance and length: scaling all emitters by a power of two scales every pixel
+// exactly, and scaling the scene by one changes nothing.
 
 #include <cctype>
 #include <cmath>
@@ -12,28 +13,59 @@
 namespace etendue::test {
 namespace {
 
-std::string scaled_rgb(const char* name, Rgb value, float factor) {
+/// Factors, relative to the units of the scene below.
+struct Units {
+    float radiance = 1, length = 1;
+};
+void PrintTo(const Units& u, std::ostream* out) {
+    *out << "radiance * " << u.radiance << ", length * " << u.length;
+}
+
+std::string rgb(const char* name, Rgb value, float factor) {
     return fmt::format("<rgb name=\"{}\" value=\"{:.9g},{:.9g},{:.9g}\"/>", name, value.r * factor,
                        value.g * factor, value.b * factor);
+}
+std::string vec(Vec3 v, float factor) {
+    return fmt::format("{:.9g},{:.9g},{:.9g}", v.x * factor, v.y * factor, v.z * factor);
 }
 
 /// A room with glass, rough and smooth, seen through a lens: every technique has something to do. The tent makes splats
 /// reach several pixels.
-Scene lit_room(float factor) {
-    std::string camera = lens_camera(16);
-    const std::string box = "<rfilter type=\"box\"/>";
-    camera.replace(camera.find(box), box.size(), "<rfilter type=\"tent\"/>");
-    const std::string lamp =
-        rectangle("<scale value=\"0.25\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.98\"/>",
-                  diffuse("0.5,0.5,0.5") + "<emitter type=\"area\">" +
-                      scaled_rgb("radiance", {12, 11, 9}, factor) + "</emitter>");
-    return build(camera + room() + lamp + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
-                 sphere("0.4,-0.65,0.3", "0.3", kRoughGlass) +
-                 sphere("0.1,0.2,-0.1", "0.2", kGlass) +
-                 "<emitter type=\"point\"><point name=\"position\" value=\"0.3,0.1,0.7\"/>" +
-                 scaled_rgb("intensity", {0.3f, 0.5f, 0.4f}, factor) +
-                 "</emitter><emitter type=\"constant\">" +
-                 scaled_rgb("radiance", {0.3f, 0.4f, 0.5f}, factor) + "</emitter>");
+Scene lit_room(Units u) {
+    const auto placed = [&](const std::string& transform) {
+        return fmt::format("{}<scale value=\"{:.9g}\"/>", transform, u.length);
+    };
+    const auto ball = [&](Vec3 center, float radius, const std::string& bsdf) {
+        return sphere(vec(center, u.length), fmt::format("{:.9g}", radius * u.length), bsdf);
+    };
+    const auto wall = [&](const std::string& transform, const char* reflectance) {
+        return rectangle(placed(transform), diffuse(reflectance));
+    };
+    const std::string camera = fmt::format(
+        "<sensor type=\"thinlens\"><float name=\"fov\" value=\"45\"/><float "
+        "name=\"aperture_radius\" value=\"{:.9g}\"/><float name=\"focus_distance\" "
+        "value=\"{:.9g}\"/><transform name=\"to_world\"><lookat origin=\"{}\" target=\"0,0,0\" "
+        "up=\"0,1,0\"/></transform><film type=\"hdrfilm\"><integer name=\"width\" "
+        "value=\"16\"/><integer name=\"height\" value=\"16\"/><rfilter type=\"tent\"/></film>"
+        "</sensor>",
+        0.3f * u.length, 3 * u.length, vec({0, 0, 3.4f}, u.length));
+    const std::string lamp = rectangle(
+        placed("<scale value=\"0.25\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.98\"/>"),
+        diffuse("0.5,0.5,0.5") + "<emitter type=\"area\">" +
+            rgb("radiance", {12, 11, 9}, u.radiance) + "</emitter>");
+    return build(
+        camera + wall("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>", "0.7,0.7,0.7") +
+        wall("<rotate x=\"1\" angle=\"90\"/><translate y=\"1\"/>", "0.7,0.7,0.7") +
+        wall("<translate z=\"-1\"/>", "0.7,0.7,0.7") +
+        wall("<rotate y=\"1\" angle=\"90\"/><translate x=\"-1\"/>", "0.6,0.1,0.1") +
+        wall("<rotate y=\"1\" angle=\"-90\"/><translate x=\"1\"/>", "0.1,0.5,0.1") + lamp +
+        ball({-0.5f, -0.6f, 0.2f}, 0.35f, kRoughMetal) +
+        ball({0.4f, -0.65f, 0.3f}, 0.3f, kRoughGlass) + ball({0.1f, 0.2f, -0.1f}, 0.2f, kGlass) +
+        "<emitter type=\"point\"><point name=\"position\" value=\"" +
+        vec({0.3f, 0.1f, 0.7f}, u.length) + "\"/>" +
+        rgb("intensity", {0.3f, 0.5f, 0.4f}, u.radiance * sqr(u.length)) +
+        "</emitter><emitter type=\"constant\">" + rgb("radiance", {0.3f, 0.4f, 0.5f}, u.radiance) +
+        "</emitter>");
 }
 
 struct Rendering {
@@ -42,8 +74,8 @@ struct Rendering {
     RenderStats stats;
 };
 
-Rendering render(float factor, const std::string& integrator) {
-    const Scene scene = lit_room(factor);
+Rendering render(Units units, const std::string& integrator) {
+    const Scene scene = lit_room(units);
     RenderSettings settings;
     settings.integrator = IntegratorSpec::parse(integrator);
     settings.sampler = SamplerKind::Sobol;
@@ -63,14 +95,19 @@ size_t different(const std::vector<Rgb>& a, const std::vector<Rgb>& b, float fac
     return count;
 }
 
-class UnitOfRadiance : public ::testing::TestWithParam<std::string> {};
+class ScaledScene : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(UnitOfRadiance, ChangesNoBit) {
-    const Rendering one = render(1, GetParam());
+/// Powers of two: of radiance, and of lengths about four orders of magnitude.
+TEST_P(ScaledScene, HasTheSameBits) {
+    const Rendering one = render({}, GetParam());
     ASSERT_TRUE(one.error.valid);
-    for (const float factor : {0x1p40f, 0x1p-40f}) {
-        SCOPED_TRACE(factor);
-        const Rendering other = render(factor, GetParam());
+    for (const Units units : {Units{.radiance = 0x1p40f},
+                              {.radiance = 0x1p-40f},
+                              {.length = 0x1p13f},
+                              {.length = 0x1p-13f}}) {
+        SCOPED_TRACE(::testing::PrintToString(units));
+        const float factor = units.radiance;
+        const Rendering other = render(units, GetParam());
         EXPECT_EQ(different(other.image, one.image, factor), 0u) << "of " << 3 * one.image.size();
         EXPECT_EQ(different(other.variance, one.variance, factor * factor), 0u);
         EXPECT_EQ(other.error.relative_rms, one.error.relative_rms);
@@ -87,13 +124,12 @@ std::vector<std::string> all_integrators() {
                       : name == "mps" ? "mps:mutations=2000,precision=0.2"
                                       : name);
     }
-    all.insert(all.end(),
-               {"bdpt:eorr=true", "bdpt:connections=cache", "vcm:radius=0.3",
-                "vcm:radius=0.3,exact=true", "pm:light_paths=2000,cache_error=0.3,cache_rays=32"});
+    all.insert(all.end(), {"bdpt:eorr=true", "bdpt:connections=cache", "vcm:exact=true",
+                           "pm:light_paths=2000,cache_error=0.3,cache_rays=32"});
     return all;
 }
 
-INSTANTIATE_TEST_SUITE_P(Integrators, UnitOfRadiance, ::testing::ValuesIn(all_integrators()),
+INSTANTIATE_TEST_SUITE_P(Integrators, ScaledScene, ::testing::ValuesIn(all_integrators()),
                          [](const auto& p) {
                              std::string name = p.param;
                              for (char& c : name)
