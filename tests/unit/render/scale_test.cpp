@@ -111,7 +111,9 @@ TEST_P(ScaledScene, HasTheSameBits) {
         EXPECT_EQ(different(other.image, one.image, factor), 0u) << "of " << 3 * one.image.size();
         EXPECT_EQ(different(other.variance, one.variance, factor * factor), 0u);
         EXPECT_EQ(other.error.relative_rms, one.error.relative_rms);
-        EXPECT_EQ(other.stats.rays(), one.stats.rays());
+        // Values near the smallest floats may become 0, which saves a ray.
+        EXPECT_NEAR(double(other.stats.rays()), double(one.stats.rays()),
+                    1e-4 * double(one.stats.rays()));
         EXPECT_EQ(other.stats.joins_skipped, one.stats.joins_skipped);
     }
 }
