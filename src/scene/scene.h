@@ -75,7 +75,7 @@ public:
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
     /// The origin of a ray of direction `d` from a surface point `p` with normal `ng`, see etendue::offset_origin().
     Vec3 offset_origin(Vec3 p, Vec3 ng, Vec3 d) const {
-        return etendue::offset_origin(p, ng, d, least_offset_);
+        return etendue::offset_origin(p, ng, d, least_offset_, size_);
     }
     /// Transmittance of masks along the open segment from `a` to `b`, which lie on surfaces with normals `ng_a` and
     /// `ng_b`; 0 where an opaque surface is in between.
@@ -153,7 +153,7 @@ private:
     ReconstructionFilter filter_ = ReconstructionFilter::box();
     RenderDefaults defaults_;
     Bounds3 bounds_;
-    float least_offset_ = 0;  ///< Of offset_origin().
+    float least_offset_ = 0, size_ = kInf;  ///< Of offset_origin().
     bool has_masks_ = false;
     bool has_open_boundaries_ = false;
     bool has_delta_emitters_ = false;
