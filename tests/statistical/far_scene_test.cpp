@@ -16,7 +16,7 @@ struct Effort {
 };
 Effort effort_for(const std::string& integrator) {
     if (integrator == "upg") return {.resolution = 0.5};
-    if (integrator == "ppm" || integrator == "sppm") return {.spp = 32, .resolution = 0.3};
+    if (integrator == "ppm" || integrator == "sppm") return {.spp = 128, .resolution = 0.2};
     if (integrator == "mlt") return {.resolution = 0.12};
     return {};
 }
