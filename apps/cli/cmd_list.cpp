@@ -71,7 +71,7 @@ void ListCommand::run() const {
         fmt::print("{}", mitsuba_manual_table(plugins));
         return;
     }
-        const std::vector<PluginEntry> entries = choose_plugins(plugin_list(), category, name);
+    const std::vector<PluginEntry> entries = choose_plugins(plugin_list(), category, name);
     if (json)
         fmt::print("{}\n", to_json(entries).dump(2));
     else if (markdown)

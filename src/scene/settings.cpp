@@ -109,7 +109,7 @@ const std::vector<IntegratorAlias>& integrator_aliases() {
         add({"ppm"}, "Progressive photon mapping.", "ppm");
         add({"sppm"}, "Stochastic progressive photon mapping.", "sppm");
         add({"pssmlt"}, "Metropolis light transport in primary sample space.", "pssmlt");
-        add({"mlt"}, "Metropolis light transport.", "mmlt");
+        add({"mlt"}, "Metropolis light transport.", "mlt");
         add({"erpt", "vpl", "ao", "field", "depth"}, "Not supported.", "path", true);
         add({"adaptive", "irrcache", "multichannel", "aov", "moment", "stokes"},
             "A wrapper around other integrators.", "");
