@@ -597,7 +597,8 @@ void bind_core(nb::module_& m) {
             [](const VertexHandle& v, float u_lobe, std::pair<float, float> u,
                const std::string& mode)
                 -> std::optional<std::tuple<FloatArray, FloatArray, float, bool>> {
-                const auto s = v.vertex().sample(u_lobe, {u.first, u.second}, mode_of(mode));
+                const auto s =
+                    v.vertex().sample_unguided(u_lobe, {u.first, u.second}, mode_of(mode));
                 if (!s) return {};
                 return std::tuple{to_array(s->wi), to_array(s->weight), s->pdf, s->is_delta};
             },

@@ -11,6 +11,7 @@
 #include "integrator/light.h"
 #include "integrator/mlt.h"
 #include "integrator/mmlt.h"
+#include "integrator/mps.h"
 #include "integrator/path.h"
 #include "integrator/pcbpt.h"
 #include "integrator/pm.h"
@@ -25,7 +26,7 @@ const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
         path_entry(),   light_entry(), bdpt_entry(), pm_entry(),       ppm_entry(),
         sppm_entry(),   vcm_entry(),   upg_entry(),  upg_bdpt_entry(), pcbpt_entry(),
-        pssmlt_entry(), mmlt_entry(),  mlt_entry()};
+        pssmlt_entry(), mmlt_entry(),  mlt_entry(),  mps_entry()};
     return entries;
 }
 

@@ -116,8 +116,14 @@ std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {
         {"pilot_samples", pilot_->samples},
         {"pool_samples", pool_},
         {"longest_stay", groups_->stats().longest_stay}};
+    add_step_figures(groups_->stats(), space_->mutations(), kShortest, out);
+    return out;
+}
+
+void add_step_figures(const ChainStats& stats, std::span<const char* const> mutations, int shortest,
+                      Figures& out) {
     std::vector<const char*> names{"large"};
-    for (const char* name : space_->mutations()) names.push_back(name);
+    for (const char* name : mutations) names.push_back(name);
     const auto add = [&](const std::string& name, const StepCounts& n) {
         if (n.proposed == 0) return;
         const double proposed = double(n.proposed);
@@ -127,14 +133,13 @@ std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {
         out.push_back({name + "_accepted", n.accepted / proposed});
     };
     for (size_t m = 0; m < names.size(); ++m) {
-        const auto& by_length = groups_->stats().steps[m];
+        const auto& by_length = stats.steps[m];
         StepCounts sum;
         for (const StepCounts& n : by_length) sum += n;
         add(names[m], sum);
-        for (size_t k = kShortest; k < by_length.size(); ++k)
+        for (size_t k = size_t(shortest); k < by_length.size(); ++k)
             add(fmt::format("{}_length_{}", names[m], k), by_length[k]);
     }
-    return out;
 }
 
 }  // namespace etendue

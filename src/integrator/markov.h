@@ -10,6 +10,11 @@
 
 namespace etendue {
 
+using Figures = std::vector<std::pair<std::string, double>>;
+/// Adds what the steps did, by mutation and by length from `shortest` on.
+void add_step_figures(const ChainStats& stats, std::span<const char* const> mutations, int shortest,
+                      Figures& out);
+
 class MarkovIntegrator : public Integrator {
 public:
     /// Edges of the shortest path that chains make. Shorter ones are taken by independent samples, one a pixel and pass.

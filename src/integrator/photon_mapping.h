@@ -16,6 +16,7 @@ public:
     PhotonMapping(const IntegratorParams& params, bool next_event);
 
     void learn(const LearnContext& pass) { paths_.learn(pass); }
+    void load(LearnedState& from) { paths_.load(from); }
 
     /// Samples of what is made without photons.
     TechniqueCounts counts() const { return {.hit = 1, .next_event = next_event_ ? 1.0f : 0.0f}; }

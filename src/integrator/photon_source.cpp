@@ -1,43 +1,47 @@
 #include "integrator/photon_source.h"
 
-#include <atomic>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
 namespace etendue {
 
-std::vector<MapPhoton> TracedPhotons::trace(const PassContext& pass) {
-    std::vector<std::vector<MapPhoton>> chunks(pass.chunks(pass.light_paths));
-    // A photon is in a chunk, among all, may be among the caustics, and has a leaf in each tree.
-    constexpr uint64_t kPhotonBytes = 3 * sizeof(MapPhoton) + 32;
-    std::atomic<uint64_t> bytes = 0;
-    pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
-        const SubPath& y = work.y;
+void PhotonMemory::add(uint64_t photons) {
+    // A photon is in a chunk, in a map, may be among the caustics too, has a leaf in each tree, and may have an irradiance.
+    constexpr uint64_t kPhotonBytes = 3 * sizeof(MapPhoton) + 32 + sizeof(Rgb) + 1;
+    const uint64_t more = photons * kPhotonBytes;
+    if (bytes_.fetch_add(more, std::memory_order_relaxed) + more > max_bytes_)
+        throw std::runtime_error(fmt::format("the photons need more than {} MiB; make "
+                                             "fewer, limit max_depth, or raise "
+                                             "the integrator's parameter \"memory\"",
+                                             max_bytes_ >> 20));
+}
+
+MapPhotons TracedPhotons::trace(const PassContext& context, uint32_t pass,
+                                const std::function<std::vector<Importon>()>&) {
+    std::vector<std::vector<MapPhoton>> chunks(context.chunks(context.light_paths));
+    PhotonMemory memory(max_bytes_);
+    context.for_each_light_path([&](const SampleContext& c, Workspace& work) {
+        c.sampler.start(pass, c.pixel);
         mapping_.paths().trace_light_path(c, {}, work);
-        const uint64_t more = uint64_t(y.size()) * kPhotonBytes;
-        if (bytes.fetch_add(more, std::memory_order_relaxed) + more > max_bytes_)
-            throw std::runtime_error(fmt::format("the photons need more than {} MiB; give fewer "
-                                                 "light_paths, limit max_depth, or raise "
-                                                 "the integrator's parameter \"memory\"",
-                                                 max_bytes_ >> 20));
-        bool by_delta = y.size() > 0 && y[0].emitter->is_delta(), by_glossy = true;
-        for (int i = 1; i < y.size(); ++i) {
-            const Vertex& v = y[i];
-            using Origin = MapPhoton::Origin;
-            const Origin origin = i == 1 || !by_glossy ? Origin::Any
-                                  : by_delta           ? Origin::DeltaCaustic
-                                                       : Origin::Caustic;
-            if (v.is_connectible && (mapping_.is_diffuse(v) || origin == Origin::DeltaCaustic))
-                chunks[c.chunk].push_back(
-                    {{v.p, v.wo, v.beta * c.splat_scale, y[0].emitter, i + 1}, origin});
-            by_delta &= v.is_delta;
-            by_glossy &= v.is_delta || !mapping_.is_diffuse(v);
-        }
+        memory.add(uint64_t(work.y.size()));
+        for_each_photon(mapping_, work.y, [&](MapPhoton photon) {
+            photon.power *= c.splat_scale;
+            chunks[c.chunk].push_back(photon);
+        });
     });
-    std::vector<MapPhoton> photons;
-    for (const auto& chunk : chunks) photons.insert(photons.end(), chunk.begin(), chunk.end());
+    MapPhotons photons;
+    for (const auto& chunk : chunks) {
+        photons.global.insert(photons.global.end(), chunk.begin(), chunk.end());
+        for (const MapPhoton& photon : chunk)
+            if (photon.is_caustic()) photons.caustic.push_back(photon);
+    }
+    photons_ = photons.global.size();
     return photons;
+}
+
+std::vector<std::pair<std::string, double>> TracedPhotons::figures() const {
+    return {{"photons", double(photons_)}};
 }
 
 }  // namespace etendue

@@ -1,31 +1,78 @@
 #pragma once
 // Where the photons of photon maps come from.
 
+#include <atomic>
+#include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "integrator/photon_mapping.h"
-#include "reuse/photon_map.h"
+#include "reuse/photon_importance.h"
 
 namespace etendue {
+
+/// Photons for both maps. Those of the caustic map are seen directly; all light that reaches a surface is in the global map.
+struct MapPhotons {
+    std::vector<MapPhoton> global, caustic;
+};
 
 class PhotonSource {
 public:
     virtual ~PhotonSource() = default;
-    /// Photons at all surfaces where density estimates are made; together they have all the flux that arrives there.
-    virtual std::vector<MapPhoton> trace(const PassContext& pass) = 0;
+    /// Photons at the surfaces where density estimates are made. Their random numbers are those of pass `pass`. `importons`
+    /// makes a sample of the places at which the rendering will look for them.
+    virtual MapPhotons trace(const PassContext& context, uint32_t pass,
+                             const std::function<std::vector<Importon>()>& importons) = 0;
+    /// Number of paths that are traced for the photons.
+    virtual uint64_t light_paths() const = 0;
+    virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
 
-/// Photons of the pass's light paths.
+/// Calls use(photon) for the photons of the light path y, each with the flux of that path alone.
+template <class Use>
+void for_each_photon(const PhotonMapping& mapping, const SubPath& y, const Use& use) {
+    bool by_delta = y.size() > 0 && y[0].emitter->is_delta(), by_glossy = true;
+    for (int i = 1; i < y.size(); ++i) {
+        const Vertex& v = y[i];
+        using Origin = MapPhoton::Origin;
+        const Origin origin = i == 1 || !by_glossy ? Origin::Any
+                              : by_delta           ? Origin::DeltaCaustic
+                                                   : Origin::Caustic;
+        if (v.is_connectible && (mapping.is_diffuse(v) || origin == Origin::DeltaCaustic))
+            use(MapPhoton{{v.p, v.wo, v.beta, y[0].emitter, i + 1}, origin, arrival_side(v)});
+        by_delta &= v.is_delta;
+        by_glossy &= v.is_delta || !mapping.is_diffuse(v);
+    }
+}
+
+/// Throws std::runtime_error, with what to change, where photons take more than some bytes.
+class PhotonMemory {
+public:
+    explicit PhotonMemory(uint64_t max_bytes) : max_bytes_(max_bytes) {}
+    /// By any thread.
+    void add(uint64_t photons);
+
+private:
+    uint64_t max_bytes_;
+    std::atomic<uint64_t> bytes_ = 0;
+};
+
+/// Photons of light paths.
 class TracedPhotons final : public PhotonSource {
 public:
     /// trace() throws std::runtime_error where the photons would take more than `max_bytes`.
-    TracedPhotons(const PhotonMapping& mapping, uint64_t max_bytes)
-        : mapping_(mapping), max_bytes_(max_bytes) {}
-    std::vector<MapPhoton> trace(const PassContext& pass) override;
+    TracedPhotons(const PhotonMapping& mapping, uint64_t light_paths, uint64_t max_bytes)
+        : mapping_(mapping), light_paths_(light_paths), max_bytes_(max_bytes) {}
+    MapPhotons trace(const PassContext& context, uint32_t pass,
+                     const std::function<std::vector<Importon>()>& importons) override;
+    uint64_t light_paths() const override { return light_paths_; }
+    std::vector<std::pair<std::string, double>> figures() const override;
 
 private:
     const PhotonMapping& mapping_;
-    uint64_t max_bytes_;
+    uint64_t light_paths_, max_bytes_;
+    size_t photons_ = 0;
 };
 
 }  // namespace etendue

@@ -1,31 +1,26 @@
 // Photon mapping [Jensen 2001]: photons are traced once, and the eye path's first vertex that is diffuse enough gets
 // direct light by next event, caustics by the density of the photons of a caustic map, and all other light by final
-// gather rays, which end at the first diffuse vertex and estimate the density of all photons there. On surfaces that are
-// diffuse alone an irradiance cache, filled before the samples of a pass, may stand for most of the gather rays.
+// gather rays, which end at the first diffuse vertex. There they find the irradiance at the nearest photon [Christensen
+// 1999], or estimate the density of all photons. On surfaces that are diffuse alone an irradiance cache, filled before the
+// samples of a pass, may stand for most of the gather rays.
 //
 // Techniques: M(s,t), and hits and next events, each path by one of them (see photon_mapping.h). Biased: density
 // estimates blur light over the radius of the nearest photons, which does not shrink.
 
 #include "integrator/pm.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "integrator/photon_source.h"
+#include "math/hash.h"
 #include "reuse/irradiance_cache.h"
 
 namespace etendue {
 namespace {
-
-int checked(const IntegratorParams& p, const char* name, int low, int high) {
-    const int value = p.integer(name);
-    if (value < low || value > high)
-        throw std::runtime_error(fmt::format("{}: {} must lie in [{}, {}], but is {}",
-                                             p.integrator(), name, low, high, value));
-    return value;
-}
 
 /// Adds up what comes from one direction.
 class RadianceSum final : public ContributionSink {
@@ -39,36 +34,49 @@ private:
     Rgb sum_;
 };
 
+/// What a density estimate is for, and so which photons it uses.
+enum class Look {
+    Gathered,      ///< All light, at the end of a gather ray.
+    Seen,          ///< All light but that of next events, where there are no gather rays.
+    Caustic,       ///< Caustics seen directly.
+    DeltaCaustic,  ///< Caustics on glossy surfaces that nothing else makes.
+};
+
 class PmIntegrator final : public Integrator {
 public:
-    explicit PmIntegrator(const IntegratorParams& p)
-        : mapping_(p, true), source_(std::make_unique<TracedPhotons>(
-                                 mapping_, uint64_t(p.integer("memory", 1, 1 << 30)) << 20)),
-          light_paths_(uint64_t(checked(p, "light_paths", 1, 1 << 30))),
-          nearest_(checked(p, "nearest", 2, PhotonMap::kMostNeighbours)),
-          gather_rays_(checked(p, "gather_rays", 0, 1 << 20)), radius_(p.number("radius")),
-          retrace_(p.flag("retrace")), cache_error_(p.number("cache_error")),
-          cache_rays_(checked(p, "cache_rays", 16, 1 << 20)) {
-        if (!(radius_ >= 0)) throw std::runtime_error("pm: radius must not be negative");
-        if (!(cache_error_ >= 0 && cache_error_ <= 1))
-            throw std::runtime_error("pm: cache_error must lie in [0, 1]");
+    PmIntegrator(const IntegratorParams& p, const MakePhotonSource& make_source)
+        : mapping_(p, true),
+          source_(make_source(p, mapping_, uint64_t(p.integer("memory", 1, 1 << 30)) << 20)),
+          nearest_(p.integer("nearest", 2, PhotonMap::kMostNeighbours)),
+          gather_rays_(p.integer("gather_rays", 0, 1 << 20)), radius_(p.number("radius")),
+          irradiance_(p.integer("irradiance", 0, 1 << 20)), retrace_(p.flag("retrace")),
+          cache_error_(p.number("cache_error", 0, 1)),
+          cache_rays_(p.integer("cache_rays", 16, 1 << 20)) {
+        const auto refuse = [&](const char* why) {
+            throw std::runtime_error(fmt::format("{}: {}", p.integrator(), why));
+        };
+        if (!(radius_ >= 0)) refuse("radius must not be negative");
         if (cache_error_ > 0 && p.integer("max_depth") >= 0)
-            throw std::runtime_error(
-                "pm: an irradiance cache holds paths of all lengths: expected max_depth=-1");
-        if (cache_error_ > 0 && gather_rays_ == 0)
-            throw std::runtime_error("pm: an irradiance cache needs gather_rays");
+            refuse("an irradiance cache holds paths of all lengths: expected max_depth=-1");
+        if (cache_error_ > 0 && gather_rays_ == 0) refuse("an irradiance cache needs gather_rays");
     }
 
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }
+    /// The maps are functions of the seed: they are made again.
+    void save(LearnedState& to) const override { mapping_.paths().save(to); }
+    void load(LearnedState& from) override { mapping_.load(from); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
+        maps_pass_ = retrace_ ? pass.index : 0;
         max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();
         if (has_maps_ && !retrace_) return;
-        std::vector<MapPhoton> all = source_->trace(pass), caustic;
-        for (const MapPhoton& photon : all)
-            if (photon.is_caustic()) caustic.push_back(photon);
-        global_.build(std::move(all));
-        caustic_.build(std::move(caustic));
+        MapPhotons photons =
+            source_->trace(pass, maps_pass_, [&] { return sample_importons(pass); });
+        global_.build(std::move(photons.global));
+        caustic_.build(std::move(photons.caustic));
+        if (irradiance_ > 0)
+            irradiances_.begin(global_, irradiance_, nearest_, max_radius_,
+                               mapping_.paths().max_depth() + 2 - kGathered);
         if (cache_error_ > 0) fill_cache(pass);
         has_maps_ = true;
     }
@@ -84,7 +92,10 @@ public:
         for (int t = 2; t <= z.size(); ++t) {
             mapping_.add_direct(c, t, work);  // C(0,t), C(1,t)
             const bool is_diffuse = mapping_.takes_photons(z, t);
-            if (mapping_.paths().is_joinable(z, t)) add_photons(c, t, is_diffuse, work);  // M(s,t)
+            if (mapping_.paths().is_joinable(z, t))  // M(s,t)
+                for_each_look(
+                    c, pass_, t, is_diffuse, true, work,
+                    [&](Look look, int u, float scale) { add_photons(c, look, u, scale, z); });
             if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
         }
     }
@@ -94,26 +105,50 @@ public:
         n.merge = float(light_paths);
         return n;
     }
-    uint64_t light_paths(const Scene&) const override { return light_paths_; }
+    uint64_t light_paths(const Scene&) const override { return source_->light_paths(); }
     bool keeps_paths() const override { return false; }
     Estimator estimator() const override { return Estimator::Biased; }
+    std::vector<std::pair<std::string, double>> figures() const override {
+        return source_->figures();
+    }
 
     static constexpr float kDefaultRadius = 0.03f;
 
 private:
-    /// What photons bring to z_{t-1}: seen directly, or by gather rays.
-    void add_photons(const SampleContext& c, int t, bool is_diffuse, Workspace& work) const {
+    /// Calls use(look, u, scale) for the density estimates that bring light to z_{t-1}: there, where u = t, or at the end
+    /// z_{u-1} of a gather ray.
+    template <class Use>
+    void for_each_look(const SampleContext& c, uint32_t pass, int t, bool is_diffuse,
+                       bool uses_cache, Workspace& work, const Use& use) const {
         if (!is_diffuse) {
-            if (c.scene.has_delta_emitters())
-                estimate(c, caustic_, t, 1, work.z, [](const MapPhoton& photon) {
-                    return photon.origin == MapPhoton::Origin::DeltaCaustic;
-                });
+            if (c.scene.has_delta_emitters()) use(Look::DeltaCaustic, t, 1.0f);
         } else if (gather_rays_ == 0) {
-            estimate(c, global_, t, 1, work.z,
-                     [](const MapPhoton& photon) { return photon.s > 2; });
+            use(Look::Seen, t, 1.0f);
         } else {
-            estimate(c, caustic_, t, 1, work.z, [](const MapPhoton&) { return true; });
-            if (!add_cached(c, t, work.z)) final_gather(c, t, work);
+            use(Look::Caustic, t, 1.0f);
+            if (!uses_cache || !add_cached(c, t, work.z)) final_gather(c, pass, t, work, use);
+        }
+    }
+
+    /// A density estimate at z_{t-1}; or, for gather rays on a surface that is diffuse alone, the irradiance near it.
+    void add_photons(const SampleContext& c, Look look, int t, float scale,
+                     const SubPath& z) const {
+        switch (look) {
+        case Look::Gathered:
+            if (!add_irradiance(c, t, scale, z))
+                estimate(c, global_, t, scale, z, [](const MapPhoton&) { return true; });
+            return;
+        case Look::Seen:
+            estimate(c, global_, t, scale, z, [](const MapPhoton& photon) { return photon.s > 2; });
+            return;
+        case Look::Caustic:
+            estimate(c, caustic_, t, scale, z, [](const MapPhoton&) { return true; });
+            return;
+        case Look::DeltaCaustic:
+            estimate(c, caustic_, t, scale, z, [](const MapPhoton& photon) {
+                return photon.origin == MapPhoton::Origin::DeltaCaustic;
+            });
+            return;
         }
     }
 
@@ -132,23 +167,38 @@ private:
         }
     }
 
-    /// Goes on from z_{t-1}, which a gather ray met, to the first diffuse vertex, and adds what all photons bring there.
-    /// What comes straight from emitters is that of next events, what comes from them over surfaces that are not diffuse
-    /// that of the caustic map.
-    void end_gather_ray(const SampleContext& c, int t, float scale, Workspace& work) const {
+    bool add_irradiance(const SampleContext& c, int t, float scale, const SubPath& z) const {
+        if (irradiance_ == 0) return false;
+        // It holds the light that paths of limited length bring to the end of a gather ray from z_1.
+        const bool is_limited = mapping_.paths().max_depth() != DepthOptions::kUnlimited;
+        if (is_limited && t != kGathered) return false;
+        const auto n = irradiance_normal(z[t - 1]);
+        if (!n) return false;
+        const auto E = irradiances_.find(z[t - 1].p, *n);
+        if (!E) return false;
+        add_reflected(c, 2, t, z, *n, *E * scale);
+        return true;
+    }
+
+    /// Goes on from z_{t-1}, which a gather ray met, to the first diffuse vertex z_{u-1}, and calls use(u) there. What comes
+    /// to it straight from emitters is that of next events, what comes from them over surfaces that are not diffuse that of
+    /// the caustic map.
+    template <class Use>
+    void end_gather_ray(const SampleContext& c, int t, Workspace& work, const Use& use) const {
         const TechniqueCounts none;
         const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
         SubPath& z = work.z;
         for (int u = t; u <= z.size(); ++u) {
             const bool is_diffuse = mapping_.takes_photons(z, u);
-            if (is_diffuse)
-                estimate(c, global_, u, scale, z, [](const MapPhoton&) { return true; });
+            if (is_diffuse) use(u);
             if (!mapping_.walk_on(walk, c.sampler, z, is_diffuse)) break;
         }
     }
 
-    /// Light that reaches z_{t-1} from another diffuse surface.
-    void final_gather(const SampleContext& c, int t, Workspace& work) const {
+    /// Calls use(look, u, scale) for the light that reaches z_{t-1} from another diffuse surface.
+    template <class Use>
+    void final_gather(const SampleContext& c, uint32_t pass, int t, Workspace& work,
+                      const Use& use) const {
         const TechniqueCounts none;
         const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
         SubPath& z = work.z;
@@ -156,18 +206,63 @@ private:
         for (int ray = 0; ray < gather_rays_; ++ray) {
             // A sample of its own; the rays of all passes are successive points of one sequence.
             Sampler of_ray = c.sampler;
-            of_ray.start(pass_ * uint32_t(gather_rays_) + uint32_t(ray),
+            of_ray.start(pass * uint32_t(gather_rays_) + uint32_t(ray),
                          hash_combine(c.pixel, uint64_t(t)));
             const SampleContext gather = c.with(of_ray, c.sink);
             if (extend<TransportMode::Radiance>(walk, of_ray, z) && !z[t - 1].is_delta)
-                end_gather_ray(gather, t + 1, 1 / float(gather_rays_), work);
+                end_gather_ray(gather, t + 1, work,
+                               [&](int u) { use(Look::Gathered, u, 1 / float(gather_rays_)); });
             z.truncate(t);
             z.eta2 = eta2;
         }
     }
 
-    /// The normal at which a cache may serve v.
-    static std::optional<Vec3> cache_normal(const Vertex& v) {
+    /// At least kFewest places where samples look for photons, if any do, with random numbers of their own.
+    std::vector<Importon> sample_importons(const PassContext& pass) const {
+        constexpr uint64_t kFewest = 1 << 16;
+        const uint64_t rays = pass.pixels * uint64_t(std::max(1, gather_rays_)),
+                       rounds = (kFewest + rays - 1) / rays,
+                       step = std::max(uint64_t(1), rays / kFewest);
+        std::vector<std::vector<Importon>> chunks(pass.chunks(pass.pixels));
+        pass.for_each_sample(pass.pixels, [&](const SampleContext& c, Workspace& work) {
+            if (c.pixel % step != 0) return;
+            for (uint32_t round = 0; round < rounds; ++round) {
+                c.sampler.start(round, hash_combine(c.pixel, kImportons));
+                add_importons(c, round, chunks[c.chunk], work);
+            }
+        });
+        std::vector<Importon> importons;
+        for (const auto& chunk : chunks)
+            importons.insert(importons.end(), chunk.begin(), chunk.end());
+        return importons;
+    }
+    void add_importons(const SampleContext& c, uint32_t round, std::vector<Importon>& importons,
+                       Workspace& work) const {
+        const TechniqueCounts none;
+        const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
+        SubPath& z = work.z;
+        Sampler of_walk = c.sampler;
+        start_eye_path(walk, c.film, c.pixel, of_walk, z);
+        for (int t = 2; t <= z.size(); ++t) {
+            const bool is_diffuse = mapping_.takes_photons(z, t);
+            if (mapping_.paths().is_joinable(z, t))
+                for_each_look(c, round, t, is_diffuse, false, work,
+                              [&](Look look, int u, float scale) {
+                                  importons.push_back(importon(look, z, u, scale));
+                              });
+            if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
+        }
+    }
+    static Importon importon(Look look, const SubPath& z, int t, float scale) {
+        const Vertex& v = z[t - 1];
+        return {.p = v.p,
+                .side = arrival_side(v),
+                .importance = luminance(v.beta) * std::fabs(z.film_weight) * scale,
+                .is_caustic = look == Look::Caustic || look == Look::DeltaCaustic};
+    }
+
+    /// The normal at which irradiance tells all that v reflects.
+    static std::optional<Vec3> irradiance_normal(const Vertex& v) {
         const auto n = v.bsdf.diffuse_normal();
         return n && dot(v.wo, *n) > 0 ? n : std::nullopt;
     }
@@ -183,6 +278,7 @@ private:
         for (uint32_t spacing = kCoarsest; spacing >= kFinest; spacing /= 2) {
             for (auto& chunk : chunks) chunk.clear();
             pass.for_each_sample(pass.pixels, [&](const SampleContext& c, Workspace& work) {
+                c.sampler.start(maps_pass_, c.pixel);
                 if (c.pixel % width % spacing != 0 || c.pixel / width % spacing != 0) return;
                 const TechniqueCounts none;
                 const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
@@ -190,7 +286,7 @@ private:
                 start_eye_path(walk, c.film, c.pixel, c.sampler, z);
                 for (int t = 2; t <= z.size(); ++t) {
                     const bool is_diffuse = mapping_.takes_photons(z, t);
-                    const auto n = is_diffuse ? cache_normal(z[t - 1]) : std::nullopt;
+                    const auto n = is_diffuse ? irradiance_normal(z[t - 1]) : std::nullopt;
                     if (n && !cache_.find(z[t - 1].p, *n))
                         chunks[c.chunk].push_back(record(c, t, *n, work));
                     if (!mapping_.walk_on(walk, c.sampler, z, is_diffuse)) break;
@@ -228,7 +324,8 @@ private:
                 return {};
             }
             const float distance = length(z[t].p - z[t - 1].p);
-            end_gather_ray(gather, t + 1, 1, work);
+            end_gather_ray(gather, t + 1, work,
+                           [&](int u) { add_photons(gather, Look::Gathered, u, 1, z); });
             z.truncate(t);
             z.eta2 = eta2;
             return {sum.sum(), distance};
@@ -243,40 +340,50 @@ private:
     bool add_cached(const SampleContext& c, int t, const SubPath& z) const {
         if (cache_.size() == 0) return false;
         const Vertex& v = z[t - 1];
-        const auto n = cache_normal(v);
+        const auto n = irradiance_normal(v);
         if (!n) return false;
         const auto E = cache_.find(v.p, *n);
         if (!E) return false;
-        // Filed under the shortest paths that it holds.
-        c.sink.add({.technique = {Strategy::Merge, 3, t},
+        add_reflected(c, 3, t, z, *n, *E);
+        return true;
+    }
+
+    /// Adds what z_{t-1} reflects of the irradiance E, filed under the shortest paths that E holds, of s light vertices.
+    static void add_reflected(const SampleContext& c, int s, int t, const SubPath& z, Vec3 n,
+                              Rgb E) {
+        const Vertex& v = z[t - 1];
+        c.sink.add({.technique = {Strategy::Merge, s, t},
                     .emitter = nullptr,
                     .contribution = {},
                     .mis_weight = 1,
                     .film = z.film},
-                   v.beta * v.eval(*n, TransportMode::Radiance).f * *E);
-        return true;
+                   v.beta * v.eval(n, TransportMode::Radiance).f * E);
     }
+
+    /// Vertices of an eye path whose gather ray leaves z_1 and ends where it first meets a surface.
+    static constexpr int kGathered = 3;
+    static constexpr uint64_t kImportons = 0x696d706f72746f6e;  ///< Of random numbers.
 
     PhotonMapping mapping_;
     std::unique_ptr<PhotonSource> source_;
-    uint64_t light_paths_;
     int nearest_, gather_rays_;
     float radius_, max_radius_ = 0;
+    int irradiance_;
     bool retrace_;
     float cache_error_;
     int cache_rays_;
-    uint32_t pass_ = 0;
+    uint32_t pass_ = 0, maps_pass_ = 0;
     IrradianceCache cache_;
     PhotonMap global_, caustic_;
+    PhotonIrradiance irradiances_;
     bool has_maps_ = false;
 };
 
 }  // namespace
 
-IntegratorEntry pm_entry() {
+std::vector<ParamInfo> photon_map_params(const ParamInfo& paths) {
     std::vector<ParamInfo> params = PhotonMapping::params();
-    params.push_back({"light_paths", ParamKind::Int, "500000",
-                      "Number of light paths whose photons are stored."});
+    params.push_back(paths);
     params.push_back({"memory", ParamKind::Int, "6144", "Largest memory for the photons, in MiB."});
     params.push_back(
         {"retrace", ParamKind::Bool, "false",
@@ -291,14 +398,35 @@ IntegratorEntry pm_entry() {
     params.push_back({"gather_rays", ParamKind::Int, "16",
                       "Number of final gather rays for each eye path in a pass; 0: the photons are "
                       "seen directly."});
+    params.push_back({"irradiance", ParamKind::Int, "4",
+                      "On diffuse surfaces, gather rays use the irradiance at the nearest of every "
+                      "n-th photon, which is computed when it is first needed; 0: they make a "
+                      "density estimate of their own."});
     params.push_back({"cache_error", ParamKind::Float, "0",
                       "Error allowed by the irradiance cache (a in [Ward et al. 1988], usually 0.1 "
                       "to 0.4); 0: no cache."});
     params.push_back({"cache_rays", ParamKind::Int, "256",
                       "Number of final gather rays for each record of the irradiance cache."});
-    return {{"integrator", "pm", "Photon mapping with final gathering. Biased.", params},
-            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-                return std::make_unique<PmIntegrator>(p);
+    return params;
+}
+
+std::unique_ptr<Integrator> make_photon_map_integrator(const IntegratorParams& params,
+                                                       const MakePhotonSource& source) {
+    return std::make_unique<PmIntegrator>(params, source);
+}
+
+IntegratorEntry pm_entry() {
+    return {{"integrator", "pm", "Photon mapping with final gathering. Biased.",
+             photon_map_params({"light_paths", ParamKind::Int, "500000",
+                                "Number of light paths whose photons are stored."})},
+            [](const IntegratorParams& params) {
+                return make_photon_map_integrator(
+                    params,
+                    [](const IntegratorParams& p, const PhotonMapping& mapping,
+                       uint64_t max_bytes) -> std::unique_ptr<PhotonSource> {
+                        return std::make_unique<TracedPhotons>(
+                            mapping, uint64_t(p.integer("light_paths", 1, 1 << 30)), max_bytes);
+                    });
             }};
 }
 

@@ -68,23 +68,26 @@ void Chain::load(LearnedState& from) {
 }
 
 void Chain::add(const ChainState& state, double chain_share, double large_share,
-                const ChainTerms& terms, double scale, const ChainContext& c, SplatSink& splats,
-                ChainStats& stats) const {
+                const ChainTerms& terms, double scale, StateSink& states, ChainStats& stats) const {
     const double inverse = state.target + terms.c * terms.p_large * state.independent_density;
-    if (!(inverse > 0) || state.splats.empty()) return;
+    if (!(inverse > 0) || !(state.target > 0)) return;
     stats.chain_light += chain_share * state.target / inverse;
     stats.large_light += large_share * terms.c * state.target / inverse;
     const double factor = scale * (chain_share + large_share * terms.c) / inverse;
-    if (factor == 0) return;
+    if (factor != 0) states.add(state, factor);
+}
+
+void StateSpace::contribute(int chain_class, const ChainState& x, double factor,
+                            const ChainContext& c, SplatSink& film) const {
     if (c.work.is_observed) {
-        Repeater sink(splats, factor, c.work);
-        space_.repeat(class_, state, c, sink);
+        Repeater sink(film, factor, c.work);
+        repeat(chain_class, x, c, sink);
     }
-    for (const Splat& s : state.splats) splats.add(s.film, s.value * float(factor));
+    for (const Splat& s : x.splats) film.add(s.film, s.value * float(factor));
 }
 
 void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t first,
-                    uint64_t count, const ChainContext& c, SplatSink& splats, ChainStats& stats) {
+                    uint64_t count, const ChainContext& c, StateSink& states, ChainStats& stats) {
     double x_share = 0;  // Of the present state, not yet added: the sum of b·a.
     double x_large = 0;  // Whether it came by a large step.
     for (uint64_t step = first; step < first + count; ++step) {
@@ -117,17 +120,17 @@ void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t ke
         const double y_share = b * accept, y_large = is_large ? 1 : 0;
         if (is_started_) x_share += b * (1 - accept);
         if (is_started_ && to_unit_double(hash_combine(step_key, 2)) < accept) {
-            add(*x_, x_share, x_large, terms, scale, c, splats, stats);
+            add(*x_, x_share, x_large, terms, scale, states, stats);
             std::swap(x_, y_);
             x_share = y_share, x_large = y_large;
             stay_ = 0;
             continue;
         }
         if (!proposal.has_failed && y_->target > 0)
-            add(*y_, y_share, y_large, terms, scale, c, splats, stats);
+            add(*y_, y_share, y_large, terms, scale, states, stats);
         if (is_started_) stats.longest_stay = std::max(stats.longest_stay, ++stay_);
     }
-    if (is_started_) add(*x_, x_share, x_large, terms, scale, c, splats, stats);
+    if (is_started_) add(*x_, x_share, x_large, terms, scale, states, stats);
 }
 
 }  // namespace etendue

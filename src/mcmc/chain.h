@@ -57,15 +57,14 @@ public:
     /// Makes steps first … first+count-1; random numbers follow from `key` and the step's number. Adds b·…/steps and so
     /// on as above, times `scale`.
     void advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t first,
-                 uint64_t count, const ChainContext& c, SplatSink& splats, ChainStats& stats);
+                 uint64_t count, const ChainContext& c, StateSink& states, ChainStats& stats);
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);
 
 private:
     void add(const ChainState& state, double chain_share, double large_share,
-             const ChainTerms& terms, double scale, const ChainContext& c, SplatSink& splats,
-             ChainStats& stats) const;
+             const ChainTerms& terms, double scale, StateSink& states, ChainStats& stats) const;
 
     const StateSpace& space_;
     int class_;

@@ -14,6 +14,21 @@ namespace {
 /// What random numbers of a group are for.
 enum Purpose : uint64_t { kPool, kResampling, kSteps };
 
+class StatesToFilm final : public StateSink {
+public:
+    StatesToFilm(const StateSpace& space, int chain_class, const ChainContext& c, SplatSink& film)
+        : space_(space), class_(chain_class), c_(c), film_(film) {}
+    void add(const ChainState& state, double factor) override {
+        space_.contribute(class_, state, factor, c_, film_);
+    }
+
+private:
+    const StateSpace& space_;
+    int class_;
+    ChainContext c_;
+    SplatSink& film_;
+};
+
 }  // namespace
 
 std::vector<size_t> resample(std::span<const double> weights, size_t count, double u) {
@@ -82,6 +97,12 @@ double ChainGroups::scale(size_t g, const Group& group, int chain_class) const {
 }
 
 void ChainGroups::advance(const PassContext& pass) {
+    advance(pass, [this](uint64_t, int chain_class, const ChainContext& c, SplatSink& film) {
+        return std::make_unique<StatesToFilm>(space_, chain_class, c, film);
+    });
+}
+
+void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
     const size_t g = pass.index % groups_.size();
     const uint64_t key = hash_combine(hash_combine(pass.seed, 0x636861696e), g);
     working_group_ = g;
@@ -103,10 +124,12 @@ void ChainGroups::advance(const PassContext& pass) {
         const WholeFilm whole(pass);
         const size_t k = size_t(class_of_chain_[i]);
         const double mean = 1 / (double(steps) * double(plan_[k].chains));
+        const ChainContext c{whole.sample, work};
+        const auto states = make_sink(i, class_of_chain_[i], c, splats);
         working_.chains[i].advance({options_.p_large, plan_[k].c}, scales[k],
                                    mean * double(pass.light_paths),
                                    hash_combine(hash_combine(key, kSteps), i), working_.steps,
-                                   steps, {whole.sample, work}, splats, stats[i]);
+                                   steps, c, *states, stats[i]);
     });
 
     working_stats_ = {};

@@ -8,6 +8,8 @@
 // of b'_h - b_h, where b'_h is the mean over h's pool and all large steps of its earlier passes. That mean has
 // expectation 0 and is independent of g, and over all groups the scales average to the mean of b'.
 
+#include <functional>
+
 #include "mcmc/chain.h"
 
 namespace etendue {
@@ -32,6 +34,10 @@ public:
     /// Makes the steps of pass `pass.index`, which belong to group index mod groups: one a pixel, rounded up so that all
     /// chains make the same number. Nothing of it stays unless commit() follows.
     void advance(const PassContext& pass);
+    /// The same with a place of its own for the states of each chain, instead of the film.
+    using MakeSink = std::function<std::unique_ptr<StateSink>(
+        uint64_t chain, int chain_class, const ChainContext& c, SplatSink& film)>;
+    void advance(const PassContext& pass, const MakeSink& make_sink);
     void commit();
 
     /// All that later passes depend on. load() throws std::runtime_error where it is of other chains.

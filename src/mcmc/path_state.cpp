@@ -51,7 +51,6 @@ void PathState::copy(const PathState& from) {
     edges = from.edges;
     splats = from.splats;
     film = from.film;
-    next_event_ = from.next_event_;
     large_step_density_ = from.large_step_density_;
     f_ = from.f_;
 }
@@ -83,7 +82,8 @@ void PathState::scatter(int i) {
     after.light = pdf_light * geometry_from_light(i + 1);
     before.eye = pdf_eye * geometry_from_eye(i - 1);
     // An eye path that leaves the scene chooses among the emitters at infinity.
-    if (before.v.is_infinite) before.eye /= double(measure_.scene.infinite_emitters().size());
+    if (before.v.is_infinite && !emitter().is_delta())
+        before.eye /= double(measure_.scene.infinite_emitters().size());
     x.value *= float(measure_.unit_area * inverse_square(before.v, x.v) *
                      double(abs_dot(x.v.ng, to_light))) *
                x.opacity;
@@ -103,13 +103,13 @@ bool PathState::evaluate(int first, int last) {
         const Emitter::Emission emission = e.eval_emission(x0.v.ng, x0.v.uv, w);
         x0.value = emission.Le_cos;
         if (x0.value.is_zero()) return false;
-        x0.light = next_event_ = measure_.unit_area * double(e.selection_pmf);
+        x0.light = x0.next_event = measure_.unit_area * double(e.selection_pmf);
         if (!e.is_delta()) {
             const EmitterHit hit = e.is_infinite()
                                        ? e.eval_infinite(x0.v.p)
                                        : e.eval_surface(x0.v.ng, x0.v.uv, x0.v.location.prim, w);
             x0.light *= double(hit.pdf_y0);
-            next_event_ *= double(hit.pdf);
+            x0.next_event *= double(hit.pdf);
         }
         x_[1].light = emission.pdf_d * geometry_from_light(1);
     }
@@ -166,7 +166,7 @@ double PathState::density(int s) const {
     // A ray that samples a vertex passes the masks before it, and meets its surface.
     for (int i = 0; i < s; ++i) {
         const PathVertex& x = x_[size_t(i)];
-        p *= i == 0 ? (s == 1 ? next_event_ : x.light)
+        p *= i == 0 ? (s == 1 ? x.next_event : x.light)
                     : x.light * double(x_[size_t(i) - 1].transmittance * x.opacity);
     }
     for (int i = s; i <= k; ++i) {

@@ -36,6 +36,7 @@ struct PathVertex {
     Vertex v;
     /// Densities as sampled from the light's side and from the eye's. That of x_{k-1} from x_k is spread over the film.
     double light = 1, eye = 1;
+    double next_event = 0;  ///< Of x_0: its density as next events from x_1 sample it.
     /// Probabilities of a delta event from either side.
     float light_pmf = 1, eye_pmf = 1;
     /// The factor of f that belongs to this vertex, with the edge before it.
@@ -61,8 +62,6 @@ public:
     /// Density of x_i given x_{i+1}, or x_{i-1}, where one direction is sampled with density 1 per solid angle.
     double geometry_from_eye(int i) const { return geometry(i + 1, i); }
     double geometry_from_light(int i) const { return geometry(i - 1, i); }
-    /// Density of x_0 as next events from x_1 sample it.
-    double next_event() const { return next_event_; }
     Vec2 film{};
 
     void clear() {
@@ -101,7 +100,6 @@ private:
     const PathMeasure& measure_;
     std::vector<PathVertex> x_;
     ComponentArena arena_;
-    double next_event_ = 0;
     double large_step_density_ = 0;
     std::array<double, 3> f_{};
 };

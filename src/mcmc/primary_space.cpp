@@ -48,23 +48,24 @@ void PrimarySpace::evaluate(int chain_class, NumberSource& source, const ChainCo
     evaluate_sample(sample_, chain_class, source, c, splats);
 }
 
-void PrimarySpace::draw(int chain_class, uint64_t key, const ChainContext& c, ChainState& y) const {
-    NumberSource source(NumberStep::Fresh, key, nullptr, &static_cast<State&>(y).numbers);
+void NumberSpace::draw(int chain_class, uint64_t key, const ChainContext& c, ChainState& y) const {
+    NumberSource source(NumberStep::Fresh, key, nullptr, &static_cast<NumberState&>(y).numbers);
     evaluate(chain_class, source, c, y);
 }
 
-Proposal PrimarySpace::propose(int chain_class, const ChainState& x, uint64_t key,
-                               const ChainContext& c, ChainState& y) const {
+Proposal NumberSpace::propose(int chain_class, const ChainState& x, uint64_t key,
+                              const ChainContext& c, ChainState& y) const {
     const Mutation mutation = to_unit_double(mix64(key)) < kBlockShare ? Block : Small;
     NumberSource source(mutation == Block ? NumberStep::Block : NumberStep::Small, key,
-                        &static_cast<const State&>(x).numbers, &static_cast<State&>(y).numbers);
+                        &static_cast<const NumberState&>(x).numbers,
+                        &static_cast<NumberState&>(y).numbers);
     evaluate(chain_class, source, c, y);
     return {.mutation = mutation};
 }
 
 void PrimarySpace::repeat(int chain_class, const ChainState& x, const ChainContext& c,
                           ContributionSink& sink) const {
-    NumberSource source(NumberStep::Same, 0, &static_cast<const State&>(x).numbers, nullptr);
+    NumberSource source(NumberStep::Same, 0, &static_cast<const NumberState&>(x).numbers, nullptr);
     evaluate_sample(sample_, chain_class, source, c, sink);
 }
 

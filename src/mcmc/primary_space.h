@@ -34,45 +34,65 @@ private:
 void evaluate_sample(const PrimarySample& sample, int chain_class, NumberSource& source,
                      const ChainContext& c, ContributionSink& sink);
 
-class PrimarySpace final : public StateSpace {
+/// The numbers that a state has read.
+struct NumberState : ChainState {
+    NumberTable numbers;
+
+    void save(LearnedState& to) const override {
+        ChainState::save(to);
+        numbers.save(to);
+    }
+    void load(LearnedState& from) override {
+        ChainState::load(from);
+        numbers.load(from);
+    }
+};
+
+/// States that are functions of their numbers.
+class NumberSpace : public StateSpace {
 public:
     enum Mutation { Small, Block };
+    static constexpr std::array<const char*, 2> kMutations{"small", "block"};
 
-    PrimarySpace(int classes, PrimarySample sample, TargetMap map)
-        : classes_(classes), sample_(std::move(sample)), map_(std::move(map)) {}
+    explicit NumberSpace(int classes) : classes_(classes) {}
 
     int classes() const override { return classes_; }
     std::span<const char* const> mutations() const override { return kMutations; }
-    std::unique_ptr<ChainState> make_state() const override { return std::make_unique<State>(); }
-    void copy(const ChainState& from, ChainState& to) const override {
-        static_cast<State&>(to) = static_cast<const State&>(from);
-    }
     void draw(int chain_class, uint64_t key, const ChainContext& c, ChainState& y) const override;
     Proposal propose(int chain_class, const ChainState& x, uint64_t key, const ChainContext& c,
                      ChainState& y) const override;
+
+protected:
+    /// Makes y of its numbers, which it reads from `source`.
+    virtual void evaluate(int chain_class, NumberSource& source, const ChainContext& c,
+                          ChainState& y) const = 0;
+
+private:
+    static constexpr double kBlockShare = 0.25;  ///< Of the mutations.
+
+    int classes_;
+};
+
+class PrimarySpace : public NumberSpace {
+public:
+    PrimarySpace(int classes, PrimarySample sample, TargetMap map)
+        : NumberSpace(classes), sample_(std::move(sample)), map_(std::move(map)) {}
+
+    std::unique_ptr<ChainState> make_state() const override {
+        return std::make_unique<NumberState>();
+    }
+    void copy(const ChainState& from, ChainState& to) const override {
+        static_cast<NumberState&>(to) = static_cast<const NumberState&>(from);
+    }
     void repeat(int chain_class, const ChainState& x, const ChainContext& c,
                 ContributionSink& sink) const override;
 
-private:
-    static constexpr std::array<const char*, 2> kMutations{"small", "block"};
-    static constexpr double kBlockShare = 0.25;  ///< Of the mutations.
-
-    struct State final : ChainState {
-        NumberTable numbers;
-
-        void save(LearnedState& to) const override {
-            ChainState::save(to);
-            numbers.save(to);
-        }
-        void load(LearnedState& from) override {
-            ChainState::load(from);
-            numbers.load(from);
-        }
-    };
+protected:
     void evaluate(int chain_class, NumberSource& source, const ChainContext& c,
-                  ChainState& y) const;
+                  ChainState& y) const override;
+    const TargetMap& map() const { return map_; }
 
-    int classes_;
+private:
     PrimarySample sample_;
     TargetMap map_;
 };

@@ -72,6 +72,17 @@ public:
     /// Makes x's contributions again, to `sink`, with its sub-paths in c.work.
     virtual void repeat(int chain_class, const ChainState& x, const ChainContext& c,
                         ContributionSink& sink) const = 0;
+    /// Adds `factor` times what x brings to the film.
+    virtual void contribute(int chain_class, const ChainState& x, double factor,
+                            const ChainContext& c, SplatSink& film) const;
+};
+
+/// Where the states of a chain go.
+class StateSink {
+public:
+    virtual ~StateSink() = default;
+    /// F of the state counts so many times (see chain.h).
+    virtual void add(const ChainState& state, double factor) = 0;
 };
 
 }  // namespace etendue

@@ -347,7 +347,7 @@ double pdf_cone(float versine) {
 
 bool UserPaths::find_on_emitter(const UserPath& path, Vec3 q, SurfaceHit& hit) const {
     const Vec3 n = path.points[0].ng;
-    return scene_.intersect({q + n * path.radius, -n, 2 * path.radius}, 0, hit) &&
+    return scene_->intersect({q + n * path.radius, -n, 2 * path.radius}, 0, hit) &&
            hit.shape->emitter == path.emitter;
 }
 

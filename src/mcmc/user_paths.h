@@ -60,7 +60,7 @@ std::string to_string(const CheckedPath& refused, const GivenPath& given, size_t
 class UserPaths {
 public:
     UserPaths(const Scene& scene, std::vector<UserPath> paths)
-        : scene_(scene), paths_(std::move(paths)) {}
+        : scene_(&scene), paths_(std::move(paths)) {}
     /// Throws std::runtime_error where the file has a path that is refused, or has none.
     static UserPaths load(const Scene& scene, const std::string& file);
 
@@ -74,7 +74,7 @@ private:
     /// The point of the emitter above or below `q`, a point of the disc.
     bool find_on_emitter(const UserPath& path, Vec3 q, SurfaceHit& hit) const;
 
-    const Scene& scene_;
+    const Scene* scene_;
     std::vector<UserPath> paths_;
 };
 

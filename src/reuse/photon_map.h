@@ -1,12 +1,16 @@
 #pragma once
-// A photon map with queries for the photons nearest to a point [Jensen 2001, §6].
+// Photon maps: queries for the photons nearest to a point [Jensen 2001, §6], and irradiance computed at photons
+// [Christensen 1999].
 
 #include <array>
+#include <atomic>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "pathspace/photon.h"
+#include "reuse/arrival_side.h"
 
 namespace etendue {
 
@@ -15,6 +19,7 @@ struct MapPhoton : Photon {
     /// Events on its path before: any; at least one, none of them on a diffuse surface; or at least one, all of them
     /// delta events, from a delta emitter.
     enum class Origin : uint8_t { Any, Caustic, DeltaCaustic } origin = Origin::Any;
+    ArrivalSide side;  ///< Of the surface that it hit.
 
     bool is_caustic() const { return origin != Origin::Any; }
 };
@@ -42,10 +47,35 @@ public:
     /// [Loftsgaarden & Quesenberry 1965].
     void find(Vec3 p, int count, float radius, Neighbours& out) const;
 
+    /// The nearest photon within `radius` whose index is a multiple of `step`, and which hit a side whose normal is close
+    /// to `n`.
+    std::optional<uint32_t> nearest_on_side(Vec3 p, Vec3 n, int step, float radius) const;
+
 private:
     struct Tree;
     std::vector<MapPhoton> photons_;
     std::unique_ptr<Tree> tree_;
+};
+
+/// Irradiance at every n-th photon of a map, from a density estimate there; computed when it is first asked for, since many
+/// photons lie where nothing looks.
+class PhotonIrradiance {
+public:
+    /// Density estimates as by find(count, radius), of photons with at most `longest` vertices. `photons` must outlive this.
+    void begin(const PhotonMap& photons, int step, int count, float radius, int longest);
+
+    /// Irradiance at the nearest of these photons on the side with the normal `n`; empty where none is within the radius.
+    std::optional<Rgb> find(Vec3 p, Vec3 n) const;
+
+private:
+    Rgb compute(uint32_t photon) const;
+
+    const PhotonMap* photons_ = nullptr;
+    int step_ = 1, count_ = 0, longest_ = 0;
+    float radius_ = 0;
+    enum State : uint8_t { Unknown, InWork, Known };
+    std::unique_ptr<std::atomic<uint8_t>[]> states_;
+    mutable std::vector<Rgb> values_;
 };
 
 }  // namespace etendue

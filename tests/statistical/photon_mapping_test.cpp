@@ -54,16 +54,44 @@ INSTANTIATE_TEST_SUITE_P(
         Method{"vcm_exact", "vcm:radius=0.15,alpha=1,exact=true", 256},
         Method{"vcm_exact_merges_alone", "vcm:radius=0.15,alpha=1,exact=true,connections=false",
                512},
-        Method{"pm", "pm:light_paths=1000,retrace=true,nearest=12,radius=0.7,gather_rays=2", 256},
+        Method{"pm",
+               "pm:light_paths=1000,retrace=true,nearest=12,radius=0.7,gather_rays=2,"
+               "irradiance=0",
+               256},
         Method{"pm_cache",
                "pm:light_paths=1000,retrace=true,nearest=12,radius=0.7,gather_rays=2,"
-               "cache_error=0.4,cache_rays=64",
+               "irradiance=0,cache_error=0.4,cache_rays=64",
                512},
         Method{"pm_fixed_radius",
-               "pm:light_paths=500,retrace=true,nearest=512,radius=0.1,gather_rays=2", 256},
+               "pm:light_paths=500,retrace=true,nearest=512,radius=0.1,gather_rays=2,irradiance=0",
+               256},
+        Method{"mps_importons",
+               "mps:mutations=2000,chains=16,precision=0.02,retrace=true,nearest=512,radius=0.1,"
+               "gather_rays=2,irradiance=0",
+               128},
+        Method{"mps_path",
+               "mps:target=path,mutations=500,chains=16,precision=0.05,retrace=true,nearest=512,"
+               "radius=0.1,gather_rays=2,irradiance=0",
+               128},
         Method{"pm_direct_view",
                "pm:light_paths=1000,retrace=true,nearest=12,radius=0.7,gather_rays=0", 256}),
     kMethodName);
+
+/// The irradiance at the nearest photon is that of the point to first order: with 60 photons within 1 %, for any share of
+/// the photons.
+TEST(IrradianceAtPhotons, IsThatAroundThem) {
+    const Scene scene = furnace();
+    for (const int step : {1, 4, 16}) {
+        const Tiles tiles = render_tiles(
+            scene,
+            fmt::format("pm:light_paths=4000,retrace=true,nearest=60,radius=0.7,gather_rays=4,"
+                        "irradiance={}",
+                        step),
+            {64, 1});
+        EXPECT_NEAR(tiles.values.back().mean(), 2, 0.02) << step;
+        EXPECT_LT(4 * std::sqrt(tiles.values.back().squared_error()), 0.02);
+    }
+}
 
 /// Parallel light on a floor that ends at x = edge; the camera sees [-1, 1]². All light comes by photons.
 Scene lit_floor(float edge) {

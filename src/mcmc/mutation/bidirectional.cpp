@@ -107,7 +107,7 @@ double BidirectionalMutation::Q(const PathState& x, const PathState& y,
     if (s.last < s.first) return 0;
     const auto from_light = [&](int i, int count) {
         // Alone, x_0 is made by a next event.
-        if (i == 0) return count == 1 ? y.next_event() : y[0].light;
+        if (i == 0) return count == 1 ? y[0].next_event : y[0].light;
         return y[i].light * double(y[i - 1].transmittance * y[i].opacity);
     };
     const auto from_eye = [&](int i) {

@@ -83,7 +83,9 @@ std::vector<std::string> all_integrators() {
     std::vector<std::string> all;
     for (const IntegratorEntry& e : integrator_registry()) {
         const std::string name = e.info.name;
-        all.push_back(name == "pm" ? "pm:light_paths=2000" : name);
+        all.push_back(name == "pm"    ? "pm:light_paths=2000"
+                      : name == "mps" ? "mps:mutations=2000,precision=0.2"
+                                      : name);
     }
     all.insert(all.end(),
                {"bdpt:eorr=true", "bdpt:connections=cache", "vcm:radius=0.3",

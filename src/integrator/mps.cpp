@@ -1,0 +1,71 @@
+// Metropolis photon sampling [Fan et al. 2005]: photon mapping as in pm.cpp, whose photons come from Markov chains over
+// light sub-paths. A state is the numbers of a light path; small steps move all of them, block steps draw those of some
+// vertices again, large steps draw a whole path. In primary sample space all of these are symmetric, and a step that
+// changes late vertices alone keeps the rest of the path, as the perturbations of [Fan et al. 2005] do.
+//
+// Target of a photon with flux Φ at x: lum(Φ) times
+// - importons: the density of importance at x, plus a floor. A photon's power is b Φ / (lum(Φ) I), the same for all but for
+//   colour and importance.
+// - path: a = min(1, h/h_0), where h is the response of the lens to a random remainder of the path from x. A photon's power
+//   is b Φ/lum(Φ) r, where r is the number of trials of remainders until one succeeds with probability a: E[r] = 1/P(x). The
+//   printed power, Φ times a ratio of path contributions, compares densities over spaces of different dimension.
+//
+// Both are exact for any I > 0 and any a in [0, 1] that are fixed before the chains begin. States that stay accumulate their
+// power on the same photons, and proposals leave their expected share. The maps' densities are biased as in pm.cpp.
+
+#include "integrator/mps.h"
+
+#include "integrator/metropolis_photons.h"
+#include "integrator/pm.h"
+
+namespace etendue {
+namespace {
+
+constexpr std::array<Choice<PhotonTarget>, 2> kTargets{
+    {{"importons", PhotonTarget::Importons}, {"path", PhotonTarget::Path}}};
+
+MetropolisPhotonOptions options(const IntegratorParams& p, uint64_t max_bytes) {
+    return {.target = p.choice("target", kTargets),
+            .mutations = uint64_t(p.integer("mutations", 1, 1 << 30)),
+            .chains = p.integer("chains", 1, 1 << 20),
+            .p_large = double(p.number("p_large", 0.01f, 1.0f)),
+            .precision = double(p.number("precision", 0.001f, 0.5f)),
+            .least_share = double(p.number("least_share", 0, 1)),
+            .max_bytes = max_bytes};
+}
+
+}  // namespace
+
+IntegratorEntry mps_entry() {
+    std::vector<ParamInfo> params = photon_map_params(
+        {"mutations", ParamKind::Int, "500000", "Number of mutations that make the photons."});
+    params.push_back(
+        {"target", ParamKind::String, "importons",
+         "What photons are worth to chains: importons (their flux times the density of "
+         "importance there) or path (their flux, where a random path from there to the "
+         "lens is not blocked)."});
+    params.push_back({"p_large", ParamKind::Float, "0.3",
+                      "Probability of a large step, which is an independent light path."});
+    params.push_back(
+        {"chains", ParamKind::Int, "256", "Number of chains, whatever the number of threads."});
+    params.push_back({"precision", ParamKind::Float, "0.02",
+                      "Relative standard error of the total power that the start-up must reach."});
+    params.push_back({"least_share", ParamKind::Float, "0.25",
+                      "Photons with less than this share of the power of one mutation are kept "
+                      "with a probability in proportion to it, and with as much more power.",
+                      true});
+    return {{"integrator", "mps",
+             "Metropolis photon sampling: photon mapping with photons where the image needs them. "
+             "Biased.",
+             params},
+            [](const IntegratorParams& params_of_spec) {
+                return make_photon_map_integrator(
+                    params_of_spec,
+                    [](const IntegratorParams& p, const PhotonMapping& mapping,
+                       uint64_t max_bytes) -> std::unique_ptr<PhotonSource> {
+                        return std::make_unique<MetropolisPhotons>(mapping, options(p, max_bytes));
+                    });
+            }};
+}
+
+}  // namespace etendue

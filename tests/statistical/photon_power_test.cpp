@@ -1,0 +1,132 @@
+// Metropolis photon sampling: the photons have the power of those of traced light paths, in all and by region, in each map.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "integrator/metropolis_photons.h"
+#include "render_tiles.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+constexpr uint64_t kPaths = 2000;
+
+IntegratorParams params_of_mps() {
+    for (const IntegratorEntry& e : integrator_registry())
+        if (std::string(e.info.name) == "mps") return {IntegratorSpec::parse("mps"), e.info};
+    throw std::logic_error("no mps");
+}
+
+/// Passes that trace photons, and sum their power by region and map.
+class PhotonTotals final : public Integrator {
+public:
+    /// Octants of the room, and all of them; of each the luminance and the red channel, by map.
+    static constexpr size_t kRegions = 9, kSums = 2 * 2 * kRegions;
+
+    PhotonTotals(const Scene& scene, std::optional<PhotonTarget> target)
+        : scene_(scene), params_(params_of_mps()), mapping_(params_, true),
+          traced_(mapping_, kPaths, uint64_t(1) << 30) {
+        if (target)
+            metropolis_.emplace(mapping_, MetropolisPhotonOptions{.target = *target,
+                                                                  .mutations = kPaths,
+                                                                  .chains = 16,
+                                                                  .precision = 0.05});
+    }
+
+    void trace(const PassContext& pass) override {
+        // Lopsided importance, of few places.
+        const auto importons = [&] {
+            std::vector<Importon> out;
+            for (const MapPhoton& p : traced_.trace(pass, 0, {}).global)
+                if (p.p.y < 0) out.push_back({p.p, p.side, 1.5f + p.p.x, p.is_caustic()});
+            return out;
+        };
+        const MapPhotons photons = metropolis_ ? metropolis_->trace(pass, pass.index, importons)
+                                               : traced_.trace(pass, pass.index, {});
+        std::array<double, kSums> sums{};
+        for (const bool is_caustic : {false, true})
+            for (const MapPhoton& p : is_caustic ? photons.caustic : photons.global) {
+                if (is_caustic && !is_seen(p)) continue;
+                const size_t octant =
+                    size_t(p.p.x < 0) + 2 * size_t(p.p.y < 0) + 4 * size_t(p.p.z < 0);
+                for (const size_t region : {octant, kRegions - 1}) {
+                    const size_t i = 2 * (region + kRegions * is_caustic);
+                    sums[i] += double(luminance(p.power));
+                    sums[i + 1] += double(p.power.r);
+                }
+            }
+        for (size_t i = 0; i < kSums; ++i) totals[i].add(sums[i]);
+    }
+    void sample(const SampleContext&, Workspace&) const override {}
+    TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
+    uint64_t light_paths(const Scene&) const override { return kPaths; }
+    Estimator estimator() const override { return Estimator::Biased; }
+
+    std::array<Moments, kSums> totals;
+
+private:
+    /// Whether the lens sees it: caustics that it does not see are left out by the target Path.
+    bool is_seen(const MapPhoton& p) const {
+        const Vec3 n = p.side.normal();
+        const auto lens = scene_.sensor().sample_connection(p.p, false, {});
+        return lens && reached_region(scene_.film(), scene_.filter()).contains(lens->film) &&
+               scene_.transmittance(p.p, n, lens->p, {}) > 0;
+    }
+
+    const Scene& scene_;
+    IntegratorParams params_;
+    PhotonMapping mapping_;
+    TracedPhotons traced_;
+    std::optional<MetropolisPhotons> metropolis_;
+};
+
+std::array<Moments, PhotonTotals::kSums>
+totals(const Scene& scene, std::optional<PhotonTarget> target, uint64_t passes) {
+    RenderSettings settings;
+    settings.spp = passes;
+    settings.seed = target ? 3 : 4;
+    settings.threads = 1;
+    auto integrator = std::make_unique<PhotonTotals>(scene, target);
+    const PhotonTotals& sums = *integrator;
+    Renderer renderer(scene, settings, std::move(integrator));
+    renderer.run([](const Progress&) {}, std::atomic<bool>{false});
+    EXPECT_EQ(renderer.stats().runaways, 0u);
+    return sums.totals;
+}
+
+class PhotonPower : public ::testing::TestWithParam<PhotonTarget> {};
+
+/// A lamp, glass that makes caustics, rough metal.
+TEST_P(PhotonPower, IsThatOfTracedPhotons) {
+    const Scene scene = build(front_camera(8) + room() + area_lamp() +
+                              sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
+                              sphere("0.4,-0.4,0.3", "0.35", kGlass));
+    const auto traced = totals(scene, {}, 256), sampled = totals(scene, GetParam(), 100);
+    const double level = sidak(1e-4, int(traced.size()));
+    for (size_t i = 0; i < traced.size(); ++i) {
+        const bool is_caustic = i >= traced.size() / 2;
+        const std::string what =
+            fmt::format("{} map, region {}, channel {}: {} ± {} for {} ± {}",
+                        is_caustic ? "caustic" : "global", i / 2 % PhotonTotals::kRegions, i % 2,
+                        sampled[i].mean(), std::sqrt(sampled[i].squared_error()), traced[i].mean(),
+                        std::sqrt(traced[i].squared_error()));
+        EXPECT_GT(welch_p(sampled[i], traced[i], kRounding * traced[i].mean()), level) << what;
+        if (i / 2 % PhotonTotals::kRegions + 1 == PhotonTotals::kRegions) {
+            EXPECT_GT(traced[i].mean(), 0) << what;
+            EXPECT_LT(4 * std::sqrt(sampled[i].squared_error()),
+                      (is_caustic ? 0.15 : 0.05) * traced[i].mean())
+                << what;
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, PhotonPower,
+                         ::testing::Values(PhotonTarget::Importons, PhotonTarget::Path),
+                         [](const auto& p) {
+                             return std::string(p.param == PhotonTarget::Path ? "path"
+                                                                              : "importons");
+                         });
+
+}  // namespace
+}  // namespace etendue::test

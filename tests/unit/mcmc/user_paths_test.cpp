@@ -1,0 +1,153 @@
+// User paths: the file, what is refused and why, and the density of proposals.
+
+#include "mcmc/user_paths.h"
+
+#include <gtest/gtest.h>
+
+#include "math/statistics.h"
+#include "mcmc/pick_paths.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+const std::string kMirror = "<bsdf type=\"twosided\"><bsdf type=\"conductor\"/></bsdf>";
+
+/// A room with a mirror on its left wall.
+Scene mirror_room() {
+    return build(front_camera(16) + room() + area_lamp() +
+                 rectangle("<scale value=\"0.5\"/><rotate y=\"1\" angle=\"90\"/><translate "
+                           "x=\"-0.95\"/>",
+                           kMirror));
+}
+
+std::string problem(const Scene& scene, std::vector<Vec3> points) {
+    const CheckedPath checked = check_user_path(
+        scene, {.name = {}, .points = std::move(points), .cones = {1}, .radius = {}});
+    return checked.path ? "" : std::to_string(checked.point + 1) + ": " + checked.problem;
+}
+
+TEST(UserPaths, AreRefusedWithAReason) {
+    const Scene scene = mirror_room();
+    const Vec3 lamp{0, 0.98f, 0};
+    // Off the mirror, from the lamp to the floor: at half the height between them.
+    EXPECT_EQ(problem(scene, {lamp, {0.3f, -1, 0.2f}}), "");
+    EXPECT_EQ(problem(scene, {lamp, {-0.95f, -0.01f, 0}, {0, -1, 0}}), "");
+    const auto expect = [&](const std::vector<Vec3>& points, const char* text) {
+        EXPECT_NE(problem(scene, points).find(text), std::string::npos) << problem(scene, points);
+    };
+    expect({lamp, {0.3f, -0.8f, 0.2f}}, "2: is 0.2 from the nearest surface");
+    expect({{0, -1, 0}, {0.3f, 1, 0.2f}}, "1: is on \"rectangle\", which emits nothing");
+    expect({lamp, {0, 1, 0.1f}}, "1: its emitter emits nothing toward the next point");
+    expect({lamp, {-1, 0, 0}}, "2: cannot be reached from the point before it");
+    expect({lamp, {-0.95f, -0.01f, 0}}, "2: is on \"rectangle\", a mirror");
+    expect({lamp, {-0.95f, 0.2f, 0}, {0, -1, 0}}, "degrees off the law of reflection");
+}
+
+TEST(UserPaths, FilesAreReadAndWritten) {
+    const std::vector<GivenPath> paths{
+        {.name = "a", .points = {{0.1f, 2, 3}, {4, 5, 6}}, .cones = {2}, .radius = 0.5f},
+        {.name = {}, .points = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}}, .cones = {1, 3}, .radius = {}}};
+    const std::vector<GivenPath> read = parse_user_paths(to_json(paths), "paths.json");
+    ASSERT_EQ(read.size(), 2u);
+    for (size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(read[i].name, paths[i].name);
+        EXPECT_EQ(read[i].cones, paths[i].cones);
+        EXPECT_EQ(read[i].radius, paths[i].radius);
+        ASSERT_EQ(read[i].points.size(), paths[i].points.size());
+        for (size_t k = 0; k < paths[i].points.size(); ++k)
+            EXPECT_EQ(length2(read[i].points[k] - paths[i].points[k]), 0);
+    }
+}
+
+TEST(UserPaths, BadFilesAreRefused) {
+    const auto message = [](const std::string& text) -> std::string {
+        try {
+            parse_user_paths(text, "paths.json");
+        } catch (const std::runtime_error& e) {
+            return e.what();
+        }
+        return "";
+    };
+    EXPECT_NE(message("[\n{\n").find("paths.json:"), std::string::npos);
+    EXPECT_NE(message("{}").find("must be a list of paths"), std::string::npos);
+    EXPECT_NE(message("[{\"points\": [[0,0,0]]}]").find("at least two points"), std::string::npos);
+    EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0]]}]").find("point 2 must be [x, y, z]"),
+              std::string::npos);
+    EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"cones\": 1}]").find("\"cones\""),
+              std::string::npos);
+    EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"cone\": -1}]").find("above 0"),
+              std::string::npos);
+    EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"cone\": [1,2]}]").find("2 angles for 1"),
+              std::string::npos);
+}
+
+/// Cells of the floor, or of what the mirror shows of it: proposals in each against the integral of their density, from
+/// samples whose own density is known.
+TEST(UserPaths, DensityIsThatOfTheProposals) {
+    const Scene scene = mirror_room();
+    const auto path = [&](std::vector<Vec3> points, float cone) {
+        return *check_user_path(
+                    scene,
+                    {.name = {}, .points = std::move(points), .cones = {cone}, .radius = 0.05f})
+                    .path;
+    };
+    const std::vector<Vec3> direct{{0, 0.98f, 0}, {0.3f, -1, 0.2f}},
+        mirrored{{0, 0.98f, 0}, {-0.95f, -0.01f, 0}, {0, -1, 0}};
+    const UserPaths narrow(scene, {path(direct, 4), path(mirrored, 4)}),
+        wide(scene, {path(direct, 8), path(mirrored, 8)});
+    const TechniqueCounts none{};
+    RenderStats stats;
+    const WalkContext walk{scene, none, stats, {}};
+    SubPath y;
+    constexpr int kCells = 8, kSamples = 60000;
+    const auto cell = [&](const SubPath& p) {
+        const Vec3 at = p[p.size() - 1].p, from = p[0].p;
+        return (p.size() == 3 ? 4 : 0) + (at.x > (p.size() == 3 ? 0.0f : 0.3f) ? 2 : 0) +
+               (from.z > 0 ? 1 : 0);
+    };
+    std::array<Moments, kCells> sampled, integrated;
+    int edges = 0;
+    for (int i = 0; i < kSamples; ++i)
+        for (const bool is_wide : {false, true}) {
+            Sampler sampler(SamplerKind::Independent, is_wide);
+            sampler.start(0, uint64_t(i));
+            int at = -1;
+            double value = 0;
+            if ((is_wide ? wide : narrow).sample(walk, sampler, y)) {
+                std::vector<const Vertex*> vertices;
+                for (int k = 0; k < y.size(); ++k) vertices.push_back(&y[k]);
+                at = cell(y);
+                const double density = (is_wide ? wide : narrow).density(vertices);
+                // Rounding may put a proposal beyond the edge of its cone.
+                edges += !(density > 0);
+                value = !is_wide ? 1.0 : density > 0 ? narrow.density(vertices) / density : 0.0;
+            }
+            for (int k = 0; k < kCells; ++k)
+                (is_wide ? integrated : sampled)[size_t(k)].add(k == at ? value : 0.0);
+        }
+    EXPECT_LT(edges, kSamples / 1000);
+    for (size_t k = 0; k < kCells; ++k) {
+        EXPECT_GT(sampled[k].mean(), 0.02) << k;
+        EXPECT_GT(welch_p(sampled[k], integrated[k], 1e-3 * sampled[k].mean()), sidak(1e-3, kCells))
+            << k << ": " << sampled[k].mean() << " and " << integrated[k].mean();
+    }
+}
+
+TEST(UserPaths, PickedOnesPassTheirChecks) {
+    const Scene scene = build(mixed_room(front_camera(16)));
+    const auto picked =
+        pick_paths(scene, {.count = 8, .x = 8, .y = 12, .length = 4, .samples = 20000, .seed = 1});
+    EXPECT_GE(picked.size(), 4u);
+    for (const GivenPath& path : picked) {
+        const CheckedPath checked = check_user_path(scene, path);
+        EXPECT_TRUE(checked.path) << path.name << ", point " << checked.point + 1 << ": "
+                                  << checked.problem;
+    }
+    EXPECT_THROW(
+        pick_paths(scene, {.count = 1, .x = 99, .y = 0, .length = 3, .samples = 1, .seed = 0}),
+        std::runtime_error);
+}
+
+}  // namespace
+}  // namespace etendue::test
