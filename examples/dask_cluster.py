@@ -63,7 +63,7 @@ def main() -> None:
     from dask.distributed import Client, LocalCluster
 
     file, integrator, runs = sys.argv[1], sys.argv[2], int(sys.argv[3])
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:  # type: ignore[no-untyped-call]
         total = render_on(client, file, integrator, runs)
     relative = total.standard_error.mean() / total.image.mean()
     print(f"{runs} runs, {total.passes} samples per pixel, mean standard error {relative:.1%} of the mean radiance")

@@ -48,9 +48,9 @@ EmissionSample emission_from(const Vertex& x0, Vec2 u) {
 
 }  // namespace
 
-PathBuilder::PathBuilder(const PathMeasure& measure, const SampleContext& sample, Sampler& sampler,
-                         Workspace& work, const PathState* x, int l, int m)
-    : measure_(measure), sample_(sample), sampler_(sampler), work_(work), x_(x), l_(l),
+PathBuilder::PathBuilder(const PathMeasure& measure, Sampler& sampler, Workspace& work,
+                         const PathState* x, int l, int m)
+    : measure_(measure), sampler_(sampler), work_(work), x_(x), l_(l),
       m_(m), walk_{measure.scene, kNoCounts, work.stats, {}} {
     work_.y.clear(), work_.z.clear();
     if (keeps_light()) keep(work_.y, (*x)[l].v, l >= 1 ? &(*x)[l - 1].v : nullptr);

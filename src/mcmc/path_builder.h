@@ -10,8 +10,8 @@ class PathBuilder {
 public:
     /// Keeps x_0 … x_l and x_m … x_k; nothing on the light's side where l = -1, on the eye's where m = k+1. `x` may be
     /// nullptr, and nothing is kept.
-    PathBuilder(const PathMeasure& measure, const SampleContext& sample, Sampler& sampler,
-                Workspace& work, const PathState* x, int l, int m);
+    PathBuilder(const PathMeasure& measure, Sampler& sampler, Workspace& work, const PathState* x,
+                int l, int m);
 
     /// Samples vertices from x_l on, or from an emitter on; a single one there is a next event. If nothing is kept of the
     /// eye's side, and nothing is sampled from there, the last one is where a ray crosses the lens.
@@ -53,7 +53,6 @@ private:
     bool append_hit_emitter(const Vertex& hit, PathState& y);
 
     const PathMeasure& measure_;
-    const SampleContext& sample_;
     Sampler& sampler_;
     Workspace& work_;
     const PathState* x_;

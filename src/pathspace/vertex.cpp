@@ -46,11 +46,11 @@ float guided_pdf(const Vertex& v, const GuideCell& cell, Vec3 from, Vec3 w, Tran
                                     cell.field(mode).mixture.pdf(view(v, cell, from), w);
 }
 
-void Vertex::mix_guide(Vec3 w, TransportMode mode, float& pdf, float& pdf_rev) const {
+void Vertex::mix_guide(Vec3 w, TransportMode mode, float& pdf, float& reverse) const {
     pdf = guided_pdf(*this, *guide, wo, w, mode, pdf);
     const TransportMode rev = other(mode);
-    if (const float a = share(*this, *guide, rev); a > 0 && pdf_rev > 0)
-        pdf_rev = (1 - a) * pdf_rev + a * (1 - delta_probability(*this, w, rev)) * guide_rev;
+    if (const float a = share(*this, *guide, rev); a > 0 && reverse > 0)
+        reverse = (1 - a) * reverse + a * (1 - delta_probability(*this, w, rev)) * guide_rev;
 }
 
 std::optional<BsdfSample> Vertex::sample_guided(float u_lobe, Vec2 u, float u_guide,

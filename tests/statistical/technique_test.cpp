@@ -43,7 +43,7 @@ protected:
 
 TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
     const Scene scene = furnace(GetParam().sensor);
-    constexpr int kRuns = 24;
+    constexpr int kRuns = 32;
     std::map<std::tuple<Strategy, int, int>, Moments> alone;
     std::map<int, Moments> together;  // by length
     for (int run = 0; run < kRuns; ++run) {

@@ -23,7 +23,7 @@ struct MutationContext {
     Sampler& sampler;
 
     PathBuilder builder(const PathState* x, int l, int m) const {
-        return {measure, chain.sample, sampler, chain.work, x, l, m};
+        return {measure, sampler, chain.work, x, l, m};
     }
 };
 
