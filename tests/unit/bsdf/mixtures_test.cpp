@@ -12,13 +12,10 @@ using namespace etendue::testing;
 /// A material on the plane z = 0, as the tests of lobes see it. Values are without the η² of radiance.
 struct MaterialLobe {
     const Material* material;
-    float pdf_factor = 1;  ///< Of the density that it claims.
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const {
         ComponentArena arena;
-        BsdfEval e = at(wo, arena).eval(wo, wi, TransportMode::Importance);
-        e.pdf *= pdf_factor;
-        return e;
+        return at(wo, arena).eval(wo, wi, TransportMode::Importance);
     }
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const {
         ComponentArena arena;
