@@ -38,7 +38,15 @@ std::vector<const Material*> lobe_sums(TestMaterials& m) {
             &m.make("lobesum", {{"diffuse_reflectance", 0.4},
                                 {"glossy_reflectance", 0.0},
                                 {"specular_reflectance", 0.3},
-                                {"specular_transmittance", 0.2}})};
+                                {"specular_transmittance", 0.2}}),
+            &m.make("lobesum", {{"diffuse_reflectance", 0.3},
+                                {"diffuse_transmittance", 0.2},
+                                {"glossy_reflectance", 0.4},
+                                {"alpha", 0.4}}),
+            &m.make("lobesum", {{"diffuse_reflectance", 0.2},
+                                {"glossy_reflectance", 0.3},
+                                {"glossy_transmittance", 0.5},
+                                {"alpha", 0.4}})};
 }
 
 const Material& mixture(TestMaterials& m, const std::string& weights) {
