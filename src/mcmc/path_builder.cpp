@@ -175,7 +175,8 @@ bool PathBuilder::sample_eye(int count) {
 
 bool PathBuilder::append_emitter_point(const Vertex& from, PathState& y) {
     const Scene& scene = measure_.scene;
-    if (!scene.has_emitters() || from.kind == Vertex::Kind::Sensor) return false;
+    if (!scene.has_emitters() || !from.is_connectible || from.kind == Vertex::Kind::Sensor)
+        return false;
     sampler_.seek(Stream::Connection, 0);
     const Emitter& emitter =
         scene.sample_emitter(sampler_.next_1d_fine_if(scene.has_emitter_choice()));

@@ -43,8 +43,6 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
                                              gloss_of_emitter(emitter.is_area()), last, counts) +
                        sum_below<Side::Eye>(z, last, last, counts);
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
-        // Two ends at infinity cannot be connected.
-        if (last == 1 && !(v.is_infinite && z[0].is_infinite)) inner += sqr(double(counts.splat));
         others += sqr(p_L) * inner;
     }
     return Join{.technique = connection_technique(0, t),
@@ -241,10 +239,21 @@ std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, f
                 .needs_test = false};
 }
 
+namespace {
+
+/// Whether y_{s-1} is a point or direction that emits; the lens does not see such an emitter itself.
+bool is_invisible(const SubPath& y, int s) {
+    return s == 1 && y[0].emitter->is_delta();
+}
+
+}  // namespace
+
 std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Sampler& sampler,
                                const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
-    if (!a.is_connectible) return {};
+    const Technique technique{Strategy::Splat, s, 1};
+    const float count = counts.of(technique);
+    if (!a.is_connectible || !(count > 0) || is_invisible(y, s)) return {};
     sampler.seek(Stream::Connection, uint64_t(s) + 0x8000u);
     const Sensor& sensor = scene.sensor();
     if (a.is_infinite && sensor.is_orthographic()) return {};
@@ -274,24 +283,23 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
     if (counts.hit_lens > 0)
         others +=
             sqr(double(counts.hit_lens) * f.pdf * abs_dot(lens->ng, w) * inv_dist2 / lens->pdf_pos);
-    Join join{.technique = {Strategy::Splat, s, 1},
-              .emitter = y[0].emitter,
-              .contribution = C,
-              .mis_weight = power_heuristic(counts.splat, others),
-              .film = lens->film,
-              .a = lens->p,
-              .ng_a = Vec3{},
-              .b = a.p,
-              .ng_b = ng_a,
-              .to_infinity = a.is_infinite};
-    return join;
+    return Join{.technique = technique,
+                .emitter = y[0].emitter,
+                .contribution = C,
+                .mis_weight = power_heuristic(count, others),
+                .film = lens->film,
+                .a = lens->p,
+                .ng_a = Vec3{},
+                .b = a.p,
+                .ng_b = ng_a,
+                .to_infinity = a.is_infinite};
 }
 
 std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
                                   const TechniqueCounts& counts) {
     const Vertex& a = y[s - 1];
     const Flight& flight = y.flight;
-    if (!(counts.hit_lens > 0) || !(flight.pdf_sa > 0)) return {};
+    if (!(counts.hit_lens > 0) || !(flight.pdf_sa > 0) || is_invisible(y, s)) return {};
     const Vec3 origin = a.is_infinite ? flight.o : a.p;
     const auto lens = scene.sensor().hit_lens(origin, flight.d, flight.length);
     if (!lens) return {};
@@ -307,7 +315,7 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
         sqr(p_lens) * outward_sum<Side::Light>(
                           y, s - 1, a.is_delta,
                           {rev_last, s >= 2 ? y[s - 2].pdf_rev : 0.0f, kLensGloss, s}, counts);
-    if (!a.is_delta) others += sqr(counts.splat * p_lens);
+    if (!a.is_delta) others += sqr(counts.of(connection_technique(s, 1)) * p_lens);
     return Join{.technique = {Strategy::HitLens, s + 1, 0},
                 .emitter = y[0].emitter,
                 .contribution = C,

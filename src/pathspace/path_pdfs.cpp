@@ -115,7 +115,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
                                ? emitter.eval_infinite(x[0]->p)
                                : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->location.prim, w0);
     p.can_hit_emitter = !emitter.is_delta();
-    p.can_connect_ends = !(x[0]->is_infinite && x[k]->is_infinite);
+    p.can_connect_ends = p.can_hit_emitter && !(x[0]->is_infinite && x[k]->is_infinite);
     p.light[0] = emission_pmf(guide, emitter);
     p.next_event = emitter.selection_pmf;
     if (p.can_hit_emitter) {

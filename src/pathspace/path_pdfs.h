@@ -20,7 +20,8 @@ struct PathPdfs {
     std::vector<bool> sees_lens;      ///< See Vertex.
     double next_event = 0;            ///< p_NE(x_0), sampled from x_1.
     bool can_hit_emitter = true;
-    bool can_connect_ends = true;  ///< False where both ends are at infinity.
+    bool can_connect_ends =
+        true;  ///< False where both ends are at infinity, or x_0 is of a delta emitter.
 
     int vertices() const { return int(light.size()); }
     /// Density with which the technique samples the path; 0 where it cannot.

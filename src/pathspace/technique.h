@@ -14,10 +14,10 @@ enum class Strategy : uint8_t {
     Hit,        ///< C(0,t): the eye path hits an emitter.
     NextEvent,  ///< C(1,t), t ≥ 2: a point sampled on an emitter for z_{t-1}.
     Connect,    ///< C(s,t), s ≥ 2, t ≥ 2; for s = 1, with y_0 of a light path.
-    Splat,      ///< C(s,1): the light path is connected to the lens.
-    HitLens,    ///< C(s,0): the light path hits a finite lens.
-    Merge,      ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are treated as one vertex.
-    Gather,     ///< U(s,t): one vertex of such a pair is dropped; a shadow ray connects the rest.
+    Splat,    ///< C(s,1): the light path is connected to the lens. Not C(1,1) where there are hits.
+    HitLens,  ///< C(s,0): the light path hits a finite lens.
+    Merge,    ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are treated as one vertex.
+    Gather,   ///< U(s,t): one vertex of such a pair is dropped; a shadow ray connects the rest.
 };
 
 /// Whether y_{s-1} and z_{t-1} stand for one vertex of the full path.
@@ -136,7 +136,9 @@ struct TechniqueCounts {
         case Strategy::Hit: return hit;
         case Strategy::NextEvent: return next_event;
         case Strategy::Connect: return q.s == 1 ? connect_emission : connect;
-        case Strategy::Splat: return splat;
+        // On a path of one edge a hit has no random choice besides the lens and film points, so that splats would only
+        // add their noise to it.
+        case Strategy::Splat: return q.s == 1 && hit > 0 ? 0 : splat;
         case Strategy::HitLens: return hit_lens;
         case Strategy::Merge: return merge;
         case Strategy::Gather: return gathers(q.vertices() - 1);

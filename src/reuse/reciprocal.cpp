@@ -11,7 +11,8 @@ namespace {
 /// The trials of one pair: rays from PairEvent::from, by the proposal with the least mass.
 class Trials {
 public:
-    explicit Trials(const PairEvent& event) : e_(event), density_{event.from, event.mode} {
+    Trials(const Scene& scene, const PairEvent& event)
+        : scene_(scene), e_(event), density_{event.from, event.mode} {
         if (e_.from.is_infinite) {
             const auto half_height =
                 e_.bound == TrialBound::Slab ? std::optional(e_.near.half_height) : std::nullopt;
@@ -20,7 +21,8 @@ public:
             return;
         }
         // Rays start at a small offset from `from`, so the set of directions is enlarged by it.
-        const float beside = length(offset_origin(e_.from.p, e_.from.ng, e_.from.ng) - e_.from.p);
+        const float beside =
+            length(scene_.offset_origin(e_.from.p, e_.from.ng, e_.from.ng) - e_.from.p);
         const Vec3 to_center = e_.near.p - e_.from.p;
         choose({to_center, e_.near.radius + beside, double(length2(to_center)),
                 e_.from.guide ? std::nullopt : e_.from.cosine_normal()},
@@ -41,8 +43,9 @@ public:
         } else if (const auto w = std::visit(
                        [&](const auto& p) { return p.propose(density_, sampler, stats); },
                        proposal_)) {
-            ray = Ray{e_.from.has_cosine ? offset_origin(e_.from.p, e_.from.ng, *w) : e_.from.p, *w,
-                      kInf};
+            ray = Ray{e_.from.has_cosine ? scene_.offset_origin(e_.from.p, e_.from.ng, *w)
+                                         : e_.from.p,
+                      *w, kInf};
         }
         return ray && e_.near.clip(*ray) ? ray : std::nullopt;
     }
@@ -81,6 +84,7 @@ private:
             take_if_less(RegionProposal<SeenBand>::make(SeenBand(view), density_));
     }
 
+    const Scene& scene_;
     const PairEvent& e_;
     WalkDensity density_;
     DirectionProposal proposal_;
@@ -114,7 +118,7 @@ bool Neighbourhood::clip(Ray& ray) const {
 double reciprocal_probability(const Scene& scene, const PairEvent& event, Sampler& sampler,
                               Vertex& scratch, RenderStats& stats) {
     constexpr uint64_t kRunaway = 10'000'000;
-    const Trials trials(event);
+    const Trials trials(scene, event);
     ComponentArena arena;
     SurfaceHit hit;
     for (uint64_t n = 1; n <= kRunaway; ++n) {

@@ -292,6 +292,11 @@ private:
     void finish_emitters() {
         Bounds3 bounds = scene_.bounds_;
         bounds.extend(scene_.sensor_->lens_bounds());
+        scene_.size_ =
+            4 * bounds.radius();  // Of coordinates, unless the scene is far from the origin.
+        // The errors of points near 0, wherever their rays come from. Large scenes may have small details.
+        scene_.least_offset_ =
+            std::ldexp(1.0f, std::clamp(std::ilogb(bounds.radius()), -120, 0) - 6);
         const float radius = std::max(bounds.radius(), 1e-6f);
         // Area emitters emit into the exterior medium.
         std::map<const Emitter*, MediumId> media;

@@ -123,7 +123,7 @@ Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
 }
 
 /// A shadow ray from `a` to `b` with parameters in [0, 1]; both ends are moved off their surfaces.
-Ray Scene::segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) {
+Ray Scene::segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const {
     const Vec3 d = b - a;
     const Vec3 from = offset_origin(a, ng_a, d);
     // Bound for the rounding error of the distance at which the ray meets the far surface.

@@ -75,6 +75,10 @@ public:
     /// Geometry of a surface point.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
+    /// The origin of a ray of direction `d` from a surface point `p` with normal `ng`, see etendue::offset_origin().
+    Vec3 offset_origin(Vec3 p, Vec3 ng, Vec3 d) const {
+        return etendue::offset_origin(p, ng, d, least_offset_, size_);
+    }
     /// Transmittance of masks along the open segment from `a` to `b`, which lie on surfaces with normals `ng_a` and
     /// `ng_b`; 0 where an opaque surface is in between.
     float transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
@@ -130,7 +134,7 @@ public:
 private:
     friend class SceneBuilder;
     void fill_hit(const RayHit& raw, SurfaceHit& hit) const;
-    static Ray segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b);
+    Ray segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;
     /// Calls `passes(hit)` for the surfaces along a ray in order, until it returns false or there are no more; returns
@@ -156,6 +160,7 @@ private:
     Bounds3 bounds_;
     std::vector<std::string> sensor_names_;
     size_t sensor_index_ = 0;
+    float least_offset_ = 0, size_ = kInf;  ///< Of offset_origin().
     bool has_masks_ = false;
     bool has_open_boundaries_ = false;
     bool has_delta_emitters_ = false;

@@ -24,6 +24,12 @@ EyeChainMutation::Chains EyeChainMutation::chains(const PathState& x) {
     }
 }
 
+bool EyeChainMutation::suits(const PathState& x) const {
+    const Chains c = chains(x);
+    const bool can_hit_end = c.end > 0 || !x.emitter().is_delta();
+    return can_hit_end && (c.turns > 0) == is_multi_;
+}
+
 bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, PathState& y,
                                MutationWay& way) const {
     const int k = x.last(), end = chains(x).end;
@@ -54,6 +60,7 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
 }
 
 double EyeChainMutation::Q(const PathState&, const PathState& y, const MutationWay& way) const {
+    if (way.l < 0 && y.emitter().is_delta()) return 0;  // The chain cannot hit it.
     // Film points and turns are as likely there as back.
     const int k = y.last();
     double p = y[k - 1].eye;

@@ -16,7 +16,7 @@ public:
     };
     EyeChainMutation(Kind kind, const PathMeasure& measure);
 
-    bool suits(const PathState& x) const override { return (chains(x).turns > 0) == is_multi_; }
+    bool suits(const PathState& x) const override;
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
                  MutationWay& way) const override;
     double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
