@@ -33,6 +33,8 @@ void info(const SceneOptions& options, bool as_json) {
                                {"width", s.film().width},
                                {"height", s.film().height},
                                {"filter", s.filter().name()},
+                               {"sensors", s.sensor_names()},
+                               {"sensor", s.sensor_index()},
                                {"geometry_bytes", st.geometry_bytes},
                                {"texture_bytes", st.texture_bytes},
                                {"accelerator_bytes", st.accelerator_bytes},
@@ -46,6 +48,10 @@ void info(const SceneOptions& options, bool as_json) {
         fmt::print(", crop {} x {} at ({}, {})", s.film().crop_width, s.film().crop_height,
                    s.film().crop_x, s.film().crop_y);
     fmt::print(", {} filter\n", s.filter().name());
+    if (s.sensor_names().size() > 1)
+        for (size_t i = 0; i < s.sensor_names().size(); ++i)
+            fmt::print("  {}    {}: {}{}\n", i == 0 ? "sensors " : "        ", i,
+                       s.sensor_names()[i], i == s.sensor_index() ? " (used)" : "");
     fmt::print("  rendering   {}, {} spp\n",
                s.defaults().integrator.empty() ? "path" : s.defaults().integrator,
                s.defaults().spp);

@@ -8,13 +8,16 @@
 
 #include "commands.h"
 #include "render/plugin_list.h"
+#include "scene/builder.h"
+#include "scene/mitsuba_manual.h"
+#include "scene/settings.h"
 
 namespace etendue {
 namespace {
 
 struct ListCommand {
     std::string category, name;
-    bool markdown = false, json = false;
+    bool markdown = false, json = false, mitsuba = false;
 
     void run() const;
 };
@@ -62,6 +65,12 @@ void print_markdown(const std::vector<PluginEntry>& entries, bool headings) {
 }
 
 void ListCommand::run() const {
+    if (mitsuba) {
+        std::vector<PluginInfo> plugins = scene_plugins();
+        for (const IntegratorAlias& a : integrator_aliases()) plugins.push_back(a.info);
+        fmt::print("{}", mitsuba_manual_table(plugins));
+        return;
+    }
     const std::vector<PluginEntry> entries = choose_plugins(plugin_list(), category, name);
     if (json)
         fmt::print("{}\n", to_json(entries).dump(2));
@@ -80,6 +89,9 @@ void add_list_command(CLI::App& app) {
     c.add_option("CATEGORY", command->category, "List only this category, e.g. bsdf");
     c.add_option("NAME", command->name, "List only this plug-in of the category, e.g. diffuse");
     CLI::Option* markdown = c.add_flag("--markdown", command->markdown, "Print Markdown");
+    c.add_flag(
+        "--mitsuba", command->mitsuba,
+        "Print, in Markdown, what becomes of everything in the manuals of Mitsuba 0.6 and 3");
     c.add_flag("--json", command->json, "Print JSON")->excludes(markdown);
     c.callback([command] { command->run(); });
 }

@@ -10,6 +10,7 @@ namespace etendue {
 
 void add_render_command(CLI::App& app);
 void add_info_command(CLI::App& app);
+void add_convert_command(CLI::App& app);
 void add_compare_command(CLI::App& app);
 void add_diff_command(CLI::App& app);
 void add_tonemap_command(CLI::App& app);

@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     etendue::add_render_command(app);
     etendue::add_info_command(app);
+    etendue::add_convert_command(app);
     etendue::add_compare_command(app);
     etendue::add_diff_command(app);
     etendue::add_tonemap_command(app);

@@ -36,7 +36,7 @@ std::vector<int> parse_integers(const std::string& text, char separator, size_t 
 }  // namespace
 
 void SceneOptions::add_to(CLI::App& command) {
-    command.add_option("SCENE", file, "Scene file (.xml, .pbrt)")->required();
+    command.add_option("SCENE", file, "Scene file (.xml, .pbrt, .gltf, .glb)")->required();
     add_reading_options(command);
 }
 
@@ -44,9 +44,12 @@ void SceneOptions::add_reading_options(CLI::App& command) {
     command
         .add_option("-D,--define", defines, "Value of a scene parameter, name=value; repeatable")
         ->allow_extra_args(false);
-    command.add_flag("--lenient", lenient, "Turn unknown plug-ins and parameters into warnings");
+    command.add_flag("--lenient", lenient,
+                     "Leave out what cannot be rendered, with a warning for each thing");
     command.add_flag("--watertight", watertight,
                      "Let no ray pass between adjacent triangles; rays take up to a fifth longer");
+    command.add_option("--sensor", sensor,
+                       "Sensor to use, by its number (from 0) or its name; see etendue info");
     command.add_option("--resolution", resolution, "Image size WxH instead of the file's");
     command.add_option("--crop", crop, "Part of the image to render: x,y,w,h in pixels");
 }
@@ -72,6 +75,7 @@ SceneDescription read_scene(const SceneOptions& options) {
 Scene build_scene(const SceneDescription& description, const SceneOptions& options) {
     BuildOptions build;
     build.lenient = options.lenient;
+    build.sensor = options.sensor;
     build.accelerator.is_watertight = options.watertight;
     if (!options.resolution.empty()) {
         const auto v = parse_integers(options.resolution, 'x', 2, "--resolution", "WxH");

@@ -18,7 +18,7 @@ struct SceneOptions {
     std::vector<std::string> defines;  ///< name=value
     bool lenient = false;
     bool watertight = false;
-    std::string resolution, crop;
+    std::string resolution, crop, sensor;
 
     void add_to(CLI::App& command);
     /// All of these options except the scene file.

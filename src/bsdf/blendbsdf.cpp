@@ -23,14 +23,14 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const std::array<float, 2> share = shares(point.uv);
+        const std::array<float, 2> share = shares(point.texture_point());
         const float total = share[0] + share[1];
         if (!(total > 0)) return;
         for (int i = 0; i < 2; ++i)
             if (share[i] > 0) nested_[i]->append(point, frame, weight * share[i] / total, list);
     }
-    float opacity(Vec2 uv) const override {
-        const std::array<float, 2> share = shares(uv);
+    float opacity(const TexturePoint& at) const override {
+        const std::array<float, 2> share = shares(at);
         return share[0] + share[1];
     }
     bool is_opaque() const override { return nested_[0]->is_opaque() && nested_[1]->is_opaque(); }
@@ -50,9 +50,9 @@ public:
 
 private:
     /// Probability that a ray meets the first or the second material at `uv`.
-    std::array<float, 2> shares(Vec2 uv) const {
-        const float w = clamp(weight_.eval_scalar(uv), 0, 1);
-        return {(1 - w) * nested_[0]->opacity(uv), w * nested_[1]->opacity(uv)};
+    std::array<float, 2> shares(const TexturePoint& at) const {
+        const float w = clamp(weight_.eval_scalar(at), 0, 1);
+        return {(1 - w) * nested_[0]->opacity(at), w * nested_[1]->opacity(at)};
     }
 
     TextureRef weight_;

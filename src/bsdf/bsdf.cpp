@@ -12,15 +12,20 @@ namespace {
 /// lobe's value.
 class Side {
 public:
-    Side(Vec3 ng, const BsdfComponent& c, Vec3 wo)
-        : c_(c), ng_(dot(ng, c.frame.n) < 0 ? -ng : ng), wo_(local(wo)) {}
+    Side(Vec3 ng, bool strict, const BsdfComponent& c, Vec3 wo)
+        : c_(c), strict_(strict), ng_(dot(ng, c.frame.n) < 0 ? -ng : ng), wo_(local(wo)) {}
 
     struct Local {
         Vec3 w;    ///< In the shading frame.
         float ng;  ///< cos to the geometric normal, turned to the side of the shading normal.
-        /// Whether both normals see the direction on the same side; nothing scatters otherwise.
-        bool is_consistent() const { return w.z * ng > 0; }
     };
+    /// Whether the lobe may scatter between wo and `wi`: no light passes through the geometric surface where the lobe
+    /// reflects, and none is reflected by it where the lobe transmits. With strict normals each direction is on the same
+    /// side of both surfaces.
+    bool allows(const Local& wi) const {
+        if (strict_) return wo_.w.z * wo_.ng > 0 && wi.w.z * wi.ng > 0;
+        return wo_.w.z * wi.w.z * (wo_.ng * wi.ng) > 0;
+    }
     Local local(Vec3 w) const { return {c_.frame.to_local(w), dot(w, ng_)}; }
     const Local& wo() const { return wo_; }
 
@@ -33,6 +38,7 @@ public:
 
 private:
     const BsdfComponent& c_;
+    bool strict_;
     Vec3 ng_;
     Local wo_;
 };
@@ -48,10 +54,11 @@ std::optional<BsdfSample> sample_lobe(const Lobe& lobe, Vec3 wo, float u_lobe, V
     return std::visit([&](const auto& l) { return l.sample(wo, u_lobe, u); }, lobe);
 }
 
-BsdfEval eval_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, Vec3 wi, TransportMode mode) {
-    const Side side(ng, c, wo);
+BsdfEval eval_component(Vec3 ng, bool strict, const BsdfComponent& c, Vec3 wo, Vec3 wi,
+                        TransportMode mode) {
+    const Side side(ng, strict, c, wo);
     const Side::Local i = side.local(wi);
-    if (!side.wo().is_consistent() || !i.is_consistent()) return {};
+    if (!side.allows(i)) return {};
     BsdfEval e = eval_lobe(c.lobe, side.wo().w, i.w);
     e.f *= c.weight * side.correction(i, e.eta, mode);
     e.pdf *= c.weight;
@@ -60,28 +67,30 @@ BsdfEval eval_component(Vec3 ng, const BsdfComponent& c, Vec3 wo, Vec3 wi, Trans
 }
 
 /// eval_component() of a diffuse lobe without its frame: the most frequent case.
-BsdfEval eval_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe, Vec3 wo, Vec3 wi,
-                      TransportMode mode) {
+BsdfEval eval_diffuse(Vec3 ng, bool strict, const BsdfComponent& c, const DiffuseLobe& lobe,
+                      Vec3 wo, Vec3 wi, TransportMode mode) {
     const Vec3 ns = c.frame.n;
     const float side = std::copysign(1.0f, dot(ng, ns));
     const float cos_o = dot(wo, ns), cos_i = dot(wi, ns), cos_og = dot(wo, ng) * side,
                 cos_ig = dot(wi, ng) * side;
-    if (!(cos_o > 0 && cos_i > 0 && cos_og > 0 && cos_ig > 0)) return {};
+    if (!(cos_o > 0 && cos_i > 0)) return {};
+    if (strict ? !(cos_og > 0 && cos_ig > 0) : !(cos_og * cos_ig > 0)) return {};
     const float factor = mode == TransportMode::Radiance ? cos_i : cos_o * cos_ig / cos_og;
     return {lobe.reflectance * (factor * c.weight * kInvPi), cos_i * c.weight * kInvPi,
             cos_o * c.weight * kInvPi};
 }
 
 /// Samples eval_diffuse() of a component with weight 1.
-std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const DiffuseLobe& lobe,
-                                         Vec3 wo, Vec2 u, TransportMode mode) {
+std::optional<BsdfSample> sample_diffuse(Vec3 ng, bool strict, const BsdfComponent& c,
+                                         const DiffuseLobe& lobe, Vec3 wo, Vec2 u,
+                                         TransportMode mode) {
     const float side = std::copysign(1.0f, dot(ng, c.frame.n));
     const float cos_o = dot(wo, c.frame.n), cos_og = dot(wo, ng) * side;
-    if (!(cos_o > 0 && cos_og > 0)) return {};
+    if (!(cos_o > 0) || (strict ? !(cos_og > 0) : cos_og == 0)) return {};
     const Vec3 local = sample_cosine_hemisphere(u);
     const Vec3 wi = c.frame.to_world(local);
     const float cos_ig = dot(wi, ng) * side;
-    if (!(local.z > 0 && cos_ig > 0)) return {};
+    if (!(local.z > 0) || (strict ? !(cos_ig > 0) : !(cos_og * cos_ig > 0))) return {};
     const float correction =
         mode == TransportMode::Radiance ? 1.0f : cos_o * cos_ig / (cos_og * local.z);
     return BsdfSample{.wi = wi,
@@ -93,16 +102,15 @@ std::optional<BsdfSample> sample_diffuse(Vec3 ng, const BsdfComponent& c, const 
 /// The sample that `local_sample(wo)` returns in the frame of `c`, with weight and densities in world space. The
 /// densities include the probability c.weight of the component; the weight does not.
 template <class LocalSample>
-std::optional<BsdfSample> sample_component(Vec3 ng, const BsdfComponent& c, Vec3 wo,
+std::optional<BsdfSample> sample_component(Vec3 ng, bool strict, const BsdfComponent& c, Vec3 wo,
                                            TransportMode mode, const LocalSample& local_sample) {
-    const Side side(ng, c, wo);
-    if (!side.wo().is_consistent()) return {};
+    const Side side(ng, strict, c, wo);
     std::optional<BsdfSample> s = local_sample(side.wo().w);
     if (!s) return {};
     const Vec3 local_wi = s->wi;
     s->wi = c.frame.to_world(local_wi);
     const Side::Local i{local_wi, side.local(s->wi).ng};
-    if (!i.is_consistent()) return {};
+    if (!side.allows(i)) return {};
     s->weight *= side.correction(i, s->eta, mode);
     s->pdf *= c.weight;
     s->pdf_rev *= c.weight;
@@ -127,17 +135,17 @@ void add(BsdfEval& sum, const BsdfEval& e) {
 BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
     if (!first_.next)
         if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe))
-            return eval_diffuse(ng_, first_, *diffuse, wo, wi, mode);
-    BsdfEval sum = eval_component(ng_, first_, wo, wi, mode);
+            return eval_diffuse(ng_, has_strict_normals_, first_, *diffuse, wo, wi, mode);
+    BsdfEval sum = eval_component(ng_, has_strict_normals_, first_, wo, wi, mode);
     for (const BsdfComponent* c = first_.next; c; c = c->next)
-        add(sum, eval_component(ng_, *c, wo, wi, mode));
+        add(sum, eval_component(ng_, has_strict_normals_, *c, wo, wi, mode));
     return sum;
 }
 
 std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const {
     if (!first_.next && first_.weight == 1)
         if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe))
-            return sample_diffuse(ng_, first_, *diffuse, wo, u, mode);
+            return sample_diffuse(ng_, has_strict_normals_, first_, *diffuse, wo, u, mode);
     const BsdfComponent* chosen = &first_;
     while (chosen && u_lobe >= chosen->weight) {
         u_lobe -= chosen->weight;
@@ -145,9 +153,10 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     }
     if (!chosen) return {};  // rounding: u_lobe exceeds the sum of the weights
     u_lobe = std::fmin(u_lobe / chosen->weight, kOneMinusEpsilon);
-    std::optional<BsdfSample> s = sample_component(ng_, *chosen, wo, mode, [&](Vec3 local_wo) {
-        return sample_lobe(chosen->lobe, local_wo, u_lobe, u);
-    });
+    std::optional<BsdfSample> s =
+        sample_component(ng_, has_strict_normals_, *chosen, wo, mode, [&](Vec3 local_wo) {
+            return sample_lobe(chosen->lobe, local_wo, u_lobe, u);
+        });
     const bool is_mixture = first_.next != nullptr;
     if (!s || !is_mixture) return s;
     if (s->is_delta) {
@@ -158,7 +167,7 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     // The other components may sample the same direction: weight = Σ f / Σ pdf.
     BsdfEval sum{s->weight * s->pdf, s->pdf, s->pdf_rev, s->eta};
     for (const BsdfComponent* c = &first_; c; c = c->next)
-        if (c != chosen) add(sum, eval_component(ng_, *c, wo, s->wi, mode));
+        if (c != chosen) add(sum, eval_component(ng_, has_strict_normals_, *c, wo, s->wi, mode));
     s->weight = sum.f / sum.pdf;
     s->pdf = sum.pdf;
     s->pdf_rev = sum.pdf_rev;
@@ -169,8 +178,8 @@ std::optional<BsdfSample> Bsdf::sample_delta(Vec3 wo, uint8_t event, TransportMo
     const BsdfComponent* c = &first_;
     for (int i = 0; i < event / 2 && c; ++i) c = c->next;
     if (!c) return {};
-    std::optional<BsdfSample> s =
-        sample_component(ng_, *c, wo, mode, [&](Vec3 local_wo) -> std::optional<BsdfSample> {
+    std::optional<BsdfSample> s = sample_component(
+        ng_, has_strict_normals_, *c, wo, mode, [&](Vec3 local_wo) -> std::optional<BsdfSample> {
             return std::visit(
                 [&](const auto& lobe) -> std::optional<BsdfSample> {
                     if constexpr (requires { lobe.delta_event(local_wo, true); })

@@ -43,7 +43,8 @@ public:
 
     /// f̃·|wi·ng|, where f̃ is the radiance BSDF for light that arrives from the light's side and leaves to the eye's,
     /// corrected for shading normals; densities are in solid angle. `wo` points to the predecessor of the walk in
-    /// `mode`. Zero where the shading normal and the geometric normal see `wi` or `wo` on different sides.
+    /// `mode`. With strict normals it is zero where the shading normal and the geometric normal see `wi` or `wo` on
+    /// different sides.
     BsdfEval eval(Vec3 wo, Vec3 wi, TransportMode mode) const;
     /// A direction with weight f̃·|wi·ng| / pdf; empty where the walk ends.
     std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const;
@@ -80,6 +81,7 @@ private:
     float sum_delta_probabilities(Vec3 wo, TransportMode mode) const;
 
     Vec3 ng_;
+    bool has_strict_normals_ = true;
     bool has_smooth_ = false, has_delta_ = false;
     bool uses_lobe_choice_ = false;
     BsdfComponent first_;

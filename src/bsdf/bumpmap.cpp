@@ -32,7 +32,7 @@ public:
 private:
     Frame bumped(const SurfacePoint& point, const Frame& frame) const {
         if (height_.is_constant()) return frame;
-        const Vec2 slope = height_.texture()->gradient(point.uv) * scale_;
+        const Vec2 slope = height_.texture()->gradient(point.texture_point()) * scale_;
         const Vec3 n = frame.n;
         const Vec3 normal = cross(point.dpdu + n * (slope.x - dot(n, point.dpdu)),
                                   point.dpdv + n * (slope.y - dot(n, point.dpdv)));

@@ -18,8 +18,8 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const Vec2 uv = point.uv;
-        list.add(frame, ConductorLobe{ior_.eta.eval(uv), ior_.k.eval(uv), reflectance_.eval(uv)},
+        const TexturePoint at = point.texture_point();
+        list.add(frame, ConductorLobe{ior_.eta.eval(at), ior_.k.eval(at), reflectance_.eval(at)},
                  weight);
     }
     bool may_be_smooth() const override { return false; }

@@ -19,7 +19,8 @@ public:
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         list.add(frame,
-                 DielectricLobe{eta_, reflectance_.eval(point.uv), transmittance_.eval(point.uv)},
+                 DielectricLobe{eta_, reflectance_.eval(point.texture_point()),
+                                transmittance_.eval(point.texture_point())},
                  weight);
     }
     bool is_transmissive() const override { return true; }

@@ -23,10 +23,10 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        list.add(
-            frame,
-            DiffuseTransmissionLobe{reflectance_.eval(point.uv), transmittance_.eval(point.uv)},
-            weight);
+        list.add(frame,
+                 DiffuseTransmissionLobe{reflectance_.eval(point.texture_point()),
+                                         transmittance_.eval(point.texture_point())},
+                 weight);
     }
     bool is_transmissive() const override { return true; }
     bool needs_tangents() const override { return false; }

@@ -54,8 +54,9 @@ public:
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         list.add(frame,
-                 FresnelBlendLobe{diffuse_.eval(point.uv), specular_.eval(point.uv),
-                                  roughness_.eval(point.uv)},
+                 FresnelBlendLobe{diffuse_.eval(point.texture_point()),
+                                  specular_.eval(point.texture_point()),
+                                  roughness_.eval(point.texture_point())},
                  weight);
     }
     Rgb mean_albedo() const override {

@@ -73,6 +73,16 @@ float read_relative_ior(const Params& params) {
 }
 
 ConductorIndex::ConductorIndex(const Params& params, MaterialContext& context) {
+    read(params, context);
+    if (!params.has("ext_eta")) return;
+    if (!eta.is_constant() || !k.is_constant())
+        params.fail("ext_eta", "\"ext_eta\" needs \"eta\" and \"k\" that are not textures");
+    const float outside = read_ior(params, "ext_eta", "air");
+    eta = TextureRef(eta.mean() / outside);
+    k = TextureRef(k.mean() / outside);
+}
+
+void ConductorIndex::read(const Params& params, MaterialContext& context) {
     const std::string name = params.text("material", "none");
     const bool has_index = params.has("eta") || params.has("k");
     if (name != "none") {
@@ -127,6 +137,8 @@ std::vector<ParamInfo> conductor_params() {
              "Named metal (Au, Cu, Ag, ...), or none for a perfect mirror."},
             {"eta", ParamKind::Texture, "0",
              "Real part of the index of refraction relative to the outside."},
+            {"ext_eta", ParamKind::FloatOrName, "1",
+             "Index of refraction of the outside, by which eta and k are divided."},
             {"k", ParamKind::Texture, "1",
              "Imaginary part of the index of refraction relative to the outside."},
             {"specular_reflectance", ParamKind::Texture, "1", "Factor on the reflectance."}};

@@ -16,10 +16,13 @@ float read_relative_ior(const Params& params);
 std::vector<ParamInfo> dielectric_params();
 
 /// Complex index of a metal: "material" (a name of color/metals.h, or "none", a perfect mirror), or
-/// "eta" and "k".
+/// "eta" and "k"; divided by "ext_eta".
 struct ConductorIndex {
     TextureRef eta, k;
     ConductorIndex(const Params& params, MaterialContext& context);
+
+private:
+    void read(const Params& params, MaterialContext& context);
 };
 /// Rows for these parameters and "specular_reflectance".
 std::vector<ParamInfo> conductor_params();
@@ -31,8 +34,8 @@ Microfacet::Kind read_distribution(const Params& params);
 class Roughness {
 public:
     Roughness(const Params& params, MaterialContext& context);
-    Microfacet eval(Vec2 uv) const {
-        return {kind_, alpha_u_.eval_scalar(uv), alpha_v_.eval_scalar(uv)};
+    Microfacet eval(const TexturePoint& at) const {
+        return {kind_, alpha_u_.eval_scalar(at), alpha_v_.eval_scalar(at)};
     }
 
 private:

@@ -28,10 +28,10 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const Vec2 uv = point.uv;
-        const Rgb d = diffuse_.eval(uv), dt = diffuse_transmission_.eval(uv), g = glossy_.eval(uv),
-                  gt = glossy_transmission_.eval(uv), s = specular_.eval(uv),
-                  st = specular_transmission_.eval(uv);
+        const TexturePoint at = point.texture_point();
+        const Rgb d = diffuse_.eval(at), dt = diffuse_transmission_.eval(at), g = glossy_.eval(at),
+                  gt = glossy_transmission_.eval(at), s = specular_.eval(at),
+                  st = specular_transmission_.eval(at);
         // Shares of the samples, by what the lobes reflect at 60°.
         const float F = fresnel_dielectric(0.5f, eta_).R;
         const float share_d = d.mean() + dt.mean(), share_g = F * g.mean() + (1 - F) * gt.mean(),
@@ -42,19 +42,18 @@ public:
             if (share > 0) list.add(f, make_lobe(sum / share), weight * share / sum);
         };
         // As in a two-sided material, reflection looks the same from behind.
-        const bool is_front = (dot(point.wo, point.ng) < 0) == (dot(frame.n, point.ng) < 0);
-        const Frame reflecting = is_front ? frame : frame.flipped();
+        const Frame reflecting = sees_front(point, frame) ? frame : frame.flipped();
         if (dt.is_zero())
             add(reflecting, share_d, [&](float k) { return DiffuseLobe{d * k}; });
         else
             add(frame, share_d, [&](float k) { return DiffuseTransmissionLobe{d * k, dt * k}; });
         if (gt.is_zero())
             add(reflecting, share_g, [&](float k) {
-                return RoughConductorLobe{roughness_.eval(uv), Rgb(eta_), Rgb(0), g * k};
+                return RoughConductorLobe{roughness_.eval(at), Rgb(eta_), Rgb(0), g * k};
             });
         else
             add(frame, share_g, [&](float k) {
-                return RoughDielectricLobe{roughness_.eval(uv), eta_, g * k, gt * k};
+                return RoughDielectricLobe{roughness_.eval(at), eta_, g * k, gt * k};
             });
         if (st.is_zero())
             add(reflecting, share_s, [&](float k) {

@@ -18,11 +18,11 @@ public:
                 ComponentList& list) const override {
         nested_->append(point, frame, weight, list);
     }
-    float opacity(Vec2 uv) const override {
-        return clamp(opacity_.eval_scalar(uv), 0, 1) * nested_->opacity(uv);
+    float opacity(const TexturePoint& at) const override {
+        return clamp(opacity_.eval_scalar(at), 0, 1) * nested_->opacity(at);
     }
     bool is_opaque() const override {
-        return nested_->is_opaque() && opacity_.is_constant() && opacity_.eval_scalar({}) >= 1;
+        return nested_->is_opaque() && opacity_.is_constant() && opacity_.eval_scalar(Vec2()) >= 1;
     }
 
 private:

@@ -19,7 +19,10 @@ struct SurfacePoint {
     Vec3 dpdu,
         dpdv;  ///< Tangents (not unit vectors); may be zero where there is no parametrisation.
     Vec2 uv;
-    Vec3 wo;  ///< Toward the predecessor.
+    Vec3 wo;              ///< Toward the predecessor.
+    Vec3 color{1, 1, 1};  ///< Vertex colour.
+
+    TexturePoint texture_point() const { return {uv, color}; }
 };
 
 /// Storage for the second and further components of mixtures during a walk. reset() keeps the memory for reuse.
@@ -55,7 +58,7 @@ public:
     virtual void append(const SurfacePoint& point, const Frame& frame, float weight,
                         class ComponentList& list) const = 0;
     /// Probability that a ray meets the surface: 1 unless masked, 0 for `null`.
-    virtual float opacity(Vec2) const { return 1; }
+    virtual float opacity(const TexturePoint&) const { return 1; }
     virtual bool is_opaque() const { return true; }  ///< Whether opacity is 1 everywhere.
     /// Whether a lobe transmits light to the other side of the surface.
     virtual bool is_transmissive() const { return false; }
@@ -67,6 +70,10 @@ public:
     /// Approximate average reflectance, for heuristics.
     virtual Rgb mean_albedo() const = 0;
 
+    /// Whether nothing scatters where a direction is on different sides of the geometric and the shading surface. If
+    /// not, the shading normal alone decides on which side a direction is.
+    void set_strict_normals(bool strict) { has_strict_normals_ = strict; }
+
     /// Constructs the BSDF at `point` in `out`; further components of a mixture are stored in the arena.
     void make_bsdf(const SurfacePoint& point, ComponentArena& arena, Bsdf& out) const;
     Bsdf bsdf(const SurfacePoint& point, ComponentArena& arena) const {
@@ -74,13 +81,25 @@ public:
         make_bsdf(point, arena, out);
         return out;
     }
+
+protected:
+    /// Whether `frame`, which an outer material may have turned, points to the side from which the surface is seen.
+    bool sees_front(const SurfacePoint& point, const Frame& frame) const {
+        if (!has_strict_normals_) return dot(point.wo, frame.n) >= 0;
+        return (dot(point.wo, point.ng) < 0) == (dot(frame.n, point.ng) < 0);
+    }
+
+private:
+    bool has_strict_normals_ = true;
 };
 
 /// Collects the components of a tree of materials: the first in the Bsdf itself, the others in the arena.
 class ComponentList {
 public:
-    ComponentList(Vec3 ng, ComponentArena& arena, Bsdf& out) : arena_(&arena), out_(&out) {
+    ComponentList(Vec3 ng, bool strict_normals, ComponentArena& arena, Bsdf& out)
+        : arena_(&arena), out_(&out) {
         out.ng_ = ng;
+        out.has_strict_normals_ = strict_normals;
         out.has_smooth_ = out.has_delta_ = false;
         out.uses_lobe_choice_ = false;
         out.first_.weight = 0;

@@ -19,22 +19,34 @@ MaterialEntry principled_entry();
 MaterialEntry twosided_entry();
 MaterialEntry mask_entry();
 MaterialEntry blendbsdf_entry();
+MaterialEntry mixturebsdf_entry();
 MaterialEntry bumpmap_entry();
 MaterialEntry normalmap_entry();
 MaterialEntry null_entry();
 
 const std::vector<MaterialEntry>& material_registry() {
     static const std::vector<MaterialEntry> entries = {
-        diffuse_entry(),         conductor_entry(),
-        roughconductor_entry(),  dielectric_entry(),
-        plastic_entry(),         thindielectric_entry(),
-        roughdielectric_entry(), roughplastic_entry(),
-        phong_entry(),           principled_entry(),
-        orennayar_entry(),       fresnelblend_entry(),
-        lobesum_entry(),         diffusetransmission_entry(),
-        twosided_entry(),        mask_entry(),
-        blendbsdf_entry(),       bumpmap_entry(),
-        normalmap_entry(),       null_entry(),
+        diffuse_entry(),
+        conductor_entry(),
+        roughconductor_entry(),
+        dielectric_entry(),
+        plastic_entry(),
+        thindielectric_entry(),
+        roughdielectric_entry(),
+        roughplastic_entry(),
+        phong_entry(),
+        principled_entry(),
+        orennayar_entry(),
+        fresnelblend_entry(),
+        lobesum_entry(),
+        diffusetransmission_entry(),
+        twosided_entry(),
+        mask_entry(),
+        blendbsdf_entry(),
+        mixturebsdf_entry(),
+        bumpmap_entry(),
+        normalmap_entry(),
+        null_entry(),
     };
     return entries;
 }

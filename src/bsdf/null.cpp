@@ -10,7 +10,7 @@ public:
     Null(const Params&, MaterialContext&) {}
 
     void append(const SurfacePoint&, const Frame&, float, ComponentList&) const override {}
-    float opacity(Vec2) const override { return 0; }
+    float opacity(const TexturePoint&) const override { return 0; }
     bool is_opaque() const override { return false; }
     bool may_be_smooth() const override { return false; }
     Rgb mean_albedo() const override { return Rgb(0); }

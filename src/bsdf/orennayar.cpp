@@ -22,7 +22,7 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        list.add(frame, OrenNayarLobe{reflectance_.eval(point.uv), A_, B_}, weight);
+        list.add(frame, OrenNayarLobe{reflectance_.eval(point.texture_point()), A_, B_}, weight);
     }
     bool needs_tangents() const override { return false; }
     Rgb mean_albedo() const override { return reflectance_.mean(); }

@@ -51,12 +51,13 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const Rgb d = diffuse_.eval(point.uv), s = specular_.eval(point.uv);
+        const Rgb d = diffuse_.eval(point.texture_point()),
+                  s = specular_.eval(point.texture_point());
         const float excess = std::max((d + s).max(), 1.0f), sum = d.mean() + s.mean();
         list.add(frame,
                  PhongLobe{.diffuse = d / excess,
                            .specular = s / excess,
-                           .exponent = exponent_.eval_scalar(point.uv),
+                           .exponent = exponent_.eval_scalar(point.texture_point()),
                            .specular_probability = sum > 0 ? s.mean() / sum : 0},
                  weight);
     }

@@ -18,8 +18,8 @@ PlasticParams::PlasticParams(const Params& params, MaterialContext& context)
       eta(read_ior(params, "int_ior", "polypropylene") / read_ior(params, "ext_ior", "air")),
       nonlinear(params.flag("nonlinear", false)) {}
 
-PlasticParams::Colors PlasticParams::eval(Vec2 uv, float F_int) const {
-    const Rgb d = diffuse.eval(uv), s = specular.eval(uv);
+PlasticParams::Colors PlasticParams::eval(const TexturePoint& at, float F_int) const {
+    const Rgb d = diffuse.eval(at), s = specular.eval(at);
     const Rgb reflected_again = nonlinear ? d * F_int : Rgb(F_int);
     const float sum = s.mean() + d.mean();
     return {.diffuse = d / ((Rgb(1) - reflected_again) * sqr(eta)),
@@ -52,7 +52,8 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const auto [diffuse, specular, specular_share] = params_.eval(point.uv, F_int_);
+        const auto [diffuse, specular, specular_share] =
+            params_.eval(point.texture_point(), F_int_);
         list.add(frame, PlasticLobe{diffuse, specular, params_.eta, specular_share}, weight);
     }
     Rgb mean_albedo() const override { return params_.mean_albedo(); }

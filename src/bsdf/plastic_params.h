@@ -17,11 +17,11 @@ struct PlasticParams {
         float
             specular_share;  ///< Share of the specular colour in the sum of both, without the coat.
     };
-    /// Colours at `uv`. The diffuse one includes interreflection below the coat, but not the two transmittances:
+    /// Colours at `at`. The diffuse one includes interreflection below the coat, but not the two transmittances:
     ///     ρ / (η² (1 − ρ' F_int)),
     /// where F_int is the coat's reflectance for diffuse light from below. With `nonlinear` ρ' = ρ, which saturates the
     /// colour; otherwise ρ' = 1, which keeps the hue of textures.
-    Colors eval(Vec2 uv, float F_int) const;
+    Colors eval(const TexturePoint& at, float F_int) const;
     Rgb mean_albedo() const;
 
     /// Rows for the tables of plug-ins with these parameters.

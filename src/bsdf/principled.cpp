@@ -262,10 +262,10 @@ public:
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         const auto scalar = [&](const TextureRef& texture) {
-            return clamp(texture.eval_scalar(point.uv), 0, 1);
+            return clamp(texture.eval_scalar(point.texture_point()), 0, 1);
         };
         list.add(frame,
-                 PrincipledLobe{.base_color = base_color_.eval(point.uv),
+                 PrincipledLobe{.base_color = base_color_.eval(point.texture_point()),
                                 .surface_roughness = scalar(roughness_),
                                 .anisotropic = scalar(anisotropic_),
                                 .metallic = scalar(metallic_),
@@ -280,7 +280,7 @@ public:
                  weight);
     }
     bool is_transmissive() const override {
-        return !spec_trans_.is_constant() || spec_trans_.eval_scalar({}) > 0;
+        return !spec_trans_.is_constant() || spec_trans_.eval_scalar(Vec2()) > 0;
     }
     Rgb mean_albedo() const override { return base_color_.mean(); }
 

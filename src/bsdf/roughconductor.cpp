@@ -52,10 +52,10 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const Vec2 uv = point.uv;
+        const TexturePoint at = point.texture_point();
         list.add(frame,
-                 RoughConductorLobe{roughness_.eval(uv), ior_.eta.eval(uv), ior_.k.eval(uv),
-                                    reflectance_.eval(uv)},
+                 RoughConductorLobe{roughness_.eval(at), ior_.eta.eval(at), ior_.k.eval(at),
+                                    reflectance_.eval(at)},
                  weight);
     }
     Rgb mean_albedo() const override {

@@ -92,10 +92,10 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const Vec2 uv = point.uv;
+        const TexturePoint at = point.texture_point();
         list.add(frame,
-                 RoughDielectricLobe{roughness_.eval(uv), eta_, reflectance_.eval(uv),
-                                     transmittance_.eval(uv)},
+                 RoughDielectricLobe{roughness_.eval(at), eta_, reflectance_.eval(at),
+                                     transmittance_.eval(at)},
                  weight);
     }
     bool is_transmissive() const override { return true; }

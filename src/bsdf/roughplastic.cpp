@@ -1,6 +1,6 @@
 // Rough plastic: a rough dielectric coat over a diffuse base.
 //   distribution (beckmann)     beckmann or ggx
-//   alpha (0.1)                 roughness of the coat
+//   alpha (0.1)                 roughness of the coat; number or texture
 //   diffuse_reflectance (0.5)   colour or texture in [0, 1]
 //   specular_reflectance (1)    colour or texture in [0, 1], factor on the reflection of the coat
 //   int_ior (polypropylene), ext_ior (air)   indices of the coat and outside; numbers or names
@@ -92,29 +92,43 @@ namespace {
 class RoughPlastic final : public Material {
 public:
     RoughPlastic(const Params& params, MaterialContext& context)
-        : params_(params, context), distribution_(read_coat(params)),
-          transmittance_(distribution_, params_.eta) {}
+        : params_(params, context), kind_(read_distribution(params)),
+          alpha_(context.texture(params, "alpha", Rgb(0.1f))) {
+        if (alpha_.is_constant())
+            transmittance_.emplace_back(coat(alpha_.eval_scalar(Vec2())), params_.eta);
+        else
+            for (int i = 0; i < kRows; ++i)
+                transmittance_.emplace_back(coat(sqr(float(i) / (kRows - 1))), params_.eta);
+    }
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const auto [diffuse, specular, share] =
-            params_.eval(point.uv, transmittance_.internal_reflectance());
+        const TexturePoint at = point.texture_point();
+        const float alpha = alpha_.eval_scalar(at);
+        const RoughTransmittance& T = transmittance(alpha);
+        const auto [diffuse, specular, share] = params_.eval(at, T.internal_reflectance());
         list.add(frame,
-                 RoughPlasticLobe{diffuse, specular, distribution_, params_.eta, share,
-                                  transmittance_.table()},
+                 RoughPlasticLobe{diffuse, specular, coat(alpha), params_.eta, share, T.table()},
                  weight);
     }
     Rgb mean_albedo() const override { return params_.mean_albedo(); }
 
 private:
-    static Microfacet read_coat(const Params& params) {
-        const float alpha = params.number("alpha", 0.1f, 0);
-        return {read_distribution(params), alpha, alpha};
+    /// Number of roughnesses for which a textured α has transmittances; they are equidistant in √α.
+    static constexpr int kRows = 33;
+
+    Microfacet coat(float alpha) const { return {kind_, alpha, alpha}; }
+    /// The transmittance for the nearest of these roughnesses: the same for both ends of a path.
+    const RoughTransmittance& transmittance(float alpha) const {
+        if (transmittance_.size() == 1) return transmittance_.front();
+        const float row = std::sqrt(clamp(alpha, 0, 1)) * (kRows - 1) + 0.5f;
+        return transmittance_[std::min(size_t(row), size_t(kRows - 1))];
     }
 
     PlasticParams params_;
-    Microfacet distribution_;
-    RoughTransmittance transmittance_;
+    Microfacet::Kind kind_;
+    TextureRef alpha_;
+    std::vector<RoughTransmittance> transmittance_;
 };
 
 }  // namespace
@@ -123,7 +137,7 @@ MaterialEntry roughplastic_entry() {
     return {{"bsdf", "roughplastic", "Rough dielectric coat over a diffuse base.",
              concat(PlasticParams::table(), {{"distribution", ParamKind::String, "beckmann",
                                               "Distribution of facet normals: beckmann or ggx."},
-                                             {"alpha", ParamKind::Float, "0.1",
+                                             {"alpha", ParamKind::Texture, "0.1",
                                               "Roughness of the coat: RMS slope of its facets."},
                                              {"sample_visible", ParamKind::Bool, "true",
                                               "Accepted; visible normals are always sampled."}})},

@@ -17,7 +17,7 @@ public:
 
     /// T at `cos_theta` >= 0 from `table()`.
     static float lookup(const float* table, float cos_theta) {
-        const float x = cos_theta * (kSize - 1);
+        const float x = std::max(cos_theta, 0.0f) * (kSize - 1);
         const int i = std::min(int(x), kSize - 2);
         return lerp(x - float(i), table[i], table[i + 1]);
     }

@@ -18,10 +18,10 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        list.add(
-            frame,
-            ThinDielectricLobe{eta_, reflectance_.eval(point.uv), transmittance_.eval(point.uv)},
-            weight);
+        list.add(frame,
+                 ThinDielectricLobe{eta_, reflectance_.eval(point.texture_point()),
+                                    transmittance_.eval(point.texture_point())},
+                 weight);
     }
     bool is_transmissive() const override { return true; }
     bool may_be_smooth() const override { return false; }

@@ -1,6 +1,6 @@
 // Makes a reflecting material visible from both sides.
 //   nested: one bsdf for both sides, or two, the first where the normal points, the second behind
-// The frame is turned to wo's side of the geometric surface. Nested materials must not transmit light.
+// The frame is turned to wo's side of the geometric surface, or of the shading surface where normals are not strict. Nested materials must not transmit light.
 
 #include "bsdf/wrapper.h"
 
@@ -21,9 +21,7 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        // Relative to `frame`, which an outer material may have turned already.
-        const bool is_front = (dot(point.wo, point.ng) < 0) == (dot(frame.n, point.ng) < 0);
-        if (is_front)
+        if (sees_front(point, frame))
             front_->append(point, frame, weight, list);
         else
             back_->append(point, frame.flipped(), weight, list);

@@ -24,7 +24,7 @@ inline std::vector<const Material*> nested_materials(const Params& params, Mater
 /// A material that modifies one nested material; everything not overridden is that of the nested one.
 class WrapperMaterial : public Material {
 public:
-    float opacity(Vec2 uv) const override { return nested_->opacity(uv); }
+    float opacity(const TexturePoint& at) const override { return nested_->opacity(at); }
     bool is_opaque() const override { return nested_->is_opaque(); }
     bool is_transmissive() const override { return nested_->is_transmissive(); }
     bool is_two_sided() const override { return nested_->is_two_sided(); }

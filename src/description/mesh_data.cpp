@@ -35,6 +35,9 @@ void check_vertices(const MeshData& mesh, const SourceLocation& where) {
         if (!std::isfinite(mesh.uvs[i].x) || !std::isfinite(mesh.uvs[i].y))
             throw SceneError(where, "texture coordinate of vertex " + std::to_string(i) +
                                         " is not finite");
+    for (size_t i = 0; i < mesh.colors.size(); ++i)
+        if (!is_finite(mesh.colors[i]))
+            throw SceneError(where, "colour of vertex " + std::to_string(i) + " is not finite");
 }
 
 void check_indices(const MeshData& mesh, const SourceLocation& where) {

@@ -18,6 +18,7 @@ struct MeshData {
     std::vector<Vec3> positions;
     std::vector<Vec3> normals;  ///< Unit vectors, one per vertex, or empty.
     std::vector<Vec2> uvs;      ///< One per vertex, or empty.
+    std::vector<Vec3> colors;   ///< Linear colours, one per vertex, or empty.
     std::vector<Triangle> triangles;
     bool face_normals = false;        ///< The file asks for flat shading; normals is empty then.
     uint32_t dropped_degenerate = 0;  ///< Triangles of zero area, removed by finish_mesh().

@@ -161,8 +161,10 @@ std::vector<SceneObject::Child> Params::children(std::string_view category) cons
     return found;
 }
 
-void check_params(const SceneDescription& scene, int index, const PluginInfo& info,
-                  const std::function<void(const SourceLocation&, const std::string&)>& report) {
+void check_params(
+    const SceneDescription& scene, int index, const PluginInfo& info,
+    const std::function<void(const SourceLocation&, const std::string&)>& report,
+    const std::function<std::optional<ForeignParam>(const std::string& name)>& foreign) {
     const SceneObject& object = scene.objects[index];
     std::vector<std::string> known;
     for (const ParamInfo& p : info.params) known.push_back(p.name);
@@ -171,6 +173,12 @@ void check_params(const SceneDescription& scene, int index, const PluginInfo& in
                             [&](const ParamInfo& p) { return name == p.name; });
     };
     auto unknown = [&](const SourceLocation& where, const std::string& name) {
+        if (const auto known_elsewhere = foreign ? foreign(name) : std::nullopt) {
+            if (!known_elsewhere->is_ignored)
+                report(where, fmt::format("parameter \"{}\" of {} \"{}\" is not supported: {}",
+                                          name, info.category, info.name, known_elsewhere->reason));
+            return;
+        }
         const std::string near = nearest_name(name, known);
         report(where,
                fmt::format("{} \"{}\" has no parameter \"{}\"{}", info.category, info.name, name,

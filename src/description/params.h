@@ -90,10 +90,19 @@ private:
     int index_;
 };
 
+/// What is known of a parameter that the plug-in's table does not have.
+struct ForeignParam {
+    bool is_ignored;     ///< It is read without effect; otherwise it is refused.
+    const char* reason;  ///< Why.
+};
+
 /// Checks that every parameter of `object` is in the table and has a suitable type. Calls `report` with location and
-/// message for each one that has not; the caller throws or warns.
-void check_params(const SceneDescription& scene, int object, const PluginInfo& info,
-                  const std::function<void(const SourceLocation&, const std::string&)>& report);
+/// message for each one that has not; the caller throws or warns. `foreign` is asked for parameters that are not in
+/// the table.
+void check_params(
+    const SceneDescription& scene, int object, const PluginInfo& info,
+    const std::function<void(const SourceLocation&, const std::string&)>& report,
+    const std::function<std::optional<ForeignParam>(const std::string& name)>& foreign = {});
 
 /// "boolean", "float", ... as printed in messages and by `etendue list`.
 const char* kind_name(ParamKind kind);

@@ -46,15 +46,24 @@ struct SceneObject {
     const Param* find(std::string_view name) const;
 };
 
+/// An image file in memory.
+struct EncodedImage {
+    std::string name;  ///< For messages.
+    std::string bytes;
+};
+
 struct SceneDescription {
     std::vector<SceneObject> objects;  ///< In any order; the graph of children has no cycles.
     std::vector<int> roots;            ///< The scene's own children, in file order.
     std::vector<MeshData> meshes;  ///< Meshes that the scene file holds itself; see shape `mesh`.
-    std::string file;              ///< The scene file, as given.
+    std::vector<EncodedImage>
+        images;        ///< Images that the scene file holds itself; see texture `bitmap`.
+    std::string file;  ///< The scene file, as given.
     /// Directories in which relative file names are looked up, in order; the scene file's own comes first.
     std::vector<std::string> search_paths;
     /// What was dropped or replaced under `lenient`, one line each.
     std::vector<std::string> warnings;
+    int left_out = 0;  ///< Number of things that were.
 };
 
 /// The candidate nearest to `name` by edit distance; empty if none is near enough for a suggestion.

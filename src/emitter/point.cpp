@@ -47,8 +47,8 @@ protected:
 };
 
 /// Intensity between cut-off and beam: linear in the angle (Mitsuba); or of x, the cosine's way from the one to the
-/// other, x²(3 − 2x) (pbrt-v4) or x⁴ (pbrt-v3).
-enum class Falloff { Angle, Smooth, Quartic };
+/// other, x²(3 − 2x) (pbrt-v4), x⁴ (pbrt-v3) or x² (glTF).
+enum class Falloff { Angle, Smooth, Quartic, Quadratic };
 
 class SpotEmitter final : public PointEmitter {
 public:
@@ -63,7 +63,9 @@ public:
     }
     float max_pdf_d() const override { return pdf_uniform_cone(cos_cutoff_); }
     double power() const override {
-        const double share = falloff_ == Falloff::Quartic ? 0.2 : 0.5;  // of the ring, on average
+        const double share = falloff_ == Falloff::Quartic     ? 0.2
+                             : falloff_ == Falloff::Quadratic ? 1.0 / 3
+                                                              : 0.5;  // of the ring, on average
         return 2 * double(kPi) * luminance(intensity_) *
                ((1 - double(cos_beam_)) + share * (double(cos_beam_) - cos_cutoff_));
     }
@@ -76,6 +78,7 @@ private:
         const float x = (c - cos_cutoff_) / (cos_beam_ - cos_cutoff_);
         switch (falloff_) {
         case Falloff::Smooth: return intensity_ * (sqr(x) * (3 - 2 * x));
+        case Falloff::Quadratic: return intensity_ * sqr(x);
         case Falloff::Quartic: return intensity_ * sqr(sqr(x));
         default: return intensity_ * ((cutoff_ - std::acos(c)) / (cutoff_ - beam_));
         }
@@ -125,7 +128,7 @@ EmitterEntry spot_entry() {
                "Half-angle in degrees up to which the intensity is full."},
               {"falloff", ParamKind::String, "angle",
                "Decrease from beam_width to cutoff_angle: angle (linear in it), or, of the cosine, "
-               "smooth (x² (3 - 2x), pbrt-v4) or quartic (x⁴, pbrt-v3)."},
+               "smooth (x² (3 - 2x), pbrt-v4), quartic (x⁴, pbrt-v3) or quadratic (x², glTF)."},
               {"to_world", ParamKind::Transform, "identity",
                "Its origin is the light's position, and its +z axis is that of the beam."}}},
             [](const Params& p, EmitterContext&) {
@@ -136,7 +139,8 @@ EmitterEntry spot_entry() {
                     p.fail("beam_width", "\"beam_width\" must not exceed \"cutoff_angle\"");
                 return one(std::make_unique<SpotEmitter>(
                     t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})), p.rgb("intensity", Rgb(1)),
-                    cutoff, beam, Falloff(p.choice("falloff", {"angle", "smooth", "quartic"}, 0))));
+                    cutoff, beam,
+                    Falloff(p.choice("falloff", {"angle", "smooth", "quartic", "quadratic"}, 0))));
             }};
 }
 

@@ -49,6 +49,7 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
             if (dot(g.ng, g.ns) < 0) g.ng = -g.ng;
         }
     }
+    if (!colors.empty()) g.color = colors[ia] * w + colors[ib] * u + colors[ic] * v;
     if (uvs.empty()) {
         g.uv = {u, v};
         if (tangents) g.dpdu = e1, g.dpdv = e2;
@@ -76,7 +77,7 @@ ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
 
 size_t TriangleMesh::memory_bytes() const {
     return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) +
-           uvs.size() * sizeof(Vec2) +
+           uvs.size() * sizeof(Vec2) + colors.size() * sizeof(Vec3) +
            triangles.size() * (sizeof(triangles[0]) + sizeof(face_normals[0]));
 }
 

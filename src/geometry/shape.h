@@ -19,6 +19,7 @@ struct SurfaceGeometry {
     Vec3 ns;          ///< Unit interpolated normal.
     Vec3 dpdu, dpdv;  ///< Zero unless requested.
     Vec2 uv;
+    Vec3 color{1, 1, 1};  ///< Interpolated vertex colour; white where the shape has none.
 };
 
 /// A point drawn from a shape's surface.
@@ -47,6 +48,7 @@ public:
     std::vector<Vec3> positions;
     std::vector<Vec3> normals;  ///< Empty, or one unit vector per vertex.
     std::vector<Vec2> uvs;      ///< Empty, or one per vertex.
+    std::vector<Vec3> colors;   ///< Empty, or one per vertex.
     std::vector<std::array<uint32_t, 3>> triangles;
     std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see compute_face_normals().
 

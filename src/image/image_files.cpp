@@ -1,9 +1,12 @@
 // The parts of image_io.h that need no library.
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -97,6 +100,35 @@ std::string image_extension(const std::string& path) {
     std::transform(e.begin(), e.end(), e.begin(),
                    [](unsigned char c) { return char(std::tolower(c)); });
     return e;
+}
+
+PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, bool raw) {
+    // The libraries select the format by the name of a file, so the bytes become one.
+    const char* extension = bytes.rfind("\xff\xd8", 0) == 0 ? ".jpg" : ".png";
+    std::string path = (fs::temp_directory_path() / "image-XXXXXX").string() + extension;
+    const int handle = mkstemps(path.data(), 4);
+    if (handle < 0)
+        throw std::runtime_error(
+            fmt::format("cannot write \"{}\": {}", path, std::generic_category().message(errno)));
+    close(handle);
+    const auto remove = [&] {
+        std::error_code ignored;
+        fs::remove(path, ignored);
+    };
+    try {
+        std::ofstream out(path, std::ios::binary);
+        out << bytes;
+        out.close();
+        if (!out) throw std::runtime_error(fmt::format("cannot write \"{}\"", path));
+        PixelBuffer pixels = read_pixels(path, raw);
+        remove();
+        return pixels;
+    } catch (const std::runtime_error& e) {
+        remove();
+        std::string why = e.what();
+        if (const size_t at = why.find(path); at != why.npos) why.replace(at, path.size(), name);
+        throw std::runtime_error(why);
+    }
 }
 
 RgbImage read_rgb(const std::string& path, std::string_view layer) {

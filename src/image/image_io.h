@@ -24,6 +24,8 @@ RgbImage read_rgb(const std::string& path, std::string_view layer = "");
 /// Reads pixels for a texture in the file's own precision. 8-bit formats stay codes; deeper integer formats become
 /// floats, decoded from sRGB unless `raw`.
 PixelBuffer read_pixels(const std::string& path, bool raw);
+/// The same for the bytes of a file; `name` is its name in messages.
+PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, bool raw);
 
 enum class ExrPrecision { Float, Half };
 

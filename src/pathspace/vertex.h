@@ -87,7 +87,7 @@ struct Vertex {
         emitter = on.emitter;
         location = at;
         uv = g.uv;
-        on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo}, arena, bsdf);
+        on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo, g.color}, arena, bsdf);
         is_connectible = bsdf.has_smooth();
         gloss = gloss_of_roughness(bsdf.roughness());
     }

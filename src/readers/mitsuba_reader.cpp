@@ -73,6 +73,7 @@ SceneDescription MitsubaReader::read(std::string_view text) {
 void MitsubaReader::reject(const SourceLocation& where, const std::string& what,
                            const std::string& more) {
     if (!options_.lenient) throw SceneError(where, what + more);
+    ++scene_.left_out;
     scene_.warnings.push_back(fmt::format("{}:{}: {}; dropped", where.file, where.line, what));
 }
 
@@ -267,7 +268,9 @@ void MitsubaReader::read_object(const Element& e, const pugi::xml_node& node, Sc
     add_child(scope, claim_name(e, scope), index, e.where);
     Scope inner{index, e.name, scope.depth + 1, scope.in_emitter || e.name == "emitter", {}};
     read_children(node, inner);
-    if (source_->old_dialect) upgrade_object(scene_.objects[index]);
+    if (!source_->old_dialect) return;
+    upgrade_object(scene_.objects[index]);
+    if (e.name == "shape") old_shapes_.push_back(index);
 }
 
 void MitsubaReader::add_child(const Scope& scope, const std::string& name, int object,
@@ -319,6 +322,28 @@ void MitsubaReader::resolve_references() {
         SceneObject& parent = scene_.objects[r.parent];
         check_nesting(parent.category, scene_.objects[target].category, r.where);
         parent.children[r.slot].object = target;
+    }
+    add_null_materials();
+}
+
+/// In Mitsuba 0.6 a shape with a medium and without a material is invisible.
+void MitsubaReader::add_null_materials() {
+    for (int shape : old_shapes_) {
+        bool has_medium = false, has_bsdf = false;
+        for (const auto& c : scene_.objects[shape].children) {
+            const std::string& category = scene_.objects[c.object].category;
+            has_medium = has_medium || category == "medium";
+            has_bsdf = has_bsdf || category == "bsdf" || category == "subsurface";
+        }
+        if (!has_medium || has_bsdf) continue;
+        const SourceLocation where = scene_.objects[shape].where;
+        scene_.objects[shape].children.push_back({"", int(scene_.objects.size()), where});
+        scene_.objects.push_back({.category = "bsdf",
+                                  .type = "null",
+                                  .id = {},
+                                  .where = where,
+                                  .params = {},
+                                  .children = {}});
     }
 }
 

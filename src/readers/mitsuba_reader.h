@@ -77,6 +77,7 @@ private:
     void declare_id(const std::string& id, int object, const SourceLocation& where);
     int find_id(const std::string& id, const SourceLocation& where) const;
     void resolve_references();
+    void add_null_materials();
     std::string load(const std::string& name, const SourceLocation& where, std::string& path);
 
     // Elements that are a parameter of the object they stand in: mitsuba_reader_params.cpp.
@@ -106,6 +107,7 @@ private:
     SceneDescription scene_;
     std::map<std::string, int> ids_;
     std::vector<Reference> references_;
+    std::vector<int> old_shapes_;  ///< Of the dialect of Mitsuba 0.6.
     Source* source_ = nullptr;
     std::vector<std::string> open_files_;  ///< The chain of includes.
     int includes_ = 0, elements_ = 0;

@@ -1,9 +1,12 @@
 #include "readers/mitsuba_upgrade.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include <fmt/format.h>
+
+#include "math/vec.h"
 
 namespace etendue {
 namespace {
@@ -79,10 +82,27 @@ void upgrade_bitmap(SceneObject& object) {
     }
 }
 
+/// Rough diffuse: the α of Mitsuba 0.6 is an RMS slope, √2 times the standard deviation of the angle of [Oren & Nayar
+/// 1994] in radians.
+void upgrade_roughdiffuse(SceneObject& object) {
+    object.type = "orennayar";
+    take(object, "use_fast_approx");
+    const auto alpha = take(object, "alpha");
+    const double degrees = (alpha ? number(*alpha) : 0.2) / std::sqrt(2.0) * 180 / double(kPi);
+    object.params.push_back({"sigma", degrees, alpha ? alpha->where : object.where});
+}
+
 void upgrade_bsdf(SceneObject& object) {
     if (object.type == "bump") object.type = "bumpmap";
+    if (object.type == "difftrans") {
+        object.type = "diffusetransmission";
+        object.params.push_back({"reflectance", Rgb(0), object.where});
+        if (!has(object, "transmittance"))
+            object.params.push_back({"transmittance", Rgb(0.5f), object.where});
+    }
     if (object.type == "diffuse" || object.type == "roughdiffuse")
         rename(object, "diffuse_reflectance", "reflectance");
+    if (object.type == "roughdiffuse") upgrade_roughdiffuse(object);
     const bool conductor = object.type == "conductor" || object.type == "roughconductor";
     if (conductor && !has(object, "material") && !has(object, "eta") && !has(object, "k"))
         object.params.push_back({"material", std::string("Cu"), object.where});
@@ -121,10 +141,12 @@ void upgrade_object(SceneObject& object) {
     upgrade_uv(object);
     if (object.category == "bsdf") upgrade_bsdf(object);
     if (object.category == "texture" && object.type == "bitmap") upgrade_bitmap(object);
+    if (object.category == "texture" && object.type == "vertexcolors")
+        object.type = "mesh_attribute";
+    if (object.category == "film" && object.type == "tiledhdrfilm") object.type = "hdrfilm";
     if (object.category == "emitter" &&
         (object.type == "sky" || object.type == "sun" || object.type == "sunsky"))
         upgrade_daylight(object);
-    if (object.category == "integrator" && object.type == "volpath_simple") object.type = "volpath";
 }
 
 }  // namespace etendue

@@ -19,7 +19,8 @@ std::string snake_case(std::string_view camel_case);
 ///   bitmap: wrap_mode_u = wrap_mode_v  → wrap_mode
 ///   diffuse, roughdiffuse: diffuse_reflectance → reflectance
 ///   conductor, roughconductor without a material, eta or k → material Cu, the default of Mitsuba 0.6
-///   bsdf bump → bumpmap; integrator volpath_simple → volpath
+///   roughdiffuse: alpha → orennayar: sigma; difftrans → diffusetransmission without reflection
+///   bsdf bump → bumpmap; texture vertexcolors → mesh_attribute; film tiledhdrfilm → hdrfilm
 void upgrade_object(SceneObject& object);
 
 }  // namespace etendue

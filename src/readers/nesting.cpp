@@ -14,19 +14,20 @@ struct Nesting {
     const char* children;
 };
 constexpr Nesting kNesting[] = {
-    {"bsdf", "bsdf texture"},
+    {"bsdf", "bsdf texture phase medium"},
     {"emitter", "texture medium"},
     {"film", "rfilter"},
-    {"integrator", "integrator sampler"},
+    {"integrator", "integrator sampler texture"},
     {"medium", "phase texture volume"},
     {"phase", "phase texture"},
     {"rfilter", ""},
     {"sampler", ""},
-    {"sensor", "film medium sampler"},
-    {"shape", "bsdf emitter medium sensor shape texture"},
-    {"texture", "texture"},
+    {"sensor", "film medium sampler sensor shape"},
+    {"shape", "bsdf emitter medium sensor shape subsurface texture"},
+    {"texture", "texture volume"},
     {"volume", "texture volume"},
     {"spectrum", ""},
+    {"subsurface", "phase texture volume"},
 };
 
 const Nesting* find_nesting(std::string_view category) {

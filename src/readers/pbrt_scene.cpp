@@ -123,12 +123,14 @@ std::string PbrtScene::load(const std::string& name, const SourceLocation& where
 void PbrtScene::reject(const SourceLocation& where, const std::string& what,
                        const std::string& more) {
     if (!options.lenient) throw SceneError(where, what + more);
+    ++description.left_out;
     warn(where, what + "; dropped");
 }
 
 void PbrtScene::refuse(const SourceLocation& where, const std::string& what,
                        const std::string& stand_in) {
     if (!options.lenient) throw SceneError(where, what);
+    ++description.left_out;
     warn(where, what + "; " + stand_in + " instead");
 }
 

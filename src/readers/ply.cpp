@@ -232,20 +232,31 @@ private:
 
 /// What a property of the element "vertex" is, as the index of a float within VertexRecord.
 struct VertexRecord {
-    float values[8];  // x y z, nx ny nz, u v
+    float values[11];  // x y z, nx ny nz, u v, r g b
 };
-constexpr int kPositionSlot = 0, kNormalSlot = 3, kUvSlot = 6, kNoSlot = -1;
+constexpr int kPositionSlot = 0, kNormalSlot = 3, kUvSlot = 6, kColorSlot = 8, kNoSlot = -1;
 
 int vertex_slot(std::string_view name) {
-    constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz", "u", "v"};
+    constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz", "u", "v", "r", "g", "b"};
+    constexpr const char* kColorNames[] = {"red", "green", "blue"};
     constexpr const char* kUvNames[][2] = {
         {"s", "t"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}};
-    for (int i = 0; i < 8; ++i)
+    for (int i = 0; i < 11; ++i)
         if (name == kNames[i]) return i;
+    for (int i = 0; i < 3; ++i)
+        if (name == kColorNames[i]) return kColorSlot + i;
     for (const auto& pair : kUvNames)
         for (int i = 0; i < 2; ++i)
             if (name == pair[i]) return kUvSlot + i;
     return kNoSlot;
+}
+
+float unit_scale(Type type) {
+    switch (type) {
+    case Type::Uint8: return 1.0f / 255;
+    case Type::Uint16: return 1.0f / 65535;
+    default: return 1;
+    }
 }
 
 template <class Body>
@@ -287,11 +298,17 @@ private:
             return true;
         };
         if (!has(kPositionSlot, 3)) in_.fail("the vertices have no x, y and z");
-        const bool has_normals = has(kNormalSlot, 3), has_uvs = has(kUvSlot, 2);
+        const bool has_normals = has(kNormalSlot, 3), has_uvs = has(kUvSlot, 2),
+                   has_colors = has(kColorSlot, 3);
+        // Integers are fractions of their largest value.
+        float color_scale = 1;
+        for (size_t k = 0; k < slots.size(); ++k)
+            if (slots[k] == kColorSlot) color_scale = unit_scale(e.properties[k].type);
 
         mesh_.positions.reserve(e.count);
         if (has_normals) mesh_.normals.reserve(e.count);
         if (has_uvs) mesh_.uvs.reserve(e.count);
+        if (has_colors) mesh_.colors.reserve(e.count);
         VertexRecord r{};
         for (uint64_t i = 0; i < e.count; ++i) {
             for (size_t k = 0; k < slots.size(); ++k) {
@@ -306,6 +323,7 @@ private:
             mesh_.positions.push_back({v[0], v[1], v[2]});
             if (has_normals) mesh_.normals.push_back({v[3], v[4], v[5]});
             if (has_uvs) mesh_.uvs.push_back({v[6], v[7]});
+            if (has_colors) mesh_.colors.push_back(Vec3{v[8], v[9], v[10]} * color_scale);
         }
     }
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "readers/gltf.h"
 #include "readers/mitsuba_xml.h"
 #include "readers/pbrt.h"
 
@@ -26,9 +27,14 @@ SceneDescription read_scene_file(const std::string& file, const ReadOptions& opt
         if (!options.defines.empty()) throw UnusedDefines("scenes of pbrt have no parameters");
         return read_pbrt(file, options);
     }
-    throw std::runtime_error(fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of "
-                                         "Mitsuba 0.6 and 3; .pbrt, of pbrt-v3 and v4)",
-                                         file, extension));
+    if (extension == ".gltf" || extension == ".glb") {
+        if (!options.defines.empty()) throw UnusedDefines("scenes of glTF have no parameters");
+        return read_gltf(file, options);
+    }
+    throw std::runtime_error(
+        fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3; "
+                    ".pbrt, of pbrt-v3 and v4; .gltf and .glb)",
+                    file, extension));
 }
 
 }  // namespace etendue

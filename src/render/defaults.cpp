@@ -1,9 +1,13 @@
 #include "render/defaults.h"
 
+#include <stdexcept>
+
 namespace etendue {
 
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
     const RenderDefaults& defaults = scene.defaults();
+    if (text.empty() && !defaults.integrator_problem.empty())
+        throw std::runtime_error(defaults.integrator_problem + "; choose another one (-i)");
     IntegratorSpec spec =
         IntegratorSpec::parse(!text.empty()                 ? text
                               : defaults.integrator.empty() ? "path"

@@ -45,7 +45,11 @@ std::vector<PluginEntry> plugin_list() {
     for (const IntegratorAlias& a : integrator_aliases()) {
         PluginInfo p = a.info;
         p.category = "scene-integrator";
-        add(entries, p, fmt::format("In a scene file: rendered by {}.", a.integrator));
+        add(entries, p,
+            *a.integrator
+                ? fmt::format("In a scene file: rendered by {}{}.", a.integrator,
+                              a.is_substitute ? ", with a warning" : "")
+                : "In a scene file: the integrator nested in it is used, with a warning.");
     }
     for (const PluginInfo& p : pbrt_plugins()) add(entries, p, p.doc);
     for (const AovInfo& a : aov_registry()) add(entries, {"aov", a.name, a.doc, {}}, a.doc);

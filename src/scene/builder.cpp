@@ -1,6 +1,7 @@
 #include "scene/builder.h"
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 
 #include <fmt/format.h>
@@ -22,35 +23,15 @@ public:
 
     Scene build() {
         scene_.file_ = description_.file;
-        const SceneObject* sensor = nullptr;
-        int sensor_index = -1;
-        for (int root : description_.roots) {
-            const SceneObject& object = description_.objects[root];
-            const std::string& c = object.category;
-            if (c == "shape")
-                add_shape(root);
-            else if (c == "emitter")
-                models_.make_emitters(root);
-            else if (c == "sensor") {
-                if (!sensor)
-                    sensor = &object, sensor_index = root;
-                else
-                    plugins_.warn(object.where,
-                                  "only the first sensor is used; this one is left out");
-            } else if (c == "integrator")
-                read_integrator(plugins_.params(root));
-            else if (c == "bsdf" || c == "texture" || c == "medium")
-                check_unused(root);
-            else
-                plugins_.problem(object.where,
-                                 fmt::format("a <{}> cannot stand in the <scene>", c));
-        }
+        is_child_.resize(description_.objects.size());
+        for (const SceneObject& object : description_.objects)
+            for (const auto& c : object.children) is_child_[size_t(c.object)] = true;
+        for (int root : description_.roots) add_root(root);
         take_models();
         if (scene_.shapes_.empty() && scene_.emitters_.empty())
             throw SceneError({description_.file, 0}, "the scene has no shapes and no emitters");
-        if (!sensor) throw SceneError({description_.file, 0}, "the scene has no sensor");
         finish_geometry();
-        make_sensor(sensor_index);
+        make_sensor(choose_sensor());
         scene_.warnings_ = plugins_.warnings();
         finish_emitters();
         count();
@@ -58,8 +39,78 @@ public:
     }
 
 private:
+    /// A camera of the file; one in a `batch` may have the film of the batch.
+    struct View {
+        int sensor;
+        int batch = -1;
+        int batch_size = 1;
+    };
+
+    /// An object of the scene itself. What others refer to may stand there for that reason alone.
+    void add_root(int root) {
+        const SceneObject& object = description_.objects[size_t(root)];
+        const std::string& c = object.category;
+        const bool is_child = is_child_[size_t(root)];
+        if (c == "shape")
+            add_shape(root);
+        else if (c == "bsdf" || c == "texture" || c == "medium")
+            check_unused(root);
+        else if (is_child)
+            return;
+        else if (c == "emitter")
+            models_.make_emitters(root);
+        else if (c == "sensor")
+            add_sensor(root);
+        else if (c == "integrator")
+            read_integrator(root);
+        else
+            plugins_.warn(object.where, fmt::format("the {} \"{}\" is not used", c, object.type));
+    }
+
+    void add_sensor(int index) {
+        if (description_.objects[size_t(index)].type != "batch") {
+            views_.push_back({index});
+            return;
+        }
+        const auto nested = plugins_.params(index).children("sensor");
+        for (const auto& c : nested) views_.push_back({c.object, index, int(nested.size())});
+    }
+
+    /// The view that the options select.
+    View choose_sensor() {
+        if (views_.empty()) throw SceneError({description_.file, 0}, "the scene has no sensor");
+        for (const View& v : views_) {
+            const SceneObject& o = description_.objects[size_t(v.sensor)];
+            scene_.sensor_names_.push_back(o.id.empty() ? o.type : o.id);
+        }
+        const auto& names = scene_.sensor_names_;
+        const std::string& wanted = options_.sensor;
+        size_t& index = scene_.sensor_index_;
+        if (wanted.empty()) {
+            if (views_.size() > 1)
+                plugins_.warn(
+                    description_.objects[size_t(views_[1].sensor)].where,
+                    fmt::format("the scene has {} sensors ({}); the first is used, and --sensor "
+                                "selects another one",
+                                views_.size(), fmt::join(names, ", ")));
+            return views_[0];
+        }
+        index = size_t(std::find(names.begin(), names.end(), wanted) - names.begin());
+        if (index == names.size()) {
+            const auto [end, error] =
+                std::from_chars(wanted.data(), wanted.data() + wanted.size(), index);
+            if (error != std::errc() || end != wanted.data() + wanted.size() ||
+                index >= names.size())
+                throw SceneError(
+                    {description_.file, 0},
+                    fmt::format("there is no sensor \"{}\" (known: 0 to {}, or by name: {})",
+                                wanted, names.size() - 1, fmt::join(names, ", ")));
+        }
+        return views_[index];
+    }
+
     void take_models() {
-        Models models = models_.take();
+        Models models = models_.take(strict_normals_);
         scene_.images_ = std::move(models.images);
         scene_.textures_ = std::move(models.textures);
         scene_.materials_ = std::move(models.materials);
@@ -94,14 +145,16 @@ private:
     }
 
     /// A shape with its material, emitter and media, not yet added to the accelerator.
-    std::optional<SceneShape> make_shape(int index) {
+    std::optional<SceneShape> make_shape(int index, bool in_group) {
         const ShapeEntry* entry = plugins_.find(index, shape_registry());
         if (!entry) return {};
         const Params p = plugins_.params(index);
         SceneShape s;
-        scene_.owned_shapes_.push_back(plugins_.guarded(index, [&] {
+        auto made = plugins_.attempt(index, [&] {
             return entry->make(p, [&](const std::string& m) { plugins_.warn(p.where(), m); });
-        }));
+        });
+        if (!made) return {};
+        scene_.owned_shapes_.push_back(std::move(made));
         s.shape = scene_.owned_shapes_.back().get();
         s.is_mesh = dynamic_cast<const TriangleMesh*>(s.shape) != nullptr;
         s.name = p.object().id.empty() ? p.object().type : p.object().id;
@@ -113,6 +166,8 @@ private:
         if (emitters.size() > 1)
             plugins_.problem(emitters[1].where,
                              "a shape can have only one emitter; this is a second");
+        if (const auto dipoles = p.children("subsurface"); !dipoles.empty())
+            plugins_.problem(dipoles[0].where, "scattering below the surface is not supported");
         s.material = materials.empty()
                          ? models_.default_material(emitters.empty() ? Rgb(0.5f) : Rgb(0))
                          : models_.make_material(materials[0].object);
@@ -121,53 +176,89 @@ private:
         if (!s.material->is_opaque()) {
             scene_.has_masks_ = true;
             scene_.has_open_boundaries_ |= s.is_interface;
-            if (!emitters.empty())
-                throw SceneError(emitters[0].where,
-                                 "an emitter on a masked shape is not supported");
         }
-        if (!emitters.empty()) {
+        if (emitters.empty()) return s;
+        const SourceLocation& where = emitters[0].where;
+        if (!s.material->is_opaque())
+            plugins_.problem(where, "an emitter on a masked shape is not supported");
+        else if (in_group)
+            plugins_.problem(where, "an emitter in a shapegroup is not supported (add the shape to "
+                                    "the scene instead)");
+        else
             s.emitter = models_.make_emitters(emitters[0].object, s.shape);
-        }
         return s;
     }
 
     void add_shape(int index) {
-        const SceneObject& object = description_.objects[index];
+        const SceneObject& object = description_.objects[size_t(index)];
         if (object.type == "shapegroup") {
             plugins_.check(index, group_infos()[0]);
             make_group(index);
         } else if (object.type == "instance") {
-            plugins_.check(index, group_infos()[1]);
-            const auto groups = plugins_.params(index).children("shape");
-            if (groups.size() != 1 || description_.objects[groups[0].object].type != "shapegroup")
-                throw SceneError(object.where,
-                                 "an instance needs exactly one reference to a shapegroup");
-            instances_.push_back(
-                {make_group(groups[0].object), plugins_.params(index).transform("to_world")});
-        } else if (auto s = make_shape(index)) {
+            for (const Instance& i : instances_of(index)) instances_.push_back(i);
+        } else if (object.type == "merge") {
+            plugins_.check(index, group_infos()[2]);
+            for (const auto& c : plugins_.params(index).children("shape")) add_shape(c.object);
+        } else if (auto s = make_shape(index, false)) {
             top_.push_back(*s);
             scene_.shapes_.push_back(*s);  // finish_geometry() sets the order
         }
     }
 
-    size_t make_group(int index) {
+    /// Shapes of the accelerator, by index in `groups_`, under a transform.
+    struct Instance {
+        size_t group;
+        Transform to_world;
+    };
+
+    /// What an `instance` shows; empty under `lenient` where there is nothing to show.
+    std::vector<Instance> instances_of(int index) {
+        plugins_.check(index, group_infos()[1]);
+        const Params p = plugins_.params(index);
+        const auto groups = p.children("shape");
+        if (groups.size() != 1 || plugins_.object(groups[0].object).type != "shapegroup") {
+            plugins_.problem(p.where(), "an instance needs exactly one reference to a shapegroup");
+            return {};
+        }
+        std::vector<Instance> shown = make_group(groups[0].object);
+        const Transform to_world = plugins_.attempt(index, [&] { return p.transform("to_world"); });
+        for (Instance& i : shown) i.to_world = to_world * i.to_world;
+        return shown;
+    }
+
+    /// The shapes of a group, and the instances nested in it.
+    std::vector<Instance> make_group(int index) {
         if (const auto it = group_of_.find(index); it != group_of_.end()) return it->second;
         std::vector<SceneShape> members;
+        std::vector<Instance> parts;
+        fill_group(index, members, parts);
+        if (!members.empty()) {
+            groups_.push_back(std::move(members));
+            parts.push_back({groups_.size() - 1, Transform()});
+        }
+        if (parts.empty())
+            plugins_.problem(plugins_.object(index).where, "the shapegroup has no shapes");
+        constexpr size_t kMostInstances = 50'000'000;
+        if (parts.size() > kMostInstances)
+            throw SceneError(
+                plugins_.object(index).where,
+                fmt::format("nested groups amount to more than {} instances", kMostInstances));
+        return group_of_[index] = std::move(parts);
+    }
+
+    void fill_group(int index, std::vector<SceneShape>& members, std::vector<Instance>& parts) {
         for (const auto& c : plugins_.params(index).children("shape")) {
-            const SceneObject& member = description_.objects[c.object];
-            if (member.type == "shapegroup" || member.type == "instance")
-                throw SceneError(member.where, "shapegroups cannot be nested");
-            if (auto s = make_shape(c.object)) {
-                if (s->emitter)
-                    throw SceneError(member.where, "an emitter in a shapegroup is not supported "
-                                                   "(add the shape to the scene instead)");
+            const std::string& type = plugins_.object(c.object).type;
+            if (type == "shapegroup" || type == "instance") {
+                const auto nested =
+                    type == "instance" ? instances_of(c.object) : make_group(c.object);
+                parts.insert(parts.end(), nested.begin(), nested.end());
+            } else if (type == "merge") {
+                fill_group(c.object, members, parts);
+            } else if (auto s = make_shape(c.object, true)) {
                 members.push_back(*s);
             }
         }
-        if (members.empty())
-            throw SceneError(description_.objects[index].where, "the shapegroup has no shapes");
-        groups_.push_back(std::move(members));
-        return group_of_[index] = groups_.size() - 1;
     }
 
     void finish_geometry() {
@@ -229,28 +320,60 @@ private:
                 "no emitter of the scene has any power: the image will be black");
     }
 
-    void read_integrator(const Params& p) {
-        if (!scene_.defaults_.integrator.empty())
-            return plugins_.problem(p.where(),
+    /// A scene file's integrator is no more than a suggestion, so what is wrong with it is noted for the case that the
+    /// user chooses no other one.
+    void read_integrator(int index) {
+        RenderDefaults& defaults = scene_.defaults_;
+        if (!defaults.integrator.empty())
+            return plugins_.problem(plugins_.object(index).where,
                                     "a scene can have only one integrator; this is a second");
-        scene_.defaults_.integrator = "path";
-        const IntegratorAlias* alias = plugins_.find(p.index(), integrator_aliases());
+        defaults.integrator = "path";
+        try {
+            apply_integrator(index);
+        } catch (const SceneError& e) {
+            defaults.integrator_problem = e.what();
+        }
+    }
+
+    void apply_integrator(int index) {
+        const Params p = plugins_.params(index);
+        const IntegratorAlias* alias = plugins_.find(index, integrator_aliases());
         if (!alias) return;
+        const std::string& type = p.object().type;
+        if (!*alias->integrator) {
+            const auto nested = p.children("integrator");
+            plugins_.warn(p.where(),
+                          nested.empty()
+                              ? fmt::format("integrator \"{}\" is rendered by path", type)
+                              : fmt::format("integrator \"{}\" is not supported; the one "
+                                            "within it, \"{}\", is rendered",
+                                            type, plugins_.object(nested[0].object).type));
+            if (!nested.empty()) apply_integrator(nested[0].object);
+            return;
+        }
         scene_.defaults_.integrator = alias->integrator;
+        if (alias->is_substitute)
+            plugins_.warn(p.where(),
+                          fmt::format("integrator \"{}\" is not supported; {} is rendered", type,
+                                      alias->integrator));
+        strict_normals_ = p.flag("strict_normals", false);
         for (const char* name : {"max_depth", "rr_depth"})
             if (p.has(name))
                 scene_.defaults_.integrator_params.emplace_back(
                     name, fmt::format("{}", p.integer(name, 0, -1, 1 << 20)));
     }
 
-    void make_sensor(int index) {
+    void make_sensor(const View& view) {
+        const int index = view.sensor;
         const SensorEntry* entry = plugins_.find(index, sensor_registry());
         if (!entry)
-            throw SceneError(description_.objects[index].where,
+            throw SceneError(description_.objects[size_t(index)].where,
                              "the sensor is unknown and cannot be left out");
         const Params p = plugins_.params(index);
         FilmGeometry film{.width = 768, .height = 576, .crop_width = 768, .crop_height = 576};
-        const auto films = p.children("film");
+        auto films = p.children("film");
+        const bool has_film_of_batch = films.empty() && view.batch >= 0;
+        if (has_film_of_batch) films = plugins_.params(view.batch).children("film");
         if (films.size() > 1)
             plugins_.problem(films[1].where, "a sensor can have only one film; this is a second");
         scene_.filter_ = default_filter();
@@ -261,6 +384,12 @@ private:
                 if (const FilterEntry* r = plugins_.find(c.object, filter_registry()))
                     scene_.filter_ = r->make(plugins_.params(c.object));
         }
+        if (has_film_of_batch) {  // whose views stand side by side
+            film.width = std::max(film.width / view.batch_size, 1);
+            film.crop_x = film.crop_y = 0;
+            film.crop_width = film.width;
+            film.crop_height = film.height;
+        }
         apply_overrides(film, p);
         for (const auto& c : p.children("sampler"))
             if (plugins_.find(c.object, sampler_registry()))
@@ -268,7 +397,7 @@ private:
                     int(plugins_.params(c.object).integer("sample_count", 4, 1, 1 << 30));
         if (!p.children("medium").empty())
             plugins_.problem(p.children("medium")[0].where,
-                             "a medium around the sensor is not supported");
+                             "a medium around the sensor is not supported", "vacuum instead");
         scene_.film_ = film;
         scene_.sensor_ = plugins_.guarded(index, [&] {
             return entry->make(p, {film, scene_.filter_.radius(), scene_.bounds_.radius(),
@@ -319,13 +448,12 @@ private:
     PluginLookup plugins_;
     ModelBuilder models_;
     Scene scene_;
-    std::map<int, size_t> group_of_;
+    std::map<int, std::vector<Instance>> group_of_;
+    std::vector<bool> is_child_;  ///< Whether another object refers to an object.
+    std::vector<View> views_;
+    bool strict_normals_ = false;
     std::vector<SceneShape> top_;
     std::vector<std::vector<SceneShape>> groups_;
-    struct Instance {
-        size_t group;
-        Transform to_world;
-    };
     std::vector<Instance> instances_;
 };
 

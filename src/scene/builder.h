@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "description/scene_description.h"
+#include "description/params.h"
 #include "scene/scene.h"
 
 namespace etendue {
@@ -14,6 +14,7 @@ struct BuildOptions {
     /// Width and height of the image, instead of the file's size and crop.
     std::optional<std::pair<int, int>> resolution;
     std::optional<std::array<int, 4>> crop;  ///< x, y, width, height
+    std::string sensor;                      ///< Number (from 0) or id; empty: the first.
     AcceleratorOptions accelerator;
 };
 

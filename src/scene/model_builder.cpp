@@ -34,18 +34,25 @@ const Texture* ModelBuilder::make_texture(int index) {
     if (const auto it = textures_.find(index); it != textures_.end()) return it->second;
     const TextureEntry* entry = plugins_.find(index, texture_registry());
     if (!entry) return textures_[index] = nullptr;
-    models_.textures.push_back(
-        plugins_.guarded(index, [&] { return entry->make(plugins_.params(index), *this); }));
+    auto made = plugins_.attempt(index, [&] { return entry->make(plugins_.params(index), *this); });
+    if (!made) return textures_[index] = nullptr;
+    models_.textures.push_back(std::move(made));
     return textures_[index] = models_.textures.back().get();
 }
 
 const Material* ModelBuilder::make_material(int index) {
     if (const auto it = materials_.find(index); it != materials_.end()) return it->second;
     const MaterialEntry* entry = plugins_.find(index, material_registry());
-    if (!entry) return materials_[index] = default_material(Rgb(0.5f));
-    models_.materials.push_back(
-        plugins_.guarded(index, [&] { return entry->make(plugins_.params(index), *this); }));
+    if (!entry) return materials_[index] = stand_in(index);
+    auto made = plugins_.attempt(index, [&] { return entry->make(plugins_.params(index), *this); });
+    if (!made) return materials_[index] = stand_in(index);
+    models_.materials.push_back(std::move(made));
     return materials_[index] = models_.materials.back().get();
+}
+
+const Material* ModelBuilder::stand_in(int index) {
+    const std::vector<const Material*> inner = nested(plugins_.params(index));
+    return inner.empty() ? default_material(Rgb(0.5f)) : inner.front();
 }
 
 const Material* ModelBuilder::default_material(Rgb reflectance) {
@@ -67,29 +74,41 @@ const Material* ModelBuilder::default_material(Rgb reflectance) {
 MediumId ModelBuilder::make_medium(int index) {
     if (const auto it = media_.find(index); it != media_.end()) return it->second;
     const SceneObject& object = plugins_.object(index);
+    const auto vacuum = [&](const SourceLocation& where, const std::string& message) {
+        plugins_.problem(where, message, "vacuum instead");
+        return media_[index] = kVacuum;
+    };
     if (object.type != "homogeneous")
-        throw SceneError(object.where,
-                         fmt::format("medium \"{}\" is not supported (supported: \"homogeneous\" "
-                                     "with albedo 0, that is absorption only)",
-                                     object.type));
+        return vacuum(object.where,
+                      fmt::format("medium \"{}\" is not supported (supported: \"homogeneous\" "
+                                  "with albedo 0, that is absorption only)",
+                                  object.type));
     plugins_.check(index, medium_info());
+    Rgb absorption;
+    try {
+        absorption = read_absorption(plugins_.params(index));
+    } catch (const SceneError& e) {
+        return vacuum(e.where(), e.message());
+    }
     constexpr size_t kMostMedia = std::numeric_limits<MediumId>::max();
     if (models_.media.size() >= kMostMedia)
         throw SceneError(object.where,
                          fmt::format("a scene can have at most {} media", kMostMedia));
-    models_.media.push_back(read_absorption(plugins_.params(index)));
+    models_.media.push_back(absorption);
     return media_[index] = MediumId(models_.media.size() - 1);
 }
 
 const Emitter* ModelBuilder::make_emitters(int index, const Shape* on_shape) {
     const EmitterEntry* entry = plugins_.find(index, emitter_registry());
     if (!entry) return nullptr;
-    if (on_shape && std::string_view(entry->info.name) != "area")
-        throw SceneError(plugins_.object(index).where,
+    if (on_shape && std::string_view(entry->info.name) != "area") {
+        plugins_.problem(plugins_.object(index).where,
                          fmt::format("emitter \"{}\" cannot stand in a shape (only \"area\" can)",
                                      entry->info.name));
+        return nullptr;
+    }
     emitting_shape_ = on_shape;
-    auto made = plugins_.guarded(index, [&] { return entry->make(plugins_.params(index), *this); });
+    auto made = plugins_.attempt(index, [&] { return entry->make(plugins_.params(index), *this); });
     emitting_shape_ = nullptr;
     const Emitter* first = made.empty() ? nullptr : made.front().get();
     for (auto& e : made) models_.emitters.push_back(std::move(e));

@@ -27,8 +27,8 @@ class ModelBuilder final : private MaterialContext, private EmitterContext, priv
 public:
     explicit ModelBuilder(PluginLookup& plugins) : plugins_(plugins) {}
 
-    /// `index` is that of the object in the description. Under `lenient` an unknown texture is nullptr, and an unknown
-    /// material is replaced by the default one.
+    /// `index` is that of the object in the description. Under `lenient` a texture that cannot be made is nullptr, such a
+    /// material is replaced by the first one nested in it or by the default one, and such a medium is vacuum.
     const Texture* make_texture(int index);
     const Material* make_material(int index);
     MediumId make_medium(int index);
@@ -37,11 +37,15 @@ public:
     /// The material of shapes without one: diffuse.
     const Material* default_material(Rgb reflectance);
 
-    Models take() { return std::move(models_); }
+    Models take(bool strict_normals) {
+        for (auto& m : models_.materials) m->set_strict_normals(strict_normals);
+        return std::move(models_);
+    }
 
 private:
     TextureRef texture(const Params& p, std::string_view name, Rgb fallback, float hi) override;
     std::vector<const Material*> nested(const Params& p) override;
+    const Material* stand_in(int index);
     const Shape* shape() const override { return emitting_shape_; }
     TextureCache& images() override { return *models_.images; }
 

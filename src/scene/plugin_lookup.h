@@ -13,17 +13,19 @@ namespace etendue {
 class PluginLookup {
 public:
     PluginLookup(const SceneDescription& description, bool lenient)
-        : description_(description), lenient_(lenient), warnings_(description.warnings) {}
+        : description_(description), lenient_(lenient), left_out_(description.left_out),
+          warnings_(description.warnings) {}
 
     const SceneDescription& description() const { return description_; }
     const SceneObject& object(int index) const { return description_.objects[size_t(index)]; }
     Params params(int index) const { return {description_, index}; }
 
     void warn(const SourceLocation& where, const std::string& message);
-    /// Throws SceneError, or adds a warning under `lenient`.
-    void problem(const SourceLocation& where, const std::string& message);
-    /// Warnings of the description and of this object, in order.
-    const std::vector<std::string>& warnings() const { return warnings_; }
+    /// Throws SceneError, or adds a warning that says what happens instead under `lenient`.
+    void problem(const SourceLocation& where, const std::string& message,
+                 const std::string& instead = "left out");
+    /// Warnings of the description and of this object, in order; the last one counts what was left out.
+    std::vector<std::string> warnings() const;
 
     void check(int index, const PluginInfo& info);
 
@@ -55,11 +57,24 @@ public:
         }
     }
 
+    /// guarded() of a make() whose result may be left out: under `lenient` an error is a warning, and the result is
+    /// empty.
+    template <class Make>
+    auto attempt(int index, const Make& make) -> decltype(make()) {
+        try {
+            return guarded(index, make);
+        } catch (const SceneError& e) {
+            problem(e.where(), e.message());
+            return {};
+        }
+    }
+
 private:
     void report_unknown(int index, std::vector<std::string>& known);
 
     const SceneDescription& description_;
     bool lenient_;
+    int left_out_;
     std::vector<std::string> warnings_;
 };
 

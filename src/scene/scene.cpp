@@ -83,7 +83,9 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage
         hit.t = travelled;
         passage.attenuation *= attenuation(passage.medium, next.t);
         const float opacity =
-            next.shape->material->is_opaque() ? 1 : next.shape->material->opacity(next.geometry.uv);
+            next.shape->material->is_opaque()
+                ? 1
+                : next.shape->material->opacity({next.geometry.uv, next.geometry.color});
         found = u < opacity;
         if (found) return false;
         u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
@@ -102,8 +104,9 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit) const {
 float Scene::masked_transmittance(const Ray& ray) const {
     float Tr = 1;
     for_each_surface(ray, [&](const SurfaceHit& hit) {
-        Tr *= hit.shape->material->is_opaque() ? 0
-                                               : 1 - hit.shape->material->opacity(hit.geometry.uv);
+        Tr *= hit.shape->material->is_opaque()
+                  ? 0
+                  : 1 - hit.shape->material->opacity({hit.geometry.uv, hit.geometry.color});
         return Tr > 0;
     });
     return Tr;

@@ -55,6 +55,8 @@ struct RenderDefaults {
     std::string integrator;  ///< Empty where the file names none.
     std::vector<std::pair<std::string, std::string>> integrator_params;  ///< max_depth, rr_depth.
     int spp = 0;                                                         ///< 0: not given.
+    /// Why the file's integrator cannot be used; empty where it can. Matters only where no other one is chosen.
+    std::string integrator_problem;
 };
 
 class Scene {
@@ -118,6 +120,9 @@ public:
     const Bounds3& bounds() const { return bounds_; }
     const std::string& file() const { return file_; }
     bool has_masks() const { return has_masks_; }
+    /// Names of the sensors in the file, and which of them is used.
+    const std::vector<std::string>& sensor_names() const { return sensor_names_; }
+    size_t sensor_index() const { return sensor_index_; }
     bool has_media() const { return !media_.empty(); }
 
     struct Statistics {
@@ -153,6 +158,8 @@ private:
     ReconstructionFilter filter_ = ReconstructionFilter::box();
     RenderDefaults defaults_;
     Bounds3 bounds_;
+    std::vector<std::string> sensor_names_;
+    size_t sensor_index_ = 0;
     float least_offset_ = 0, size_ = kInf;  ///< Of offset_origin().
     bool has_masks_ = false;
     bool has_open_boundaries_ = false;

@@ -88,16 +88,31 @@ const std::vector<IntegratorAlias>& integrator_aliases() {
             {"rr_depth", ParamKind::Int, "5",
              "Index of the first vertex of a sub-path at which Russian roulette is applied."},
             {"hide_emitters", ParamKind::Bool, "", "Accepted; emitters are never hidden."},
-            {"strict_normals", ParamKind::Bool, "", "Accepted; normals are always strict."},
+            {"strict_normals", ParamKind::Bool, "false",
+             "Whether nothing scatters where the geometric and the shading normal see a direction "
+             "on "
+             "different sides."},
             {"light_image", ParamKind::Bool, "", "Accepted; splats are always made."},
             {"sample_direct", ParamKind::Bool, "", "Accepted; direct light is always sampled."}};
         std::vector<IntegratorAlias> all;
-        for (const char* name : {"path", "volpath", "volpathmis", "volpath_simple", "direct"})
-            all.push_back({{"integrator", name, "Path tracing.", params}, "path"});
-        for (const char* name : {"ptracer", "light"})
-            all.push_back({{"integrator", name, "Light tracing.", params}, "light"});
-        all.push_back({{"integrator", "bdpt", "Bidirectional path tracing.", params}, "bdpt"});
-        all.push_back({{"integrator", "sppm", "Photon mapping.", params}, "sppm"});
+        const auto add = [&](std::initializer_list<const char*> names, const char* doc,
+                             const char* integrator, bool is_substitute = false) {
+            for (const char* name : names)
+                all.push_back({{"integrator", name, doc, params}, integrator, is_substitute});
+        };
+        add({"path", "volpath", "volpathmis", "volpath_simple", "direct", "prb", "prb_basic",
+             "prbvolpath", "prb_projective", "direct_projective"},
+            "Path tracing.", "path");
+        add({"ptracer", "light"}, "Light tracing.", "light");
+        add({"bdpt"}, "Bidirectional path tracing.", "bdpt");
+        add({"photonmapper"}, "Photon mapping.", "pm");
+        add({"ppm"}, "Progressive photon mapping.", "ppm");
+        add({"sppm"}, "Stochastic progressive photon mapping.", "sppm");
+        add({"pssmlt"}, "Metropolis light transport in primary sample space.", "pssmlt");
+        add({"mlt"}, "Metropolis light transport.", "mlt");
+        add({"erpt", "vpl", "ao", "field", "depth"}, "Not supported.", "path", true);
+        add({"adaptive", "irrcache", "multichannel", "aov", "moment", "stokes"},
+            "A wrapper around other integrators.", "");
         return all;
     }();
     return entries;

@@ -24,7 +24,8 @@ const std::vector<SamplerEntry>& sampler_registry();
 /// An integrator that scene files may name, and the integrator used for it unless the command line names one.
 struct IntegratorAlias {
     PluginInfo info;
-    const char* integrator;
+    const char* integrator;  ///< Empty for one that only wraps others: the first of these is used.
+    bool is_substitute;      ///< Whether it computes something else, so that a warning is due.
 };
 const std::vector<IntegratorAlias>& integrator_aliases();
 

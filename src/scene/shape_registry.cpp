@@ -47,7 +47,7 @@ std::vector<ParamInfo> mesh_params(const char* flip) {
          {"collapse", ParamKind::Bool, "false", "Accepted; a file is always a single shape."},
          {"shape_index", ParamKind::Int, "0", "Index of the mesh in a .serialized file."},
          {"max_smooth_angle", ParamKind::Float, "", "Accepted; without effect."},
-         {"srgb", ParamKind::Bool, "false", "Accepted; vertex colours are not used."}});
+         {"srgb", ParamKind::Bool, "false", "Accepted; vertex colours are linear."}});
 }
 
 /// Converts the data of a mesh file to a mesh in world space.
@@ -78,6 +78,7 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     mesh->positions = std::move(data.positions);
     mesh->normals = std::move(data.normals);
     mesh->uvs = std::move(data.uvs);
+    mesh->colors = std::move(data.colors);
     mesh->triangles = std::move(data.triangles);
     for (Vec3 p : mesh->positions)
         if (!is_finite(p))
@@ -161,36 +162,75 @@ std::unique_ptr<Shape> make_cube(const Params& params, const Warn&) {
     return make_quads(quads, params);
 }
 
-/// Throws SceneError where `t` has shear or scales x and y (for `uniform` also z) differently.
-void check_similarity(const Transform& t, const Params& params, bool uniform) {
+/// Whether `t` has no shear and scales x and y (for `uniform` also z) equally.
+bool is_similarity(const Transform& t, bool uniform) {
     const Vec3 x = t.vector({1, 0, 0}), y = t.vector({0, 1, 0}), z = t.vector({0, 0, 1});
     const float lx = length(x), ly = length(y), lz = length(z);
     const bool orthogonal = std::fabs(dot(x, y)) < 1e-3f * lx * ly &&
                             std::fabs(dot(y, z)) < 1e-3f * ly * lz &&
                             std::fabs(dot(z, x)) < 1e-3f * lz * lx;
-    const bool round =
-        std::fabs(lx - ly) < 1e-3f * lx && (!uniform || std::fabs(lx - lz) < 1e-3f * lx);
-    if (!orthogonal || !round)
-        params.fail("to_world",
-                    fmt::format("\"to_world\" of a {} must have no shear and {}",
-                                params.object().type,
-                                uniform ? "a uniform scale" : "the same scale in x and y"));
+    return orthogonal && std::fabs(lx - ly) < 1e-3f * lx &&
+           (!uniform || std::fabs(lx - lz) < 1e-3f * lx);
 }
 
-std::unique_ptr<Shape> make_sphere(const Params& params, const Warn&) {
+/// A mesh of `columns` × `rows` squares; `vertex(u, v)` returns position and normal for (u, v) in the unit square.
+template <class Vertex>
+MeshData grid_mesh(int columns, int rows, const Vertex& vertex) {
+    MeshData mesh;
+    for (int j = 0; j <= rows; ++j)
+        for (int i = 0; i <= columns; ++i) {
+            const Vec2 uv{float(i) / float(columns), float(j) / float(rows)};
+            const auto [p, n] = vertex(uv);
+            mesh.positions.push_back(p);
+            mesh.normals.push_back(n);
+            mesh.uvs.push_back(uv);
+        }
+    for (int j = 0; j < rows; ++j)
+        for (int i = 0; i < columns; ++i) {
+            const auto a = uint32_t(j * (columns + 1) + i), b = a + 1,
+                       c = a + uint32_t(columns) + 1, d = c + 1;
+            mesh.triangles.push_back({a, b, d});
+            mesh.triangles.push_back({a, d, c});
+        }
+    return mesh;
+}
+
+constexpr int kColumns = 128, kRows = 64;  ///< Of the mesh of a stretched quadric.
+
+std::unique_ptr<Shape> finish_quadric(MeshData mesh, const Params& params, const Warn& warn) {
+    warn(
+        fmt::format("\"to_world\" stretches or shears the {}: it becomes a mesh of {} × {} squares",
+                    params.object().type, kColumns, kRows));
+    finish_mesh(mesh, {}, params.where());
+    mesh.dropped_degenerate = 0;  // those at the poles of a sphere
+    return finish(std::move(mesh), params, warn);
+}
+
+std::unique_ptr<Shape> make_sphere(const Params& params, const Warn& warn) {
     const Transform t = params.transform("to_world");
-    check_similarity(t, params, true);
     const float radius = params.number("radius", 1, 1e-20f);
-    const Transform local = Transform::translate(params.vector("center", {0, 0, 0})) *
-                            Transform::scale({radius, radius, radius});
-    return std::make_unique<Sphere>(t * local, params.flag("flip_normals", false));
+    const Vec3 center = params.vector("center", {0, 0, 0});
+    if (is_similarity(t, true)) {
+        const Transform local =
+            Transform::translate(center) * Transform::scale({radius, radius, radius});
+        return std::make_unique<Sphere>(t * local, params.flag("flip_normals", false));
+    }
+    return finish_quadric(grid_mesh(kColumns, kRows,
+                                    [&](Vec2 uv) {
+                                        const float phi = 2 * kPi * uv.x, theta = kPi * uv.y;
+                                        const Vec3 n{std::sin(theta) * std::cos(phi),
+                                                     std::sin(theta) * std::sin(phi),
+                                                     std::cos(theta)};
+                                        return std::pair(center + n * radius, n);
+                                    }),
+                          params, warn);
 }
 
 std::unique_ptr<Shape> make_disk(const Params& params, const Warn&) {
     return std::make_unique<Disk>(params.transform("to_world"), params.flag("flip_normals", false));
 }
 
-std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn&) {
+std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn& warn) {
     const Vec3 p0 = params.vector("p0", {0, 0, 0}), p1 = params.vector("p1", {0, 0, 1});
     const float radius = params.number("radius", 1, 1e-20f);
     const Vec3 axis = p1 - p0;
@@ -205,8 +245,16 @@ std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn&) {
                                              {s.y, r.y, axis.y, p0.y},
                                              {s.z, r.z, axis.z, p0.z},
                                              {0, 0, 0, 1}}});
-    check_similarity(t * local, params, false);
-    return std::make_unique<Cylinder>(t * local, params.flag("flip_normals", false));
+    if (is_similarity(t * local, false))
+        return std::make_unique<Cylinder>(t * local, params.flag("flip_normals", false));
+    return finish_quadric(grid_mesh(kColumns, kRows,
+                                    [&](Vec2 uv) {
+                                        const float phi = 2 * kPi * uv.x;
+                                        const Vec3 n =
+                                            frame.s * std::cos(phi) + frame.t * std::sin(phi);
+                                        return std::pair(p0 + n * radius + axis * uv.y, n);
+                                    }),
+                          params, warn);
 }
 
 }  // namespace
@@ -253,13 +301,17 @@ const std::vector<PluginInfo>& group_infos() {
     static const std::vector<PluginInfo> infos = {
         {"shape",
          "shapegroup",
-         "Shapes that appear only through instances.",
+         "Shapes that appear only through instances; groups may be nested.",
          {{"shape", ParamKind::Object, "", "Nested shapes."}}},
         {"shape",
          "instance",
          "A copy of a shapegroup.",
          {{"to_world", ParamKind::Transform, "identity", "Group-to-world transform."},
-          {"shapegroup", ParamKind::Object, "", "Reference to the group."}}}};
+          {"shapegroup", ParamKind::Object, "", "Reference to the group."}}},
+        {"shape",
+         "merge",
+         "Several shapes, as if each stood for itself.",
+         {{"shape", ParamKind::Object, "", "Nested shapes."}}}};
     return infos;
 }
 

@@ -15,7 +15,7 @@ struct ShapeEntry {
     std::unique_ptr<Shape> (*make)(const Params& params,
                                    const std::function<void(const std::string&)>& warn);
 };
-/// All shape plug-ins except `shapegroup` and `instance`, which the builder handles; their tables are group_infos().
+/// All shape plug-ins except `shapegroup`, `instance` and `merge`, which the builder handles; their tables are group_infos().
 const std::vector<ShapeEntry>& shape_registry();
 const std::vector<PluginInfo>& group_infos();
 

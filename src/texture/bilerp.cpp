@@ -17,12 +17,13 @@ public:
           v10_(params.rgb("v10", Rgb(0))), v11_(params.rgb("v11", Rgb(1))),
           to_uv_(params.transform("to_uv")) {}
 
-    Rgb eval(Vec2 uv) const override {
+    Rgb eval(const TexturePoint& at) const override {
+        const Vec2 uv = at.uv;
         const Vec2 p = to_uv_.point(uv);
         const Rgb c = lerp(p.x, lerp(p.y, v00_, v01_), lerp(p.y, v10_, v11_));
         return {std::max(c.r, 0.0f), std::max(c.g, 0.0f), std::max(c.b, 0.0f)};
     }
-    Rgb mean() const override { return eval({0.5f, 0.5f}); }
+    Rgb mean() const override { return eval(Vec2{0.5f, 0.5f}); }
     void resolution(int& width, int& height) const override { width = height = 16; }
 
 private:

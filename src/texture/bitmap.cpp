@@ -120,18 +120,18 @@ inline Rgb BitmapTexture::filtered(const Texels& texels, const Footprint& f) con
                 lerp(f.x.weight, texel(texels, f.x.i0, f.y.i1), texel(texels, f.x.i1, f.y.i1)));
 }
 
-Rgb BitmapTexture::eval(Vec2 uv) const {
-    return std::visit([&](const auto& texels) { return filtered(texels, footprint(uv)); },
+Rgb BitmapTexture::eval(const TexturePoint& at) const {
+    return std::visit([&](const auto& texels) { return filtered(texels, footprint(at.uv)); },
                       image_->data);
 }
 
-float BitmapTexture::eval_scalar(Vec2 uv) const {
-    const Rgb c = eval(uv);
+float BitmapTexture::eval_scalar(const TexturePoint& at) const {
+    const Rgb c = eval(at);
     return is_grey_ ? c.r : luminance(c);
 }
 
-Vec2 BitmapTexture::gradient(Vec2 uv) const {
-    const Footprint f = footprint(uv);
+Vec2 BitmapTexture::gradient(const TexturePoint& at) const {
+    const Footprint f = footprint(at.uv);
     const auto slopes = [&](const auto& texels) -> Vec2 {
         const auto scalar = [&](int x, int y) {
             const Rgb c = texel(texels, x, y);
@@ -173,22 +173,37 @@ Rgb BitmapTexture::image_mean(const Texels& texels) const {
 
 namespace {
 
+/// The opacity of an image without an alpha channel.
+class Opaque final : public Texture {
+public:
+    Rgb eval(const TexturePoint&) const override { return Rgb(1); }
+    Rgb mean() const override { return Rgb(1); }
+};
+
+const PixelBuffer& load_image(const Params& params, TextureContext& context, bool raw) {
+    const auto& images = params.scene().images;
+    if (!params.has("image") || images.empty())
+        return context.images().load(resolve_file(params), raw);
+    const auto& image = images[size_t(params.integer("image", 0, 0, int64_t(images.size()) - 1))];
+    return context.images().decode(image.bytes, image.name, raw);
+}
+
 std::unique_ptr<Texture> make_bitmap(const Params& params, TextureContext& context) {
     BitmapTexture::Options options;
     options.filter = TextureFilter(params.choice("filter_type", {"bilinear", "nearest"}, 0));
     options.wrap = TextureWrap(params.choice("wrap_mode", {"repeat", "mirror", "clamp"}, 0));
     options.raw = params.flag("raw", false);
     options.to_uv = UvTransform(params.transform("to_uv"));
-    const int channel = params.choice("channel", {"all", "r", "g", "b", "a"}, 0);
-    const std::string path = resolve_file(params);
+    const int channel = params.choice("channel", {"all", "r", "g", "b", "a", "opacity"}, 0);
     try {
-        const PixelBuffer& image = context.images().load(path, options.raw);
-        if (channel == 4)
+        const PixelBuffer& image = load_image(params, context, options.raw);
+        if (channel == 5 && image.alpha_channel < 0) return std::make_unique<Opaque>();
+        if (channel >= 4)
             options.channel = image.alpha_channel;
         else if (channel > 0)
             options.channel = image.channels < 3 ? 0 : channel - 1;
         if (channel == 4 && options.channel < 0)
-            params.fail("channel", fmt::format("image \"{}\" has no alpha channel", path));
+            params.fail("channel", "the image has no alpha channel");
         return std::make_unique<BitmapTexture>(image, options);
     } catch (const SceneError&) {
         throw;
@@ -211,7 +226,9 @@ TextureEntry bitmap_entry() {
           {"raw", ParamKind::Bool, "false",
            "Whether integer formats hold linear data instead of sRGB."},
           {"channel", ParamKind::String, "all",
-           "all (the colours), or one of r, g, b and a as grey."},
+           "all (the colours), one of r, g, b and a as grey, or opacity: a, or 1 without it."},
+          {"image", ParamKind::Int, "",
+           "Instead of filename: number of the image among those of the scene file."},
           {"to_uv", ParamKind::Transform, "identity", "Affine map of (u, v) before the look-up."}}},
         make_bitmap};
 }

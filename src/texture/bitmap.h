@@ -26,9 +26,9 @@ public:
     BitmapTexture(const PixelBuffer& image,
                   const Options& options);  ///< The image must outlive the texture.
 
-    Rgb eval(Vec2 uv) const override;
-    float eval_scalar(Vec2 uv) const override;
-    Vec2 gradient(Vec2 uv) const override;
+    Rgb eval(const TexturePoint& at) const override;
+    float eval_scalar(const TexturePoint& at) const override;
+    Vec2 gradient(const TexturePoint& at) const override;
     Rgb mean() const override { return mean_; }
     void resolution(int& width, int& height) const override;
     size_t memory_bytes() const override { return sizeof(*this); }

@@ -19,9 +19,13 @@ public:
           color1_(context.texture(params, "color1", Rgb(0.2f))), to_uv_(params.transform("to_uv")) {
     }
 
-    Rgb eval(Vec2 uv) const override { return square(uv).eval(uv); }
-    float eval_scalar(Vec2 uv) const override { return square(uv).eval_scalar(uv); }
-    Vec2 gradient(Vec2 uv) const override { return square(uv).gradient(uv); }  // edges have none
+    Rgb eval(const TexturePoint& at) const override { return square(at.uv).eval(at); }
+    float eval_scalar(const TexturePoint& at) const override {
+        return square(at.uv).eval_scalar(at);
+    }
+    Vec2 gradient(const TexturePoint& at) const override {
+        return square(at.uv).gradient(at);
+    }  // edges have none
     Rgb mean() const override { return (color0_.mean() + color1_.mean()) * 0.5f; }
     void resolution(int& width, int& height) const override {
         width = height = 2;

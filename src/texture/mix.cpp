@@ -16,8 +16,8 @@ public:
           value1_(context.texture(params, "value1", Rgb(1))),
           weight_(context.texture(params, "weight", Rgb(0.5f), 1)) {}
 
-    Rgb eval(Vec2 uv) const override {
-        return lerp(weight_.eval_scalar(uv), value0_.eval(uv), value1_.eval(uv));
+    Rgb eval(const TexturePoint& at) const override {
+        return lerp(weight_.eval_scalar(at), value0_.eval(at), value1_.eval(at));
     }
     Rgb mean() const override {  // exact where the weight is constant
         return lerp(luminance(weight_.mean()), value0_.mean(), value1_.mean());

@@ -16,8 +16,10 @@ public:
         : roughness_(context.texture(params, "roughness", Rgb(0.1f))),
           is_polynomial_(params.choice("curve", {"pbrt4", "pbrt3"}, 0) == 1) {}
 
-    Rgb eval(Vec2 uv) const override { return Rgb(eval_scalar(uv)); }
-    float eval_scalar(Vec2 uv) const override { return alpha(roughness_.eval_scalar(uv)); }
+    Rgb eval(const TexturePoint& at) const override { return Rgb(eval_scalar(at)); }
+    float eval_scalar(const TexturePoint& at) const override {
+        return alpha(roughness_.eval_scalar(at));
+    }
     Rgb mean() const override { return Rgb(alpha(luminance(roughness_.mean()))); }
     void resolution(int& width, int& height) const override {
         roughness_.resolution(width, height);

@@ -15,10 +15,10 @@ public:
         : value_(context.texture(params, value_name(params), Rgb(1))),
           scale_(context.texture(params, "scale", Rgb(1))) {}
 
-    Rgb eval(Vec2 uv) const override { return value_.eval(uv) * scale_.eval(uv); }
-    Vec2 gradient(Vec2 uv) const override {
-        if (!scale_.is_constant() || !is_grey(scale_.eval(uv))) return Texture::gradient(uv);
-        return value_.gradient(uv) * scale_.eval(uv).r;
+    Rgb eval(const TexturePoint& at) const override { return value_.eval(at) * scale_.eval(at); }
+    Vec2 gradient(const TexturePoint& at) const override {
+        if (!scale_.is_constant() || !is_grey(scale_.eval(at))) return Texture::gradient(at);
+        return value_.gradient(at) * scale_.eval(at).r;
     }
     Rgb mean() const override {  // exact where one of the two is constant
         return value_.mean() * scale_.mean();

@@ -1,5 +1,5 @@
 #pragma once
-// Textures: functions of the surface's (u, v). Materials and emitters store `TextureRef`s: a constant or a texture.
+// Textures: functions of the surface's (u, v) and of its vertex colours. Materials and emitters store `TextureRef`s: a constant or a texture.
 
 #include <memory>
 #include <string>
@@ -12,15 +12,24 @@
 
 namespace etendue {
 
+/// What a texture knows of the point at which it is evaluated.
+struct TexturePoint {
+    TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3(1, 1, 1)) : uv(uv_), color(color_) {}
+    TexturePoint(float u, float v) : TexturePoint(Vec2{u, v}) {}
+
+    Vec2 uv;
+    Vec3 color;  ///< Interpolated vertex colour; white where the shape has none.
+};
+
 class Texture {
 public:
     virtual ~Texture() = default;
-    /// Colour at `uv`; finite and not negative.
-    virtual Rgb eval(Vec2 uv) const = 0;
+    /// Colour at `at`; finite and not negative.
+    virtual Rgb eval(const TexturePoint& at) const = 0;
     /// Value of roughness, opacity and height maps: the luminance of colours, the value of grey.
-    virtual float eval_scalar(Vec2 uv) const { return luminance(eval(uv)); }
+    virtual float eval_scalar(const TexturePoint& at) const { return luminance(eval(at)); }
     /// (∂/∂u, ∂/∂v) of eval_scalar(), for bump mapping; by central differences unless overridden.
-    virtual Vec2 gradient(Vec2 uv) const;
+    virtual Vec2 gradient(const TexturePoint& at) const;
     /// Average over the unit square, for the power of emitters and average albedos; may be approximate.
     virtual Rgb mean() const = 0;
     /// Size of a grid over the unit square that resolves the texture's detail, for importance sampling.
@@ -40,9 +49,13 @@ public:
         : constant_(constant), scalar_(is_grey(constant) ? constant.g : luminance(constant)) {}
     explicit TextureRef(const Texture* texture) : texture_(texture) {}
 
-    Rgb eval(Vec2 uv) const { return texture_ ? texture_->eval(uv) : constant_; }
-    float eval_scalar(Vec2 uv) const { return texture_ ? texture_->eval_scalar(uv) : scalar_; }
-    Vec2 gradient(Vec2 uv) const { return texture_ ? texture_->gradient(uv) : Vec2(); }
+    Rgb eval(const TexturePoint& at) const { return texture_ ? texture_->eval(at) : constant_; }
+    float eval_scalar(const TexturePoint& at) const {
+        return texture_ ? texture_->eval_scalar(at) : scalar_;
+    }
+    Vec2 gradient(const TexturePoint& at) const {
+        return texture_ ? texture_->gradient(at) : Vec2();
+    }
     Rgb mean() const { return texture_ ? texture_->mean() : constant_; }
     void resolution(int& width, int& height) const {
         width = height = 1;

@@ -40,17 +40,23 @@ size_t sanitize(std::vector<uint8_t>&, bool) {
 }  // namespace
 
 const PixelBuffer& TextureCache::load(const std::string& path, bool raw) {
-    auto& image = images_[{std::filesystem::weakly_canonical(path).string(), raw}];
-    if (!image) {
-        auto loaded = std::make_unique<PixelBuffer>(read_pixels(path, raw));
-        const size_t bad =
-            std::visit([&](auto& data) { return sanitize(data, raw); }, loaded->data);
-        if (bad > 0)
-            throw std::runtime_error("image \"" + path + "\" has " + std::to_string(bad) +
-                                     " values that are infinite or NaN");
-        image = std::move(loaded);
-    }
-    return *image;
+    const std::string name = std::filesystem::weakly_canonical(path).string();
+    if (const auto it = images_.find({name, raw}); it != images_.end()) return *it->second;
+    return keep(read_pixels(path, raw), name, raw);
+}
+
+const PixelBuffer& TextureCache::decode(const std::string& bytes, const std::string& name,
+                                        bool raw) {
+    if (const auto it = images_.find({name, raw}); it != images_.end()) return *it->second;
+    return keep(decode_pixels(bytes, name, raw), name, raw);
+}
+
+const PixelBuffer& TextureCache::keep(PixelBuffer image, const std::string& name, bool raw) {
+    const size_t bad = std::visit([&](auto& data) { return sanitize(data, raw); }, image.data);
+    if (bad > 0)
+        throw std::runtime_error("image \"" + name + "\" has " + std::to_string(bad) +
+                                 " values that are infinite or NaN");
+    return *(images_[{name, raw}] = std::make_unique<PixelBuffer>(std::move(image)));
 }
 
 size_t TextureCache::memory_bytes() const {

@@ -14,8 +14,8 @@ struct FunctionTexture final : Texture {
     std::function<Rgb(Vec2)> color;
     std::function<Vec2(Vec2)> slope = [](Vec2) { return Vec2{}; };
 
-    Rgb eval(Vec2 uv) const override { return color(uv); }
-    Vec2 gradient(Vec2 uv) const override { return slope(uv); }
+    Rgb eval(const TexturePoint& at) const override { return color(at.uv); }
+    Vec2 gradient(const TexturePoint& at) const override { return slope(at.uv); }
     Rgb mean() const override { return color({0.5f, 0.5f}); }
 };
 

@@ -24,7 +24,7 @@ struct Mixture {
 
     Bsdf bsdf(Vec3 ng) {
         Bsdf made;
-        ComponentList list(ng, arena, made);
+        ComponentList list(ng, true, arena, made);
         for (const BsdfComponent& c : components)
             std::visit([&](const auto& lobe) { list.add(c.frame, lobe, c.weight); }, c.lobe);
         return made;

@@ -70,6 +70,18 @@ TEST(LobeSum, ReflectsTheSameFromBehind) {
     EXPECT_TRUE(at(wo, {wi.x, wi.y, -wi.z}).is_zero());
 }
 
+TEST(LobeSum, DiffuseLightGoesToItsSide) {
+    TestMaterials m;
+    ComponentArena arena;
+    const Vec3 wo = direction(30, 0), wi = direction(20, 170), below{wi.x, wi.y, -wi.z};
+    const Bsdf bsdf = m.make("lobesum", {{"diffuse_reflectance", 0.2},
+                                         {"diffuse_transmittance", 0.1},
+                                         {"glossy_reflectance", 0.0}})
+                          .bsdf(plane_point(wo), arena);
+    EXPECT_NEAR(bsdf.eval(wo, wi, TransportMode::Importance).f.g, 0.2f * wi.z * kInvPi, 1e-6);
+    EXPECT_NEAR(bsdf.eval(wo, below, TransportMode::Importance).f.g, 0.1f * wi.z * kInvPi, 1e-6);
+}
+
 TEST(LobeSum, WithoutContrastThereIsNoGloss) {
     TestMaterials m;
     ComponentArena arena;

@@ -150,11 +150,11 @@ TEST(Mask, HasItsOpacityAndDoesNotScaleTheNestedMaterial) {
     EXPECT_EQ(MaterialLobe{&material}.sample(direction(30, 0), 0.5f, {0.3f, 0.3f})->weight,
               Rgb(0.8f));
 
-    EXPECT_FLOAT_EQ(m.make("mask", {}, {{"", diffuse}}).opacity({}), 0.5f);
+    EXPECT_FLOAT_EQ(m.make("mask", {}, {{"", diffuse}}).opacity(Vec2()), 0.5f);
     EXPECT_TRUE(m.make("mask", {{"opacity", 1.0}}, {{"", diffuse}}).is_opaque());
     const int inner = m.bsdf("mask", {{"opacity", 0.5}}, {{"", diffuse}});
     const Material& outer = m.make("mask", {{"opacity", 0.4}}, {{"", inner}});
-    EXPECT_FLOAT_EQ(outer.opacity({}), 0.2f);
+    EXPECT_FLOAT_EQ(outer.opacity(Vec2()), 0.2f);
     EXPECT_FALSE(outer.is_opaque());
     EXPECT_FALSE(m.make("mask", {{"opacity", 1.0}}, {{"", inner}}).is_opaque());
     EXPECT_THROW(m.make("mask"), SceneError);
@@ -164,7 +164,7 @@ TEST(Mask, HasItsOpacityAndDoesNotScaleTheNestedMaterial) {
 TEST(Null, IsNeverMet) {
     TestMaterials m;
     const Material& material = m.make("null");
-    EXPECT_EQ(material.opacity({}), 0);
+    EXPECT_EQ(material.opacity(Vec2()), 0);
     EXPECT_FALSE(material.is_opaque());
     EXPECT_FALSE(material.may_be_smooth());
     const MaterialLobe lobe{&material};
@@ -228,7 +228,7 @@ TEST(BlendBsdf, SharesOpacity) {
               black = m.bsdf("diffuse", reflectance(Rgb(0)));
     const int half = m.bsdf("mask", {{"opacity", 0.5}}, {{"", white}});
     const Material& blend = m.make("blendbsdf", {{"weight", 0.2}}, {{"", half}, {"", black}});
-    EXPECT_FLOAT_EQ(blend.opacity({}), 0.8f * 0.5f + 0.2f);
+    EXPECT_FLOAT_EQ(blend.opacity(Vec2()), 0.8f * 0.5f + 0.2f);
     EXPECT_FALSE(blend.is_opaque());
     // Of the light that meets the surface, 0.4 of 0.6 meets the white material.
     const Vec3 wo = direction(30, 0), wi = direction(40, 90);
@@ -236,7 +236,7 @@ TEST(BlendBsdf, SharesOpacity) {
 
     const Material& with_null =
         m.make("blendbsdf", {{"weight", 1.0}}, {{"", white}, {"", m.bsdf("null")}});
-    EXPECT_EQ(with_null.opacity({}), 0);
+    EXPECT_EQ(with_null.opacity(Vec2()), 0);
     EXPECT_FALSE(MaterialLobe{&with_null}.sample(wo, 0.5f, {0.5f, 0.5f}));
 }
 
@@ -404,7 +404,7 @@ TEST(MaterialRegistry, NamesAreUniqueAndEveryParameterIsDocumented) {
         for (const ParamInfo& p : entry.info.params)
             EXPECT_TRUE(std::string(p.doc).ends_with('.')) << entry.info.name << " " << p.name;
     }
-    EXPECT_EQ(names.size(), 20u);
+    EXPECT_EQ(names.size(), 21u);
 }
 
 }  // namespace

@@ -407,14 +407,14 @@ TEST(MitsubaXml, TextInMemoryOpensNoFiles) {
 TEST(MitsubaXml, LenientDropsUnknownElements) {
     ReadOptions options;
     options.lenient = true;
-    const auto scene = parse3(
-        "<shape type=\"cube\" colour=\"red\">\n<subsurface type=\"dipole\"><x/></subsurface>\n"
-        "<transform name=\"to_world\"><shear x=\"1\"/></transform></shape>",
-        options);
+    const auto scene =
+        parse3("<shape type=\"cube\" colour=\"red\">\n<animation type=\"dipole\"><x/></animation>\n"
+               "<transform name=\"to_world\"><shear x=\"1\"/></transform></shape>",
+               options);
     EXPECT_EQ(dump(scene), "shape cube\n  to_world: transform 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
     ASSERT_EQ(scene.warnings.size(), 3u);
     EXPECT_EQ(scene.warnings[0], "s.xml:2: <shape> has no attribute \"colour\"; dropped");
-    EXPECT_EQ(scene.warnings[1], "s.xml:3: unknown element <subsurface>; dropped");
+    EXPECT_EQ(scene.warnings[1], "s.xml:3: unknown element <animation>; dropped");
     EXPECT_EQ(scene.warnings[2], "s.xml:4: a <transform> cannot contain a <shear>; dropped");
     // Malformed input remains an error.
     EXPECT_NE(error3(R"(<shape type="cube"><float name="x" value="1a"/></shape>)", options),

@@ -210,7 +210,9 @@ TEST(TextureRef, ScalarOfAConstantIsItsLuminance) {
 
 TEST(TextureDefaults, GradientIsByCentralDifferences) {
     struct Quadratic final : Texture {
-        Rgb eval(Vec2 uv) const override { return Rgb(uv.x * uv.x + 3 * uv.y); }
+        Rgb eval(const TexturePoint& at) const override {
+            return Rgb(at.uv.x * at.uv.x + 3 * at.uv.y);
+        }
         Rgb mean() const override { return Rgb(11.0f / 6); }
     };
     const Vec2 g = Quadratic().gradient({0.5f, 0.25f});

@@ -1,0 +1,49 @@
+#pragma once
+// The binary data of a glTF file: buffers, views of them, and accessors.
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "readers/gltf_json.h"
+
+namespace etendue {
+
+class GltfBuffers {
+public:
+    /// Returns the contents of a file that the scene names; fails at `where` if there are none.
+    using LoadFile = std::function<std::string(const std::string& name, const JsonValue& where)>;
+
+    /// `chunk` is the binary chunk of a .glb file. `root` must outlive the object.
+    GltfBuffers(const JsonValue& root, std::string_view chunk, LoadFile load);
+
+    /// The bytes of a bufferView.
+    std::string_view view(size_t index);
+    /// The bytes that a URI stands for: data in base64, or a file.
+    std::string uri(const JsonValue& where);
+
+    /// The values of an accessor.
+    struct Values {
+        size_t count = 0, components = 0;
+        std::vector<float> numbers;  ///< count × components; normalised integers are fractions.
+    };
+    /// `types`: those allowed, e.g. "VEC3 VEC4".
+    Values floats(const JsonValue& accessor_index, std::string_view types);
+    /// Values of unsigned integers.
+    std::vector<uint32_t> indices(const JsonValue& accessor_index);
+
+private:
+    struct Layout;
+    Layout read_layout(const JsonValue& accessor) const;
+    template <class Store>
+    void read(const JsonValue& accessor, const Layout& layout, const Store& store);
+    const std::string& buffer(size_t index);
+
+    std::vector<JsonValue> buffers_, views_, accessors_;
+    std::string_view chunk_;
+    LoadFile load_;
+    std::vector<std::optional<std::string>> loaded_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,334 @@
+// Materials of glTF. Metallic-roughness is `principled`, whose roughness is defined in the same way; extensions that
+// glTF layers on it set the parameters of `principled` that come nearest.
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "readers/gltf_reader.h"
+
+namespace etendue {
+namespace {
+
+JsonValue extension(const JsonValue& m, const char* name) {
+    return m["extensions"][name];
+}
+
+Rgb colour(const JsonValue& value, Rgb fallback) {
+    const std::vector<double> c = value.numbers(3, {fallback.r, fallback.g, fallback.b});
+    for (const double x : c)
+        if (!(x >= 0)) value.fail("components must not be negative");
+    return {float(c[0]), float(c[1]), float(c[2])};
+}
+
+Rgb clamped(Rgb c) {
+    return {clamp(c.r, 0, 1), clamp(c.g, 0, 1), clamp(c.b, 0, 1)};
+}
+
+double transmission(const JsonValue& m) {
+    return extension(m, "KHR_materials_transmission")["transmissionFactor"].number(0, 0, 1);
+}
+
+bool has_volume(const JsonValue& m) {
+    return extension(m, "KHR_materials_volume")["thicknessFactor"].number(0, 0) > 0;
+}
+
+/// From "ior" and "specularFactor" to the index of refraction with the same reflectance at normal incidence.
+double relative_ior(const JsonValue& m) {
+    double eta = extension(m, "KHR_materials_ior")["ior"].number(1.5, 0);
+    if (eta == 0) eta = 1e3;  // by its specification: total reflection
+    eta = std::max(eta, 1.0);
+    const double factor = extension(m, "KHR_materials_specular")["specularFactor"].number(1, 0, 1);
+    if (factor == 1) return std::max(eta, 1.0001);
+    const double r = (eta - 1) / (eta + 1) * std::sqrt(factor);
+    return std::max((1 + r) / (1 - r), 1.0001);
+}
+
+}  // namespace
+
+const GltfReader::Material& GltfReader::material(size_t index, bool has_colors) {
+    const auto key = std::pair(index, has_colors);
+    if (const auto it = made_materials_.find(key); it != made_materials_.end()) return it->second;
+    const bool is_default = index >= materials_.size();
+    const Material made = read_material(
+        is_default ? JsonValue(nullptr, &file_, "/materials") : materials_[index], has_colors);
+    return made_materials_.emplace(key, made).first->second;
+}
+
+GltfReader::Material GltfReader::read_material(const JsonValue& m, bool has_colors) {
+    uv_set_.reset();
+    Material made;
+    if (extension(m, "KHR_materials_unlit")) {
+        warn(fmt::format("{}: an unlit material is rendered as a diffuse one", m.path()));
+        made.bsdf = add("bsdf", "diffuse", m);
+        Rgb factor;
+        const int texture = base_color(m, has_colors, factor);
+        if (texture >= 0)
+            add_child(made.bsdf, "reflectance", texture);
+        else
+            set(made.bsdf, "reflectance", clamped(factor));
+    } else {
+        made.bsdf = add("bsdf", "principled", m);
+        read_principled(m, made.bsdf, has_colors);
+    }
+    const bool transmits = transmission(m) > 0;
+    if (transmits && !has_volume(m)) made.bsdf = thin_glass(m, made.bsdf, has_colors);
+    if (const JsonValue normals = m["normalTexture"]) {
+        if (const int image = bitmap(normals, true); image >= 0) {
+            const int map = add("bsdf", "normalmap", normals);
+            add_child(map, "normalmap", image);
+            if (const double scale = normals["scale"].number(1); scale != 1)
+                set(map, "scale", scale);
+            add_child(map, "", made.bsdf);
+            made.bsdf = map;
+        }
+    }
+    if (!transmits) {
+        const int both_sides = add("bsdf", "twosided", m);
+        add_child(both_sides, "", made.bsdf);
+        made.bsdf = both_sides;
+    } else if (has_volume(m)) {
+        read_volume(m, made);
+    }
+    read_emission(m, made);
+    if (made.emitter < 0)
+        made.bsdf = with_opacity(m, made.bsdf);
+    else if (m["alphaMode"].text("OPAQUE") != "OPAQUE")
+        warn(fmt::format("{}: alpha has no effect, since the material emits light", m.path()));
+    made.uv_set = uv_set_.value_or(0);
+    return made;
+}
+
+void GltfReader::read_principled(const JsonValue& m, int principled, bool has_colors) {
+    const JsonValue pbr = m["pbrMetallicRoughness"];
+    Rgb factor;
+    const int texture = base_color(m, has_colors, factor);
+    if (texture >= 0)
+        add_child(principled, "base_color", texture);
+    else
+        set(principled, "base_color", clamped(factor));
+    const JsonValue metal_and_rough = pbr["metallicRoughnessTexture"];
+    set_scalar(principled, "metallic", pbr["metallicFactor"].number(1, 0, 1), metal_and_rough, "b");
+    set_scalar(principled, "roughness", pbr["roughnessFactor"].number(1, 0, 1), metal_and_rough,
+               "g");
+    set(principled, "eta", relative_ior(m));
+    if (const double t = transmission(m); t > 0 && has_volume(m))
+        set_scalar(principled, "spec_trans", t,
+                   extension(m, "KHR_materials_transmission")["transmissionTexture"], "r");
+    if (const JsonValue coat = extension(m, "KHR_materials_clearcoat")) {
+        set_scalar(principled, "clearcoat", coat["clearcoatFactor"].number(0, 0, 1),
+                   coat["clearcoatTexture"], "r");
+        // The gloss from 0 to 1 is an α from 0.1 to 0.001.
+        const double alpha = std::pow(coat["clearcoatRoughnessFactor"].number(0, 0, 1), 2);
+        set(principled, "clearcoat_gloss", std::clamp((0.1 - alpha) / 0.099, 0.0, 1.0));
+        for (const char* name : {"clearcoatRoughnessTexture", "clearcoatNormalTexture"})
+            if (coat[name]) warn(fmt::format("{}: has no effect", coat[name].path()));
+    }
+    if (const JsonValue cloth = extension(m, "KHR_materials_sheen")) {
+        const Rgb c = colour(cloth["sheenColorFactor"], Rgb(0));
+        set_scalar(principled, "sheen", std::min(c.max(), 1.0f), cloth["sheenColorTexture"], "all");
+        if (c.max() > 0 && !(c.r == c.g && c.g == c.b)) set(principled, "sheen_tint", Rgb(1));
+    }
+    if (const JsonValue brushed = extension(m, "KHR_materials_anisotropy")) {
+        set_scalar(principled, "anisotropic", brushed["anisotropyStrength"].number(0, 0, 1),
+                   brushed["anisotropyTexture"], "b");
+        if (brushed["anisotropyRotation"].number(0) != 0 || brushed["anisotropyTexture"])
+            warn(fmt::format("{}: the direction has no effect", brushed.path()));
+    }
+    const JsonValue specular = extension(m, "KHR_materials_specular");
+    for (const char* name : {"specularTexture", "specularColorTexture", "specularColorFactor"})
+        if (specular[name]) warn(fmt::format("{}: has no effect", specular[name].path()));
+}
+
+/// The texture of the base colour, with vertex colours and factor; -1 where it is constant, namely `factor`.
+int GltfReader::base_color(const JsonValue& m, bool has_colors, Rgb& factor) {
+    const JsonValue pbr = m["pbrMetallicRoughness"];
+    const std::vector<double> f = pbr["baseColorFactor"].numbers(4, {1, 1, 1, 1});
+    factor = clamped({float(f[0]), float(f[1]), float(f[2])});
+    int texture = bitmap(pbr["baseColorTexture"], false);
+    if (has_colors) {
+        const int colors = add("texture", "mesh_attribute", m);
+        set(colors, "name", std::string("vertex_color"));
+        if (texture >= 0) {
+            const int product = add("texture", "scale", m);
+            add_child(product, "value", texture);
+            add_child(product, "scale", colors);
+            texture = product;
+        } else {
+            texture = colors;
+        }
+    }
+    return texture >= 0 && !(factor == Rgb(1)) ? scaled(texture, factor) : texture;
+}
+
+/// A surface without volume does not refract: it is a pane of glass, coloured by the base colour.
+int GltfReader::thin_glass(const JsonValue& m, int principled, bool has_colors) {
+    const JsonValue pbr = m["pbrMetallicRoughness"];
+    if (pbr["roughnessFactor"].number(1, 0, 1) > 0.1)
+        warn(fmt::format("{}: transmission without volume is clear, whatever the roughness",
+                         m.path()));
+    const int pane = add("bsdf", "thindielectric", m);
+    set(pane, "int_ior", relative_ior(m));
+    set(pane, "ext_ior", 1.0);
+    Rgb factor;
+    const int tint = base_color(m, has_colors, factor);
+    if (tint >= 0)
+        add_child(pane, "specular_transmittance", tint);
+    else
+        set(pane, "specular_transmittance", factor);
+    const int opaque = add("bsdf", "twosided", m);
+    add_child(opaque, "", principled);
+    const int blend = add("bsdf", "blendbsdf", m);
+    set_scalar(blend, "weight", transmission(m),
+               extension(m, "KHR_materials_transmission")["transmissionTexture"], "r");
+    add_child(blend, "", opaque);
+    add_child(blend, "", pane);
+    return blend;
+}
+
+void GltfReader::read_volume(const JsonValue& m, Material& made) {
+    const JsonValue volume = extension(m, "KHR_materials_volume");
+    const double distance = volume["attenuationDistance"].number(0, 0);
+    const Rgb c = clamped(colour(volume["attenuationColor"], Rgb(1)));
+    if (!(distance > 0) || c == Rgb(1)) return;
+    const auto sigma = [&](float x) {
+        constexpr double kDarkest = 1e-6;
+        return float(-std::log(std::max(double(x), kDarkest)) / distance);
+    };
+    made.interior = add("medium", "homogeneous", volume);
+    set(made.interior, "sigma_t", Rgb(sigma(c.r), sigma(c.g), sigma(c.b)));
+    set(made.interior, "albedo", 0.0);
+}
+
+void GltfReader::read_emission(const JsonValue& m, Material& made) {
+    const double strength =
+        extension(m, "KHR_materials_emissive_strength")["emissiveStrength"].number(1, 0);
+    const Rgb factor = colour(m["emissiveFactor"], Rgb(0)) * float(strength);
+    if (factor.max() == 0) return;
+    made.emitter = add("emitter", "area", m);
+    const int texture = bitmap(m["emissiveTexture"], false);
+    if (texture < 0)
+        set(made.emitter, "radiance", factor);
+    else
+        add_child(made.emitter, "radiance", factor == Rgb(1) ? texture : scaled(texture, factor));
+    if (m["doubleSided"].flag(false)) set(made.emitter, "two_sided", true);
+}
+
+int GltfReader::with_opacity(const JsonValue& m, int bsdf) {
+    const std::string mode = m["alphaMode"].text("OPAQUE");
+    if (mode == "OPAQUE") return bsdf;
+    if (mode != "MASK" && mode != "BLEND")
+        m["alphaMode"].fail(fmt::format("is \"{}\", but must be OPAQUE, MASK or BLEND", mode));
+    const JsonValue pbr = m["pbrMetallicRoughness"];
+    const double factor = pbr["baseColorFactor"].numbers(4, {1, 1, 1, 1})[3];
+    const double cutoff = m["alphaCutoff"].number(0.5, 0);
+    const int texture = bitmap(pbr["baseColorTexture"], false, "opacity");
+    const int mask = add("bsdf", "mask", m);
+    if (texture < 0) {
+        set(mask, "opacity",
+            std::clamp(mode == "BLEND"    ? factor
+                       : factor >= cutoff ? 1.0
+                                          : 0.0,
+                       0.0, 1.0));
+    } else {
+        const int product = factor == 1 ? texture : scaled(texture, factor);
+        int opacity = product;
+        if (mode == "MASK") {
+            opacity = add("texture", "threshold", m);
+            set(opacity, "cutoff", cutoff);
+            add_child(opacity, "value", product);
+        }
+        add_child(mask, "opacity", opacity);
+    }
+    add_child(mask, "", bsdf);
+    return mask;
+}
+
+// ---- Textures
+
+/// A mesh has one set of texture coordinates in the description.
+void GltfReader::check_uv_set(const JsonValue& info) {
+    const JsonValue transform = info["extensions"]["KHR_texture_transform"];
+    const auto own = info["texCoord"].integer(0, 0, 1000);
+    const auto set = size_t(transform["texCoord"].integer(own, 0, 1000));
+    if (!uv_set_) uv_set_ = set;
+    if (*uv_set_ != set)
+        reject(info,
+               fmt::format("a material whose textures use different texture coordinates ({} and "
+                           "{}) is not supported",
+                           *uv_set_, set));
+}
+
+int GltfReader::bitmap(const JsonValue& info, bool raw, const char* channel) {
+    if (!info) return -1;
+    const auto index = info["index"].index(textures_.size());
+    if (!index) info["index"].fail("is missing");
+    check_uv_set(info);
+    const JsonValue& t = textures_[*index];
+    const auto source = t["source"].index(images_.size());
+    if (!source) {
+        reject(t, "a texture without an image of PNG or JPEG");
+        return -1;
+    }
+    const JsonValue& image = images_[*source];
+    const int made = add("texture", "bitmap", info);
+    const std::string uri = image["uri"].text("");
+    if (!uri.empty() && uri.rfind("data:", 0) != 0) {
+        set(made, "filename", uri);
+    } else {
+        const auto [at, is_new] =
+            loaded_images_.try_emplace(*source, int64_t(scene_.images.size()));
+        if (is_new) {
+            const auto view = image["bufferView"].index(root_["bufferViews"].elements().size());
+            if (!view && uri.empty()) image.fail("has neither a uri nor a bufferView");
+            scene_.images.push_back(
+                {fmt::format("{}{}", file_, image.path()),
+                 view ? std::string(buffers_.view(*view)) : buffers_.uri(image["uri"])});
+        }
+        set(made, "image", at->second);
+    }
+    if (raw) set(made, "raw", true);
+    if (channel && std::string_view(channel) != "all") set(made, "channel", std::string(channel));
+    if (const auto sampler = t["sampler"].index(samplers_.size())) {
+        const JsonValue& s = samplers_[*sampler];
+        constexpr int64_t kNearest = 9728, kClamp = 33071, kMirror = 33648, kRepeat = 10497;
+        if (s["magFilter"].integer(0, 0, 1 << 20) == kNearest)
+            set(made, "filter_type", std::string("nearest"));
+        const int64_t u = s["wrapS"].integer(kRepeat, 0, 1 << 20),
+                      v = s["wrapT"].integer(kRepeat, 0, 1 << 20);
+        if (u != v) warn(fmt::format("{}: both directions wrap as wrapS says", s.path()));
+        if (u == kClamp) set(made, "wrap_mode", std::string("clamp"));
+        if (u == kMirror) set(made, "wrap_mode", std::string("mirror"));
+    }
+    if (const JsonValue transform = info["extensions"]["KHR_texture_transform"]) {
+        const std::vector<double> offset = transform["offset"].numbers(2, {0, 0}),
+                                  scale = transform["scale"].numbers(2, {1, 1});
+        const double angle = transform["rotation"].number(0), c = std::cos(angle),
+                     s = std::sin(angle);
+        set(made, "to_uv",
+            Transform(Transform::Matrix{{{c * scale[0], s * scale[1], 0, offset[0]},
+                                         {-s * scale[0], c * scale[1], 0, offset[1]},
+                                         {0, 0, 1, 0},
+                                         {0, 0, 0, 1}}}));
+    }
+    return made;
+}
+
+int GltfReader::scaled(int texture, ParamValue factor) {
+    const int product = add("texture", "scale", root_);
+    add_child(product, "value", texture);
+    set(product, "scale", std::move(factor));
+    return product;
+}
+
+void GltfReader::set_scalar(int object, const char* name, double factor, const JsonValue& texture,
+                            const char* channel) {
+    const int image = factor > 0 ? bitmap(texture, true, channel) : -1;
+    if (image < 0)
+        set(object, name, factor);
+    else
+        add_child(object, name, factor == 1 ? image : scaled(image, factor));
+}
+
+}  // namespace etendue

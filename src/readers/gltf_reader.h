@@ -1,0 +1,102 @@
+#pragma once
+// Implementation of gltf.h: one object reads one scene.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "description/scene_description.h"
+#include "math/bounds.h"
+#include "readers/gltf_buffers.h"
+#include "readers/gltf_json.h"
+#include "readers/read_options.h"
+
+namespace etendue {
+
+class GltfReader {
+public:
+    /// The arguments must outlive the reader. `chunk`: the binary chunk of a .glb file.
+    GltfReader(const std::string& file, const ReadOptions& options, const nlohmann::json& document,
+               std::string_view chunk);
+    /// Reads the scene; to be called once.
+    SceneDescription read();
+
+private:
+    /// What a material becomes.
+    struct Material {
+        int bsdf = -1;
+        int emitter = -1;  ///< Emitter, of which each shape has its own copy; -1: none.
+        int interior = -1;
+        size_t uv_set = 0;
+    };
+    /// A mesh primitive in the description.
+    struct Primitive {
+        int64_t mesh;  ///< Index into SceneDescription::meshes.
+        size_t material;
+        bool has_colors;
+        Bounds3 bounds;
+    };
+    /// A mesh to be placed.
+    struct Placement {
+        size_t mesh;
+        Transform to_world;
+    };
+
+    // Nodes, cameras and lights: gltf_reader.cpp.
+    void check_extensions();
+    void read_scene();
+    void read_node(const JsonValue& node, const Transform& to_world);
+    std::vector<Transform> gpu_instances(const JsonValue& node);
+    void add_camera(const JsonValue& camera, const Transform& to_world);
+    void add_default_camera();
+    void add_light(const JsonValue& light, const Transform& to_world);
+    int add_film(double aspect);
+
+    // Meshes: gltf_meshes.cpp.
+    void place_meshes();
+    const std::vector<Primitive>& primitives(size_t mesh);
+    std::optional<Primitive> read_primitive(const JsonValue& primitive, const std::string& name);
+    int add_shape(const Primitive& primitive, const Transform& to_world, bool in_group);
+
+    // Materials and textures: gltf_materials.cpp.
+    const Material& material(size_t index, bool has_colors);
+    Material read_material(const JsonValue& m, bool has_colors);
+    void read_principled(const JsonValue& m, int principled, bool has_colors);
+    int base_color(const JsonValue& m, bool has_colors, Rgb& factor);
+    int with_opacity(const JsonValue& m, int bsdf);
+    void read_emission(const JsonValue& m, Material& made);
+    void read_volume(const JsonValue& m, Material& made);
+    int thin_glass(const JsonValue& m, int principled, bool has_colors);
+    /// The bitmap that a textureInfo names; -1 where it is absent.
+    int bitmap(const JsonValue& info, bool raw, const char* channel = nullptr);
+    /// Sets `name` of `object` to a factor, times the channel of a texture where there is one.
+    void set_scalar(int object, const char* name, double factor, const JsonValue& texture,
+                    const char* channel);
+    int scaled(int texture, ParamValue factor);
+    void check_uv_set(const JsonValue& info);
+
+    int add(const char* category, const char* type, const JsonValue& where);
+    void set(int object, const char* name, ParamValue value);
+    void add_child(int parent, const char* name, int object);
+    void warn(const std::string& message);
+    /// An error, or a warning under `lenient`.
+    void reject(const JsonValue& where, const std::string& message);
+
+    const ReadOptions& options_;
+    std::string file_;
+    JsonValue root_;
+    std::vector<JsonValue> nodes_, meshes_, materials_, textures_, images_, samplers_, cameras_,
+        lights_;
+    GltfBuffers buffers_;
+    SceneDescription scene_;
+    std::vector<bool> visited_;  ///< Nodes.
+    std::vector<Placement> placements_;
+    std::map<size_t, std::vector<Primitive>> primitives_;
+    std::map<std::pair<size_t, bool>, Material> made_materials_;
+    std::map<size_t, int64_t> loaded_images_;  ///< Index into SceneDescription::images.
+    std::optional<size_t> uv_set_;             ///< Of the material that is being read.
+    Bounds3 bounds_;
+    bool has_light_ = false, has_camera_ = false;
+};
+
+}  // namespace etendue

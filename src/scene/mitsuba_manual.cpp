@@ -1,0 +1,696 @@
+#include "scene/mitsuba_manual.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include <fmt/format.h>
+
+namespace etendue {
+namespace {
+
+constexpr bool kAccepted = true, kRefused = false;
+
+constexpr const char* kSpectral = "polarised or spectral light is not simulated";
+constexpr const char* kInside = "scattering below the surface is not supported";
+constexpr const char* kClip = "all distances are rendered";
+
+const ManualNote kSamplingWeight = {"sampling_weight", kAccepted,
+                                    "emitters are chosen by their power"};
+const ManualNote kSmoothAngle = {"max_smooth_angle", kAccepted,
+                                 "normals are those of the file, or smooth everywhere"};
+const ManualNote kSpectralResponse = {"srf", kRefused, kSpectral};
+
+constexpr const char* kPlacement = "to_world flip_normals";
+constexpr const char* kMeshFile = "filename face_normals flip_normals to_world";
+constexpr const char* kDaylight = "turbidity albedo year month day hour minute second latitude "
+                                  "longitude timezone sun_direction";
+constexpr const char* kCrop = "width height crop_offset_x crop_offset_y crop_width crop_height "
+                              "file_format pixel_format rfilter";
+constexpr const char* kPathDepths = "max_depth rr_depth";
+
+std::vector<std::string> words(std::string_view list) {
+    std::vector<std::string> found;
+    for (size_t begin = 0; begin < list.size();) {
+        const size_t end = std::min(list.find(' ', begin), list.size());
+        if (end > begin) found.emplace_back(list.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    return found;
+}
+
+std::vector<ManualEntry> shapes() {
+    constexpr const char* kCurve = "curves are not supported";
+    return {
+        {"shape", "cube", kBothManuals, kPlacement},
+        {"shape", "sphere", kBothManuals, "center radius to_world flip_normals"},
+        {"shape", "cylinder", kBothManuals, "p0 p1 radius to_world flip_normals"},
+        {"shape", "rectangle", kBothManuals, kPlacement},
+        {"shape", "disk", kBothManuals, kPlacement},
+        {"shape",
+         "obj",
+         kBothManuals,
+         kMeshFile,
+         "max_smooth_angle flip_tex_coords collapse",
+         "flip_tex_coords",
+         {kSmoothAngle}},
+        {"shape",
+         "ply",
+         kBothManuals,
+         kMeshFile,
+         "max_smooth_angle srgb",
+         "flip_tex_coords",
+         {kSmoothAngle}},
+        {"shape",
+         "serialized",
+         kBothManuals,
+         "filename face_normals flip_normals to_world shape_index",
+         "max_smooth_angle",
+         "",
+         {kSmoothAngle}},
+        {"shape", "shapegroup", kBothManuals, ""},
+        {"shape", "instance", kBothManuals, "to_world"},
+        {"shape", "merge", kMitsuba3, ""},
+        {"shape", "hair", kMitsuba06, "", "", "", {}, kCurve},
+        {"shape",
+         "heightfield",
+         kMitsuba06,
+         "",
+         "",
+         "",
+         {},
+         "height fields are not supported: use a mesh"},
+        {"shape", "bsplinecurve", kMitsuba3, "", "", "", {}, kCurve},
+        {"shape", "linearcurve", kMitsuba3, "", "", "", {}, kCurve},
+        {"shape", "sdfgrid", kMitsuba3, "", "", "", {}, "signed distance fields are not supported"},
+        {"shape",
+         "ellipsoids",
+         kMitsuba3,
+         "",
+         "",
+         "",
+         {},
+         "primitives of radiance fields are not supported"},
+        {"shape",
+         "ellipsoidsmesh",
+         kMitsuba3,
+         "",
+         "",
+         "",
+         {},
+         "primitives of radiance fields are not supported"},
+    };
+}
+
+std::vector<ManualEntry> bsdfs() {
+    constexpr const char* kIors = "int_ior ext_ior specular_reflectance specular_transmittance";
+    constexpr const char* kMetal = "material eta k specular_reflectance";
+    constexpr const char* kCoat =
+        "int_ior ext_ior specular_reflectance diffuse_reflectance nonlinear";
+    const ManualNote kViewDependent = {
+        "flip_invalid_normals use_shadowing_function", kAccepted,
+        "must be false where given: they depend on which direction is that of the view"};
+    constexpr const char* kLayer =
+        "a layer over another material has no closed form; with --lenient the nested material";
+    return {
+        {"bsdf", "diffuse", kBothManuals, "reflectance", "diffuse_reflectance"},
+        {"bsdf",
+         "roughdiffuse",
+         kMitsuba06,
+         "reflectance alpha use_fast_approx",
+         "diffuse_reflectance",
+         "",
+         {{"use_fast_approx", kAccepted, "the approximation is always used"}},
+         nullptr,
+         "orennayar"},
+        {"bsdf", "dielectric", kBothManuals, kIors},
+        {"bsdf", "thindielectric", kBothManuals, kIors},
+        {"bsdf", "roughdielectric", kBothManuals,
+         "int_ior ext_ior specular_reflectance specular_transmittance distribution alpha alpha_u "
+         "alpha_v sample_visible"},
+        {"bsdf", "conductor", kBothManuals, kMetal, "ext_eta"},
+        {"bsdf", "roughconductor", kBothManuals,
+         "material eta k specular_reflectance distribution alpha alpha_u alpha_v sample_visible",
+         "ext_eta"},
+        {"bsdf", "plastic", kBothManuals, kCoat},
+        {"bsdf", "roughplastic", kBothManuals,
+         "int_ior ext_ior specular_reflectance diffuse_reflectance nonlinear distribution alpha "
+         "sample_visible"},
+        {"bsdf", "phong", kMitsuba06, "exponent specular_reflectance diffuse_reflectance"},
+        {"bsdf",
+         "principled",
+         kMitsuba3,
+         "base_color roughness anisotropic metallic spec_trans eta specular spec_tint sheen "
+         "sheen_tint flatness clearcoat clearcoat_gloss diffuse_reflectance_sampling_rate "
+         "main_specular_sampling_rate clearcoat_sampling_rate",
+         "",
+         "",
+         {{"diffuse_reflectance_sampling_rate main_specular_sampling_rate clearcoat_sampling_rate "
+           "diffuse_sampling main_specular_sampling clearcoat_sampling",
+           kAccepted, "the lobes are sampled by their strengths"}}},
+        {"bsdf", "twosided", kBothManuals, ""},
+        {"bsdf", "mask", kBothManuals, "opacity"},
+        {"bsdf", "blendbsdf", kBothManuals, "weight"},
+        {"bsdf", "mixturebsdf", kMitsuba06, "weights"},
+        {"bsdf", "bump", kMitsuba06, "", "", "", {}, nullptr, "bumpmap"},
+        {"bsdf",
+         "bumpmap",
+         kMitsuba3,
+         "scale flip_invalid_normals use_shadowing_function",
+         "",
+         "",
+         {kViewDependent}},
+        {"bsdf",
+         "normalmap",
+         kMitsuba3,
+         "normalmap flip_invalid_normals use_shadowing_function",
+         "",
+         "",
+         {kViewDependent}},
+        {"bsdf",
+         "difftrans",
+         kMitsuba06,
+         "transmittance",
+         "",
+         "",
+         {},
+         nullptr,
+         "diffusetransmission"},
+        {"bsdf", "null", kBothManuals, ""},
+        {"bsdf", "coating", kMitsuba06, "", "", "", {}, kLayer},
+        {"bsdf", "roughcoating", kMitsuba06, "", "", "", {}, kLayer},
+        {"bsdf", "ward", kMitsuba06, "", "", "", {}, "use roughconductor or roughplastic"},
+        {"bsdf", "hk", kMitsuba06, "", "", "", {}, kInside},
+        {"bsdf", "irawan", kMitsuba06, "", "", "", {}, "woven cloth is not supported"},
+        {"bsdf",
+         "principledthin",
+         kMitsuba3,
+         "",
+         "",
+         "",
+         {},
+         "thin principled surfaces are not supported"},
+        {"bsdf", "hair", kMitsuba3, "", "", "", {}, "hair is not supported"},
+        {"bsdf", "measured", kMitsuba3, "", "", "", {}, "measured materials are not supported"},
+        {"bsdf", "measured_polarized", kMitsuba3, "", "", "", {}, kSpectral},
+        {"bsdf", "pplastic", kMitsuba3, "", "", "", {}, kSpectral},
+        {"bsdf", "polarizer", kMitsuba3, "", "", "", {}, kSpectral},
+        {"bsdf", "retarder", kMitsuba3, "", "", "", {}, kSpectral},
+        {"bsdf", "circular", kMitsuba3, "", "", "", {}, kSpectral},
+        {"subsurface", "dipole", kMitsuba06, "", "", "", {}, kInside},
+    };
+}
+
+std::vector<ManualEntry> textures() {
+    return {
+        {"texture",
+         "bitmap",
+         kBothManuals,
+         "filename filter_type wrap_mode to_uv",
+         "wrap_mode_u wrap_mode_v gamma channel cache max_anisotropy",
+         "raw bitmap data format",
+         {{"wrap_mode_u wrap_mode_v", kRefused, "u and v must have the same mode"},
+          {"gamma", kRefused, "must be 1 (linear) or -1 (sRGB)"},
+          {"cache max_anisotropy", kAccepted, "images are kept in memory and not filtered"},
+          {"format", kAccepted, "8-bit and 16-bit images stay as they are"},
+          {"bitmap data", kRefused, "images come from files"}}},
+        {"texture", "checkerboard", kBothManuals, "color0 color1 to_uv"},
+        {"texture", "gridtexture", kMitsuba06, "color0 color1 line_width to_uv"},
+        {"texture", "scale", kMitsuba06, "scale"},
+        {"texture", "vertexcolors", kMitsuba06, "", "", "", {}, nullptr, "mesh_attribute"},
+        {"texture", "mesh_attribute", kMitsuba3, "name scale"},
+        {"texture", "wireframe", kMitsuba06, "", "", "", {}, "wire frames are not supported"},
+        {"texture", "curvature", kMitsuba06, "", "", "", {}, "curvature is not computed"},
+        {"texture", "volume", kMitsuba3, "", "", "", {}, "volume data are not supported"},
+    };
+}
+
+std::vector<ManualEntry> emitters() {
+    constexpr const char* kWeight = "sampling_weight";
+    return {
+        {"emitter", "area", kBothManuals, "radiance", kWeight, "", {kSamplingWeight}},
+        {"emitter",
+         "point",
+         kBothManuals,
+         "intensity position to_world",
+         kWeight,
+         "",
+         {kSamplingWeight}},
+        {"emitter",
+         "spot",
+         kBothManuals,
+         "intensity cutoff_angle beam_width to_world texture",
+         kWeight,
+         "",
+         {kSamplingWeight, {"texture", kRefused, "a texture of the beam is not supported"}}},
+        {"emitter",
+         "directional",
+         kBothManuals,
+         "irradiance direction to_world",
+         kWeight,
+         "",
+         {kSamplingWeight}},
+        {"emitter", "constant", kBothManuals, "radiance", kWeight, "", {kSamplingWeight}},
+        {"emitter",
+         "envmap",
+         kBothManuals,
+         "filename scale to_world",
+         "gamma cache sampling_weight",
+         "bitmap mis_compensation",
+         {kSamplingWeight,
+          {"gamma", kRefused, "give the image in linear colours"},
+          {"cache", kAccepted, "the image is kept in memory"},
+          {"bitmap", kRefused, "images come from files"}}},
+        {"emitter",
+         "sky",
+         kMitsuba06,
+         kDaylight,
+         "stretch resolution scale sampling_weight to_world",
+         "",
+         {kSamplingWeight, {"stretch", kRefused, "the sky is a half sphere"}}},
+        {"emitter",
+         "sun",
+         kMitsuba06,
+         "turbidity year month day hour minute second latitude longitude timezone sun_direction "
+         "resolution scale sun_radius_scale",
+         kWeight,
+         "",
+         {kSamplingWeight}},
+        {"emitter",
+         "sunsky",
+         kBothManuals,
+         kDaylight,
+         "stretch resolution sky_scale sun_scale sun_radius_scale sampling_weight",
+         "sky_scale sun_scale sun_aperture complex_sun to_world",
+         {kSamplingWeight, {"stretch", kRefused, "the sky is a half sphere"}}},
+        {"emitter",
+         "collimated",
+         kMitsuba06,
+         "",
+         "",
+         "",
+         {},
+         "a beam without width is seen by no path"},
+        {"emitter", "projector", kMitsuba3, "", "", "", {}, "projectors are not supported"},
+        {"emitter",
+         "directionalarea",
+         kMitsuba3,
+         "",
+         "",
+         "",
+         {},
+         "emission in one direction from a surface is not supported"},
+        {"emitter",
+         "timed_sunsky",
+         kMitsuba3,
+         "",
+         "",
+         "",
+         {},
+         "the mean of the daylight over time is not supported"},
+    };
+}
+
+std::vector<ManualEntry> sensors() {
+    constexpr const char* kMeter = "only cameras are supported";
+    constexpr const char* kShutter = "shutter_open shutter_close";
+    const ManualNote kNoClip = {"near_clip far_clip", kAccepted, kClip};
+    const ManualNote kNoShutter = {kShutter, kAccepted, "nothing moves"};
+    return {
+        {"sensor",
+         "perspective",
+         kBothManuals,
+         "to_world fov fov_axis focal_length near_clip far_clip",
+         kShutter,
+         "principal_point_offset_x principal_point_offset_y srf",
+         {kSpectralResponse}},
+        {"sensor",
+         "thinlens",
+         kBothManuals,
+         "to_world fov fov_axis focal_length near_clip far_clip aperture_radius focus_distance",
+         kShutter,
+         "srf",
+         {kSpectralResponse}},
+        {"sensor",
+         "orthographic",
+         kBothManuals,
+         "to_world near_clip far_clip",
+         kShutter,
+         "srf",
+         {kSpectralResponse, kNoShutter, kNoClip}},
+        {"sensor", "batch", kMitsuba3, "srf", "", "", {kSpectralResponse}},
+        {"sensor",
+         "telecentric",
+         kMitsuba06,
+         "",
+         "",
+         "",
+         {},
+         "lenses of parallel views are not supported"},
+        {"sensor",
+         "spherical",
+         kMitsuba06,
+         "",
+         "",
+         "",
+         {},
+         "views in all directions are not supported"},
+        {"sensor",
+         "perspective_rdist",
+         kMitsuba06,
+         "",
+         "",
+         "",
+         {},
+         "distortion of lenses is not supported"},
+        {"sensor", "irradiancemeter", kBothManuals, "", "", "", {}, kMeter},
+        {"sensor", "radiancemeter", kBothManuals, "", "", "", {}, kMeter},
+        {"sensor", "fluencemeter", kMitsuba06, "", "", "", {}, kMeter},
+        {"sensor", "distant", kMitsuba3, "", "", "", {}, kMeter},
+    };
+}
+
+std::vector<ManualEntry> films_and_samplers() {
+    std::vector<ManualEntry> all = {
+        {"film", "hdrfilm", kBothManuals, kCrop,
+         "component_format attach_log banner high_quality_edges",
+         "component_format sample_border compensate"},
+        {"film", "tiledhdrfilm", kMitsuba06, kCrop, "component_format banner high_quality_edges"},
+        {"film",
+         "ldrfilm",
+         kMitsuba06,
+         kCrop,
+         "tonemap_method gamma exposure key burn banner high_quality_edges",
+         "",
+         {{"key burn", kAccepted, "the output is linear"}}},
+        {"film",
+         "mfilm",
+         kMitsuba06,
+         kCrop,
+         "digits variable high_quality_edges",
+         "",
+         {{"digits variable", kAccepted, "the name of the output selects the format"}}},
+        {"film", "specfilm", kMitsuba3, "", "", "", {}, kSpectral},
+        {"rfilter", "box", kBothManuals, ""},
+        {"rfilter", "tent", kBothManuals, "radius"},
+        {"rfilter", "gaussian", kBothManuals, "stddev"},
+        {"rfilter", "mitchell", kBothManuals, "B C"},
+        {"rfilter", "catmullrom", kBothManuals, ""},
+        {"rfilter", "lanczos", kBothManuals, "lobes"},
+        {"sampler", "independent", kBothManuals, "sample_count", "", "seed"},
+        {"sampler", "stratified", kBothManuals, "sample_count", "dimension", "seed jitter"},
+        {"sampler", "ldsampler", kBothManuals, "sample_count", "dimension", "seed"},
+        {"sampler", "multijitter", kMitsuba3, "sample_count seed jitter"},
+        {"sampler",
+         "orthogonal",
+         kMitsuba3,
+         "sample_count strength seed jitter",
+         "",
+         "",
+         {{"strength", kAccepted, "the points are those of --sampler"}}},
+        {"sampler", "halton", kMitsuba06, "sample_count scramble"},
+        {"sampler", "hammersley", kMitsuba06, "sample_count scramble"},
+        {"sampler", "sobol", kMitsuba06, "sample_count scramble"},
+    };
+    return all;
+}
+
+std::vector<ManualEntry> media() {
+    constexpr const char* kScatters = "scattering media are not supported; with --lenient vacuum";
+    return {
+        {"medium",
+         "homogeneous",
+         kBothManuals,
+         "sigma_t albedo scale",
+         "material sigma_a sigma_s phase",
+         "sample_emitters phase",
+         {{"material", kRefused, kScatters}, {"phase", kAccepted, "nothing is scattered"}}},
+        {"medium", "heterogeneous", kBothManuals, "", "", "", {}, kScatters},
+    };
+}
+
+std::vector<ManualEntry> integrators() {
+    const auto no_effect = [](const char* names) {
+        return ManualNote{names, kAccepted, "a parameter of Mitsuba's algorithm"};
+    };
+    constexpr const char* kShared = "max_depth rr_depth hide_emitters";
+    constexpr const char* kGradients = "reparam_max_depth sppc sppp sppi guiding guiding_proj "
+                                       "guiding_rounds antithetic_sampling emitter_samples";
+    const auto no_image = "does not compute radiance; path is rendered";
+    std::vector<ManualEntry> all = {
+        {"integrator", "path", kBothManuals, kShared, "strict_normals"},
+        {"integrator", "volpath", kBothManuals, kShared, "strict_normals"},
+        {"integrator",
+         "volpathmis",
+         kMitsuba3,
+         "max_depth rr_depth hide_emitters use_spectral_mis",
+         "",
+         "",
+         {no_effect("use_spectral_mis")}},
+        {"integrator", "volpath_simple", kMitsuba06,
+         "max_depth rr_depth hide_emitters strict_normals"},
+        {"integrator",
+         "direct",
+         kBothManuals,
+         "shading_samples emitter_samples bsdf_samples hide_emitters",
+         "strict_normals",
+         "",
+         {no_effect("shading_samples emitter_samples bsdf_samples")}},
+        {"integrator", "bdpt", kMitsuba06, "max_depth rr_depth light_image sample_direct"},
+        {"integrator",
+         "ptracer",
+         kBothManuals,
+         kPathDepths,
+         "granularity brute_force",
+         "hide_emitters samples_per_pass",
+         {no_effect("granularity brute_force samples_per_pass")}},
+        {"integrator",
+         "photonmapper",
+         kMitsuba06,
+         "max_depth rr_depth hide_emitters direct_samples glossy_samples global_photons "
+         "caustic_photons volume_photons global_lookup_radius caustic_lookup_radius lookup_size "
+         "granularity",
+         "",
+         "",
+         {no_effect("direct_samples glossy_samples global_photons caustic_photons volume_photons "
+                    "global_lookup_radius caustic_lookup_radius lookup_size granularity")}},
+        {"integrator",
+         "ppm",
+         kMitsuba06,
+         "max_depth rr_depth photon_count initial_radius alpha granularity max_passes",
+         "",
+         "",
+         {no_effect("photon_count initial_radius alpha granularity max_passes")}},
+        {"integrator",
+         "sppm",
+         kMitsuba06,
+         "max_depth rr_depth photon_count initial_radius alpha granularity max_passes",
+         "",
+         "",
+         {no_effect("photon_count initial_radius alpha granularity max_passes")}},
+        {"integrator",
+         "pssmlt",
+         kMitsuba06,
+         "max_depth rr_depth bidirectional direct_samples luminance_samples two_stage p_large",
+         "",
+         "",
+         {no_effect("bidirectional direct_samples luminance_samples two_stage p_large")}},
+        {"integrator",
+         "mlt",
+         kMitsuba06,
+         "max_depth direct_samples luminance_samples two_stage bidirectional_mutation "
+         "lens_perturbation caustic_perturbation multi_chain_perturbation manifold_perturbation "
+         "lambda",
+         "",
+         "",
+         {no_effect("direct_samples luminance_samples two_stage bidirectional_mutation "
+                    "lens_perturbation caustic_perturbation multi_chain_perturbation "
+                    "manifold_perturbation lambda")}},
+        {"integrator",
+         "erpt",
+         kMitsuba06,
+         "max_depth rr_depth num_chains max_chains chain_length direct_samples "
+         "bidirectional_mutation lens_perturbation caustic_perturbation multi_chain_perturbation "
+         "manifold_perturbation lambda",
+         "",
+         "",
+         {no_effect("num_chains max_chains chain_length direct_samples bidirectional_mutation "
+                    "lens_perturbation caustic_perturbation multi_chain_perturbation "
+                    "manifold_perturbation lambda")}},
+        {"integrator",
+         "vpl",
+         kMitsuba06,
+         "max_depth clamping shadow_map_resolution",
+         "",
+         "",
+         {no_effect("clamping shadow_map_resolution")}},
+        {"integrator", "prb", kMitsuba3, kPathDepths},
+        {"integrator", "prb_basic", kMitsuba3, kPathDepths},
+        {"integrator", "prbvolpath", kMitsuba3, "max_depth rr_depth hide_emitters"},
+        {"integrator", "direct_projective", kMitsuba3, kGradients, "", "", {no_effect(kGradients)}},
+        {"integrator",
+         "prb_projective",
+         kMitsuba3,
+         "max_depth rr_depth reparam_max_depth sppc sppp sppi guiding guiding_proj guiding_rounds "
+         "antithetic_sampling emitter_samples",
+         "",
+         "",
+         {no_effect(kGradients)}},
+        {"integrator",
+         "adaptive",
+         kMitsuba06,
+         "max_error p_value max_sample_factor",
+         "",
+         "",
+         {no_effect("max_error p_value max_sample_factor")}},
+        {"integrator",
+         "irrcache",
+         kMitsuba06,
+         "resolution quality gradients clamp_neighbor clamp_screen overture quality_adjustment "
+         "indirect_only debug",
+         "",
+         "",
+         {no_effect("resolution quality gradients clamp_neighbor clamp_screen overture "
+                    "quality_adjustment indirect_only debug")}},
+        {"integrator", "multichannel", kMitsuba06, ""},
+        {"integrator", "aov", kMitsuba3, "aovs", "", "", {{"aovs", kAccepted, "use --aov"}}},
+        {"integrator", "moment", kMitsuba3, ""},
+        {"integrator", "stokes", kMitsuba3, ""},
+        {"integrator",
+         "ao",
+         kMitsuba06,
+         "shading_samples ray_length",
+         "",
+         "",
+         {{"shading_samples ray_length", kAccepted, no_image}}},
+        {"integrator",
+         "field",
+         kMitsuba06,
+         "field undefined",
+         "",
+         "",
+         {{"field undefined", kAccepted, "use --aov; path is rendered"}}},
+        {"integrator", "depth", kMitsuba3, ""},
+    };
+    return all;
+}
+
+/// "to_world" → "toWorld", as the manual of Mitsuba 0.6 spells it.
+std::string camel_case(std::string_view snake) {
+    if (snake == "int_ior") return "intIOR";
+    if (snake == "ext_ior") return "extIOR";
+    if (snake == "to_uv") return "uscale, vscale, uoffset, voffset";
+    std::string camel;
+    for (size_t i = 0; i < snake.size(); ++i) {
+        if (snake[i] == '_' && i + 1 < snake.size() &&
+            std::isalpha(static_cast<unsigned char>(snake[i + 1])))
+            camel += char(std::toupper(static_cast<unsigned char>(snake[++i])));
+        else
+            camel += snake[i];
+    }
+    return camel;
+}
+
+std::string code(const std::string& text) {
+    return "`" + text + "`";
+}
+
+const PluginInfo* find_plugin(const std::vector<PluginInfo>& plugins, std::string_view category,
+                              std::string_view name) {
+    const auto it = std::find_if(plugins.begin(), plugins.end(), [&](const PluginInfo& p) {
+        return p.category == category && p.name == name;
+    });
+    return it == plugins.end() ? nullptr : &*it;
+}
+
+/// What etendue does with a parameter.
+std::string param_status(const ManualEntry& entry, const PluginInfo* plugin,
+                         const std::string& param) {
+    if (plugin)
+        for (const ParamInfo& p : plugin->params)
+            if (p.name == param) {
+                const std::string_view doc = p.doc;
+                constexpr std::string_view kWord = "Accepted; ";
+                return doc.substr(0, kWord.size()) == kWord
+                           ? fmt::format("accepted: {}",
+                                         doc.substr(kWord.size(), doc.size() - kWord.size() - 1))
+                           : "supported";
+            }
+    const ManualNote* note = find_manual_note(entry.category, entry.name, param);
+    if (!note) return "supported";
+    return fmt::format("{}: {}", note->is_accepted ? "accepted" : "refused", note->text);
+}
+
+}  // namespace
+
+const std::vector<ManualEntry>& mitsuba_manual() {
+    static const std::vector<ManualEntry> entries = [] {
+        std::vector<ManualEntry> all;
+        for (const auto& part : {shapes(), bsdfs(), textures(), emitters(), media(), sensors(),
+                                 films_and_samplers(), integrators()})
+            all.insert(all.end(), part.begin(), part.end());
+        return all;
+    }();
+    return entries;
+}
+
+const ManualEntry* find_manual_entry(std::string_view category, std::string_view name) {
+    const auto& all = mitsuba_manual();
+    const auto it = std::find_if(all.begin(), all.end(), [&](const ManualEntry& e) {
+        return e.category == category && e.name == name;
+    });
+    return it == all.end() ? nullptr : &*it;
+}
+
+const ManualNote* find_manual_note(std::string_view category, std::string_view plugin,
+                                   std::string_view param) {
+    const ManualEntry* entry = find_manual_entry(category, plugin);
+    if (!entry) return nullptr;
+    for (const ManualNote& note : entry->notes)
+        for (const std::string& name : words(note.names))
+            if (name == param) return &note;
+    return nullptr;
+}
+
+std::string mitsuba_manual_table(const std::vector<PluginInfo>& plugins) {
+    std::string out;
+    std::string_view category;
+    for (const ManualEntry& e : mitsuba_manual()) {
+        if (e.category != category) {
+            category = e.category;
+            out += fmt::format("{}## {}\n\n| 0.6 | 3 | etendue |\n| --- | --- | --- |\n",
+                               out.empty() ? "" : "\n", category);
+        }
+        const bool in_06 = e.manuals & kMitsuba06, in_3 = e.manuals & kMitsuba3;
+        const std::string name = fmt::format("**`{}`**", e.name);
+        out += fmt::format("| {} | {} | {} |\n", in_06 ? name : "", in_3 ? name : "",
+                           e.refused       ? fmt::format("refused: {}", e.refused)
+                           : e.replacement ? fmt::format("becomes `{}`", e.replacement)
+                                           : "supported");
+        if (e.refused) continue;
+        const PluginInfo* plugin =
+            find_plugin(plugins, e.category, e.replacement ? e.replacement : e.name);
+        std::vector<std::string> params;
+        std::vector<int> manuals;
+        const auto add = [&](const char* names, int in) {
+            for (const std::string& p : words(names)) {
+                const auto known = std::find(params.begin(), params.end(), p);
+                if (known != params.end()) {
+                    manuals[size_t(known - params.begin())] |= in;
+                } else {
+                    params.push_back(p);
+                    manuals.push_back(in);
+                }
+            }
+        };
+        add(e.params, e.manuals);
+        add(e.params_06, kMitsuba06);
+        add(e.params_3, kMitsuba3);
+        for (size_t i = 0; i < params.size(); ++i)
+            out += fmt::format(
+                "| {} | {} | {} |\n", manuals[i] & kMitsuba06 ? code(camel_case(params[i])) : "",
+                manuals[i] & kMitsuba3 ? code(params[i]) : "", param_status(e, plugin, params[i]));
+    }
+    return out;
+}
+
+}  // namespace etendue

@@ -1,0 +1,106 @@
+// Materials of several components, tested as one lobe: χ², adjoint symmetry, energy.
+
+#include "bsdf/bsdf.h"
+#include "lobe_tests.h"
+#include "test_materials.h"
+
+namespace etendue {
+namespace {
+
+using namespace etendue::testing;
+
+/// A material on the plane z = 0, as the tests of lobes see it. Values are without the η² of radiance.
+struct MaterialLobe {
+    const Material* material;
+
+    BsdfEval eval(Vec3 wo, Vec3 wi) const {
+        ComponentArena arena;
+        return at(wo, arena).eval(wo, wi, TransportMode::Importance);
+    }
+    std::optional<BsdfSample> sample(Vec3 wo, float u_lobe, Vec2 u) const {
+        ComponentArena arena;
+        return at(wo, arena).sample(wo, u_lobe, u, TransportMode::Importance);
+    }
+    float max_pdf(Vec3 wo, const DirectionCone& cone) const {
+        ComponentArena arena;
+        return at(wo, arena).max_pdf(wo, cone);
+    }
+
+private:
+    Bsdf at(Vec3 wo, ComponentArena& arena) const { return material->bsdf(plane_point(wo), arena); }
+};
+
+std::vector<const Material*> lobe_sums(TestMaterials& m) {
+    return {&m.make("lobesum", {{"diffuse_reflectance", 0.3},
+                                {"glossy_reflectance", 0.5},
+                                {"distribution", std::string("ggx")},
+                                {"alpha", 0.3}}),
+            &m.make("lobesum", {{"diffuse_reflectance", 0.4},
+                                {"glossy_reflectance", 0.0},
+                                {"specular_reflectance", 0.3},
+                                {"specular_transmittance", 0.2}}),
+            &m.make("lobesum", {{"diffuse_reflectance", 0.3},
+                                {"diffuse_transmittance", 0.2},
+                                {"glossy_reflectance", 0.4},
+                                {"alpha", 0.4}}),
+            &m.make("lobesum", {{"diffuse_reflectance", 0.2},
+                                {"glossy_reflectance", 0.3},
+                                {"glossy_transmittance", 0.5},
+                                {"alpha", 0.4}})};
+}
+
+const Material& mixture(TestMaterials& m, const std::string& weights) {
+    const int diffuse = m.bsdf("diffuse", {{"reflectance", 0.8}}),
+              metal = m.bsdf("roughconductor", {{"alpha", 0.3}});
+    return m.make("mixturebsdf", {{"weights", weights}}, {{"", diffuse}, {"", metal}});
+}
+
+void check(const Material& material, Vec3 wo, double significance) {
+    const MaterialLobe lobe{&material};
+    expect_samples_match_pdf(lobe, wo, significance, 30000);
+    expect_sample_agrees_with_eval(lobe, wo, 3e-3, 500);
+    expect_adjoint_symmetry(lobe, wo, 3e-3, 500);
+    expect_energy_conserved(lobe, wo);
+}
+
+TEST(Mixtures, LobeSumsAgreeWithTheirDensities) {
+    TestMaterials m;
+    const auto materials = lobe_sums(m);
+    const double significance =
+        sidak(1e-3, int(2 * materials.size() * test_directions_both_sides().size()));
+    for (const Material* material : materials)
+        for (const Vec3 wo : test_directions_both_sides()) check(*material, wo, significance);
+}
+
+TEST(Mixtures, WeightedSumsAgreeWithTheirDensities) {
+    TestMaterials m;
+    const double significance = sidak(1e-3, int(2 * 2 * test_directions().size()));
+    for (const char* weights : {"0.3, 0.5", "0.4 0.6"})
+        for (const Vec3 wo : test_directions()) check(mixture(m, weights), wo, significance);
+}
+
+TEST(Mixtures, WeightsAboveOneAreScaled) {
+    TestMaterials m;
+    const Vec3 wo = direction(30, 0), wi = direction(20, 170);
+    const MaterialLobe half{&mixture(m, "0.5 0.5")}, twice{&mixture(m, "1 1")};
+    EXPECT_FLOAT_EQ(half.eval(wo, wi).f.g, twice.eval(wo, wi).f.g);
+    EXPECT_THROW(mixture(m, "1"), SceneError);
+    EXPECT_THROW(mixture(m, "1 x"), SceneError);
+    EXPECT_THROW(mixture(m, "1 -1"), SceneError);
+}
+
+// α of 0.25 = (16/32)² is one of the roughnesses that have a transmittance of their own.
+TEST(Mixtures, TexturedRoughPlasticIsThatOfItsRoughness) {
+    TestMaterials m;
+    FunctionTexture alpha;
+    alpha.color = [](Vec2) { return Rgb(0.25f); };
+    const MaterialLobe textured{&m.make("roughplastic", {}, {{"alpha", m.texture(alpha)}})},
+        constant{&m.make("roughplastic", {{"alpha", 0.25}})};
+    for (const Vec3 wo : test_directions()) {
+        const Vec3 wi = direction(50, 120);
+        EXPECT_TRUE(nearly(textured.eval(wo, wi).f, constant.eval(wo, wi).f, 1e-5, 0));
+    }
+}
+
+}  // namespace
+}  // namespace etendue

@@ -1,0 +1,315 @@
+// Scenes of glTF: values of all kinds, materials, placement, and messages that name the place in the file.
+
+#include "readers/gltf.h"
+
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+namespace etendue {
+namespace {
+
+/// The binary file of a test scene.
+class Bytes {
+public:
+    template <class T>
+    Bytes& add(std::initializer_list<T> values) {
+        for (const T v : values) {
+            char raw[sizeof(T)];
+            std::memcpy(raw, &v, sizeof(T));
+            bytes_.append(raw, sizeof(T));
+        }
+        return *this;
+    }
+    const std::string& str() const { return bytes_; }
+
+private:
+    std::string bytes_;
+};
+
+/// Four corners of a square (48 bytes), and the indices of its two triangles (12 bytes).
+Bytes square() {
+    Bytes b;
+    b.add<float>({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}).add<uint16_t>({0, 1, 2, 0, 2, 3});
+    return b;
+}
+
+const std::string kSquareAccessors =
+    R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":4},
+       {"bufferView":1,"componentType":5123,"type":"SCALAR","count":6}],
+       "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12}])";
+
+std::string document(const Bytes& bytes, const std::string& rest) {
+    return R"({"asset":{"version":"2.0"},"buffers":[{"uri":"b.bin","byteLength":)" +
+           std::to_string(bytes.str().size()) + "}]," + rest + "}";
+}
+
+SceneDescription read(const std::string& json, const Bytes& bytes = {}, bool lenient = false) {
+    ReadOptions options;
+    options.lenient = lenient;
+    options.read_file = [&](const std::string& path) -> std::optional<std::string> {
+        if (path == "b.bin") return bytes.str();
+        return {};
+    };
+    return parse_gltf(json, "s.gltf", options);
+}
+
+std::string error_of(const std::string& json, const Bytes& bytes = {}) {
+    try {
+        read(json, bytes);
+    } catch (const SceneError& e) {
+        return e.what();
+    }
+    return "no error";
+}
+
+/// A square with this material.
+SceneDescription with_material(const std::string& material, const std::string& more = "") {
+    const Bytes b = square();
+    return read(document(b, kSquareAccessors +
+                                R"(,"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":
+        {"POSITION":0},"indices":1,"material":0}]}],"materials":[)" +
+                                material + "]" + more),
+                b);
+}
+
+const SceneObject& find(const SceneDescription& scene, const std::string& type) {
+    for (const SceneObject& o : scene.objects)
+        if (o.type == type) return o;
+    throw std::runtime_error("there is no " + type);
+}
+
+template <class T>
+T value(const SceneObject& o, const char* name) {
+    const Param* p = o.find(name);
+    if (!p) throw std::runtime_error(std::string("there is no ") + name);
+    return std::get<T>(p->value);
+}
+
+TEST(Gltf, ReadsASquare) {
+    const SceneDescription scene = with_material(
+        R"({"pbrMetallicRoughness":{"baseColorFactor":[0.1,0.2,0.3,1],"metallicFactor":0.25,
+            "roughnessFactor":0.5},"extensions":{"KHR_materials_ior":{"ior":1.25}}})");
+    ASSERT_EQ(scene.meshes.size(), 1u);
+    EXPECT_EQ(scene.meshes[0].positions[2], Vec3(1, 1, 0));
+    EXPECT_EQ(scene.meshes[0].triangles[1], (MeshData::Triangle{0, 2, 3}));
+    const SceneObject& m = find(scene, "principled");
+    EXPECT_EQ(value<Rgb>(m, "base_color"), Rgb(0.1f, 0.2f, 0.3f));
+    EXPECT_EQ(value<double>(m, "metallic"), 0.25);
+    EXPECT_EQ(value<double>(m, "roughness"), 0.5);
+    EXPECT_NEAR(value<double>(m, "eta"), 1.25, 1e-9);
+    // Without camera and light.
+    EXPECT_EQ(find(scene, "constant").category, "emitter");
+    EXPECT_EQ(find(scene, "perspective").category, "sensor");
+}
+
+TEST(Gltf, StripsAndFansHaveTheSameSides) {
+    const Bytes b = square();
+    for (const auto& [mode, expected] :
+         {std::pair{5, MeshData::Triangle{2, 1, 3}}, {6, MeshData::Triangle{2, 3, 0}}}) {
+        const SceneDescription scene =
+            read(document(b, kSquareAccessors +
+                                 R"(,"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"mode":)" +
+                                 std::to_string(mode) + R"(,"attributes":{"POSITION":0}}]}])"),
+                 b);
+        ASSERT_EQ(scene.meshes[0].triangles.size(), 2u);
+        EXPECT_EQ(scene.meshes[0].triangles[1], expected);
+    }
+}
+
+TEST(Gltf, IntegersAreFractionsWhereNormalized) {
+    Bytes b = square();
+    b.add<uint8_t>({0, 51, 255, 0, 255, 0, 102, 0})
+        .add<int16_t>({0, 0, 32767, 0, 0, 0, -32768, 0, 0, 32767, 0, 0});
+    const SceneDescription scene = read(
+        document(b, R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":4},
+            {"bufferView":1,"componentType":5123,"type":"SCALAR","count":6},
+            {"bufferView":2,"componentType":5121,"type":"VEC2","count":4,"normalized":true},
+            {"bufferView":3,"componentType":5122,"type":"VEC3","count":4,"normalized":true}],
+            "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12},
+            {"buffer":0,"byteOffset":60,"byteLength":8},{"buffer":0,"byteOffset":68,"byteLength":24}],
+            "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":2,
+            "COLOR_0":3},"indices":1}]}])"),
+        b);
+    const MeshData& mesh = scene.meshes[0];
+    EXPECT_FLOAT_EQ(mesh.uvs[0].y, 0.2f);
+    EXPECT_FLOAT_EQ(mesh.uvs[3].x, 0.4f);
+    EXPECT_FLOAT_EQ(mesh.colors[0].z, 1);
+    EXPECT_FLOAT_EQ(mesh.colors[2].x, -1);
+    EXPECT_EQ(find(scene, "mesh_attribute").category, "texture");
+}
+
+TEST(Gltf, SparseAccessorsReplaceValues) {
+    Bytes b = square();
+    b.add<uint8_t>({2}).add<uint8_t>({0, 0, 0}).add<float>({5, 6, 7});
+    const SceneDescription scene = read(
+        document(b, R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":4,
+            "sparse":{"count":1,"indices":{"bufferView":2,"componentType":5121},"values":{"bufferView":3}}},
+            {"bufferView":1,"componentType":5123,"type":"SCALAR","count":6}],
+            "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12},
+            {"buffer":0,"byteOffset":60,"byteLength":1},{"buffer":0,"byteOffset":64,"byteLength":12}],
+            "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}])"),
+        b);
+    EXPECT_EQ(scene.meshes[0].positions[2], Vec3(5, 6, 7));
+    EXPECT_EQ(scene.meshes[0].positions[1], Vec3(1, 0, 0));
+}
+
+TEST(Gltf, NodesMultiplyFromTheRootAndSharedMeshesAreInstances) {
+    const Bytes b = square();
+    const SceneDescription scene =
+        read(document(b, kSquareAccessors + R"(,"scene":0,"scenes":[{"nodes":[0]}],"nodes":[
+            {"translation":[1,0,0],"scale":[2,2,2],"children":[1,2]},{"mesh":0,"translation":[3,0,0]},
+            {"mesh":0,"rotation":[0,0,1,0]}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}])"),
+             b);
+    std::vector<Vec3> origins, ends;
+    for (const SceneObject& o : scene.objects)
+        if (o.type == "instance") {
+            origins.push_back(value<Transform>(o, "to_world").point({0, 0, 0}));
+            ends.push_back(value<Transform>(o, "to_world").point({1, 0, 0}));
+        }
+    EXPECT_EQ(origins, (std::vector<Vec3>{{7, 0, 0}, {1, 0, 0}}));
+    EXPECT_EQ(ends[1], Vec3(-1, 0, 0));
+    EXPECT_EQ(scene.meshes.size(), 1u);
+}
+
+TEST(Gltf, GpuInstancesArePlaced) {
+    Bytes b = square();
+    b.add<float>({1, 0, 0, 0, 5, 0});
+    const SceneDescription scene = read(
+        document(b, R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":4},
+            {"bufferView":1,"componentType":5123,"type":"SCALAR","count":6},
+            {"bufferView":2,"componentType":5126,"type":"VEC3","count":2}],
+            "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12},
+            {"buffer":0,"byteOffset":60,"byteLength":24}],"nodes":[{"mesh":0,"extensions":
+            {"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":2}}}}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}])"),
+        b);
+    int count = 0;
+    for (const SceneObject& o : scene.objects) count += o.type == "instance";
+    EXPECT_EQ(count, 2);
+}
+
+TEST(Gltf, ExtensionsOfMaterialsSetTheirParameters) {
+    const SceneDescription scene = with_material(
+        R"({"emissiveFactor":[1,0.5,0],"extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":4},
+            "KHR_materials_transmission":{"transmissionFactor":0.75},
+            "KHR_materials_volume":{"thicknessFactor":1,"attenuationDistance":2,"attenuationColor":[0.5,1,1]},
+            "KHR_materials_clearcoat":{"clearcoatFactor":0.3,"clearcoatRoughnessFactor":0.1},
+            "KHR_materials_sheen":{"sheenColorFactor":[0.2,0.4,0.2]},
+            "KHR_materials_anisotropy":{"anisotropyStrength":0.6}}})");
+    const SceneObject& m = find(scene, "principled");
+    EXPECT_EQ(value<double>(m, "spec_trans"), 0.75);
+    EXPECT_EQ(value<double>(m, "clearcoat"), 0.3);
+    EXPECT_NEAR(value<double>(m, "clearcoat_gloss"), 0.09 / 0.099, 1e-9);
+    EXPECT_NEAR(value<double>(m, "sheen"), 0.4, 1e-6);
+    EXPECT_EQ(value<double>(m, "anisotropic"), 0.6);
+    EXPECT_EQ(value<Rgb>(find(scene, "area"), "radiance"), Rgb(4, 2, 0));
+    EXPECT_NEAR(value<Rgb>(find(scene, "homogeneous"), "sigma_t").r, std::log(2.0) / 2, 1e-6);
+}
+
+TEST(Gltf, TransmissionWithoutVolumeIsAPane) {
+    const SceneDescription scene =
+        with_material(R"({"extensions":{"KHR_materials_transmission":{"transmissionFactor":1}}})");
+    EXPECT_EQ(find(scene, "thindielectric").category, "bsdf");
+    EXPECT_EQ(value<double>(find(scene, "blendbsdf"), "weight"), 1);
+}
+
+TEST(Gltf, TexturesKeepTheirTransformAndSampler) {
+    const SceneDescription scene = with_material(
+        R"({"alphaMode":"MASK","alphaCutoff":0.25,"pbrMetallicRoughness":{"baseColorTexture":{"index":0,
+            "extensions":{"KHR_texture_transform":{"offset":[0.5,0],"rotation":1.5707963267948966,
+            "scale":[2,3]}}}}})",
+        R"(,"textures":[{"source":0,"sampler":0}],"images":[{"uri":"a.png"}],
+            "samplers":[{"magFilter":9728,"wrapS":33071,"wrapT":33071}])");
+    const SceneObject& image = find(scene, "bitmap");
+    EXPECT_EQ(value<std::string>(image, "filename"), "a.png");
+    EXPECT_EQ(value<std::string>(image, "filter_type"), "nearest");
+    EXPECT_EQ(value<std::string>(image, "wrap_mode"), "clamp");
+    const Vec3 uv = value<Transform>(image, "to_uv").point({1, 1, 0});
+    EXPECT_NEAR(uv.x, 0.5 + 3, 1e-6);  // u' = 0.5 + 3 v
+    EXPECT_NEAR(uv.y, -2, 1e-6);
+    EXPECT_EQ(value<double>(find(scene, "threshold"), "cutoff"), 0.25);
+}
+
+TEST(Gltf, CamerasLookAlongMinusZ) {
+    const SceneDescription scene = read(
+        R"({"asset":{"version":"2.0"},"nodes":[{"camera":0,"translation":[0,0,5]},{"camera":1}],"cameras":[
+            {"name":"front","type":"perspective","perspective":{"yfov":0.5,"aspectRatio":2}},
+            {"type":"orthographic","orthographic":{"xmag":2,"ymag":1,"znear":0,"zfar":9}}]})");
+    const SceneObject& camera = find(scene, "perspective");
+    EXPECT_EQ(camera.id, "front");
+    EXPECT_NEAR(value<double>(camera, "fov"), 0.5 * 180 / kPi, 1e-5);
+    const Transform t = value<Transform>(camera, "to_world");
+    EXPECT_EQ(t.point({0, 0, 1}), Vec3(0, 0, 4));
+    EXPECT_EQ(t.vector({1, 0, 0}), Vec3(-1, 0, 0));
+    EXPECT_GT(t.determinant3(), 0);
+    EXPECT_EQ(value<int64_t>(scene.objects[size_t(camera.children[0].object)], "width"), 1440);
+    EXPECT_EQ(value<Transform>(find(scene, "orthographic"), "to_world").vector({1, 0, 0}),
+              Vec3(-2, 0, 0));
+}
+
+TEST(Gltf, PunctualLightsShineAlongMinusZ) {
+    const SceneDescription scene = read(
+        R"({"asset":{"version":"2.0"},"extensions":{"KHR_lights_punctual":{"lights":[
+            {"type":"directional","color":[1,0,0],"intensity":3},{"type":"spot","spot":{"outerConeAngle":0.5}},
+            {"type":"point"}]}},"nodes":[{"extensions":{"KHR_lights_punctual":{"light":0}}},
+            {"extensions":{"KHR_lights_punctual":{"light":1}}},{"translation":[1,2,3],
+            "extensions":{"KHR_lights_punctual":{"light":2}}}]})");
+    EXPECT_EQ(value<Vec3>(find(scene, "directional"), "direction"), Vec3(0, 0, -1));
+    EXPECT_EQ(value<Rgb>(find(scene, "directional"), "irradiance"), Rgb(3, 0, 0));
+    EXPECT_EQ(value<Vec3>(find(scene, "point"), "position"), Vec3(1, 2, 3));
+    EXPECT_EQ(value<std::string>(find(scene, "spot"), "falloff"), "quadratic");
+    const Vec3 axis = value<Transform>(find(scene, "spot"), "to_world").vector({0, 0, 1});
+    EXPECT_NEAR(axis.z, -1, 1e-6);
+}
+
+TEST(Gltf, ReadsTheContainer) {
+    const auto chunk = [](const char* type, std::string contents) {
+        const auto length = uint32_t(contents.size());
+        return std::string(reinterpret_cast<const char*>(&length), 4) + std::string(type, 4) +
+               contents;
+    };
+    const Bytes b = square();
+    const std::string json =
+        R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":60}],)" + kSquareAccessors +
+        R"(,"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}]})";
+    const std::string body = chunk("JSON", json) + chunk("BIN\0", b.str());
+    const uint32_t header[] = {2, uint32_t(12 + body.size())};
+    const std::string file = "glTF" + std::string(reinterpret_cast<const char*>(header), 8) + body;
+    EXPECT_EQ(read(file).meshes.size(), 1u);
+    EXPECT_EQ(error_of(file.substr(0, 100)), "s.gltf: the file ends within a chunk");
+}
+
+TEST(Gltf, ErrorsNameThePlace) {
+    const Bytes b = square();
+    const std::pair<std::string, const char*> cases[] = {
+        {R"({"asset":{"version":"1.0"}})",
+         "s.gltf: /asset/version: is \"1.0\", but only glTF 2 is supported"},
+        {"{\n\"asset\":}", "s.gltf:2: malformed JSON"},
+        {R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}]})",
+         "s.gltf: /nodes/0/mesh: refers to an entry of an empty list"},
+        {R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]})",
+         "s.gltf: /nodes/0: the node occurs twice in the scene"},
+        {R"({"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]})",
+         "s.gltf: /extensionsRequired/0: the extension KHR_draco_mesh_compression is not "
+         "supported"},
+        {R"({"asset":{"version":"2.0"},"nodes":[{"translation":[1,2]}]})",
+         "s.gltf: /nodes/0/translation: must have 3 numbers, but has 2"},
+        {document(b, R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":6}],
+            "bufferViews":[{"buffer":0,"byteLength":60}],"nodes":[{"mesh":0}],"meshes":[{"primitives":
+            [{"attributes":{"POSITION":0}}]}])"),
+         "s.gltf: /accessors/0: needs more than the 60 bytes of its bufferView"},
+        {document(b, R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":2},
+            {"bufferView":1,"componentType":5123,"type":"SCALAR","count":6}],
+            "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12}],
+            "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}])"),
+         "s.gltf: /meshes/0/primitives/0/indices: has the index 2 of 2 vertices"},
+    };
+    for (const auto& [json, expected] : cases)
+        EXPECT_EQ(error_of(json, b).rfind(expected, 0), 0u)
+            << error_of(json, b) << "\nexpected " << expected;
+}
+
+}  // namespace
+}  // namespace etendue
