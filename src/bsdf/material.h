@@ -22,7 +22,7 @@ struct SurfacePoint {
     Vec3 wo;              ///< Toward the predecessor.
     Vec3 color{1, 1, 1};  ///< Vertex colour.
 
-    TexturePoint texture_point() const { return {uv, color}; }
+    TexturePoint texture_point() const { return {uv, color, p, dpdu, dpdv}; }
 };
 
 /// Storage for the second and further components of mixtures during a walk. reset() keeps the memory for reuse.

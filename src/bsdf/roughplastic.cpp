@@ -11,6 +11,9 @@
 
 #include "bsdf/roughplastic.h"
 
+#include <map>
+#include <tuple>
+
 #include "bsdf/ior.h"
 #include "bsdf/plastic_params.h"
 
@@ -60,6 +63,26 @@ RoughTransmittance::RoughTransmittance(const Microfacet& distribution, float eta
     internal_reflectance_ = float(internal / kSize);
 }
 
+std::shared_ptr<SharedTransmittance> SharedTransmittance::of(Microfacet::Kind kind, float alpha,
+                                                             float eta) {
+    static std::mutex mutex;
+    static std::map<std::tuple<Microfacet::Kind, float, float>, std::weak_ptr<SharedTransmittance>>
+        all;
+    const std::lock_guard lock(mutex);
+    std::weak_ptr<SharedTransmittance>& known = all[{kind, alpha, eta}];
+    std::shared_ptr<SharedTransmittance> shared = known.lock();
+    if (!shared)
+        known = shared = std::make_shared<SharedTransmittance>(Microfacet{kind, alpha, alpha}, eta);
+    return shared;
+}
+
+const RoughTransmittance& SharedTransmittance::make() const {
+    const std::lock_guard lock(making_);
+    if (!value_) value_.emplace(distribution_, eta_);
+    made_.store(&*value_, std::memory_order_release);
+    return *value_;
+}
+
 BsdfEval RoughPlasticLobe::eval(Vec3 wo, Vec3 wi) const {
     if (!(wo.z > 0 && wi.z > 0)) return {};
     const Vec3 h = wo + wi, m = h / length(h);
@@ -94,11 +117,13 @@ public:
     RoughPlastic(const Params& params, MaterialContext& context)
         : params_(params, context), kind_(read_distribution(params)),
           alpha_(context.texture(params, "alpha", Rgb(0.1f))) {
+        const auto add = [&](float alpha) {
+            transmittance_.push_back(SharedTransmittance::of(kind_, alpha, params_.eta));
+        };
         if (alpha_.is_constant())
-            transmittance_.emplace_back(coat(alpha_.eval_scalar(Vec2())), params_.eta);
+            add(alpha_.eval_scalar(Vec2()));
         else
-            for (int i = 0; i < kRows; ++i)
-                transmittance_.emplace_back(coat(sqr(float(i) / (kRows - 1))), params_.eta);
+            for (int i = 0; i < kRows; ++i) add(sqr(float(i) / (kRows - 1)));
     }
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
@@ -120,15 +145,15 @@ private:
     Microfacet coat(float alpha) const { return {kind_, alpha, alpha}; }
     /// The transmittance for the nearest of these roughnesses: the same for both ends of a path.
     const RoughTransmittance& transmittance(float alpha) const {
-        if (transmittance_.size() == 1) return transmittance_.front();
+        if (transmittance_.size() == 1) return transmittance_.front()->get();
         const float row = std::sqrt(clamp(alpha, 0, 1)) * (kRows - 1) + 0.5f;
-        return transmittance_[std::min(size_t(row), size_t(kRows - 1))];
+        return transmittance_[std::min(size_t(row), size_t(kRows - 1))]->get();
     }
 
     PlasticParams params_;
     Microfacet::Kind kind_;
     TextureRef alpha_;
-    std::vector<RoughTransmittance> transmittance_;
+    std::vector<std::shared_ptr<const SharedTransmittance>> transmittance_;
 };
 
 }  // namespace

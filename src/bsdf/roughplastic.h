@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
 
 #include "bsdf/microfacet.h"
 #include "bsdf/plastic.h"
@@ -30,6 +34,29 @@ private:
 
     std::array<float, kSize> external_;
     float internal_reflectance_;
+};
+
+/// A transmittance that is computed when it is first needed. All materials with the same coat share it.
+class SharedTransmittance {
+public:
+    /// That of a coat of one distribution, isotropic roughness and relative index.
+    static std::shared_ptr<SharedTransmittance> of(Microfacet::Kind kind, float alpha, float eta);
+
+    SharedTransmittance(const Microfacet& distribution, float eta)
+        : distribution_(distribution), eta_(eta) {}
+    const RoughTransmittance& get() const {
+        const RoughTransmittance* made = made_.load(std::memory_order_acquire);
+        return made ? *made : make();
+    }
+
+private:
+    const RoughTransmittance& make() const;
+
+    Microfacet distribution_;
+    float eta_;
+    mutable std::mutex making_;
+    mutable std::optional<RoughTransmittance> value_;
+    mutable std::atomic<const RoughTransmittance*> made_ = nullptr;  ///< `value_` once complete.
 };
 
 /// Rough dielectric coat over a diffuse base:

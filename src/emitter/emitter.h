@@ -115,5 +115,10 @@ struct EmitterEntry {
     std::vector<std::unique_ptr<Emitter>> (*make)(const Params& params, EmitterContext& context);
 };
 const std::vector<EmitterEntry>& emitter_registry();
+inline std::vector<std::unique_ptr<Emitter>> one_emitter(std::unique_ptr<Emitter> emitter) {
+    std::vector<std::unique_ptr<Emitter>> made;
+    made.push_back(std::move(emitter));
+    return made;
+}
 
 }  // namespace etendue

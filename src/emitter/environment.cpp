@@ -127,6 +127,33 @@ std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb
     return std::make_unique<EnvironmentEmitter>(width, height, std::move(pixels), to_world);
 }
 
+RgbImage read_emission_image(const Params& p, Rgb factor) {
+    const std::string path = resolve_file(p);
+    RgbImage image;
+    try {
+        image = read_rgb(path);
+    } catch (const std::exception& e) {
+        p.fail("filename", e.what());
+    }
+    for (Rgb& c : image.pixels) {
+        c *= factor;
+        if (!is_finite(c) || std::min({c.r, c.g, c.b}) < 0)
+            p.fail("filename", "image \"" + path + "\" has a pixel that is negative or not finite");
+    }
+    return image;
+}
+
+std::unique_ptr<Emitter> make_environment(const Params& p, RgbImage image,
+                                          const Transform& to_world) {
+    if (p.choice("projection", {"latlong", "equalarea"}, 0) == 0)
+        return make_environment(image.width, image.height, std::move(image.pixels), to_world);
+    if (image.width != image.height)
+        p.fail("filename", fmt::format("{}: an image in the equal-area projection is square, but "
+                                       "this one has {} x {} pixels",
+                                       p.text("filename", ""), image.width, image.height));
+    return make_equal_area_environment(image.width, std::move(image.pixels), to_world);
+}
+
 EmitterEntry envmap_entry() {
     return {{"emitter",
              "envmap",
@@ -142,32 +169,11 @@ EmitterEntry envmap_entry() {
                "Rotation of the environment; its own up direction is +y."},
               {"mis_compensation", ParamKind::Bool, "false", "Accepted; without effect."}}},
             [](const Params& p, EmitterContext&) {
-                const std::string path = resolve_file(p);
-                RgbImage image;
-                try {
-                    image = read_rgb(path);
-                } catch (const std::exception& e) {
-                    p.fail("filename", e.what());
-                }
-                const Rgb scale = p.rgb("tint", Rgb(1)) * p.number("scale", 1, 0);
-                for (Rgb& c : image.pixels) {
-                    c *= scale;
-                    if (!is_finite(c) || std::min({c.r, c.g, c.b}) < 0)
-                        p.fail("filename",
-                               "image \"" + path + "\" has a pixel that is negative or not finite");
-                }
+                RgbImage image =
+                    read_emission_image(p, p.rgb("tint", Rgb(1)) * p.number("scale", 1, 0));
                 std::vector<std::unique_ptr<Emitter>> made;
                 const Transform to_world = p.transform("to_world");
-                const bool equal_area = p.choice("projection", {"latlong", "equalarea"}, 0) == 1;
-                if (equal_area && image.width != image.height)
-                    p.fail("filename",
-                           fmt::format("{}: an image in the equal-area projection is square, "
-                                       "but this one has {} x {} pixels",
-                                       path, image.width, image.height));
-                made.push_back(equal_area ? make_equal_area_environment(
-                                                image.width, std::move(image.pixels), to_world)
-                                          : make_environment(image.width, image.height,
-                                                             std::move(image.pixels), to_world));
+                made.push_back(make_environment(p, std::move(image), to_world));
                 return made;
             }};
 }

@@ -73,12 +73,6 @@ private:
     Rgb E_;
 };
 
-std::vector<std::unique_ptr<Emitter>> one(std::unique_ptr<Emitter> e) {
-    std::vector<std::unique_ptr<Emitter>> v;
-    v.push_back(std::move(e));
-    return v;
-}
-
 }  // namespace
 
 EmitterEntry constant_entry() {
@@ -87,7 +81,7 @@ EmitterEntry constant_entry() {
              "Environment with the same radiance from every direction.",
              {{"radiance", ParamKind::Rgb, "1", "Radiance in W/(m² sr)."}}},
             [](const Params& p, EmitterContext&) {
-                return one(std::make_unique<ConstantEmitter>(p.rgb("radiance", Rgb(1))));
+                return one_emitter(std::make_unique<ConstantEmitter>(p.rgb("radiance", Rgb(1))));
             }};
 }
 
@@ -106,7 +100,7 @@ EmitterEntry directional_entry() {
             const Vec3 d = p.has("direction") ? p.vector("direction", {})
                                               : p.transform("to_world").vector({0, 0, 1});
             if (!(length2(d) > 0)) p.fail("direction", "parameter \"direction\" must not be zero");
-            return one(
+            return one_emitter(
                 std::make_unique<DirectionalEmitter>(normalize(d), p.rgb("irradiance", Rgb(1))));
         }};
 }

@@ -4,47 +4,9 @@
 #include "emitter/point.h"
 
 #include "math/frame.h"
-#include "math/warp.h"
 
 namespace etendue {
 namespace {
-
-class PointEmitter : public Emitter {
-public:
-    PointEmitter(Vec3 p, Rgb intensity) : p_(p), intensity_(intensity) {}
-
-    EmissionSample sample_emission(FinePoint, Vec2 u_d) const override {
-        const Vec3 d = sample_direction({}, u_d);
-        return {p_, d, d, intensity(d), 1, pdf_direction(d), {}, 0};
-    }
-
-    bool sample_direct(Vec3 from, FinePoint, DirectSample& out) const override {
-        const Vec3 v = p_ - from;
-        const float dist2 = length2(v);
-        if (!(dist2 > 0)) return false;
-        const float dist = std::sqrt(dist2);
-        const Vec3 wi = v * (1 / dist);
-        const Rgb I = intensity(-wi);
-        if (I.is_zero()) return false;
-        out = {p_, -wi, wi, dist, I, 1, 1, pdf_direction(-wi), {}, 0};
-        return true;
-    }
-
-    Emission eval_emission(Vec3, Vec2, Vec3 w) const override {
-        return {intensity(w), pdf_direction(w)};
-    }
-    Vec3 sample_direction(Vec3, Vec2 u) const override { return sample_uniform_sphere(u); }
-    float max_pdf_d() const override { return kUniformSpherePdf; }
-    double power() const override { return 4 * double(kPi) * luminance(intensity_); }
-    bool is_delta() const override { return true; }
-
-protected:
-    virtual Rgb intensity(Vec3) const { return intensity_; }
-    virtual float pdf_direction(Vec3) const { return kUniformSpherePdf; }
-
-    Vec3 p_;
-    Rgb intensity_;
-};
 
 /// Intensity between cut-off and beam: linear in the angle (Mitsuba); or of x, the cosine's way from the one to the
 /// other, x²(3 − 2x) (pbrt-v4), x⁴ (pbrt-v3) or x² (glTF).
@@ -92,13 +54,19 @@ private:
     float cutoff_, beam_, cos_cutoff_, cos_beam_;
 };
 
-std::vector<std::unique_ptr<Emitter>> one(std::unique_ptr<Emitter> e) {
-    std::vector<std::unique_ptr<Emitter>> v;
-    v.push_back(std::move(e));
-    return v;
-}
-
 }  // namespace
+
+Transform similarity(const Params& params, const char* name) {
+    const Transform t = params.transform(name);
+    const Vec3 x = t.vector({1, 0, 0}), y = t.vector({0, 1, 0}), z = t.vector({0, 0, 1});
+    const float size = length(x), tolerance = 1e-3f * size;
+    if (std::fabs(length(y) - size) > tolerance || std::fabs(length(z) - size) > tolerance ||
+        std::fabs(dot(x, y)) > tolerance * size || std::fabs(dot(y, z)) > tolerance * size ||
+        std::fabs(dot(z, x)) > tolerance * size)
+        params.fail(name, "the transform of a light with an image may rotate, mirror, move and "
+                          "scale by the same factor along all axes, but not distort");
+    return t;
+}
 
 EmitterEntry point_entry() {
     return {
@@ -113,7 +81,7 @@ EmitterEntry point_entry() {
                 p.fail("to_world", "give either \"position\" or \"to_world\", not both");
             const Vec3 at = p.has("position") ? p.vector("position", {})
                                               : p.transform("to_world").point({0, 0, 0});
-            return one(std::make_unique<PointEmitter>(at, p.rgb("intensity", Rgb(1))));
+            return one_emitter(std::make_unique<PointEmitter>(at, p.rgb("intensity", Rgb(1))));
         }};
 }
 
@@ -137,7 +105,7 @@ EmitterEntry spot_entry() {
                 const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
                 if (beam > cutoff)
                     p.fail("beam_width", "\"beam_width\" must not exceed \"cutoff_angle\"");
-                return one(std::make_unique<SpotEmitter>(
+                return one_emitter(std::make_unique<SpotEmitter>(
                     t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})), p.rgb("intensity", Rgb(1)),
                     cutoff, beam,
                     Falloff(p.choice("falloff", {"angle", "smooth", "quartic", "quadratic"}, 0))));

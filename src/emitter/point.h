@@ -1,10 +1,68 @@
 #pragma once
 
+#include <cmath>
+
 #include "emitter/emitter.h"
+#include "image/image_io.h"
+#include "math/transform.h"
+#include "math/warp.h"
 
 namespace etendue {
 
+/// An emitter at a point, with the same intensity in all directions unless derived.
+class PointEmitter : public Emitter {
+public:
+    PointEmitter(Vec3 p, Rgb intensity) : p_(p), intensity_(intensity) {}
+
+    EmissionSample sample_emission(FinePoint, Vec2 u_d) const override {
+        const Vec3 d = sample_direction({}, u_d);
+        return {p_, d, d, intensity(d), 1, pdf_direction(d), {}, 0};
+    }
+
+    bool sample_direct(Vec3 from, FinePoint, DirectSample& out) const override {
+        const Vec3 v = p_ - from;
+        const float dist2 = length2(v);
+        if (!(dist2 > 0)) return false;
+        const float dist = std::sqrt(dist2);
+        const Vec3 wi = v * (1 / dist);
+        const Rgb I = intensity(-wi);
+        if (I.is_zero()) return false;
+        out = {p_, -wi, wi, dist, I, 1, 1, pdf_direction(-wi), {}, 0};
+        return true;
+    }
+
+    Emission eval_emission(Vec3, Vec2, Vec3 w) const override {
+        return {intensity(w), pdf_direction(w)};
+    }
+    Vec3 sample_direction(Vec3, Vec2 u) const override { return sample_uniform_sphere(u); }
+    float max_pdf_d() const override { return kUniformSpherePdf; }
+    double power() const override { return 4 * double(kPi) * luminance(intensity_); }
+    bool is_delta() const override { return true; }
+
+protected:
+    virtual Rgb intensity(Vec3) const { return intensity_; }
+    virtual float pdf_direction(Vec3) const { return kUniformSpherePdf; }
+
+    Vec3 p_;
+    Rgb intensity_;
+};
+
+/// The emitter that `make` makes of an image, of the power that parameter "power" asks for, if any.
+template <class Make>
+std::unique_ptr<Emitter> scaled_to_power(const Params& params, RgbImage image, const Make& make) {
+    std::unique_ptr<Emitter> emitter = make(image);
+    if (!params.has("power")) return emitter;
+    const double wanted = double(params.number("power", 0, 0)), power = emitter->power();
+    if (!(power > 0)) params.fail("power", "a black image cannot be scaled to a power");
+    for (Rgb& c : image.pixels) c *= float(wanted / power);
+    return make(std::move(image));
+}
+/// A parameter that maps the directions of an image without distortion: rotation, mirror, uniform scale and translation.
+Transform similarity(const Params& params, const char* name);
+
 EmitterEntry point_entry();
 EmitterEntry spot_entry();
+EmitterEntry goniometric_entry();
+EmitterEntry projection_entry();
 
 }  // namespace etendue

@@ -32,7 +32,8 @@ void PathState::append(const Vertex& v) {
     if (added.kind == Vertex::Kind::Surface) {
         arena_.adopt(added.bsdf);
         const Material& material = *added.shape->material;
-        x_.back().opacity = material.is_opaque() ? 1 : material.opacity(added.uv);
+        x_.back().opacity =
+            material.is_opaque() ? 1 : material.opacity({added.uv, {1, 1, 1}, added.p});
     } else {
         added.bsdf = {};
     }

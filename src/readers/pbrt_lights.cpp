@@ -117,6 +117,40 @@ int make_infinite(PbrtScene& scene, const PbrtArguments& args) {
     return finish(scene, emitter);
 }
 
+/// What goniometric and projection lights share: a point with an image of its intensity.
+int add_image_light(PbrtScene& scene, const PbrtArguments& args, const char* type) {
+    const int emitter = scene.add("emitter", type, args.where());
+    scene.set(emitter, "filename", args.text(scene.is_v3() ? "mapname" : "filename", ""));
+    const Rgb I = light_colour(scene, args, "I");
+    scene.set(emitter, "intensity", I);
+    // The luminance of the colour, without its scale, is 1.
+    if (const float power = args.number("power", -1); power > 0)
+        scene.set(emitter, "power", double(power * luminance(I)));
+    return emitter;
+}
+
+int make_goniometric(PbrtScene& scene, const PbrtArguments& args) {
+    const int emitter = add_image_light(scene, args, "goniometric");
+    // pbrt exchanges y and z: the zenith of its images is +y.
+    Transform from_image(
+        Transform::Matrix{{{1, 0, 0, 0}, {0, 0, 1, 0}, {0, 1, 0, 0}, {0, 0, 0, 1}}});
+    if (scene.is_v3())
+        from_image = from_image * from_z_up();
+    else
+        scene.set(emitter, "projection", std::string("equalarea"));
+    scene.set(emitter, "to_world", scene.state.ctm * from_image);
+    return finish(scene, emitter);
+}
+
+int make_projection(PbrtScene& scene, const PbrtArguments& args) {
+    const int emitter = add_image_light(scene, args, "projection");
+    scene.set(emitter, "fov", double(args.number("fov", scene.is_v3() ? 45 : 90, 0.01f, 179)));
+    // In pbrt-v3 the upper edge of the image is that of -y.
+    scene.set(emitter, "to_world",
+              scene.is_v3() ? scene.state.ctm * Transform::scale({1, -1, 1}) : scene.state.ctm);
+    return finish(scene, emitter);
+}
+
 int make_area(PbrtScene& scene, const PbrtArguments& args) {
     const int emitter = scene.add("emitter", "area", args.where());
     scene.set(emitter, "two_sided", args.flag("twosided", false));
@@ -197,16 +231,22 @@ const std::vector<PbrtEntry>& pbrt_lights() {
               {"conedeltaangle", ParamKind::Float, "5", "Width of the fall-off inside it."}},
              "I", "Intensity in the beam."),
          make_spot},
-        {"goniometric",
-         kV3And4,
-         "Rejected: intensity from an image is not supported.",
-         {},
-         nullptr},
-        {"projection",
-         kV3And4,
-         "Rejected: images projected from a point are not supported.",
-         {},
-         nullptr},
+        {"goniometric", kV3And4,
+         "Becomes goniometric; colours of the image are kept, which pbrt-v4 averages.",
+         with_shared({{"mapname", ParamKind::String, "", "Latitude-longitude image, +y up.", kV3},
+                      {"filename", ParamKind::String, "",
+                       "Square image in equal-area octahedral projection.", kV4},
+                      kPower},
+                     "I", "Factor of the image."),
+         make_goniometric},
+        {"projection", kV3And4, "Becomes projection; its pixels are not interpolated.",
+         with_shared({{"mapname", ParamKind::String, "", "Image.", kV3},
+                      {"filename", ParamKind::String, "", "Image.", kV4},
+                      {"fov", ParamKind::Float, "90, v3: 45",
+                       "Full angle in degrees over the shorter side."},
+                      kPower},
+                     "I", "Factor of the image; v3 only."),
+         make_projection},
     };
     return entries;
 }

@@ -72,6 +72,11 @@ PbrtRoughness read_roughness(PbrtScene& scene, const PbrtArguments& args, float 
     const bool remap = args.flag("remaproughness", true);
     r.given_zero = true;
     for (size_t i = 0; i < 2; ++i) {
+        if (i == 1 && !args.has(prefix + "uroughness") && !args.has(prefix + "vroughness")) {
+            r.alpha[1] = r.alpha[0];
+            r.texture[1] = r.texture[0];
+            break;
+        }
         std::string name = prefix + (i == 0 ? "uroughness" : "vroughness");
         if (!args.has(name)) name = prefix + "roughness";
         if (const auto x = scene.constant(args, name, fallback)) {
@@ -101,20 +106,20 @@ void set_roughness(PbrtScene& scene, int object, const PbrtRoughness& r) {
 }
 
 /// One α for models that have no other.
-float isotropic_alpha(PbrtScene& scene, const PbrtArguments& args, const PbrtRoughness& r) {
-    if (!r.is_constant()) {
-        scene.refuse(
-            args.where(),
-            fmt::format("the roughness of {} must be a number, not a texture", quote(args.name())),
-            "0.1");
-        return 0.1f;
-    }
+void set_isotropic_alpha(PbrtScene& scene, const PbrtArguments& args, int object,
+                         const PbrtRoughness& r) {
+    scene.set(object, "distribution", std::string("ggx"));
     if (!r.is_isotropic())
         scene.refuse(
             args.where(),
             fmt::format("the roughness of {} must be the same along u and v", quote(args.name())),
-            "their geometric mean");
-    return std::sqrt(*r.alpha[0] * *r.alpha[1]);
+            r.is_constant() ? "their geometric mean" : "that along u");
+    if (r.is_constant())
+        scene.set(object, "alpha", double(std::sqrt(*r.alpha[0] * *r.alpha[1])));
+    else if (r.alpha[0])
+        scene.set(object, "alpha", double(*r.alpha[0]));
+    else
+        scene.add_child(object, "alpha", r.texture[0]);
 }
 
 /// Index of refraction of a dielectric; a spectrum's at the sodium line.
@@ -287,10 +292,7 @@ int make_coateddiffuse(PbrtScene& scene, const PbrtArguments& args) {
     scene.bind(coated, "diffuse_reflectance", args, "reflectance", Rgb(0.5f));
     scene.set(coated, "nonlinear", true);
     set_ior(scene, coated, read_eta(scene, args, "eta", 1.5f));
-    if (!smooth) {
-        scene.set(coated, "distribution", std::string("ggx"));
-        scene.set(coated, "alpha", double(isotropic_alpha(scene, args, r)));
-    }
+    if (!smooth) set_isotropic_alpha(scene, args, coated, r);
     return reflecting(scene, args, coated);
 }
 

@@ -121,15 +121,42 @@ int make_mix(PbrtScene& scene, const PbrtArguments& args) {
     return texture;
 }
 
+/// A texture of space. Its space is that of the current transform; pbrt-v3 takes that transform for its inverse.
+int add_solid(PbrtScene& scene, const PbrtArguments& args, const char* type) {
+    const int texture = scene.add("texture", type, args.where());
+    const Transform& ctm = scene.state.ctm;
+    if (!ctm.is_identity()) scene.set(texture, "to_texture", scene.is_v3() ? ctm : ctm.inverse());
+    return texture;
+}
+
+void set_number(PbrtScene& scene, int texture, const PbrtArguments& args, const char* name) {
+    if (args.has(name)) scene.set(texture, name, double(args.number(name, 0)));
+}
+
+/// fbm, wrinkled, windy or marble, which have the same names here.
+int make_noise(PbrtScene& scene, const PbrtArguments& args) {
+    const int texture = add_solid(scene, args, args.name().c_str());
+    for (const char* name : {"roughness", "scale", "variation"})
+        set_number(scene, texture, args, name);
+    if (args.has("octaves")) scene.set(texture, "octaves", args.integer("octaves", 8, 1, 64));
+    return texture;
+}
+
+int make_dots(PbrtScene& scene, const PbrtArguments& args) {
+    const int texture = scene.add("texture", "dots", args.where());
+    bind(scene, texture, "inside", args, "inside", 1);
+    bind(scene, texture, "outside", args, "outside", 0);
+    set_to_uv(scene, texture, mapping(scene, args));
+    return texture;
+}
+
 int make_checkerboard(PbrtScene& scene, const PbrtArguments& args) {
-    if (args.integer("dimension", 2, 2, 3) == 3)
-        scene.refuse(
-            args.find("dimension")->where(),
-            "a checkerboard of three dimensions is not supported: textures are functions of (u, v)",
-            "one of two");
-    const int texture = scene.add("texture", "checkerboard", args.where());
+    const bool is_solid = args.integer("dimension", 2, 2, 3) == 3;
+    const int texture = is_solid ? add_solid(scene, args, "checkerboard3d")
+                                 : scene.add("texture", "checkerboard", args.where());
     bind(scene, texture, "color0", args, "tex1", 1);
     bind(scene, texture, "color1", args, "tex2", 0);
+    if (is_solid) return texture;
     // One square to the unit of (u, v), not two.
     set_to_uv(scene, texture, Transform::scale({0.5f, 0.5f, 1}) * mapping(scene, args));
     return texture;
@@ -157,8 +184,10 @@ std::vector<PbrtParamInfo> with_mapping(std::vector<PbrtParamInfo> params) {
     return params;
 }
 
-constexpr const char* kOfSpace =
-    "Rejected: textures are functions of (u, v), this one is of space.";
+std::vector<PbrtParamInfo> octaves() {
+    return {{"octaves", ParamKind::Int, "8", "Number of octaves."},
+            {"roughness", ParamKind::Float, "0.5", "Ratio of their amplitudes."}};
+}
 
 }  // namespace
 
@@ -197,10 +226,10 @@ const std::vector<PbrtEntry>& pbrt_textures() {
           {"tex2", ParamKind::Texture, "1", "Where amount is 1."},
           {"amount", ParamKind::Texture, "0.5", "Share of tex2."}},
          make_mix},
-        {"checkerboard", kV3And4, "Becomes checkerboard.",
+        {"checkerboard", kV3And4, "Becomes checkerboard, or checkerboard3d.",
          with_mapping({{"tex1", ParamKind::Texture, "1", "The squares of the diagonal."},
                        {"tex2", ParamKind::Texture, "0", "The others."},
-                       {"dimension", ParamKind::Int, "2", "3 is rejected."},
+                       {"dimension", ParamKind::Int, "2", "3 becomes checkerboard3d."},
                        {"aamode", ParamKind::String, "", "Accepted; without effect.", kV3}}),
          make_checkerboard},
         {"bilerp", kV3And4, "Becomes bilerp.",
@@ -209,18 +238,29 @@ const std::vector<PbrtEntry>& pbrt_textures() {
                        {"v10", ParamKind::Texture, "0", "At (1, 0)."},
                        {"v11", ParamKind::Texture, "1", "At (1, 1)."}}),
          make_bilerp},
-        {"dots", kV3And4, "Rejected: there is no such texture.", {}, nullptr},
+        {"dots", kV3And4, "Becomes dots, in places of etendue's own.",
+         with_mapping({{"inside", ParamKind::Texture, "1", "Value of the dots."},
+                       {"outside", ParamKind::Texture, "0", "Value around them."}}),
+         make_dots},
         {"uv", kV3, "Rejected: there is no such texture.", {}, nullptr},
         {"directionmix",
          kV4,
          "Rejected: textures are functions of (u, v), this one is of the normal.",
          {},
          nullptr},
+        {"fbm", kV3And4, "Becomes fbm; the noise is etendue's own.", octaves(), make_noise},
+        {"wrinkled", kV3And4, "Becomes wrinkled; the noise is etendue's own.", octaves(),
+         make_noise},
+        {"windy", kV3And4, "Becomes windy; the noise is etendue's own.", {}, make_noise},
+        {"marble",
+         kV3And4,
+         "Becomes marble, with pbrt-v4's spline; the noise is etendue's own.",
+         {{"octaves", ParamKind::Int, "8", "Number of octaves."},
+          {"roughness", ParamKind::Float, "0.5", "Ratio of their amplitudes."},
+          {"scale", ParamKind::Float, "1", "Factor of the coordinates."},
+          {"variation", ParamKind::Float, "0.2", "Factor of the noise."}},
+         make_noise},
         {"ptex", kV3And4, "Rejected: Ptex files are not supported.", {}, nullptr},
-        {"fbm", kV3And4, kOfSpace, {}, nullptr},
-        {"wrinkled", kV3And4, kOfSpace, {}, nullptr},
-        {"windy", kV3And4, kOfSpace, {}, nullptr},
-        {"marble", kV3And4, kOfSpace, {}, nullptr},
     };
     return entries;
 }

@@ -12,6 +12,8 @@ namespace etendue {
 TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fallback, float hi) {
     for (const auto& c : p.object().children)
         if (c.name == name && plugins_.object(c.object).category == "texture") {
+            if (emitting_shape_ && is_solid(c.object))
+                p.fail(name, "an emitter cannot have a texture of space: only one of (u, v)");
             const Texture* texture = make_texture(c.object);
             return texture ? TextureRef(texture) : TextureRef(fallback);
         }
@@ -22,6 +24,15 @@ TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fal
                          "parameter \"{}\" is ({}, {}, {}), but its components must be at most {}",
                          name, c.r, c.g, c.b, hi));
     return TextureRef(c);
+}
+
+bool ModelBuilder::is_solid(int texture) const {
+    const SceneObject& object = plugins_.object(texture);
+    for (const TextureEntry& e : texture_registry())
+        if (object.type == e.info.name && e.is_solid) return true;
+    for (const auto& c : object.children)
+        if (is_solid(c.object)) return true;
+    return false;
 }
 
 std::vector<const Material*> ModelBuilder::nested(const Params& p) {

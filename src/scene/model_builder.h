@@ -45,6 +45,8 @@ public:
 private:
     TextureRef texture(const Params& p, std::string_view name, Rgb fallback, float hi) override;
     std::vector<const Material*> nested(const Params& p) override;
+    /// Whether a texture, or one nested in it, is a function of the position.
+    bool is_solid(int texture) const;
     const Material* stand_in(int index);
     const Shape* shape() const override { return emitting_shape_; }
     TextureCache& images() override { return *models_.images; }

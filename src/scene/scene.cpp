@@ -82,10 +82,10 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage
         travelled += next.t;
         hit.t = travelled;
         passage.attenuation *= attenuation(passage.medium, next.t);
-        const float opacity =
-            next.shape->material->is_opaque()
-                ? 1
-                : next.shape->material->opacity({next.geometry.uv, next.geometry.color});
+        const float opacity = next.shape->material->is_opaque()
+                                  ? 1
+                                  : next.shape->material->opacity(
+                                        {next.geometry.uv, next.geometry.color, next.geometry.p});
         found = u < opacity;
         if (found) return false;
         u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
@@ -106,7 +106,8 @@ float Scene::masked_transmittance(const Ray& ray) const {
     for_each_surface(ray, [&](const SurfaceHit& hit) {
         Tr *= hit.shape->material->is_opaque()
                   ? 0
-                  : 1 - hit.shape->material->opacity({hit.geometry.uv, hit.geometry.color});
+                  : 1 - hit.shape->material->opacity(
+                            {hit.geometry.uv, hit.geometry.color, hit.geometry.p});
         return Tr > 0;
     });
     return Tr;

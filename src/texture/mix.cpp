@@ -19,6 +19,9 @@ public:
     Rgb eval(const TexturePoint& at) const override {
         return lerp(weight_.eval_scalar(at), value0_.eval(at), value1_.eval(at));
     }
+    float eval_scalar(const TexturePoint& at) const override {
+        return lerp(weight_.eval_scalar(at), value0_.eval_scalar(at), value1_.eval_scalar(at));
+    }
     Rgb mean() const override {  // exact where the weight is constant
         return lerp(luminance(weight_.mean()), value0_.mean(), value1_.mean());
     }

@@ -16,6 +16,10 @@ public:
           scale_(context.texture(params, "scale", Rgb(1))) {}
 
     Rgb eval(const TexturePoint& at) const override { return value_.eval(at) * scale_.eval(at); }
+    float eval_scalar(const TexturePoint& at) const override {
+        if (!scale_.is_constant() || !is_grey(scale_.eval(at))) return luminance(eval(at));
+        return value_.eval_scalar(at) * scale_.eval_scalar(at);
+    }
     Vec2 gradient(const TexturePoint& at) const override {
         if (!scale_.is_constant() || !is_grey(scale_.eval(at))) return Texture::gradient(at);
         return value_.gradient(at) * scale_.eval(at).r;

@@ -11,21 +11,27 @@ TextureEntry gridtexture_entry();
 TextureEntry mesh_attribute_entry();
 TextureEntry roughness_to_alpha_entry();
 TextureEntry threshold_entry();
+TextureEntry dots_entry();
+TextureEntry checkerboard3d_entry();
+TextureEntry fbm_entry();
+TextureEntry wrinkled_entry();
+TextureEntry windy_entry();
+TextureEntry marble_entry();
 
 Vec2 Texture::gradient(const TexturePoint& at) const {
-    const Vec2 uv = at.uv;
     int width, height;
     resolution(width, height);
     const Vec2 h = {0.1f / float(width), 0.1f / float(height)};
-    return {(eval_scalar({uv.x + h.x, uv.y}) - eval_scalar({uv.x - h.x, uv.y})) / (2 * h.x),
-            (eval_scalar({uv.x, uv.y + h.y}) - eval_scalar({uv.x, uv.y - h.y})) / (2 * h.y)};
+    return {(eval_scalar(at.moved({h.x, 0})) - eval_scalar(at.moved({-h.x, 0}))) / (2 * h.x),
+            (eval_scalar(at.moved({0, h.y})) - eval_scalar(at.moved({0, -h.y}))) / (2 * h.y)};
 }
 
 const std::vector<TextureEntry>& texture_registry() {
     static const std::vector<TextureEntry> entries = {
-        bitmap_entry(),   checkerboard_entry(), gridtexture_entry(),    scale_entry(),
-        mix_entry(),      bilerp_entry(),       mesh_attribute_entry(), roughness_to_alpha_entry(),
-        threshold_entry()};
+        bitmap_entry(),    checkerboard_entry(), gridtexture_entry(),    scale_entry(),
+        mix_entry(),       bilerp_entry(),       mesh_attribute_entry(), roughness_to_alpha_entry(),
+        threshold_entry(), dots_entry(),         checkerboard3d_entry(), fbm_entry(),
+        wrinkled_entry(),  windy_entry(),        marble_entry()};
     return entries;
 }
 

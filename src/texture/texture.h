@@ -1,5 +1,6 @@
 #pragma once
-// Textures: functions of the surface's (u, v) and of its vertex colours. Materials and emitters store `TextureRef`s: a constant or a texture.
+// Textures: functions of the surface's (u, v), of its vertex colours, or of the position ("solid" textures). Materials
+// and emitters store `TextureRef`s: a constant or a texture.
 
 #include <memory>
 #include <string>
@@ -14,11 +15,20 @@ namespace etendue {
 
 /// What a texture knows of the point at which it is evaluated.
 struct TexturePoint {
-    TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3(1, 1, 1)) : uv(uv_), color(color_) {}
+    TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3(1, 1, 1), Vec3 p_ = {}, Vec3 dpdu_ = {},
+                 Vec3 dpdv_ = {})
+        : uv(uv_), color(color_), p(p_), dpdu(dpdu_), dpdv(dpdv_) {}
     TexturePoint(float u, float v) : TexturePoint(Vec2{u, v}) {}
 
+    /// The point at (u, v) + `d` on the tangent plane.
+    TexturePoint moved(Vec2 d) const {
+        return {{uv.x + d.x, uv.y + d.y}, color, p + dpdu * d.x + dpdv * d.y, dpdu, dpdv};
+    }
+
     Vec2 uv;
-    Vec3 color;  ///< Interpolated vertex colour; white where the shape has none.
+    Vec3 color;       ///< Interpolated vertex colour; white where the shape has none.
+    Vec3 p;           ///< Position in the world.
+    Vec3 dpdu, dpdv;  ///< Its derivatives; needed for gradients only.
 };
 
 class Texture {
@@ -26,7 +36,7 @@ public:
     virtual ~Texture() = default;
     /// Colour at `at`; finite and not negative.
     virtual Rgb eval(const TexturePoint& at) const = 0;
-    /// Value of roughness, opacity and height maps: the luminance of colours, the value of grey.
+    /// Value of roughness, opacity and height maps: the luminance of colours, the value of grey; may be negative.
     virtual float eval_scalar(const TexturePoint& at) const { return luminance(eval(at)); }
     /// (∂/∂u, ∂/∂v) of eval_scalar(), for bump mapping; by central differences unless overridden.
     virtual Vec2 gradient(const TexturePoint& at) const;
@@ -87,6 +97,7 @@ public:
 struct TextureEntry {
     PluginInfo info;
     std::unique_ptr<Texture> (*make)(const Params& params, TextureContext& context);
+    bool is_solid = false;  ///< A function of the position, which emitters do not know.
 };
 /// All texture plug-ins, in the order of `etendue list`.
 const std::vector<TextureEntry>& texture_registry();

@@ -2,6 +2,8 @@
 
 #include "bsdf/plastic.h"
 
+#include <thread>
+
 #include "bsdf/roughdielectric.h"
 #include "bsdf/roughplastic.h"
 #include "lobe_tests.h"
@@ -144,6 +146,23 @@ TEST_F(PlasticTest, ParametersAreChecked) {
     EXPECT_THROW(m.make("roughplastic", {{"distribution", std::string("gauss")}}), SceneError);
     EXPECT_THROW(m.make("roughplastic", {{"alpha", -0.1}}), SceneError);
     EXPECT_FLOAT_EQ(lobe_of<PlasticLobe>(m.make("plastic")).eta, 1.49f / 1.000277f);
+}
+
+TEST(SharedTransmittances, AreThoseOfTheCoatAndMadeOnce) {
+    const auto a = SharedTransmittance::of(Microfacet::Kind::Ggx, 0.3f, 1.5f),
+               b = SharedTransmittance::of(Microfacet::Kind::Ggx, 0.3f, 1.5f);
+    EXPECT_EQ(a, b);
+    EXPECT_NE(a, SharedTransmittance::of(Microfacet::Kind::Beckmann, 0.3f, 1.5f));
+    EXPECT_NE(a, SharedTransmittance::of(Microfacet::Kind::Ggx, 0.3f, 1.6f));
+    const float* tables[4];
+    std::vector<std::thread> threads;
+    for (const float*& table : tables)
+        threads.emplace_back([&table, &a] { table = a->get().table(); });
+    for (std::thread& t : threads) t.join();
+    for (const float* table : tables) EXPECT_EQ(table, tables[0]);
+    const RoughTransmittance expected({Microfacet::Kind::Ggx, 0.3f, 0.3f}, 1.5f);
+    EXPECT_EQ(a->get().internal_reflectance(), expected.internal_reflectance());
+    for (int i = 0; i < 64; ++i) EXPECT_EQ(tables[0][i], expected.table()[i]);
 }
 
 }  // namespace

@@ -6,9 +6,11 @@
 
 #include <gtest/gtest.h>
 
+#include "chi2.h"
 #include "emitter/area.h"
 #include "emitter/environment.h"
 #include "emitter/point.h"
+#include "image/image_io.h"
 #include "random.h"
 
 namespace etendue {
@@ -140,6 +142,138 @@ TEST(EqualAreaEnvironment, SamplesHaveTheDensityOfTheImage) {
     EXPECT_NEAR(sphere / kSamples, 4 * M_PI, 0.02 * 4 * M_PI);
     EXPECT_NEAR(double(bright) / kSamples, 0.6, 4 * 0.5 / std::sqrt(double(kSamples)));
     EXPECT_NEAR(environment->power(), M_PI * 4 * M_PI * 2.5, 1e-2);
+}
+
+// ---- Points with an image of their intensity
+
+class ImageLights : public ::testing::Test {
+protected:
+    std::unique_ptr<Emitter> make(const EmitterEntry& entry, int width, int height,
+                                  std::vector<Rgb> pixels, std::vector<Param> params = {}) {
+        const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+        const std::string file = ::testing::TempDir() + "etendue-" + test->name() + ".exr";
+        write_image(file, rgb_image(width, height, pixels));
+        params.push_back({"filename", file, {}});
+        scene_.objects = {{"emitter", entry.info.name, "", {}, std::move(params), {}}};
+        return std::move(entry.make({scene_, 0}, context_).front());
+    }
+
+    /// Samples of emission against the density and the intensity that are claimed for both directions.
+    void expect_consistent(const Emitter& light, int cells) {
+        EXPECT_TRUE(light.is_delta());
+        testing::Random random(5);
+        testing::Chi2Grid grid(0, M_PI, cells, -M_PI, M_PI, cells);
+        double flux = 0;
+        for (int i = 0; i < kSamples; ++i) {
+            const EmissionSample s = light.sample_emission({}, random.next_2d());
+            grid.add(std::acos(double(s.d.z)), std::atan2(double(s.d.y), double(s.d.x)));
+            if (!(s.pdf_d > 0)) continue;  // rounded across the edge of a black pixel
+            flux += double(luminance(s.Le) / s.pdf_d);
+            ASSERT_LE(s.pdf_d, light.max_pdf_d());
+            const Emitter::Emission e = light.eval_emission(s.ng, s.uv, s.d);
+            ASSERT_EQ(e.pdf_d, s.pdf_d);
+            ASSERT_EQ(e.Le_cos, s.Le);
+            // Next event from a point in this direction.
+            DirectSample direct;
+            ASSERT_TRUE(light.sample_direct(s.p + s.d * 4, {}, direct));
+            ASSERT_NEAR(direct.dist, 4, 1e-4);
+            EXPECT_EQ(direct.pdf, 1);
+        }
+        EXPECT_NEAR(flux / kSamples / light.power(), 1, 0.01);
+        const auto density = [&](double theta, double phi) {
+            const double r = std::sin(theta);
+            const Vec3 d{float(r * std::cos(phi)), float(r * std::sin(phi)),
+                         float(std::cos(theta))};
+            return r * double(light.eval_emission({}, {}, d).pdf_d);
+        };
+        const testing::Chi2Result result = grid.test(density, 3);
+        EXPECT_GT(result.p_value, 1e-3);
+        EXPECT_NEAR(result.total_probability, 1, 5e-3);
+    }
+
+    static Emitter::Emission along(const Emitter& light, Vec3 d) {
+        return light.eval_emission({}, {}, normalize(d));
+    }
+
+    SceneDescription scene_;
+    NoContext context_;
+};
+
+TEST_F(ImageLights, ProjectionShowsTheImageUpright) {
+    // Two columns and one row: red on the left, that is -x; the view is 90° high and twice as wide.
+    const auto light =
+        make(projection_entry(), 2, 1, {Rgb(1, 0, 0), Rgb(0, 1, 0)}, {{"intensity", Rgb(3), {}}});
+    EXPECT_EQ(along(*light, {-0.1f, 0, 1}).Le_cos, Rgb(3, 0, 0));
+    EXPECT_EQ(along(*light, {1.9f, 0.9f, 1}).Le_cos, Rgb(0, 3, 0));
+    for (const Vec3 d : {Vec3{2.1f, 0, 1}, {0, 1.1f, 1}, {0, 0, -1}, {1, 0, 0}}) {
+        EXPECT_EQ(along(*light, d).Le_cos, Rgb(0));
+        EXPECT_EQ(along(*light, d).pdf_d, 0);
+    }
+    const auto rows = make(projection_entry(), 1, 2, {Rgb(1), Rgb(2)});
+    EXPECT_EQ(along(*rows, {0, 0.5f, 1}).Le_cos, Rgb(1));  // the upper row
+}
+
+TEST_F(ImageLights, ProjectionIsSampledByItsImage) {
+    const std::vector<Rgb> pixels = {Rgb(1), Rgb(0), Rgb(5), Rgb(0.5f, 0, 2), Rgb(3), Rgb(0.1f)};
+    const auto light =
+        make(projection_entry(), 3, 2, pixels,
+             {{"fov", 100.0, {}}, {"to_world", Transform::rotate({1, 2, 3}, 50), {}}});
+    expect_consistent(*light, 24);
+    const auto mirrored =
+        make(projection_entry(), 3, 2, pixels, {{"to_world", Transform::scale({-2, 2, 2}), {}}});
+    expect_consistent(*mirrored, 24);
+}
+
+TEST_F(ImageLights, GoniometricIsSampledByItsImage) {
+    std::vector<Rgb> pixels;
+    for (int i = 0; i < 8 * 8; ++i) pixels.push_back(Rgb(float(i * 7 % 11), 1, float(i % 3)));
+    for (const char* projection : {"latlong", "equalarea"}) {
+        SCOPED_TRACE(projection);
+        const auto light =
+            make(goniometric_entry(), 8, 8, pixels,
+                 {{"projection", std::string(projection), {}},
+                  // The poles of the first one, where its density diverges, are ±z.
+                  {"to_world",
+                   Transform::rotate({0, 0, 1}, 25) * Transform::rotate({1, 0, 0}, 90),
+                   {}}});
+        expect_consistent(*light, 24);
+    }
+}
+
+TEST_F(ImageLights, GoniometricHasTheDirectionsOfItsImage) {
+    // Square with the zenith +z in the middle.
+    std::vector<Rgb> pixels(9, Rgb(1));
+    pixels[4] = Rgb(7);
+    const auto light = make(
+        goniometric_entry(), 3, 3, pixels,
+        {{"projection", std::string("equalarea"), {}},
+         {"to_world", Transform::translate({1, 2, 3}) * Transform::rotate({1, 0, 0}, 90), {}}});
+    EXPECT_EQ(along(*light, {0, -1, 0}).Le_cos, Rgb(7));
+    EXPECT_EQ(along(*light, {0, 1, 0}).Le_cos, Rgb(1));
+    EXPECT_EQ(light->sample_emission({}, {0.5f, 0.5f}).p, Vec3(1, 2, 3));
+    // The upper half of a latitude-longitude image is that of +y.
+    const auto up = make(goniometric_entry(), 1, 2, {Rgb(4), Rgb(0)});
+    EXPECT_EQ(along(*up, {0, 1, 0}).Le_cos, Rgb(4));
+    EXPECT_EQ(along(*up, {0, -1, 0}).Le_cos, Rgb(0));
+}
+
+TEST_F(ImageLights, AreScaledToAPower) {
+    const std::vector<Rgb> pixels = {Rgb(1), Rgb(2), Rgb(3), Rgb(0)};
+    for (const auto& entry : {goniometric_entry(), projection_entry()})
+        EXPECT_NEAR(make(entry, 2, 2, pixels, {{"power", 60.0, {}}})->power(), 60, 1e-3);
+    const auto white = make(projection_entry(), 1, 1, {Rgb(1)});
+    EXPECT_NEAR(white->power(), 4 * M_PI / 6, 1e-5);  // one of the six faces of a cube
+}
+
+TEST_F(ImageLights, RefuseWhatTheyCannotDo) {
+    const std::vector<Rgb> pixels = {Rgb(0), Rgb(0)};
+    EXPECT_THROW(make(projection_entry(), 2, 1, pixels, {{"power", 1.0, {}}}), SceneError);
+    EXPECT_THROW(
+        make(goniometric_entry(), 2, 1, pixels, {{"projection", std::string("equalarea"), {}}}),
+        SceneError);
+    EXPECT_THROW(
+        make(projection_entry(), 2, 1, pixels, {{"to_world", Transform::scale({1, 2, 1}), {}}}),
+        SceneError);
 }
 
 }  // namespace

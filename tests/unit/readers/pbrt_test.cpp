@@ -407,7 +407,62 @@ TEST(Pbrt, CheckerboardHasOneSquareToTheUnit) {
     EXPECT_EQ(value<Rgb>(t, "color0"), Rgb(1));
 }
 
+TEST(Pbrt, TexturesOfSpaceHaveTheCurrentTransform) {
+    const std::string world = "Scale 2 2 2\nTexture \"t\" \"spectrum\" \"marble\" \"float scale\" "
+                              "3 \"integer octaves\" 4\n"
+                              "Identity Material \"diffuse\" \"texture reflectance\" \"t\" " +
+                              std::string(kSphere);
+    const auto v4 = parse4(world);
+    const SceneObject& t = child(v4, material(v4), "texture", "reflectance");
+    EXPECT_EQ(t.type, "marble");
+    EXPECT_EQ(value<double>(t, "scale"), 3);
+    EXPECT_EQ(value<int64_t>(t, "octaves"), 4);
+    expect_near(value<Transform>(t, "to_texture").point({2, 4, 6}), {1, 2, 3});
+    // pbrt-v3 applies the transform itself to the points of the world.
+    const auto v3 =
+        parse3("Scale 2 2 2\nTexture \"t\" \"color\" \"checkerboard\" \"integer dimension\" 3\n"
+               "Identity Material \"matte\" \"texture Kd\" \"t\" " +
+               std::string(kSphere));
+    const SceneObject& cubes = child(v3, material(v3), "texture", "reflectance");
+    EXPECT_EQ(cubes.type, "checkerboard3d");
+    expect_near(value<Transform>(cubes, "to_texture").point({1, 2, 3}), {2, 4, 6});
+}
+
+TEST(Pbrt, CoatsHaveTexturesOfRoughness) {
+    const std::string texture = "Texture \"r\" \"float\" \"checkerboard\"\n";
+    const auto scene =
+        parse4(texture + "Material \"coateddiffuse\" \"texture roughness\" \"r\" " + kSphere);
+    EXPECT_EQ(child(scene, material(scene), "texture", "alpha").type, "roughness_to_alpha");
+}
+
 // ---- Lights and the view
+
+TEST(Pbrt, LightsWithImages) {
+    const auto v4 =
+        parse4("Translate 1 2 3\nLightSource \"goniometric\" \"string filename\" \"a.exr\" \"float "
+               "scale\" 2\n"
+               "LightSource \"projection\" \"string filename\" \"b.exr\" \"float power\" 50\n");
+    const SceneObject &g = find(v4, "emitter"), &p = find(v4, "emitter", 1);
+    EXPECT_EQ(g.type, "goniometric");
+    expect_near(value<Rgb>(g, "intensity"), Rgb(2));
+    // The middle of the square, its +z, is the light's +y.
+    expect_near(value<Transform>(g, "to_world").point({0, 0, 1}), {1, 3, 3});
+    EXPECT_EQ(p.type, "projection");
+    EXPECT_EQ(value<double>(p, "fov"), 90);
+    EXPECT_NEAR(value<double>(p, "power"), 50, 1e-4);
+    expect_near(value<Transform>(p, "to_world").vector({0, 1, 0}), {0, 1, 0});
+    const auto v3 =
+        parse3("LightSource \"goniometric\" \"string mapname\" \"a.exr\" \"rgb I\" [1 2 3]\n"
+               "LightSource \"projection\" \"string mapname\" \"b.exr\"\n");
+    expect_near(value<Rgb>(find(v3, "emitter"), "intensity"), Rgb(1, 2, 3));
+    // The column of azimuth 0 is +x, a quarter on it is +z; the zenith is +y.
+    const Transform t = value<Transform>(find(v3, "emitter"), "to_world");
+    expect_near(t.vector({0, 1, 0}), {0, 1, 0});
+    expect_near(t.vector({0, 0, -1}), {1, 0, 0});
+    expect_near(t.vector({1, 0, 0}), {0, 0, 1});
+    EXPECT_EQ(value<double>(find(v3, "emitter", 1), "fov"), 45);
+    expect_near(value<Transform>(find(v3, "emitter", 1), "to_world").vector({0, 1, 0}), {0, -1, 0});
+}
 
 TEST(Pbrt, LightsOfV4AreScaledByPowerAndExposure) {
     const auto scene = parse_pbrt(
@@ -509,8 +564,8 @@ TEST(Pbrt, ErrorsNameTheLineAndWhatIsNear) {
         {"Material \"conductor\" \"spectrum eta\" \"metal-Ak-eta\"", 2,
          "unknown spectrum \"metal-Ak-eta\" (did you mean \"metal-A"},
         {"Texture \"t\" \"int\" \"imagemap\"", 2, "a texture is of the type float or spectrum"},
-        {"Texture \"t\" \"float\" \"fbm\"", 2, "this one is of space"},
-        {"LightSource \"goniometric\"", 2, "intensity from an image is not supported"},
+        {"Texture \"t\" \"float\" \"directionmix\"", 2, "this one is of the normal"},
+        {"Material \"measured\"", 2, "measured BSDFs are not supported"},
         {"Camera \"perspective\"", 2, "Camera must stand before WorldBegin"},
         {"AttributeEnd", 2, "AttributeEnd without AttributeBegin"},
         {"AttributeBegin TransformEnd", 2, "the last thing opened is the AttributeBegin"},

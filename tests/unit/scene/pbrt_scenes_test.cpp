@@ -59,10 +59,11 @@ TEST(PbrtScenes, WhatTheReaderNamesTheBuilderKnows) {
     for (const char* material :
          {"diffuse\" \"float sigma\" 20", "diffuse\" \"texture reflectance\" \"t\"",
           "diffuse\" \"texture displacement\" \"f\"", "coateddiffuse",
-          "coateddiffuse\" \"float roughness\" .1", "conductor",
-          "conductor\" \"texture roughness\" \"f\"", "conductor\" \"rgb reflectance\" [.2 .3 .4]",
-          "dielectric", "dielectric\" \"float roughness\" .2", "thindielectric",
-          "diffusetransmission", "interface"}) {
+          "coateddiffuse\" \"texture roughness\" \"f\"", "coateddiffuse\" \"float roughness\" .1",
+          "conductor", "conductor\" \"texture roughness\" \"f\"",
+          "conductor\" \"rgb reflectance\" [.2 .3 .4]", "dielectric",
+          "dielectric\" \"float roughness\" .2", "thindielectric", "diffusetransmission",
+          "interface"}) {
         SCOPED_TRACE(material);
         const std::string quote = std::string(material).find('"') == std::string::npos ? "\"" : "";
         EXPECT_NO_THROW(build4(kTextures + "Material \"" + material + quote + kSphere));
@@ -77,7 +78,9 @@ TEST(PbrtScenes, WhatTheReaderNamesTheBuilderKnows) {
     }
     for (const char* texture :
          {"mix\" \"rgb tex1\" [1 0 0] \"texture amount\" \"f\"", "bilerp\" \"rgb v00\" [1 0 0]",
-          "scale\" \"rgb tex\" [.5 .5 .5] \"texture scale\" \"t\""}) {
+          "scale\" \"rgb tex\" [.5 .5 .5] \"texture scale\" \"t\"", "marble\"",
+          "checkerboard\" \"integer dimension\" 3", "dots\" \"texture inside\" \"t\"",
+          "fbm\" \"integer octaves\" 3", "wrinkled\" \"float roughness\" .7", "windy\""}) {
         SCOPED_TRACE(texture);
         EXPECT_NO_THROW(build4(kTextures + "Texture \"x\" \"spectrum\" \"" + texture +
                                "\nMaterial \"diffuse\" \"texture reflectance\" \"x\"" + kSphere));

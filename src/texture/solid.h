@@ -1,0 +1,28 @@
+#pragma once
+
+#include "math/transform.h"
+#include "texture/texture.h"
+
+namespace etendue {
+
+/// A function of the position alone, in a space of its own (parameter `to_texture`, from the world).
+class SolidTexture : public Texture {
+public:
+    explicit SolidTexture(const Params& params) : to_texture_(params.transform("to_texture")) {}
+
+    /// Steps of gradients: those that pbrt takes where it knows of no pixel, 0.0005.
+    void resolution(int& width, int& height) const override { width = height = 200; }
+
+protected:
+    Vec3 point(const TexturePoint& at) const { return to_texture_.point(at.p); }
+
+    static ParamInfo to_texture_info() {
+        return {"to_texture", ParamKind::Transform, "identity",
+                "From the world to the space of the pattern."};
+    }
+
+private:
+    Transform to_texture_;
+};
+
+}  // namespace etendue
