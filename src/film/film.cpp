@@ -82,7 +82,8 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     mean /= double(n);
     for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
-            // Half the squared difference of two passes estimates the variance of one pass, even if its samples are correlated.
+            // Half the squared difference of two passes estimates the variance of one pass, even if its samples are
+            // correlated.
             const double scale2 = sqr(double(expected_[i])) + 0.01 * mean * mean;
             if (second && scale2 > 0) pair_sum[chunk] += 0.5 * sqr(double(previous_[i])) / scale2;
             expected_[i] = std::max(expected_[i], float(0.1 * mean));
@@ -166,7 +167,8 @@ ErrorEstimate Film::group_error() const {
 ErrorEstimate Film::error() const {
     if (has_groups()) return group_error();
     ErrorEstimate e;
-    // The errors of the first pairs are relative to a mean that was still noisy. They are left out when there are others.
+    // The errors of the first pairs are relative to a mean that was still noisy. They are left out when there are
+    // others.
     const size_t skip = std::min<size_t>(pair_errors_.size() / 4, 8);
     const size_t count = pair_errors_.size() - skip;
     if (count < 4) return e;

@@ -20,8 +20,8 @@ struct ErrorEstimate {
 };
 
 /// Accumulates passes. The image of the current pass is separate from the totals, so that the pass can be discarded. A
-/// finished pass is added to the totals. Within a pass, the eye contributions of a pixel come from one thread at a time;
-/// splats may come from any thread.
+/// finished pass is added to the totals. Within a pass, the eye contributions of a pixel come from one thread at a
+/// time; splats may come from any thread.
 class Film {
 public:
     /// `typical_radiance`: an estimate of the scene's radiance within a factor of about 1000. The absolute precision of
@@ -51,9 +51,9 @@ public:
         return {{r.low.x + u.x * r.size.x, r.low.y + u.y * r.size.y}, r.area()};
     }
 
-    /// Declares that passes depend on each other, as those of Markov chains do: pass i belongs to group i mod `count`, and
-    /// groups are independent. error(), variance() and the error of the mean are then computed from groups, and are unknown
-    /// until every group has had a pass. `count` must be even. To be called before the first pass.
+    /// Declares that passes depend on each other, as those of Markov chains do: pass i belongs to group i mod `count`,
+    /// and groups are independent. error(), variance() and the error of the mean are then computed from groups, and are
+    /// unknown until every group has had a pass. `count` must be even. To be called before the first pass.
     void set_groups(int count);
 
     // -- The current pass.
@@ -62,8 +62,8 @@ public:
     void begin_pass(uint64_t light_paths);
     /// Adds the eye path's value (already times PixelSample::weight) to its own pixel.
     void add_eye(uint64_t pixel, Rgb value) { pass_.add_eye(pixel, value); }
-    /// Adds the contribution of a light path at a film point, distributed to all pixels whose filter reaches it. `value` is
-    /// for one light path; it is divided by the number of light paths.
+    /// Adds the contribution of a light path at a film point, distributed to all pixels whose filter reaches it.
+    /// `value` is for one light path; it is divided by the number of light paths.
     void add_splat(Vec2 point, Rgb value) { pass_.add_splat(point, value); }
     /// Hints that a splat at `point` may follow.
     void prefetch_splat(Vec2 point) const { pass_.prefetch_splat(point); }
@@ -78,8 +78,8 @@ public:
     uint64_t passes() const { return passes_; }
     /// Mean luminance of a pixel in the finished passes, at least a tenth of the image's mean; 0 in the first pass.
     float expected_luminance(uint64_t pixel) const { return expected_[pixel]; }
-    /// The same at a film point (clamped to the crop), averaged over a block of pixels. Splats read this in random order;
-    /// unlike the pixels, the blocks fit into the processor's cache.
+    /// The same at a film point (clamped to the crop), averaged over a block of pixels. Splats read this in random
+    /// order; unlike the pixels, the blocks fit into the processor's cache.
     float expected_luminance(Vec2 point) const {
         const auto [x, y] = geometry_.pixel_near(point);
         return expected_blocks_[uint64_t(y / kBlock) * blocks_across() + uint64_t(x / kBlock)];
@@ -131,8 +131,8 @@ private:
     std::vector<Moments> moments_;
     std::vector<float> expected_;
     std::vector<float> expected_blocks_;  ///< Means of kBlock × kBlock pixels.
-    /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. With groups: the
-    /// luminance of the eye paths in the pass that is being added.
+    /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. With
+    /// groups: the luminance of the eye paths in the pass that is being added.
     std::vector<float> previous_;
     std::vector<double>
         pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.

@@ -61,7 +61,8 @@ inline FilmRegion reached_region(const FilmGeometry& g, const ReconstructionFilt
 template <class Use>
 void for_each_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point,
                     const Use& use) {
-    // Pixels i with |point - (i + 1/2)| ≤ r, clamped before the conversion, because an integer cannot represent every float.
+    // Pixels i with |point - (i + 1/2)| ≤ r, clamped before the conversion, because an integer cannot represent every
+    // float.
     const float r = filter.radius();
     const auto first = [r](float at, int begin, int end) {
         return int(std::min(std::max(float(begin), std::ceil(at - r - 0.5f)), float(end)));

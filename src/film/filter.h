@@ -1,7 +1,7 @@
 #pragma once
-// Reconstruction filters. A filter is the response of a pixel to light at an offset from the pixel's centre. Eye samples are
-// drawn from it (filter importance sampling [Ernst et al. 2006]), and splats are weighted with it, so both estimate the same
-// image.
+// Reconstruction filters. A filter is the response of a pixel to light at an offset from the pixel's centre. Eye
+// samples are drawn from it (filter importance sampling [Ernst et al. 2006]), and splats are weighted with it, so both
+// estimate the same image.
 
 #include <memory>
 #include <vector>

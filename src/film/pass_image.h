@@ -11,8 +11,9 @@
 
 namespace etendue {
 
-/// The image of the current pass, separate from the film's totals, so that the pass can be discarded. The eye contributions
-/// of a pixel come from one thread at a time; splats may come from any thread. `geometry` and `filter` must outlive it.
+/// The image of the current pass, separate from the film's totals, so that the pass can be discarded. The eye
+/// contributions of a pixel come from one thread at a time; splats may come from any thread. `geometry` and `filter`
+/// must outlive it.
 class PassImage {
 public:
     PassImage(const FilmGeometry& geometry, const ReconstructionFilter& filter,

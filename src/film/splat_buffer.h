@@ -16,11 +16,11 @@ namespace etendue {
 
 /// The splats of one pass. Sums are integers, so that the result does not depend on the order of the additions.
 ///
-/// A sum consists of digits in base 2^26, each in 64 bits: digit j counts multiples of unit·2^(26j), where the unit is a
-/// power of two, 2^-40 of a typical radiance. A value below 2^50 units is rounded to the nearest unit and added to digit 0.
-/// A larger value is added to the digit that can represent all its bits. Before a digit overflows, most of its value is
-/// carried to the next digit. Therefore no value is too large, and no sum overflows. Digits above 0 are allocated when they
-/// are needed.
+/// A sum consists of digits in base 2^26, each in 64 bits: digit j counts multiples of unit·2^(26j), where the unit is
+/// a power of two, 2^-40 of a typical radiance. A value below 2^50 units is rounded to the nearest unit and added to
+/// digit 0. A larger value is added to the digit that can represent all its bits. Before a digit overflows, most of its
+/// value is carried to the next digit. Therefore no value is too large, and no sum overflows. Digits above 0 are
+/// allocated when they are needed.
 class SplatBuffer {
 public:
     /// Values may have any magnitude; the precision of small ones is relative to `typical_radiance`.
@@ -47,8 +47,8 @@ private:
     static constexpr int kDigitBits = 26;
     /// Enough for the largest float over the smallest: 2^128/2^-149 = 2^277 = 2^(26·9 + 43).
     static constexpr size_t kDigits = 11;
-    /// Largest value, in units, that is added to digit 0. A cell never leaves (-2^63, 2^63): it can exceed kFull only by the
-    /// values that up to 2^12 threads, 2^50 each, add before it is carried.
+    /// Largest value, in units, that is added to digit 0. A cell never leaves (-2^63, 2^63): it can exceed kFull only
+    /// by the values that up to 2^12 threads, 2^50 each, add before it is carried.
     static constexpr double kLarge = 0x1p50;
     static constexpr int64_t kFull = int64_t(1) << 61;
 

@@ -1,10 +1,10 @@
 // Bidirectional path tracing [Veach & Guibas 1994; Lafortune & Willems 1993]: all techniques C(s,t), combined by the power
 // heuristic. Unbiased. Joins with a small contribution pass Russian roulette before their shadow ray.
 //
-// An eye vertex is connected to the light path of its own pixel, or to C random vertices of the light vertex cache, which
-// holds the V connectible vertices y_i, i ≥ 1, of all light paths of the pass [Davidovič et al. 2014]. In the latter case
-// the contribution of each connection C(s,t), s, t ≥ 2, is multiplied by V/(C·N_L), and the weights count C·N_L/V̄ samples.
-// V̄ is the mean of V; V itself cannot be used in the weights, because it depends on the paths.
+// An eye vertex is connected to the light path of its own pixel, or to C random vertices of the light vertex cache,
+// which holds the V connectible vertices y_i, i ≥ 1, of all light paths of the pass [Davidovič et al. 2014]. In the
+// latter case the contribution of each connection C(s,t), s, t ≥ 2, is multiplied by V/(C·N_L), and the weights count
+// C·N_L/V̄ samples. V̄ is the mean of V; V itself cannot be used in the weights, because it depends on the paths.
 
 #include "integrator/bdpt.h"
 

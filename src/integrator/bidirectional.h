@@ -54,8 +54,8 @@ public:
                 learned};
     }
 
-    /// Traces the light sub-path work.y, which is the light path c.own_light_path(). Adds C(s,1) and C(s,0) if this pixel is
-    /// the first one that uses this light path.
+    /// Traces the light sub-path work.y, which is the light path c.own_light_path(). Adds C(s,1) and C(s,0) if this
+    /// pixel is the first one that uses this light path.
     void trace_light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                           const LearnedPlaces* learned = nullptr) const;
     /// Traces the eye sub-path work.z.
@@ -66,8 +66,8 @@ public:
         return z[t - 1].is_connectible && t <= depth_.max_depth;
     }
 
-    /// Traces the light paths of the pass, adds C(s,1) and C(s,0), and stores the first `kept` paths in `cache`. The caller
-    /// has called cache.begin().
+    /// Traces the light paths of the pass, adds C(s,1) and C(s,0), and stores the first `kept` paths in `cache`. The
+    /// caller has called cache.begin().
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& counts, uint64_t kept,
                            LightVertexCache& cache, const LearnedPlaces* learned = nullptr) const;
 
@@ -106,8 +106,8 @@ public:
             for_each_hit(c.scene, work.z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution * factor); });
     }
-    /// Adds the join, times `factor`, if it exists and passes test(). If z_{t-1} has several joins of the same technique,
-    /// `draw` (from 1 on) distinguishes them.
+    /// Adds the join, times `factor`, if it exists and passes test(). If z_{t-1} has several joins of the same
+    /// technique, `draw` (from 1 on) distinguishes them.
     void add(const SampleContext& c, const std::optional<Join>& join, Workspace& work,
              float factor = 1, uint32_t draw = 0) const;
     /// The contribution of a join after Russian roulette and the shadow ray; empty if either of them ends it. A unit of

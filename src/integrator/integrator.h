@@ -21,19 +21,20 @@ enum class Estimator { Unbiased, Consistent, Biased };
 class Integrator {
 public:
     virtual ~Integrator() = default;
-    /// Learns from the statistics of earlier passes. Called before pass 0, when there are none, and before passes 1, 4, 16,
-    /// 64 …. What is learned holds until the next call. From each call on, the random numbers are independent of all earlier
-    /// ones. Therefore no pass uses learned data that depend on its own random numbers, and every pass is unbiased.
+    /// Learns from the statistics of earlier passes. Called before pass 0, when there are none, and before passes 1, 4,
+    /// 16, 64 …. What is learned holds until the next call. From each call on, the random numbers are independent of
+    /// all earlier ones. Therefore no pass uses learned data that depend on its own random numbers, and every pass is
+    /// unbiased.
     virtual void learn(const LearnContext&) {}
     /// Whether learn() changes the sampling or the weights of later passes.
     virtual bool is_learning() const { return false; }
-    /// Writes the state that later passes need. Called between passes. After load(), an integrator with the same parameters
-    /// continues as this one would. The state includes neither the film and the statistics nor the data of a single pass.
-    /// load() throws std::runtime_error if the state is that of another integrator.
+    /// Writes the state that later passes need. Called between passes. After load(), an integrator with the same
+    /// parameters continues as this one would. The state includes neither the film and the statistics nor the data of a
+    /// single pass. load() throws std::runtime_error if the state is that of another integrator.
     virtual void save(LearnedState&) const {}
     virtual void load(LearnedState&) {}
-    /// Traces the paths that the samples of the pass share. Called by one thread, before the samples. An exception, here or
-    /// in a sample, discards the pass.
+    /// Traces the paths that the samples of the pass share. Called by one thread, before the samples. An exception,
+    /// here or in a sample, discards the pass.
     virtual void trace(const PassContext&) {}
 
     /// Makes the sums that a worker accumulates during a pass for learn() (Workspace::sums); nullptr if there are none.
@@ -54,8 +55,8 @@ public:
     /// Whether contributions are reported together with their sub-paths, which `verify` needs to identify the paths.
     virtual bool keeps_paths() const { return true; }
     virtual Estimator estimator() const = 0;
-    /// Number of independent groups of passes, for integrators whose passes depend on each other: pass i belongs to group i
-    /// modulo this number. 0 if all passes are independent.
+    /// Number of independent groups of passes, for integrators whose passes depend on each other: pass i belongs to
+    /// group i modulo this number. 0 if all passes are independent.
     virtual int error_groups() const { return 0; }
     /// Factor of the splats of the last pass in estimates of the error from groups, see Film::end_pass().
     virtual double splat_error_factor() const { return 1; }
@@ -63,8 +64,8 @@ public:
     virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
 
-/// An integrator with its parameters, as text: `bdpt:max_depth=12,rr_depth=5`. Parameters are checked against the table of the
-/// integrator.
+/// An integrator with its parameters, as text: `bdpt:max_depth=12,rr_depth=5`. Parameters are checked against the table
+/// of the integrator.
 struct IntegratorSpec {
     std::string name;
     std::map<std::string, std::string> params;

@@ -1,7 +1,7 @@
 // Light tracing, or particle tracing: light paths are connected to the lens [Dutré & Willems 1995].
 //
-// Techniques: C(s,1) splats and, with a finite lens, C(s,0). Unbiased for the paths it can make. Limits: with a pinhole,
-// everything that is seen in a mirror or through glass is missing.
+// Techniques: C(s,1) splats and, with a finite lens, C(s,0). Unbiased for the paths it can make. Limits: with a
+// pinhole, everything that is seen in a mirror or through glass is missing.
 
 #include "integrator/light.h"
 

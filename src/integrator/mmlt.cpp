@@ -1,10 +1,10 @@
-// Multiplexed Metropolis light transport [Hachisuka et al. 2014]: a state is one path made by one technique, which one of
-// its random numbers chooses. Each path length has its own chains. Unbiased.
+// Multiplexed Metropolis light transport [Hachisuka et al. 2014]: a state is one path made by one technique, which one
+// of its random numbers chooses. Each path length has its own chains. Unbiased.
 //
-// The contribution of C(s,t) of length k is C·w/p(s|k), with the weights of bidirectional path tracing. A pilot fixes p(s|k):
-// four fifths are proportional to the energy of each technique, and one fifth is uniform. Walks have no Russian roulette. The
-// last class contains all longer paths; its states also choose their length, from a geometric distribution. Only large and
-// block steps change the technique and the length.
+// The contribution of C(s,t) of length k is C·w/p(s|k), with the weights of bidirectional path tracing. A pilot fixes
+// p(s|k): four fifths are proportional to the energy of each technique, and one fifth is uniform. Walks have no Russian
+// roulette. The last class contains all longer paths; its states also choose their length, from a geometric
+// distribution. Only large and block steps change the technique and the length.
 
 #include "integrator/mmlt.h"
 
@@ -33,7 +33,8 @@ public:
         int k = shortest_ + chain_class;
         double pmf = 1;
         if (has_length_choice(chain_class)) {
-            // Geometric, truncated at the longest length: P(k+j) = (1-r) r^j, and the remaining probability at the last one.
+            // Geometric, truncated at the longest length: P(k+j) = (1-r) r^j, and the remaining probability at the last
+            // one.
             const int most = longest_ - k;
             const int j = std::min(most, int(std::log1p(-u_length) / std::log(kLonger)));
             pmf = std::pow(kLonger, j) * (j == most ? 1 : 1 - kLonger);

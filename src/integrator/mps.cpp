@@ -1,7 +1,8 @@
 // Metropolis photon sampling [Fan et al. 2005]: photon mapping as in pm.cpp, whose photons come from Markov chains over
-// light sub-paths. A state is the set of random numbers of a light path. Small steps change all of them, block steps draw
-// those of some vertices anew, and large steps draw a whole path anew. In primary sample space all steps are symmetric. A step
-// that changes only late vertices keeps the beginning of the path, like the perturbations of [Fan et al. 2005].
+// light sub-paths. A state is the set of random numbers of a light path. Small steps change all of them, block steps
+// draw those of some vertices anew, and large steps draw a whole path anew. In primary sample space all steps are
+// symmetric. A step that changes only late vertices keeps the beginning of the path, like the perturbations of [Fan et
+// al. 2005].
 //
 // The target of a photon with flux Φ at x is lum(Φ) times
 // - importons: the density of importance I at x, plus a floor. The power of a photon is b Φ / (lum(Φ) I).
@@ -10,9 +11,9 @@
 //   E[r] = 1/P(x). The printed power, Φ times a ratio of path contributions, compares densities over spaces of different
 //   dimensions.
 //
-// Both are exact for any I > 0 and any a in [0, 1] that are fixed before the chains start. A state at which a chain stays
-// accumulates its power on the same photons, and proposals leave their expected share. The densities of the maps are biased
-// as in pm.cpp.
+// Both are exact for any I > 0 and any a in [0, 1] that are fixed before the chains start. A state at which a chain
+// stays accumulates its power on the same photons, and proposals leave their expected share. The densities of the maps
+// are biased as in pm.cpp.
 
 #include "integrator/mps.h"
 
@@ -47,16 +48,17 @@ IntegratorEntry mps_entry() {
          "to a random path from there)."});
     params.push_back({"p_large", ParamKind::Float, "0.3",
                       "Probability of a large step, which is an independent light path."});
+    params.push_back({"chains", ParamKind::Int, "256",
+                      "Number of chains; it does not depend on the number of threads."});
     params.push_back(
-        {"chains", ParamKind::Int, "256",
-         "Number of chains; it does not depend on the number of threads."});
-    params.push_back({"precision", ParamKind::Float, "0.02",
-                      "Required relative standard error of the normalisation; determines the number "
-                      "of light paths of the start-up."});
-    params.push_back({"least_share", ParamKind::Float, "0.25",
-                      "A photon with less than this fraction of the power of one mutation is kept "
-                      "with a probability proportional to its power, which is increased accordingly.",
-                      true});
+        {"precision", ParamKind::Float, "0.02",
+         "Required relative standard error of the normalisation; determines the number "
+         "of light paths of the start-up."});
+    params.push_back(
+        {"least_share", ParamKind::Float, "0.25",
+         "A photon with less than this fraction of the power of one mutation is kept "
+         "with a probability proportional to its power, which is increased accordingly.",
+         true});
     return {{"integrator", "mps",
              "Metropolis photon sampling: photon mapping with photons where the image needs them. "
              "Biased.",

@@ -1,12 +1,13 @@
-// Bidirectional path tracing with probabilistic connections [Popov et al. 2015]: the vertices of the first M light paths
-// of a pass are stored. Every eye vertex is connected to K of them, which are drawn from a mass function that approximates
-// their contributions. The mass function is computed at importance records along few eye paths and interpolated in between.
+// Bidirectional path tracing with probabilistic connections [Popov et al. 2015]: the vertices of the first M light
+// paths of a pass are stored. Every eye vertex is connected to K of them, which are drawn from a mass function that
+// approximates their contributions. The mass function is computed at importance records along few eye paths and
+// interpolated in between.
 //
-// Techniques: C(0,t), C(s,1), C(s,0) as in bdpt; C(s,t) with s, t ≥ 2 from the stored vertices; C(1,t) from their y_0, from
-// next events, or from both. Unbiased. All eye paths of a pass share the M light paths, so the errors of M samples of a
-// connection are correlated. The weights therefore count them as 1 (`upper`) [eq. 16-17], or as M, as if they were
-// independent (`standard`). The weights contain neither K nor the mass function, because these are not defined for paths
-// of other techniques.
+// Techniques: C(0,t), C(s,1), C(s,0) as in bdpt; C(s,t) with s, t ≥ 2 from the stored vertices; C(1,t) from their y_0,
+// from next events, or from both. Unbiased. All eye paths of a pass share the M light paths, so the errors of M samples
+// of a connection are correlated. The weights therefore count them as 1 (`upper`) [eq. 16-17], or as M, as if they were
+// independent (`standard`). The weights contain neither K nor the mass function, because these are not defined for
+// paths of other techniques.
 
 #include "integrator/pcbpt.h"
 

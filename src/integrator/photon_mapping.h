@@ -1,9 +1,9 @@
 #pragma once
-// Common parts of the photon mapping methods: which surfaces are diffuse enough for photons, and the eye path to the first of
-// these surfaces.
+// Common parts of the photon mapping methods: which surfaces are diffuse enough for photons, and the eye path to the
+// first of these surfaces.
 //
-// Every path is made in one way. Let x_m be the first vertex from the eye that is diffuse enough and scatters by a smooth
-// event.
+// Every path is made in one way. Let x_m be the first vertex from the eye that is diffuse enough and scatters by a
+// smooth event.
 // - If x_m exists, photons make the path; for m = 1, next event estimation makes it instead, if it is enabled.
 // - Otherwise hits and next events make the path, combined by MIS.
 // - Neither of these can make a path that leads from an emitter without extent to a glossy vertex by delta events alone.

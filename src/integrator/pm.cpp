@@ -1,8 +1,8 @@
-// Photon mapping [Jensen 2001]: photons are traced once. At the first vertex of the eye path that is diffuse enough, direct
-// light comes from next event estimation, caustics from the photon density of a caustic map, and all other light from final
-// gather rays. A gather ray ends at the first diffuse vertex. There it uses the irradiance at the nearest photon
-// [Christensen 1999], or a density estimate from all photons. On purely diffuse surfaces, an irradiance cache can replace
-// most of the gather rays; it is filled before the samples of a pass.
+// Photon mapping [Jensen 2001]: photons are traced once. At the first vertex of the eye path that is diffuse enough,
+// direct light comes from next event estimation, caustics from the photon density of a caustic map, and all other light
+// from final gather rays. A gather ray ends at the first diffuse vertex. There it uses the irradiance at the nearest
+// photon [Christensen 1999], or a density estimate from all photons. On purely diffuse surfaces, an irradiance cache
+// can replace most of the gather rays; it is filled before the samples of a pass.
 //
 // Techniques: M(s,t), hits and next events; each path is made by one of them (see photon_mapping.h). Biased: density
 // estimates blur light over the radius of the nearest photons, which does not shrink.
@@ -57,8 +57,9 @@ public:
         };
         if (!(radius_ >= 0)) refuse("radius must not be negative");
         if (cache_error_ > 0 && p.integer("max_depth") >= 0)
-            refuse("an irradiance cache holds paths of all lengths: expected max_depth=-1");
-        if (cache_error_ > 0 && gather_rays_ == 0) refuse("an irradiance cache needs gather_rays");
+            refuse("an irradiance cache contains paths of all lengths: expected max_depth=-1");
+        if (cache_error_ > 0 && gather_rays_ == 0)
+            refuse("an irradiance cache requires gather_rays of at least 1");
     }
 
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }
@@ -115,8 +116,8 @@ public:
     static constexpr float kDefaultRadius = 0.03f;
 
 private:
-    /// Calls use(look, u, scale) for the density estimates that contribute to z_{t-1}: at z_{t-1} itself (u = t), or at the end
-    /// z_{u-1} of a gather ray.
+    /// Calls use(look, u, scale) for the density estimates that contribute to z_{t-1}: at z_{t-1} itself (u = t), or at
+    /// the end z_{u-1} of a gather ray.
     template <class Use>
     void for_each_look(const SampleContext& c, uint32_t pass, int t, bool is_diffuse,
                        bool uses_cache, Workspace& work, const Use& use) const {
@@ -130,8 +131,8 @@ private:
         }
     }
 
-    /// Adds a density estimate at z_{t-1} or, for gather rays that hit a purely diffuse surface, the irradiance at a nearby
-    /// photon.
+    /// Adds a density estimate at z_{t-1} or, for gather rays that hit a purely diffuse surface, the irradiance at a
+    /// nearby photon.
     void add_photons(const SampleContext& c, Look look, int t, float scale,
                      const SubPath& z) const {
         switch (look) {
@@ -153,8 +154,8 @@ private:
         }
     }
 
-    /// Adds a density estimate at z_{t-1} from the photons that `use` accepts. Their surfaces may have other normals: in a
-    /// corner, the photons of one wall replace those that are missing where the disc of the other wall ends.
+    /// Adds a density estimate at z_{t-1} from the photons that `use` accepts. Their surfaces may have other normals:
+    /// in a corner, the photons of one wall replace those that are missing where the disc of the other wall ends.
     template <class Use>
     void estimate(const SampleContext& c, const PhotonMap& map, int t, float scale,
                   const SubPath& z, const Use& use) const {
@@ -181,8 +182,8 @@ private:
         return true;
     }
 
-    /// Continues a gather ray from its first hit z_{t-1} to the first diffuse vertex z_{u-1}, and calls use(u) there. Hits of
-    /// emitters are not added: next events and the caustic map contribute this light.
+    /// Continues a gather ray from its first hit z_{t-1} to the first diffuse vertex z_{u-1}, and calls use(u) there.
+    /// Hits of emitters are not added: next events and the caustic map contribute this light.
     template <class Use>
     void end_gather_ray(const SampleContext& c, int t, Workspace& work, const Use& use) const {
         const TechniqueCounts none;
@@ -268,8 +269,8 @@ private:
         return n && dot(v.wo, *n) > 0 ? n : std::nullopt;
     }
 
-    /// Makes irradiance records at eye vertices that have no record nearby, for more and more pixels. Records of one level do
-    /// not depend on each other, so the result does not depend on the threads.
+    /// Makes irradiance records at eye vertices that have no record nearby, for more and more pixels. Records of one
+    /// level do not depend on each other, so the result does not depend on the threads.
     void fill_cache(const PassContext& pass) {
         constexpr uint32_t kCoarsest = 16, kFinest = 2;
         const float size = pass.scene.bounds().radius();
@@ -349,8 +350,8 @@ private:
         return true;
     }
 
-    /// Adds the reflection of the irradiance E at z_{t-1}. It is assigned to the shortest paths that E contains, which have s
-    /// light vertices.
+    /// Adds the reflection of the irradiance E at z_{t-1}. It is assigned to the shortest paths that E contains, which
+    /// have s light vertices.
     static void add_reflected(const SampleContext& c, int s, int t, const SubPath& z, Vec3 n,
                               Rgb E) {
         const Vertex& v = z[t - 1];

@@ -9,7 +9,8 @@ namespace etendue {
 
 IntegratorEntry pm_entry();
 
-/// Parameters of all integrators that render photon maps. `paths` is the parameter that determines the number of photons.
+/// Parameters of all integrators that render photon maps. `paths` is the parameter that determines the number of
+/// photons.
 std::vector<ParamInfo> photon_map_params(const ParamInfo& paths);
 using MakePhotonSource = std::function<std::unique_ptr<PhotonSource>(
     const IntegratorParams&, const PhotonMapping&, uint64_t max_bytes)>;

@@ -1,8 +1,8 @@
-// Primary sample space Metropolis light transport [Kelemen et al. 2002] over samples of bidirectional path tracing: a state
-// is the set of random numbers of an eye and a light sub-path, and contributes all joins of the two. Unbiased.
+// Primary sample space Metropolis light transport [Kelemen et al. 2002] over samples of bidirectional path tracing: a
+// state is the set of random numbers of an eye and a light sub-path, and contributes all joins of the two. Unbiased.
 //
-// Direct light is computed without chains. Small steps change every number; block steps draw the numbers of some vertices
-// anew.
+// Direct light is computed without chains. Small steps change every number; block steps draw the numbers of some
+// vertices anew.
 
 #include "integrator/pssmlt.h"
 

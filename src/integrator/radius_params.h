@@ -21,8 +21,8 @@ struct RadiusParams {
     bool shrinks() const { return alpha < 1; }
 };
 
-/// Radius of a disc with the area of a pixel, projected to the first surface: the median over the image. Independent of the
-/// crop. 0 if no eye ray hits a surface.
+/// Radius of a disc with the area of a pixel, projected to the first surface: the median over the image. Independent of
+/// the crop. 0 if no eye ray hits a surface.
 float pixel_radius(const Scene& scene);
 
 }  // namespace etendue

@@ -17,8 +17,8 @@
 namespace etendue {
 namespace {
 
-/// Default radius, relative to the radius of the scene's bounds. It is larger than in `vcm`, where merges are one technique
-/// among many.
+/// Default radius, relative to the radius of the scene's bounds. It is larger than in `vcm`, where merges are one
+/// technique among many.
 constexpr float kDefaultRadius = 0.01f;
 
 class SppmIntegrator final : public Integrator {

@@ -2,8 +2,9 @@
 // dropped, and the other is joined by a shadow ray to the predecessor of the dropped one. Bernoulli trials estimate the
 // reciprocal of the probability that the pair was found.
 //
-// Techniques: U(s,t), for paths of three edges and more; `upg+bdpt` also has C(s,t). Unbiased for the paths it can make.
-// `upg` alone cannot make short paths, and paths where every vertex, or both of its neighbours, scatter by delta events.
+// Techniques: U(s,t), for paths of three edges and more; `upg+bdpt` also has C(s,t). Unbiased for the paths it can
+// make. `upg` alone cannot make short paths, and paths where every vertex, or both of its neighbours, scatter by delta
+// events.
 
 #include "integrator/upg.h"
 
@@ -134,8 +135,8 @@ private:
         return grid_.points().is_empty() ? loaded_ : grid_.points().counts();
     }
 
-    /// Adds the join U(s,t) of a pair: one of its vertices is dropped, and the other is joined to the predecessor of the
-    /// dropped one by a shadow ray. r estimates 1/p_c by Bernoulli trials.
+    /// Adds the join U(s,t) of a pair: one of its vertices is dropped, and the other is joined to the predecessor of
+    /// the dropped one by a shadow ray. r estimates 1/p_c by Bernoulli trials.
     void gather(const SampleContext& c, const TechniqueCounts& n, const GatherSearch& search,
                 const GatherPair& pair, Workspace& work) const {
         const auto& [strategy, s, t, drops_eye] = pair.technique;
@@ -159,8 +160,8 @@ private:
         c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.rate));
     }
 
-    /// `scale`: the value that a unit of contribution adds to the pixel. `seen`: the transmittance of the join, divided by
-    /// its survival probability in Russian roulette.
+    /// `scale`: the value that a unit of contribution adds to the pixel. `seen`: the transmittance of the join, divided
+    /// by its survival probability in Russian roulette.
     void observe_weight_scale(const SampleContext& c, const Join& join, float scale, double r,
                               double seen, Workspace& work) const {
         const float pixel = c.film.expected_luminance(c.pixel);
@@ -170,8 +171,8 @@ private:
                                       seen, GatherSums::of(work));
     }
 
-    /// Chooses the radius such that an eye path finds GatherConstants::pairs pairs on average, according to the passes since
-    /// the last choice.
+    /// Chooses the radius such that an eye path finds GatherConstants::pairs pairs on average, according to the passes
+    /// since the last choice.
     void choose_radius(const LearnContext& pass) {
         if (given_radius_ > 0) {
             learned_.radius = given_radius_;

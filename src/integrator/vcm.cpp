@@ -24,8 +24,8 @@ constexpr float kDefaultRadius = 6;
 /// Upper limit of the default radius, relative to the radius of the scene's bounds. Without it, small images would be
 /// blurred.
 constexpr float kLargestRadius = 0.01f;
-/// Ratio of the radius of merges behind a diffuse or glossy eye vertex to that of other merges. The former share a random
-/// eye path, so each of them adds less information. They matter for light that no other technique finds.
+/// Ratio of the radius of merges behind a diffuse or glossy eye vertex to that of other merges. The former share a
+/// random eye path, so each of them adds less information. They matter for light that no other technique finds.
 constexpr float kInnerRadius = 0.3f;
 
 class VcmIntegrator final : public Integrator {
@@ -34,8 +34,8 @@ public:
         : paths_(p, Guiding(p)), radius_params_(p), connects_(p.flag("connections")),
           merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p) {
         if (!connects_ && !merges_)
-            throw std::runtime_error("vcm: connections and merges cannot both be off");
-        if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact needs merges");
+            throw std::runtime_error("vcm: connections and merges cannot both be false");
+        if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact=true requires merges=true");
     }
 
     void learn(const LearnContext& pass) override {
@@ -144,8 +144,8 @@ private:
         });
     }
 
-    /// Adds U(s,t), with the approximation q π d² p̃ of p_c. q is the survival probability of the Russian roulette before
-    /// the dropped vertex [Qin et al. 2015, eq. 7].
+    /// Adds U(s,t), with the approximation q π d² p̃ of p_c. q is the survival probability of the Russian roulette
+    /// before the dropped vertex [Qin et al. 2015, eq. 7].
     void gather(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
         const GatherSearch search{
             c,   n, cache_, grid_, density_, roulette_, paths_.max_depth(), 1, paths_.threshold(c),

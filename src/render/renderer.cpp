@@ -118,7 +118,8 @@ private:
             to_.observer->observe(join, contribution, share, 0, to_.work);
             return;
         }
-        // The eye path of a chain has no pixel of its own. It contributes to all pixels whose filter reaches its film point.
+        // The eye path of a chain has no pixel of its own. It contributes to all pixels whose filter reaches its film
+        // point.
         for_each_pixel(to_.film.geometry(), to_.film.filter(), join.film,
                        [&](uint64_t pixel, float h) {
                            to_.observer->observe(join, contribution, share * h, pixel, to_.work);
@@ -151,8 +152,8 @@ const char* to_string(Estimator estimator) {
 
 namespace {
 
-/// Estimates the radiance in the scene within a factor of about 1000: the radiance that a bounding sphere with all emitted
-/// power would have. Like the image, it is proportional to the radiance of the emitters.
+/// Estimates the radiance in the scene within a factor of about 1000: the radiance that a bounding sphere with all
+/// emitted power would have. Like the image, it is proportional to the radiance of the emitters.
 double typical_radiance(const Scene& scene) {
     double power = 0;
     for (const auto& emitter : scene.emitters()) power += emitter->power();
@@ -160,9 +161,9 @@ double typical_radiance(const Scene& scene) {
     return radius > 0 ? power / (4 * sqr(double(kPi) * radius)) : power;
 }
 
-/// By default, TBB limits the number of threads in all arenas together to that of the hardware. The limit applies to the
-/// whole process, and a larger one is valid only while a global_control exists, so every renderer that needs more threads
-/// creates its own. TBB uses the smallest limit of all global_controls; kRoom leaves room for other renderers.
+/// By default, TBB limits the number of threads in all arenas together to that of the hardware. The limit applies to
+/// the whole process, and a larger one is valid only while a global_control exists, so every renderer that needs more
+/// threads creates its own. TBB uses the smallest limit of all global_controls; kRoom leaves room for other renderers.
 std::unique_ptr<tbb::global_control> allow_threads(int threads) {
     constexpr size_t kRoom = 256;
     if (threads <= tbb::info::default_concurrency()) return nullptr;

@@ -25,10 +25,12 @@ struct RenderSettings : RenderLimits {
     IntegratorSpec integrator{"path", {}};
     SamplerKind sampler = SamplerKind::Independent;
     uint64_t seed = 0;
-    int threads = 0;  ///< Number of threads of this renderer; 0: one per core. Renderers share no threads.
+    int threads =
+        0;  ///< Number of threads of this renderer; 0: one per core. Renderers share no threads.
     /// Technique images up to this many edges; 0 for none.
     int technique_depth = 0;
-    PathSelection shown;  ///< Paths that are added to the image. Other paths are sampled, but not added.
+    PathSelection
+        shown;  ///< Paths that are added to the image. Other paths are sampled, but not added.
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
 };
 
@@ -54,18 +56,18 @@ public:
              std::unique_ptr<Integrator> integrator);
     ~Renderer();
 
-    /// Renders until a limit is reached or `interrupted` is set. The current pass is finished, unless `drop` is also set.
-    /// `progress` is called after every pass, by the calling thread.
+    /// Renders until a limit is reached or `interrupted` is set. The current pass is finished, unless `drop` is also
+    /// set. `progress` is called after every pass, by the calling thread.
     ///
-    /// A pass is discarded if `drop` is set or if it throws an exception, which is passed to the caller. Film, technique
-    /// images and statistics are then the same as after the previous pass.
+    /// A pass is discarded if `drop` is set or if it throws an exception, which is passed to the caller. Film,
+    /// technique images and statistics are then the same as after the previous pass.
     StopReason run(const std::function<void(const Progress&)>& progress,
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop) {
         return run(settings_, progress, interrupted, drop);
     }
-    /// The same with other limits. Limits count from the first pass. Each call continues where the previous one stopped, so
-    /// several calls render the same image as a single call.
+    /// The same with other limits. Limits count from the first pass. Each call continues where the previous one
+    /// stopped, so several calls render the same image as a single call.
     StopReason run(const RenderLimits& limits, const std::function<void(const Progress&)>& progress,
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop);

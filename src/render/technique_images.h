@@ -44,7 +44,8 @@ private:
     int max_edges_;
     double typical_radiance_;
     uint64_t passes_ = 0;
-    std::vector<std::atomic<Layer*>> layers_;  ///< In the order of number of vertices, then s, then pairs.
+    std::vector<std::atomic<Layer*>>
+        layers_;  ///< In the order of number of vertices, then s, then pairs.
     std::vector<std::unique_ptr<Layer>> owned_;
     std::mutex creation_;
 };
