@@ -23,8 +23,8 @@ public:
     virtual ~Integrator() = default;
     /// Learns from the statistics of earlier passes. Called before pass 0, when there are none, and before passes 1, 4,
     /// 16, 64 …. What is learned holds until the next call. From each call on, the random numbers are independent of
-    /// all earlier ones. Therefore no pass uses learned data that depend on its own random numbers, and every pass is
-    /// unbiased.
+    /// all earlier ones. Therefore no pass uses learned data that depend on its own random numbers, and learning causes
+    /// no bias.
     virtual void learn(const LearnContext&) {}
     /// Whether learn() changes the sampling or the weights of later passes.
     virtual bool is_learning() const { return false; }
