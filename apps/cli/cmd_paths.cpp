@@ -23,6 +23,7 @@ struct PathsCommand {
 
 void check_paths(const Scene& scene, const std::string& file) {
     const std::vector<GivenPath> given = read_user_paths(file);
+    if (given.empty()) throw std::runtime_error(file + ": has no paths");
     size_t usable = 0;
     for (size_t i = 0; i < given.size(); ++i) {
         const CheckedPath checked = check_user_path(scene, given[i]);
@@ -30,9 +31,7 @@ void check_paths(const Scene& scene, const std::string& file) {
         if (!checked.path) fmt::print("{}\n", to_string(checked, given[i], i, file));
     }
     fmt::print("{}: {} of {} paths can be used\n", file, usable, given.size());
-    if (usable < given.size() || given.empty())
-        throw std::runtime_error(given.empty() ? file + ": the file contains no paths"
-                                               : file + ": some paths cannot be used");
+    if (usable < given.size()) throw std::runtime_error(file + ": some paths cannot be used");
 }
 
 void PathsCommand::run() {

@@ -18,6 +18,7 @@
 #include "integrator/pssmlt.h"
 #include "integrator/sppm.h"
 #include "integrator/upg.h"
+#include "integrator/upg_pssmlt.h"
 #include "integrator/vcm.h"
 
 namespace etendue {
@@ -26,7 +27,7 @@ const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
         path_entry(),   light_entry(), bdpt_entry(), pm_entry(),       ppm_entry(),
         sppm_entry(),   vcm_entry(),   upg_entry(),  upg_bdpt_entry(), pcbpt_entry(),
-        pssmlt_entry(), mmlt_entry(),  mlt_entry(),  mps_entry()};
+        pssmlt_entry(), mmlt_entry(),  mlt_entry(),  mps_entry(),      upg_pssmlt_entry()};
     return entries;
 }
 

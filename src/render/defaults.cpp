@@ -1,5 +1,6 @@
 #include "render/defaults.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace etendue {
@@ -12,7 +13,17 @@ IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
         IntegratorSpec::parse(!text.empty()                 ? text
                               : defaults.integrator.empty() ? "path"
                                                             : defaults.integrator);
-    for (const auto& [name, value] : defaults.integrator_params) spec.params.emplace(name, value);
+    const auto& known = integrator_registry();
+    const auto entry = std::find_if(known.begin(), known.end(),
+                                    [&](const auto& e) { return e.info.name == spec.name; });
+    if (entry == known.end()) return spec;
+    const auto takes = [&](const std::string& name) {
+        const std::vector<ParamInfo>& params = entry->info.params;
+        return std::any_of(params.begin(), params.end(),
+                           [&](const ParamInfo& p) { return p.name == name; });
+    };
+    for (const auto& [name, value] : defaults.integrator_params)
+        if (takes(name)) spec.params.emplace(name, value);
     return spec;
 }
 

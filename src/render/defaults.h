@@ -10,7 +10,7 @@
 namespace etendue {
 
 /// The integrator that `text` names, or the scene's if `text` is empty. Parameters missing from `text` are taken
-/// from the scene's integrator.
+/// from the scene's integrator, if this one has them.
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
 
 /// If `limits` has no limit, sets the sample count of the scene file, or 64.
