@@ -119,6 +119,8 @@ struct IntegratorEntry {
     std::unique_ptr<Integrator> (*make)(const IntegratorParams& params);
 };
 const std::vector<IntegratorEntry>& integrator_registry();
+/// Throws std::runtime_error for an unknown name.
+const IntegratorEntry& integrator_entry(const std::string& name);
 std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec);
 
 /// Maximum path length and start of Russian roulette; parameters of all integrators.

@@ -13,12 +13,8 @@ IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
         IntegratorSpec::parse(!text.empty()                 ? text
                               : defaults.integrator.empty() ? "path"
                                                             : defaults.integrator);
-    const auto& known = integrator_registry();
-    const auto entry = std::find_if(known.begin(), known.end(),
-                                    [&](const auto& e) { return e.info.name == spec.name; });
-    if (entry == known.end()) return spec;
+    const std::vector<ParamInfo>& params = integrator_entry(spec.name).info.params;
     const auto takes = [&](const std::string& name) {
-        const std::vector<ParamInfo>& params = entry->info.params;
         return std::any_of(params.begin(), params.end(),
                            [&](const ParamInfo& p) { return p.name == name; });
     };

@@ -152,7 +152,7 @@ TEST_F(PathsTest, PickRefusesWhatItCannotDo) {
         EXPECT_NE(r.errors.find(message), std::string::npos) << r.errors;
         EXPECT_EQ(read_text(paths), before);
     };
-    expect({}, "give either --pick N or --check FILE");
+    expect({}, "expected either --pick N or --check FILE");
     expect({"--pick", "3", "-o", paths}, "--pick needs --pixel x,y and -o FILE");
     expect({"--pick", "3", "--pixel", "16,2", "-o", paths}, "pixel 16,2 lies outside the image");
     expect({"--pick", "3", "--pixel", "8,0", "--length", "2", "--samples", "100", "-o", paths},
