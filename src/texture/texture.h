@@ -14,7 +14,7 @@ namespace etendue {
 
 /// What a texture knows of the point at which it is evaluated.
 struct TexturePoint {
-    TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3(1, 1, 1)) : uv(uv_), color(color_) {}
+    TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3{1, 1, 1}) : uv(uv_), color(color_) {}
     TexturePoint(float u, float v) : TexturePoint(Vec2{u, v}) {}
 
     Vec2 uv;
