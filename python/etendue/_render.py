@@ -180,7 +180,7 @@ class Result:
 
     @property
     def estimator(self) -> str:
-        """Property of the method: "unbiased", "consistent" or "biased"."""
+        """Name of the property that the method claims: "unbiased", "consistent" or "biased"."""
         return self._rendering.estimator
 
     @property
