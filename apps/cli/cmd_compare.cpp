@@ -43,7 +43,7 @@ private:
                                       const std::vector<MethodSpec>& specs) const;
 };
 
-/// A status line on stderr, rewritten at most ten times a second; silent where stderr is no terminal.
+/// A status line on stderr, rewritten at most ten times per second. Prints nothing if stderr is not a terminal.
 class StatusLine {
 public:
     explicit StatusLine(bool quiet) : active_(!quiet && isatty(STDERR_FILENO)) {}
@@ -67,9 +67,9 @@ private:
 void CompareCommand::check() const {
     if (seconds > 0 && spp > 0)
         throw std::runtime_error(
-            "--time and --spp exclude each other: equal time or equal samples");
+            "--time and --spp exclude each other: compare at equal time or at equal samples");
     if (!(seconds > 0) && spp == 0)
-        throw std::runtime_error("give --time or --spp: how long each method renders");
+        throw std::runtime_error("expected --time or --spp, the limit of each method");
     if (!references.empty() && references.size() != scenes.size())
         throw std::runtime_error(
             fmt::format("--reference needs one image per scene, but has {} for {} scenes",
@@ -77,7 +77,7 @@ void CompareCommand::check() const {
     if (!references.empty() &&
         (reference_seconds > 0 || reference_spp > 0 || !reference_method.empty()))
         throw std::runtime_error("--reference excludes --reference-time, --reference-spp and "
-                                 "--reference-method, which render one");
+                                 "--reference-method, which apply to rendered references");
     if (std::filesystem::exists(report) && !std::filesystem::is_directory(report))
         throw std::runtime_error(fmt::format("--report: {} is not a folder", report));
 }

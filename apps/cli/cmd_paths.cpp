@@ -23,6 +23,7 @@ struct PathsCommand {
 
 void check_paths(const Scene& scene, const std::string& file) {
     const std::vector<GivenPath> given = read_user_paths(file);
+    if (given.empty()) throw std::runtime_error(file + ": has no paths");
     size_t usable = 0;
     for (size_t i = 0; i < given.size(); ++i) {
         const CheckedPath checked = check_user_path(scene, given[i]);
@@ -30,14 +31,12 @@ void check_paths(const Scene& scene, const std::string& file) {
         if (!checked.path) fmt::print("{}\n", to_string(checked, given[i], i, file));
     }
     fmt::print("{}: {} of {} paths can be used\n", file, usable, given.size());
-    if (usable < given.size() || given.empty())
-        throw std::runtime_error(given.empty() ? file + ": has no paths"
-                                               : file + ": some paths are refused");
+    if (usable < given.size()) throw std::runtime_error(file + ": some paths cannot be used");
 }
 
 void PathsCommand::run() {
     if (check.empty() == (count == 0))
-        throw std::runtime_error("paths: give either --pick N or --check FILE");
+        throw std::runtime_error("paths: expected either --pick N or --check FILE");
     if (count > 0 && (pixel.empty() || output.empty()))
         throw std::runtime_error("paths: --pick needs --pixel x,y and -o FILE");
     const Scene s = load_scene(scene);
@@ -56,18 +55,19 @@ void add_paths_command(CLI::App& app) {
     CLI::App& c = *app.add_subcommand("paths", "Pick or check light paths for mlt:user_paths=FILE");
     options->scene.add_to(c);
     CLI::Option* pick =
-        c.add_option("--pick", options->count, "Save up to so many good paths of a short run")
+        c.add_option("--pick", options->count,
+                     "Save up to this many paths of a short run, by their contributions")
             ->check(CLI::Range(1, 10000));
-    c.add_option("--pixel", options->pixel, "Column and row of the pixel that they reach: x,y")
+    c.add_option("--pixel", options->pixel, "Column and row of the pixel that the paths reach: x,y")
         ->delimiter(',')
         ->expected(2)
         ->needs(pick);
     c.add_option("--length", options->pick.length,
-                 "Edges of the full paths, from the emitter to the lens")
+                 "Length of the full paths in edges, from the emitter to the lens")
         ->check(CLI::Range(2, 64))
         ->capture_default_str()
         ->needs(pick);
-    c.add_option("--samples", options->pick.samples, "Paths to try")
+    c.add_option("--samples", options->pick.samples, "Number of paths to sample")
         ->check(CLI::Range(uint64_t(1), uint64_t(1) << 40))
         ->capture_default_str()
         ->needs(pick);
@@ -76,7 +76,7 @@ void add_paths_command(CLI::App& app) {
         ->needs(pick);
     c.add_option("-o,--output", options->output, "JSON file to write")->needs(pick);
     c.add_option("--check", options->check,
-                 "JSON file of paths: says of each that cannot be used why")
+                 "JSON file of paths to check; prints the reason for each path that cannot be used")
         ->excludes(pick);
     c.callback([options] { options->run(); });
 }

@@ -234,7 +234,7 @@ void add_render_command(CLI::App& app) {
                  "Stop at this estimated relative RMS error of the image, e.g. 0.01")
         ->check(must_be_above_0);
     c.add_option("--grace", command->grace,
-                 "Seconds given to the current pass after Ctrl-C or SIGTERM before it is dropped")
+                 "Seconds that the current pass may continue after Ctrl-C or SIGTERM")
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();

@@ -214,7 +214,7 @@ void print_report(const VerifyReport& report, const Scene& scene, const std::str
                report.tests, options.alpha, report.level);
     fmt::print("\n");
     for (const MethodReport& m : report.methods) {
-        fmt::print("{}, {} spp a run\n", m.method, m.spp);
+        fmt::print("{}, {} spp per run\n", m.method, m.spp);
         print_image(report, m);
         print_lengths(report, m);
         print_classes(report, m);

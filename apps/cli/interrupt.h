@@ -10,9 +10,9 @@ const std::atomic<bool>& catch_interrupts();
 
 /// Flags set by SIGINT (Ctrl-C) and SIGTERM.
 struct Interrupts {
+    const std::atomic<bool>& stop;  ///< Set by the first signal: finish the current work, then end.
     const std::atomic<bool>&
-        stop;  ///< Set by the first signal: finish the work in flight, then end.
-    const std::atomic<bool>& drop;  ///< Set by the second one or after `grace`: abandon that work.
+        drop;  ///< Set by the second signal or after `grace`: abandon that work.
 };
 /// Handles both signals from now on by setting these flags; a further signal once `drop` is set ends the program.
 /// `grace`: seconds after the first signal.

@@ -6,8 +6,8 @@
 
 namespace etendue {
 
-/// Sends the image to the viewer tev (https://github.com/Tom94/tev) during rendering, at most once a second. If the
-/// viewer closes the connection, the preview ends and the rendering goes on.
+/// Sends the image to the viewer tev (https://github.com/Tom94/tev) during rendering, at most once per second. If the
+/// viewer closes the connection, the preview ends and the rendering continues.
 class Preview {
 public:
     /// `address`: tev, tev://host or tev://host:port; port 14158 by default. Throws std::runtime_error where no viewer

@@ -1,7 +1,7 @@
 """Unbiased light transport with reused light paths.
 
-A scene is loaded as a `Description`, which is plain data and can be edited; `Description.build` makes a `Scene` of it;
-`render` makes a `Result`, whose images are NumPy arrays:
+A scene is loaded as a `Description`, which is plain data and can be edited. `Description.build` converts it to a `Scene`.
+`render` returns a `Result`, whose images are NumPy arrays:
 
     import etendue as et
     d = et.load("scenes/demo.xml")
@@ -9,8 +9,8 @@ A scene is loaded as a `Description`, which is plain data and can be edited; `De
     result = et.render(d.build(resolution=(320, 240)), "upg+bdpt:max_depth=12", time=10)
     result.save("demo.exr")
 
-Images are arrays of shape (H, W, 3), float32, linear sRGB; the first row is the top one. The same seed gives the same
-bits as the program `etendue`.
+Images are arrays of shape (H, W, 3), float32, linear sRGB; the first row is the top one. With the same seed, images are
+bit-identical to those of the program `etendue`.
 """
 
 from ._cpu import check_cpu as _check_cpu

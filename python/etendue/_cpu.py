@@ -1,4 +1,4 @@
-"""The processor, checked before compiled code could end the process by an illegal instruction."""
+"""Check of the processor, before compiled code could end the process by an illegal instruction."""
 
 import os
 from pathlib import Path
@@ -8,7 +8,7 @@ NEEDED = ("avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe")
 
 
 def check_cpu(cpuinfo: str = "/proc/cpuinfo") -> None:
-    """Raises ImportError where the processor lacks instructions that the package needs."""
+    """Raises ImportError if the processor lacks instructions that the package needs."""
     if os.environ.get("ETENDUE_ANY_CPU"):
         return
     try:

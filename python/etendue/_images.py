@@ -70,7 +70,7 @@ class Diff(dict[str, float]):
     """
 
     flip_map: Image | None
-    """FLIP of each pixel, in [0, 1], shape (H, W); None where FLIP was not asked for."""
+    """FLIP of each pixel, in [0, 1], shape (H, W); None if FLIP was not requested."""
     rel_se_map: Image
     """Each pixel's term of rel_mse, dimensionless, shape (H, W)."""
 

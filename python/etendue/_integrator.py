@@ -4,8 +4,8 @@ from . import core
 
 
 class Integrator:
-    """Base class of integrators written in Python, for teaching and research: some 10^4 samples a second, so use images
-    of about 64 x 64 pixels. render(), compare() and verify() take objects of such a class.
+    """Base class of integrators written in Python, for teaching and research. They take about 10^4 samples per second, so
+    use images of about 64 x 64 pixels. render(), compare() and verify() accept objects of such a class.
 
         class Hits(et.Integrator):
             def counts(self, light_paths):
@@ -19,9 +19,9 @@ class Integrator:
     """
 
     traces_light_paths: bool = False
-    """Whether sample() calls Sample.light_path(); N_L, the number of light paths of a pass, is then that of pixels."""
+    """Whether sample() calls Sample.light_path(). If so, the number N_L of light paths in a pass is that of pixels."""
     estimator: str = "unbiased"
-    """What the class claims to be: "unbiased", "consistent" or "biased"; verify() reports it."""
+    """The property that the class claims to have: "unbiased", "consistent" or "biased"; verify() reports it."""
 
     @property
     def name(self) -> str:
@@ -29,9 +29,9 @@ class Integrator:
         return type(self).__name__
 
     def counts(self, light_paths: int) -> core.Counts:
-        """How many samples each strategy takes, for the MIS weights. light_paths is N_L, 0 where there are none."""
+        """Returns the number of samples of each strategy, for the MIS weights. light_paths is N_L; 0 without light paths."""
         raise NotImplementedError(f"{type(self).__name__} needs a method counts(self, light_paths)")
 
     def sample(self, c: core.Sample) -> None:
-        """Makes the paths of one sample, which is one eye path of a pixel, and one light path, and adds them."""
+        """Makes and adds the paths of one sample, which may trace one eye path of a pixel and one light path."""
         raise NotImplementedError(f"{type(self).__name__} needs a method sample(self, c)")

@@ -19,7 +19,7 @@ Image = NDArray[np.float32]
 
 
 class FilmView:
-    """Sums over the passes, as views of the film's own memory: read-only, and never copied."""
+    """Sums over the passes, as read-only views of the film's memory, without copies."""
 
     def __init__(self, rendering: _etendue.Rendering):
         self._rendering = rendering
@@ -49,7 +49,7 @@ class Progress:
     seconds: float
     """Time spent on them, in seconds."""
     fraction: float | None
-    """Share of the work that is done, in [0, 1]; None where no limit tells."""
+    """Finished fraction of the work, in [0, 1]; None if the limits do not determine it."""
     rays_per_second: float
     """Rays per second."""
     error: float | None
@@ -81,14 +81,14 @@ class TechniqueImage:
 
 
 class Result:
-    """What a rendering leaves. Arrays are made once, when they are first asked for, and own their memory."""
+    """The result of a rendering. Arrays are created when they are first needed, and own their memory."""
 
     def __init__(self, rendering: _etendue.Rendering, stopped_by: str, aovs: Sequence[str]):
         self._rendering = rendering
         self._aov_names = tuple(aovs)
         self._cache: dict[str, Any] = {}
         self.stopped_by = stopped_by
-        """Why it ended: "samples", "time", "error", "interrupted" (by Ctrl-C) or "callback" (which returned False)."""
+        """Why the rendering ended: "samples", "time", "error", "interrupted" (Ctrl-C), "callback" (it returned False)."""
 
     def _cached(self, name: str, make: Callable[[], Any]) -> Any:
         if name not in self._cache:
@@ -129,8 +129,8 @@ class Result:
 
     @property
     def aov(self) -> dict[str, Image]:
-        """Auxiliary images by name, those that render() was asked for: linear values of the first surface, averaged over a
-        pixel, shape (H, W, 3); "depth" and "position" in scene units, "variance" as Result.variance.
+        """The auxiliary images requested from render(), by name: linear values of the first surface, averaged over a pixel,
+        shape (H, W, 3). "depth" and "position" are in scene units; "variance" is Result.variance.
         """
 
         def make() -> dict[str, Image]:
@@ -144,7 +144,7 @@ class Result:
 
     @property
     def techniques(self) -> list[TechniqueImage]:
-        """The images of all techniques, by path length and s; empty unless render() was asked for them."""
+        """The images of all techniques, by path length and s; empty unless they were requested from render()."""
         techniques: list[TechniqueImage] = self._cached(
             "techniques", lambda: [TechniqueImage(*t) for t in self._rendering.techniques()]
         )
@@ -180,7 +180,7 @@ class Result:
 
     @property
     def estimator(self) -> str:
-        """What the method is, a text: "unbiased", "consistent" or "biased"."""
+        """Name of the property that the method claims: "unbiased", "consistent" or "biased"."""
         return self._rendering.estimator
 
     @property
@@ -195,7 +195,7 @@ class Result:
 
     @property
     def warnings(self) -> list[str]:
-        """What may be wrong with the image, one sentence each."""
+        """Possible errors of the image, one sentence each."""
         return self._rendering.warnings
 
     @property
@@ -205,7 +205,7 @@ class Result:
         return stats
 
     def save(self, file: str | PathLike[str]) -> None:
-        """Writes the image, and to .exr also its auxiliary images and statistics, as `etendue render -o`."""
+        """Writes the image, like `etendue render -o`. An .exr file also contains the auxiliary images and statistics."""
         self._rendering.save(fspath(file), list(self._aov_names))
 
     def __repr__(self) -> str:
@@ -226,7 +226,7 @@ class Result:
 
 
 class _Bar:
-    """A bar of tqdm, where it is installed."""
+    """A progress bar of tqdm, if tqdm is installed."""
 
     def __init__(self, rendering: _etendue.Rendering, wanted: bool | None):
         self._rendering = rendering
@@ -269,22 +269,25 @@ def render(
     progress: bool | None = None,
     live: bool = False,
 ) -> Result:
-    """Renders a scene, with the same bits as the program for the same seed.
+    """Renders a scene. With the same seed, the image is bit-identical to that of the program.
 
-    integrator: a name with parameters, such as "upg+bdpt:max_depth=12"; "" for the scene's own; or an Integrator.
-    spp, time, error: when to stop, at whichever comes first: samples per pixel, seconds, relative error of the image.
-        Without any, the scene's samples per pixel, or 64.
-    seed, sampler, threads: of the random numbers, "sobol" or "independent", and 0 for one thread per core.
-    aovs: auxiliary images to keep: albedo, normal, depth, position, uv, variance.
-    techniques: keeps an image of each technique, up to paths of this many edges; True: 6.
-    callback: called between passes with a Progress; the rendering stops where it returns False, and what it raises goes
-        on to the caller.
-    progress: shows a bar by tqdm; None: in notebooks and on terminals, where tqdm is installed.
-    live: shows the image while it renders, in notebooks; see show().
+    integrator: a name with parameters, such as "upg+bdpt:max_depth=12"; "" for the integrator of the scene; or an
+        Integrator.
+    spp, time, error: limits: samples per pixel, seconds, relative error of the image. The first limit that is reached
+        ends the rendering. Without a limit, the samples per pixel of the scene, or 64.
+    seed: seed of all random numbers.
+    sampler: "sobol" or "independent".
+    threads: number of threads; 0 for one per core.
+    aovs: auxiliary images to render: albedo, normal, depth, position, uv, variance.
+    techniques: makes an image of each technique, for paths of at most this many edges; True: 6.
+    callback: called between passes with a Progress. If it returns False, the rendering ends. Exceptions that it raises
+        are passed to the caller.
+    progress: shows a progress bar of tqdm; None: in notebooks and on terminals, if tqdm is installed.
+    live: shows the image during the rendering, in notebooks; see show().
 
-    Ctrl-C drops the pass in flight and returns what there is, with stopped_by "interrupted"; before the first pass is
-    done it raises KeyboardInterrupt. Other threads of Python run on meanwhile. A process that was forked cannot render;
-    use the start method "spawn".
+    Ctrl-C discards the current pass and returns the result of the passes before it, with stopped_by "interrupted". If no
+    pass is complete yet, it raises KeyboardInterrupt. Other Python threads continue during the rendering. A forked process
+    cannot render; use the start method "spawn".
     """
     _etendue.check_aovs(list(aovs))
     depth = 6 if techniques is True else int(techniques)

@@ -34,7 +34,7 @@ def _methods(methods: Method | Sequence[Method]) -> list[Method]:
 
 
 def _status(progress: bool | None) -> tuple[Callable[[str], None] | None, Callable[[], None]]:
-    """A listener that rewrites one line, and what ends it."""
+    """A listener that rewrites one line, and a function that clears this line."""
     if progress is False or (progress is None and not sys.stderr.isatty()):
         return None, lambda: None
 
@@ -53,7 +53,7 @@ class CompareReport:
         self.data: list[dict[str, Any]] = data["scenes"]
         """All results, one dict for each scene, as in report.json of `etendue compare`."""
         self.warnings: list[str] = list(data["warnings"])
-        """What to know when reading them, one sentence each."""
+        """Warnings about the results, one sentence each."""
         for scene in self.data:
             for method in scene["methods"]:
                 self.warnings += [f"{method['name']}: {w}" for w in method["warnings"]]
@@ -134,7 +134,7 @@ class VerifyReport:
 
     @property
     def warnings(self) -> list[str]:
-        """What may be wrong with the renderings, one sentence each."""
+        """Possible errors of the renderings, one sentence each."""
         return list(self.data["warnings"])
 
     @property
@@ -214,17 +214,17 @@ def compare(
     techniques: int = 5,
     progress: bool | None = None,
 ) -> CompareReport:
-    """Compares methods at equal time (seconds) or equal samples (spp) a pixel, as `etendue compare`.
+    """Compares methods at equal time (seconds) or equal samples per pixel (spp), like `etendue compare`.
 
-    scenes: files, Descriptions or Scenes, or one of them. methods: names with parameters, or Integrators.
-    runs, seed: independent runs with consecutive seeds.
-    paths, lengths: which paths the images show; lengths in edges, None for no limit.
-    reference: image files, one for each scene. Otherwise references are rendered by reference_method (bdpt) in
-        reference_time seconds (10 times time) or with reference_spp (16 times spp), and kept in the folder references.
+    scenes: one or several files, Descriptions or Scenes. methods: names with parameters, or Integrators.
+    runs, seed: number of independent runs, which have consecutive seeds, and the first seed.
+    paths, lengths: paths shown in the images; lengths in edges, None for no limit.
+    reference: image files, one for each scene. Without them, references are rendered by reference_method (bdpt) in
+        reference_time seconds (10 times time) or with reference_spp (16 times spp), and stored in the folder references.
     techniques: longest path with technique images, in edges; 0: none.
     progress: shows a status line; None: on terminals.
 
-    Ctrl-C ends the comparison with what was rendered until then.
+    Ctrl-C ends the comparison; the report contains the results so far.
     """
     wanted = [scenes] if isinstance(scenes, (Scene, Description, str, PathLike)) else list(scenes)
     images = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
@@ -257,16 +257,16 @@ def verify(
     threads: int = 0,
     progress: bool | None = None,
 ) -> VerifyReport:
-    """Tests whether methods are unbiased, as `etendue verify`: means over independent runs against those of references.
+    """Tests whether methods are unbiased, like `etendue verify`: compares means over independent runs with references.
 
-    methods: names with parameters, or Integrators, without max_depth, which lengths determines.
-    time: seconds for all runs of one method (30 where spp is not given); with detect, for the whole verification.
+    methods: names with parameters, or Integrators. lengths determines max_depth, which must not be given.
+    time: seconds for all runs of one method (30 if spp is not given); with detect, for the whole verification.
     spp: samples per pixel of one run. detect: renders until a relative error of this size would be found.
     lengths: shortest and longest path, in edges. runs: independent renderings, at least 8.
     alpha: probability of a false alarm in all comparisons together.
     tiles: number of tiles across and down the image.
 
-    Ctrl-C ends it after the run in flight, by KeyboardInterrupt.
+    Ctrl-C ends the verification after the current run and raises KeyboardInterrupt.
     """
     listener, end = _status(progress)
     try:

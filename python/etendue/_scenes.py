@@ -17,8 +17,8 @@ Vector = tuple[float, float, float]
 def load(file: str | PathLike[str], defines: Mapping[str, object] = {}, *, lenient: bool = False) -> Description:
     """Reads a scene file: .xml of Mitsuba 0.6 and 3, .pbrt of pbrt-v3 and v4.
 
-    defines: values of the scene's parameters ($name), as the option -D of the program.
-    lenient: unknown elements become warnings instead of errors.
+    defines: values of the parameters of the scene ($name), like the option -D of the program.
+    lenient: unknown elements cause warnings instead of errors.
     """
     return _etendue.load(fspath(file), {name: str(value) for name, value in defines.items()}, lenient)
 
@@ -26,21 +26,21 @@ def load(file: str | PathLike[str], defines: Mapping[str, object] = {}, *, lenie
 def load_string(
     xml: str, defines: Mapping[str, object] = {}, *, name: str = "scene.xml", lenient: bool = False
 ) -> Description:
-    """Reads the text of a scene file of Mitsuba.
+    """Reads the text of a Mitsuba scene file.
 
-    name: the file's name in messages; files that the scene names are relative to its folder.
+    name: file name for messages. Names of other files in the scene are relative to the folder of this file.
     """
     return _etendue.load_string(xml, {key: str(value) for key, value in defines.items()}, name, lenient)
 
 
 def load_dict(d: dict[str, Any], *, folder: str | PathLike[str] = ".") -> Description:
-    """Reads a scene from nested dicts, as mi.load_dict() of Mitsuba 3 takes them.
+    """Reads a scene from nested dicts in the format of mi.load_dict() of Mitsuba 3.
 
-    Every object is a dict with a "type", the name of a plug-in; {"type": "ref", "id": ...} refers to another one. Values
+    Every object is a dict with a "type", the name of a plug-in; {"type": "ref", "id": ...} refers to another object. Values
     are numbers, texts, sequences of 3 numbers, 4x4 arrays, {"type": "rgb", "value": ...} and {"type": "spectrum", ...}.
-    Keys name parameters and objects; a key that is a category ("bsdf", "shape_2") leaves an object without a name.
+    Keys are names of parameters and objects. An object whose key is a category ("bsdf", "shape_2") has no name.
 
-    folder: where files that the scene names are looked up.
+    folder: folder in which the files of the scene are searched.
     """
     return _etendue.load_dict(d, fspath(folder))
 
@@ -55,14 +55,14 @@ def look_at(origin: Vector, target: Vector, up: Vector = (0, 1, 0)) -> NDArray[n
 
 
 def translate(x: float = 0, y: float = 0, z: float = 0) -> NDArray[np.float64]:
-    """A translation in scene units, as a 4x4 matrix. Matrices are combined by @; the right one comes first."""
+    """A translation in scene units, as a 4x4 matrix. Matrices are combined by @; the right one is applied first."""
     matrix = np.eye(4)
     matrix[:3, 3] = (x, y, z)
     return matrix
 
 
 def scale(x: float, y: float | None = None, z: float | None = None) -> NDArray[np.float64]:
-    """A scaling along the axes as a 4x4 matrix; by x along all of them where only x is given. Dimensionless."""
+    """A scaling along the axes, as a 4x4 matrix. If only x is given, it applies to all axes. Dimensionless."""
     return np.diag([x, x if y is None else y, x if z is None else z, 1.0])
 
 
@@ -72,9 +72,10 @@ def rotate(axis: Vector, degrees: float) -> NDArray[np.float64]:
 
 
 def plugins(category: str = "", name: str = "") -> list[dict[str, Any]]:
-    """All plug-ins with their parameters, types, defaults and texts with units, as `etendue list --json`.
+    """All plug-ins with their parameters, types, defaults and descriptions, like `etendue list --json`.
 
-    category, name: only these, such as plugins("bsdf", "diffuse"). "integrator" has those of render().
+    category, name: return only these plug-ins, such as plugins("bsdf", "diffuse"). The category "integrator" contains the
+        integrators of render().
     """
     result: list[dict[str, Any]] = json.loads(_etendue.plugins(category, name))
     return result

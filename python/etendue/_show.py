@@ -53,15 +53,15 @@ class _Png:
 
 
 def show(image: Any) -> Any:
-    """An image or Result in a notebook: radiance, linear RGB, shape (H, W, 3), with controls of exposure in stops and tone
-    mapping, and the radiance of the pixel under the pointer. Without anywidget a tone-mapped PNG.
+    """Shows an image (radiance, linear RGB, shape (H, W, 3)) or a Result in a notebook, with controls for exposure in stops
+    and tone mapping, and the radiance of the pixel under the pointer. Without anywidget, shows a tone-mapped PNG.
     """
     widget = _widget(image)
     return _Png(image) if widget is None else widget
 
 
 class LiveView:
-    """An image that changes while it renders, at most twice a second."""
+    """A view of the image during a rendering, updated at most twice per second."""
 
     def __init__(self) -> None:
         self._view: Any = None

@@ -1,8 +1,8 @@
-"""The path space, as the integrators in C++ use it: sub-paths, joins, densities, MIS weights.
+"""Path space, as used by the integrators in C++: sub-paths, joins, densities, MIS weights.
 
 A path is x_0 (on an emitter), x_1, ..., x_k (on the lens). A technique (s, t) makes it from s vertices of a light path
 y_0, y_1, ... and t vertices of an eye path z_0, z_1, ... Positions are in scene units, radiance and throughputs in
-linear RGB, densities per unit area of the scene, also where a direction was sampled.
+linear RGB. All densities are per unit area of the scene, even if a direction was sampled.
 """
 
 from collections.abc import Sequence
@@ -34,11 +34,11 @@ def eye_path(
     counts: Counts = _BDPT,
     sampler: str = "independent",
 ) -> SubPath:
-    """Walks from the lens through a pixel, (column, row) from the upper left corner.
+    """Traces an eye path from the lens through a pixel, (column, row) from the upper left corner.
 
-    With the seed, sampler and pass of a rendering, the numbers are those of that rendering. max_vertices: of the walk,
-    z_0 included. rr_depth: index of the first vertex with Russian roulette; None: there is none. counts: for the MIS
-    weights of joins.
+    With the seed, sampler and pass of a rendering, the random numbers are those of that rendering. max_vertices: limit of
+    the number of vertices, including z_0. rr_depth: index of the first vertex with Russian roulette; None: no roulette.
+    counts: sample counts for the MIS weights of joins.
     """
     return _etendue.eye_path(scene, pixel, seed, pass_, max_vertices, rr_depth, counts, sampler)
 
@@ -54,13 +54,13 @@ def light_path(
     counts: Counts = _BDPT,
     sampler: str = "independent",
 ) -> SubPath:
-    """Walks from an emitter. path: number of the light path in its pass; the other arguments as for eye_path()."""
+    """Traces a light path from an emitter. path: index of the light path in its pass; see eye_path() for the others."""
     return _etendue.light_path(scene, path, seed, pass_, max_vertices, rr_depth, counts, sampler)
 
 
 def vertex_at(scene: Scene, o: Vector, d: Vector) -> Vertex | None:
-    """The first surface along the ray from o, in scene units, in direction d (of any length), as a vertex whose wo is
-    the opposite direction; None where there is none.
+    """The first surface that the ray from o (in scene units) in direction d (of any length) hits, as a vertex whose wo is
+    the opposite direction; None if the ray hits nothing.
     """
     return _etendue.vertex_at(scene, o, d)
 
@@ -68,11 +68,11 @@ def vertex_at(scene: Scene, o: Vector, d: Vector) -> Vertex | None:
 def join(
     scene: Scene, y: SubPath | None, s: int, z: SubPath | None, t: int, *, seed: int = 0, counts: Counts | None = None
 ) -> list[Join]:
-    """The paths that the first s vertices of y and the first t of z make, after the shadow ray: none where the
-    contribution is zero, one, or for s = 0 one for each emitter at infinity. t is at least 1.
+    """Joins the first s vertices of y and the first t vertices of z, and tests the visibility. Returns the resulting paths:
+    none if the contribution is zero, otherwise one, or for s = 0 one for each emitter at infinity. t is at least 1.
 
-    seed: of the point that s = 1 samples on an emitter, and t = 1 on a finite lens. counts: those that the sub-paths were
-    walked with, whose MIS weights are right; None: those.
+    seed: seed of the point that is sampled on an emitter (s = 1) or on a finite lens (t = 1). counts: must be the counts
+    with which the sub-paths were traced, so that the MIS weights are correct; None: these counts.
     """
     return _etendue.join(scene, y, s, z, t, seed, counts)
 
@@ -80,8 +80,8 @@ def join(
 def evaluate(
     scene: Scene, x: Sequence[Vertex], delta: Sequence[bool] | None = None
 ) -> tuple[NDArray[np.float32], PathPdfs]:
-    """The slow definition: the measurement contribution f of the whole path x, RGB of shape (3,), without visibility, in
-    radiance per unit area for each vertex; and the densities of its vertices from both sides.
+    """Evaluates a path by the slow definition. Returns the measurement contribution f of the whole path x, RGB of shape
+    (3,), without visibility, in radiance per unit area for each vertex; and the densities of its vertices from both sides.
 
     x: from the emitter to the lens, such as Join.vertices(). delta: whether the path scatters by a delta event at each
     vertex, such as Join.delta.
@@ -109,7 +109,7 @@ def sample_paths(
     max_vertices: int = 9,
     sampler: str = "independent",
 ) -> NDArray[Any]:
-    """The first n paths with a contribution that a rendering with one thread makes, as a structured array, shape (n,).
+    """The first n paths with a contribution, in the order of a rendering with one thread, as a structured array, shape (n,).
 
     Fields: s, t; strategy, a number in the order hit, next_event, connect, splat, hit_lens, merge, gather; pixel, its
     index row by row; vertices, their number; mis_weight; contribution, unweighted radiance of shape (3,); film, in

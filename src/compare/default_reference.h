@@ -1,5 +1,5 @@
 #pragma once
-// The reference that a comparison renders where nothing else is asked for.
+// The default reference of a comparison.
 
 #include <string>
 #include <vector>

@@ -4,9 +4,9 @@
 
 namespace etendue {
 
-/// Measures the memory of one of several users of a process that run in turns. Linux reports resident memory and its
-/// peak for the whole process only, so a user's share is what it adds between begin() and end(), and users must not run
-/// at the same time. Shared memory that existed before (the scene) is not counted.
+/// Measures the memory of one of several users within a process that run in turns. Linux reports resident memory and
+/// its peak only for the whole process. The share of a user is therefore the increase between begin() and end(), and
+/// users must not run at the same time. Shared memory that existed before (the scene) is not counted.
 class MemoryMeter {
 public:
     void begin();

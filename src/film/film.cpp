@@ -52,7 +52,7 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     const uint64_t n = geometry_.pixel_count(), chunks = film_chunks(n);
     const bool second = !has_groups() && passes_ % 2 == 1;
     float* const group = has_groups() ? group_sums_[passes_ % group_sums_.size()].data() : nullptr;
-    // All memory is taken before anything changes, so that what fails leaves the totals as they were.
+    // All memory is allocated before anything changes, so that a failure leaves the totals unchanged.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks);
     for (std::vector<double>* list : {&pass_means_, &pair_errors_})
         if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);
@@ -82,7 +82,8 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     mean /= double(n);
     for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
-            // Half the squared difference of two passes estimates the variance of one, however its samples are correlated.
+            // Half the squared difference of two passes estimates the variance of one pass, even if its samples are
+            // correlated.
             const double scale2 = sqr(double(expected_[i])) + 0.01 * mean * mean;
             if (second && scale2 > 0) pair_sum[chunk] += 0.5 * sqr(double(previous_[i])) / scale2;
             expected_[i] = std::max(expected_[i], float(0.1 * mean));
@@ -107,7 +108,7 @@ std::vector<Rgb> Film::variance() const {
     std::vector<Rgb> out(moments_.size());
     if (has_groups()) {
         if (!has_all_groups()) return out;
-        // Groups have sums of luminance only. All channels are given the relative variance of the luminance.
+        // Groups have only sums of luminance. All channels get the relative variance of the luminance.
         const std::vector<Rgb> mean = image();
         const size_t pairs = group_sums_.size() / 2;
         for (size_t i = 0; i < out.size(); ++i) {
@@ -134,7 +135,7 @@ double Film::group_error2(size_t pair, size_t pixel) const {
     const size_t a = 2 * pair, b = a + 1;
     const double difference = double(group_sums_[a][pixel]) / double(passes_of_group(a)) -
                               double(group_sums_[b][pixel]) / double(passes_of_group(b));
-    // Half its square is the variance of one group; the image is the mean of all groups.
+    // Half the squared difference estimates the variance of one group; the image is the mean of all groups.
     return 0.5 * sqr(difference) / double(group_sums_.size());
 }
 
@@ -166,7 +167,8 @@ ErrorEstimate Film::group_error() const {
 ErrorEstimate Film::error() const {
     if (has_groups()) return group_error();
     ErrorEstimate e;
-    // The first pairs were divided by a mean that was noisy itself; they are left out once there are others.
+    // The errors of the first pairs are relative to a mean that was still noisy. They are left out when there are
+    // others.
     const size_t skip = std::min<size_t>(pair_errors_.size() / 4, 8);
     const size_t count = pair_errors_.size() - skip;
     if (count < 4) return e;

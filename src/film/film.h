@@ -1,6 +1,6 @@
 #pragma once
-// The film: integrators add contributions to it pass by pass; it gives the image and its variance. All normalisation
-// (number of light paths, crop, filter) is here.
+// The film: integrators add contributions to it pass by pass. It computes the image and its variance, and does all
+// normalisation (number of light paths, crop, filter).
 
 #include <cstdint>
 #include <span>
@@ -19,11 +19,12 @@ struct ErrorEstimate {
     bool valid = false;        ///< False until there are enough passes.
 };
 
-/// Accumulates passes. The image of the current pass is kept apart, so that the pass can be dropped; a finished pass is
-/// added to the totals. Within a pass, eye contributions of a pixel come from one thread at a time; splats from any.
+/// Accumulates passes. The image of the current pass is separate from the totals, so that the pass can be discarded. A
+/// finished pass is added to the totals. Within a pass, the eye contributions of a pixel come from one thread at a
+/// time; splats may come from any thread.
 class Film {
 public:
-    /// `typical_radiance`: an estimate of the scene's radiance, right within a factor of 1000 or so. The absolute precision of
+    /// `typical_radiance`: an estimate of the scene's radiance within a factor of about 1000. The absolute precision of
     /// splats is 2^-40 of it.
     Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
          double typical_radiance = 1);
@@ -43,33 +44,33 @@ public:
         return {geometry_.pixel_center(index) + s.offset, s.weight};
     }
 
-    /// A film point anywhere in the crop grown by the filter's radius, uniformly; the weight is that area, in pixels. It is a
-    /// splat's: every pixel whose filter reaches the point gets its share.
+    /// A film point, uniformly distributed in the crop enlarged by the filter's radius. The weight is the area of this
+    /// region, in pixels. It applies to splats, which are distributed to all pixels whose filter reaches the point.
     PixelSample sample_anywhere(Vec2 u) const {
         const FilmRegion r = reached_region(geometry_, filter_);
         return {{r.low.x + u.x * r.size.x, r.low.y + u.y * r.size.y}, r.area()};
     }
 
-    /// Passes depend on each other, as those of Markov chains do: pass i belongs to group i mod `count`, and groups are
-    /// independent. error(), variance() and the error of the mean then come from groups, and are unknown until every
-    /// group has had a pass. Even, and set before the first pass.
+    /// Declares that passes depend on each other, as those of Markov chains do: pass i belongs to group i mod `count`,
+    /// and groups are independent. error(), variance() and the error of the mean are then computed from groups, and are
+    /// unknown until every group has had a pass. `count` must be even. To be called before the first pass.
     void set_groups(int count);
 
     // -- The current pass.
 
-    /// Light paths that this pass traces (splats are divided by it); 0 where there are none.
+    /// `light_paths`: number of light paths of this pass, by which splats are divided; 0 if there are none.
     void begin_pass(uint64_t light_paths);
     /// Adds the eye path's value (already times PixelSample::weight) to its own pixel.
     void add_eye(uint64_t pixel, Rgb value) { pass_.add_eye(pixel, value); }
-    /// Adds a light path's measurement at a film point: every pixel whose filter reaches it gets its share. `value`
-    /// is for one light path; it is divided by the number that begin_pass() was told.
+    /// Adds the contribution of a light path at a film point, distributed to all pixels whose filter reaches it.
+    /// `value` is for one light path; it is divided by the number of light paths.
     void add_splat(Vec2 point, Rgb value) { pass_.add_splat(point, value); }
     /// Hints that a splat at `point` may follow.
     void prefetch_splat(Vec2 point) const { pass_.prefetch_splat(point); }
     /// Adds the pass to the totals. `splat_factor`: the factor of splats in the groups' sums, from which errors are
     /// estimated.
     void end_pass(double splat_factor = 1);
-    /// Drops the pass; the totals stay as they were before begin_pass().
+    /// Discards the pass; the totals are unchanged.
     void drop_pass() { pass_.clear(); }
 
     // -- Totals of the finished passes; they do not include the current pass.
@@ -77,8 +78,8 @@ public:
     uint64_t passes() const { return passes_; }
     /// Mean luminance of a pixel in the finished passes, at least a tenth of the image's mean; 0 in the first pass.
     float expected_luminance(uint64_t pixel) const { return expected_[pixel]; }
-    /// The same at a film point (clamped to the crop), averaged over a block of pixels: the blocks fit into a cache, and
-    /// splats read them in random order.
+    /// The same at a film point (clamped to the crop), averaged over a block of pixels. Splats read this in random
+    /// order; unlike the pixels, the blocks fit into the processor's cache.
     float expected_luminance(Vec2 point) const {
         const auto [x, y] = geometry_.pixel_near(point);
         return expected_blocks_[uint64_t(y / kBlock) * blocks_across() + uint64_t(x / kBlock)];
@@ -88,7 +89,7 @@ public:
     /// Variance of that mean, per pixel and channel; zero with fewer than two passes.
     std::vector<Rgb> variance() const;
     ErrorEstimate error() const;
-    /// Mean of the luminance over the crop, and the standard error of it.
+    /// Mean luminance of the crop, and its standard error.
     struct MeanEstimate {
         double mean = 0, standard_error = 0;
     };
@@ -104,7 +105,7 @@ public:
             return luminance(Rgb(float(sum[0]), float(sum[1]), float(sum[2])));
         }
     };
-    /// Of all pixels, row by row.
+    /// The sums of all pixels, row by row.
     std::span<const Moments> moments() const { return moments_; }
 
 private:
@@ -130,13 +131,13 @@ private:
     std::vector<Moments> moments_;
     std::vector<float> expected_;
     std::vector<float> expected_blocks_;  ///< Means of kBlock × kBlock pixels.
-    /// Luminance of the last pass with an even index; after the next pass, the difference of the two. With groups: the
-    /// luminance of the eye paths of the pass that is being added.
+    /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. With
+    /// groups: the luminance of the eye paths in the pass that is being added.
     std::vector<float> previous_;
     std::vector<double>
         pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.
     std::vector<double> pass_means_;
-    std::vector<std::vector<float>> group_sums_;  ///< Of luminance, by group and pixel.
+    std::vector<std::vector<float>> group_sums_;  ///< Sums of luminance, by group and pixel.
     uint64_t passes_ = 0, rejected_ = 0;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// The film's pixels, and which of them a film point reaches.
+// Pixels of the film, and the pixels that a film point contributes to.
 
 #include <algorithm>
 #include <cmath>
@@ -13,11 +13,11 @@ namespace etendue {
 
 /// Size of the image and the part of it that is rendered. Film points are in pixels, (0, 0) at the top left corner.
 struct FilmGeometry {
-    int width = 0, height = 0;  ///< Of the whole image.
+    int width = 0, height = 0;  ///< Size of the whole image.
     int crop_x = 0, crop_y = 0, crop_width = 0, crop_height = 0;
 
     uint64_t pixel_count() const { return uint64_t(crop_width) * uint64_t(crop_height); }
-    /// Index of the pixel in this column and row of the crop.
+    /// Index of the pixel at a column and row of the crop.
     uint64_t pixel_index(int column, int row) const {
         return uint64_t(row) * uint64_t(crop_width) + uint64_t(column);
     }
@@ -26,24 +26,23 @@ struct FilmGeometry {
         return {float(crop_x + int(index % uint64_t(crop_width))) + 0.5f,
                 float(crop_y + int(index / uint64_t(crop_width))) + 0.5f};
     }
-    /// Column and row, within the crop, of the pixel that a film point lies in, or of the one nearest to it. The point may
-    /// lie anywhere.
+    /// Column and row, within the crop, of the pixel nearest to a film point, which may be outside the crop.
     std::pair<int, int> pixel_near(Vec2 point) const {
         return {cell(point.x - float(crop_x), crop_width),
                 cell(point.y - float(crop_y), crop_height)};
     }
-    /// The same pixel's index.
+    /// Index of the same pixel.
     uint64_t pixel_at(Vec2 point) const {
         const auto [column, row] = pixel_near(point);
         return pixel_index(column, row);
     }
 
 private:
-    /// Clamped before it becomes an integer, which cannot hold every float.
+    /// Clamps before the conversion, because an integer cannot represent every float.
     static int cell(float x, int count) { return x > 0 ? int(std::min(x, float(count - 1))) : 0; }
 };
 
-/// The film points that some pixel's filter reaches.
+/// The film points that the filter of any pixel reaches.
 struct FilmRegion {
     Vec2 low, size;
 
@@ -62,7 +61,8 @@ inline FilmRegion reached_region(const FilmGeometry& g, const ReconstructionFilt
 template <class Use>
 void for_each_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point,
                     const Use& use) {
-    // Pixels i with |point - (i + 1/2)| ≤ r: clamped before they become integers, which cannot hold every float.
+    // Pixels i with |point - (i + 1/2)| ≤ r, clamped before the conversion, because an integer cannot represent every
+    // float.
     const float r = filter.radius();
     const auto first = [r](float at, int begin, int end) {
         return int(std::min(std::max(float(begin), std::ceil(at - r - 0.5f)), float(end)));

@@ -14,7 +14,7 @@ double box_shape(double, double, double) {
 double tent_shape(double x, double radius, double) {
     return std::max(0.0, 1 - std::fabs(x) / radius);
 }
-/// Gaussian of standard deviation `sigma`, lowered so that it meets zero at `radius`.
+/// Gaussian of standard deviation `sigma`, shifted down so that it is zero at `radius`.
 double gaussian_shape(double x, double sigma, double radius) {
     const double k = -0.5 / (sigma * sigma);
     return std::max(0.0, std::exp(k * x * x) - std::exp(k * radius * radius));

@@ -1,7 +1,7 @@
 #pragma once
-// Reconstruction filters. A filter is the pixel's response to light at an offset from the pixel's centre; eye samples are
-// drawn from it (filter importance sampling [Ernst et al. 2006]), splats are weighted with it, so both estimate the same
-// image.
+// Reconstruction filters. A filter is the response of a pixel to light at an offset from the pixel's centre. Eye
+// samples are drawn from it (filter importance sampling [Ernst et al. 2006]), and splats are weighted with it, so both
+// estimate the same image.
 
 #include <memory>
 #include <vector>
@@ -41,7 +41,7 @@ private:
     bool box_ = false;
     double (*shape_)(double, double, double);
     double a_, b_, scale_ = 1;
-    std::vector<double> cdf_;  ///< Of |h| over [-radius, radius], at equal steps.
+    std::vector<double> cdf_;  ///< CDF of |h| over [-radius, radius], at equal steps.
 };
 
 struct FilterEntry {

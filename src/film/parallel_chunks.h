@@ -7,7 +7,8 @@
 
 namespace etendue {
 
-/// Pixels in a chunk of parallel work on the film; fixed, so that sums over chunks do not depend on the threads.
+/// Number of pixels in a chunk of parallel work on the film. It is fixed, so that sums over chunks do not depend on the
+/// threads.
 inline constexpr uint64_t kFilmChunk = 4096;
 
 inline uint64_t film_chunks(uint64_t count) {

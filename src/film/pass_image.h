@@ -1,5 +1,5 @@
 #pragma once
-// What one pass adds to the film.
+// The image of one pass.
 
 #include <atomic>
 #include <memory>
@@ -11,8 +11,9 @@
 
 namespace etendue {
 
-/// The image of the current pass, apart from the film's totals, so that the pass can be dropped. Eye contributions of a
-/// pixel come from one thread at a time; splats from any. `geometry` and `filter` must outlive it.
+/// The image of the current pass, separate from the film's totals, so that the pass can be discarded. The eye
+/// contributions of a pixel come from one thread at a time; splats may come from any thread. `geometry` and `filter`
+/// must outlive it.
 class PassImage {
 public:
     PassImage(const FilmGeometry& geometry, const ReconstructionFilter& filter,
@@ -20,20 +21,20 @@ public:
         : geometry_(geometry), filter_(filter), typical_radiance_(typical_radiance),
           pixels_(geometry.pixel_count()) {}
 
-    /// For so many light paths; 0 where there are none.
+    /// `light_paths`: number of light paths of the pass; 0 if there are none.
     void begin(uint64_t light_paths);
     void add_eye(uint64_t pixel, Rgb value) { pixels_[pixel] += value; }
     void add_splat(Vec2 point, Rgb value);
     void prefetch_splat(Vec2 point) const { splats_->prefetch(geometry_.pixel_at(point)); }
     bool has_splats() const { return splats_ != nullptr; }
 
-    /// The contributions of eye paths, until finish().
+    /// The contributions of eye paths; valid until finish().
     std::span<const Rgb> eye_values() const { return pixels_; }
-    /// The finished image. Pixels that are not finite become 0, and count as rejected.
+    /// The finished image. Pixels that are not finite become 0 and are counted as rejected.
     std::span<const Rgb> finish();
-    /// Values that were not finite and were left out.
+    /// Number of values that were not finite and were left out.
     uint64_t rejected() const { return rejected_.load(std::memory_order_relaxed); }
-    /// Makes the image black again.
+    /// Resets the image to black.
     void clear();
 
 private:

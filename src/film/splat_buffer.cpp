@@ -29,13 +29,13 @@ SplatBuffer::SplatBuffer(uint64_t pixels, double typical_radiance)
 
 void SplatBuffer::add_large(uint64_t cell, double units) {
     if (!std::isfinite(units)) return;
-    // A float has 24 bits. The last of them is that of 2^(26·digit) units or above it.
+    // A float has 24 bits. The lowest of them is 2^(26·digit) units or more.
     const int digit = (std::ilogb(units) - 23) / kDigitBits;
     add(size_t(digit), cell, int64_t(std::ldexp(units, -kDigitBits * digit)));
 }
 
 void SplatBuffer::carry(size_t digit, uint64_t cell, Cell& from) {
-    // Another thread may have carried the cell's value on already; then there is little left.
+    // Another thread may have carried the value already; then little is left.
     const int64_t taken = from.exchange(0, std::memory_order_relaxed);
     const int64_t passed = taken >> kDigitBits;
     add(digit, cell, taken - (passed << kDigitBits));
@@ -53,7 +53,7 @@ SplatBuffer::Cell* SplatBuffer::higher(size_t digit) {
 }
 
 double SplatBuffer::take(uint64_t cell, size_t digits) {
-    // Carried on until all digits but the last lie in [0, 2^26), which they do in one way only.
+    // Carries until all digits except the last lie in [0, 2^26). This representation is unique.
     constexpr int64_t kMask = (int64_t(1) << kDigitBits) - 1;
     std::array<int64_t, kDigits> sum{};
     int64_t passed = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// Sums of splats, which come from any thread in any order.
+// Sums of splats that do not depend on the order of the additions or on the threads.
 
 #include <array>
 #include <atomic>
@@ -14,15 +14,16 @@
 
 namespace etendue {
 
-/// One pass's splats, summed in integers, so that the result does not depend on the order of the additions.
+/// The splats of one pass. Sums are integers, so that the result does not depend on the order of the additions.
 ///
-/// A sum has digits in base 2^26, each in 64 bits: digit j counts multiples of unit·2^(26j), where the unit is a power of
-/// two, 2^-40 of a typical radiance. A value below 2^50 units is rounded to the nearest unit and added to digit 0; a
-/// larger one is added to the digit that holds all its bits. A digit that comes near the end of its 64 bits passes most
-/// of what it has to the next. So no value is too large, and no sum wraps. Digits above 0 are made when one is needed.
+/// A sum consists of digits in base 2^26, each in 64 bits: digit j counts multiples of unit·2^(26j), where the unit is
+/// a power of two, 2^-40 of a typical radiance. A value below 2^50 units is rounded to the nearest unit and added to
+/// digit 0. A larger value is added to the digit that can represent all its bits. Before a digit overflows, most of its
+/// value is carried to the next digit. Therefore no value is too large, and no sum overflows. Digits above 0 are
+/// allocated when they are needed.
 class SplatBuffer {
 public:
-    /// Values may have any size; the precision of small ones is relative to `typical_radiance`.
+    /// Values may have any magnitude; the precision of small ones is relative to `typical_radiance`.
     SplatBuffer(uint64_t pixels, double typical_radiance);
 
     /// Thread-safe. A value that is not finite is left out; the caller reports it.
@@ -46,8 +47,8 @@ private:
     static constexpr int kDigitBits = 26;
     /// Enough for the largest float over the smallest: 2^128/2^-149 = 2^277 = 2^(26·9 + 43).
     static constexpr size_t kDigits = 11;
-    /// Units up to which a value goes to digit 0. A digit's cell never leaves (-2^63, 2^63): it stays below kFull but for
-    /// what up to 2^12 threads add before they pass it on, 2^50 each.
+    /// Largest value, in units, that is added to digit 0. A cell never leaves (-2^63, 2^63): it can exceed kFull only
+    /// by the values that up to 2^12 threads, 2^50 each, add before it is carried.
     static constexpr double kLarge = 0x1p50;
     static constexpr int64_t kFull = int64_t(1) << 61;
 
@@ -59,9 +60,9 @@ private:
     }
     void add_large(uint64_t cell, double units);
     void carry(size_t digit, uint64_t cell, Cell& from);
-    /// The cells of a digit above 0; made if there are none.
+    /// The cells of a digit above 0; allocated on first use.
     Cell* higher(size_t digit);
-    /// The sum in units, rounded once; the cell becomes 0.
+    /// Returns the sum in units, rounded once, and sets the cell to 0.
     double take(uint64_t cell, size_t digits);
 
     double unit_, units_per_radiance_;

@@ -1,9 +1,10 @@
 // Bidirectional path tracing [Veach & Guibas 1994; Lafortune & Willems 1993]: all techniques C(s,t), combined by the power
-// heuristic. Unbiased. Joins that will add little are thinned by roulette before their shadow ray.
+// heuristic. Unbiased. Joins with a small contribution pass Russian roulette before their shadow ray.
 //
-// An eye vertex is connected to the light path of its own pixel, or to C of the V connectible vertices y_i, i ≥ 1, of all
-// light paths of the pass, the light-vertex cache [Davidovič et al. 2014]. Then C(s,t), s, t ≥ 2, brings V/(C·N_L) times
-// what each brings, and counts C·N_L/V̄ in the weights, V̄ being the mean of V: V itself depends on the paths.
+// An eye vertex is connected to the light path of its own pixel, or to C random vertices of the light vertex cache,
+// which holds the V connectible vertices y_i, i ≥ 1, of all light paths of the pass [Davidovič et al. 2014]. In the
+// latter case the contribution of each connection C(s,t), s, t ≥ 2, is multiplied by V/(C·N_L), and the weights count
+// C·N_L/V̄ samples. V̄ is the mean of V; V itself cannot be used in the weights, because it depends on the paths.
 
 #include "integrator/bdpt.h"
 
@@ -80,7 +81,8 @@ public:
     }
 
 private:
-    /// C as given, or as many as an average light path has vertices, from paths that bring nothing to the film.
+    /// Sets C to the given value, or to the mean number of connectible vertices of pilot light paths, which do not
+    /// contribute to the film.
     void choose_draws(const PassContext& pass) {
         constexpr uint64_t kPilotPaths = 8192;
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
@@ -97,7 +99,7 @@ private:
         count_ = vertices > 0 ? float(draws_ / vertices) : 1.0f;
     }
 
-    /// `draws_` of the connections of z_{t-1} to the cache.
+    /// Connects z_{t-1} to `draws_` random vertices of the cache.
     void connect_to_cache(const SampleContext& c, const TechniqueCounts& n, int t,
                           Workspace& work) const {
         if (connectible_.empty()) return;
@@ -116,9 +118,9 @@ private:
         }
     }
 
-    /// A vertex is in the cache, and has a number among the connectible.
+    /// Memory per vertex: in the cache and in the list of connectible vertices.
     static constexpr uint64_t kVertexBytes = LightVertexCache::kVertexBytes + 2 * sizeof(uint32_t);
-    /// Before the pilot; not that of other methods.
+    /// Value of count_ before the pilot has run; it differs from the counts of all other methods.
     static constexpr float kUnknownCount = 0.5f;
 
     Bidirectional paths_;

@@ -17,7 +17,8 @@ std::vector<ParamInfo> Bidirectional::params() {
     params.push_back({"eorr", ParamKind::Bool, "false",
                       "Efficiency-optimised roulette: the threshold is √(V/T) instead, where V is "
                       "the variance of the pixel and T the number of rays of a sample, both from "
-                      "earlier passes. Has no effect if `roulette` is 0."});
+                      "earlier passes. Has no effect if `roulette` is 0.",
+                      true});
     return params;
 }
 
@@ -74,12 +75,12 @@ void Bidirectional::add_sample(const SampleContext& c, const TechniqueCounts& co
 void Bidirectional::add_technique(const SampleContext& c, const TechniqueCounts& counts, int s,
                                   int t, float factor, Workspace& work) const {
     SubPath &y = work.y, &z = work.z;
-    // The last flight of C(s,0) ends on the lens; the surface that lies beyond it is not needed, but met.
+    // The last flight of C(s,0) ends on the lens. Its ray also hits the surface behind the lens, which is not needed.
     const WalkContext light{c.scene, counts, work.stats, {s, depth_.rr_depth}};
     const WalkContext eye{c.scene, counts, work.stats, {t, depth_.rr_depth}};
     if (s >= 2) {
         if (!start_light_path(light, c.sampler, y)) return;
-        // Not beyond: another step would forget the flight.
+        // The loop must not take another step, since that would overwrite y.flight.
         while (y.size() < s && extend<TransportMode::Importance>(light, c.sampler, y)) {
         }
         if (t == 0 && y.size() >= s - 1) {
@@ -107,12 +108,12 @@ void Bidirectional::add_technique(const SampleContext& c, const TechniqueCounts&
 
 void Bidirectional::learn(const LearnContext& pass) {
     if (!is_optimised_ || pass.film.passes() < 2) return;
-    // Of one pass, averaged over a window, since few passes know little of a pixel's variance.
+    // The variance of one pass, averaged over a window, because few passes give a poor estimate for a single pixel.
     constexpr int kReach = 3;
     const FilmGeometry& g = pass.film.geometry();
     const std::vector<Rgb> variance = pass.film.variance();
     thresholds_.resize(variance.size());
-    // Variance of one pass over the rays of a sample.
+    // Factor from film.variance() to the variance of one pass divided by the number of rays of a sample.
     const double passes = double(pass.film.passes());
     const double samples = passes * double(g.pixel_count());
     const double scale = passes / (double(pass.so_far.rays()) / samples);
@@ -134,8 +135,9 @@ float Bidirectional::threshold(const SampleContext& c, const Vec2* splat) const 
     if (!is_optimised_ || roulette_ == 0)
         return roulette_ *
                (splat ? c.film.expected_luminance(*splat) : c.film.expected_luminance(c.pixel));
-    // With a survival of q = C/δ the rays of a join fall to q, and its variance grows by C²(1/q - 1): the product of the
-    // sample's rays T and variance V is least where δ² = V/T [Veach 1997, §10.4.2].
+    // With a survival probability q = C/δ, the expected number of rays of a join is q, and its variance increases by
+    // C²(1/q - 1). The product of the number of rays T and the variance V of a sample is minimal for δ² = V/T
+    // [Veach 1997, §10.4.2].
     if (thresholds_.empty()) return 0;
     return thresholds_[splat ? c.film.geometry().pixel_at(*splat) : c.pixel];
 }

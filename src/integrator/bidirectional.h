@@ -1,5 +1,5 @@
 #pragma once
-// What the bidirectional integrators share: both walks, and the roulette before shadow rays.
+// Common parts of the bidirectional integrators: both walks, and the Russian roulette before shadow rays.
 
 #include "integrator/guiding.h"
 #include "reuse/light_vertex_cache.h"
@@ -9,13 +9,13 @@ namespace etendue {
 class Bidirectional {
 public:
     static std::vector<ParamInfo> params();
-    /// `guiding` has to be given where the integrator has Guiding::param().
+    /// `guiding` must be given if the integrator has the parameter Guiding::param().
     explicit Bidirectional(const IntegratorParams& params, Guiding guiding = {});
-    /// Without roulette of joins; paths of less than `shortest` edges are left out.
+    /// Without Russian roulette of joins. Paths with fewer than `shortest` edges are left out.
     Bidirectional(const DepthOptions& depth, int shortest)
         : depth_(depth), shortest_(shortest), roulette_(0), is_optimised_(false) {}
 
-    /// Counts of bidirectional path tracing, without pairs.
+    /// Sample counts of bidirectional path tracing, without merges and gathers.
     static TechniqueCounts counts(const Scene& scene, uint64_t light_paths) {
         const float N = float(light_paths);
         return {.hit = 1,
@@ -25,10 +25,10 @@ public:
                 .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
     }
 
-    /// Trains the guide for a pass, before anything of it is traced.
+    /// Trains the guide. Must be called before any path of the pass is traced.
     void train(const PassContext& pass) { guiding_.train(pass, depth_); }
 
-    /// Sets the thresholds of efficiency-optimised roulette from what earlier passes brought.
+    /// Sets the thresholds of efficiency-optimised roulette from the statistics of earlier passes.
     void learn(const LearnContext& pass);
     void save(LearnedState& to) const {
         to.put(thresholds_);
@@ -44,7 +44,7 @@ public:
                          const LearnedPlaces* learned = nullptr) const {
         return {scene, counts, stats, depth_.walk(), learned};
     }
-    /// The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
+    /// The last vertex of the longest path is the lens. A splat connects to it; a ray may hit it if it is finite.
     WalkContext light_walk(const Scene& scene, const TechniqueCounts& counts, RenderStats& stats,
                            const LearnedPlaces* learned = nullptr) const {
         return {scene,
@@ -54,26 +54,26 @@ public:
                 learned};
     }
 
-    /// The light sub-path work.y of the light path c.own_light_path(). Its techniques C(s,1) and C(s,0) are added for the
-    /// first pixel that it belongs to.
+    /// Traces the light sub-path work.y, which is the light path c.own_light_path(). Adds C(s,1) and C(s,0) if this
+    /// pixel is the first one that uses this light path.
     void trace_light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                           const LearnedPlaces* learned = nullptr) const;
-    /// The eye sub-path work.z.
+    /// Traces the eye sub-path work.z.
     void trace_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                         const LearnedPlaces* learned = nullptr) const;
-    /// Whether z_{t-1} can be joined to a light sub-path, for some path that is not too long.
+    /// Whether z_{t-1} can be joined to a light sub-path without exceeding the maximum path length.
     bool is_joinable(const SubPath& z, int t) const {
         return z[t - 1].is_connectible && t <= depth_.max_depth;
     }
 
-    /// Traces the light paths of the pass, with their techniques C(s,1) and C(s,0); the first `kept` go into `cache`, which
-    /// has begun.
+    /// Traces the light paths of the pass, adds C(s,1) and C(s,0), and stores the first `kept` paths in `cache`. The
+    /// caller has called cache.begin().
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& counts, uint64_t kept,
                            LightVertexCache& cache, const LearnedPlaces* learned = nullptr) const;
 
-    /// Everything that the sub-paths of one sample bring: bidirectional path tracing.
+    /// Adds all techniques of one sample of bidirectional path tracing.
     void add_sample(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
-    /// The eye sub-path, C(0,t) and C(1,t); `join(t)` adds what else z_{t-1} is joined to.
+    /// Traces the eye sub-path and adds C(0,t) and C(1,t). `join(t)` adds all other joins of z_{t-1}.
     template <class JoinMore>
     void add_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                       const LearnedPlaces* learned, const JoinMore& join) const {
@@ -88,48 +88,48 @@ public:
             join(t);
         }
     }
-    /// C(s,t), s ≥ 2, with the light sub-path work.y.
+    /// Adds C(s,t), s ≥ 2, with the light sub-path work.y.
     void add_connections(const SampleContext& c, const TechniqueCounts& counts, int t,
                          Workspace& work) const {
         const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
         for (int s = 2; s <= work.y.size() && s + t - 1 <= max_depth(); ++s)
             add(c, join_connect(c.scene, work.y, s, work.z, t, counts), work);
     }
-    /// C(s,t) alone, times `factor`, with sub-paths no longer than it needs.
+    /// Adds only C(s,t), times `factor`. Traces sub-paths of s and t vertices.
     void add_technique(const SampleContext& c, const TechniqueCounts& counts, int s, int t,
                        float factor, Workspace& work) const;
 
-    /// C(0,t).
+    /// Adds C(0,t).
     void add_hits(const SampleContext& c, const TechniqueCounts& counts, int t,
                   const Workspace& work, float factor = 1) const {
         if (counts.hit > 0 && t - 1 >= shortest_)
             for_each_hit(c.scene, work.z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution * factor); });
     }
-    /// Adds a join, where there is one and it passes test(). Where z_{t-1} draws several of one technique each is added
-    /// times `factor`, and `draw` (from 1 on) tells them apart.
+    /// Adds the join, times `factor`, if it exists and passes test(). If z_{t-1} has several joins of the same
+    /// technique, `draw` (from 1 on) distinguishes them.
     void add(const SampleContext& c, const std::optional<Join>& join, Workspace& work,
              float factor = 1, uint32_t draw = 0) const;
-    /// What is left of a join's contribution after the roulette and the shadow ray; nothing where they end it. A unit of
-    /// contribution adds `scale` to its pixel; `number` tells joins of one sample apart.
+    /// The contribution of a join after Russian roulette and the shadow ray; empty if either of them ends it. A unit of
+    /// contribution adds `scale` to its pixel. `number` distinguishes the joins of one sample.
     std::optional<Rgb> test(const SampleContext& c, const Join& join, float scale, uint64_t number,
                             Workspace& work) const;
 
     const DepthOptions& depth() const { return depth_; }
     int max_depth() const { return depth_.max_depth; }
-    /// Of join_survival(), for what is added to the own pixel.
+    /// Threshold of join_survival() for contributions to the own pixel.
     float threshold(const SampleContext& c) const { return threshold(c, nullptr); }
 
 private:
-    /// Of join_survival(); `splat`: where it is added, nullptr: to the own pixel.
+    /// Threshold of join_survival() for contributions at the film point `splat`, or to the own pixel if it is nullptr.
     float threshold(const SampleContext& c, const Vec2* splat) const;
 
     DepthOptions depth_;
     Guiding guiding_;
-    int shortest_ = 1;  ///< Edges.
+    int shortest_ = 1;  ///< Length of the shortest paths, in edges.
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
-    bool is_optimised_;              ///< The thresholds below instead.
-    std::vector<float> thresholds_;  ///< By pixel, of this pass; empty until there are some.
+    bool is_optimised_;              ///< Whether thresholds_ replaces roulette_.
+    std::vector<float> thresholds_;  ///< By pixel; empty until they are learned.
 };
 
 }  // namespace etendue

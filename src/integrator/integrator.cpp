@@ -18,6 +18,7 @@
 #include "integrator/pssmlt.h"
 #include "integrator/sppm.h"
 #include "integrator/upg.h"
+#include "integrator/upg_pssmlt.h"
 #include "integrator/vcm.h"
 
 namespace etendue {
@@ -26,7 +27,7 @@ const std::vector<IntegratorEntry>& integrator_registry() {
     static const std::vector<IntegratorEntry> entries = {
         path_entry(),   light_entry(), bdpt_entry(), pm_entry(),       ppm_entry(),
         sppm_entry(),   vcm_entry(),   upg_entry(),  upg_bdpt_entry(), pcbpt_entry(),
-        pssmlt_entry(), mmlt_entry(),  mlt_entry(),  mps_entry()};
+        pssmlt_entry(), mmlt_entry(),  mlt_entry(),  mps_entry(),      upg_pssmlt_entry()};
     return entries;
 }
 
@@ -153,17 +154,22 @@ float IntegratorParams::number(const char* name, float low, float high) const {
     return checked_range(integrator_, name, number(name), low, high);
 }
 
-std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec) {
-    if (spec.make) return spec.make(spec.params);
+const IntegratorEntry& integrator_entry(const std::string& name) {
     std::vector<std::string> known;
     for (const IntegratorEntry& e : integrator_registry()) {
-        if (spec.name == e.info.name) return e.make(IntegratorParams(spec, e.info));
+        if (name == e.info.name) return e;
         known.push_back(e.info.name);
     }
-    const std::string near = nearest_name(spec.name, known);
+    const std::string near = nearest_name(name, known);
     throw std::runtime_error(fmt::format(
-        "there is no integrator \"{}\"; {}there are: {}", spec.name,
+        "there is no integrator \"{}\"; {}there are: {}", name,
         near.empty() ? "" : fmt::format("did you mean \"{}\"? ", near), fmt::join(known, ", ")));
+}
+
+std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec) {
+    if (spec.make) return spec.make(spec.params);
+    const IntegratorEntry& entry = integrator_entry(spec.name);
+    return entry.make(IntegratorParams(spec, entry.info));
 }
 
 DepthOptions DepthOptions::without_roulette(const IntegratorParams& params) {

@@ -1,5 +1,5 @@
 #pragma once
-// Integrators: which sub-paths are traced, which techniques join them, how many samples each takes. Nothing else.
+// Integrators: which sub-paths are traced, which techniques join them, and how many samples each technique takes.
 
 #include <array>
 #include <functional>
@@ -21,49 +21,51 @@ enum class Estimator { Unbiased, Consistent, Biased };
 class Integrator {
 public:
     virtual ~Integrator() = default;
-    /// Learns from what earlier passes left: before pass 0, where there is nothing yet, and before passes 1, 4, 16, 64 …
-    /// What is learned holds until the next call, and from each call on random numbers are independent of earlier ones:
-    /// so no pass depends on its own numbers through what it has learned, and every pass has the right expectation.
+    /// Learns from the statistics of earlier passes. Called before pass 0, when there are none, and before passes 1, 4,
+    /// 16, 64 …. What is learned holds until the next call. From each call on, the random numbers are independent of
+    /// all earlier ones. Therefore no pass uses learned data that depend on its own random numbers, and learning causes
+    /// no bias.
     virtual void learn(const LearnContext&) {}
-    /// Whether learn() changes what later passes sample or weigh.
+    /// Whether learn() changes the sampling or the weights of later passes.
     virtual bool is_learning() const { return false; }
-    /// Writes what later passes need of earlier ones, between passes: load() into an integrator with the same parameters
-    /// makes it go on as this one would. What the film and the statistics keep is not part of it, nor what a pass makes for
-    /// itself. load() throws std::runtime_error where the state is of another integrator.
+    /// Writes the state that later passes need. Called between passes. After load(), an integrator with the same
+    /// parameters continues as this one would. The state includes neither the film and the statistics nor the data of a
+    /// single pass. load() throws std::runtime_error if the state is that of another integrator.
     virtual void save(LearnedState&) const {}
     virtual void load(LearnedState&) {}
-    /// Traces what the samples of the pass share. Called by one thread, before them. What it throws, and what samples throw,
-    /// drops the pass.
+    /// Traces the paths that the samples of the pass share. Called by one thread, before the samples. An exception,
+    /// here or in a sample, discards the pass.
     virtual void trace(const PassContext&) {}
 
-    /// What a worker adds up for learn() during a pass (Workspace::sums); nullptr where nothing is.
+    /// Makes the sums that a worker accumulates during a pass for learn() (Workspace::sums); nullptr if there are none.
     virtual std::unique_ptr<PassSums> make_sums() const { return nullptr; }
-    /// Takes over all workers' sums of a finished pass.
+    /// Takes the sums of all workers at the end of a pass.
     virtual void collect(std::span<const std::unique_ptr<PassSums>>) {}
 
     /// Traces sample `context.pixel` and reports its contributions.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
-    /// Samples of each strategy per eye sub-path, as the weights have it, where a pass traces `light_paths`.
+    /// Number of samples of each strategy per eye sub-path, as counted in the weights, for a pass with `light_paths`.
     virtual TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const = 0;
-    /// Whether it makes paths by this technique.
+    /// Whether the integrator makes paths by this technique.
     virtual bool uses(const Technique& q, const Scene& scene, uint64_t light_paths) const {
         return counts(scene, light_paths).of(q) > 0;
     }
-    /// N_L, light paths of a pass; 0 where it traces none.
+    /// N_L, the number of light paths in a pass; 0 if there are none.
     virtual uint64_t light_paths(const Scene& scene) const = 0;
-    /// Whether contributions come with the sub-paths they were made of, so that `verify` can tell their paths.
+    /// Whether contributions are reported together with their sub-paths, which `verify` needs to identify the paths.
     virtual bool keeps_paths() const { return true; }
     virtual Estimator estimator() const = 0;
-    /// Where passes depend on each other: of how many independent groups they are, pass i of group i modulo their number.
-    /// 0 where each pass is independent.
+    /// Number of independent groups of passes, for integrators whose passes depend on each other: pass i belongs to
+    /// group i modulo this number. 0 if all passes are independent.
     virtual int error_groups() const { return 0; }
-    /// What splats of the pass just traced count in estimates of errors by groups, see Film::end_pass().
+    /// Factor of the splats of the last pass in estimates of the error from groups, see Film::end_pass().
     virtual double splat_error_factor() const { return 1; }
-    /// What a run tells of the integrator's own structures, by name; as of the last pass.
+    /// Statistics of the integrator by name, as of the last pass; written by --stats.
     virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
 
-/// An integrator with its parameters, as text: `bdpt:max_depth=12,rr_depth=5`. Checked against the integrator's table.
+/// An integrator with its parameters, as text: `bdpt:max_depth=12,rr_depth=5`. Parameters are checked against the table
+/// of the integrator.
 struct IntegratorSpec {
     std::string name;
     std::map<std::string, std::string> params;
@@ -76,14 +78,14 @@ struct IntegratorSpec {
     std::string to_string() const;
 };
 
-/// One of the words that a parameter may be, and what it stands for.
+/// One of the allowed values of a text parameter, and its meaning.
 template <class T>
 struct Choice {
     const char* name;
     T value;
 };
 
-/// Typed access to a spec's parameters; the table's defaults where absent.
+/// Typed access to the parameters of a spec. Parameters that are not given have the defaults of the table.
 class IntegratorParams {
 public:
     IntegratorParams(const IntegratorSpec& spec, const PluginInfo& info);
@@ -100,7 +102,7 @@ public:
         }
         refuse_choice(name, known);
     }
-    /// As integer() and number(), within [low, high].
+    /// Like integer() and number(), but throws if the value is outside [low, high].
     int integer(const char* name, int low, int high) const;
     float number(const char* name, float low, float high) const;
     const std::string& integrator() const { return integrator_; }
@@ -117,17 +119,19 @@ struct IntegratorEntry {
     std::unique_ptr<Integrator> (*make)(const IntegratorParams& params);
 };
 const std::vector<IntegratorEntry>& integrator_registry();
+/// Throws std::runtime_error for an unknown name.
+const IntegratorEntry& integrator_entry(const std::string& name);
 std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec);
 
-/// Longest path and start of roulette, as all integrators have them.
+/// Maximum path length and start of Russian roulette; parameters of all integrators.
 struct DepthOptions {
-    int max_depth;  ///< Edges of the longest path; INT_MAX where unlimited.
+    int max_depth;  ///< Edges of the longest path; kUnlimited if there is no limit.
     int rr_depth;
 
     static DepthOptions from(const IntegratorParams& params);
-    /// The same without roulette.
+    /// The same without Russian roulette.
     static DepthOptions without_roulette(const IntegratorParams& params);
-    /// Vertices of a sub-path that can still be joined.
+    /// Limits of walks: sub-paths end at the last vertex that can be part of a path of max_depth edges.
     WalkOptions walk() const {
         return {max_depth == kUnlimited ? kUnlimited : max_depth + 1, rr_depth};
     }

@@ -1,7 +1,7 @@
 // Light tracing, or particle tracing: light paths are connected to the lens [Dutré & Willems 1995].
 //
-// Techniques: C(s,1) splats and, with a finite lens, C(s,0). Unbiased for the paths it can make. Limits: whatever the
-// eye sees in a mirror or through glass is missing with a pinhole.
+// Techniques: C(s,1) splats and, with a finite lens, C(s,0). Unbiased for the paths it can make. Limits: with a
+// pinhole, everything that is seen in a mirror or through glass is missing.
 
 #include "integrator/light.h"
 
@@ -21,7 +21,7 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, c.light_paths);
-        // The last vertex of the longest path is the lens: joined to by a splat, met by a ray if it is finite.
+        // The last vertex of the longest path is the lens. A splat connects to it; a ray may hit it if it is finite.
         const WalkContext walk{
             c.scene,
             counts,

@@ -20,7 +20,7 @@ uint64_t LightPathOptions::count(const Scene& scene, const DepthOptions& depth,
                                  uint64_t vertex_bytes) const {
     if (given > 0) return given;
     const uint64_t pixels = scene.film().pixel_count();
-    // So many vertices of a path fit in any case, and hardly any scene has more on average.
+    // If this many vertices per path fit into the memory, no pilot is needed: hardly any scene has more on average.
     constexpr uint64_t kManyVertices = 24;
     if (pixels * kManyVertices * vertex_bytes <= memory) return pixels;
     constexpr uint64_t kPilotPaths = 4096;

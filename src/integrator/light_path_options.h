@@ -1,19 +1,19 @@
 #pragma once
-// How many light paths a pass traces, and what they may take of memory.
+// Number of light paths in a pass, and their memory limit.
 
 #include "integrator/integrator.h"
 
 namespace etendue {
 
 struct LightPathOptions {
-    uint64_t given;   ///< 0: one a pixel, if memory allows.
-    uint64_t memory;  ///< Bytes.
+    uint64_t given;   ///< Parameter light_paths; 0: one light path per pixel, if memory allows.
+    uint64_t memory;  ///< Memory limit in bytes.
 
     static std::vector<ParamInfo> params();
     explicit LightPathOptions(const IntegratorParams& params);
 
-    /// N_L, where each light vertex that a pass keeps takes `vertex_bytes`; 0 where it keeps none. Of a large film, short
-    /// paths tell how many fit.
+    /// Number of light paths N_L. `vertex_bytes` is the memory of a stored light vertex, or 0 if the pass stores none.
+    /// On a large film, pilot paths determine how many light paths fit into the memory.
     uint64_t count(const Scene& scene, const DepthOptions& depth, uint64_t vertex_bytes) const;
 };
 

@@ -48,7 +48,8 @@ bool MarkovIntegrator::hits_emitters(const Scene& scene) {
 
 PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
                                                      const Bidirectional& paths) const {
-    const TechniqueCounts n = counts(scene, 0);
+    // Those of bidirectional path tracing alone: more may depend on what begin() chose before.
+    const TechniqueCounts n = MarkovIntegrator::counts(scene, 0);
     return
         [&paths, n](int, const SampleContext& c, Workspace& work) { paths.add_sample(c, n, work); };
 }
@@ -70,7 +71,7 @@ void MarkovIntegrator::trace(const PassContext& pass) {
         groups_->load(state);
         has_begun_ = true;
     }
-    groups_->advance(pass);
+    advance(pass, *space_, *groups_);
 }
 
 void MarkovIntegrator::save(LearnedState& to) const {

@@ -35,7 +35,7 @@ public:
     void sample(const SampleContext& context, Workspace& work) const final;
 
     /// Of the chains; all that they make can be made in all these ways.
-    TechniqueCounts counts(const Scene& scene, uint64_t) const final {
+    TechniqueCounts counts(const Scene& scene, uint64_t) const override {
         return Bidirectional::counts(scene, whole_film_paths(scene));
     }
     bool uses(const Technique& q, const Scene& scene, uint64_t light_paths) const final {
@@ -46,7 +46,7 @@ public:
     Estimator estimator() const final { return Estimator::Unbiased; }
     int error_groups() const final { return options_.groups; }
     double splat_error_factor() const final { return groups_ ? groups_->own_scale() : 1.0; }
-    std::vector<std::pair<std::string, double>> figures() const final;
+    std::vector<std::pair<std::string, double>> figures() const override;
 
 protected:
     MarkovIntegrator(const IntegratorParams& params, const DepthOptions& depth);
@@ -57,6 +57,10 @@ protected:
         std::vector<ClassPlan> plan;
     };
     virtual Chains begin(const PassContext& pass, const Pilot& pilot) = 0;
+    /// Makes the steps of a pass.
+    virtual void advance(const PassContext& pass, const StateSpace&, ChainGroups& groups) {
+        groups.advance(pass);
+    }
 
     /// A sample of all techniques, as of `bdpt`, by the walks of `paths`.
     PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;

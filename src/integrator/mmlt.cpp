@@ -1,9 +1,10 @@
-// Multiplexed Metropolis light transport [Hachisuka et al. 2014]: a state is one path of one technique, which a number of
-// its own chooses; each path length has chains of its own. Unbiased.
+// Multiplexed Metropolis light transport [Hachisuka et al. 2014]: a state is one path made by one technique, which one
+// of its random numbers chooses. Each path length has its own chains. Unbiased.
 //
-// C(s,t) of length k brings C·w/p(s|k), with the weights of bidirectional path tracing. p(s|k) is fixed by a pilot: by the
-// energy of each technique, and a fifth uniformly. Walks have no roulette. The last class holds all longer paths: its
-// states choose their length too, from a geometric distribution. Technique and length change in large and block steps only.
+// The contribution of C(s,t) of length k is C·w/p(s|k), with the weights of bidirectional path tracing. A pilot fixes
+// p(s|k): four fifths are proportional to the energy of each technique, and one fifth is uniform. Walks have no Russian
+// roulette. The last class contains all longer paths; its states also choose their length, from a geometric
+// distribution. Only large and block steps change the technique and the length.
 
 #include "integrator/mmlt.h"
 
@@ -19,7 +20,7 @@ namespace {
 /// Length and technique of a path.
 class PathChoice {
 public:
-    /// Classes are the lengths from `shortest` on, the last one all that are longer too, up to `longest`.
+    /// The classes are the lengths from `shortest` on. The last class also contains all longer paths, up to `longest`.
     PathChoice(int shortest, int classes, int longest, const TechniqueChoice& technique)
         : shortest_(shortest), classes_(classes), longest_(longest), technique_(technique) {}
 
@@ -27,12 +28,13 @@ public:
         int s, t;
         double pmf;
     };
-    /// `u_length` is read where has_length_choice().
+    /// Reads `u_length` only if has_length_choice().
     Chosen choose(int chain_class, double u_length, double u_s) const {
         int k = shortest_ + chain_class;
         double pmf = 1;
         if (has_length_choice(chain_class)) {
-            // Geometric, cut off at the longest: P(k+j) = (1-r) r^j, all the rest at the last one.
+            // Geometric, truncated at the longest length: P(k+j) = (1-r) r^j, and the remaining probability at the last
+            // one.
             const int most = longest_ - k;
             const int j = std::min(most, int(std::log1p(-u_length) / std::log(kLonger)));
             pmf = std::pow(kLonger, j) * (j == most ? 1 : 1 - kLonger);
@@ -44,7 +46,7 @@ public:
     bool has_length_choice(int chain_class) const {
         return chain_class == classes_ - 1 && shortest_ + chain_class < longest_;
     }
-    /// Lengths of the last class whose techniques a pilot may have learned.
+    /// Number of lengths of the last class for which the pilot's statistics of techniques are used.
     static constexpr int kTabulated = 16;
 
 private:
@@ -81,7 +83,7 @@ protected:
     }
 
 private:
-    /// Chains by b_k/√k: steps on longer paths take longer.
+    /// Divides the chains among the classes in proportion to b_k/√k, since steps on longer paths take longer.
     std::vector<ClassPlan> shared_out(const Pilot& pilot, int classes) const {
         constexpr int kFewest = 4;
         constexpr uint64_t kSmallestPool = 64;
@@ -118,11 +120,11 @@ IntegratorEntry mmlt_entry() {
     std::vector<ParamInfo> params{depth_params()[0]};
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     params.push_back({"lengths", ParamKind::Int, "10",
-                      "Path lengths, from three edges on, that have chains of their own; the last "
-                      "of them are of all longer paths."});
+                      "Number of classes of path lengths, from three edges on, each with its own "
+                      "chains; the last class contains all longer paths."});
     return {{"integrator", "mmlt",
-             "Metropolis light transport on one path at a time, whose length has chains of its "
-             "own, and whose technique is chosen. Unbiased.",
+             "Multiplexed Metropolis light transport: each state is one path of one technique, and "
+             "each path length has its own chains. Unbiased.",
              params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MmltIntegrator>(p);

@@ -1,17 +1,19 @@
 // Metropolis photon sampling [Fan et al. 2005]: photon mapping as in pm.cpp, whose photons come from Markov chains over
-// light sub-paths. A state is the numbers of a light path; small steps move all of them, block steps draw those of some
-// vertices again, large steps draw a whole path. In primary sample space all of these are symmetric, and a step that
-// changes late vertices alone keeps the rest of the path, as the perturbations of [Fan et al. 2005] do.
+// light sub-paths. A state is the set of random numbers of a light path. Small steps change all of them, block steps
+// draw those of some vertices anew, and large steps draw a whole path anew. In primary sample space all steps are
+// symmetric. A step that changes only late vertices keeps the beginning of the path, like the perturbations of [Fan et
+// al. 2005].
 //
-// Target of a photon with flux Φ at x: lum(Φ) times
-// - importons: the density of importance at x, plus a floor. A photon's power is b Φ / (lum(Φ) I), the same for all but for
-//   colour and importance.
-// - path: a = min(1, h/h_0), where h is the response of the lens to a random remainder of the path from x. A photon's power
-//   is b Φ/lum(Φ) r, where r is the number of trials of remainders until one succeeds with probability a: E[r] = 1/P(x). The
-//   printed power, Φ times a ratio of path contributions, compares densities over spaces of different dimension.
+// The target of a photon with flux Φ at x is lum(Φ) times
+// - importons: the density of importance I at x, plus a floor. The power of a photon is b Φ / (lum(Φ) I).
+// - path: a = min(1, h/h_0), where h is the response of the lens to a random remainder of the path from x. The power of a
+//   photon is b Φ/lum(Φ) r, where r is the number of trials of remainders until one succeeds with probability a, so that
+//   E[r] = 1/P(x). The printed power, Φ times a ratio of path contributions, compares densities over spaces of different
+//   dimensions.
 //
-// Both are exact for any I > 0 and any a in [0, 1] that are fixed before the chains begin. States that stay accumulate their
-// power on the same photons, and proposals leave their expected share. The maps' densities are biased as in pm.cpp.
+// Both are exact for any I > 0 and any a in [0, 1] that are fixed before the chains start. A state at which a chain
+// stays accumulates its power on the same photons, and proposals leave their expected share. The densities of the maps
+// are biased as in pm.cpp.
 
 #include "integrator/mps.h"
 
@@ -41,19 +43,22 @@ IntegratorEntry mps_entry() {
         {"mutations", ParamKind::Int, "500000", "Number of mutations that make the photons."});
     params.push_back(
         {"target", ParamKind::String, "importons",
-         "What photons are worth to chains: importons (their flux times the density of "
-         "importance there) or path (their flux, where a random path from there to the "
-         "lens is not blocked)."});
+         "Target function of the chains for a photon: importons (its flux times the density of "
+         "importance at its position) or path (its flux times the clamped response of the lens "
+         "to a random path from there)."});
     params.push_back({"p_large", ParamKind::Float, "0.3",
                       "Probability of a large step, which is an independent light path."});
+    params.push_back({"chains", ParamKind::Int, "256",
+                      "Number of chains; it does not depend on the number of threads."});
     params.push_back(
-        {"chains", ParamKind::Int, "256", "Number of chains, whatever the number of threads."});
-    params.push_back({"precision", ParamKind::Float, "0.02",
-                      "Relative standard error of the total power that the start-up must reach."});
-    params.push_back({"least_share", ParamKind::Float, "0.25",
-                      "Photons with less than this share of the power of one mutation are kept "
-                      "with a probability in proportion to it, and with as much more power.",
-                      true});
+        {"precision", ParamKind::Float, "0.02",
+         "Required relative standard error of the normalisation; determines the number "
+         "of light paths of the start-up."});
+    params.push_back(
+        {"least_share", ParamKind::Float, "0.25",
+         "A photon with less than this fraction of the power of one mutation is kept "
+         "with a probability proportional to its power, which is increased accordingly.",
+         true});
     return {{"integrator", "mps",
              "Metropolis photon sampling: photon mapping with photons where the image needs them. "
              "Biased.",

@@ -1,8 +1,8 @@
 // Path tracing with next event estimation [Kajiya 1986; Veach 1997, §9.3].
 //
-// Techniques: C(0,t) hits and C(1,t) next events, combined by the power heuristic. Unbiased. Limits: light that reaches
-// diffuse surfaces over mirrors or glass from small emitters is found only by chance, from point and directional
-// emitters never.
+// Techniques: C(0,t) hits and C(1,t) next events, combined by the power heuristic. Unbiased. Limits: light of small
+// emitters that reaches diffuse surfaces by way of mirrors or glass is found only by chance. The same light of point
+// and directional emitters is never found.
 
 #include "integrator/path.h"
 

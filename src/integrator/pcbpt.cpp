@@ -1,11 +1,13 @@
-// Bidirectional path tracing with probabilistic connections [Popov et al. 2015]: the vertices of the first M light paths
-// of a pass are kept, and every eye vertex is connected to K of them, drawn from a mass function that follows what they
-// bring there. It is known at importance records along few eye paths and interpolated between them.
+// Bidirectional path tracing with probabilistic connections [Popov et al. 2015]: the vertices of the first M light
+// paths of a pass are stored. Every eye vertex is connected to K of them, which are drawn from a mass function that
+// approximates their contributions. The mass function is computed at importance records along few eye paths and
+// interpolated in between.
 //
-// Techniques: C(0,t), C(s,1), C(s,0) as in bdpt; C(s,t) with s, t ≥ 2 from the kept vertices; C(1,t) from their y_0, from
-// next events, or from both. Unbiased. All eye paths of a pass share the M light paths, so M samples of a connection are
-// worth no more than one in the weights [eq. 16-17]: they count 1 (`upper`), or M as if they were independent (`standard`).
-// Neither K nor the mass function is in a weight, since a path that was made otherwise has none.
+// Techniques: C(0,t), C(s,1), C(s,0) as in bdpt; C(s,t) with s, t ≥ 2 from the stored vertices; C(1,t) from their y_0,
+// from next events, or from both. Unbiased. All eye paths of a pass share the M light paths, so the errors of M samples
+// of a connection are correlated. The weights therefore count them as 1 (`upper`) [eq. 16-17], or as M, as if they were
+// independent (`standard`). The weights contain neither K nor the mass function, because these are not defined for
+// paths of other techniques.
 
 #include "integrator/pcbpt.h"
 
@@ -22,7 +24,7 @@
 namespace etendue {
 namespace {
 
-/// How C(1,t) are made.
+/// How C(1,t) is made.
 enum class Direct { Stored, NextEvent, Both };
 
 constexpr std::array<Choice<Direct>, 3> kDirect{
@@ -64,7 +66,7 @@ public:
                 paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
             if (vertices_.empty()) continue;
             const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
-            // Where K is no integer, one of its neighbours with the mean K.
+            // If K is not an integer, one of the two neighbouring integers is drawn such that the mean is K.
             c.sampler.seek(Stream::Selection, join_number(0, t));
             const int draws = int(connections_ + c.sampler.next_1d_unstructured());
             if (draws == 0) continue;
@@ -95,7 +97,7 @@ public:
     }
 
 private:
-    /// M.
+    /// Number M of stored light paths.
     uint64_t kept(uint64_t light_paths) const { return std::min(light_paths_, light_paths); }
 
     void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
@@ -141,9 +143,9 @@ private:
 
         connections_ = double(given_connections_);
         if (connections_ > 0) return;
-        // The records are the pilot: bdpt would trace as many shadow rays from an eye vertex as they did for one light
-        // path. What the records cost themselves is taken off, and what takes time besides rays: finding the records, and
-        // searching them at each draw. K may depend on them, as the draws do not.
+        // The records also serve as the pilot. From an eye vertex, bdpt would trace as many shadow rays as the records
+        // needed for one light path. The cost of the records, and that of the search for records at each eye vertex and
+        // at each draw, is subtracted. K may depend on the records, because the draws are independent of them.
         uint64_t vertices = 0, rays = 0;
         for (const auto& [v, r] : found) vertices += v, rays += r;
         const double M = double(kept(pass.light_paths));
@@ -167,7 +169,7 @@ private:
                (x * uint64_t(g.crop_width) >> 32);
     }
 
-    /// work.masses: what every stored vertex would bring to z_{t-1}.
+    /// Sets work.masses to the contribution of every stored vertex to z_{t-1}.
     void evaluate(const Scene& scene, const TechniqueCounts& n, int t, Workspace& work) const {
         work.masses.clear();
         for (const StoredVertex& v : vertices_) {
@@ -181,7 +183,7 @@ private:
         }
     }
 
-    /// What z_{t-1} draws from.
+    /// The distribution from which z_{t-1} draws light vertices.
     VertexMixture mixture(const Scene& scene, const TechniqueCounts& n, int t,
                           Workspace& work) const {
         if (uses_cache_) return records_.mixture(work.z[t - 1], neighbours_, uniform_);
@@ -191,7 +193,7 @@ private:
         return exact;
     }
 
-    /// The k-th of `draws` connections of z_{t-1}.
+    /// Adds the k-th of `draws` connections of z_{t-1}.
     void connect(const SampleContext& c, const TechniqueCounts& n, int t, int k, int draws,
                  const VertexMixture& mixture, Workspace& work) const {
         c.sampler.seek(Stream::Selection, join_number(0, t, uint32_t(k) + 1));
@@ -205,12 +207,12 @@ private:
                    float(1 / (samples * pmf)), uint32_t(k) + 1);
     }
 
-    /// In the cache, and ready to be joined.
+    /// Memory per vertex: in the cache, and restored for joins.
     static constexpr uint64_t kVertexBytes =
         LightVertexCache::kVertexBytes + 2 * sizeof(Vertex) + sizeof(uint32_t) + sizeof(int);
-    /// K at least, where it is automatic.
+    /// Smallest automatic K.
     static constexpr double kFewest = 0.125;
-    /// What a mixture takes to be found, and a draw from it with its join, in connections of bdpt.
+    /// Cost of the search for a mixture, and of a draw with its join, in units of a connection of bdpt.
     static constexpr double kRaysOfSearch = 0.5, kRaysOfDraw = 1.1;
 
     struct StoredVertex {
@@ -230,7 +232,7 @@ private:
     // Of the pass.
     double connections_ = 0;  ///< K
     LightVertexCache compact_;
-    std::vector<SubPath> stored_;         ///< The M light paths, ready to be joined.
+    std::vector<SubPath> stored_;         ///< The M light paths, restored for joins.
     std::vector<StoredVertex> vertices_;  ///< Their V connectible vertices.
     ImportanceRecords records_;
     std::vector<ImportanceRecords::Chunk> record_chunks_;
@@ -245,11 +247,11 @@ IntegratorEntry pcbpt_entry() {
          "M: number of light paths of a pass to whose vertices eye vertices may be connected."});
     params.push_back(
         {"memory", ParamKind::Int, "6144",
-         "Largest memory for these paths, and for the importance records, each in MiB."});
+         "Largest memory for these light paths in MiB, and also for the importance records."});
     params.push_back(
         {"connections", ParamKind::Float, "0",
-         "K: average number of connections of each eye vertex; 0: as many as cost what the "
-         "connections of bdpt do, less the cost of the records, but at least 0.125."});
+         "K: average number of connections of each eye vertex; 0: chosen so that connections and "
+         "records together cost as much as the connections of bdpt, but at least 0.125."});
     params.push_back(
         {"record_fraction", ParamKind::Float, "0.001",
          "Number of eye paths that create importance records, divided by the number of pixels."});
@@ -265,7 +267,8 @@ IntegratorEntry pcbpt_entry() {
                       true});
     params.push_back({"direct", ParamKind::String, "next_event",
                       "How C(1,t) is made: stored (connections to the y_0 of the stored light "
-                      "paths), next_event, or both."});
+                      "paths), next_event, or both.",
+                      true});
     params.push_back({"cache", ParamKind::Bool, "true",
                       "Whether the mass function is interpolated from records; false evaluates it "
                       "at every eye vertex, which is slow.",

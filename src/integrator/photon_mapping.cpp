@@ -24,7 +24,8 @@ void PhotonMapping::add_direct(const SampleContext& c, int t, Workspace& work) c
     const SubPath& z = work.z;
     paths_.add_hits(c, counts(), t, work);
     if (!next_event_ || !paths_.is_joinable(z, t)) return;
-    // No hit can follow the smooth event at which the path ends.
+    // At a diffuse vertex the eye path does not continue by a smooth event, so no hit can make the path of the next
+    // event.
     const TechniqueCounts alone{.next_event = 1};
     paths_.add(c,
                join_next_event(c.scene, z, t, c.sampler, is_diffuse(z[t - 1]) ? alone : counts()),

@@ -1,10 +1,13 @@
 #pragma once
-// What the methods of photon mapping share: which surfaces are diffuse enough, and the eye path to the first of them.
+// Common parts of the photon mapping methods: which surfaces are diffuse enough for photons, and the eye path to the
+// first of these surfaces.
 //
-// Every path is made in one way. Let x_m be its first vertex from the eye that is diffuse enough and scatters by a smooth
-// event. Where there is one, photons bring the light to it; where m = 1 a next event does, if there are such. Where
-// there is none, hits and next events share the path; and what neither can make (from an emitter without extent by delta
-// events alone to a glossy vertex) photons bring to the glossy vertex.
+// Every path is made in one way. Let x_m be the first vertex from the eye that is diffuse enough and scatters by a
+// smooth event.
+// - If x_m exists, photons make the path; for m = 1, next event estimation makes it instead, if it is enabled.
+// - Otherwise hits and next events make the path, combined by MIS.
+// - Neither of these can make a path that leads from an emitter without extent to a glossy vertex by delta events alone.
+//   Photons at the glossy vertex make such a path.
 
 #include "integrator/bidirectional.h"
 
@@ -18,22 +21,22 @@ public:
     void learn(const LearnContext& pass) { paths_.learn(pass); }
     void load(LearnedState& from) { paths_.load(from); }
 
-    /// Samples of what is made without photons.
+    /// Sample counts of the techniques that use no photons.
     TechniqueCounts counts() const { return {.hit = 1, .next_event = next_event_ ? 1.0f : 0.0f}; }
-    /// Light vertices of the shortest path that photons make.
+    /// Number of light vertices of the shortest path that photons make.
     int shortest() const { return next_event_ ? 3 : 2; }
 
     bool is_diffuse(const Vertex& v) const { return v.bsdf.roughness() >= roughness_; }
-    /// Whether z_{t-1} may be joined, and is diffuse enough.
+    /// Whether z_{t-1} can be joined and is diffuse enough.
     bool takes_photons(const SubPath& z, int t) const {
         return paths_.is_joinable(z, t) && is_diffuse(z[t - 1]);
     }
 
-    /// C(0,t), and C(1,t) where z_{t-1} may be joined.
+    /// Adds C(0,t), and C(1,t) if z_{t-1} can be joined.
     void add_direct(const SampleContext& c, int t, Workspace& work) const;
 
-    /// One more vertex of the eye path z; where photons have brought the light of smooth events (`only_delta`), by a delta
-    /// event. False where the path ends.
+    /// Appends a vertex to the eye path z. With `only_delta`, the path continues by a delta event only, because photons
+    /// contribute the light of smooth events. False if the path ends.
     bool walk_on(const WalkContext& walk, Sampler& sampler, SubPath& z, bool only_delta) const;
 
     const Bidirectional& paths() const { return paths_; }

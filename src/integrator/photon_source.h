@@ -1,5 +1,5 @@
 #pragma once
-// Where the photons of photon maps come from.
+// Sources of the photons in photon maps.
 
 #include <atomic>
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace etendue {
 
-/// Photons for both maps. Those of the caustic map are seen directly; all light that reaches a surface is in the global map.
+/// Photons for both maps. The caustic map is seen directly; the global map contains all light that reaches a surface.
 struct MapPhotons {
     std::vector<MapPhoton> global, caustic;
 };
@@ -20,16 +20,16 @@ struct MapPhotons {
 class PhotonSource {
 public:
     virtual ~PhotonSource() = default;
-    /// Photons at the surfaces where density estimates are made. Their random numbers are those of pass `pass`. `importons`
-    /// makes a sample of the places at which the rendering will look for them.
+    /// Returns photons at the surfaces where densities are estimated. Their random numbers are those of pass `pass`.
+    /// `importons` samples the points at which the rendering will estimate densities.
     virtual MapPhotons trace(const PassContext& context, uint32_t pass,
                              const std::function<std::vector<Importon>()>& importons) = 0;
-    /// Number of paths that are traced for the photons.
+    /// Number of light paths traced for the photons.
     virtual uint64_t light_paths() const = 0;
     virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
 
-/// Calls use(photon) for the photons of the light path y, each with the flux of that path alone.
+/// Calls use(photon) for the photons of the light path y. Their flux is that of this path alone, not divided by N_L.
 template <class Use>
 void for_each_photon(const PhotonMapping& mapping, const SubPath& y, const Use& use) {
     bool by_delta = y.size() > 0 && y[0].emitter->is_delta(), by_glossy = true;
@@ -46,11 +46,11 @@ void for_each_photon(const PhotonMapping& mapping, const SubPath& y, const Use& 
     }
 }
 
-/// Throws std::runtime_error, with what to change, where photons take more than some bytes.
+/// Counts the memory of photons. Throws std::runtime_error with advice if a limit is exceeded.
 class PhotonMemory {
 public:
     explicit PhotonMemory(uint64_t max_bytes) : max_bytes_(max_bytes) {}
-    /// By any thread.
+    /// May be called by any thread.
     void add(uint64_t photons);
 
 private:
@@ -58,10 +58,10 @@ private:
     std::atomic<uint64_t> bytes_ = 0;
 };
 
-/// Photons of light paths.
+/// Photons from traced light paths.
 class TracedPhotons final : public PhotonSource {
 public:
-    /// trace() throws std::runtime_error where the photons would take more than `max_bytes`.
+    /// trace() throws std::runtime_error if the photons would need more than `max_bytes`.
     TracedPhotons(const PhotonMapping& mapping, uint64_t light_paths, uint64_t max_bytes)
         : mapping_(mapping), light_paths_(light_paths), max_bytes_(max_bytes) {}
     MapPhotons trace(const PassContext& context, uint32_t pass,

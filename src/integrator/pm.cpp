@@ -1,10 +1,10 @@
-// Photon mapping [Jensen 2001]: photons are traced once, and the eye path's first vertex that is diffuse enough gets
-// direct light by next event, caustics by the density of the photons of a caustic map, and all other light by final
-// gather rays, which end at the first diffuse vertex. There they find the irradiance at the nearest photon [Christensen
-// 1999], or estimate the density of all photons. On surfaces that are diffuse alone an irradiance cache, filled before the
-// samples of a pass, may stand for most of the gather rays.
+// Photon mapping [Jensen 2001]: photons are traced once. At the first vertex of the eye path that is diffuse enough,
+// direct light comes from next event estimation, caustics from the photon density of a caustic map, and all other light
+// from final gather rays. A gather ray ends at the first diffuse vertex. There it uses the irradiance at the nearest
+// photon [Christensen 1999], or a density estimate from all photons. On purely diffuse surfaces, an irradiance cache
+// can replace most of the gather rays; it is filled before the samples of a pass.
 //
-// Techniques: M(s,t), and hits and next events, each path by one of them (see photon_mapping.h). Biased: density
+// Techniques: M(s,t), hits and next events; each path is made by one of them (see photon_mapping.h). Biased: density
 // estimates blur light over the radius of the nearest photons, which does not shrink.
 
 #include "integrator/pm.h"
@@ -22,7 +22,7 @@
 namespace etendue {
 namespace {
 
-/// Adds up what comes from one direction.
+/// Sums the radiance from one direction.
 class RadianceSum final : public ContributionSink {
 public:
     void add(const Join& join, Rgb contribution) override {
@@ -34,12 +34,12 @@ private:
     Rgb sum_;
 };
 
-/// What a density estimate is for, and so which photons it uses.
+/// Purpose of a density estimate, which determines the photons that it uses.
 enum class Look {
-    Gathered,      ///< All light, at the end of a gather ray.
-    Seen,          ///< All light but that of next events, where there are no gather rays.
+    Gathered,      ///< All light at the end of a gather ray.
+    Seen,          ///< All light except that of next events; used without gather rays.
     Caustic,       ///< Caustics seen directly.
-    DeltaCaustic,  ///< Caustics on glossy surfaces that nothing else makes.
+    DeltaCaustic,  ///< Caustics on glossy surfaces that no other technique makes.
 };
 
 class PmIntegrator final : public Integrator {
@@ -57,12 +57,13 @@ public:
         };
         if (!(radius_ >= 0)) refuse("radius must not be negative");
         if (cache_error_ > 0 && p.integer("max_depth") >= 0)
-            refuse("an irradiance cache holds paths of all lengths: expected max_depth=-1");
-        if (cache_error_ > 0 && gather_rays_ == 0) refuse("an irradiance cache needs gather_rays");
+            refuse("an irradiance cache contains paths of all lengths: expected max_depth=-1");
+        if (cache_error_ > 0 && gather_rays_ == 0)
+            refuse("an irradiance cache requires gather_rays of at least 1");
     }
 
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }
-    /// The maps are functions of the seed: they are made again.
+    /// The maps are not saved, since they are functions of the seed.
     void save(LearnedState& to) const override { mapping_.paths().save(to); }
     void load(LearnedState& from) override { mapping_.load(from); }
     void trace(const PassContext& pass) override {
@@ -115,8 +116,8 @@ public:
     static constexpr float kDefaultRadius = 0.03f;
 
 private:
-    /// Calls use(look, u, scale) for the density estimates that bring light to z_{t-1}: there, where u = t, or at the end
-    /// z_{u-1} of a gather ray.
+    /// Calls use(look, u, scale) for the density estimates that contribute to z_{t-1}: at z_{t-1} itself (u = t), or at
+    /// the end z_{u-1} of a gather ray.
     template <class Use>
     void for_each_look(const SampleContext& c, uint32_t pass, int t, bool is_diffuse,
                        bool uses_cache, Workspace& work, const Use& use) const {
@@ -130,7 +131,8 @@ private:
         }
     }
 
-    /// A density estimate at z_{t-1}; or, for gather rays on a surface that is diffuse alone, the irradiance near it.
+    /// Adds a density estimate at z_{t-1} or, for gather rays that hit a purely diffuse surface, the irradiance at a
+    /// nearby photon.
     void add_photons(const SampleContext& c, Look look, int t, float scale,
                      const SubPath& z) const {
         switch (look) {
@@ -152,8 +154,8 @@ private:
         }
     }
 
-    /// Density estimate at z_{t-1} from the photons that `use` accepts. Their surfaces may face another way: in a corner
-    /// the photons of one wall stand for those that the disc of the other lacks.
+    /// Adds a density estimate at z_{t-1} from the photons that `use` accepts. Their surfaces may have other normals:
+    /// in a corner, the photons of one wall replace those that are missing where the disc of the other wall ends.
     template <class Use>
     void estimate(const SampleContext& c, const PhotonMap& map, int t, float scale,
                   const SubPath& z, const Use& use) const {
@@ -169,7 +171,7 @@ private:
 
     bool add_irradiance(const SampleContext& c, int t, float scale, const SubPath& z) const {
         if (irradiance_ == 0) return false;
-        // It holds the light that paths of limited length bring to the end of a gather ray from z_1.
+        // The stored irradiance contains the paths that are short enough for a gather ray from z_1.
         const bool is_limited = mapping_.paths().max_depth() != DepthOptions::kUnlimited;
         if (is_limited && t != kGathered) return false;
         const auto n = irradiance_normal(z[t - 1]);
@@ -180,9 +182,8 @@ private:
         return true;
     }
 
-    /// Goes on from z_{t-1}, which a gather ray met, to the first diffuse vertex z_{u-1}, and calls use(u) there. What comes
-    /// to it straight from emitters is that of next events, what comes from them over surfaces that are not diffuse that of
-    /// the caustic map.
+    /// Continues a gather ray from its first hit z_{t-1} to the first diffuse vertex z_{u-1}, and calls use(u) there.
+    /// Hits of emitters are not added: next events and the caustic map contribute this light.
     template <class Use>
     void end_gather_ray(const SampleContext& c, int t, Workspace& work, const Use& use) const {
         const TechniqueCounts none;
@@ -204,7 +205,7 @@ private:
         SubPath& z = work.z;
         const float eta2 = z.eta2;
         for (int ray = 0; ray < gather_rays_; ++ray) {
-            // A sample of its own; the rays of all passes are successive points of one sequence.
+            // Each ray is a separate sample. The rays of all passes are successive points of one sequence.
             Sampler of_ray = c.sampler;
             of_ray.start(pass * uint32_t(gather_rays_) + uint32_t(ray),
                          hash_combine(c.pixel, uint64_t(t)));
@@ -217,7 +218,8 @@ private:
         }
     }
 
-    /// At least kFewest places where samples look for photons, if any do, with random numbers of their own.
+    /// Samples at least kFewest points where the rendering estimates densities, if there are any. Uses separate random
+    /// numbers.
     std::vector<Importon> sample_importons(const PassContext& pass) const {
         constexpr uint64_t kFewest = 1 << 16;
         const uint64_t rays = pass.pixels * uint64_t(std::max(1, gather_rays_)),
@@ -261,14 +263,14 @@ private:
                 .is_caustic = look == Look::Caustic || look == Look::DeltaCaustic};
     }
 
-    /// The normal at which irradiance tells all that v reflects.
+    /// The normal for which the irradiance determines all light that v reflects; empty if there is none.
     static std::optional<Vec3> irradiance_normal(const Vertex& v) {
         const auto n = v.bsdf.diffuse_normal();
         return n && dot(v.wo, *n) > 0 ? n : std::nullopt;
     }
 
-    /// Records where the eye paths of ever more pixels find none; by levels, so that those of one level do not depend on
-    /// each other, whichever thread makes them.
+    /// Makes irradiance records at eye vertices that have no record nearby, for more and more pixels. Records of one
+    /// level do not depend on each other, so the result does not depend on the threads.
     void fill_cache(const PassContext& pass) {
         constexpr uint32_t kCoarsest = 16, kFinest = 2;
         const float size = pass.scene.bounds().radius();
@@ -299,12 +301,12 @@ private:
         }
     }
 
-    /// Of the light of final_gather() at z_{t-1}.
+    /// Makes a record of the light of final_gather() at z_{t-1}.
     IrradianceRecord record(const SampleContext& c, int t, Vec3 n, Workspace& work) const {
         const TechniqueCounts none;
         const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
         SubPath& z = work.z;
-        // Radiance is asked for: that of the path's throughput 1 here.
+        // The record needs incident radiance, so the throughput is 1 here.
         const Rgb beta = std::exchange(z[t - 1].beta, Rgb(1));
         const float eta2 = z.eta2;
         Sampler of_cells = c.sampler, of_ray = c.sampler;
@@ -336,7 +338,7 @@ private:
         return r;
     }
 
-    /// Adds what the cache knows of the light of final_gather(), if it does.
+    /// Adds the light of final_gather() from the cache; false if there is no record nearby.
     bool add_cached(const SampleContext& c, int t, const SubPath& z) const {
         if (cache_.size() == 0) return false;
         const Vertex& v = z[t - 1];
@@ -348,7 +350,8 @@ private:
         return true;
     }
 
-    /// Adds what z_{t-1} reflects of the irradiance E, filed under the shortest paths that E holds, of s light vertices.
+    /// Adds the reflection of the irradiance E at z_{t-1}. It is assigned to the shortest paths that E contains, which
+    /// have s light vertices.
     static void add_reflected(const SampleContext& c, int s, int t, const SubPath& z, Vec3 n,
                               Rgb E) {
         const Vertex& v = z[t - 1];
@@ -362,7 +365,7 @@ private:
 
     /// Vertices of an eye path whose gather ray leaves z_1 and ends where it first meets a surface.
     static constexpr int kGathered = 3;
-    static constexpr uint64_t kImportons = 0x696d706f72746f6e;  ///< Of random numbers.
+    static constexpr uint64_t kImportons = 0x696d706f72746f6e;  ///< Key of random numbers.
 
     PhotonMapping mapping_;
     std::unique_ptr<PhotonSource> source_;
@@ -387,7 +390,8 @@ std::vector<ParamInfo> photon_map_params(const ParamInfo& paths) {
     params.push_back({"memory", ParamKind::Int, "6144", "Largest memory for the photons, in MiB."});
     params.push_back(
         {"retrace", ParamKind::Bool, "false",
-         "Whether every pass traces new photons; otherwise all passes use those of the first."});
+         "Whether every pass traces new photons; otherwise all passes use the photons of the "
+         "first one."});
     params.push_back(
         {"nearest", ParamKind::Int, "60",
          "Number of photons in a density estimate; the farthest only determines the radius."});
@@ -400,8 +404,8 @@ std::vector<ParamInfo> photon_map_params(const ParamInfo& paths) {
                       "seen directly."});
     params.push_back({"irradiance", ParamKind::Int, "4",
                       "On diffuse surfaces, gather rays use the irradiance at the nearest of every "
-                      "n-th photon, which is computed when it is first needed; 0: they make a "
-                      "density estimate of their own."});
+                      "n-th photon, which is computed when it is first needed; 0: each gather ray "
+                      "makes its own density estimate."});
     params.push_back({"cache_error", ParamKind::Float, "0",
                       "Error allowed by the irradiance cache (a in [Ward et al. 1988], usually 0.1 "
                       "to 0.4); 0: no cache."});

@@ -1,7 +1,8 @@
-// Primary sample space Metropolis light transport [Kelemen et al. 2002], over samples of bidirectional path tracing: a
-// state is the numbers of an eye and a light sub-path, and brings all joins of the two. Unbiased.
+// Primary sample space Metropolis light transport [Kelemen et al. 2002] over samples of bidirectional path tracing: a
+// state is the set of random numbers of an eye and a light sub-path, and contributes all joins of the two. Unbiased.
 //
-// Direct light is apart. Small steps move every number, block steps draw those of some vertices again.
+// Direct light is computed without chains. Small steps change every number; block steps draw the numbers of some
+// vertices anew.
 
 #include "integrator/pssmlt.h"
 
@@ -35,8 +36,8 @@ IntegratorEntry pssmlt_entry() {
         if (p.name == std::string("rr_depth")) p.fallback = "10";
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     return {{"integrator", "pssmlt",
-             "Metropolis light transport over the numbers of bidirectional path tracing. "
-             "Unbiased.",
+             "Metropolis light transport in the primary sample space of bidirectional path "
+             "tracing. Unbiased.",
              params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PssmltIntegrator>(p);

@@ -6,12 +6,12 @@
 
 namespace etendue {
 
-/// `doc`: of the first radius.
+/// `doc` is the description of the parameter `radius`.
 std::vector<ParamInfo> radius_params(const char* doc);
 
-/// What the user gave.
+/// Values given by the user.
 struct RadiusParams {
-    float first;  ///< 0: the method's default.
+    float first;  ///< Radius of the first pass; 0: the default of the method.
     float alpha;
 
     explicit RadiusParams(const IntegratorParams& params);
@@ -21,8 +21,8 @@ struct RadiusParams {
     bool shrinks() const { return alpha < 1; }
 };
 
-/// Radius of the disc of a pixel's area where its ray meets the scene: the median over the image. It does not depend on the
-/// crop. 0 where no ray meets anything.
+/// Radius of a disc with the area of a pixel, projected to the first surface: the median over the image. Independent of
+/// the crop. 0 if no eye ray hits a surface.
 float pixel_radius(const Scene& scene);
 
 }  // namespace etendue

@@ -2,7 +2,7 @@
 // with the radius schedule of [Knaus & Zwicker 2011]: an eye path ends at the first vertex that is diffuse enough, and is
 // merged there with all light vertices within the radius.
 //
-// Techniques: M(s,t), and hits and next events, each path by one of them (see photon_mapping.h). Consistent where the
+// Techniques: M(s,t), hits and next events; each path is made by one of them (see photon_mapping.h). Consistent if the
 // radius shrinks.
 
 #include "integrator/sppm.h"
@@ -17,12 +17,13 @@
 namespace etendue {
 namespace {
 
-/// Of the scene's: more than where merges are one technique among many.
+/// Default radius, relative to the radius of the scene's bounds. It is larger than in `vcm`, where merges are one
+/// technique among many.
 constexpr float kDefaultRadius = 0.01f;
 
 class SppmIntegrator final : public Integrator {
 public:
-    /// `eye_paths`: how many each pixel has; 0: new ones in every pass.
+    /// `eye_paths`: number of eye paths of each pixel; 0: new eye paths in every pass.
     SppmIntegrator(const IntegratorParams& p, int eye_paths)
         : mapping_(p, p.flag("next_event")), radius_params_(p), light_(p),
           eye_paths_(uint32_t(eye_paths)) {}

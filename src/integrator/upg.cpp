@@ -1,9 +1,10 @@
-// Unbiased photon gathering [Qin et al. 2015]: an eye vertex and a light vertex near it form a pair; one of the two is
-// dropped, the other joined by a shadow ray, and Bernoulli trials estimate the reciprocal of the probability that the
-// pair was found.
+// Unbiased photon gathering [Qin et al. 2015]: an eye vertex and a light vertex near it form a pair. One of the two is
+// dropped, and the other is joined by a shadow ray to the predecessor of the dropped one. Bernoulli trials estimate the
+// reciprocal of the probability that the pair was found.
 //
-// Techniques: U(s,t), for paths of three edges and more; `upg+bdpt` has C(s,t) as well. Unbiased for the paths it can
-// make, which for `upg` alone leaves out short ones and those where every vertex or its neighbours are delta events.
+// Techniques: U(s,t), for paths of three edges and more; `upg+bdpt` also has C(s,t). Unbiased for the paths it can
+// make. `upg` alone cannot make short paths, and paths where every vertex, or both of its neighbours, scatter by delta
+// events.
 
 #include "integrator/upg.h"
 
@@ -51,7 +52,7 @@ public:
         if (connects_) learned_.weight_scale.learn(learned_.gathers);
         learned_.roulette.learn(learned_.gathers);
         choose_radius(pass);
-        // The first pass's weights know of no density, so that what is learned from it is of no use for the scale.
+        // The weights of the first pass use no density, so its statistics are not suitable for the scale.
         learned_.learns_weight_scale = connects_ && pass.index > 0;
         if (pass.index > 0)
             density_ = PairDensity(cells(), learned_.radius, kGatherConstants.correlation);
@@ -129,13 +130,13 @@ public:
     }
 
 private:
-    /// Of the light vertices of the pass before.
+    /// Number of light vertices by cell, in the previous pass.
     CellCounts cells() const {
         return grid_.points().is_empty() ? loaded_ : grid_.points().counts();
     }
 
-    /// One of the two vertices is dropped, the other joined to the dropped one's predecessor by a shadow ray; r, by Bernoulli
-    /// trials, estimates 1/p_c.
+    /// Adds the join U(s,t) of a pair: one of its vertices is dropped, and the other is joined to the predecessor of
+    /// the dropped one by a shadow ray. r estimates 1/p_c by Bernoulli trials.
     void gather(const SampleContext& c, const TechniqueCounts& n, const GatherSearch& search,
                 const GatherPair& pair, Workspace& work) const {
         const auto& [strategy, s, t, drops_eye] = pair.technique;
@@ -159,8 +160,8 @@ private:
         c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.rate));
     }
 
-    /// `scale`: what a unit of contribution adds to the pixel; `seen`: the inverse of the probability that roulette spared
-    /// the join, times its transmittance.
+    /// `scale`: the value that a unit of contribution adds to the pixel. `seen`: the transmittance of the join, divided
+    /// by its survival probability in Russian roulette.
     void observe_weight_scale(const SampleContext& c, const Join& join, float scale, double r,
                               double seen, Workspace& work) const {
         const float pixel = c.film.expected_luminance(c.pixel);
@@ -170,7 +171,8 @@ private:
                                       seen, GatherSums::of(work));
     }
 
-    /// Such that an eye path finds GatherConstants::pairs pairs, as far as the passes since the last choice tell.
+    /// Chooses the radius such that an eye path finds GatherConstants::pairs pairs on average, according to the passes
+    /// since the last choice.
     void choose_radius(const LearnContext& pass) {
         if (given_radius_ > 0) {
             learned_.radius = given_radius_;
@@ -199,7 +201,7 @@ private:
     bool connects_;
     LightPathOptions light_;
     TrialBound bound_;
-    float flatness_;  ///< Half the height of a neighbourhood over its radius.
+    float flatness_;  ///< Half the height of a neighbourhood, divided by its radius.
     PairRule rule_;
     float short_rate_;
     bool clamps_;
@@ -207,14 +209,14 @@ private:
     struct Learned {
         float radius = 0;
         GatherTotals gathers;
-        double pairs_so_far = 0;  ///< When the radius was chosen.
+        double pairs_so_far = 0;  ///< Value when the radius was chosen.
         uint64_t eye_paths_so_far = 0;
         bool learns_weight_scale = false;
         GatherWeightScale weight_scale;
         GatherRoulette roulette;
     } learned_;
     PairDensity density_;
-    CellCounts loaded_;  ///< Those of cells(), until there is a pass.
+    CellCounts loaded_;  ///< The result of cells() until a pass has been made.
 
     // Of the pass.
     LightVertexCache cache_;

@@ -19,12 +19,13 @@
 namespace etendue {
 namespace {
 
-/// In radii of a pixel's disc (pixel_radius()). Less is noisier on caustics, more blurs them.
+/// The default radius, in units of pixel_radius(). A smaller one makes caustics noisier, a larger one blurs them.
 constexpr float kDefaultRadius = 6;
-/// The largest default, of the radius of the scene's bounds: small images of small scenes would be blurred.
+/// Upper limit of the default radius, relative to the radius of the scene's bounds. Without it, small images would be
+/// blurred.
 constexpr float kLargestRadius = 0.01f;
-/// The radius of merges behind a diffuse or glossy eye vertex, over that of others. Such merges share a random eye path, so
-/// each of them is worth less; they matter for light that no other technique finds.
+/// Ratio of the radius of merges behind a diffuse or glossy eye vertex to that of other merges. The former share a
+/// random eye path, so each of them adds less information. They matter for light that no other technique finds.
 constexpr float kInnerRadius = 0.3f;
 
 class VcmIntegrator final : public Integrator {
@@ -33,8 +34,8 @@ public:
         : paths_(p, Guiding(p)), radius_params_(p), connects_(p.flag("connections")),
           merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p) {
         if (!connects_ && !merges_)
-            throw std::runtime_error("vcm: connections and merges cannot both be off");
-        if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact needs merges");
+            throw std::runtime_error("vcm: connections and merges cannot both be false");
+        if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact=true requires merges=true");
     }
 
     void learn(const LearnContext& pass) override {
@@ -113,19 +114,19 @@ public:
     }
 
 private:
-    /// Of pass `index`.
+    /// The radius of pass `index`.
     float radius(const Scene& scene, uint32_t index) {
         if (radius_params_.first == 0 && !default_radius_)
             default_radius_ = std::min(kDefaultRadius * pixel_radius(scene),
                                        kLargestRadius * scene.bounds().radius());
         return radius_params_.schedule(default_radius_.value_or(0)).radius(index);
     }
-    /// Of the light vertices of the pass before.
+    /// Number of light vertices by cell, in the previous pass.
     CellCounts cells() const {
         return grid_.points().is_empty() ? loaded_ : grid_.points().counts();
     }
 
-    /// M(s,t) with the light vertices near z_{t-1}.
+    /// Adds M(s,t) for the light vertices near z_{t-1}.
     void merge(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
         const Vertex& z = work.z[t - 1];
         const ArrivalSide side = arrival_side(z);
@@ -143,8 +144,8 @@ private:
         });
     }
 
-    /// U(s,t) with q π d² p̃ for p_c, where q is the survival of the roulette before the dropped vertex
-    /// [Qin et al. 2015, eq. 7].
+    /// Adds U(s,t), with the approximation q π d² p̃ of p_c. q is the survival probability of the Russian roulette
+    /// before the dropped vertex [Qin et al. 2015, eq. 7].
     void gather(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
         const GatherSearch search{
             c,   n, cache_, grid_, density_, roulette_, paths_.max_depth(), 1, paths_.threshold(c),
@@ -178,7 +179,7 @@ private:
     GatherTotals gathers_;
     PairDensity density_;
     GatherRoulette roulette_;
-    CellCounts loaded_;  ///< Those of cells(), until there is a pass.
+    CellCounts loaded_;  ///< The result of cells() until a pass has been made.
 
     // Of the pass.
     float radius_ = 0;
@@ -206,7 +207,8 @@ IntegratorEntry vcm_entry() {
     params.push_back(
         {"exact", ParamKind::Bool, "false",
          "Whether merges form true paths, with a shadow ray and the BSDFs at both ends; the "
-         "probability of a pair is still that of a disc [Bekaert et al. 2003]."});
+         "probability of a pair is still that of a disc [Bekaert et al. 2003].",
+         true});
     return {{"integrator", "vcm",
              "Vertex connection and merging. Consistent; biased with a fixed radius.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {

@@ -100,17 +100,19 @@ std::vector<GivenPath> read_user_paths(const std::string& file) {
 }
 
 std::string to_json(std::span<const GivenPath> paths) {
+    // The shortest number that is read as the same float.
+    const auto number = [](float v) { return std::stod(fmt::format("{}", v)); };
     json list = json::array();
     for (const GivenPath& path : paths) {
         json points = json::array();
-        for (const Vec3 p : path.points) points.push_back({p.x, p.y, p.z});
+        for (const Vec3 p : path.points) points.push_back({number(p.x), number(p.y), number(p.z)});
         json item{{"points", std::move(points)}};
         if (!path.name.empty()) item["name"] = path.name;
         if (path.cones.size() == 1)
-            item["cone"] = path.cones[0];
+            item["cone"] = number(path.cones[0]);
         else if (!path.cones.empty())
             item["cone"] = path.cones;
-        if (path.radius) item["radius"] = *path.radius;
+        if (path.radius) item["radius"] = number(*path.radius);
         list.push_back(std::move(item));
     }
     return list.dump(1) + "\n";

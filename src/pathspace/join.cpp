@@ -241,7 +241,7 @@ std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, f
 
 namespace {
 
-/// Whether y_{s-1} is a point or direction that emits; the lens does not see such an emitter itself.
+/// Whether y_{s-1} is y_0 of an emitter without extent, which is not seen directly.
 bool is_invisible(const SubPath& y, int s) {
     return s == 1 && y[0].emitter->is_delta();
 }

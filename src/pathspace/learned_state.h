@@ -1,5 +1,6 @@
 #pragma once
-// What an integrator has learned, as bytes: written in one order and read back in the same, equal to the last bit.
+// The learned state of an integrator, as bytes. Values are read in the order in which they were written, and are
+// bit-identical.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +11,7 @@
 
 namespace etendue {
 
-/// For the same build only: numbers are stored as they lie in memory.
+/// Can be read by the same build only, because numbers are stored in their representation in memory.
 class LearnedState {
 public:
     template <class T>
@@ -25,7 +26,7 @@ public:
         put_bytes(values.data(), values.size() * sizeof(T));
     }
 
-    /// Throws std::runtime_error where fewer bytes are left.
+    /// Throws std::runtime_error if fewer bytes are left.
     template <class T>
     void get(T& value) {
         static_assert(std::is_trivially_copyable_v<T>);
@@ -42,7 +43,7 @@ public:
     }
 
     const std::vector<std::byte>& bytes() const { return bytes_; }
-    /// To read what was written.
+    /// For reading the values.
     explicit LearnedState(std::vector<std::byte> bytes) : bytes_(std::move(bytes)) {}
     LearnedState() = default;
 
@@ -57,7 +58,8 @@ private:
         at_ += size;
     }
     [[noreturn]] static void throw_too_short() {
-        throw std::runtime_error("the learned state ends too early: it is of another integrator");
+        throw std::runtime_error(
+            "the learned state ends too early: it belongs to another integrator");
     }
 
     std::vector<std::byte> bytes_;

@@ -79,8 +79,8 @@ struct PassContext {
     using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;
     std::function<void(uint64_t count, const Task& task)> for_each_other_path;
 
-    /// Calls `task(i, splats, work)` for i < count in parallel, each a task of its own: Markov chains. Where
-    /// work.is_observed, splats.tell() must have the joins.
+    /// Calls `task(i, splats, work)` for i < count in parallel, each as a separate task; for Markov chains. If
+    /// work.is_observed is set, the task must report the joins to splats.tell().
     using ChainTask = std::function<void(uint64_t, SplatSink&, Workspace&)>;
     std::function<void(uint64_t count, const ChainTask& task)> for_each_chain;
 

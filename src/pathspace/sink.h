@@ -14,14 +14,15 @@ public:
     virtual void add(const Join& join, Rgb contribution) = 0;
 };
 
-/// Where states of Markov chains go, whose contributions count with factors that are known later than they are.
+/// Receiver of states of Markov chains. The factors of their contributions are known only after the states are
+/// evaluated.
 class SplatSink {
 public:
     virtual ~SplatSink() = default;
-    /// Adds to the film, as a light path's splat.
+    /// Adds a value to the film, as a splat of a light path.
     virtual void add(Vec2 film, Rgb value) = 0;
-    /// Of what add() got, a join's part: factor times its weighted contribution, wherever t is. Only where the workspace
-    /// is observed.
+    /// Reports the part of a join in the value passed to add(): `factor` times its weighted contribution, for any t.
+    /// Called only if the workspace is observed.
     virtual void tell(const Join& join, Rgb contribution, float factor) = 0;
 };
 

@@ -14,7 +14,7 @@ enum class Strategy : uint8_t {
     Hit,        ///< C(0,t): the eye path hits an emitter.
     NextEvent,  ///< C(1,t), t ≥ 2: a point sampled on an emitter for z_{t-1}.
     Connect,    ///< C(s,t), s ≥ 2, t ≥ 2; for s = 1, with y_0 of a light path.
-    Splat,    ///< C(s,1): the light path is connected to the lens. Not C(1,1) where there are hits.
+    Splat,  ///< C(s,1): the light path is connected to the lens. Methods with hits do not use C(1,1).
     HitLens,  ///< C(s,0): the light path hits a finite lens.
     Merge,    ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are treated as one vertex.
     Gather,   ///< U(s,t): one vertex of such a pair is dropped; a shadow ray connects the rest.
@@ -28,7 +28,7 @@ constexpr bool is_pair(Strategy strategy) {
 struct Technique {
     Strategy strategy;
     int s, t;
-    bool drops_eye = false;  ///< Of a gather: whether z_{t-1} is dropped, or y_{s-1}.
+    bool drops_eye = false;  ///< For gathers: whether z_{t-1} is dropped instead of y_{s-1}.
 
     /// Number of vertices of the full path.
     int vertices() const { return s + t - is_pair(strategy); }
@@ -45,7 +45,7 @@ constexpr Technique connection_technique(int s, int t) {
             s, t};
 }
 
-/// The vertex of a pair that is dropped where either one could be [Qin et al. 2015, appendix B and table 2].
+/// The vertex of a pair that is dropped if either one can be dropped [Qin et al. 2015, appendix B and table 2].
 enum class PairRule : uint8_t {
     Gloss,  ///< The one sampled from the less glossy vertex; z_{t-1} if both are equal.
     Eye,    ///< z_{t-1}.
@@ -93,8 +93,8 @@ struct PairModel {
 };
 
 extern const std::array<float, 256> kPairShares;
-/// Share of pairs that weights count at a vertex, since its pairs share the eye path: 2^(-level/16), where level is
-/// Vertex::pair_level.
+/// Share of the pairs of a vertex that the weights count, since these pairs share the eye path: 2^(-level/16), where
+/// level is Vertex::pair_level.
 inline double pair_share(uint8_t level) {
     return double(kPairShares[level]);
 }
@@ -109,7 +109,7 @@ struct TechniqueCounts {
     float merge = 0,
           gather = 0;  ///< For each inner vertex of the path; at least one of the two is 0.
     PairModel pairs{};
-    const Guide* guide = nullptr;  ///< Of both walks; nullptr where nothing guides them.
+    const Guide* guide = nullptr;  ///< Guide of both walks; nullptr if they have none.
 
     friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
     bool uses_light_paths() const {
@@ -121,12 +121,12 @@ struct TechniqueCounts {
     float gathers(int edges) const {
         return edges < pairs.min_edges ? 0.0f : edges == 3 ? gather * pairs.short_rate : gather;
     }
-    /// Counts of gathers and merges in MIS weights at an x_m of this level.
+    /// Count of gathers in MIS weights at an x_m of this level.
     double weighed_gathers(uint8_t pair_level, int edges) const {
         return double(gathers(edges)) * pair_share(pair_level);
     }
-    /// Of merges at an x_m, the count in MIS weights times the area of the disc. All merges of an eye vertex share its eye
-    /// path; where x_m sees the lens (Vertex), that is no random choice, and they count in full.
+    /// Count of merges in MIS weights at an x_m, times the area of the disc. All merges of an eye vertex share its eye
+    /// path. If x_m sees the lens (Vertex), this eye path contains no random choice, and the merges count in full.
     double merge_area(uint8_t pair_level, bool sees_lens) const {
         return sees_lens ? double(merge) * double(pairs.disc)
                          : double(merge) * pair_share(pair_level) * double(pairs.inner_disc);
@@ -136,8 +136,8 @@ struct TechniqueCounts {
         case Strategy::Hit: return hit;
         case Strategy::NextEvent: return next_event;
         case Strategy::Connect: return q.s == 1 ? connect_emission : connect;
-        // On a path of one edge a hit has no random choice besides the lens and film points, so that splats would only
-        // add their noise to it.
+        // On a path of one edge, the only random choices of a hit are the lens point and the film point. Splats would
+        // only add noise.
         case Strategy::Splat: return q.s == 1 && hit > 0 ? 0 : splat;
         case Strategy::HitLens: return hit_lens;
         case Strategy::Merge: return merge;

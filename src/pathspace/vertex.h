@@ -58,8 +58,8 @@ struct Vertex {
     bool is_infinite = false;     ///< Whether it is at infinity; p is a direction then.
     bool has_cosine = true;       ///< Whether |cos θ| is part of G here, as on surfaces.
     bool is_connectible = false;  ///< Whether it has a smooth lobe or is an end point.
-    /// Of an eye path: whether its film point determines it. It does where the lens is a point or at infinity, through
-    /// delta events alone; with a finite lens, z_1 counts as determined.
+    /// For eye paths: whether the film point determines this vertex. This is the case after delta events alone if the
+    /// lens is a point or at infinity. With a finite lens, only z_1 counts as determined.
     bool sees_lens = false;
     MediumId medium = kVacuum;  ///< On the edge to the predecessor.
     Survival survival;          ///< Of Russian roulette before the walk left this vertex.
@@ -71,7 +71,7 @@ struct Vertex {
     SurfaceLocation location;          ///< On a surface; for y_0 only `prim` is set.
     Vec2 uv;
     const GuideCell* guide =
-        nullptr;  ///< Learned directions here; nullptr where nothing guides the walk.
+        nullptr;  ///< Learned directions here; nullptr if the walk is not guided.
     float guide_rev =
         0;  ///< Learned density of `wo` for walks in the other mode, which arrive from the successor.
     Bsdf bsdf;
@@ -95,9 +95,9 @@ struct Vertex {
     /// whether the densities of walks in the other mode are needed.
     void set_guide(const GuideCell& cell, TransportMode mode, bool both);
 
-    /// A direction in which a walk in `mode` leaves, with weight f̃·|cos θ| / pdf (for emission L_e |cos θ| / pdf) and
-    /// both densities; empty where the walk ends. Not for emitters at infinity, whose direction is fixed. `u_guide` is
-    /// read where there is a guide.
+    /// Samples a direction in which a walk in `mode` leaves, with weight f̃·|cos θ| / pdf (for emission L_e |cos θ| /
+    /// pdf) and both densities; empty if the walk ends. Not for emitters at infinity, whose direction is fixed.
+    /// `u_guide` is read only if there is a guide.
     std::optional<BsdfSample> sample(float u_lobe, Vec2 u, float u_guide,
                                      TransportMode mode) const {
         return guide ? sample_guided(u_lobe, u, u_guide, mode) : sample_unguided(u_lobe, u, mode);
@@ -142,7 +142,7 @@ struct Vertex {
 private:
     std::optional<BsdfSample> sample_guided(float u_lobe, Vec2 u, float u_guide,
                                             TransportMode mode) const;
-    /// Turns the densities of `w`, and of `wo` from `w`, into those of guided walks.
+    /// Converts the densities of `w`, and of `wo` from `w`, to those of guided walks.
     void mix_guide(Vec3 w, TransportMode mode, float& pdf, float& pdf_rev) const;
     float max_guided_pdf(float unguided, const DirectionCone& cone, TransportMode mode) const;
 };

@@ -9,7 +9,7 @@ namespace {
 
 /// Survival of Russian roulette at the last vertex: its throughput relative to that of the first scattering vertex. The
 /// η² of refractions is removed, since it cancels when the path leaves the glass. The throughput is that of a walk
-/// without guide, since the better the guide, the smaller the throughput of the paths that it prefers.
+/// without guide, because a good guide makes the throughput of the paths that it prefers small.
 Survival survival(const SubPath& path) {
     const float left =
         path[path.size() - 1].beta.max() * path.eta2 * path.gain / path[1].beta.max();
@@ -115,7 +115,7 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const 
 
 namespace {
 
-/// Replaces the direction of emission by one of the guide or the emitter; its density is 0 where there is none.
+/// Replaces the direction of emission by one of the guide or the emitter. Its density is 0 if there is none.
 void guide_emission(Vertex& y0, Vec2 u_d, float u_guide, EmissionSample& e) {
     const auto s = y0.sample(0, u_d, u_guide, TransportMode::Importance);
     e.pdf_d = s ? s->pdf : 0;
@@ -206,7 +206,7 @@ std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sa
         v.survival = survival(path);
         if (!(u_roulette < v.survival.value())) return {};
     }
-    // The last slot, since a walk without guide reads none for it.
+    // This is the last slot, because a walk without guide does not read a number here.
     const float u_guide = v.guide ? sampler.next_1d() : 0.0f;
     return v.sample(u_lobe, u_direction, u_guide, mode);
 }

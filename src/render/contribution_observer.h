@@ -4,7 +4,7 @@
 
 namespace etendue {
 
-/// Sees every contribution that reaches the film together with the sub-paths it was made of.
+/// Receives every contribution to the film together with its sub-paths.
 class ContributionObserver {
 public:
     virtual ~ContributionObserver() = default;

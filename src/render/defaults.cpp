@@ -1,5 +1,6 @@
 #include "render/defaults.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace etendue {
@@ -12,7 +13,13 @@ IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
         IntegratorSpec::parse(!text.empty()                 ? text
                               : defaults.integrator.empty() ? "path"
                                                             : defaults.integrator);
-    for (const auto& [name, value] : defaults.integrator_params) spec.params.emplace(name, value);
+    const std::vector<ParamInfo>& params = integrator_entry(spec.name).info.params;
+    const auto takes = [&](const std::string& name) {
+        return std::any_of(params.begin(), params.end(),
+                           [&](const ParamInfo& p) { return p.name == name; });
+    };
+    for (const auto& [name, value] : defaults.integrator_params)
+        if (takes(name)) spec.params.emplace(name, value);
     return spec;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a rendering uses where nothing is asked for.
+// Defaults of renderings.
 
 #include <optional>
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace etendue {
 
-/// The integrator that `text` names, or the scene's where `text` is empty. Parameters missing from `text` are taken
-/// from the scene's integrator.
+/// The integrator that `text` names, or the scene's if `text` is empty. Parameters missing from `text` are taken
+/// from the scene's integrator, if this one has them.
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
 
-/// Without any limit: the samples of the scene file, or 64.
+/// If `limits` has no limit, sets the sample count of the scene file, or 64.
 void set_default_limit(RenderLimits& limits, const Scene& scene);
 
 /// "independent" or "sobol"; empty for other names.

@@ -22,7 +22,7 @@ bool same_param(const ParamInfo& a, const ParamInfo& b) {
 }
 
 void add(std::vector<PluginEntry>& entries, PluginInfo p, const std::string& doc) {
-    // What a user needs comes first.
+    // Experimental parameters come last.
     std::stable_partition(p.params.begin(), p.params.end(),
                           [](const ParamInfo& q) { return !q.is_experimental; });
     if (!entries.empty()) {

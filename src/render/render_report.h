@@ -1,5 +1,5 @@
 #pragma once
-// What is written down about a rendering: statistics as JSON, and the image with its layers and metadata.
+// Output of a rendering: statistics as JSON, and the image with its layers and metadata.
 
 #include <string>
 #include <vector>

@@ -15,23 +15,23 @@
 namespace etendue {
 namespace {
 
-/// Samples in a chunk of parallel work; fixed, whatever the number of threads.
+/// Number of samples in a chunk of parallel work. It does not depend on the number of threads.
 constexpr uint64_t kChunk = 256;
 
 /// Integrators learn before passes 0, 1, 4, 16, 64 …
 struct LearningStep {
-    uint32_t number;  ///< Of the step that the pass belongs to.
-    uint32_t pass;    ///< Number of the pass since then.
+    uint32_t number;  ///< Index of the learning step.
+    uint32_t pass;    ///< Index of the pass within the step.
 
     static LearningStep of(uint32_t pass) {
         if (pass == 0) return {0, 0};
-        // Since the greatest power of four that is not above `pass`.
+        // The step begins at the largest power of four that is at most `pass`.
         const uint32_t step = uint32_t(std::bit_width(pass) + 1) / 2;
         return {step, pass - (uint32_t(1) << (2 * step - 2))};
     }
 };
 
-/// What receives the contributions of a rendering: the film, and on request technique images and an observer.
+/// Receivers of contributions: the film, and optionally technique images and an observer.
 struct Receivers {
     Receivers(Film& film, TechniqueImages* techniques, const RenderSettings& settings,
               float splat_scale, Workspace& work)
@@ -118,7 +118,8 @@ private:
             to_.observer->observe(join, contribution, share, 0, to_.work);
             return;
         }
-        // The eye path has no pixel: it belongs to all that its film point reaches.
+        // The eye path of a chain has no pixel of its own. It contributes to all pixels whose filter reaches its film
+        // point.
         for_each_pixel(to_.film.geometry(), to_.film.filter(), join.film,
                        [&](uint64_t pixel, float h) {
                            to_.observer->observe(join, contribution, share * h, pixel, to_.work);
@@ -151,8 +152,8 @@ const char* to_string(Estimator estimator) {
 
 namespace {
 
-/// An estimate of the scene's radiance, right within a factor of 1000 or so: as if all emitted power left the bounding
-/// sphere uniformly. Like the image, it is proportional to the emitters' radiance.
+/// Estimates the radiance in the scene within a factor of about 1000: the radiance that a bounding sphere with all
+/// emitted power would have. Like the image, it is proportional to the radiance of the emitters.
 double typical_radiance(const Scene& scene) {
     double power = 0;
     for (const auto& emitter : scene.emitters()) power += emitter->power();
@@ -160,9 +161,9 @@ double typical_radiance(const Scene& scene) {
     return radius > 0 ? power / (4 * sqr(double(kPi) * radius)) : power;
 }
 
-/// TBB runs as many threads as the hardware has, in all arenas together, unless more are allowed. The limit is that of the
-/// whole process and lasts as long as a renderer asks for it, so every renderer that needs more asks for itself. TBB takes the
-/// least number that anybody asks for: it has room for other renderers.
+/// By default, TBB limits the number of threads in all arenas together to that of the hardware. The limit applies to
+/// the whole process, and a larger one is valid only while a global_control exists, so every renderer that needs more
+/// threads creates its own. TBB uses the smallest limit of all global_controls; kRoom leaves room for other renderers.
 std::unique_ptr<tbb::global_control> allow_threads(int threads) {
     constexpr size_t kRoom = 256;
     if (threads <= tbb::info::default_concurrency()) return nullptr;
@@ -170,7 +171,7 @@ std::unique_ptr<tbb::global_control> allow_threads(int threads) {
                                                  std::max(size_t(threads), kRoom));
 }
 
-/// Ends a pass that is to be dropped.
+/// Exception that ends a pass which is to be discarded.
 struct PassDropped {};
 
 }  // namespace
@@ -271,7 +272,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
             }
         });
     };
-    // A dropped pass is traced again; its learning step is not repeated.
+    // If a discarded pass is traced again, its learning step is not repeated.
     if (learned_passes_ == index) {
         if (LearningStep::of(index).pass == 0)
             integrator_->learn({.scene = scene_,

@@ -1,5 +1,5 @@
 #pragma once
-// Passes over the film: the parallel loop, when to stop, statistics.
+// Renders pass by pass: the parallel loop, limits, statistics.
 
 #include <atomic>
 #include <chrono>
@@ -14,7 +14,7 @@
 
 namespace etendue {
 
-/// When to stop: at whichever comes first. At least one pass is made.
+/// Limits of a rendering; the first one that is reached ends it. At least one pass is made.
 struct RenderLimits {
     std::optional<uint64_t> spp;
     std::optional<double> seconds;
@@ -25,17 +25,19 @@ struct RenderSettings : RenderLimits {
     IntegratorSpec integrator{"path", {}};
     SamplerKind sampler = SamplerKind::Independent;
     uint64_t seed = 0;
-    int threads = 0;  ///< 0: all. Each renderer has its own, whatever others have.
+    int threads =
+        0;  ///< Number of threads of this renderer; 0: one per core. Renderers share no threads.
     /// Technique images up to this many edges; 0 for none.
     int technique_depth = 0;
-    PathSelection shown;                       ///< Others are made, but do not reach the image.
+    PathSelection
+        shown;  ///< Paths that are added to the image. Other paths are sampled, but not added.
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
 };
 
 struct Progress {
     uint64_t passes;
-    double seconds;                  ///< As Renderer::seconds().
-    std::optional<double> fraction;  ///< Of the work, where that can be told.
+    double seconds;                  ///< See Renderer::seconds().
+    std::optional<double> fraction;  ///< Finished fraction of the work; empty if it is unknown.
     double rays_per_second;
     ErrorEstimate error;
 };
@@ -49,30 +51,31 @@ class Renderer {
 public:
     /// Throws std::runtime_error if the integrator's parameters are wrong. The scene must outlive the renderer.
     Renderer(const Scene& scene, const RenderSettings& settings);
-    /// With this integrator instead of the settings'.
+    /// Uses `integrator` instead of settings.integrator.
     Renderer(const Scene& scene, const RenderSettings& settings,
              std::unique_ptr<Integrator> integrator);
     ~Renderer();
 
-    /// Renders until a limit is reached or `interrupted` is set. The current pass is finished, unless `drop` is set too. `progress` is called after every pass, from the calling thread.
+    /// Renders until a limit is reached or `interrupted` is set. The current pass is finished, unless `drop` is also
+    /// set. `progress` is called after every pass, by the calling thread.
     ///
-    /// A pass is dropped if `drop` is set or if it throws an exception, which the caller receives. Film, technique images
-    /// and statistics are then as they were after the pass before.
+    /// A pass is discarded if `drop` is set or if it throws an exception, which is passed to the caller. Film,
+    /// technique images and statistics are then the same as after the previous pass.
     StopReason run(const std::function<void(const Progress&)>& progress,
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop) {
         return run(settings_, progress, interrupted, drop);
     }
-    /// The same with other limits. Limits count from the first pass on. Several calls render the same image as one call:
-    /// each continues where the last one stopped.
+    /// The same with other limits. Limits count from the first pass. Each call continues where the previous one
+    /// stopped, so several calls render the same image as a single call.
     StopReason run(const RenderLimits& limits, const std::function<void(const Progress&)>& progress,
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop);
 
     const Film& film() const { return film_; }
     const Integrator& integrator() const { return *integrator_; }
-    const RenderStats& stats() const { return stats_; }  ///< Of the finished passes.
-    double seconds() const { return seconds_; }          ///< Spent in run() on them.
+    const RenderStats& stats() const { return stats_; }  ///< Statistics of the finished passes.
+    double seconds() const { return seconds_; }          ///< Time of the finished passes in run().
     const TechniqueImages* techniques() const { return techniques_.get(); }
 
 private:
@@ -85,12 +88,12 @@ private:
     const Scene& scene_;
     RenderSettings settings_;
     std::unique_ptr<Integrator> integrator_;
-    uint64_t light_paths_;  ///< Of a pass.
+    uint64_t light_paths_;  ///< Number of light paths in a pass.
     Film film_;
     std::unique_ptr<TechniqueImages> techniques_;
     struct Workers;
     std::unique_ptr<Workers> workers_;
-    uint64_t learned_passes_ = 0;  ///< That the integrator has learned for.
+    uint64_t learned_passes_ = 0;  ///< Number of passes for which the integrator has learned.
     RenderStats stats_;
     double seconds_ = 0;
 };

@@ -3,8 +3,8 @@
 namespace etendue {
 namespace {
 
-/// Place of a technique in the triangle of (vertices, s): n vertices have s = 0 … n. Pairs, which have s ≥ 2, and
-/// connections to y_0 have one of their own.
+/// Index of a technique in the triangle of (vertices, s), where n vertices have s = 0 … n. Pairs, for which s ≥ 2, and
+/// connections to y_0 have separate indices.
 size_t triangle_index(const Technique& q) {
     const size_t n = size_t(q.vertices());
     const bool is_second = is_pair(q.strategy) || (q.strategy == Strategy::Connect && q.s == 1);
@@ -19,7 +19,7 @@ struct TechniqueImages::Layer {
           pass_unweighted(pixels, typical_radiance), weighted(pixels), unweighted(pixels) {}
 
     Technique technique;
-    bool is_folded = false;  ///< Some finished pass had it.
+    bool is_folded = false;  ///< Whether a finished pass has contributed to it.
     SplatBuffer pass_weighted, pass_unweighted;
     std::vector<Rgb> weighted, unweighted;
 };

@@ -39,8 +39,9 @@ struct LightVertexGuide {
 
 class LightVertexCache {
 public:
-    /// Starts the collection of a pass's light paths in `chunks` chunks. `vertex_bytes`: memory per vertex, here and in
-    /// the caller's own structures; `max_bytes`: limit of the total; `is_guided`: whether the walks have a guide.
+    /// Starts the collection of the light paths of a pass in `chunks` chunks. `vertex_bytes`: memory per vertex, here
+    /// and in the data structures of the caller; `max_bytes`: limit of the total; `is_guided`: whether the walks have a
+    /// guide.
     void begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes, bool is_guided = false);
     /// Adds the next path of a chunk; each chunk belongs to one thread at a time. Throws std::runtime_error where the
     /// paths exceed `max_bytes`.
@@ -68,9 +69,9 @@ public:
     }
     /// For the vertex y_i: the gloss of y_{i-1}, or kDeltaGloss after a delta event.
     uint8_t gloss_before(uint32_t vertex) const;
-    /// Restores the first `size` vertices of the path of `vertex`. Only the vertices needed for joins with the last one
-    /// are set, y_0 and the last three, or all of them if `whole`; only the last one has a BSDF, if `with_bsdf`: merges
-    /// read none.
+    /// Restores the first `size` vertices of the path of `vertex`. Without `whole`, only the vertices needed for joins
+    /// with the last one are set: y_0 and the last three. Only the last vertex has a BSDF, and only with `with_bsdf`,
+    /// since merges do not read it.
     void restore_first(const Scene& scene, uint32_t vertex, int size, bool whole, SubPath& y,
                        bool with_bsdf = true) const;
 
@@ -79,7 +80,7 @@ public:
     /// Whether all scattering before `vertex` was by delta events.
     bool came_by_delta_events(uint32_t vertex) const;
 
-    /// Memory per vertex: in its chunk, whose capacity may be twice its size, and after assemble().
+    /// Memory per vertex: in a chunk, whose capacity may be twice its size, and in the assembled cache.
     static constexpr uint64_t kVertexBytes = 3 * (sizeof(LightVertex) + sizeof(LightVertexPlace));
 
 private:

@@ -20,7 +20,7 @@ float PhotonImportance::operator()(const MapPhoton& photon) const {
     float sum = floor_;
     grid_.for_each_near(photon.p, radius_, [&](const PointGrid::Entry& e) {
         if ((e.tag & kCaustic) && !photon.is_caustic()) return;
-        // Light that arrives on the other side of a wall is not seen from here.
+        // An importon does not count for photons on the other side of its surface.
         const ArrivalSide side = ArrivalSide::from_bits(e.tag & 0xffff);
         if (side.is_transmissive() || dot(side.normal(), photon.wi) > 0) sum += e.weight;
     });

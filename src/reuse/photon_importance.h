@@ -1,6 +1,6 @@
 #pragma once
-// Visual importance of photons: the density of importons, which lie where a rendering looks for photons [Peter & Pietrek
-// 1998]. Frozen, and positive everywhere.
+// Visual importance of photons: the density of importons, which are the points where a rendering estimates photon
+// densities [Peter & Pietrek 1998]. Constant during a rendering, and positive everywhere.
 
 #include <span>
 
@@ -10,26 +10,26 @@
 
 namespace etendue {
 
-/// A place at which a rendering looks for photons.
+/// A point at which a rendering estimates the density of photons.
 struct Importon {
     Vec3 p;
     ArrivalSide side;
-    float importance;  ///< What a unit of radiance from there brings to the image.
-    bool is_caustic;   ///< Whether it looks into the caustic map.
+    float importance;  ///< Contribution to the image of a unit of radiance from this point.
+    bool is_caustic;   ///< Whether the density estimate uses the caustic map.
 };
 
 class PhotonImportance {
 public:
-    /// Densities within `radius`. Until set_floor() the floor is 0.
+    /// Importance is the density of importons within `radius`. The floor is 0 until set_floor() is called.
     PhotonImportance(std::span<const Importon> importons, float radius);
-    /// The least importance of any photon.
+    /// Sets the smallest importance of any photon.
     void set_floor(float floor) { floor_ = floor; }
 
-    /// Importance per area where the photon is, of both maps if it is a caustic.
+    /// Importance per area at the photon. If it is a caustic, that of both maps.
     float operator()(const MapPhoton& photon) const;
 
 private:
-    /// Tags of entries: the arrival side, and above it which map.
+    /// Tags of entries: the arrival side, and this bit above it for the caustic map.
     static constexpr uint32_t kCaustic = 1u << 16;
 
     PointGrid grid_;

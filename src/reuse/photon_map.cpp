@@ -42,7 +42,7 @@ void PhotonMap::find(Vec3 p, int count, float radius, Neighbours& out) const {
     std::array<float, kMostNeighbours> dist2;
     nanoflann::KNNResultSet<float, uint32_t, int> found(count);
     found.init(out.index.data(), dist2.data());
-    dist2[size_t(count - 1)] = radius * radius;  // the search's first bound
+    dist2[size_t(count - 1)] = radius * radius;  // initial bound of the search
     const float query[3] = {p.x, p.y, p.z};
     tree_->index.findNeighbors(found, query, nanoflann::SearchParams());
     out.count = found.size();
@@ -53,7 +53,7 @@ void PhotonMap::find(Vec3 p, int count, float radius, Neighbours& out) const {
 
 namespace {
 
-/// Of the points that `accept` takes, the nearest within a radius; a result set of nanoflann.
+/// Result set of nanoflann: the nearest point within a radius that `accept` accepts.
 template <class Accept>
 class NearestAccepted {
 public:
@@ -123,8 +123,8 @@ Rgb PhotonIrradiance::compute(uint32_t photon) const {
     const MapPhoton& at = photons_->photons()[photon];
     const Vec3 n = at.side.normal();
     PhotonMap::Neighbours near;
-    // The photon itself counts. It is there for certain, but a point whose nearest photon it is has a disc without photons
-    // around it, which lacks one photon in the mean.
+    // The photon itself is included. It is always inside the disc. On the other hand, there is a disc without photons
+    // around any point whose nearest photon this is, and this disc lacks one photon on average. The two effects cancel.
     photons_->find(at.p, count_, radius_, near);
     Rgb sum;
     for (int i = 0; i < near.count; ++i) {

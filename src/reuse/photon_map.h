@@ -14,12 +14,12 @@
 
 namespace etendue {
 
-/// A photon stored without its path. Its power is a share of the flux of all light.
+/// A photon stored without its path. Its power is a fraction of the total flux.
 struct MapPhoton : Photon {
-    /// Events on its path before: any; at least one, none of them on a diffuse surface; or at least one, all of them
-    /// delta events, from a delta emitter.
+    /// Scattering events of the light path before the photon. Any: no condition. Caustic: at least one, and none on a
+    /// diffuse surface. DeltaCaustic: the same, with delta events alone and from a delta emitter.
     enum class Origin : uint8_t { Any, Caustic, DeltaCaustic } origin = Origin::Any;
-    ArrivalSide side;  ///< Of the surface that it hit.
+    ArrivalSide side;  ///< Side of the surface that the photon hit.
 
     bool is_caustic() const { return origin != Origin::Any; }
 };
@@ -57,11 +57,12 @@ private:
     std::unique_ptr<Tree> tree_;
 };
 
-/// Irradiance at every n-th photon of a map, from a density estimate there; computed when it is first asked for, since many
-/// photons lie where nothing looks.
+/// Irradiance at every n-th photon of a map, from a density estimate. It is computed when it is first needed, because
+/// many photons are never needed.
 class PhotonIrradiance {
 public:
-    /// Density estimates as by find(count, radius), of photons with at most `longest` vertices. `photons` must outlive this.
+    /// Density estimates use find(count, radius) and photons with at most `longest` vertices. `photons` must outlive
+    /// this object.
     void begin(const PhotonMap& photons, int step, int count, float radius, int longest);
 
     /// Irradiance at the nearest of these photons on the side with the normal `n`; empty where none is within the radius.

@@ -9,10 +9,10 @@
 
 namespace etendue {
 
-/// How many points each cell has, or the cells that share its bucket.
+/// Number of points in each cell, or in all cells that share its bucket.
 struct CellCounts {
     CellHash cells;
-    std::vector<uint32_t> counts;  ///< By bucket; empty where nothing is known.
+    std::vector<uint32_t> counts;  ///< By bucket; empty if nothing is known.
 
     void save(LearnedState& to) const {
         to.put(cells);
@@ -46,7 +46,7 @@ public:
         if (entries_.empty()) return;
         const CellHash::Cell lowest = cells_.lowest_cell(p);
         const float radius2 = radius * radius;
-        // All eight at the same time, since the time is dominated by memory latency.
+        // All eight buckets are looked up together, because memory latency dominates the time.
         CellHash::Cell cells[8];
         uint32_t begin[8], end[8];
         for (int corner = 0; corner < 8; ++corner) {

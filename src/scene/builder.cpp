@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "description/resolve_file.h"
 #include "film/filter.h"
 #include "scene/model_builder.h"
 #include "scene/plugin_lookup.h"
@@ -361,6 +362,9 @@ private:
             if (p.has(name))
                 scene_.defaults_.integrator_params.emplace_back(
                     name, fmt::format("{}", p.integer(name, 0, -1, 1 << 20)));
+        if (p.has("user_paths"))
+            scene_.defaults_.integrator_params.emplace_back("user_paths",
+                                                            resolve_file(p, "user_paths"));
     }
 
     void make_sensor(const View& view) {

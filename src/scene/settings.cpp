@@ -110,6 +110,8 @@ const std::vector<IntegratorAlias>& integrator_aliases() {
         add({"sppm"}, "Stochastic progressive photon mapping.", "sppm");
         add({"pssmlt"}, "Metropolis light transport in primary sample space.", "pssmlt");
         add({"mlt"}, "Metropolis light transport.", "mlt");
+        all.back().info.params.push_back({"user_paths", ParamKind::String, "",
+                                          "JSON file of light paths that matter, see mlt."});
         add({"erpt", "vpl", "ao", "field", "depth"}, "Not supported.", "path", true);
         add({"adaptive", "irrcache", "multichannel", "aov", "moment", "stokes"},
             "A wrapper around other integrators.", "");

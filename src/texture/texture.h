@@ -15,7 +15,7 @@ namespace etendue {
 
 /// What a texture knows of the point at which it is evaluated.
 struct TexturePoint {
-    TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3(1, 1, 1), Vec3 p_ = {}, Vec3 dpdu_ = {},
+    TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3{1, 1, 1}, Vec3 p_ = {}, Vec3 dpdu_ = {},
                  Vec3 dpdv_ = {})
         : uv(uv_), color(color_), p(p_), dpdu(dpdu_), dpdv(dpdv_) {}
     TexturePoint(float u, float v) : TexturePoint(Vec2{u, v}) {}

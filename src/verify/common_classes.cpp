@@ -37,7 +37,7 @@ CommonClasses::CommonClasses(const RunSeries& method, std::span<const RunSeries>
         const RunSeries& r = references[i];
         expected.push_back(r.classes());
         may_serve_.push_back(i == 0 || r.spec.name != method.spec.name);
-        implies_.push_back(has_techniques_of(method.counts, r.counts));
+        implies_.push_back(!method.has_chains && has_techniques_of(method.counts, r.counts));
         fewer_.push_back(kRouletteMargin *
                          (shares_light_paths(method.counts) ? kClusterMargin : 1.0) *
                          double(r.samples()) / double(method.samples()));

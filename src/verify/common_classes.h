@@ -36,8 +36,9 @@ struct SideTallies {
 /// that of R is at least 1/1.21 of ∫ f v_R. Hence with equal samples M has at least 1/1.21 of R's effective
 /// contributions (Σv)² / Σv². Russian roulette, which references do not use, makes contributions fewer and larger.
 /// kRouletteMargin allows for it: M is credited with a tenth. Light paths shared by many eye paths make contributions
-/// correlated; then M is credited with a hundredth. Where M has no such reference, or the credit is too small, a lost
-/// class remains "too rare" and the report names it.
+/// correlated; then M is credited with a hundredth. Markov chains are credited with nothing: few of their states are
+/// independent samples, and those by one technique each. Where M has no such reference, or the credit is too small, a
+/// lost class remains "too rare" and the report names it.
 ///
 /// The credit affects which classes are tested, but not the test. Under the hypothesis that M is unbiased, its sum over
 /// a class consists of at least kEnoughContributions effective contributions, as for all other classes, so the level of

@@ -79,6 +79,14 @@ std::vector<SideTallies> tile_tallies(const Sides& sides, const TileGrid& grid) 
     return found;
 }
 
+/// Counts of independent contributions to every tile, at most.
+void limit_counts(const RunSeries& series, const TileMoments& moments,
+                  std::vector<double>& counts) {
+    for (size_t i = 0; i < counts.size(); ++i)
+        for (const Moments& m : moments[i])
+            counts[i] = std::min(counts[i], series.most_contributions(m));
+}
+
 void compare_tiles(const TileMoments& method, const TileMoments& reference,
                    const std::vector<double>& effective_counts, const TileGrid& grid,
                    MethodReport& report) {
@@ -126,6 +134,7 @@ void compare_images(const Sides& sides, const TileGrid& grid, MethodReport& repo
     }
     std::vector<double> counts;
     for (const SideTallies& t : tile_tallies(sides, grid)) counts.push_back(t.effective_count());
+    limit_counts(sides.method, method, counts);
     compare_tiles(method, reference, counts, grid, report);
 }
 
@@ -147,6 +156,7 @@ void compare_images(const RunSeries& method, const ReferenceImage& image, const 
     }
     std::vector<double> counts;
     for (const Tally& t : tallies) counts.push_back(t.effective_count());
+    limit_counts(method, moments, counts);
     compare_tiles(moments, reference, counts, grid, report);
 }
 
@@ -214,6 +224,14 @@ TechniqueReport compare_technique(const Technique& q, const Sides& sides,
     for (const IndependentRun& r : unthinned.runs)
         for (const ContributionTally::Entry& e : r.entries)
             if (is_of_technique(e)) found[e.path_class].method += e.alone;
+    for (auto& [c, f] : found)
+        f.method = f.method.with_count_of_at_most(
+            unthinned.most_contributions(unthinned.moments([&, &c = c](const IndependentRun& r) {
+                double sum = 0;
+                for (const ContributionTally::Entry& e : r.entries)
+                    if (is_of_technique(e) && e.path_class == c) sum += e.alone.sum;
+                return sum;
+            })));
     double length_total = 0;
     for (const auto& [c, k] : sides.common.all())
         if (c.edges + 1 == q.vertices()) length_total += k.light;
@@ -222,7 +240,7 @@ TechniqueReport compare_technique(const Technique& q, const Sides& sides,
         const RunSeries& reference = sides.references[i];
         const bool has_it = reference.counts.of(q) > 0 &&
                             reference.counts.of(q) <= sides.method.counts.of(q) &&
-                            sides.common.may_serve(i);
+                            sides.common.may_serve(i) && !sides.method.has_chains;
         for (const IndependentRun& r : reference.runs)
             for (const ContributionTally::Entry& e : r.entries) {
                 if (!is_of_length(e)) continue;

@@ -37,6 +37,12 @@ struct Tally {
     Tally from_fewer_samples(double factor) const {
         return {sum, squares * factor, fourths * factor * factor * factor};
     }
+    /// The tally with so large a second moment that its effective count is at most `count`.
+    Tally with_count_of_at_most(double count) const {
+        Tally limited = *this;
+        limited.squares = std::max(squares, sum * sum / count);
+        return limited;
+    }
     /// Effective sample size (Σv)² / Σv² [Kish 1965]: a t-test needs a large one. Where few contributions dominate Σv²,
     /// it is uncertain itself, so it is limited to four times the effective sample size of the squares.
     double effective_count() const {

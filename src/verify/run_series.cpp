@@ -127,6 +127,9 @@ std::map<PathClass, Tally> RunSeries::classes() const {
     std::map<PathClass, Tally> out;
     for (const IndependentRun& r : runs)
         for (const auto& [c, tally] : r.classes) out[c] += tally;
+    for (auto& [c, tally] : out)
+        tally = tally.with_count_of_at_most(
+            most_contributions(moments([&, &c = c](const auto& r) { return r.light(c); })));
     return out;
 }
 
@@ -211,6 +214,7 @@ RunSeries SeriesRenderer::begin(const IntegratorSpec& spec, uint64_t stream,
         return integrator->uses(q, scene_, light_paths);
     };
     series.estimator = integrator->estimator();
+    series.has_chains = integrator->error_groups() > 0;
     series.runs.resize(size_t(options_.runs));
     if (spp) {
         series.spp = *spp;

@@ -2,6 +2,7 @@
 // Independent renderings of one method, on which all tests are based.
 
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -39,6 +40,7 @@ struct RunSeries {
     TechniqueCounts counts;
     std::function<bool(const Technique&)> uses;  ///< Integrator::uses()
     Estimator estimator = Estimator::Unbiased;
+    bool has_chains = false;  ///< Contributions of the states of a Markov chain are correlated.
     uint64_t spp = 0;         ///< Samples per pixel of one rendering.
     uint64_t renderings = 0;  ///< Renderings per run.
     double seconds = 0;       ///< Wall-clock time of all renderings.
@@ -46,7 +48,7 @@ struct RunSeries {
 
     uint64_t samples() const { return spp * renderings; }  ///< Samples per pixel of one run.
     RenderStats stats() const;                             ///< Sums over the runs.
-    /// Sums over the runs.
+    /// Sums over the runs; their counts are of independent contributions.
     std::map<PathClass, Tally> classes() const;
     /// Mean and spread of `value(run)` over the runs.
     template <class Value>
@@ -54,6 +56,11 @@ struct RunSeries {
         Moments m;
         for (const IndependentRun& r : runs) m.add(value(r));
         return m;
+    }
+    /// Independent contributions to a mean over the runs, at most: of chains as many as would explain its spread.
+    double most_contributions(const Moments& m) const {
+        if (!has_chains) return std::numeric_limits<double>::infinity();
+        return m.squared_error() > 0 ? m.mean() * m.mean() / m.squared_error() : 0.0;
     }
 };
 

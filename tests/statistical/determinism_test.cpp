@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(
                                          "ppm:eye_paths=2", "pm:light_paths=2000",
                                          "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
                                          "pssmlt:groups=2,chains=24", "mmlt:groups=2,chains=48",
-                                         "mlt:groups=2,chains=48",
+                                         "mlt:groups=2,chains=48", "upg+pssmlt:groups=2,chains=24",
                                          "mps:mutations=2000,precision=0.2",
                                          "mps:target=path,mutations=1000,precision=0.2"),
                        ::testing::Values(SamplerKind::Independent, SamplerKind::Sobol)),

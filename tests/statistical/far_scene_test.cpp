@@ -7,7 +7,7 @@
 namespace etendue::test {
 namespace {
 
-class LongFarScene : public ::testing::TestWithParam<std::string> {};
+class FarScene : public ::testing::TestWithParam<std::string> {};
 
 /// Samples per pixel, and the relative error of the image's mean that the test sees.
 struct Effort {
@@ -39,14 +39,14 @@ Tiles render_independently(const Scene& scene, const std::string& integrator, ui
     return tiles;
 }
 
-TEST_P(LongFarScene, HasTheSameImage) {
+TEST_P(FarScene, HasTheSameImage) {
     const Scene near = lit_room({}), far = lit_room({.origin = {10000, -20000, 5000}});
     expect_same_image(render_independently(far, GetParam(), 1000),
                       render_independently(near, GetParam(), 1), effort_for(GetParam()).resolution,
                       GetParam());
 }
 
-INSTANTIATE_TEST_SUITE_P(Integrators, LongFarScene, ::testing::ValuesIn(all_integrators()),
+INSTANTIATE_TEST_SUITE_P(Long, FarScene, ::testing::ValuesIn(all_integrators()),
                          name_of_integrator);
 
 }  // namespace

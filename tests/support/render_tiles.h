@@ -42,6 +42,7 @@ struct TileOptions {
     int tiles = 4;
     uint64_t seed = 1;
     int batches = 32;
+    int shortest = 1;  ///< Paths of fewer edges are left out.
 };
 
 /// The integrator's image from `passes` passes; their spread is measured between batches of consecutive ones.
@@ -51,6 +52,7 @@ inline Tiles render_tiles(const Scene& scene, const std::string& integrator, con
     settings.seed = o.seed;
     settings.threads = 1;
     settings.spp = o.passes;
+    settings.shown.shortest = o.shortest;
     Renderer renderer(scene, settings);
     Tiles tiles(o.tiles);
     std::vector<double> before(tiles.values.size());

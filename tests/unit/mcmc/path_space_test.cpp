@@ -137,14 +137,24 @@ TEST_P(Paths, AreToldAsJoins) {
     }
 }
 
-/// What a path is like: its mean must not change by a step from states that are distributed as the target.
+/// Logarithm of a cosine or of 1/d², zero where there is none.
+double log_of(double v) {
+    return v > 0 ? std::log(v) : 0.0;
+}
+
+/// What a path is like: the factors of densities at both ends, and some of the middle. Their means must not change by a step.
 std::vector<double> features(const PathState& x) {
     const int k = x.last();
+    const auto edge = [&](int from, int to) {
+        return log_of(double(to_area(1, x[from].v, x[to].v)));
+    };
+    const auto cosine = [&](int at, int to) {
+        return x[at].v.has_cosine ? log_of(double(abs_dot(x[at].v.ng, direction(x[at].v, x[to].v))))
+                                  : 0.0;
+    };
     double edges = 0, cosines = 0;
-    for (int i = 1; i <= k; ++i) {
-        edges += std::log(double(to_area(1, x[i - 1].v, x[i].v)));
-        if (i < k) cosines += double(abs_dot(x[i].v.ng, direction(x[i].v, x[i + 1].v)));
-    }
+    for (int i = 1; i <= k; ++i) edges += edge(i - 1, i);
+    for (int i = 1; i < k; ++i) cosines += cosine(i, i + 1);
     const Vertex &seen = x[k - 1].v, &first = x[1].v;
     return {double(x.film.x),
             double(x.film.y),
@@ -153,15 +163,25 @@ std::vector<double> features(const PathState& x) {
             cosines,
             double(first.is_infinite ? 0.0f : first.p.y),
             double(seen.is_infinite ? 0.0f : seen.p.z),
-            double(abs_dot(seen.ng, direction(seen, x[k].v))),
-            double(abs_dot(first.ng, direction(first, x[0].v)))};
+            edge(k, k - 1),
+            edge(k - 1, k - 2),
+            edge(k - 2, k - 1),
+            cosine(k - 1, k),
+            cosine(k - 1, k - 2),
+            edge(0, 1),
+            edge(1, 0),
+            edge(1, 2),
+            cosine(1, 0),
+            cosine(0, 1)};
 }
 
-/// Each mutation alone: Σ I(x) a(x→y) (h(y) - h(x)) over independent states x has the mean zero for any h.
+/// Each mutation alone: from independent states x, whose density is T, the flow min(T(x) Q(x→y), T(y) Q(y→x)) is the same
+/// there and back. So Σ min(1, T(y) Q(y→x) / (T(x) Q(x→y))) (h(y) - h(x)) has the mean zero for any h. With T in place of
+/// the target no state counts more than another one.
 TEST_P(Paths, MutationsKeepDetailedBalance) {
     const WholeFilm whole(passes.pass());
     const ChainContext c{whole.sample, passes.work()};
-    constexpr uint64_t kSamples = 30000;
+    constexpr uint64_t kSamples = 60000;
     for (int kind = 0; kind < PathMutations::kCount; ++kind) {
         PathMutations alone;
         alone.weights.fill(0);
@@ -183,20 +203,15 @@ TEST_P(Paths, MutationsKeepDetailedBalance) {
         uint64_t moves = 0;
         for (uint64_t i = 0; i < kSamples; ++i) {
             space->draw(0, hash_combine(5, i), c, *x);
-            double rate = 0;
-            if (x->target > 0) {
-                const Proposal p = space->propose(0, *x, hash_combine(6, i), c, *y);
-                if (!p.has_failed) rate = std::min(x->target, y->target * p.Q_ratio);
-            }
-            std::vector<double> h(change.empty() ? 9 : change.size(), 0.0);
-            if (rate > 0) {
-                ++moves;
-                const auto before = features(static_cast<const PathState&>(*x)),
-                           after = features(static_cast<const PathState&>(*y));
-                for (size_t f = 0; f < h.size(); ++f) h[f] = rate * (after[f] - before[f]);
-            }
-            change.resize(h.size());
-            for (size_t f = 0; f < h.size(); ++f) change[f].add(h[f]);
+            if (!(x->target > 0)) continue;
+            const Proposal p = space->propose(0, *x, hash_combine(6, i), c, *y);
+            if (p.has_failed || !(y->target > 0)) continue;
+            ++moves;
+            const double rate = std::min(1.0, p.Q_ratio);
+            const auto before = features(static_cast<const PathState&>(*x)),
+                       after = features(static_cast<const PathState&>(*y));
+            change.resize(before.size());
+            for (size_t f = 0; f < change.size(); ++f) change[f].add(rate * (after[f] - before[f]));
         }
         if (moves < 200) continue;
         const double level = sidak(1e-3, change.size());

@@ -1,5 +1,6 @@
 // Passes that fail or are dropped have no effect on the image, and the rendering can continue.
 
+#include <algorithm>
 #include <functional>
 #include <span>
 
@@ -187,10 +188,13 @@ TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
 INSTANTIATE_TEST_SUITE_P(Integrators, DropPass,
                          ::testing::Values("path", "light", "bdpt", "vcm:radius=0.3", "upg+bdpt",
                                            "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
-                                           "mmlt:groups=2,chains=48", "mlt:groups=2,chains=48"),
+                                           "mmlt:groups=2,chains=48", "mlt:groups=2,chains=48",
+                                           "upg+pssmlt:groups=2,chains=16"),
                          [](const auto& p) {
-                             const std::string name = p.param;
-                             return name.substr(0, name.find_first_of(":+"));
+                             std::string name = p.param;
+                             name = name.substr(0, name.find(':'));
+                             std::replace(name.begin(), name.end(), '+', '_');
+                             return name;
                          });
 
 }  // namespace

@@ -191,7 +191,7 @@ TEST(MitsubaScenes, StretchedQuadricsAreMeshes) {
         EXPECT_NEAR(scene.bounds().hi.y, 1, 1e-5);
         EXPECT_TRUE(has(scene.warnings(), "becomes a mesh"));
         const SurfaceGeometry g = scene.shapes()[0].shape->surface(5000, 0.3f, 0.3f, false);
-        EXPECT_GT(dot(g.ng, Vec3(g.p.x / 4, g.p.y, shape[0] == 's' ? g.p.z : 0)), 0);  // outward
+        EXPECT_GT(dot(g.ng, Vec3{g.p.x / 4, g.p.y, shape[0] == 's' ? g.p.z : 0}), 0);  // outward
         EXPECT_GT(dot(g.ns, g.ng), 0.99f);
     }
 }
@@ -211,8 +211,8 @@ TEST(MitsubaScenes, NormalsAreStrictWhereTheIntegratorSaysSo) {
             read(front_camera(4) + kLamp + "<shape type=\"rectangle\">" + diffuse("0.5,0.5,0.5") +
                  "</shape><integrator type=\"path\"><boolean name=\"strict_normals\" value=\"" +
                  (strict ? "true" : "false") + "\"/></integrator>");
-        const Vec3 ns = normalize(Vec3(1, 0, 1)), wo = normalize(Vec3(-0.95f, 0, 0.3f)),
-                   wi = normalize(Vec3(-0.9f, 0.1f, 0.4f)), behind = normalize(Vec3(-1, 0, -1));
+        const Vec3 ns = normalize(Vec3{1, 0, 1}), wo = normalize(Vec3{-0.95f, 0, 0.3f}),
+                   wi = normalize(Vec3{-0.9f, 0.1f, 0.4f}), behind = normalize(Vec3{-1, 0, -1});
         ComponentArena arena;
         const auto bsdf = [&](Vec3 from) {
             return scene.shapes()[0].material->bsdf(

@@ -76,6 +76,25 @@ TEST(CommonClasses, OtherTechniquesMayFindAClassSeldom) {
     EXPECT_EQ(left.out_of_reach, 0);
 }
 
+/// States of a chain come from few independent ones: a class that one run has found, in many states, is too rare for a
+/// test, and so is one that path tracing finds more often than the chains' independent samples do.
+TEST(CommonClasses, StatesOfChainsAreNotIndependent) {
+    const std::vector<RunSeries> references{
+        series("path", kPath, {{kDirect, 1000}, {kCaustic, 300}})};
+    RunSeries chains = series("mlt", kBdpt, {{kDirect, 1000}});
+    chains.has_chains = true;
+    EXPECT_FALSE(CommonClasses(chains, references).contains(kCaustic));
+    chains.runs[5].classes[kCaustic] = {1, 1e-4, 1e-12};
+    const CommonClasses common(chains, references);
+    EXPECT_TRUE(common.contains(kDirect));
+    EXPECT_FALSE(common.contains(kCaustic));
+    EXPECT_NEAR(common.left_out([](const PathClass&) { return true; }).too_rare, 0.5, 0.05);
+    // Found in all runs.
+    RunSeries many = series("mlt", kBdpt, {{kDirect, 1000}, {kCaustic, 1000}});
+    many.has_chains = true;
+    EXPECT_TRUE(CommonClasses(many, references).contains(kCaustic));
+}
+
 /// A class that the first reference samples badly is compared with another one, but not with the method itself.
 TEST(CommonClasses, LaterReferencesServeWhereTheyAreMuchBetter) {
     const PathClass caustic{.edges = 4, .delta_events = 0b0110};

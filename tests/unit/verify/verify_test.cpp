@@ -42,6 +42,7 @@ TEST(Verify, SamplersGiveTheSameMeans) {
     for (const SamplerKind sampler : {SamplerKind::Sobol, SamplerKind::Independent}) {
         VerifyOptions options = quick_options();
         options.sampler = sampler;
+        options.spp = 48;
         const VerifyReport report = verify(scene, {IntegratorSpec::parse("bdpt")}, options);
         EXPECT_EQ(report.verdict(report.methods[0]), Verdict::Consistent);
         means.push_back(report.methods[0].image[1].method.mean());
