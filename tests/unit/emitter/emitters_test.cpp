@@ -250,7 +250,7 @@ TEST_F(ImageLights, GoniometricHasTheDirectionsOfItsImage) {
          {"to_world", Transform::translate({1, 2, 3}) * Transform::rotate({1, 0, 0}, 90), {}}});
     EXPECT_EQ(along(*light, {0, -1, 0}).Le_cos, Rgb(7));
     EXPECT_EQ(along(*light, {0, 1, 0}).Le_cos, Rgb(1));
-    EXPECT_EQ(light->sample_emission({}, {0.5f, 0.5f}).p, Vec3(1, 2, 3));
+    EXPECT_EQ(light->sample_emission({}, {0.5f, 0.5f}).p, (Vec3{1, 2, 3}));
     // The upper half of a latitude-longitude image is that of +y.
     const auto up = make(goniometric_entry(), 1, 2, {Rgb(4), Rgb(0)});
     EXPECT_EQ(along(*up, {0, 1, 0}).Le_cos, Rgb(4));

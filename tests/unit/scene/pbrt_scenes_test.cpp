@@ -1,5 +1,8 @@
 // Scenes of pbrt as the builder makes them: which way normals point, where textures lie, that every plug-in can be built.
 
+#include <cmath>
+
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "readers/pbrt.h"
@@ -48,6 +51,43 @@ TEST(PbrtScenes, MeshesWithoutNormalsAreFlat) {
     const Scene scene = build4(kRoof);
     ASSERT_TRUE(scene.intersect(Ray{{0.45f, 0.45f, 5}, {0, 0, -1}}, 0.5f, hit));
     EXPECT_NEAR(hit.geometry.ns.z, 1, 1e-6);
+}
+
+/// A board of cubes that starts at x = 1/2, on the opacity and on the reflectance of an instanced square.
+TEST(PbrtScenes, TexturesOfSpaceLieInTheWorld) {
+    const std::string world =
+        "Translate .5 0 0 Texture \"a\" \"float\" \"checkerboard\" \"integer dimension\" 3\n"
+        "Texture \"c\" \"spectrum\" \"checkerboard\" \"integer dimension\" 3\n"
+        "Identity Translate 0 0 -.5 Material \"diffuse\" \"texture reflectance\" \"c\"\n"
+        "ObjectBegin \"o\" Shape \"bilinearmesh\""
+        " \"point3 P\" [-4 -4 0 4 -4 0 -4 4 0 4 4 0] ALPHA ObjectEnd\n"
+        "Identity Translate 10 0 0 ObjectInstance \"o\"";
+    const auto with_alpha = [&](const std::string& alpha) {
+        std::string text = world;
+        return build4(text.replace(text.find("ALPHA"), 5, alpha));
+    };
+    const Scene opaque = with_alpha(""), masked = with_alpha("\"texture alpha\" \"a\"");
+    for (float x = 6.25f; x < 14; x += 0.5f)
+        for (const float y : {-1.3f, 0.4f}) {
+            SCOPED_TRACE(fmt::format("({}, {})", x, y));
+            const int cube = int(std::floor(x - 0.5f)) + int(std::floor(y)) - 1;
+            const bool is_first = cube % 2 == 0;
+            SurfaceHit hit;
+            EXPECT_EQ(masked.intersect(Ray{{x, y, 5}, {0, 0, -1}}, 0.5f, hit), is_first);
+            ASSERT_TRUE(opaque.intersect(Ray{{x, y, 5}, {0, 0, -1}}, 0.5f, hit));
+            const SurfaceGeometry& at = hit.geometry;
+            const SurfacePoint point{.p = at.p,
+                                     .ng = at.ng,
+                                     .ns = at.ns,
+                                     .dpdu = at.dpdu,
+                                     .dpdv = at.dpdv,
+                                     .uv = at.uv,
+                                     .wo = {0, 0, 1},
+                                     .color = at.color};
+            ComponentArena arena;
+            const Bsdf bsdf = hit.shape->material->bsdf(point, arena);
+            EXPECT_EQ(bsdf.albedo_estimate(), Rgb(is_first ? 1 : 0));
+        }
 }
 
 /// A material, texture or light for each line.
