@@ -5,6 +5,7 @@
 
 #include <variant>
 
+#include "bsdf/coatedconductor.h"
 #include "bsdf/conductor.h"
 #include "bsdf/dielectric.h"
 #include "bsdf/diffuse.h"
@@ -22,10 +23,10 @@
 namespace etendue {
 
 /// The closed set of lobes; trivially copyable, at most 64 bytes each.
-using Lobe =
-    std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, DielectricLobe, ThinDielectricLobe,
-                 RoughDielectricLobe, PlasticLobe, RoughPlasticLobe, PhongLobe, PrincipledLobe,
-                 OrenNayarLobe, FresnelBlendLobe, DiffuseTransmissionLobe>;
+using Lobe = std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, DielectricLobe,
+                          ThinDielectricLobe, RoughDielectricLobe, PlasticLobe, RoughPlasticLobe,
+                          PhongLobe, PrincipledLobe, OrenNayarLobe, FresnelBlendLobe,
+                          DiffuseTransmissionLobe, CoatedMirrorLobe, CoatedConductorLobe>;
 
 /// One lobe in its shading frame; a mixture is a list of them whose weights sum to one.
 struct BsdfComponent {

@@ -5,6 +5,7 @@ namespace etendue {
 MaterialEntry diffuse_entry();
 MaterialEntry conductor_entry();
 MaterialEntry roughconductor_entry();
+MaterialEntry coatedconductor_entry();
 MaterialEntry dielectric_entry();
 MaterialEntry thindielectric_entry();
 MaterialEntry roughdielectric_entry();
@@ -34,6 +35,7 @@ const std::vector<MaterialEntry>& material_registry() {
         thindielectric_entry(),
         roughdielectric_entry(),
         roughplastic_entry(),
+        coatedconductor_entry(),
         phong_entry(),
         principled_entry(),
         orennayar_entry(),

@@ -3,6 +3,7 @@
 //   specular_reflectance (1)    colour or texture in [0, 1], factor on the mirror reflection
 //   int_ior (polypropylene), ext_ior (air)   indices of the coat and outside; numbers or names
 //   nonlinear (false)           whether interreflection under the coat saturates the colour
+//   thickness (0)               optical thickness of the coat: its thickness times its absorption coefficient
 // Reciprocal. One-sided.
 
 #include "bsdf/plastic.h"
@@ -16,7 +17,7 @@ PlasticParams::PlasticParams(const Params& params, MaterialContext& context)
     : diffuse(context.texture(params, "diffuse_reflectance", Rgb(0.5f), 1)),
       specular(context.texture(params, "specular_reflectance", Rgb(1), 1)),
       eta(read_ior(params, "int_ior", "polypropylene") / read_ior(params, "ext_ior", "air")),
-      nonlinear(params.flag("nonlinear", false)) {}
+      nonlinear(params.flag("nonlinear", false)), thickness(params.number("thickness", 0, 0)) {}
 
 PlasticParams::Colors PlasticParams::eval(const TexturePoint& at, float F_int) const {
     const Rgb d = diffuse.eval(at), s = specular.eval(at);
@@ -40,7 +41,9 @@ std::vector<ParamInfo> PlasticParams::table() {
              "Index of refraction of the coat, above 0."},
             {"ext_ior", ParamKind::FloatOrName, "air", "Index of refraction outside, above 0."},
             {"nonlinear", ParamKind::Bool, "false",
-             "Whether interreflection under the coat saturates the colour."}};
+             "Whether interreflection under the coat saturates the colour."},
+            {"thickness", ParamKind::Float, "0",
+             "Optical thickness of the coat: its thickness times its absorption coefficient."}};
 }
 
 namespace {
@@ -48,13 +51,16 @@ namespace {
 class Plastic final : public Material {
 public:
     Plastic(const Params& params, MaterialContext& context)
-        : params_(params, context), F_int_(fresnel_diffuse_reflectance(1 / params_.eta)) {}
+        : params_(params, context), F_int_(reflectance_below_coat(params_.eta, params_.thickness)) {
+    }
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         const auto [diffuse, specular, specular_share] =
             params_.eval(point.texture_point(), F_int_);
-        list.add(frame, PlasticLobe{diffuse, specular, params_.eta, specular_share}, weight);
+        list.add(frame,
+                 PlasticLobe{diffuse, specular, params_.eta, specular_share, params_.thickness},
+                 weight);
     }
     Rgb mean_albedo() const override { return params_.mean_albedo(); }
 

@@ -1,29 +1,26 @@
 #pragma once
 
-#include "bsdf/fresnel.h"
+#include "bsdf/coat.h"
 #include "math/warp.h"
 
 namespace etendue {
 
-/// Probability of sampling the specular part, where the specular part receives `F` and the diffuse part 1 − `F` of the
-/// light, and `specular_share` is the share of the specular colour in the sum of both colours.
-inline float coat_probability(float F, float specular_share) {
-    const float s = F * specular_share, d = (1 - F) * (1 - specular_share);
-    return s + d > 0 ? s / (s + d) : 0;
-}
-
 /// Smooth dielectric coat over a diffuse base: a mirror reflection ρ_s F(θo) and
-///     f = (1 − F(θo)) (1 − F(θi)) ρ_d / π.
+///     f = (1 − F(θo)) (1 − F(θi)) exp(−τ (1/cos θ'o + 1/cos θ'i)) ρ_d / π,
+/// with the optical thickness τ of the coat and the angles θ' in it.
 struct PlasticLobe {
     Rgb diffuse;           ///< ρ_d, see PlasticParams::eval.
     Rgb specular;          ///< ρ_s
     float eta;             ///< η of the coat over η outside.
     float specular_share;  ///< As for coat_probability.
+    float thickness;       ///< Optical thickness of the coat.
 
     BsdfEval eval(Vec3 wo, Vec3 wi) const {
         if (!(wo.z > 0 && wi.z > 0)) return {};
         const float Fo = fresnel_dielectric(wo.z, eta).R, Fi = fresnel_dielectric(wi.z, eta).R;
-        return {.f = diffuse * ((1 - Fo) * (1 - Fi) * wi.z * kInvPi),
+        const float attenuation =
+            coat_attenuation(thickness, cos_below_coat(wo.z, eta), cos_below_coat(wi.z, eta));
+        return {.f = diffuse * ((1 - Fo) * (1 - Fi) * attenuation * wi.z * kInvPi),
                 .pdf = (1 - coat_probability(Fo, specular_share)) * wi.z * kInvPi,
                 .pdf_rev = (1 - coat_probability(Fi, specular_share)) * wo.z * kInvPi};
     }

@@ -107,7 +107,7 @@ void set_roughness(PbrtScene& scene, int object, const PbrtRoughness& r) {
 
 /// One α for models that have no other.
 void set_isotropic_alpha(PbrtScene& scene, const PbrtArguments& args, int object,
-                         const PbrtRoughness& r) {
+                         const PbrtRoughness& r, const char* name) {
     scene.set(object, "distribution", std::string("ggx"));
     if (!r.is_isotropic())
         scene.refuse(
@@ -115,11 +115,11 @@ void set_isotropic_alpha(PbrtScene& scene, const PbrtArguments& args, int object
             fmt::format("the roughness of {} must be the same along u and v", quote(args.name())),
             r.is_constant() ? "their geometric mean" : "that along u");
     if (r.is_constant())
-        scene.set(object, "alpha", double(std::sqrt(*r.alpha[0] * *r.alpha[1])));
+        scene.set(object, name, double(std::sqrt(*r.alpha[0] * *r.alpha[1])));
     else if (r.alpha[0])
-        scene.set(object, "alpha", double(*r.alpha[0]));
+        scene.set(object, name, double(*r.alpha[0]));
     else
-        scene.add_child(object, "alpha", r.texture[0]);
+        scene.add_child(object, name, r.texture[0]);
 }
 
 /// Index of refraction of a dielectric; a spectrum's at the sodium line.
@@ -220,13 +220,19 @@ Rgb k_of_reflectance(Rgb R) {
     return k;
 }
 
-int add_metal(PbrtScene& scene, const PbrtArguments& args, const PbrtRoughness& r, bool mirror,
-              const std::string& prefix = "") {
+/// Index of refraction; copper's by default.
+void bind_metal(PbrtScene& scene, int metal, const PbrtArguments& args,
+                const std::string& prefix = "") {
+    const Rgb copper_eta(0.2009f, 0.9238f, 1.1016f), copper_k(3.913f, 2.4532f, 2.1411f);
+    scene.bind(metal, "eta", args, (prefix + "eta").c_str(), copper_eta, PbrtSpectrum::Unbounded);
+    scene.bind(metal, "k", args, (prefix + "k").c_str(), copper_k, PbrtSpectrum::Unbounded);
+}
+
+int add_metal(PbrtScene& scene, const PbrtArguments& args, const PbrtRoughness& r, bool mirror) {
     const int metal = scene.add("bsdf", mirror ? "conductor" : "roughconductor", args.where());
     if (!mirror) set_roughness(scene, metal, r);
-    const std::string eta = prefix + "eta", k = prefix + "k";
     if (args.has("reflectance")) {
-        if (args.has(eta) || args.has(k))
+        if (args.has("eta") || args.has("k"))
             args.fail("reflectance", "give either reflectance, or eta and k, not both");
         auto R = scene.constant(args, "reflectance", Rgb(0.5f), PbrtSpectrum::Albedo);
         if (!R) {
@@ -241,23 +247,13 @@ int add_metal(PbrtScene& scene, const PbrtArguments& args, const PbrtRoughness& 
         scene.set(metal, "k", k_of_reflectance(*R));
         return metal;
     }
-    const Rgb copper_eta(0.2009f, 0.9238f, 1.1016f), copper_k(3.913f, 2.4532f, 2.1411f);
-    scene.bind(metal, "eta", args, eta.c_str(), copper_eta, PbrtSpectrum::Unbounded);
-    scene.bind(metal, "k", args, k.c_str(), copper_k, PbrtSpectrum::Unbounded);
+    bind_metal(scene, metal, args);
     return metal;
 }
 
 int make_conductor(PbrtScene& scene, const PbrtArguments& args) {
     const PbrtRoughness r = read_roughness(scene, args, 0);
     return reflecting(scene, args, add_metal(scene, args, r, r.is_mirror()));
-}
-
-/// There is no model of a coated metal.
-int make_coatedconductor(PbrtScene& scene, const PbrtArguments& args) {
-    scene.refuse(args.where(), fmt::format("the material {} is not supported", quote(args.name())),
-                 "the metal without its coat");
-    const PbrtRoughness r = read_roughness(scene, args, 0, "conductor.");
-    return reflecting(scene, args, add_metal(scene, args, r, r.is_mirror(), "conductor."));
 }
 
 int make_dielectric(PbrtScene& scene, const PbrtArguments& args) {
@@ -284,6 +280,17 @@ void refuse_coat_medium(PbrtScene& scene, const PbrtArguments& args) {
                      "a coat that scatters (albedo above 0) is not supported", "a clear one");
 }
 
+/// pbrt's coats have the absorption coefficient 1.
+void set_thickness(PbrtScene& scene, int object, const PbrtArguments& args) {
+    std::optional<float> thickness = scene.constant(args, "thickness", 0.01f);
+    if (!thickness) {
+        scene.refuse(args.find("thickness")->where(),
+                     "the thickness of a coat must be a number, not a texture", "0.01");
+        thickness = 0.01f;
+    }
+    scene.set(object, "thickness", double(std::max(*thickness, 0.0f)));
+}
+
 int make_coateddiffuse(PbrtScene& scene, const PbrtArguments& args) {
     refuse_coat_medium(scene, args);
     const PbrtRoughness r = read_roughness(scene, args, 0);
@@ -292,7 +299,30 @@ int make_coateddiffuse(PbrtScene& scene, const PbrtArguments& args) {
     scene.bind(coated, "diffuse_reflectance", args, "reflectance", Rgb(0.5f));
     scene.set(coated, "nonlinear", true);
     set_ior(scene, coated, read_eta(scene, args, "eta", 1.5f));
-    if (!smooth) set_isotropic_alpha(scene, args, coated, r);
+    set_thickness(scene, coated, args);
+    if (!smooth) set_isotropic_alpha(scene, args, coated, r, "alpha");
+    return reflecting(scene, args, coated);
+}
+
+int make_coatedconductor(PbrtScene& scene, const PbrtArguments& args) {
+    refuse_coat_medium(scene, args);
+    const PbrtRoughness metal = read_roughness(scene, args, 0, "conductor."),
+                        coat = read_roughness(scene, args, 0, "interface.");
+    const int coated = scene.add("bsdf", "coatedconductor", args.where());
+    if (metal.is_mirror())
+        scene.set(coated, "alpha", 0.0);
+    else
+        set_roughness(scene, coated, metal);
+    if (!coat.is_mirror()) set_isotropic_alpha(scene, args, coated, coat, "coat_alpha");
+    if (args.has("reflectance")) {
+        if (args.has("conductor.eta") || args.has("conductor.k"))
+            args.fail("reflectance", "give either reflectance, or eta and k, not both");
+        scene.bind(coated, "reflectance", args, "reflectance", Rgb(0.5f));
+    } else {
+        bind_metal(scene, coated, args, "conductor.");
+    }
+    set_ior(scene, coated, read_eta(scene, args, "interface.eta", 1.5f));
+    set_thickness(scene, coated, args);
     return reflecting(scene, args, coated);
 }
 
@@ -478,7 +508,7 @@ std::vector<PbrtEntry> make_entries() {
     const PbrtParamInfo sigma = texture(
         "sigma", "0", "Standard deviation of the facets' slopes in degrees: becomes orennayar.");
     const std::vector<PbrtParamInfo> coat = {
-        texture("thickness", "0.01", "Accepted; the coat does not absorb."),
+        texture("thickness", "0.01", "Optical thickness of the coat, a number."),
         texture("g", "0", "Accepted; without effect."),
         texture("albedo", "0", "Rejected unless 0: a coat does not scatter."),
         {"maxdepth", ParamKind::Int, "", "Accepted; all interreflections count."},
@@ -521,9 +551,7 @@ std::vector<PbrtEntry> make_entries() {
                                     {"scale", ParamKind::Float, "1", "Factor of both."}} +
              maps(),
          make_diffusetransmission},
-        {"coatedconductor", kV4,
-         "Rejected: there is no model of a coated metal. --lenient takes the metal without its "
-         "coat.",
+        {"coatedconductor", kV4, "Becomes coatedconductor, a closed form of what pbrt simulates.",
          std::vector<PbrtParamInfo>{
              texture("conductor.eta", "copper", "Real part of the metal's index of refraction."),
              texture("conductor.k", "copper", "Imaginary part of it."),

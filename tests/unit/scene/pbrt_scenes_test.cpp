@@ -98,7 +98,10 @@ TEST(PbrtScenes, WhatTheReaderNamesTheBuilderKnows) {
     const std::string kSphere = "\nShape \"sphere\"";
     for (const char* material :
          {"diffuse\" \"float sigma\" 20", "diffuse\" \"texture reflectance\" \"t\"",
-          "diffuse\" \"texture displacement\" \"f\"", "coateddiffuse",
+          "diffuse\" \"texture displacement\" \"f\"", "coateddiffuse", "coatedconductor",
+          "coatedconductor\" \"texture interface.roughness\" \"f\"",
+          "coatedconductor\" \"float conductor.vroughness\" .1",
+          "coatedconductor\" \"texture reflectance\" \"t\"",
           "coateddiffuse\" \"texture roughness\" \"f\"", "coateddiffuse\" \"float roughness\" .1",
           "conductor", "conductor\" \"texture roughness\" \"f\"",
           "conductor\" \"rgb reflectance\" [.2 .3 .4]", "dielectric",

@@ -1,0 +1,106 @@
+#pragma once
+// Dielectric coats over opaque bases. A coat absorbs but does not scatter.
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "bsdf/fresnel.h"
+#include "bsdf/microfacet.h"
+#include "texture/texture.h"
+
+namespace etendue {
+
+/// Probability of sampling the specular part, where the specular part receives `F` and the diffuse part 1 − `F` of the
+/// light, and `specular_share` is the share of the specular colour in the sum of both colours.
+inline float coat_probability(float F, float specular_share) {
+    const float s = F * specular_share, d = (1 - F) * (1 - specular_share);
+    return s + d > 0 ? s / (s + d) : 0;
+}
+
+/// Cosine below the coat of a direction with cosine `cos` >= 0 above it; 0 under total reflection.
+inline float cos_below_coat(float cos, float eta) {
+    return safe_sqrt(1 - (1 - cos) * (1 + cos) / sqr(eta));
+}
+/// What a coat of optical thickness τ lets pass on the way down and up again, exp(−τ (1/c_o + 1/c_i)), for the cosines
+/// of both directions below it.
+inline float coat_attenuation(float thickness, float cos_o, float cos_i) {
+    return thickness > 0 ? std::exp(-thickness * (1 / cos_o + 1 / cos_i)) : 1.0f;
+}
+/// Share of diffuse light from the base that a smooth coat reflects back to it, with the absorption on this way:
+///     2 ∫ F(μ) exp(−2τ/μ) μ dμ;
+/// `eta` is η of the coat over η outside.
+float reflectance_below_coat(float eta, float thickness);
+
+/// Rough transmittance T(θ) of a dielectric boundary: the share of light from outside that is refracted at the first
+/// facet and not masked afterwards.
+class RoughTransmittance {
+public:
+    /// `eta` is η of the inside over η outside.
+    RoughTransmittance(const Microfacet& distribution, float eta);
+
+    /// T at `cos_theta` >= 0 from `table()`.
+    static float lookup(const float* table, float cos_theta) {
+        const float x = std::max(cos_theta, 0.0f) * (kSize - 1);
+        const int i = std::min(int(x), kSize - 2);
+        return lerp(x - float(i), table[i], table[i + 1]);
+    }
+    const float* table() const { return external_.data(); }
+    /// Share of diffuse light from inside that is reflected at the first facet.
+    float internal_reflectance() const { return internal_reflectance_; }
+
+private:
+    static constexpr int kSize = 64;
+
+    std::array<float, kSize> external_;
+    float internal_reflectance_;
+};
+
+/// A transmittance that is computed when it is first needed. All materials with the same coat share it.
+class SharedTransmittance {
+public:
+    /// That of a coat of one distribution, isotropic roughness and relative index.
+    static std::shared_ptr<SharedTransmittance> of(Microfacet::Kind kind, float alpha, float eta);
+
+    SharedTransmittance(const Microfacet& distribution, float eta)
+        : distribution_(distribution), eta_(eta) {}
+    const RoughTransmittance& get() const {
+        const RoughTransmittance* made = made_.load(std::memory_order_acquire);
+        return made ? *made : make();
+    }
+
+private:
+    const RoughTransmittance& make() const;
+
+    Microfacet distribution_;
+    float eta_;
+    mutable std::mutex making_;
+    mutable std::optional<RoughTransmittance> value_;
+    mutable std::atomic<const RoughTransmittance*> made_ = nullptr;  ///< `value_` once complete.
+};
+
+/// A coat with an isotropic roughness, constant or textured.
+class RoughCoat {
+public:
+    RoughCoat(Microfacet::Kind kind, TextureRef alpha, float eta);
+
+    float alpha(const TexturePoint& at) const { return alpha_.eval_scalar(at); }
+    Microfacet distribution(float alpha) const { return {kind_, alpha, alpha}; }
+    /// The transmittance for `alpha`; where it is textured, for the nearest of kRows roughnesses, the same for both
+    /// ends of a path.
+    const RoughTransmittance& transmittance(float alpha) const;
+
+private:
+    /// Number of roughnesses for which a textured α has transmittances; they are equidistant in √α.
+    static constexpr int kRows = 33;
+
+    Microfacet::Kind kind_;
+    TextureRef alpha_;
+    std::vector<std::shared_ptr<const SharedTransmittance>> transmittance_;
+};
+
+}  // namespace etendue
