@@ -401,6 +401,8 @@ SceneDescription parse_gltf(std::string_view bytes, const std::string& file,
                        parts.json.begin() + ptrdiff_t(std::min(e.byte, parts.json.size())), '\n') +
             1;
         throw SceneError({file, int(line)}, "malformed JSON");
+    } catch (const nlohmann::json::out_of_range&) {
+        throw SceneError({file, 0}, "malformed JSON: a number is too large");
     }
     return GltfReader(file, options, document, parts.chunk).read();
 }
