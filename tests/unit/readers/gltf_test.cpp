@@ -91,7 +91,7 @@ TEST(Gltf, ReadsASquare) {
         R"({"pbrMetallicRoughness":{"baseColorFactor":[0.1,0.2,0.3,1],"metallicFactor":0.25,
             "roughnessFactor":0.5},"extensions":{"KHR_materials_ior":{"ior":1.25}}})");
     ASSERT_EQ(scene.meshes.size(), 1u);
-    EXPECT_EQ(scene.meshes[0].positions[2], Vec3{1, 1, 0});
+    EXPECT_EQ(scene.meshes[0].positions[2], (Vec3{1, 1, 0}));
     EXPECT_EQ(scene.meshes[0].triangles[1], (MeshData::Triangle{0, 2, 3}));
     const SceneObject& m = find(scene, "principled");
     EXPECT_EQ(value<Rgb>(m, "base_color"), Rgb(0.1f, 0.2f, 0.3f));
@@ -150,8 +150,8 @@ TEST(Gltf, SparseAccessorsReplaceValues) {
             {"buffer":0,"byteOffset":60,"byteLength":1},{"buffer":0,"byteOffset":64,"byteLength":12}],
             "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}])"),
         b);
-    EXPECT_EQ(scene.meshes[0].positions[2], Vec3{5, 6, 7});
-    EXPECT_EQ(scene.meshes[0].positions[1], Vec3{1, 0, 0});
+    EXPECT_EQ(scene.meshes[0].positions[2], (Vec3{5, 6, 7}));
+    EXPECT_EQ(scene.meshes[0].positions[1], (Vec3{1, 0, 0}));
 }
 
 TEST(Gltf, NodesMultiplyFromTheRootAndSharedMeshesAreInstances) {
@@ -169,7 +169,7 @@ TEST(Gltf, NodesMultiplyFromTheRootAndSharedMeshesAreInstances) {
             ends.push_back(value<Transform>(o, "to_world").point({1, 0, 0}));
         }
     EXPECT_EQ(origins, (std::vector<Vec3>{{7, 0, 0}, {1, 0, 0}}));
-    EXPECT_EQ(ends[1], Vec3{-1, 0, 0});
+    EXPECT_EQ(ends[1], (Vec3{-1, 0, 0}));
     EXPECT_EQ(scene.meshes.size(), 1u);
 }
 
@@ -241,12 +241,12 @@ TEST(Gltf, CamerasLookAlongMinusZ) {
     EXPECT_EQ(camera.id, "front");
     EXPECT_NEAR(value<double>(camera, "fov"), 0.5 * 180 / kPi, 1e-5);
     const Transform t = value<Transform>(camera, "to_world");
-    EXPECT_EQ(t.point({0, 0, 1}), Vec3{0, 0, 4});
-    EXPECT_EQ(t.vector({1, 0, 0}), Vec3{-1, 0, 0});
+    EXPECT_EQ(t.point({0, 0, 1}), (Vec3{0, 0, 4}));
+    EXPECT_EQ(t.vector({1, 0, 0}), (Vec3{-1, 0, 0}));
     EXPECT_GT(t.determinant3(), 0);
     EXPECT_EQ(value<int64_t>(scene.objects[size_t(camera.children[0].object)], "width"), 1440);
     EXPECT_EQ(value<Transform>(find(scene, "orthographic"), "to_world").vector({1, 0, 0}),
-              Vec3{-2, 0, 0});
+              (Vec3{-2, 0, 0}));
 }
 
 TEST(Gltf, PunctualLightsShineAlongMinusZ) {
@@ -256,9 +256,9 @@ TEST(Gltf, PunctualLightsShineAlongMinusZ) {
             {"type":"point"}]}},"nodes":[{"extensions":{"KHR_lights_punctual":{"light":0}}},
             {"extensions":{"KHR_lights_punctual":{"light":1}}},{"translation":[1,2,3],
             "extensions":{"KHR_lights_punctual":{"light":2}}}]})");
-    EXPECT_EQ(value<Vec3>(find(scene, "directional"), "direction"), Vec3{0, 0, -1});
+    EXPECT_EQ(value<Vec3>(find(scene, "directional"), "direction"), (Vec3{0, 0, -1}));
     EXPECT_EQ(value<Rgb>(find(scene, "directional"), "irradiance"), Rgb(3, 0, 0));
-    EXPECT_EQ(value<Vec3>(find(scene, "point"), "position"), Vec3{1, 2, 3});
+    EXPECT_EQ(value<Vec3>(find(scene, "point"), "position"), (Vec3{1, 2, 3}));
     EXPECT_EQ(value<std::string>(find(scene, "spot"), "falloff"), "quadratic");
     const Vec3 axis = value<Transform>(find(scene, "spot"), "to_world").vector({0, 0, 1});
     EXPECT_NEAR(axis.z, -1, 1e-6);
