@@ -344,7 +344,7 @@ Answers answer(const PointGrid& grid, const std::vector<Vec3>& queries, float ra
     uint64_t found = 0, candidates = 0;
     for (Vec3 p : queries) {
         grid.for_each_near(p, radius, [&](const PointGrid::Entry&) { ++found; });
-        candidates += grid.candidates(p);
+        candidates += grid.candidates(p, radius);
     }
     return {double(found), double(candidates)};
 }

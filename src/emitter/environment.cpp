@@ -23,14 +23,13 @@ public:
         for (int y = 0; y <= height; ++y) {
             const double top = std::max(0.0, (y - 0.5) / height),
                          bottom = std::min(1.0, (y + 0.5) / height);
-            // Mean of sin θ over the row, up to a constant.
-            const double area =
-                (std::cos(double(kPi) * top) - std::cos(double(kPi) * bottom)) / (bottom - top);
+            // Integral of sin θ over the row, up to a constant.
+            const double area = std::cos(double(kPi) * top) - std::cos(double(kPi) * bottom);
             for (int x = 0; x < width; ++x) {
                 const Rgb sum =
                     texel(x, y - 1) + texel(x + 1, y - 1) + texel(x, y) + texel(x + 1, y);
                 weights[size_t(y) * width + x] = float(0.25 * luminance(sum) * area);
-                mean_ += 0.25 * luminance(sum) * area * (bottom - top) / width / 2;
+                mean_ += 0.25 * luminance(sum) * area / width / 2;
             }
         }
         distribution_ = PiecewiseConstant2D(weights, width, height + 1);

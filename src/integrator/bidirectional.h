@@ -26,7 +26,9 @@ public:
     }
 
     /// Trains the guide. Must be called before any path of the pass is traced.
-    void train(const PassContext& pass) { guiding_.train(pass, depth_); }
+    void train(const PassContext& pass, GuidedWalks walks = GuidedWalks::Both) {
+        guiding_.train(pass, depth_, walks);
+    }
 
     /// Sets the thresholds of efficiency-optimised roulette from the statistics of earlier passes.
     void learn(const LearnContext& pass);

@@ -141,17 +141,25 @@ Guiding::Guiding(const IntegratorParams& p) {
     mode_ = p.choice("guide", kModes);
 }
 
-bool Guiding::gains_little(bool has_light_walks) const {
-    constexpr float kLeastGain = 0.2f;  // nats
-    const auto is_little = [](const GuideTree& tree, TransportMode mode) {
-        return !(tree.gain(mode) >= kLeastGain);
+bool Guiding::gains_little(GuidedWalks walks) const {
+    // The logarithm of what a guided sample costs, training included, in samples without guide.
+    constexpr float kLeastGain = 0.4f;  // nats
+    const auto gains = [](const GuideTree& tree, TransportMode mode) {
+        return tree.gain(mode) >= kLeastGain;
     };
-    return is_little(guide_->surfaces, TransportMode::Radiance) &&
-           (!has_light_walks || (is_little(guide_->surfaces, TransportMode::Importance) &&
-                                 is_little(guide_->emission, TransportMode::Importance)));
+    const bool eye = gains(guide_->surfaces, TransportMode::Radiance),
+               light = gains(guide_->surfaces, TransportMode::Importance) ||
+                       gains(guide_->emission, TransportMode::Importance);
+    switch (walks) {
+    case GuidedWalks::Eye:
+    case GuidedWalks::BothWithPairs: return !eye;
+    case GuidedWalks::Light: return !light;
+    case GuidedWalks::Both: return !eye && !light;
+    }
+    return true;
 }
 
-void Guiding::train(const PassContext& pass, const DepthOptions& depth, bool has_light_walks) {
+void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks) {
     constexpr int kRounds = 4;
     constexpr uint64_t kFewestWalks = 1024;
     // A pass that was dropped and is traced again is trained for once.
@@ -171,7 +179,7 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, bool has
         const uint64_t first = std::max(kFewestWalks, std::min(pass.pixels, kMostWalks) >> kRounds);
         for (int round = 0; round < kRounds; ++round)
             guide_ = trained(pass, depth, first << round, hash_combine(seed, uint64_t(round)));
-        if (mode_ == Mode::Auto && gains_little(has_light_walks)) {
+        if (mode_ == Mode::Auto && gains_little(walks)) {
             is_given_up_ = true;
             guide_ = nullptr;
         }

@@ -8,6 +8,10 @@
 
 namespace etendue {
 
+/// Walks that a method guides, by which `auto` decides. Where each eye path finds pairs among all light paths of a pass,
+/// it has found those that get out of a lamp already: the guide must gain for eye walks.
+enum class GuidedWalks { Eye, Light, Both, BothWithPairs };
+
 class Guiding {
 public:
     static ParamInfo param();
@@ -16,8 +20,8 @@ public:
 
     /// Trains before pass 0 and refits before passes 1, 4, 16, 64 …, from walks of its own: light walks show eye walks
     /// where radiance comes from, and eye walks show light walks where importance does. Each round is guided by the one
-    /// before. For Integrator::trace(), before it traces anything. `has_light_walks`: whether the method has them.
-    void train(const PassContext& pass, const DepthOptions& depth, bool has_light_walks = true);
+    /// before. For Integrator::trace(), before it traces anything.
+    void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks);
     /// What guides walks until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
 
@@ -29,7 +33,7 @@ public:
 private:
     enum class Mode { Off, On, Auto, Random };
     /// Whether it gains so little that it is not worth its time.
-    bool gains_little(bool has_light_walks) const;
+    bool gains_little(GuidedWalks walks) const;
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
                                    uint64_t walks, uint64_t seed) const;
 

@@ -18,10 +18,11 @@ constexpr int kPilotRoulette = 10;
 std::vector<ParamInfo> MarkovIntegrator::params() {
     return {{"p_large", ParamKind::Float, "0.3",
              "Probability of a large step, which is an independent sample and counts as one too."},
-            {"chains", ParamKind::Int, "256", "Chains of a group, whatever the number of threads."},
+            {"chains", ParamKind::Int, "256",
+             "Number of chains in each group; it does not depend on the number of threads."},
             {"groups", ParamKind::Int, "16",
-             "Independent groups of chains, an even number: they take turns, pass by pass, and "
-             "tell the error, once each has had one."}};
+             "Number of independent groups of chains, even. The groups take turns, one per pass; "
+             "the error is estimated from their differences once each has had a pass."}};
 }
 
 MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions& depth)

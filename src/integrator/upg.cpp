@@ -76,7 +76,7 @@ public:
     }
 
     void trace(const PassContext& pass) override {
-        paths_.train(pass);
+        paths_.train(pass, GuidedWalks::BothWithPairs);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,

@@ -27,6 +27,8 @@ constexpr float kLargestRadius = 0.01f;
 /// Ratio of the radius of merges behind a diffuse or glossy eye vertex to that of other merges. The former share a
 /// random eye path, so each of them adds less information. They matter for light that no other technique finds.
 constexpr float kInnerRadius = 0.3f;
+/// Ratio of half the width of a cell of the grid to the radius. Most searches have the inner one.
+constexpr float kHalfWidth = 0.5f;
 
 class VcmIntegrator final : public Integrator {
 public:
@@ -74,7 +76,7 @@ public:
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
-        if (merges_) grid_.build(cache_, radius_);
+        if (merges_) grid_.build(cache_, radius_, is_exact_ ? radius_ : kHalfWidth * radius_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {

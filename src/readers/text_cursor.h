@@ -1,10 +1,13 @@
 #pragma once
 // Reads numbers and words from the text of a mesh file and counts its lines.
 
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string>
 #include <string_view>
+
+#include <fmt/format.h>
 
 #include "description/scene_description.h"
 
@@ -112,6 +115,10 @@ private:
                  (found.empty() ? "" : ", found \"" + std::string(found) + "\""));
         }
         at_ = stop;
+        if (at_ != end_ && (std::isalnum(static_cast<unsigned char>(*at_)) || *at_ == '.'))
+            fail(fmt::format(
+                "{} expected, found \"{}\"", what,
+                std::string_view(begin, size_t(stop - begin) + word().size()).substr(0, 40)));
     }
 
     const char *at_, *end_;

@@ -66,6 +66,8 @@ Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t s
     for (const auto& [key, value] : report.items())
         if (value.is_string())
             image.attributes["etendue." + key] = value.get<std::string>();
+        else if (value.is_number_unsigned() && value.get<uint64_t>() >> 53 != 0)
+            image.attributes["etendue." + key] = value.dump();
         else if (value.is_number())
             image.attributes["etendue." + key] = value.get<double>();
     image.attributes["etendue.version"] = std::string(ETENDUE_VERSION);

@@ -15,10 +15,10 @@ size_t triangle_index(const Technique& q) {
 
 struct TechniqueImages::Layer {
     Layer(const Technique& q, uint64_t pixels, double typical_radiance)
-        : technique(q), pass_weighted(pixels, typical_radiance),
+        : technique{q.strategy, q.s, q.t}, pass_weighted(pixels, typical_radiance),
           pass_unweighted(pixels, typical_radiance), weighted(pixels), unweighted(pixels) {}
 
-    Technique technique;
+    Technique technique;  ///< Gathers that drop either vertex share an image; drops_eye is false.
     bool is_folded = false;  ///< Whether a finished pass has contributed to it.
     SplatBuffer pass_weighted, pass_unweighted;
     std::vector<Rgb> weighted, unweighted;

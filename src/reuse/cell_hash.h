@@ -17,28 +17,27 @@ public:
     struct Cell {
         int x, y, z;
         friend bool operator==(const Cell&, const Cell&) = default;
-        /// One of the eight cells that share the upper corner of this cell, itself included.
-        Cell neighbour(int corner) const {
-            return {x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)};
-        }
     };
-    /// Has about twice as many buckets as `points`, and cells of width 2·radius, so that a ball of `radius` meets at
-    /// most eight cells.
+    /// Has about twice as many buckets as `points`, and cells of width 2·radius, so that a ball of `radius` meets eight
+    /// cells.
     CellHash(size_t points = 0, float radius = 1)
         : inv_width_(0.5f / radius),
           mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}
 
     float width() const { return 1 / inv_width_; }
     uint32_t buckets() const { return mask_ + 1; }
-    /// The lowest of the eight cells that a ball about `p` can meet.
-    Cell lowest_cell(Vec3 p) const {
+    Cell cell_of(Vec3 p) const { return cell_of_scaled(p * inv_width_); }
+    /// Calls use(cell) for each cell that a ball of `radius` about `p` may meet: x varies fastest, then y.
+    template <class Use>
+    void for_each_near(Vec3 p, float radius, const Use& use) const {
+        constexpr float kRounding = 1.00001f;
+        const float r = radius * inv_width_ * kRounding;
         const Vec3 s = p * inv_width_;
-        return {int(std::floor(s.x - 0.5f)), int(std::floor(s.y - 0.5f)),
-                int(std::floor(s.z - 0.5f))};
-    }
-    Cell cell_of(Vec3 p) const {
-        const Vec3 s = p * inv_width_;
-        return {int(std::floor(s.x)), int(std::floor(s.y)), int(std::floor(s.z))};
+        const Cell low = cell_of_scaled(s - Vec3{r, r, r}),
+                   high = cell_of_scaled(s + Vec3{r, r, r});
+        for (int z = low.z; z <= high.z; ++z)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int x = low.x; x <= high.x; ++x) use(Cell{x, y, z});
     }
     uint32_t bucket_of(const Cell& c) const {
         const uint64_t key = uint64_t(uint32_t(c.x)) * 0x9e3779b97f4a7c15ull ^
@@ -48,6 +47,10 @@ public:
     }
 
 private:
+    static Cell cell_of_scaled(Vec3 s) {
+        return {int(std::floor(s.x)), int(std::floor(s.y)), int(std::floor(s.z))};
+    }
+
     float inv_width_;
     uint32_t mask_;
 };

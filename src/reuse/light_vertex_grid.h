@@ -27,15 +27,17 @@ public:
     /// two numbers each and a level of PairDensity.
     static constexpr uint64_t kVertexBytes = 2 * sizeof(PointGrid::Entry) + 10 * sizeof(uint32_t);
 
-    /// The cache must outlive the grid, and not change before the next build().
-    void build(const LightVertexCache& cache, float radius);
+    /// For searches of `radius`; where most of them are smaller, `half_width` of the cells should be as well. The cache
+    /// must outlive the grid, and not change before the next build().
+    void build(const LightVertexCache& cache, float radius, float half_width);
+    void build(const LightVertexCache& cache, float radius) { build(cache, radius, radius); }
 
     float radius() const { return radius_; }
     /// Mean of GatherCandidate::flux.
     float mean_flux() const { return mean_flux_; }
     const PointGrid& points() const { return grid_; }
 
-    /// Calls use(candidate, choice) for the light vertices within `radius` of `p`, at most that of build(), for which
+    /// Calls use(candidate, choice) for the light vertices within `radius` of `p` for which
     /// `choose(candidate) -> std::optional<Choice>` returns a choice.
     template <class Choose, class Use>
     void for_each_near(Vec3 p, float radius, const Choose& choose, const Use& use) const {

@@ -39,14 +39,13 @@ CellCounts PointGrid::counts() const {
     return c;
 }
 
-size_t PointGrid::candidates(Vec3 p) const {
+size_t PointGrid::candidates(Vec3 p, float radius) const {
     if (entries_.empty()) return 0;
-    const CellHash::Cell lowest = cells_.lowest_cell(p);
     size_t count = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-        const uint32_t bucket = cells_.bucket_of(lowest.neighbour(corner));
+    cells_.for_each_near(p, radius, [&](const CellHash::Cell& cell) {
+        const uint32_t bucket = cells_.bucket_of(cell);
         count += begins_[bucket + 1] - begins_[bucket];
-    }
+    });
     return count;
 }
 

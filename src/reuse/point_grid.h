@@ -34,40 +34,47 @@ public:
         float weight = 0;
     };
 
-    /// For queries of up to `radius`. The order of the entries determines that of the results.
+    /// Cells have the width 2·radius, so that a query of this radius looks into eight of them. The order of the entries
+    /// determines that of the results.
     void build(std::span<const Entry> entries, float radius);
     const CellHash& cells() const { return cells_; }
     CellCounts counts() const;
     bool is_empty() const { return entries_.empty(); }
 
-    /// Calls use(entry) for every point nearer to `p` than `radius`, at most that of build().
+    /// Calls use(entry) for every point nearer to `p` than `radius`.
     template <class Use>
     void for_each_near(Vec3 p, float radius, const Use& use) const {
         if (entries_.empty()) return;
-        const CellHash::Cell lowest = cells_.lowest_cell(p);
         const float radius2 = radius * radius;
-        // All eight buckets are looked up together, because memory latency dominates the time.
-        CellHash::Cell cells[8];
-        uint32_t begin[8], end[8];
-        for (int corner = 0; corner < 8; ++corner) {
-            cells[corner] = lowest.neighbour(corner);
-            begin[corner] = cells_.bucket_of(cells[corner]);
-            __builtin_prefetch(&begins_[begin[corner]]);
-        }
-        for (int corner = 0; corner < 8; ++corner) {
-            const uint32_t bucket = begin[corner];
-            begin[corner] = begins_[bucket], end[corner] = begins_[bucket + 1];
-            if (begin[corner] < end[corner]) __builtin_prefetch(&entries_[begin[corner]]);
-        }
-        for (int corner = 0; corner < 8; ++corner)
-            for (uint32_t i = begin[corner]; i < end[corner]; ++i) {
-                const Entry& e = entries_[i];
-                // Other cells may share the bucket.
-                if (length2(e.p - p) < radius2 && cells_.cell_of(e.p) == cells[corner]) use(e);
+        // Several buckets are looked up together, because memory latency dominates the time.
+        constexpr int kBatch = 8;
+        CellHash::Cell cells[kBatch];
+        uint32_t begin[kBatch], end[kBatch];
+        int count = 0;
+        const auto test_batch = [&] {
+            for (int i = 0; i < count; ++i) {
+                const uint32_t bucket = begin[i];
+                begin[i] = begins_[bucket], end[i] = begins_[bucket + 1];
+                if (begin[i] < end[i]) __builtin_prefetch(&entries_[begin[i]]);
             }
+            for (int i = 0; i < count; ++i)
+                for (uint32_t k = begin[i]; k < end[i]; ++k) {
+                    const Entry& e = entries_[k];
+                    // Other cells may share the bucket.
+                    if (length2(e.p - p) < radius2 && cells_.cell_of(e.p) == cells[i]) use(e);
+                }
+            count = 0;
+        };
+        cells_.for_each_near(p, radius, [&](const CellHash::Cell& cell) {
+            cells[count] = cell;
+            begin[count] = cells_.bucket_of(cell);
+            __builtin_prefetch(&begins_[begin[count]]);
+            if (++count == kBatch) test_batch();
+        });
+        test_batch();
     }
     /// Number of entries that for_each_near() tests.
-    size_t candidates(Vec3 p) const;
+    size_t candidates(Vec3 p, float radius) const;
     size_t memory_bytes() const {
         return entries_.capacity() * sizeof(Entry) + begins_.capacity() * sizeof(uint32_t);
     }

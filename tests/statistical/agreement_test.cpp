@@ -165,6 +165,32 @@ protected:
 };
 class LongAgreement : public Agreement {};
 
+/// Every method with a guide, of `passes` times `factor` passes: a guide that has learned, and one that knows nothing
+/// and is sure of it.
+class GuidedAgreement : public Agreement {
+protected:
+    void expect_guided_agreement(uint64_t factor) {
+        const AgreementCase& c = GetParam();
+        const Scene scene = build(c.xml);
+        const double resolution = c.resolution / std::sqrt(double(factor));
+        const TileOptions plan{factor * c.passes, 4, 2};
+        const Tiles path = render_tiles(scene, "path", {2 * factor * c.passes, 4, 1});
+        for (const std::string guide : {"guide=on", "guide=random"}) {
+            for (const std::string method :
+                 {"path:", "bdpt:", "upg+bdpt:radius=0.12,", "pcbpt:record_fraction=0.02,"}) {
+                // Alone, eye paths that a bad guide misleads would need too many samples.
+                if (method == "path:" && guide == "guide=random") continue;
+                expect_same_image(render_tiles(scene, method + guide, plan), path,
+                                  (method == "path:" ? 3 : 2) * resolution, method + guide);
+            }
+            if (c.light)
+                expect_same_image(render_tiles(scene, "light:" + guide, plan), path, 4 * resolution,
+                                  "light:" + guide);
+        }
+    }
+};
+class LongGuidedAgreement : public GuidedAgreement {};
+
 /// All parameters of gathers give unbiased methods.
 TEST(GatherChoices, AgreeWithPathTracing) {
     const Scene scene = build(mixed_room(front_camera(kSize)));
@@ -184,11 +210,29 @@ TEST_P(LongAgreement, WithPathTracing) {
     expect_agreement(16, 16);
 }
 
+TEST_P(GuidedAgreement, WithPathTracing) {
+    expect_guided_agreement(1);
+}
+TEST_P(LongGuidedAgreement, WithPathTracing) {
+    expect_guided_agreement(16);
+}
+
+/// Of the cases, those with these names.
+std::vector<AgreementCase> cases(std::initializer_list<std::string_view> names) {
+    std::vector<AgreementCase> chosen;
+    for (const AgreementCase& c : cases())
+        if (std::find(names.begin(), names.end(), c.name) != names.end()) chosen.push_back(c);
+    return chosen;
+}
+
 const auto kName = [](const ::testing::TestParamInfo<AgreementCase>& p) {
     return std::string(p.param.name);
 };
 INSTANTIATE_TEST_SUITE_P(Quick, Agreement, ::testing::ValuesIn(cases()), kName);
 INSTANTIATE_TEST_SUITE_P(Long, LongAgreement, ::testing::ValuesIn(cases()), kName);
+INSTANTIATE_TEST_SUITE_P(Quick, GuidedAgreement,
+                         ::testing::ValuesIn(cases({"rough", "several", "gloss"})), kName);
+INSTANTIATE_TEST_SUITE_P(Long, LongGuidedAgreement, ::testing::ValuesIn(cases()), kName);
 
 }  // namespace
 }  // namespace etendue::test

@@ -1,6 +1,7 @@
 #include "emitter/environment.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -29,6 +30,22 @@ TEST(Environment, EverySampleHasADensity) {
         }
         EXPECT_GT(sampled, kSamples / 4) << height;
     }
+}
+
+/// Rows of cells at the poles have half the height of the others.
+TEST(Environment, AWhiteImageIsSampledUniformly) {
+    constexpr int kSamples = 40000;
+    const auto environment = make_environment(4, 2, std::vector<Rgb>(8, Rgb(1)), Transform());
+    testing::Random random(2);
+    int at_poles = 0;
+    for (int i = 0; i < kSamples; ++i) {
+        DirectSample d;
+        // False at a pole, where the density in solid angle has no finite value.
+        at_poles += !environment->sample_direct({}, {random.next_1d(), random.next_1d()}, d) ||
+                    std::abs(d.wi.y) > std::sqrt(0.5);
+    }
+    const double expected = 1 - std::sqrt(0.5);  // solid angle of the two rows / 4π
+    EXPECT_NEAR(double(at_poles) / kSamples, expected, 4 * std::sqrt(expected / kSamples));
 }
 
 }  // namespace

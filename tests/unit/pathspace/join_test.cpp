@@ -101,7 +101,7 @@ protected:
             }
         }
         if (extra() == Extra::Guided || extra() == Extra::GuidedMerges) {
-            // Narrow lobes would enlarge the difference of directions that Tally describes.
+            // The density of a lobe changes by κ dθ, which enlarges the difference of directions that Tally describes.
             constexpr float kKappa = 10;
             std::vector<double> pmf;
             for (const auto& e : scene.emitters()) pmf.push_back(double(e->selection_pmf));
@@ -136,7 +136,7 @@ protected:
         const double p = value.pdfs.density(join.technique);
         ASSERT_GT(p, 0);
         p_sampled *= eye_jacobian(x, delta, s + 1);
-        Tally& tally = tally_of(join.technique.strategy, delta);
+        Tally& tally = tally_of(join.technique.strategy, x, delta);
         tally.add(p_sampled / p, 1);
         for (int c = 0; c < 3; ++c)
             if (value.f[c] > 0) tally.add(join.contribution[c] * p / value.f[c], 1);
@@ -204,7 +204,7 @@ protected:
         const double p = density_of(y, drops_eye ? s : s - 1) *
                          density_of(z, drops_eye ? t - 1 : t) *
                          eye_jacobian(x, delta, drops_eye ? s : s - 1);
-        Tally& tally = tally_of(Strategy::Gather, delta);
+        Tally& tally = tally_of(Strategy::Gather, x, delta);
         for (int c = 0; c < 3; ++c)
             if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);
         tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
@@ -246,7 +246,7 @@ protected:
         const float disc = b.sees_lens ? counts.pairs.disc : counts.pairs.inner_disc;
         const double p =
             density_of(merged, s) * density_of(z, t) * double(disc) * eye_jacobian(x, delta, s);
-        Tally& tally = tally_of(Strategy::Merge, delta);
+        Tally& tally = tally_of(Strategy::Merge, x, delta);
         for (int c = 0; c < 3; ++c)
             if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);
         tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
@@ -255,8 +255,7 @@ protected:
         EXPECT_EQ(alone->contribution.g, j->contribution.g);
     }
 
-    /// Rays start a little off their surface, so on short edges the walk's directions differ from those between the
-    /// stored points: a few comparisons deviate by more than rounding. A wrong factor makes all of its strategy
+    /// A few comparisons deviate by more than rounding, see error_of_offsets(); a wrong factor makes all of its strategy
     /// deviate.
     struct Tally {
         int compared = 0, deviating = 0;
@@ -265,11 +264,31 @@ protected:
             deviating += !(std::fabs(fast - slow) < 2e-3);
         }
     };
+    static constexpr double kTolerance = 0.02;
 
-    /// A random guide leads more walks along the walls, where edges are short.
-    double tolerance() const { return counts.guide ? 0.06 : 0.03; }
+    /// Rays start a little off their surface, so the walk's directions differ from those between the stored points, by
+    /// dθ = offset/d along an edge of length d. This is a bound of the relative change dθ/cos θ of the cosines. Paths where
+    /// it is large are not compared. They are more frequent with a random guide, since its directions are less often
+    /// along the normal: without this limit, up to 5.1 % of all comparisons deviate with a guide, and 1.2 % without; with
+    /// a limit of 10⁻⁴ 0.2 % do.
+    double error_of_offsets(const std::vector<const Vertex*>& x) const {
+        double sum = 0;
+        for (size_t i = 0; i + 1 < x.size(); ++i) {
+            const Vertex &a = *x[i], &b = *x[i + 1];
+            if (a.is_infinite || b.is_infinite) continue;
+            const Vec3 w = direction(a, b);
+            const float offset = length(scene.offset_origin(a.p, a.ng, w) - a.p);
+            for (const Vertex* v : {&a, &b})
+                if (v->kind == Vertex::Kind::Surface)
+                    sum += double(offset / (length(b.p - a.p) * abs_dot(v->ng, w)));
+        }
+        return sum;
+    }
 
-    Tally& tally_of(Strategy strategy, const std::vector<bool>& delta) {
+    Tally& tally_of(Strategy strategy, const std::vector<const Vertex*>& x,
+                    const std::vector<bool>& delta) {
+        constexpr double kMostError = 3e-4;
+        if (error_of_offsets(x) > kMostError) return unclear;
         const bool has_delta = std::count(delta.begin(), delta.end(), true) > 0;
         return has_delta ? delta_tallies[strategy] : tallies[strategy];
     }
@@ -290,6 +309,7 @@ protected:
     RenderStats stats;
     std::map<Strategy, Tally> tallies,
         delta_tallies;  ///< Of paths without delta events, and with some.
+    Tally unclear;      ///< Of those where offsets of rays change the densities much.
     int checked = 0;
 };
 
@@ -334,13 +354,13 @@ TEST_P(Joins, EqualTheDefinition) {
     EXPECT_GE(tallies.size(), 3u);
     EXPECT_EQ(tallies.count(Strategy::Merge) > 0, counts.merge > 0);
     for (const auto& [strategy, tally] : tallies)
-        EXPECT_LT(tally.deviating, tolerance() * tally.compared)
+        EXPECT_LT(tally.deviating, kTolerance * tally.compared)
             << "strategy " << int(strategy) << ", " << tally.compared << " comparisons";
     if (std::get<Case>(GetParam()).has_delta) {
         EXPECT_GE(delta_tallies.size(), 3u);
     }
     for (const auto& [strategy, tally] : delta_tallies)
-        EXPECT_LT(tally.deviating, tolerance() * tally.compared)
+        EXPECT_LT(tally.deviating, kTolerance * tally.compared)
             << "with delta events: strategy " << int(strategy) << ", " << tally.compared
             << " comparisons";
 }

@@ -27,7 +27,7 @@ TEST(PointGrid, AgreesWithALoop) {
         const auto entries = points(count, 1);
         grid.build(entries, kRadius);
         size_t found_in_all = 0;
-        for (float radius : {kRadius, 0.5f * kRadius})
+        for (float radius : {kRadius, 0.3f * kRadius, 2 * kRadius})
             for (const auto& query : points(300, 2)) {
                 std::vector<uint32_t> found, expected;
                 grid.for_each_near(query.p, radius,
@@ -36,7 +36,7 @@ TEST(PointGrid, AgreesWithALoop) {
                     if (length2(e.p - query.p) < radius * radius) expected.push_back(e.index);
                 std::sort(found.begin(), found.end());
                 EXPECT_EQ(found, expected);
-                EXPECT_GE(grid.candidates(query.p), found.size());
+                EXPECT_GE(grid.candidates(query.p, radius), found.size());
                 found_in_all += found.size();
             }
         EXPECT_EQ(found_in_all > 500, count == 5000);
@@ -48,7 +48,7 @@ TEST(PointGrid, TestsFewDistantPoints) {
     grid.build(points(20000, 1), kRadius);
     double candidates = 0, found = 0;
     for (const auto& query : points(2000, 2)) {
-        candidates += double(grid.candidates(query.p));
+        candidates += double(grid.candidates(query.p, kRadius));
         grid.for_each_near(query.p, kRadius, [&](const PointGrid::Entry&) { ++found; });
     }
     // Eight cells have 15.3 times the volume of the ball; other cells share their buckets.
