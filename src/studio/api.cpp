@@ -344,6 +344,8 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
             if (!is_get) throw ApiError(405, "only GET is possible here");
             return done({200, std::string(file.type), std::string(file.text), {}});
         }
+    // Browsers ask for it unbidden, and complain where it is missing.
+    if (path == "/favicon.ico") return done({204, {}, {}, {}});
     const auto needs = [&](bool holds) {
         if (!holds) throw ApiError(405, "this method is not possible here");
     };
@@ -571,7 +573,7 @@ Reply Api::pixel(const Request& request) {
               w = query_integer(request, "w", 1), h = query_integer(request, "h", 1),
               id = query_integer(request, "run", 0);
     const auto snapshot = session_.snapshot(id);
-    if (!snapshot) throw ApiError(404, "no pass is finished yet");
+    if (!snapshot) return Reply::json(dump({{"run", id}, {"passes", 0}}));
     check(ImageHeader{.run = 0,
                       .passes = 0,
                       .width = snapshot->width,

@@ -138,7 +138,8 @@ async function imagePart() {
         await key(browser, 'ArrowDown', 1, 8);
         const moved = await browser.evaluate('studio.view.cursor');
         check(moved[0] === cursor[0] + 3 && moved[1] === cursor[1] + 10, `arrows move the cursor: ${moved}`);
-        await browser.until("document.querySelector('#pixel table')?.textContent.includes('±')", 'a pixel with its interval');
+        await browser.until(`document.querySelector('#pixel').textContent.includes('(${moved[0]}, ${moved[1]})') && document.querySelector('#pixel table')?.textContent.includes('±')`,
+            'a pixel with its interval');
         const text = await browser.evaluate("document.querySelector('#pixel').textContent");
         check(text.includes(`(${moved[0]}, ${moved[1]})`) && text.includes('sobol'), `pixel values: ${text.slice(0, 80)}`);
         const value = await browser.evaluate(`studio.server.get('/v1/pixel?run=1&x=${moved[0]}&y=${moved[1]}')`);

@@ -31,6 +31,11 @@ let editor = null;
 /** @type {Inspector | null} */
 let inspector = null;
 let pane = 'image';
+/**
+ * Controls of the image.
+ * @type {Record<string, any>}
+ */
+const tools = {};
 
 // ---------------------------------------------------------------------------------------- messages
 
@@ -61,7 +66,7 @@ function report(promise) {
 
 // ---------------------------------------------------------------------------------------- image
 
-const view = new View(at('view'), {pixel: (x, y) => showPixel(x, y)});
+const view = new View(at('view'), {pixel: (x, y) => showPixel(x, y), wipe: w => { tools.wipe.value = w; }});
 if (!view.hasGraphics) banner('graphics', 'This browser has no WebGL2: only numbers are shown.');
 
 const kLabels = {image: '', error: 'relative standard error', first: 'first picture: albedo × cosine, no light yet'};
@@ -103,10 +108,16 @@ async function refresh(place) {
     }
 }
 
+/**
+ * The text of an option of the choice of views.
+ * @param {string} view
+ */
+const optionText = view => [...tools.view.options].find((/** @type {any} */ o) => o.value === view)?.textContent ?? view;
+
 function label() {
     const [a, b] = shown;
     const text = (/** @type {Shown} */ s) => s.view === 'reference' ? 'reference'
-        : [s.run > 0 ? `run ${s.run}` : '', /** @type {any} */ (kLabels)[s.view] ?? s.view, s.run > 0 && s.passes > 0 ? `${s.passes} spp` : ''].filter(Boolean).join(', ');
+        : [s.run > 0 ? `run ${s.run}` : '', /** @type {any} */ (kLabels)[s.view] ?? optionText(s.view), s.run > 0 && s.passes > 0 ? `${s.passes} spp` : ''].filter(Boolean).join(', ');
     const first = a.passes === 0 && view.pictures[0] ? kLabels.first : text(a);
     at('label').textContent = b ? `${view.isFlipped ? 'right | left' : 'left | right'}: ${first} | ${text(b)}` : first;
 }
@@ -129,7 +140,7 @@ async function showPixel(x, y) {
     const describePixel = async (/** @type {Shown | null} */ s) => {
         if (!s || s.run === 0) return;
         const p = await server.get(`/v1/pixel?run=${s.run}&x=${x}&y=${y}`).catch(() => null);
-        if (!p) return;
+        if (!p?.passes) return;
         const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: 'no interval: one chain'};
         parts.push(element('div', {className: 'soft', textContent: `run ${s.run}, ${p.passes} spp, ${/** @type {any} */ (kNames)[p.interval]}`}));
         parts.push(element('table', {}, ['red', 'green', 'blue'].map((name, c) => element('tr', {}, [element('th', {textContent: name}),
@@ -142,15 +153,13 @@ async function showPixel(x, y) {
     inspector?.setPixel(x, y, shown[0].run);
 }
 
-/** @type {Record<string, any>} */
-const tools = {};
 function makeTools() {
     const number = (/** @type {any} */ properties) => element('input', {type: 'range', ...properties});
     tools.exposure = number({id: 'exposure', min: -12, max: 12, step: 0.25, value: 0, oninput: () => setExposure(Number(tools.exposure.value))});
     tools.exposureText = element('output', {textContent: '0'});
     tools.view = element('select', {id: 'view-choice', onchange: () => showIn(0, shown[0].run || newest(), tools.view.value)});
     tools.mode = element('select', {id: 'mode', onchange: () => { view.mode = Number(tools.mode.value); view.redraw(); }},
-        ['colours', 'false colours (8 stops below 1 to 2 above)', 'difference / right picture'].map((t, i) => element('option', {value: i, textContent: t})));
+        ['colours', 'false colours', 'difference'].map((t, i) => element('option', {value: i, textContent: t})));
     tools.against = element('select', {id: 'against', onchange: () => {
         const value = tools.against.value;
         if (value === 'reference') showIn(1, 0, 'reference');

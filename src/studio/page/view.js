@@ -89,7 +89,7 @@ export function fit(canvas) {
 export const clamp = (v, low, high) => Math.min(Math.max(v, low), high);
 
 export class View {
-    /** @param {HTMLCanvasElement} canvas @param {{pixel: (x: number, y: number) => void}} tell */
+    /** @param {HTMLCanvasElement} canvas @param {{pixel: (x: number, y: number) => void, wipe: (at: number) => void}} tell */
     constructor(canvas, tell) {
         this.canvas = canvas;
         this.tell = tell;
@@ -255,6 +255,7 @@ export class View {
             drag.moved = true;
             if (drag.kind === 'wipe') {
                 this.wipe = clamp(this.place(e.offsetX, e.offsetY)[0], 0, 1);
+                this.tell.wipe(this.wipe);
             } else {
                 const s = this.scale() / devicePixelRatio;
                 this.center = [clamp(this.center[0] - dx / (s * this.width), 0, 1), clamp(this.center[1] - dy / (s * this.height), 0, 1)];
