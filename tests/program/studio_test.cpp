@@ -191,7 +191,7 @@ TEST_F(StudioTest, AnswersOnlyItsOwnPage) {
         for (const char* target : {"/", "/v1/state"})
             EXPECT_EQ(ask("GET", target, {{"Host", bad}, {"Authorization", bearer()}}).status, 403)
                 << bad;
-    for (const std::string good : {"localhost", "LocalHost:1234", "127.0.0.1:99"})
+    for (const char* good : {"localhost", "LocalHost:1234", "127.0.0.1:99"})
         EXPECT_EQ(ask("GET", "/v1/state", {{"Host", good}, {"Authorization", bearer()}}).status,
                   200)
             << good;
@@ -250,7 +250,7 @@ TEST_F(StudioTest, LimitsWhatIsSent) {
         c.send("GET / HTTP/1.1\r\nX: " + std::string(9000, 'a') + "\r\n\r\n");
         EXPECT_EQ(parse(c.read_until([](const std::string&) { return false; })).status, 431);
     }
-    for (const std::string garbage :
+    for (const std::string& garbage :
          {std::string("hello\r\n\r\n"), std::string("GET / HTTP/9.9\r\n\r\n"),
           std::string("\x16\x03\x01\x02\x00\x01\x00\x01", 8) + std::string(200, '\0')}) {
         const Connection c(port);
