@@ -17,5 +17,6 @@ void add_tonemap_command(CLI::App& app);
 void add_paths_command(CLI::App& app);
 void add_list_command(CLI::App& app);
 void add_verify_command(CLI::App& app);
+void add_studio_command(CLI::App& app);
 
 }  // namespace etendue

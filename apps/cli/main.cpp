@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
     etendue::add_paths_command(app);
     etendue::add_list_command(app);
     etendue::add_verify_command(app);
+    etendue::add_studio_command(app);
     try {
         app.parse(argc, argv);
     } catch (const CLI::Success& e) {

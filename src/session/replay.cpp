@@ -1,0 +1,145 @@
+#include "session/replay.h"
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace etendue {
+namespace {
+
+/// Keeps the joins of one pixel.
+class PathRecorder final : public ContributionSink {
+public:
+    PathRecorder(const Film& film, uint64_t pixel, size_t most, const Workspace& work,
+                 Replay& result)
+        : film_(film), pixel_(pixel), most_(most), work_(work), result_(result) {}
+
+    void begin(uint32_t pass, bool is_for_splats, float splat_share) {
+        pass_ = pass;
+        is_for_splats_ = is_for_splats;
+        splat_share_ = splat_share;
+    }
+
+    void add(const Join& join, Rgb contribution) override {
+        const bool is_splat = join.technique.t <= 1;
+        if (is_splat != is_for_splats_) return;
+        float share = splat_share_;
+        if (is_splat) {
+            float h = 0;
+            for_each_pixel(film_.geometry(), film_.filter(), join.film,
+                           [&](uint64_t pixel, float value) {
+                               if (pixel == pixel_) h = value;
+                           });
+            share *= h;
+        } else {
+            share = work_.z.film_weight;
+        }
+        const Rgb value = contribution * (join.mis_weight * share);
+        if (!is_finite(value) || value.is_zero()) return;
+        if (!is_splat) result_.sum += value;
+        if (result_.paths.size() >= most_) {
+            ++result_.left_out;
+            return;
+        }
+        result_.paths.push_back({points(join), join.technique, pass_, join.mis_weight, value});
+    }
+
+private:
+    /// `is_joined`: the sub-path ends here, though its walk may have gone on by a delta event.
+    static ReplayedPath::Point point(const Vertex& v, bool is_joined) {
+        return {v.p, v.is_delta && !is_joined ? 'S' : 'D', v.is_infinite};
+    }
+
+    /// Hits have all vertices; next events and splats sample the other end, which the join's edge has.
+    std::vector<ReplayedPath::Point> points(const Join& join) const {
+        const int s = join.technique.s, t = join.technique.t;
+        std::vector<ReplayedPath::Point> list;
+        if (join.technique.strategy == Strategy::NextEvent)
+            list.push_back({join.b, 'L', join.to_infinity});
+        else
+            for (int i = 0; i < std::min(s, work_.y.size()); ++i)
+                list.push_back(point(work_.y[i], i == s - 1));
+        if (t == 1)
+            list.push_back({join.a, 'E', false});
+        else
+            for (int i = std::min(t, work_.z.size()) - 1; i >= 0; --i)
+                list.push_back(point(work_.z[i], i == t - 1));
+        if (list.empty()) return list;
+        list.front().event = 'L';
+        list.back().event = 'E';
+        return list;
+    }
+
+    const Film& film_;
+    uint64_t pixel_;
+    size_t most_;
+    const Workspace& work_;
+    Replay& result_;
+    uint32_t pass_ = 0;
+    bool is_for_splats_ = false;
+    float splat_share_ = 0;
+};
+
+bool has_value(const IntegratorSpec& spec, const char* name, const char* value) {
+    const auto at = spec.params.find(name);
+    return at != spec.params.end() && at->second == value;
+}
+
+}  // namespace
+
+std::string replay_problem(const IntegratorSpec& spec) {
+    if (spec.name != "path" && spec.name != "bdpt" && spec.name != "light")
+        return fmt::format("paths of path, bdpt and light can be traced again; those of {} share "
+                           "data between pixels",
+                           spec.name);
+    if (const auto guide = spec.params.find("guide");
+        guide != spec.params.end() && guide->second != "off")
+        return "guided paths depend on what earlier passes learned, and cannot be traced again";
+    if (has_value(spec, "connections", "cache"))
+        return "connections to the cache share light paths between pixels";
+    return {};
+}
+
+Replay replay(const Scene& scene, const ReplayRequest& request) {
+    if (const std::string problem = replay_problem(request.integrator); !problem.empty())
+        throw std::runtime_error(problem);
+    IntegratorSpec spec = request.integrator;
+    if (spec.name == "bdpt") spec.params["roulette"] = "0";
+    const std::unique_ptr<Integrator> integrator = make_integrator(spec);
+    const uint64_t light_paths = integrator->light_paths(scene);
+    const float splat_scale = light_paths > 0 ? float(1 / double(light_paths)) : 0.0f;
+    Film film(scene.film(), scene.filter());
+    // Integrators read it, though nothing is added to it. As in a first pass, it knows of no earlier ones.
+    film.begin_pass(light_paths);
+    Workspace work;
+    work.is_observed = true;
+    Replay result;
+    PathRecorder recorder(film, request.pixel, request.most_paths, work, result);
+    Sampler sampler(request.sampler, request.seed);
+    const auto begin = std::chrono::steady_clock::now();
+    const auto has_time = [&] {
+        const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+        return elapsed.count() < request.seconds;
+    };
+    const auto trace = [&](uint32_t pass, uint64_t pixel, bool is_for_splats) {
+        recorder.begin(pass, is_for_splats, splat_scale);
+        sampler.start(pass, pixel);
+        // Chunks matter only to integrators that share light paths.
+        integrator->sample({scene, film, pixel, 0, light_paths, splat_scale, sampler, recorder},
+                           work);
+    };
+    for (uint32_t i = 0; i < request.passes && has_time(); ++i, ++result.passes)
+        trace(request.first_pass + i, request.pixel, false);
+    if (request.splats)
+        for (uint64_t i = 0; i < light_paths && has_time(); ++i, ++result.light_paths)
+            trace(request.first_pass, i, true);
+    std::sort(result.paths.begin(), result.paths.end(),
+              [](const ReplayedPath& a, const ReplayedPath& b) {
+                  return luminance(a.value) > luminance(b.value);
+              });
+    return result;
+}
+
+}  // namespace etendue

@@ -1,0 +1,159 @@
+#pragma once
+// An interactive session: a thread that loads a scene and renders runs, one per method. Other threads start and stop runs,
+// and read snapshots. The images are those of `etendue render`, bit by bit, however often a run is stopped or shown.
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "render/render_report.h"
+#include "render/renderer.h"
+#include "session/snapshot.h"
+
+namespace etendue {
+
+struct RunRequest {
+    std::string integrator;  ///< As text; empty for the scene's.
+    std::string user_paths;  ///< File of the parameter of this name, where it is not empty.
+    SamplerKind sampler = SamplerKind::Sobol;
+    uint64_t seed = 0;
+    RenderLimits limits;      ///< Without any, the run ends when it is stopped.
+    int technique_depth = 0;  ///< Reduced until the technique images fit into kTechniqueBytes.
+};
+
+enum class RunState { Rendering, Stopped, Finished, Failed };
+const char* to_string(RunState state);
+
+/// What the spread of a run's passes says about a pixel.
+enum class IntervalKind {
+    Confidence,  ///< 95 % confidence interval.
+    Upper,       ///< Passes of a Sobol' sampler spread more than their mean errs.
+    NoiseOnly,   ///< Without the bias of a consistent or biased method.
+    None,        ///< Passes belong to Markov chains.
+};
+const char* to_string(IntervalKind kind);
+
+struct ConvergencePoint {
+    uint64_t passes;
+    double seconds;
+    ErrorEstimate error;
+};
+
+struct RunStatus {
+    int id = 0;
+    std::string integrator;
+    SamplerKind sampler = SamplerKind::Sobol;
+    uint64_t seed = 0;
+    RenderLimits limits;
+    int technique_depth = 0;
+    RunState state = RunState::Rendering;
+    std::string message;  ///< Why the run failed.
+    uint64_t passes = 0, snapshot_passes = 0;
+    double seconds = 0, rays_per_second = 0;
+    std::optional<double> fraction;
+    ErrorEstimate error;
+    Estimator estimator = Estimator::Unbiased;
+    IntervalKind interval = IntervalKind::Confidence;
+    std::vector<std::pair<std::string, double>> figures;
+    std::vector<ConvergencePoint> history;  ///< Points that are about equally spaced in log time.
+    bool is_of_this_scene = true;           ///< False once the scene was loaded again.
+};
+
+/// The technique images of a run after a number of passes.
+struct TechniqueSnapshot {
+    uint64_t passes;
+    std::vector<TechniqueImages::Entry> images;
+};
+
+class Session {
+public:
+    using Load = std::function<Scene()>;
+    static constexpr size_t kTechniqueBytes = size_t(512) << 20;
+
+    /// Loads the scene in the session's thread. `threads`: of each rendering; 0: one per core.
+    Session(Load load, int threads);
+    ~Session();  ///< Discards the current pass.
+    Session(const Session&) = delete;
+    Session& operator=(const Session&) = delete;
+
+    // -- From any thread.
+
+    /// nullptr while the first scene is loaded, or if that failed.
+    std::shared_ptr<const Scene> scene() const { return scene_.load(); }
+    /// Why the scene could not be loaded; empty while it is loading or where it was loaded.
+    std::string load_error() const;
+    /// Loads the scene again. Runs of the old one are stopped; they keep their scene.
+    void reload();
+
+    /// Returns the run's id. Throws std::runtime_error with the integrator's own message.
+    int start(const RunRequest& request);
+    /// Finishes the current pass, then stops.
+    void stop(int run);
+    /// Discards the current pass, and stops.
+    void discard(int run);
+    /// Continues a run that was stopped or has finished, to `limits` if any are given.
+    void resume(int run, const RenderLimits& limits);
+    /// Forgets the run and its image.
+    void remove(int run);
+    /// Writes the image between two passes; then calls `done`, in the session's thread, with an error or an empty text.
+    void save(int run, const std::string& file, std::function<void(std::string)> done);
+    /// Stops all runs; with `drop`, discards the current pass.
+    void stop_all(bool drop);
+    /// Waits until the current pass is over and all that was asked for so far is done.
+    void settle();
+
+    /// Throws std::runtime_error for an unknown run, as do all functions that take one.
+    RunStatus status(int run) const;
+    std::vector<RunStatus> runs() const;
+    /// Changes whenever any status does.
+    uint64_t revision() const { return revision_.load(); }
+
+    /// The latest snapshot, or nullptr; asks for a newer one.
+    std::shared_ptr<const Snapshot> snapshot(int run);
+    std::shared_ptr<const TechniqueSnapshot> techniques(int run);
+    /// Counts processor time that was spent on a snapshot outside the session.
+    void spent(double cpu_seconds);
+
+private:
+    struct Run;
+    void work();
+    void load_scene();
+    void post(std::function<void()> command);
+    void execute_commands();
+    std::shared_ptr<Run> find(int run) const;
+    std::shared_ptr<Run> next_run() const;
+    void take_turn(Run& run);
+    void after_pass(Run& run, const Progress& progress);
+    /// Publishes a snapshot. This is done at the first pass after it was asked for that the budget allows.
+    void show(Run& run);
+    void finish_turn(Run& run, RunState state, const std::string& message = {});
+    void changed() { ++revision_; }
+
+    const Load load_;
+    const int threads_;
+    std::atomic<std::shared_ptr<const Scene>> scene_;
+    std::atomic<uint64_t> revision_{1};
+
+    mutable std::mutex mutex_;  ///< Guards all below, and the status of runs.
+    std::condition_variable wake_;
+    std::string load_error_;
+    std::deque<std::function<void()>> commands_;
+    std::vector<std::shared_ptr<Run>> runs_;
+    SnapshotBudget budget_;
+    int last_id_ = 0;
+    bool is_ended_ = false;
+
+    std::atomic<bool> turn_over_{false};  ///< The current turn ends after its pass.
+    std::atomic<bool> drop_{false};       ///< The current pass is to be discarded.
+    int turn_of_ = 0;                     ///< Id of the run whose turn it is; 0: none.
+    uint64_t turns_ = 0;
+    std::thread thread_;
+};
+
+}  // namespace etendue

@@ -1,0 +1,65 @@
+#pragma once
+// Copies of a film between passes, for readers in other threads, and the budget of time that they may take.
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "film/film.h"
+
+namespace etendue {
+
+/// The image of a run after a number of passes.
+struct Snapshot {
+    int run = 0;
+    uint64_t passes = 0;
+    int width = 0, height = 0;
+    std::vector<Rgb> mean;
+    std::vector<Rgb> variance;  ///< Of the mean; zero with fewer than two passes.
+};
+
+/// Half-width of the 95 % confidence interval of a mean of `passes` ≥ 2 passes, whose variance was estimated from their
+/// spread.
+double interval_half_width(double variance, uint64_t passes);
+
+/// Reuses the memory of snapshots that no reader holds any more: fresh pages cost more than the copy.
+class SnapshotPool {
+public:
+    /// A snapshot with undefined contents, which returns to the pool when its last owner releases it.
+    std::shared_ptr<Snapshot> take();
+
+private:
+    struct Shelf {
+        std::mutex mutex;
+        std::vector<std::unique_ptr<Snapshot>> free;
+    };
+    std::shared_ptr<Shelf> shelf_ = std::make_shared<Shelf>();
+};
+
+/// Copies the film's mean and variance. `has_groups`: see Film::set_groups(). Must not run during Film::end_pass().
+void fill_snapshot(const Film& film, bool has_groups, Snapshot& to);
+
+/// Keeps the processor time of snapshots, and of sending them, at or below 2 % of the time of a rendering.
+class SnapshotBudget {
+public:
+    using Clock = std::chrono::steady_clock;
+    static constexpr double kShare = 0.02;
+
+    bool allows(Clock::time_point now) const { return now >= next_; }
+    /// Notes that a snapshot was finished at `now` and took `cpu_seconds`.
+    void taken(Clock::time_point now, double cpu_seconds) {
+        next_ = now;
+        spent(cpu_seconds);
+    }
+    /// Adds processor time, such as that of encoding and sending.
+    void spent(double cpu_seconds) {
+        next_ += std::chrono::duration_cast<Clock::duration>(
+            std::chrono::duration<double>(cpu_seconds / kShare));
+    }
+
+private:
+    Clock::time_point next_{};
+};
+
+}  // namespace etendue

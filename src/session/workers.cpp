@@ -1,0 +1,44 @@
+#include "session/workers.h"
+
+#include <utility>
+
+namespace etendue {
+
+Workers::Workers() {
+    for (size_t i = 0; i < kThreads; ++i) threads_.emplace_back([this] { work(); });
+}
+
+Workers::~Workers() {
+    {
+        const std::lock_guard lock(mutex_);
+        is_ended_ = true;
+    }
+    wake_.notify_all();
+    for (std::thread& t : threads_) t.join();
+}
+
+bool Workers::post(std::function<void()> task) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (tasks_.size() >= kMostWaiting) return false;
+        tasks_.push_back(std::move(task));
+    }
+    wake_.notify_one();
+    return true;
+}
+
+void Workers::work() {
+    while (true) {
+        std::function<void()> task;
+        {
+            std::unique_lock lock(mutex_);
+            wake_.wait(lock, [&] { return is_ended_ || !tasks_.empty(); });
+            if (is_ended_) return;
+            task = std::move(tasks_.front());
+            tasks_.pop_front();
+        }
+        task();
+    }
+}
+
+}  // namespace etendue

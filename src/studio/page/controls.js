@@ -1,0 +1,149 @@
+// @ts-check
+// The list of runs, and the form for a new one, made from the tables of the program.
+
+/**
+ * An element with properties, attributes and children.
+ * @param {string} name @param {Record<string, any>} [properties] @param {any} [children] @returns {any}
+ */
+export function element(name, properties = {}, children = []) {
+    const e = document.createElement(name);
+    for (const [key, value] of Object.entries(properties)) {
+        if (key in e) /** @type {any} */ (e)[key] = value;
+        else e.setAttribute(key, value);
+    }
+    e.append(...[children].flat().filter(c => c !== null));
+    return e;
+}
+
+/** @param {number | null | undefined} v */
+export function significant(v, digits = 3) {
+    if (v === null || v === undefined || !Number.isFinite(v)) return '–';
+    if (v === 0) return '0';
+    const a = Math.abs(v);
+    return a >= 1e6 || a < 1e-4 ? v.toExponential(digits - 1) : Number(v.toPrecision(digits)).toString();
+}
+
+/** @param {number} s */
+const time = s => s < 100 ? `${s.toFixed(1)} s` : `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')} min`;
+
+const kSymbols = {rendering: '▶', stopped: '⏸', finished: '✓', failed: '✗'};
+
+/** @param {any} run */
+export function describe(run) {
+    const error = run.error ? `, relative error ${significant(run.error[0])} (${significant(run.error[1])} to ${significant(run.error[2])})` : '';
+    return `${run.passes} spp, ${time(run.seconds)}, ${significant(run.rays / 1e6)} Mrays/s${error}`;
+}
+
+export class RunList {
+    /**
+     * @param {HTMLElement} parent
+     * @param {{act: (action: string, run: any) => void, shown: () => number, show: (run: any) => void}} tell
+     */
+    constructor(parent, tell) {
+        this.parent = parent;
+        this.tell = tell;
+        /** @type {Map<number, any>} */
+        this.rows = new Map();
+    }
+
+    /** @param {any} run */
+    makeRow(run) {
+        const figures = element('div', {className: 'figures'}), state = element('span');
+        const button = (/** @type {string} */ text, /** @type {string} */ action) => element('button', {type: 'button',
+            textContent: text, 'aria-label': `${text} run ${run.id}`, onclick: () => this.tell.act(action, run.id)});
+        const toggle = element('button', {type: 'button'}), discard = button('Discard pass', 'discard');
+        const box = element('div', {className: 'run'}, [
+            element('div', {className: 'name'}, [state, ` ${run.id}: ${run.integrator}`]), figures,
+            element('div', {className: 'bar'}, [
+                element('button', {type: 'button', textContent: 'Show', 'aria-label': `Show run ${run.id}`, onclick: () => this.tell.show(run.id)}),
+                toggle, discard, button('Save', 'save'), button('Remove', 'remove')])]);
+        this.parent.append(box);
+        return {box, figures, state, toggle, discard};
+    }
+
+    /** @param {any[]} runs */
+    update(runs) {
+        for (const [id, row] of this.rows)
+            if (!runs.some(r => r.id === id)) { row.box.remove(); this.rows.delete(id); }
+        for (const run of runs) {
+            let row = this.rows.get(run.id);
+            if (!row) this.rows.set(run.id, row = this.makeRow(run));
+            const isRendering = run.state === 'rendering';
+            row.state.textContent = /** @type {any} */ (kSymbols)[run.state];
+            row.state.title = run.state;
+            const text = `${run.state}: ${describe(run)}${run.old_scene ? ' (earlier version of the scene)' : ''}${run.message ? `: ${run.message}` : ''}`;
+            if (row.figures.textContent !== text) row.figures.textContent = text;
+            row.figures.classList.toggle('error', run.state === 'failed');
+            const label = isRendering ? 'Stop' : 'Continue';
+            if (row.toggle.textContent !== label) {
+                row.toggle.textContent = label;
+                row.toggle.setAttribute('aria-label', `${label} run ${run.id}`);
+                row.toggle.onclick = () => this.tell.act(label.toLowerCase(), run.id);
+            }
+            row.discard.disabled = !isRendering;
+            row.box.classList.toggle('shown', run.id === this.tell.shown());
+        }
+    }
+}
+
+export class RunForm {
+    /**
+     * @param {HTMLElement} parent @param {any[]} integrators
+     * @param {{start: (request: any) => Promise<void>}} tell
+     */
+    constructor(parent, integrators, tell) {
+        this.integrators = integrators;
+        this.parameters = element('div', {className: 'parameters'});
+        this.doc = element('p', {className: 'soft'});
+        this.message = element('p', {className: 'error', role: 'alert'});
+        this.name = element('select', {id: 'method'}, integrators.map(i => element('option', {value: i.name, textContent: i.name})));
+        this.name.onchange = () => this.fill();
+        this.sampler = element('select', {id: 'sampler'}, ['sobol', 'independent'].map(s => element('option', {value: s, textContent: s})));
+        this.seed = element('input', {id: 'seed', type: 'number', value: '0', min: '0'});
+        this.spp = element('input', {id: 'spp', type: 'number', min: '1', placeholder: 'no limit'});
+        this.techniques = element('input', {id: 'techniques', type: 'number', value: '0', min: '0', max: '64'});
+        const experimental = element('input', {type: 'checkbox', id: 'experimental', onchange: () => this.fill()});
+        this.experimental = experimental;
+        const field = (/** @type {string} */ text, /** @type {any} */ input) => [element('label', {htmlFor: input.id, textContent: text}), input];
+        parent.append(element('details', {open: true}, [element('summary', {textContent: 'New run'}),
+            element('form', {onsubmit: (/** @type {Event} */ e) => { e.preventDefault(); this.start(tell.start); }}, [
+                element('div', {className: 'parameters'}, field('method', this.name)), this.doc, this.parameters,
+                element('label', {}, [experimental, ' experimental parameters']),
+                element('div', {className: 'parameters'}, [field('sampler', this.sampler), field('seed', this.seed),
+                    field('samples per pixel', this.spp), field('technique images, edges', this.techniques)].flat()),
+                element('button', {type: 'submit', textContent: 'Start'}), this.message])]));
+        this.fill();
+    }
+
+    /** @param {string} name */
+    choose(name) {
+        if (!this.integrators.some(i => i.name === name)) return;
+        this.name.value = name;
+        this.fill();
+    }
+
+    fill() {
+        const entry = this.integrators.find(i => i.name === this.name.value);
+        this.doc.textContent = entry.doc;
+        this.parameters.replaceChildren(...entry.parameters.filter((/** @type {any} */ p) => !p.experimental || this.experimental.checked)
+            .flatMap((/** @type {any} */ p) => {
+                const id = `parameter-${p.name}`;
+                const input = p.type === 'boolean'
+                    ? element('select', {id, name: p.name, title: p.doc}, ['', 'true', 'false'].map(v => element('option', {value: v, textContent: v || `default (${p.default})`})))
+                    : element('input', {id, name: p.name, title: p.doc, placeholder: p.default ?? '', autocomplete: 'off'});
+                return [element('label', {htmlFor: id, textContent: p.name, title: p.doc}), input];
+            }));
+    }
+
+    /** @param {(request: any) => Promise<void>} start */
+    async start(start) {
+        const given = [...this.parameters.querySelectorAll('[name]')].map(i => /** @type {HTMLInputElement} */ (i))
+            .filter(i => i.value.trim()).map(i => `${i.name}=${i.value.trim()}`);
+        /** @type {any} */
+        const request = {action: 'start', integrator: this.name.value + (given.length ? `:${given.join(',')}` : ''),
+            sampler: this.sampler.value, seed: Number(this.seed.value), techniques: Number(this.techniques.value)};
+        if (this.spp.value) request.spp = Number(this.spp.value);
+        this.message.textContent = '';
+        await start(request).catch(e => { this.message.textContent = e.message; });
+    }
+}

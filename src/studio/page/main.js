@@ -1,0 +1,387 @@
+// @ts-check
+// The page: keeps the session's state, and connects the parts.
+
+import {Server, Refusal} from './server.js';
+import {View} from './view.js';
+import {RunForm, RunList, describe, element, significant} from './controls.js';
+import {drawPlot} from './plot.js';
+import {Space} from './space.js';
+import {PathEditor} from './paths.js';
+import {Inspector} from './inspector.js';
+
+/** @param {string} id @returns {any} */
+const at = id => document.getElementById(id);
+
+const server = new Server(new URLSearchParams(location.hash.slice(1)).get('token') ?? '');
+
+/** @type {any} */
+let state = null;
+/** @type {Map<number, any>} */
+const runs = new Map();
+/**
+ * What the two places of the view show.
+ * @typedef {{run: number, view: string, passes: number, isAsked: boolean, busy: boolean}} Shown
+ */
+/** @type {[Shown, Shown | null]} */
+const shown = [{run: 0, view: 'image', passes: 0, isAsked: false, busy: false}, null];
+/** @type {Space | null} */
+let space = null;
+/** @type {PathEditor | null} */
+let editor = null;
+/** @type {Inspector | null} */
+let inspector = null;
+let pane = 'image';
+/**
+ * Controls of the image.
+ * @type {Record<string, any>}
+ */
+const tools = {};
+
+// ---------------------------------------------------------------------------------------- messages
+
+/** @type {Map<string, {text: string, action?: string, act?: () => void}>} */
+const banners = new Map();
+
+/**
+ * Shows, or with an empty text takes away, a message.
+ * @param {string} key @param {string} text @param {string} [action] @param {() => void} [act]
+ */
+function banner(key, text, action, act) {
+    if (text) banners.set(key, {text, action, act});
+    else banners.delete(key);
+    const first = [...banners.values()][0];
+    at('banner').hidden = !first;
+    if (!first) return;
+    if (at('banner-text').textContent !== first.text) at('banner-text').textContent = first.text;
+    const button = at('banner-action');
+    button.hidden = !first.action;
+    button.textContent = first.action ?? '';
+    button.onclick = first.act ?? null;
+}
+
+/** @param {Promise<any>} promise */
+function report(promise) {
+    promise.then(() => banner('failure', ''), e => banner('failure', e.message, 'Dismiss', () => banner('failure', '')));
+}
+
+// ---------------------------------------------------------------------------------------- image
+
+const view = new View(at('view'), {pixel: (x, y) => showPixel(x, y), wipe: w => { tools.wipe.value = w; }});
+if (!view.hasGraphics) banner('graphics', 'This browser has no WebGL2: only numbers are shown.');
+
+const kLabels = {image: '', error: 'relative standard error', first: 'first picture: albedo × cosine, no light yet'};
+
+/**
+ * Asks for a newer picture of one place, at most one at a time.
+ * @param {0 | 1} place
+ */
+async function refresh(place) {
+    const s = shown[place];
+    if (!s || s.busy || document.hidden || !view.hasGraphics || !state?.scene) return;
+    const isOfRun = s.run > 0 && (['image', 'error', 'variance'].includes(s.view) || s.view.includes(':'));
+    if (!isOfRun && s.passes > 0) return;
+    const run = runs.get(s.run);
+    if (isOfRun && run && s.isAsked && run.snapshot <= s.passes && !s.view.includes(':')) return;
+    s.busy = true;
+    try {
+        const query = {run: s.run, view: s.view, after: s.passes};
+        const pixels = state.scene.width * state.scene.height, kCoarse = 1e6;
+        // Coarse first.
+        let picture = s.passes === 0 && pixels > kCoarse ? await server.image({...query, level: 2}) : null;
+        if (picture && shown[place] === s) view.show(place, picture);
+        picture = await server.image(query) ?? picture;
+        if (shown[place] !== s) return;
+        s.isAsked = picture === null;
+        if (picture) {
+            s.passes = Math.max(1, picture.passes);
+            view.show(place, picture);
+            label();
+            if (isOfRun && place === 0) showPixel(view.cursor[0], view.cursor[1]);
+        } else if (s.passes === 0 && place === 0 && s.view === 'image' && !view.pictures[0]) {
+            const first = await server.image({view: 'first'});
+            if (first && s.passes === 0 && shown[0] === s) view.show(0, first), label();
+        }
+    } catch (e) {
+        if (e instanceof Refusal && e.status !== 503) banner('image', e.message, 'Dismiss', () => banner('image', ''));
+    } finally {
+        s.busy = false;
+    }
+}
+
+/**
+ * The text of an option of the choice of views.
+ * @param {string} view
+ */
+const optionText = view => [...tools.view.options].find((/** @type {any} */ o) => o.value === view)?.textContent ?? view;
+
+function label() {
+    const [a, b] = shown;
+    const text = (/** @type {Shown} */ s) => s.view === 'reference' ? 'reference'
+        : [s.run > 0 ? `run ${s.run}` : '', /** @type {any} */ (kLabels)[s.view] ?? optionText(s.view), s.run > 0 && s.passes > 0 ? `${s.passes} spp` : ''].filter(Boolean).join(', ');
+    const first = a.passes === 0 && view.pictures[0] ? kLabels.first : text(a);
+    at('label').textContent = b ? `${view.isFlipped ? 'right | left' : 'left | right'}: ${first} | ${text(b)}` : first;
+}
+
+/** @param {0 | 1} place @param {number} run @param {string} what */
+function showIn(place, run, what) {
+    if (place === 0 || run > 0 || what === 'reference') shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false};
+    else shown[1] = null;
+    if (place === 1 && !shown[1]) view.show(1, null);
+    refresh(place).then(label);
+    updateRuns();
+}
+
+let pixelRequest = 0;
+/** @param {number} x @param {number} y */
+async function showPixel(x, y) {
+    const request = ++pixelRequest;
+    const place = at('pixel');
+    const parts = [element('div', {textContent: `(${x}, ${y})`})];
+    const describePixel = async (/** @type {Shown | null} */ s) => {
+        if (!s || s.run === 0) return;
+        const p = await server.get(`/v1/pixel?run=${s.run}&x=${x}&y=${y}`).catch(() => null);
+        if (!p?.passes) return;
+        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: 'no interval: one chain'};
+        parts.push(element('div', {className: 'soft', textContent: `run ${s.run}, ${p.passes} spp, ${/** @type {any} */ (kNames)[p.interval]}`}));
+        parts.push(element('table', {}, ['red', 'green', 'blue'].map((name, c) => element('tr', {}, [element('th', {textContent: name}),
+            element('td', {textContent: significant(p.mean[c], 6)}), element('td', {textContent: p.half ? `± ${significant(p.half[c], 3)}` : ''}),
+            element('td', {textContent: p.reference ? `reference ${significant(p.reference[c], 6)}` : ''})]))));
+    };
+    await describePixel(shown[0]);
+    await describePixel(shown[1]);
+    if (request === pixelRequest) place.replaceChildren(...parts);
+    inspector?.setPixel(x, y, shown[0].run);
+}
+
+function makeTools() {
+    const number = (/** @type {any} */ properties) => element('input', {type: 'range', ...properties});
+    tools.exposure = number({id: 'exposure', min: -12, max: 12, step: 0.25, value: 0, oninput: () => setExposure(Number(tools.exposure.value))});
+    tools.exposureText = element('output', {textContent: '0'});
+    tools.view = element('select', {id: 'view-choice', onchange: () => showIn(0, shown[0].run || newest(), tools.view.value)});
+    tools.mode = element('select', {id: 'mode', onchange: () => { view.mode = Number(tools.mode.value); view.redraw(); }},
+        ['colours', 'false colours', 'difference'].map((t, i) => element('option', {value: i, textContent: t})));
+    tools.against = element('select', {id: 'against', onchange: () => {
+        const value = tools.against.value;
+        if (value === 'reference') showIn(1, 0, 'reference');
+        else showIn(1, Number(value), 'image');
+    }});
+    tools.wipe = number({id: 'wipe', min: 0, max: 1, step: 0.01, value: 0.5, oninput: () => { view.wipe = Number(tools.wipe.value); view.redraw(); }});
+    const field = (/** @type {string} */ text, /** @type {any} */ input, /** @type {any[]} */ ...more) => element('label', {}, [`${text} `, input, ...more]);
+    at('view-tools').append(field('show', tools.view), field('exposure', tools.exposure, ' ', tools.exposureText), field('as', tools.mode),
+        field('compare with', tools.against), field('wipe', tools.wipe),
+        element('button', {type: 'button', textContent: 'Flip', onclick: flip}), element('button', {type: 'button', textContent: 'Whole image', onclick: () => view.resetZoom()}));
+}
+
+/** @param {number} stops */
+function setExposure(stops) {
+    view.exposure = Math.min(Math.max(stops, -12), 12);
+    tools.exposure.value = view.exposure;
+    tools.exposureText.textContent = String(view.exposure);
+    view.redraw();
+}
+
+function flip() {
+    if (!view.pictures[1]) return;
+    view.isFlipped = !view.isFlipped;
+    // The wipe would show a part of each.
+    view.wipe = 1;
+    tools.wipe.value = 1;
+    label();
+    view.redraw();
+}
+
+const newest = () => Math.max(0, ...runs.keys());
+
+/**
+ * Sets the options of a select element; keeps its value if it is among them.
+ * @param {any} select @param {[string, string][]} options @param {string} fallback
+ */
+function setOptions(select, options, fallback) {
+    const key = JSON.stringify(options);
+    if (select.dataset.key === key) return;
+    select.dataset.key = key;
+    const before = select.value || fallback;
+    select.replaceChildren(...options.map(([value, text]) => element('option', {value, textContent: text})));
+    select.value = options.some(o => o[0] === before) ? before : fallback;
+}
+
+async function updateViewOptions() {
+    /** @type {[string, string][]} */
+    const options = [['image', 'image'], ['error', 'relative error'], ...state.layers.map((/** @type {any} */ l) => [l.name, l.name])];
+    const run = runs.get(shown[0].run);
+    if (run?.techniques > 0 && run.passes > 0) {
+        const {techniques} = await server.get(`/v1/techniques?run=${run.id}`);
+        const lengths = [...new Set(techniques.map((/** @type {any} */ t) => t.edges))].sort((a, b) => a - b);
+        for (const edges of lengths) options.push([`length:${edges}`, `paths of ${edges} edges`]);
+        for (const t of techniques) {
+            const text = `${t.strategy} s=${t.s} t=${t.t} (${t.edges} edges)`;
+            options.push([`technique:${t.index}`, `${text}, weighted`], [`unweighted:${t.index}`, `${text}, unweighted`]);
+        }
+    }
+    setOptions(tools.view, options, 'image');
+}
+
+// ---------------------------------------------------------------------------------------- runs
+
+const list = new RunList(at('run-list'), {act, shown: () => shown[0].run, show: run => showIn(0, run, tools.view.value || 'image')});
+
+function updateRuns() {
+    const all = [...runs.values()];
+    list.update(all);
+    /** @type {[string, string][]} */
+    const others = [['0', 'nothing'], ...all.map(r => /** @type {[string, string]} */ ([String(r.id), `run ${r.id}: ${r.integrator}`]))];
+    if (state?.has_reference) others.push(['reference', 'reference']);
+    setOptions(tools.against, others, '0');
+    if (pane === 'image') drawPlot(at('plot'), all);
+}
+
+/** @param {string} action @param {number} run */
+function act(action, run) {
+    if (action === 'save') {
+        const name = prompt('Name of the file in the output folder (.exr, .pfm, .hdr or .png)', `run-${run}.exr`);
+        if (name) report(server.post('/v1/save', {run, file: name}));
+        return;
+    }
+    const r = runs.get(run);
+    /** @type {any} */
+    const request = {action, run};
+    // A run that has reached its limit goes on to the double of it.
+    if (action === 'continue' && r?.state === 'finished') request.spp = 2 * r.passes;
+    report(server.post('/v1/run', request));
+}
+
+/** @param {any} request @returns {Promise<number>} */
+async function start(request) {
+    const {run} = await server.post('/v1/run', request);
+    await update();
+    showIn(0, run, 'image');
+    tools.view.value = 'image';
+    return run;
+}
+
+// ---------------------------------------------------------------------------------------- state
+
+async function update() {
+    state = await server.get('/v1/state');
+    for (const r of state.runs) runs.set(r.id, r);
+    for (const id of runs.keys()) if (!state.runs.some((/** @type {any} */ r) => r.id === id)) runs.delete(id);
+    at('scene-name').textContent = state.scene ? `${state.scene_file}, ${state.scene.width} × ${state.scene.height}` : `${state.scene_file} is being loaded`;
+    banner('load', state.load_error);
+    if (state.scene) view.setSize(state.scene.width, state.scene.height);
+    if (!tools.form) {
+        tools.form = new RunForm(at('run-form'), state.integrators, {start: async request => { await start(request); }});
+        if (state.scene) tools.form.choose(state.scene.integrator);
+    }
+    await updateViewOptions();
+    updateRuns();
+}
+
+/** @param {any} event */
+async function onEvent(event) {
+    const isNew = event.runs.length !== runs.size || event.runs.some((/** @type {any} */ r) => !runs.has(r.id)) || (event.loaded && !state.scene)
+        || event.load_error !== state.load_error;
+    if (isNew) await update();
+    for (const r of event.runs) {
+        const run = runs.get(r.id);
+        if (!run) continue;
+        const hadError = run.error;
+        Object.assign(run, r);
+        const last = run.history[run.history.length - 1];
+        if (r.error && (!hadError || !last || r.seconds > 1.05 * last[1])) run.history.push([r.passes, r.seconds, ...r.error]);
+    }
+    banner('changed', event.scene_changed ? 'The scene changed on the disk.' : '', 'Load it again', () => report(server.post('/v1/run', {action: 'reload'}).then(() => { state.scene = null; })));
+    if (shown[0].run === 0 && runs.size > 0) showIn(0, newest(), 'image');
+    if (shown[0].run > 0 && !runs.has(shown[0].run) && runs.size > 0) showIn(0, newest(), 'image');
+    if (runs.get(shown[0].run)?.techniques > 0 && !tools.view.dataset.key?.includes('technique:')) await updateViewOptions();
+    updateRuns();
+    editor?.onEvent(event);
+    await Promise.all([refresh(0), refresh(1)]);
+}
+
+/** Follows the session for as long as the page is open. */
+async function follow() {
+    let since = null;
+    for (;;) {
+        try {
+            await update();
+            banner('connection', '');
+            since = null;
+            await server.listen(event => { onEvent(event).catch(() => {}); });
+        } catch (e) {
+            const status = e instanceof Refusal ? e.status : 0;
+            if (status === 401) {
+                banner('connection', /** @type {Error} */ (e).message);
+                return;
+            }
+            since ??= new Date();
+            banner('connection', status === 429 ? /** @type {Error} */ (e).message
+                : `The program does not answer since ${since.toLocaleTimeString()}; the picture is the last one. Trying again.`);
+            await new Promise(r => setTimeout(r, status === 429 ? 5000 : 1000));
+        }
+    }
+}
+
+// ---------------------------------------------------------------------------------------- panes and keys
+
+/** @param {string} name */
+function showPane(name) {
+    pane = name;
+    for (const p of ['image', 'paths']) {
+        at(`pane-${p}`).hidden = p !== name;
+        at(`tab-${p}`).setAttribute('aria-selected', String(p === name));
+        at(`tab-${p}`).tabIndex = p === name ? 0 : -1;
+    }
+    for (const id of ['editor-section', 'inspector-section']) at(id).hidden = name !== 'paths';
+    for (const id of ['plot-section', 'run-form']) at(id).hidden = name !== 'image';
+    if (name === 'paths' && !space && state?.scene) {
+        space = new Space(at('space'), at('space-tools'), at('space-label'), server, state.scene);
+        editor = new PathEditor(at('editor'), space, server, {
+            pixel: () => ({x: view.cursor[0], y: view.cursor[1]}), start, runs: () => runs, fail: text => banner('editor', text, 'Dismiss', () => banner('editor', ''))});
+        inspector = new Inspector(at('inspector'), space, server, editor);
+        inspector.setPixel(view.cursor[0], view.cursor[1], shown[0].run);
+        report(space.load());
+    }
+    if (name === 'image') view.redraw();
+    else space?.redraw();
+}
+for (const name of ['image', 'paths']) at(`tab-${name}`).onclick = () => showPane(name);
+document.querySelector('[role=tablist]')?.addEventListener('keydown', e => {
+    const key = /** @type {KeyboardEvent} */ (e).key;
+    if (key !== 'ArrowLeft' && key !== 'ArrowRight') return;
+    showPane(pane === 'image' ? 'paths' : 'image');
+    at(`tab-${pane}`).focus();
+});
+
+const help = at('help');
+at('help-button').onclick = () => help.showModal();
+
+document.addEventListener('keydown', e => {
+    const target = /** @type {HTMLElement} */ (e.target);
+    if (help.open || target.closest('input:not([type=range]):not([type=checkbox]), select, textarea')) return;
+    if (editor && pane === 'paths' && editor.onKey(e)) return e.preventDefault();
+    if (e.ctrlKey || e.altKey || e.metaKey) return;
+    if (e.key === ' ' && !target.closest('button, summary, input')) {
+        const run = runs.get(shown[0].run);
+        if (run) act(run.state === 'rendering' ? 'stop' : 'continue', run.id);
+    } else if (e.key === 'f') flip();
+    else if (e.key === '+' || e.key === '=') setExposure(view.exposure + 0.5);
+    else if (e.key === '-') setExposure(view.exposure - 0.5);
+    else if (e.key === '?') help.showModal();
+    else return;
+    e.preventDefault();
+});
+document.addEventListener('visibilitychange', () => { refresh(0); refresh(1); });
+
+const kSpokenInterval = 10000;
+setInterval(() => {
+    const run = runs.get(shown[0].run);
+    if (run && run.state === 'rendering') at('spoken').textContent = `Run ${run.id}: ${describe(run)}`;
+}, kSpokenInterval);
+
+makeTools();
+showPane('image');
+if (server.token) follow();
+else banner('connection', 'The address has no token; open the one that the program printed.');
+
+// For tests and for curious users of the console.
+Object.assign(window, {studio: {view, server, runs, shown, space: () => space, editor: () => editor, inspector: () => inspector, state: () => state}});

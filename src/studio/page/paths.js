@@ -1,0 +1,375 @@
+// @ts-check
+// The editor of user paths. Each edit is checked and saved by the program; the file is the one that mlt and mps read.
+
+import {Refusal} from './server.js';
+import {element, significant} from './controls.js';
+
+/** @typedef {[number, number, number]} Vec */
+/** @typedef {{name: string, points: Vec[], cone: number | number[], radius?: number, on: boolean, verdict?: {ok: boolean, point?: number, problem?: string}}} Path */
+
+const kColors = [[1, 0.75, 0.3], [0.5, 0.8, 1], [0.6, 1, 0.6], [1, 0.6, 0.9], [1, 1, 0.5]];
+
+export class PathEditor {
+    /**
+     * @param {HTMLElement} parent @param {import('./space.js').Space} space @param {import('./server.js').Server} server
+     * @param {{pixel: () => {x: number, y: number}, start: (request: any) => Promise<number>, runs: () => Map<number, any>, fail: (text: string) => void}} tell
+     */
+    constructor(parent, space, server, tell) {
+        this.space = space;
+        this.server = server;
+        this.tell = tell;
+        this.file = 'paths.json';
+        this.etags = {on: '', off: ''};
+        /** @type {Path[]} */
+        this.paths = [];
+        this.chosen = -1;
+        this.point = -1;
+        /** @type {string[]} */
+        this.undone = [];
+        /** @type {string[]} */
+        this.done = [];
+        this.version = 0;
+        /** Edits follow one another, each after the answer to the last. */
+        this.queue = Promise.resolve();
+        this.list = element('div', {className: 'paths', role: 'group', 'aria-label': 'Paths'});
+        this.status = element('p', {className: 'soft', role: 'status'});
+        this.gain = element('p', {role: 'status'});
+        const button = (/** @type {string} */ text, /** @type {string} */ title, /** @type {() => any} */ onclick) => element('button', {type: 'button', textContent: text, title, onclick});
+        this.length = element('input', {id: 'pick-length', type: 'number', min: 2, max: 16, value: 3});
+        this.spp = element('input', {id: 'gain-spp', type: 'number', min: 2, value: 64});
+        const fileInput = element('input', {id: 'paths-file', value: this.file, size: 14});
+        fileInput.onchange = () => { this.file = fileInput.value; this.open(); };
+        parent.append(
+            element('div', {className: 'bar'}, [element('label', {}, ['file ', fileInput])]),
+            element('div', {className: 'bar'}, [button('New path', 'N', () => this.begin()), button('Undo', 'Ctrl+Z', () => this.undo()), button('Redo', 'Ctrl+Y', () => this.redo()),
+                button('Continue by mirrors', 'T', () => this.run(() => this.trace())), button('Obey the law', 'M', () => this.run(() => this.solve())), button('Delete', 'Del', () => this.remove())]),
+            this.list, this.status,
+            element('div', {className: 'bar'}, [button('Pick from pixel', 'Paths of a short run that reach the pixel', () => this.run(() => this.pick())),
+                element('label', {}, ['of edges ', this.length])]),
+            element('div', {className: 'bar'}, [button('Render with and without', 'Two runs of mlt in turns', () => this.run(() => this.compare())),
+                element('label', {}, ['spp ', this.spp])]), this.gain);
+        space.tell = {
+            click: (x, y) => { if (this.chosen >= 0) this.run(() => this.addPoint(x, y)); },
+            press: (x, y) => this.choosePointAt(x, y),
+            drag: (x, y) => { this.dragTo = [x, y]; this.run(() => this.movePoint(), 'drag'); return true; },
+            release: () => { this.dragTo = null; this.isDragging = false; },
+        };
+        this.open();
+    }
+
+    /**
+     * Carries out an edit after those before it.
+     * @param {() => Promise<any>} task @param {string} [kind] Of several that wait, only the last is done.
+     */
+    run(task, kind) {
+        const version = kind ? (this.version += 1) : 0;
+        this.queue = this.queue.then(async () => {
+            if (kind && version !== this.version) return;
+            await task();
+        }).catch(e => this.tell.fail(e.message));
+        return this.queue;
+    }
+
+    open() {
+        return this.run(async () => {
+            const [on, off] = await Promise.all([this.server.paths(this.file), this.server.paths(this.offFile())]);
+            this.etags = {on: on.etag, off: off.etag};
+            const read = (/** @type {any[]} */ list, /** @type {boolean} */ isOn) => list.map(p => ({name: '', cone: 1, ...p, on: isOn}));
+            this.paths = [...read(on.list, true), ...read(off.list, false)];
+            this.chosen = this.paths.length - 1;
+            this.point = -1;
+            await this.check();
+        });
+    }
+    offFile() { return this.file.replace(/\.json$/, '') + '-off.json'; }
+
+    snapshot() { return JSON.stringify(this.paths.map(({verdict, ...p}) => p)); }
+
+    /** Keeps the state before an edit for undo. */
+    remember() {
+        this.done.push(this.snapshot());
+        this.undone = [];
+    }
+
+    /** @param {string[]} from @param {string[]} to */
+    restore(from, to) {
+        const text = from.pop();
+        if (text === undefined) return;
+        to.push(this.snapshot());
+        this.paths = JSON.parse(text);
+        this.chosen = Math.min(this.chosen, this.paths.length - 1);
+        this.point = -1;
+        this.run(() => this.changed());
+    }
+    undo() { this.restore(this.done, this.undone); }
+    redo() { this.restore(this.undone, this.done); }
+
+    /** After an edit: check, draw, save. */
+    async changed() {
+        await this.check();
+        await this.save();
+    }
+
+    async check() {
+        const whole = this.paths.filter(p => p.points.length > 1);
+        if (whole.length > 0) {
+            const {verdicts} = await this.server.post('/v1/paths/check', {paths: whole.map(p => this.plain(p))});
+            whole.forEach((p, i) => { p.verdict = verdicts[i]; });
+        }
+        this.update();
+    }
+
+    /**
+     * As the file has it.
+     * @param {Path} p
+     */
+    plain({name, points, cone, radius}) {
+        return {points, cone, ...(name ? {name} : {}), ...(radius ? {radius} : {})};
+    }
+
+    async save() {
+        const whole = this.paths.filter(p => p.points.length > 1);
+        const list = (/** @type {boolean} */ isOn) => whole.filter(p => p.on === isOn).map(p => this.plain(p));
+        try {
+            this.etags.on = await this.server.putPaths(this.file, list(true), this.etags.on);
+            if (list(false).length > 0 || this.hasOff) {
+                this.etags.off = await this.server.putPaths(this.offFile(), list(false), this.etags.off);
+                this.hasOff = true;
+            }
+            this.status.textContent = `${list(true).length} paths saved in ${this.file}`;
+        } catch (e) {
+            if (!(e instanceof Refusal) || e.status !== 409) throw e;
+            this.tell.fail('The paths were edited elsewhere; this is the newer list. Undo brings back yours.');
+            this.done.push(this.snapshot());
+            this.open();
+        }
+    }
+
+    /** @param {any} event */
+    onEvent(event) {
+        const version = event.paths[this.file] ?? 0;
+        this.seen = version;
+        this.updateGain();
+    }
+
+    // -- Edits.
+
+    begin() {
+        this.remember();
+        this.paths.push({name: `path ${this.paths.length + 1}`, points: [], cone: 1, on: true});
+        this.chosen = this.paths.length - 1;
+        this.point = -1;
+        this.space.canvas.focus();
+        this.update();
+    }
+
+    path() { return this.paths[this.chosen]; }
+
+    /** @param {number} x @param {number} y */
+    async addPoint(x, y) {
+        const hit = await this.space.pick(x, y);
+        const path = this.path();
+        if (!hit || !path) return;
+        this.remember();
+        const at = this.point >= 0 ? this.point + 1 : path.points.length;
+        path.points.splice(at, 0, hit.point);
+        if (this.point >= 0) this.point = at;
+        this.space.label.textContent = `${hit.shape}${hit.emits ? ', emits' : ''}${hit.delta ? ', mirror or glass' : ''}`;
+        await this.changed();
+    }
+
+    /** @param {number} x @param {number} y */
+    choosePointAt(x, y) {
+        const width = this.space.canvas.clientWidth, height = this.space.canvas.clientHeight;
+        let best = 10;
+        let found = false;
+        this.paths.forEach((path, i) => path.points.forEach((p, j) => {
+            const at = this.space.project(p);
+            const d = at ? Math.hypot((at[0] - x) * width / 2, (at[1] - y) * height / 2) : Infinity;
+            if (d >= best) return;
+            [best, found] = [d, true];
+            [this.chosen, this.point] = [i, j];
+        }));
+        if (found) this.update();
+        return found;
+    }
+
+    async movePoint() {
+        if (!this.dragTo) return;
+        const hit = await this.space.pick(this.dragTo[0], this.dragTo[1]);
+        if (!hit || !this.path()?.points[this.point]) return;
+        if (!this.isDragging) this.remember();
+        this.isDragging = true;
+        this.path().points[this.point] = hit.point;
+        await this.changed();
+    }
+
+    /** @param {number} dx @param {number} dy In the view. */
+    async nudge(dx, dy) {
+        const p = this.path()?.points[this.point], at = p && this.space.project(p);
+        if (!at) return;
+        const hit = await this.space.pick(at[0] + dx, at[1] + dy);
+        if (!hit) return;
+        this.remember();
+        this.path().points[this.point] = hit.point;
+        await this.changed();
+    }
+
+    async trace() {
+        const points = this.path()?.points ?? [];
+        if (points.length < 2) throw new Error('A path needs two points before mirrors can continue it.');
+        const [a, b] = points.slice(-2);
+        const direction = b.map((v, i) => v - a[i]);
+        const length = Math.hypot(...direction);
+        const origin = a.map((v, i) => v + direction[i] / length * 1e-4 * this.space.radius);
+        const {points: met} = await this.server.post('/v1/ray', {origin, direction, trace: true});
+        if (met.length < 2) throw new Error('The last point is on no mirror or clear glass.');
+        this.remember();
+        points.splice(points.length - 1, 1, ...met.map((/** @type {any} */ m) => m.point));
+        await this.changed();
+    }
+
+    async solve() {
+        const path = this.path();
+        if (!path || this.point < 1) throw new Error('Select a point on a mirror or on glass between two others.');
+        const {points, problem} = await this.server.post('/v1/paths/snap', {points: path.points, index: this.point});
+        if (problem) throw new Error(`No such point: ${problem}.`);
+        this.remember();
+        path.points = points;
+        await this.changed();
+    }
+
+    remove() {
+        const path = this.path();
+        if (!path) return;
+        this.remember();
+        if (this.point >= 0) path.points.splice(this.point, 1);
+        else this.paths.splice(this.chosen, 1);
+        this.point = -1;
+        this.chosen = Math.min(this.chosen, this.paths.length - 1);
+        this.run(() => this.changed());
+    }
+
+    async pick() {
+        const pixel = this.tell.pixel();
+        this.status.textContent = `looking for paths of pixel (${pixel.x}, ${pixel.y}) …`;
+        this.seed = (this.seed ?? 0) + 1;
+        const picked = await this.server.post('/v1/paths/pick', {...pixel, length: Number(this.length.value), count: 8, seed: this.seed});
+        // At most two of the same number of points, which are mostly alike.
+        this.addAll(picked.slice(0, 8));
+        await this.changed();
+    }
+
+    /** @param {any[]} paths */
+    addAll(paths) {
+        this.remember();
+        for (const p of paths) this.paths.push({name: '', cone: 1, ...p, on: true});
+        this.chosen = this.paths.length - 1;
+        this.point = -1;
+    }
+
+    async compare() {
+        await this.changed();
+        const spp = Number(this.spp.value);
+        const request = {action: 'start', sampler: 'independent', spp};
+        const without = await this.tell.start({...request, integrator: 'mlt'});
+        const with_ = await this.tell.start({...request, integrator: `mlt:user_paths=${this.file}`});
+        this.compared = {without, with: with_};
+        this.updateGain();
+    }
+
+    updateGain() {
+        if (!this.compared) return;
+        const a = this.tell.runs().get(this.compared.without), b = this.tell.runs().get(this.compared.with);
+        if (!a || !b) return;
+        const name = `run ${a.id} without, run ${b.id} with the paths`;
+        if (b.state === 'failed') this.gain.textContent = `${name}: ${b.message}`;
+        else if (!a.error || !b.error) this.gain.textContent = `${name}: ${a.passes} and ${b.passes} spp; no error estimate yet`;
+        else {
+            const efficiency = (/** @type {any} */ r) => 1 / (r.error[0] ** 2 * r.seconds);
+            this.gain.textContent = `${name}: relative error ${significant(a.error[0])} and ${significant(b.error[0])} in ${significant(a.seconds)} and `
+                + `${significant(b.seconds)} s; with the paths, the same variance takes 1/${significant(efficiency(b) / efficiency(a))} of the time.`;
+        }
+    }
+
+    // -- Keys.
+
+    /** @param {KeyboardEvent} e Whether the key was used. */
+    onKey(e) {
+        if (e.ctrlKey && (e.key === 'z' || e.key === 'y')) {
+            e.key === 'z' ? this.undo() : this.redo();
+            return true;
+        }
+        if (e.ctrlKey || e.altKey || e.metaKey) return false;
+        if (e.key === 'n') this.begin();
+        else if (e.key === 'Delete') this.remove();
+        else if (e.key === 't') this.run(() => this.trace());
+        else if (e.key === 'm') this.run(() => this.solve());
+        else if (document.activeElement !== this.space.canvas) return false;
+        else return this.onCanvasKey(e);
+        return true;
+    }
+
+    /** @param {KeyboardEvent} e */
+    onCanvasKey(e) {
+        const step = (e.shiftKey ? 0.2 : 0.02);
+        const move = {ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step]}[e.key];
+        const turn = {a: [-0.08, 0], d: [0.08, 0], w: [0, -0.08], s: [0, 0.08]}[e.key];
+        const last = (this.path()?.points.length ?? 0) - 1;
+        if (move && this.point >= 0) this.run(() => this.nudge(move[0], move[1]));
+        else if (move) this.space.moveCross(move[0], move[1]);
+        else if (turn) this.space.orbit(turn[0], turn[1]);
+        else if (e.key === 'q') this.space.dolly(1 / 1.1);
+        else if (e.key === 'e') this.space.dolly(1.1);
+        else if (e.key === 'Enter') this.run(() => this.addPoint(this.space.cross[0], this.space.cross[1]));
+        else if (e.key === '[') this.choosePoint(this.point <= 0 ? last : this.point - 1);
+        else if (e.key === ']') this.choosePoint(this.point >= last ? 0 : this.point + 1);
+        else if (e.key === 'Escape') this.choosePoint(-1);
+        else return false;
+        return true;
+    }
+
+    /** @param {number} i */
+    choosePoint(i) {
+        this.point = i;
+        this.update();
+    }
+
+    // -- What is shown.
+
+    update() {
+        this.space.lines.paths = this.paths.filter(p => p.points.length > 0).map(path => {
+            const i = this.paths.indexOf(path);
+            const color = path.verdict && !path.verdict.ok ? [1, 0.35, 0.3] : kColors[i % kColors.length];
+            return {points: path.points, color: [...color, path.on ? 1 : 0.4], marks: true, chosen: i === this.chosen ? this.point : -1};
+        });
+        this.space.redraw();
+        const hadFocus = this.list.contains(document.activeElement) ? /** @type {any} */ (document.activeElement).dataset.key : null;
+        this.list.replaceChildren(...this.paths.map((path, i) => this.row(path, i)));
+        if (hadFocus) /** @type {HTMLElement | null} */ (this.list.querySelector(`[data-key="${hadFocus}"]`))?.focus();
+    }
+
+    /** @param {Path} path @param {number} i */
+    row(path, i) {
+        const name = path.name || `path ${i + 1}`;
+        const edit = (/** @type {() => void} */ change) => { this.remember(); change(); this.run(() => this.changed()); };
+        const cones = [path.cone].flat();
+        const verdict = path.points.length < 2 ? element('div', {className: 'soft', textContent: 'needs two points'})
+            : !path.verdict ? null : path.verdict.ok ? element('div', {className: 'good', textContent: '✓ can be used'})
+                : element('div', {className: 'error', textContent: `✗ point ${(path.verdict.point ?? 0) + 1} ${path.verdict.problem}`});
+        return element('div', {className: i === this.chosen ? 'path chosen' : 'path'}, [
+            element('input', {type: 'checkbox', checked: path.on, 'aria-label': `Use ${name}`, 'data-key': `on${i}`, onchange: () => edit(() => { path.on = !path.on; })}),
+            element('input', {type: 'text', value: path.name, 'aria-label': `Name of path ${i + 1}`, 'data-key': `name${i}`,
+                onchange: (/** @type {any} */ e) => edit(() => { path.name = e.target.value; })}), ' ',
+            element('label', {}, ['cone ° ', element('input', {type: 'text', size: 5, value: cones.join(', '), title: 'One half-angle, or one for each segment', 'data-key': `cone${i}`,
+                'aria-label': `Cone of ${name} in degrees`, onchange: (/** @type {any} */ e) => edit(() => {
+                    const given = e.target.value.split(',').map(Number);
+                    path.cone = given.length === 1 ? given[0] : given;
+                })})]), ' ',
+            element('button', {type: 'button', textContent: 'Select', 'aria-pressed': String(i === this.chosen), 'aria-label': `Select ${name}`, 'data-key': `select${i}`,
+                onclick: () => { this.chosen = i; this.choosePoint(-1); }}), verdict,
+            i === this.chosen ? element('div', {className: 'bar', role: 'group', 'aria-label': `Points of ${name}`}, path.points.map((p, j) => element('button', {type: 'button', textContent: String(j + 1),
+                title: p.map(v => significant(v, 4)).join(', '), 'aria-pressed': String(j === this.point), 'aria-label': `Point ${j + 1} of ${name}`, 'data-key': `point${i}.${j}`,
+                onclick: () => this.choosePoint(j)}))) : null]);
+    }
+}

@@ -1,0 +1,337 @@
+// @ts-check
+// The scene in three dimensions, with light paths. Rays are traced by the program, on the true geometry.
+
+import {clamp, fit, makeProgram} from './view.js';
+import {element} from './controls.js';
+
+/** @typedef {[number, number, number]} Vec */
+
+const kMeshVertex = `#version 300 es
+in vec3 position;
+uniform mat4 transform;
+uniform vec3 low, extent;
+out vec3 world;
+void main() { world = low + position * extent; gl_Position = transform * vec4(world, 1.0); }`;
+
+const kMeshFragment = `#version 300 es
+precision highp float;
+in vec3 world;
+uniform vec3 eye, tint;
+uniform float isLit;
+out vec4 color;
+void main() {
+    vec3 n = normalize(cross(dFdx(world), dFdy(world)));
+    float facing = abs(dot(n, normalize(eye - world)));
+    vec3 v = mix(tint * (0.25 + 0.75 * facing), tint, isLit);
+    color = vec4(pow(clamp(v, 0.0, 1.0), vec3(1.0 / 2.2)), 1.0);
+}`;
+
+const kLineVertex = `#version 300 es
+in vec3 position;
+in vec4 tint;
+uniform mat4 transform;
+uniform float pointSize;
+out vec4 shade;
+void main() { gl_Position = transform * vec4(position, 1.0); gl_PointSize = pointSize; shade = tint; }`;
+
+const kLineFragment = `#version 300 es
+precision highp float;
+in vec4 shade;
+uniform float fade;
+out vec4 color;
+void main() { color = vec4(shade.rgb, shade.a * fade); }`;
+
+const add = (/** @type {Vec} */ a, /** @type {Vec} */ b, f = 1) => /** @type {Vec} */ (a.map((v, i) => v + f * b[i]));
+const dot = (/** @type {Vec} */ a, /** @type {Vec} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (/** @type {Vec} */ a, /** @type {Vec} */ b) => /** @type {Vec} */ ([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]);
+const unit = (/** @type {Vec} */ v) => /** @type {Vec} */ (v.map(c => c / Math.hypot(...v)));
+
+/**
+ * Product of two matrices, by columns.
+ * @param {number[]} a @param {number[]} b
+ */
+function product(a, b) {
+    return Array.from({length: 16}, (_, i) => [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + i % 4] * b[4 * (i >> 2) + k], 0));
+}
+
+/**
+ * A line through points, drawn as one color.
+ * @typedef {{points: Vec[], color: number[], width?: number, marks?: boolean, chosen?: number}} Line
+ */
+
+export class Space {
+    /**
+     * @param {HTMLCanvasElement} canvas @param {HTMLElement} toolbar @param {HTMLElement} label
+     * @param {import('./server.js').Server} server @param {any} scene
+     */
+    constructor(canvas, toolbar, label, server, scene) {
+        this.canvas = canvas;
+        this.label = label;
+        this.server = server;
+        this.radius = scene.radius;
+        this.home = {eye: /** @type {Vec} */ (scene.eye), look: /** @type {Vec} */ (scene.look), center: /** @type {Vec} */ (scene.center)};
+        /** The crosshair, from -1 to 1. */
+        this.cross = [0, 0];
+        this.cut = 0;
+        /** @type {Record<string, Line[]>} By who draws them. */
+        this.lines = {};
+        /** @type {any[]} */
+        this.shapes = [];
+        this.isDue = false;
+        /**
+         * Called with a point under the pointer.
+         * @type {{click: (x: number, y: number) => void, drag: (x: number, y: number) => boolean, press: (x: number, y: number) => boolean, release: () => void}}
+         */
+        this.tell = {click: () => {}, drag: () => false, press: () => false, release: () => {}};
+        this.cutInput = element('input', {type: 'range', id: 'cut', min: 0, max: 1, step: 0.005, value: 0, oninput: () => { this.cut = Number(this.cutInput.value); this.redraw(); }});
+        toolbar.append(
+            element('button', {type: 'button', textContent: 'Camera', title: 'Look as the camera does', onclick: () => this.lookAsCamera()}),
+            element('button', {type: 'button', textContent: 'From outside', onclick: () => this.lookFromOutside()}),
+            element('label', {title: 'Leave out what is nearer than this'}, ['cut away ', this.cutInput]));
+        this.lookAsCamera();
+        const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
+        this.gl = gl;
+        if (!gl) return;
+        this.meshProgram = makeProgram(gl, kMeshVertex, kMeshFragment);
+        this.lineProgram = makeProgram(gl, kLineVertex, kLineFragment);
+        this.lineBuffer = gl.createBuffer();
+        new ResizeObserver(() => this.redraw()).observe(canvas);
+        this.listen();
+    }
+
+    lookAsCamera() {
+        const {eye, look, center} = this.home;
+        this.distance = clamp(dot(add(center, eye, -1), look), 0.05 * this.radius, 4 * this.radius);
+        this.target = add(eye, look, this.distance);
+        this.setDirection(look);
+    }
+    lookFromOutside() {
+        this.target = this.home.center;
+        this.distance = 2.6 * this.radius;
+        this.redraw();
+    }
+    /** @param {Vec} d */
+    setDirection(d) {
+        this.azimuth = Math.atan2(d[0], d[2]);
+        this.height = Math.asin(clamp(d[1], -1, 1));
+        this.redraw();
+    }
+    forward() {
+        const c = Math.cos(this.height ?? 0), a = this.azimuth ?? 0;
+        return /** @type {Vec} */ ([c * Math.sin(a), Math.sin(this.height ?? 0), c * Math.cos(a)]);
+    }
+    frame() {
+        const forward = this.forward(), right = unit(cross(forward, [0, 1, 0]));
+        return {forward, right, up: cross(right, forward)};
+    }
+    eye() { return add(/** @type {Vec} */ (this.target), this.forward(), -/** @type {number} */ (this.distance)); }
+    near() { return 2e-3 * this.radius + this.cut * 2 * (/** @type {number} */ (this.distance) + this.radius); }
+
+    matrix() {
+        const {forward, right, up} = this.frame(), eye = this.eye();
+        const f = 1 / Math.tan(0.4), aspect = this.canvas.width / this.canvas.height;
+        const near = this.near(), far = near + 8 * this.radius + /** @type {number} */ (this.distance);
+        const view = [right[0], up[0], -forward[0], 0, right[1], up[1], -forward[1], 0, right[2], up[2], -forward[2], 0,
+            -dot(right, eye), -dot(up, eye), dot(forward, eye), 1];
+        const perspective = [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, 2 * far * near / (near - far), 0];
+        return product(perspective, view);
+    }
+    /**
+     * The ray through a point of the view, from -1 to 1 each way; it starts behind what is cut away.
+     * @param {number} x @param {number} y
+     */
+    ray(x, y) {
+        const {forward, right, up} = this.frame(), t = Math.tan(0.4), aspect = this.canvas.width / this.canvas.height;
+        const d = add(add(forward, right, x * t * aspect), up, y * t);
+        return {origin: add(this.eye(), d, this.near()), direction: unit(d)};
+    }
+    /**
+     * Where a point of the scene is in the view, or null behind it.
+     * @param {Vec} p
+     */
+    project(p) {
+        const m = this.matrix(), w = m[3] * p[0] + m[7] * p[1] + m[11] * p[2] + m[15];
+        if (w <= 0) return null;
+        return [(m[0] * p[0] + m[4] * p[1] + m[8] * p[2] + m[12]) / w, (m[1] * p[0] + m[5] * p[1] + m[9] * p[2] + m[13]) / w];
+    }
+    /**
+     * From -1 to 1.
+     * @param {PointerEvent} e
+     */
+    at(e) { return [2 * e.offsetX / this.canvas.clientWidth - 1, 1 - 2 * e.offsetY / this.canvas.clientHeight]; }
+
+    /**
+     * The surface point seen in the view at (x, y), or null.
+     * @param {number} x @param {number} y
+     */
+    async pick(x, y) {
+        const {points} = await this.server.post('/v1/ray', this.ray(x, y));
+        return points[0] ?? null;
+    }
+
+    async load() {
+        const gl = this.gl;
+        if (!gl) return;
+        for (const s of await this.server.geometry()) {
+            const array = gl.createVertexArray();
+            gl.bindVertexArray(array);
+            gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+            gl.bufferData(gl.ARRAY_BUFFER, s.positions, gl.STATIC_DRAW);
+            gl.enableVertexAttribArray(0);
+            gl.vertexAttribPointer(0, 3, gl.UNSIGNED_SHORT, true, 0, 0);
+            gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+            gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, s.triangles, gl.STATIC_DRAW);
+            gl.bindVertexArray(null);
+            this.shapes.push({...s, array});
+        }
+        this.redraw();
+    }
+
+    redraw() {
+        if (this.isDue) return;
+        this.isDue = true;
+        requestAnimationFrame(() => { this.isDue = false; this.draw(); });
+    }
+
+    draw() {
+        const gl = this.gl;
+        if (!gl || !this.meshProgram || !this.lineProgram || this.canvas.clientWidth === 0) return;
+        fit(this.canvas);
+        gl.viewport(0, 0, this.canvas.width, this.canvas.height);
+        gl.clearColor(0.06, 0.065, 0.08, 1);
+        gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+        gl.enable(gl.DEPTH_TEST);
+        const transform = new Float32Array(this.matrix());
+        gl.useProgram(this.meshProgram);
+        const at = (/** @type {string} */ name) => gl.getUniformLocation(/** @type {WebGLProgram} */ (this.meshProgram), name);
+        gl.uniformMatrix4fv(at('transform'), false, transform);
+        gl.uniform3fv(at('eye'), this.eye());
+        for (const s of this.shapes) {
+            gl.uniform3fv(at('low'), s.low);
+            gl.uniform3fv(at('extent'), s.high.map((/** @type {number} */ v, /** @type {number} */ i) => v - s.low[i]));
+            gl.uniform3fv(at('tint'), s.emits ? [1, 0.9, 0.5] : s.delta ? [0.45, 0.6, 0.75] : s.color.map((/** @type {number} */ c) => 0.08 + 0.8 * c));
+            gl.uniform1f(at('isLit'), s.emits ? 1 : 0);
+            gl.bindVertexArray(s.array);
+            gl.drawElements(gl.TRIANGLES, s.indices, gl.UNSIGNED_INT, 0);
+        }
+        this.drawLines(gl, transform);
+        this.drawCross(gl);
+    }
+
+    /** @param {WebGL2RenderingContext} gl @param {Float32Array} transform */
+    drawLines(gl, transform) {
+        /** @type {number[]} */
+        const segments = [];
+        /** @type {number[]} */
+        const marks = [];
+        for (const line of Object.values(this.lines).flat()) {
+            line.points.forEach((p, i) => {
+                if (i > 0) segments.push(...line.points[i - 1], ...line.color, ...p, ...line.color);
+                if (line.marks) marks.push(...p, ...(line.chosen === i ? [1, 1, 1, 1] : line.color));
+            });
+        }
+        gl.enable(gl.BLEND);
+        gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+        this.drawArrays(gl, transform, segments, gl.LINES);
+        this.drawArrays(gl, transform, marks, gl.POINTS);
+        gl.disable(gl.BLEND);
+    }
+
+    /**
+     * Draws also what is hidden, but faintly.
+     * @param {WebGL2RenderingContext} gl @param {Float32Array} transform @param {number[]} values @param {number} kind
+     */
+    drawArrays(gl, transform, values, kind) {
+        if (values.length === 0 || !this.lineProgram) return;
+        gl.bindVertexArray(null);
+        gl.useProgram(this.lineProgram);
+        gl.bindBuffer(gl.ARRAY_BUFFER, this.lineBuffer ?? null);
+        gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(values), gl.DYNAMIC_DRAW);
+        const position = gl.getAttribLocation(this.lineProgram, 'position'), tint = gl.getAttribLocation(this.lineProgram, 'tint');
+        gl.enableVertexAttribArray(position);
+        gl.enableVertexAttribArray(tint);
+        gl.vertexAttribPointer(position, 3, gl.FLOAT, false, 28, 0);
+        gl.vertexAttribPointer(tint, 4, gl.FLOAT, false, 28, 12);
+        gl.uniformMatrix4fv(gl.getUniformLocation(this.lineProgram, 'transform'), false, transform);
+        gl.uniform1f(gl.getUniformLocation(this.lineProgram, 'pointSize'), 9 * devicePixelRatio);
+        const fade = gl.getUniformLocation(this.lineProgram, 'fade');
+        gl.depthMask(false);
+        gl.enable(gl.POLYGON_OFFSET_FILL);
+        gl.depthFunc(gl.GREATER);
+        gl.uniform1f(fade, 0.35);
+        gl.drawArrays(kind, 0, values.length / 7);
+        gl.depthFunc(gl.LEQUAL);
+        gl.uniform1f(fade, 1);
+        gl.drawArrays(kind, 0, values.length / 7);
+        gl.depthFunc(gl.LESS);
+        gl.depthMask(true);
+    }
+
+    /** @param {WebGL2RenderingContext} gl */
+    drawCross(gl) {
+        const [x, y] = this.cross, dx = 14 / this.canvas.clientWidth, dy = 14 / this.canvas.clientHeight;
+        const identity = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+        const white = [1, 1, 1, 1];
+        gl.disable(gl.DEPTH_TEST);
+        this.drawArrays(gl, identity, [x - dx, y, 0, ...white, x + dx, y, 0, ...white, x, y - dy, 0, ...white, x, y + dy, 0, ...white], gl.LINES);
+        gl.enable(gl.DEPTH_TEST);
+    }
+
+    /** @param {number} dx @param {number} dy */
+    orbit(dx, dy) {
+        this.azimuth = (this.azimuth ?? 0) - dx;
+        this.height = clamp((this.height ?? 0) - dy, -1.55, 1.55);
+        this.redraw();
+    }
+    /** @param {number} factor */
+    dolly(factor) {
+        this.distance = clamp(/** @type {number} */ (this.distance) * factor, 0.01 * this.radius, 8 * this.radius);
+        this.redraw();
+    }
+    /** @param {number} dx @param {number} dy */
+    moveCross(dx, dy) {
+        this.cross = [clamp(this.cross[0] + dx, -1, 1), clamp(this.cross[1] + dy, -1, 1)];
+        this.redraw();
+    }
+
+    listen() {
+        const canvas = this.canvas;
+        /** @type {{x: number, y: number, kind: 'orbit' | 'pan' | 'point', moved: boolean} | null} */
+        let drag = null;
+        canvas.addEventListener('pointerdown', e => {
+            canvas.setPointerCapture(e.pointerId);
+            canvas.focus();
+            const [x, y] = this.at(e);
+            drag = {x: e.offsetX, y: e.offsetY, moved: false, kind: e.button === 2 || e.shiftKey ? 'pan' : this.tell.press(x, y) ? 'point' : 'orbit'};
+        });
+        canvas.addEventListener('pointermove', e => {
+            if (!drag) return;
+            const dx = e.offsetX - drag.x, dy = e.offsetY - drag.y;
+            if (!drag.moved && Math.hypot(dx, dy) < 4) return;
+            drag.moved = true;
+            const [x, y] = this.at(e);
+            if (drag.kind === 'orbit') this.orbit(dx * 0.006, dy * 0.006);
+            else if (drag.kind === 'pan') {
+                const {right, up} = this.frame(), f = /** @type {number} */ (this.distance) * 0.85 / canvas.clientHeight;
+                this.target = add(add(/** @type {Vec} */ (this.target), right, -dx * f), up, dy * f);
+                this.redraw();
+            } else this.tell.drag(x, y);
+            [drag.x, drag.y] = [e.offsetX, e.offsetY];
+        });
+        canvas.addEventListener('pointerup', e => {
+            const [x, y] = this.at(e);
+            if (drag && !drag.moved && drag.kind === 'orbit') {
+                this.cross = [x, y];
+                this.tell.click(x, y);
+                this.redraw();
+            }
+            if (drag?.kind === 'point') this.tell.release();
+            drag = null;
+        });
+        canvas.addEventListener('contextmenu', e => e.preventDefault());
+        canvas.addEventListener('wheel', e => {
+            e.preventDefault();
+            this.dolly(Math.exp(e.deltaY * 0.0015));
+        }, {passive: false});
+    }
+}

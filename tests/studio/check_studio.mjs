@@ -1,0 +1,352 @@
+// Uses `etendue studio` in a headless browser: pixels appear and change with exposure, zoom and wipe; runs are started,
+// stopped and continued; a path by way of a mirror is drawn by keys alone, and another by the pointer alone; the paths of a
+// pixel are traced again; two pages edit the same paths; the program is killed. Controls have names, the console is quiet.
+//
+//     node check_studio.mjs etendue scene.xml [folder for screenshots]
+//
+// Needs Node.js and Chromium; see browser.mjs.
+
+import {spawn} from 'node:child_process';
+import {existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+
+import {Browser} from '../support/browser.mjs';
+
+const [program, sceneFile, screenshots] = process.argv.slice(2);
+if (!sceneFile) {
+    console.error('usage: check_studio.mjs etendue scene.xml [folder for screenshots]');
+    process.exit(2);
+}
+const kFlags = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+const folder = mkdtempSync(join(tmpdir(), 'etendue-studio-'));
+
+let failures = 0;
+function check(holds, what) {
+    console.log(`${holds ? 'ok  ' : 'FAIL'} ${what}`);
+    if (!holds) ++failures;
+}
+
+/// A lamp above a floor, and a mirror on the left.
+const rectangle = (id, transform, inside) =>
+    `<shape type="rectangle" id="${id}"><transform name="to_world">${transform}</transform>${inside}</shape>`;
+const mirrorScene = `<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="60"/>
+<transform name="to_world"><lookat origin="0,0,3" target="0,-0.3,0" up="0,1,0"/></transform><film type="hdrfilm">
+<integer name="width" value="64"/><integer name="height" value="48"/></film></sensor>
+${rectangle('floor', '<rotate x="1" angle="-90"/><translate y="-1"/>', '')}
+${rectangle('lamp', '<scale value="0.3"/><rotate x="1" angle="90"/><translate y="1"/>', '<emitter type="area"/>')}
+${rectangle('mirror', '<rotate y="1" angle="90"/><translate x="-1"/>', '<bsdf type="conductor"/>')}</scene>`;
+
+/// A running program.
+class Studio {
+    static async start(scene, ...more) {
+        const studio = new Studio();
+        studio.process = spawn(program, ['studio', scene, '-o', folder, '--threads', '1', ...more]);
+        studio.errors = '';
+        studio.process.stderr.on('data', d => { studio.errors += d; });
+        studio.ended = new Promise(fulfil => studio.process.on('exit', fulfil));
+        studio.url = await new Promise((fulfil, reject) => {
+            let text = '';
+            studio.process.stdout.on('data', d => { text += d; if (text.includes('\n')) fulfil(text.trim()); });
+            studio.process.on('exit', () => reject(new Error(`the program ended: ${studio.errors}`)));
+        });
+        return studio;
+    }
+    stop(signal = 'SIGINT') {
+        this.process.kill(signal);
+        return this.ended;
+    }
+}
+
+const kCodes = {' ': 'Space', '[': 'BracketLeft', ']': 'BracketRight'};
+async function key(browser, name, times = 1, modifiers = 0) {
+    for (let i = 0; i < times; ++i) {
+        const text = name.length === 1 && modifiers !== 2 ? name : name === 'Enter' ? '\r' : undefined;
+        const kVirtual = {Tab: 9, Enter: 13, ' ': 32};
+        const event = {key: name, code: kCodes[name] ?? name, text, modifiers, windowsVirtualKeyCode: kVirtual[name]};
+        await browser.send('Input.dispatchKeyEvent', {type: text ? 'keyDown' : 'rawKeyDown', ...event});
+        await browser.send('Input.dispatchKeyEvent', {type: 'keyUp', ...event});
+    }
+}
+/// Tab until the element is focused.
+async function tabTo(browser, selector) {
+    for (let i = 0; i < 120; ++i) {
+        if (await browser.evaluate(`document.activeElement.matches('${selector}')`)) return true;
+        await key(browser, 'Tab');
+    }
+    return false;
+}
+
+const box = (browser, selector) => browser.evaluate(`(() => { const b = document.querySelector('${selector}').getBoundingClientRect();
+    return [b.left, b.top, b.width, b.height]; })()`);
+async function click(browser, x, y) {
+    await browser.mouse('mousePressed', x, y);
+    await browser.mouse('mouseReleased', x, y);
+    await browser.settle();
+}
+/// What a canvas shows: one number for each pixel of a coarse grid.
+const pixels = (browser, id) => browser.evaluate(`(() => {
+    const c = document.getElementById('${id}');
+    const copy = Object.assign(document.createElement('canvas'), {width: c.width, height: c.height});
+    const context = copy.getContext('2d', {willReadFrequently: true});
+    context.drawImage(c, 0, 0);
+    const d = context.getImageData(0, 0, c.width, c.height).data, out = [];
+    for (let y = 4; y < c.height; y += 12) for (let x = 4; x < c.width; x += 12) { const at = 4 * (y * c.width + x); out.push(d[at] + d[at + 1] + d[at + 2]); }
+    return out;
+})()`);
+const average = values => values.reduce((a, b) => a + b, 0) / values.length;
+const differs = (a, b) => a.length !== b.length || a.some((v, i) => v !== b[i]);
+const first = 'studio.runs.get(studio.shown[0].run)';
+
+async function checkNames(browser, what) {
+    const nameless = await browser.evaluate(`[...document.querySelectorAll('button, input, select, canvas, svg, [role]')]
+        .filter(e => e.getClientRects().length && !e.textContent.trim() && !e.getAttribute('aria-label') && !e.getAttribute('aria-labelledby')
+            && !(e.labels && e.labels.length) && !e.title && e.getAttribute('role') !== 'alert' && e.getAttribute('role') !== 'status')
+        .map(e => e.outerHTML.slice(0, 120))`);
+    check(nameless.length === 0, `${what}: all controls have names ${nameless}`);
+}
+
+async function imagePart() {
+    const studio = await Studio.start(sceneFile, '-i', 'path', '--resolution', '160x120');
+    const browser = new Browser({flags: kFlags, screenshots});
+    try {
+        const begin = Date.now();
+        await browser.open(studio.url);
+        const loaded = Date.now();
+        await browser.until('studio.view.pictures[0]', 'the first pixels');
+        console.log(`     first pixels ${Date.now() - loaded} ms after load, ${Date.now() - begin} ms after the address`);
+        await browser.until('studio.shown[0].passes >= 4', 'four passes');
+        await browser.settle();
+        const one = await pixels(browser, 'view');
+        check(new Set(one).size > 20, `the image has ${new Set(one).size} levels`);
+        await browser.screenshot('1-image');
+        check((await browser.evaluate('document.querySelector("#label").textContent')).includes('spp'), 'its passes are stated');
+
+        // By keys: focus the image by Tab, then exposure, zoom, pixel, stop, continue.
+        check(await tabTo(browser, '#view'), 'the image can be reached by Tab');
+        await key(browser, '+', 4);
+        await browser.settle();
+        const brighter = await pixels(browser, 'view');
+        check(average(brighter) > 1.2 * average(one), `+ brightens: ${average(one).toFixed(0)} to ${average(brighter).toFixed(0)}`);
+        await key(browser, '-', 4);
+        await key(browser, 'z', 5);
+        check(await browser.evaluate('studio.view.zoom > 5'), 'Z zooms');
+        await browser.screenshot('2-zoomed');
+        await key(browser, '0');
+        const cursor = await browser.evaluate('studio.view.cursor');
+        await key(browser, 'ArrowRight', 3);
+        await key(browser, 'ArrowDown', 1, 8);
+        const moved = await browser.evaluate('studio.view.cursor');
+        check(moved[0] === cursor[0] + 3 && moved[1] === cursor[1] + 10, `arrows move the cursor: ${moved}`);
+        await browser.until(`document.querySelector('#pixel').textContent.includes('(${moved[0]}, ${moved[1]})') && document.querySelector('#pixel table')?.textContent.includes('±')`,
+            'a pixel with its interval');
+        const text = await browser.evaluate("document.querySelector('#pixel').textContent");
+        check(text.includes(`(${moved[0]}, ${moved[1]})`) && text.includes('sobol'), `pixel values: ${text.slice(0, 80)}`);
+        const value = await browser.evaluate(`studio.server.get('/v1/pixel?run=1&x=${moved[0]}&y=${moved[1]}')`);
+        check(value.mean.every(v => v >= 0) && value.half.every(v => v >= 0), 'the server states means and intervals');
+        await key(browser, ' ');
+        await browser.until(`${first}.state === 'stopped'`, 'space stops');
+        const passes = await browser.evaluate(`${first}.passes`);
+        await browser.until(`studio.shown[0].passes === ${passes}`, 'the last pass is shown');
+        await key(browser, ' ');
+        await browser.until(`${first}.state === 'rendering' && ${first}.passes > ${passes}`, 'space continues');
+        await browser.until("document.querySelector('#plot svg')", 'the convergence plot');
+        check((await browser.evaluate("document.querySelector('#plot svg').getAttribute('aria-label')")).includes('run 1'), 'the plot has a text');
+
+        // By the pointer: another method from the tables, shown beside the first, wiped.
+        await browser.evaluate(`(() => { const s = document.getElementById('method'); s.value = 'bdpt'; s.dispatchEvent(new Event('change'));
+            document.getElementById('techniques').value = 4; document.getElementById('parameter-max_depth').value = 5; })()`);
+        const [bx, by, bw, bh] = await browser.evaluate(`(() => { const b = document.querySelector('#run-form button[type=submit]'); b.scrollIntoView();
+            const r = b.getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; })()`);
+        await click(browser, bx + bw / 2, by + bh / 2);
+        await browser.until('studio.runs.size === 2 && studio.shown[0].run === 2 && studio.shown[0].passes > 1', 'a second run is shown');
+        check((await browser.evaluate('studio.runs.get(2).integrator')).includes('bdpt:max_depth=5'), 'with its parameter');
+        await browser.evaluate(`(() => { const s = document.getElementById('against'); s.value = '1'; s.dispatchEvent(new Event('change')); })()`);
+        await browser.until('studio.view.pictures[1]', 'the first run beside it');
+        await browser.settle();
+        const before = await pixels(browser, 'view');
+        const [x, y, w, h] = await box(browser, '#view');
+        const scale = await browser.evaluate('studio.view.scale() * studio.view.width / devicePixelRatio');
+        await browser.drag([x + w / 2, y + h / 2], [x + w / 2 - 0.3 * scale, y + h / 2]);
+        check(Math.abs(await browser.evaluate('studio.view.wipe') - 0.2) < 0.02, 'the wipe follows the pointer');
+        await browser.screenshot('3-wipe');
+        await browser.evaluate(`(() => { const s = document.getElementById('mode'); s.value = '2'; s.dispatchEvent(new Event('change')); })()`);
+        await browser.settle();
+        check(differs(before, await pixels(browser, 'view')), 'the difference is drawn');
+        await browser.screenshot('4-difference');
+        await browser.evaluate(`(() => { const s = document.getElementById('mode'); s.value = '0'; s.dispatchEvent(new Event('change'));
+            const a = document.getElementById('against'); a.value = '0'; a.dispatchEvent(new Event('change')); })()`);
+        for (const view of ['error', 'albedo', 'normal']) {
+            await browser.evaluate(`(() => { const s = document.getElementById('view-choice'); s.value = '${view}'; s.dispatchEvent(new Event('change')); })()`);
+            await browser.until(`studio.shown[0].view === '${view}' && studio.shown[0].passes > 0`, view);
+            await browser.settle();
+            check(new Set(await pixels(browser, 'view')).size > 3, `${view} is drawn`);
+        }
+        await browser.until("document.getElementById('view-choice').dataset.key.includes('length:')", 'technique images are offered');
+        for (const view of ['length:2', 'technique:1', 'unweighted:1']) {
+            await browser.evaluate(`(() => { const s = document.getElementById('view-choice'); s.value = '${view}'; s.dispatchEvent(new Event('change')); })()`);
+            await browser.until(`studio.shown[0].view === '${view}' && studio.shown[0].passes > 0`, view);
+        }
+        await browser.screenshot('5-technique');
+        await checkNames(browser, 'image');
+        const bad = await browser.evaluate(`studio.server.post('/v1/run', {action: 'start', integrator: 'path:max_depth=-9'}).then(() => '', e => e.status + ' ' + e.message)`);
+        check(bad.startsWith('422') && bad.includes('max_depth'), `a bad parameter is refused: ${bad}`);
+        check(browser.complaints.filter(c => !c.includes('422')).length === 0, `the console is quiet: ${browser.complaints.join('; ')}`);
+        check(browser.requests.every(u => u.startsWith(studio.url.split('/#')[0]) || u.startsWith('blob:')), 'no request leaves the page');
+
+        // Killed: the picture stays, and the page says so.
+        await studio.stop('SIGKILL');
+        await browser.until("document.getElementById('banner-text').textContent.includes('does not answer since')", 'the banner');
+        check(await browser.evaluate('studio.view.pictures[0] !== undefined'), 'the picture is kept');
+        await browser.screenshot('6-gone');
+    } finally {
+        browser.close();
+        await studio.stop('SIGKILL');
+    }
+}
+
+/// Presses arrows until the crosshair is at a point of the scene.
+async function crossTo(browser, point) {
+    const [tx, ty] = await browser.evaluate(`studio.space().project(${JSON.stringify(point)})`);
+    const [x, y] = await browser.evaluate('studio.space().cross');
+    const go = async (distance, plus, minus) => {
+        const large = Math.floor(Math.abs(distance) / 0.2), small = Math.round((Math.abs(distance) - 0.2 * large) / 0.02);
+        await key(browser, distance > 0 ? plus : minus, large, 8);
+        await key(browser, distance > 0 ? plus : minus, small);
+    };
+    await go(tx - x, 'ArrowRight', 'ArrowLeft');
+    await go(ty - y, 'ArrowUp', 'ArrowDown');
+}
+const paths = 'studio.editor().paths';
+const idle = browser => browser.evaluate('studio.editor().queue');
+
+async function pathPart() {
+    const scene = join(folder, 'mirror.xml'), file = join(folder, 'paths.json');
+    writeFileSync(scene, mirrorScene);
+    const studio = await Studio.start(scene, '-i', 'bdpt');
+    const browser = new Browser({flags: kFlags, screenshots}), other = new Browser({flags: kFlags, screenshots});
+    try {
+        await browser.open(studio.url);
+        await browser.until('studio.shown[0].passes > 0', 'an image');
+        await browser.evaluate('studio.view.moveCursor(36, 42)');
+        check(await tabTo(browser, '#tab-image'), 'the tabs can be reached');
+        await key(browser, 'ArrowRight');
+        await browser.until('studio.space()?.shapes.length === 3', 'the geometry');
+        await idle(browser);
+        // A path from the lamp by the mirror to the floor, by keys alone.
+        check(await tabTo(browser, '#space'), 'the scene can be reached by Tab');
+        await key(browser, 'e', 6);
+        await key(browser, 'n');
+        for (const p of [[0, 1, 0], [-1, 0.15, 0.1], [0.1, -1, 0.2]]) {
+            await crossTo(browser, p);
+            await key(browser, 'Enter');
+            await browser.settle();
+            await idle(browser);
+        }
+        check(await browser.evaluate(`${paths}[0].points.length`) === 3, 'three points by keys');
+        const refused = await browser.evaluate(`${paths}[0].verdict`);
+        check(!refused.ok && refused.problem.includes('law of reflection'), `off the law: ${refused.problem}`);
+        await browser.screenshot('7-refused');
+        await key(browser, ']', 2);
+        await key(browser, 'm');
+        await browser.settle();
+        await idle(browser);
+        const verdict = await browser.evaluate(`${paths}[0].verdict`);
+        check(verdict.ok, `M moves the point to obey the law ${verdict.problem ?? ''}`);
+        check(JSON.parse(readFileSync(file)).length === 1, 'each edit is saved');
+        await browser.screenshot('8-mirror-path');
+        const before = await browser.evaluate(`${paths}[0].points[1]`);
+        await key(browser, 'ArrowUp');
+        await browser.settle();
+        await idle(browser);
+        check(differs(before, await browser.evaluate(`${paths}[0].points[1]`)), 'arrows move the selected point');
+        await key(browser, 'z', 1, 2);
+        await idle(browser);
+        check(!differs(before, await browser.evaluate(`${paths}[0].points[1]`)), 'Ctrl+Z takes it back');
+        await key(browser, 'Escape');
+
+        // Another by the pointer alone.
+        const [x, y, w, h] = await box(browser, '#space');
+        const at = async p => {
+            const [u, v] = await browser.evaluate(`studio.space().project(${JSON.stringify(p)})`);
+            return [x + (u + 1) / 2 * w, y + (1 - v) / 2 * h];
+        };
+        const button = async text => {
+            const [l, t, bw, bh] = await browser.evaluate(`(() => { const b = [...document.querySelectorAll('#editor button')].find(e => e.textContent === '${text}');
+                b.scrollIntoView(); const r = b.getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; })()`);
+            await click(browser, l + bw / 2, t + bh / 2);
+        };
+        await button('New path');
+        for (const p of [[0.1, 1, 0.1], [-1, 0.1, 0.3]]) {
+            await click(browser, ...await at(p));
+            await idle(browser);
+        }
+        await button('Continue by mirrors');
+        await idle(browser);
+        check(await browser.evaluate(`${paths}[1].points.length === 3 && ${paths}[1].verdict.ok`), 'the second path, continued by the mirror');
+        const end = await browser.evaluate(`${paths}[1].points[2]`);
+        const from = await at(end);
+        await browser.drag(from, [from[0] + 25, from[1] + 5]);
+        await idle(browser);
+        check(differs(end, await browser.evaluate(`${paths}[1].points[2]`)), 'the pointer moves a point');
+        await button('Undo');
+        await idle(browser);
+        check(await browser.evaluate(`${paths}[1].verdict.ok`), 'which can be undone');
+        const orbit = await browser.evaluate('studio.space().azimuth');
+        await browser.drag([x + 0.9 * w, y + 0.1 * h], [x + 0.8 * w, y + 0.1 * h]);
+        check(await browser.evaluate('studio.space().azimuth') !== orbit, 'dragging turns the view');
+        await button('Pick from pixel');
+        await idle(browser);
+        const picked = await browser.evaluate(`${paths}.slice(2).map(p => p.verdict.ok)`);
+        check(picked.length > 0 && picked.every(Boolean), `paths of the pixel are picked: ${picked.length}`);
+        await browser.screenshot('9-picked');
+        await browser.evaluate("document.querySelector('#editor input[type=checkbox]').click()");
+        await idle(browser);
+        check(JSON.parse(readFileSync(file)).length === 1 + picked.length && existsSync(join(folder, 'paths-off.json')), 'a path can be switched off');
+        await browser.evaluate("document.querySelector('#editor input[type=checkbox]').click()");
+        await idle(browser);
+
+        // The paths of a pixel, traced again.
+        await browser.evaluate("[...document.querySelectorAll('#inspector button')].find(b => b.textContent === 'Trace again').click()");
+        await browser.until("document.querySelectorAll('.replayed button').length > 3", 'paths of the pixel');
+        check(await browser.evaluate("document.querySelector('.replayed button').textContent.startsWith('L')"), 'with their types');
+        await browser.evaluate("document.querySelector('.replayed button').click()");
+        await browser.settle();
+        await browser.screenshot('10-inspector');
+        await checkNames(browser, 'light paths');
+
+        // Two pages: a stale edit is refused, and the newer list is shown.
+        await other.open(studio.url);
+        await other.until('studio.shown[0].passes > 0', 'an image in the other page');
+        await other.evaluate("document.getElementById('tab-paths').click()");
+        await other.until(`studio.editor() && ${paths}.length === ${2 + picked.length}`, 'the paths in the other page');
+        await other.evaluate(`(() => { ${paths}[0].name = 'of the other page'; return studio.editor().changed(); })()`);
+        await browser.evaluate(`(() => { ${paths}[0].name = 'stale'; return studio.editor().changed(); })()`);
+        await browser.until(`${paths}[0].name === 'of the other page'`, 'the newer list');
+        check(JSON.parse(readFileSync(file))[0].name === 'of the other page', 'the file has the newer list');
+        check(browser.complaints.filter(c => !c.includes('409')).length === 0, `the console is quiet: ${browser.complaints.join('; ')}`);
+
+        // Rendering with these paths.
+        await browser.evaluate("document.getElementById('gain-spp').value = 24");
+        await button('Render with and without');
+        await browser.until("document.getElementById('editor').textContent.includes('the same variance takes')", 'the gain');
+        console.log(`     ${await browser.evaluate('studio.editor().gain.textContent')}`);
+        check(await studio.stop() === 0, 'Ctrl-C ends with exit code 0');
+        check(existsSync(join(folder, 'mirror-1.exr')), 'and writes the images');
+    } finally {
+        browser.close();
+        other.close();
+        await studio.stop('SIGKILL');
+    }
+}
+
+if (screenshots) mkdirSync(screenshots, {recursive: true});
+for (const part of [imagePart, pathPart])
+    try {
+        await part();
+    } catch (error) {
+        console.log(`FAIL ${error.stack}`);
+        ++failures;
+    }
+rmSync(folder, {recursive: true, force: true});
+process.exitCode = failures > 0 ? 1 : 0;

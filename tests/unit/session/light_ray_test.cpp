@@ -1,0 +1,135 @@
+// Rays for those who draw light paths; mirrors and slabs have closed forms.
+
+#include "session/light_ray.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "mcmc/user_paths.h"
+#include "session/scene_geometry.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+/// A lamp above a floor, and a mirror on the left.
+Scene mirror_room() {
+    return build(
+        sensor("0,0,3", "0,-0.3,0", 16, "60") +
+        rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>", diffuse("0.5,0.5,0.5")) +
+        rectangle("<rotate x=\"1\" angle=\"90\"/><scale value=\"0.3\"/>"
+                  "<translate y=\"1\"/>",
+                  "<emitter type=\"area\"/>") +
+        rectangle("<scale value=\"2\"/><rotate y=\"1\" angle=\"90\"/><translate "
+                  "x=\"-1\"/>",
+                  "<bsdf type=\"conductor\"/>"));
+}
+
+/// A slab of glass between y = 0 and y = 0.5, below a lamp and above a floor.
+constexpr float kGlass = 1.5f, kTop = 0.5f;
+Scene slab_room() {
+    return build(sensor("0,0,5", "0,0,0", 16, "60") +
+                 rectangle("<scale value=\"4\"/><rotate x=\"1\" angle=\"-90\"/><translate "
+                           "y=\"-1\"/>",
+                           diffuse("0.5,0.5,0.5")) +
+                 rectangle("<scale value=\"0.3\"/><rotate x=\"1\" angle=\"90\"/><translate "
+                           "y=\"2\"/>",
+                           "<emitter type=\"area\"/>") +
+                 "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"3\" y=\"0.25\" "
+                 "z=\"3\"/><translate y=\"0.25\"/></transform><bsdf type=\"dielectric\"><float "
+                 "name=\"int_ior\" value=\"1.5\"/><float name=\"ext_ior\" value=\"1\"/></bsdf>"
+                 "</shape>");
+}
+
+TEST(Snap, MirrorIsThatOfTheMirroredPoint) {
+    const Scene scene = mirror_room();
+    const Vec3 lamp{0, 1, 0}, floor{0.3f, -1, 0.4f};
+    // The mirror is the plane x = -1: the straight line to the mirrored point meets it.
+    const Vec3 mirrored{-2 - floor.x, floor.y, floor.z};
+    const float t = (-1 - lamp.x) / (mirrored.x - lamp.x);
+    const Vec3 expected = lamp + (mirrored - lamp) * t;
+    const std::vector<Vec3> given{lamp, expected + Vec3{0, 0.2f, -0.15f}, floor};
+    const Snapped s = snap(scene, given, 1);
+    ASSERT_EQ(s.problem, "");
+    EXPECT_LT(length(s.points[1] - expected), 1e-4f);
+    EXPECT_EQ(s.points[0].y, lamp.y);
+    EXPECT_EQ(s.points[2].z, floor.z);
+    GivenPath path{.name = "", .points = s.points, .cones = {1}, .radius = {}};
+    EXPECT_EQ(check_user_path(scene, path).problem, "");
+    path.points = given;
+    EXPECT_NE(check_user_path(scene, path).problem, "");
+}
+
+TEST(Snap, SlabIsThatOfSnellsLaw) {
+    const Scene scene = slab_room();
+    const Vec3 lamp{0, 2, 0}, floor{1.2f, -1, 0.5f};
+    // The horizontal distance covered, as a function of sin θ above the slab; by bisection.
+    const float wanted = std::hypot(floor.x, floor.z);
+    const auto covered = [&](double sine) {
+        const double inner = sine / double(kGlass);
+        return 2.5 * sine / std::sqrt(1 - sine * sine) +
+               double(kTop) * inner / std::sqrt(1 - inner * inner);
+    };
+    double low = 0, high = 0.999;
+    for (int i = 0; i < 80; ++i)
+        (covered((low + high) / 2) < double(wanted) ? low : high) = (low + high) / 2;
+    const double tangent = low / std::sqrt(1 - low * low);
+    const Vec3 along = Vec3{floor.x, 0, floor.z} * (1 / wanted);
+    const Vec3 above = along * float(1.5 * tangent) + Vec3{0, kTop, 0},
+               below = along * float(double(wanted) - tangent);
+    std::vector<Vec3> given{lamp, above + Vec3{0.1f, 0, 0.05f}, below + Vec3{-0.08f, 0, 0.1f},
+                            floor};
+    for (const size_t index : {1u, 2u}) {
+        const Snapped s = snap(scene, given, index);
+        ASSERT_EQ(s.problem, "");
+        EXPECT_LT(length(s.points[1] - above), 1e-4f);
+        EXPECT_LT(length(s.points[2] - below), 1e-4f);
+        const GivenPath path{.name = "", .points = s.points, .cones = {1}, .radius = {}};
+        EXPECT_EQ(check_user_path(scene, path).problem, "");
+    }
+}
+
+TEST(Snap, SaysWhyNot) {
+    const Scene scene = mirror_room();
+    const std::vector<Vec3> diffuse_middle{{0, 1, 0}, {0, -1, 0}, {0.3f, -1, 0}};
+    EXPECT_NE(snap(scene, diffuse_middle, 1).problem, "");
+    EXPECT_NE(snap(scene, diffuse_middle, 0).problem, "");
+    EXPECT_NE(snap(scene, diffuse_middle, 7).problem, "");
+    // The mirror sends nothing behind itself.
+    const std::vector<Vec3> behind{{0, 1, 0}, {-1, 0, 0}, {-3, -1, 0}};
+    EXPECT_NE(snap(scene, behind, 1).problem, "");
+    EXPECT_EQ(snap(scene, behind, 1).points.size(), 3u);
+}
+
+TEST(TraceLight, FollowsMirrorsToTheFirstDiffuseSurface) {
+    const Scene scene = mirror_room();
+    const auto points = trace_light(scene, {0, 0.999f, 0}, normalize(Vec3{-1, -1, 0}), 8);
+    ASSERT_EQ(points.size(), 2u);
+    EXPECT_TRUE(points[0].is_specular);
+    EXPECT_LT(length(points[0].p - Vec3{-1, -0.001f, 0}), 1e-4f);
+    EXPECT_FALSE(points[1].is_specular);
+    EXPECT_NEAR(points[1].p.y, -1, 1e-5f);
+    EXPECT_EQ(trace_light(scene, {0, 0.999f, 0}, normalize(Vec3{-1, -1, 0}), 1).size(), 1u);
+    EXPECT_TRUE(trace_light(scene, {0, 9, 0}, {0, 1, 0}, 8).empty());
+}
+
+TEST(DrawnShapes, KeepTheirBoundsAndTheirLimit) {
+    const Scene scene = build(sensor("0,0,3", "0,0,0", 8) + room() + area_lamp() +
+                              sphere("0.3,0.2,0.1", "0.4", diffuse("0.5,0.5,0.5")));
+    const std::vector<DrawnShape> all = drawn_shapes(scene, 1'000'000);
+    ASSERT_EQ(all.size(), scene.shapes().size());
+    for (const DrawnShape& s : all) {
+        const Bounds3 b = scene.shapes()[s.shape].shape->bounds();
+        EXPECT_LT(length(s.bounds.lo - b.lo) + length(s.bounds.hi - b.hi), 2e-2f);
+        for (const uint32_t i : s.triangles) EXPECT_LT(i, s.positions.size() / 3);
+    }
+    EXPECT_EQ(std::count_if(all.begin(), all.end(), [](const auto& s) { return s.emits; }), 1);
+    size_t triangles = 0;
+    for (const DrawnShape& s : drawn_shapes(scene, 500)) triangles += s.triangles.size() / 3;
+    EXPECT_LT(triangles, 2400u);
+}
+
+}  // namespace
+}  // namespace etendue::test

@@ -1,0 +1,105 @@
+// Paths that are traced again are those of the rendering.
+
+#include "session/replay.h"
+
+#include <gtest/gtest.h>
+
+#include "render/renderer.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+Scene small_room() {
+    return build(sensor("0,0,3.5", "0,0,0", 8) + room() + area_lamp() +
+                 sphere("0.3,-0.5,0.1", "0.4", "<bsdf type=\"conductor\"/>"));
+}
+
+class ReplayOf : public ::testing::TestWithParam<const char*> {};
+
+/// Contributions with t ≥ 2 sum to what the pixel has of them; the film's other part are splats.
+TEST_P(ReplayOf, SumsToThePixel) {
+    const Scene scene = small_room();
+    constexpr uint32_t kPasses = 16;
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(GetParam());
+    settings.seed = 4;
+    settings.threads = 1;
+    settings.spp = kPasses;
+    settings.technique_depth = 12;
+    settings.integrator.params["max_depth"] = "10";
+    Renderer renderer(scene, settings);
+    renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+    std::vector<Rgb> eye(scene.film().pixel_count()), splats(eye.size());
+    for (const auto& e : renderer.techniques()->images())
+        for (size_t i = 0; i < eye.size(); ++i)
+            (e.technique.t >= 2 ? eye : splats)[i] += e.weighted[i];
+    for (const uint64_t pixel : {9u, 27u, 36u, 58u}) {
+        ReplayRequest request;
+        request.integrator = settings.integrator;
+        request.sampler = settings.sampler;
+        request.seed = settings.seed;
+        request.pixel = pixel;
+        request.passes = kPasses;
+        request.seconds = 100;
+        const Replay all = replay(scene, request);
+        EXPECT_EQ(all.passes, kPasses);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(all.sum[c] / kPasses, eye[pixel][c], 1e-4f * (1 + eye[pixel][c])) << pixel;
+        Rgb listed;
+        for (const ReplayedPath& p : all.paths) {
+            listed += p.value;
+            ASSERT_EQ(int(p.points.size()), p.technique.vertices());
+            EXPECT_EQ(p.points.front().event, 'L');
+            EXPECT_EQ(p.points.back().event, 'E');
+        }
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(listed[c], all.sum[c], 1e-3f * (1 + all.sum[c]));
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, ReplayOf, ::testing::Values("path", "bdpt:roulette=0"));
+
+TEST(Replay, SplatsAreThoseOfOnePass) {
+    const Scene scene = small_room();
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse("light");
+    settings.seed = 4;
+    settings.threads = 1;
+    settings.spp = 1;
+    Renderer renderer(scene, settings);
+    renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+    ReplayRequest request;
+    request.integrator = settings.integrator;
+    request.sampler = settings.sampler;
+    request.seed = settings.seed;
+    request.pixel = 60;
+    request.splats = true;
+    request.seconds = 100;
+    const Replay r = replay(scene, request);
+    EXPECT_EQ(r.light_paths, scene.film().pixel_count());
+    Rgb sum;
+    for (const ReplayedPath& p : r.paths) sum += p.value;
+    for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(sum[c], renderer.film().image()[60][c], 1e-5f + 1e-4f * sum[c]);
+}
+
+TEST(Replay, EndsAtItsLimits) {
+    const Scene scene = small_room();
+    ReplayRequest request;
+    request.integrator = IntegratorSpec::parse("bdpt");
+    request.pixel = 27;
+    request.passes = 1000;
+    request.most_paths = 10;
+    const Replay r = replay(scene, request);
+    EXPECT_EQ(r.paths.size(), 10u);
+    EXPECT_GT(r.left_out, 0u);
+    request.seconds = 0;
+    EXPECT_EQ(replay(scene, request).passes, 0u);
+    for (const char* shared : {"vcm", "mlt", "path:guide=paths", "bdpt:connections=cache"})
+        EXPECT_NE(replay_problem(IntegratorSpec::parse(shared)), "") << shared;
+    request.integrator = IntegratorSpec::parse("vcm");
+    EXPECT_THROW(replay(scene, request), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace etendue::test

@@ -1,0 +1,254 @@
+// Runs of a session: their images are those of a plain rendering; commands; snapshots and their budget.
+
+#include "session/session.h"
+
+#include <cstring>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "session/workers.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+Scene small_room() {
+    return build(sensor("0,0,3.5", "0,0,0", 24) + room() + area_lamp());
+}
+
+template <class Condition>
+bool wait_for(const Condition& condition) {
+    for (int i = 0; i < 6000; ++i) {
+        if (condition()) return true;
+        std::this_thread::sleep_for(5ms);
+    }
+    return false;
+}
+
+bool wait_for_scene(const Session& session) {
+    return wait_for([&] { return session.scene() || !session.load_error().empty(); });
+}
+
+RunRequest request(const std::string& integrator, uint64_t spp) {
+    RunRequest r;
+    r.integrator = integrator;
+    r.seed = 3;
+    r.limits.spp = spp;
+    return r;
+}
+
+std::vector<Rgb> plain_image(const Scene& scene, const RunRequest& r) {
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(r.integrator);
+    settings.sampler = r.sampler;
+    settings.seed = r.seed;
+    settings.threads = 1;
+    settings.spp = r.limits.spp;
+    Renderer renderer(scene, settings);
+    renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+    return renderer.film().image();
+}
+
+class SessionBits : public ::testing::TestWithParam<std::tuple<const char*, int>> {};
+
+TEST_P(SessionBits, AreThoseOfRenderThroughStopsAndSnapshots) {
+    const auto& [integrator, threads] = GetParam();
+    constexpr int kStops = 20;
+    const RunRequest r = request(integrator, 3 * kStops);
+    Session session(small_room, threads);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(r);
+    for (int stops = 1; stops <= kStops; ++stops) {
+        wait_for([&] {
+            session.snapshot(run);
+            const RunStatus s = session.status(run);
+            return s.passes >= uint64_t(stops) || s.state == RunState::Finished;
+        });
+        stops % 2 == 0 ? session.stop(run) : session.discard(run);
+        session.snapshot(run);
+        session.resume(run, {});
+    }
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    ASSERT_TRUE(wait_for([&] { return session.snapshot(run)->passes == 3 * kStops; }));
+    const std::shared_ptr<const Snapshot> shown = session.snapshot(run);
+    const std::vector<Rgb> expected = plain_image(small_room(), r);
+    ASSERT_EQ(shown->mean.size(), expected.size());
+    EXPECT_EQ(std::memcmp(shown->mean.data(), expected.data(), expected.size() * sizeof(Rgb)), 0);
+    const RunStatus s = session.status(run);
+    EXPECT_EQ(s.passes, 3u * kStops);
+    EXPECT_EQ(s.snapshot_passes, s.passes);
+    EXPECT_FALSE(s.history.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, SessionBits,
+                         ::testing::Combine(::testing::Values("path", "bdpt", "vcm"),
+                                            ::testing::Values(1, 2)));
+
+TEST(Session, SnapshotHasTheVarianceOfTheFilm) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const RunRequest r = request("path", 8);
+    const int run = session.start(r);
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    const Scene scene = small_room();
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse("path");
+    settings.sampler = r.sampler;
+    settings.seed = r.seed;
+    settings.spp = r.limits.spp;
+    Renderer renderer(scene, settings);
+    renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+    const std::vector<Rgb> expected = renderer.film().variance();
+    const auto shown = session.snapshot(run);
+    ASSERT_EQ(shown->variance.size(), expected.size());
+    for (size_t i = 0; i < expected.size(); ++i)
+        for (int c = 0; c < 3; ++c)
+            ASSERT_NEAR(shown->variance[i][c], expected[i][c], 1e-5f * expected[i][c]);
+}
+
+TEST(Session, RunsTakeTurnsAndCanBeRemoved) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int a = session.start(request("path", 1u << 30)), b = session.start(request("light", 4));
+    EXPECT_NE(a, b);
+    ASSERT_TRUE(wait_for([&] { return session.status(b).state == RunState::Finished; }));
+    EXPECT_EQ(session.status(a).state, RunState::Rendering);
+    EXPECT_EQ(session.status(b).passes, 4u);
+    session.remove(a);
+    ASSERT_TRUE(wait_for([&] { return session.runs().size() == 1; }));
+    EXPECT_THROW(session.status(a), std::runtime_error);
+    RenderLimits more;
+    more.spp = 9;
+    session.resume(b, more);
+    ASSERT_TRUE(wait_for([&] { return session.status(b).passes == 9; }));
+}
+
+TEST(Session, RefusesWithTheIntegratorsMessage) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    for (const char* bad : {"nonsense", "path:max_depth=-7", "bdpt:depth=3"}) {
+        std::string expected, message;
+        try {
+            make_integrator(IntegratorSpec::parse(bad));
+        } catch (const std::exception& e) {
+            expected = e.what();
+        }
+        try {
+            session.start(request(bad, 1));
+        } catch (const std::exception& e) {
+            message = e.what();
+        }
+        EXPECT_FALSE(message.empty());
+        EXPECT_EQ(message, expected);
+    }
+    EXPECT_TRUE(session.runs().empty());
+}
+
+TEST(Session, SavesBetweenPasses) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(request("path", 1u << 30));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).passes > 2; }));
+    const std::string file =
+        (std::filesystem::temp_directory_path() / "etendue-session-test.pfm").string();
+    std::atomic<bool> is_done{false};
+    std::string error;
+    session.save(run, file, [&](const std::string& e) {
+        error = e;
+        is_done = true;
+    });
+    ASSERT_TRUE(wait_for([&] { return is_done.load(); }));
+    EXPECT_EQ(error, "");
+    EXPECT_TRUE(std::filesystem::remove(file));
+}
+
+TEST(Session, TechniqueImagesAreMadeOnDemand) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    RunRequest r = request("bdpt", 3);
+    r.technique_depth = 3;
+    const int run = session.start(r);
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    ASSERT_TRUE(wait_for([&] { return session.techniques(run) != nullptr; }));
+    EXPECT_EQ(session.techniques(run)->passes, 3u);
+    EXPECT_FALSE(session.techniques(run)->images.empty());
+}
+
+TEST(Session, FailureToLoadIsKept) {
+    std::atomic<bool> is_bad{true};
+    Session session(
+        [&] {
+            if (is_bad) throw std::runtime_error("no such scene");
+            return small_room();
+        },
+        1);
+    ASSERT_TRUE(wait_for_scene(session));
+    EXPECT_EQ(session.load_error(), "no such scene");
+    EXPECT_THROW(session.start(request("path", 1)), std::runtime_error);
+    is_bad = false;
+    session.reload();
+    ASSERT_TRUE(wait_for([&] { return session.scene() != nullptr; }));
+    EXPECT_EQ(session.load_error(), "");
+    const int run = session.start(request("path", 1u << 30));
+    session.reload();
+    ASSERT_TRUE(wait_for([&] { return !session.status(run).is_of_this_scene; }));
+    EXPECT_EQ(session.status(run).state, RunState::Stopped);
+}
+
+TEST(SnapshotBudget, KeepsTheShare) {
+    SnapshotBudget budget;
+    SnapshotBudget::Clock::time_point now{};
+    constexpr double kCost = 0.013, kPass = 0.05, kLength = 100;
+    double used = 0;
+    int taken = 0;
+    for (int pass = 0; double(pass) * kPass < kLength; ++pass) {
+        now += std::chrono::microseconds(int(kPass * 1e6));
+        if (!budget.allows(now)) continue;
+        budget.taken(now, kCost);
+        budget.spent(0.5 * kCost);
+        used += 1.5 * kCost;
+        ++taken;
+    }
+    EXPECT_GT(taken, 50);
+    EXPECT_LE(used, SnapshotBudget::kShare * kLength * 1.05);
+}
+
+TEST(SnapshotPool, GivesNoMemoryAwayThatAReaderHolds) {
+    SnapshotPool pool;
+    const Snapshot* first = nullptr;
+    {
+        const auto a = pool.take(), b = pool.take();
+        EXPECT_NE(a, b);
+        first = a.get();
+    }
+    const auto c = pool.take(), d = pool.take();
+    EXPECT_TRUE(c.get() == first || d.get() == first);
+    std::shared_ptr<Snapshot> survivor;
+    {
+        SnapshotPool shortlived;
+        survivor = shortlived.take();
+    }
+    survivor->passes = 1;
+}
+
+TEST(Workers, RefuseWhenTooManyWait) {
+    std::atomic<bool> may_end{false};
+    std::atomic<int> ended{0};
+    Workers workers;
+    size_t taken = 0;
+    for (int i = 0; i < 100; ++i)
+        taken += workers.post([&] {
+            while (!may_end) std::this_thread::sleep_for(1ms);
+            ++ended;
+        });
+    EXPECT_GE(taken, Workers::kMostWaiting);
+    EXPECT_LE(taken, Workers::kMostWaiting + Workers::kThreads);
+    may_end = true;
+    EXPECT_TRUE(wait_for([&] { return size_t(ended.load()) == taken; }));
+}
+
+}  // namespace
+}  // namespace etendue::test

@@ -1,0 +1,144 @@
+// Requests, names of files and images of the studio, without sockets; and the reader of requests.
+
+#include <cmath>
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "image/image.h"
+#include "studio/guard.h"
+#include "studio/image_reply.h"
+#include "studio/server.h"
+
+namespace etendue::test {
+namespace {
+
+Request good_request() {
+    return {.method = "GET",
+            .target = "/v1/state",
+            .host = "127.0.0.1:80",
+            .origin = {},
+            .fetch_site = {},
+            .authorization = "Bearer secret",
+            .if_match = {},
+            .body = {},
+            .local_address = "127.0.0.1"};
+}
+int status(const Request& r) {
+    const auto refused = refuse(r, "secret");
+    return refused ? refused->status : 200;
+}
+
+TEST(Refuse, LetsTheOwnPagePass) {
+    Request r = good_request();
+    EXPECT_EQ(status(r), 200);
+    r.origin = "http://127.0.0.1:80";
+    r.fetch_site = "same-origin";
+    EXPECT_EQ(status(r), 200);
+    r.host = "[::1]:99", r.local_address = "::1", r.origin = {};
+    EXPECT_EQ(status(r), 200);
+}
+
+TEST(Refuse, OthersAndWrongTokens) {
+    for (const char* token : {"", "Bearer ", "Bearer secreT", "bearer secret", "secret",
+                              "Bearer secret ", "Bearer secretsecret"}) {
+        Request r = good_request();
+        r.authorization = token;
+        EXPECT_EQ(status(r), 401) << token;
+    }
+    for (const char* host : {"", "evil", "127.0.0.1.evil", "[127.0.0.1", "[::1]x", "0.0.0.0"}) {
+        Request r = good_request();
+        r.host = host;
+        EXPECT_EQ(status(r), 403) << host;
+        r.target = "/";
+        EXPECT_EQ(status(r), 403) << host;
+    }
+}
+
+TEST(Tokens, Have128BitsAndDiffer) {
+    const std::string a = make_token(), b = make_token();
+    EXPECT_EQ(a.size(), 32u);
+    EXPECT_NE(a, b);
+}
+
+TEST(FileNames, AreSimple) {
+    for (const char* good : {"a", "picture.exr", "A_b-c.1"}) EXPECT_TRUE(is_file_name(good));
+    for (const std::string bad : {"", ".", "..", ".a", "a/b", "a\\b", "a b", "ä", "a\n", "%41"})
+        EXPECT_FALSE(is_file_name(bad)) << bad;
+    EXPECT_FALSE(is_file_name(std::string(129, 'a')));
+    EXPECT_FALSE(is_file_name(std::string("a\0b", 3)));
+}
+
+TEST(Queries, AreDecodedOnce) {
+    Request r = good_request();
+    r.target = "/v1/image?view=length%3a2&run=3&twice=1&twice=2&bad=%4&worse=%zz&empty=&alone";
+    EXPECT_EQ(r.path(), "/v1/image");
+    EXPECT_EQ(r.query("view"), "length:2");
+    EXPECT_EQ(r.query("run"), "3");
+    EXPECT_EQ(r.query("empty"), "");
+    for (const char* none : {"twice", "bad", "worse", "alone", "missing", "un"})
+        EXPECT_FALSE(r.query(none)) << none;
+}
+
+TEST(Requests, AreReadWithinLimits) {
+    const auto read = [](const std::string& text) { return parse_request(text); };
+    const ParsedRequest good = read("PUT /v1/paths?file=a HTTP/1.1\r\nHost: h\r\nOrigin: o\r\n"
+                                    "Sec-Fetch-Site: s\r\nAuthorization: t\r\nIf-Match: e\r\n"
+                                    "Content-Length: 2\r\n\r\n[]");
+    ASSERT_TRUE(good.request);
+    EXPECT_EQ(good.request->method, "PUT");
+    EXPECT_EQ(good.request->host + good.request->origin + good.request->fetch_site +
+                  good.request->authorization + good.request->if_match + good.request->body,
+              "hoste[]");
+    const auto refused = [&](const std::string& text) {
+        const ParsedRequest r = read(text);
+        return r.refusal ? r.refusal->status : 200;
+    };
+    EXPECT_EQ(refused("GET / HTTP/1.1\r\nX: " + std::string(9000, 'x') + "\r\n\r\n"), 431);
+    EXPECT_EQ(refused("POST / HTTP/1.1\r\nContent-Length: 1048577\r\n\r\n"), 413);
+    EXPECT_EQ(refused("POST / HTTP/1.1\r\nContent-Length: -1\r\n\r\n"), 400);
+    EXPECT_EQ(refused("POST / HTTP/1.1\r\nContent-Length: 9\r\n\r\n[]"), 400);
+    EXPECT_EQ(refused("GET / HTTP/1.1\r\nHost: a"), 400);
+    EXPECT_EQ(refused(""), 400);
+}
+
+float half_at(const std::string& body, size_t index) {
+    uint16_t bits = 0;
+    std::memcpy(&bits, body.data() + 64 + 2 * index, 2);
+    return float(Half(Half::FromBits, bits));
+}
+uint32_t field_at(const std::string& body, size_t index) {
+    uint32_t value = 0;
+    std::memcpy(&value, body.data() + 4 + 4 * index, 4);
+    return value;
+}
+
+TEST(Images, KeepRectanglesLevelsAndLargeValues) {
+    std::vector<Rgb> pixels;
+    for (int i = 0; i < 15; ++i) pixels.push_back(Rgb(float(i), 1, 1e6f));
+    ImageHeader h{.run = 7, .passes = 3, .width = 5, .height = 3, .rect = {1, 1, 3, 2}, .level = 0};
+    const std::string whole = encode_image(h, pixels);
+    EXPECT_EQ(whole.size(), 64 + 3 * 2 * 3 * 2u);
+    EXPECT_EQ(whole.substr(0, 4), "ETND");
+    EXPECT_EQ(field_at(whole, 1), 7u);
+    EXPECT_EQ(field_at(whole, 2), 3u);
+    const float scale = std::ldexp(1.0f, int(field_at(whole, 9)));
+    EXPECT_GT(scale, 1);
+    EXPECT_EQ(half_at(whole, 0) * scale, 6);
+    EXPECT_NEAR(half_at(whole, 2) * scale, 1e6f, 1e3f);
+    h.level = 1;
+    const std::string coarse = encode_image(h, pixels);
+    EXPECT_EQ(coarse.size(), 64 + 2 * 1 * 3 * 2u);
+    EXPECT_NEAR(half_at(coarse, 0) * scale, (6 + 7 + 11 + 12) / 4.0f, 0.01f);
+    EXPECT_NEAR(half_at(coarse, 3) * scale, (8 + 13) / 2.0f, 0.01f);
+    for (const ImageRect bad :
+         {ImageRect{-1, 0, 1, 1}, ImageRect{0, 0, 6, 1}, ImageRect{4, 2, 2, 1},
+          ImageRect{0, 0, 0, 1}, ImageRect{1, 1, 2147483647, 1}}) {
+        h.rect = bad;
+        EXPECT_THROW(check(h), std::runtime_error);
+    }
+}
+
+}  // namespace
+}  // namespace etendue::test
