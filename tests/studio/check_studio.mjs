@@ -291,7 +291,8 @@ async function pathPart() {
         check(differs(end, await browser.evaluate(`${paths}[1].points[2]`)), 'the pointer moves a point');
         await button('Undo');
         await idle(browser);
-        check(await browser.evaluate(`${paths}[1].verdict.ok`), 'which can be undone');
+        await browser.until(`${paths}[1].verdict?.ok`, 'the undone move');
+        check(!differs(end, await browser.evaluate(`${paths}[1].points[2]`)), 'which can be undone');
         const orbit = await browser.evaluate('studio.space().azimuth');
         await browser.drag([x + 0.9 * w, y + 0.1 * h], [x + 0.8 * w, y + 0.1 * h]);
         check(await browser.evaluate('studio.space().azimuth') !== orbit, 'dragging turns the view');
@@ -329,7 +330,7 @@ async function pathPart() {
         // Rendering with these paths.
         await browser.evaluate("document.getElementById('gain-spp').value = 24");
         await button('Render with and without');
-        await browser.until("document.getElementById('editor').textContent.includes('the same variance takes')", 'the gain');
+        await browser.until("document.getElementById('editor').textContent.includes('the same variance takes')", 'the gain', 240);
         console.log(`     ${await browser.evaluate('studio.editor().gain.textContent')}`);
         check(await studio.stop() === 0, 'Ctrl-C ends with exit code 0');
         check(existsSync(join(folder, 'mirror-1.exr')), 'and writes the images');

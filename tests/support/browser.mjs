@@ -81,12 +81,12 @@ export class Browser {
         return result.value;
     }
 
-    async until(expression, what) {
-        for (let i = 0; i < 300; ++i) {
+    async until(expression, what, seconds = 60) {
+        for (let i = 0; i < 10 * seconds; ++i) {
             if (await this.evaluate(`Boolean(${expression})`)) return;
             await new Promise(r => setTimeout(r, 100));
         }
-        throw new Error(`${what}: not within 30 s`);
+        throw new Error(`${what}: not within ${seconds} s`);
     }
 
     /// Two frames, so that what was asked for is drawn.

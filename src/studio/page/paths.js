@@ -7,6 +7,12 @@ import {element, significant} from './controls.js';
 /** @typedef {[number, number, number]} Vec */
 /** @typedef {{name: string, points: Vec[], cone: number | number[], radius?: number, on: boolean, verdict?: {ok: boolean, point?: number, problem?: string}}} Path */
 
+/**
+ * From press to release. Its moves wait in the queue and may be carried out after the release; undo takes back all of
+ * them at once.
+ * @typedef {{isRemembered: boolean}} Drag
+ */
+
 const kColors = [[1, 0.75, 0.3], [0.5, 0.8, 1], [0.6, 1, 0.6], [1, 0.6, 0.9], [1, 1, 0.5]];
 
 export class PathEditor {
@@ -29,6 +35,8 @@ export class PathEditor {
         /** @type {string[]} */
         this.done = [];
         this.version = 0;
+        /** @type {Drag | null} */
+        this.drag = null;
         /** Edits follow one another, each after the answer to the last. */
         this.queue = Promise.resolve();
         this.list = element('div', {className: 'paths', role: 'group', 'aria-label': 'Paths'});
@@ -42,7 +50,7 @@ export class PathEditor {
         parent.append(
             element('div', {className: 'bar'}, [element('label', {}, ['file ', fileInput])]),
             element('div', {className: 'bar'}, [button('New path', 'N', () => this.begin()), button('Undo', 'Ctrl+Z', () => this.undo()), button('Redo', 'Ctrl+Y', () => this.redo()),
-                button('Continue by mirrors', 'T', () => this.run(() => this.trace())), button('Obey the law', 'M', () => this.run(() => this.solve())), button('Delete', 'Del', () => this.remove())]),
+                button('Continue by mirrors', 'T', () => this.run(() => this.trace())), button('Obey the law', 'M', () => this.run(() => this.solve())), button('Delete', 'Del', () => this.run(() => this.remove()))]),
             this.list, this.status,
             element('div', {className: 'bar'}, [button('Pick from pixel', 'Paths of a short run that reach the pixel', () => this.run(() => this.pick())),
                 element('label', {}, ['of edges ', this.length])]),
@@ -51,8 +59,12 @@ export class PathEditor {
         space.tell = {
             click: (x, y) => { if (this.chosen >= 0) this.run(() => this.addPoint(x, y)); },
             press: (x, y) => this.choosePointAt(x, y),
-            drag: (x, y) => { this.dragTo = [x, y]; this.run(() => this.movePoint(), 'drag'); return true; },
-            release: () => { this.dragTo = null; this.isDragging = false; },
+            drag: (x, y) => {
+                const drag = this.drag ??= {isRemembered: false};
+                this.run(() => this.movePoint(x, y, drag), 'drag');
+                return true;
+            },
+            release: () => { this.drag = null; },
         };
         this.open();
     }
@@ -92,17 +104,17 @@ export class PathEditor {
     }
 
     /** @param {string[]} from @param {string[]} to */
-    restore(from, to) {
+    async restore(from, to) {
         const text = from.pop();
         if (text === undefined) return;
         to.push(this.snapshot());
         this.paths = JSON.parse(text);
         this.chosen = Math.min(this.chosen, this.paths.length - 1);
         this.point = -1;
-        this.run(() => this.changed());
+        await this.changed();
     }
-    undo() { this.restore(this.done, this.undone); }
-    redo() { this.restore(this.undone, this.done); }
+    undo() { return this.run(() => this.restore(this.done, this.undone)); }
+    redo() { return this.run(() => this.restore(this.undone, this.done)); }
 
     /** After an edit: check, draw, save. */
     async changed() {
@@ -194,12 +206,12 @@ export class PathEditor {
         return found;
     }
 
-    async movePoint() {
-        if (!this.dragTo) return;
-        const hit = await this.space.pick(this.dragTo[0], this.dragTo[1]);
+    /** @param {number} x @param {number} y @param {Drag} drag */
+    async movePoint(x, y, drag) {
+        const hit = await this.space.pick(x, y);
         if (!hit || !this.path()?.points[this.point]) return;
-        if (!this.isDragging) this.remember();
-        this.isDragging = true;
+        if (!drag.isRemembered) this.remember();
+        drag.isRemembered = true;
         this.path().points[this.point] = hit.point;
         await this.changed();
     }
@@ -239,7 +251,7 @@ export class PathEditor {
         await this.changed();
     }
 
-    remove() {
+    async remove() {
         const path = this.path();
         if (!path) return;
         this.remember();
@@ -247,7 +259,7 @@ export class PathEditor {
         else this.paths.splice(this.chosen, 1);
         this.point = -1;
         this.chosen = Math.min(this.chosen, this.paths.length - 1);
-        this.run(() => this.changed());
+        await this.changed();
     }
 
     async pick() {
@@ -302,7 +314,7 @@ export class PathEditor {
         }
         if (e.ctrlKey || e.altKey || e.metaKey) return false;
         if (e.key === 'n') this.begin();
-        else if (e.key === 'Delete') this.remove();
+        else if (e.key === 'Delete') this.run(() => this.remove());
         else if (e.key === 't') this.run(() => this.trace());
         else if (e.key === 'm') this.run(() => this.solve());
         else if (document.activeElement !== this.space.canvas) return false;
@@ -352,7 +364,11 @@ export class PathEditor {
     /** @param {Path} path @param {number} i */
     row(path, i) {
         const name = path.name || `path ${i + 1}`;
-        const edit = (/** @type {() => void} */ change) => { this.remember(); change(); this.run(() => this.changed()); };
+        const edit = (/** @type {() => void} */ change) => this.run(async () => {
+            this.remember();
+            change();
+            await this.changed();
+        });
         const cones = [path.cone].flat();
         const verdict = path.points.length < 2 ? element('div', {className: 'soft', textContent: 'needs two points'})
             : !path.verdict ? null : path.verdict.ok ? element('div', {className: 'good', textContent: '✓ can be used'})
