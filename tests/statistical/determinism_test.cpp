@@ -44,13 +44,22 @@ bool same_bits(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Rgb)) == 0;
 }
 
+#ifdef __SANITIZE_THREAD__
+// A race shows with either sampler, and a rendering takes ten times as long.
+constexpr int kThreads[] = {2, 7};
+constexpr SamplerKind kSamplers[] = {SamplerKind::Sobol};
+#else
+constexpr int kThreads[] = {1, 2, 3, 7};
+constexpr SamplerKind kSamplers[] = {SamplerKind::Independent, SamplerKind::Sobol};
+#endif
+
 class Determinism : public ::testing::TestWithParam<std::tuple<const char*, SamplerKind>> {};
 
 TEST_P(Determinism, OfThreadsAndSeeds) {
     const auto& [integrator, sampler] = GetParam();
     const Scene scene = scene_with_tent();
     const Rendering one = render(scene, integrator, sampler, 5, 1);
-    for (const int threads : {1, 2, 3, 7}) {
+    for (const int threads : kThreads) {
         const Rendering more = render(scene, integrator, sampler, 5, threads);
         EXPECT_TRUE(same_bits(one.image, more.image)) << threads << " threads";
         EXPECT_TRUE(same_bits(one.variance, more.variance)) << threads << " threads";
@@ -70,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(
                                          "mlt:groups=2,chains=48", "upg+pssmlt:groups=2,chains=24",
                                          "mps:mutations=2000,precision=0.2",
                                          "mps:target=path,mutations=1000,precision=0.2"),
-                       ::testing::Values(SamplerKind::Independent, SamplerKind::Sobol)),
+                       ::testing::ValuesIn(kSamplers)),
     [](const auto& p) {
         std::string name = std::get<0>(p.param);
         for (char& c : name)
