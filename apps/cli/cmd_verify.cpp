@@ -169,11 +169,13 @@ std::string power(const Detectable& d) {
     if (!d.image) return "no error of the image could have been found";
     std::string text = fmt::format("an error of {} of the image", percent(*d.image));
     if (d.length)
-        text += fmt::format(
-            ", and of {} of any path length with {:.0f} % of the light or more{}",
-            percent(*d.length), 100 * kLargeShare,
-            d.not_tested.empty() ? "" : fmt::format(" (but {})", fmt::join(d.not_tested, ", ")));
-    return text + ", would have been found with 90 % probability";
+        text += fmt::format(", or of {} of any path length with {:.0f} % of the light or more{},",
+                            percent(*d.length), 100 * kLargeShare,
+                            d.not_tested.empty()
+                                ? ""
+                                : fmt::format(" (except paths of {} edges, which were not tested)",
+                                              fmt::join(d.not_tested, ", ")));
+    return text + " would have been found with 90 % probability";
 }
 
 void print_verdict(const VerifyReport& report, const MethodReport& m,
@@ -198,8 +200,8 @@ void print_verdict(const VerifyReport& report, const MethodReport& m,
         fmt::print("; {} of the light is out of reach of the method or of all references",
                    percent(m.out_of_reach));
     if (m.too_rare > 0)
-        fmt::print("; {} of the light comes along paths too rare for a test, which could hide an "
-                   "error of up to that size",
+        fmt::print("; {} of the light comes from paths that are too rare for a test, which could "
+                   "hide an error of up to that size",
                    percent(m.too_rare));
     fmt::print("\n\n");
 }
