@@ -176,9 +176,10 @@ MaterialEntry coatedconductor_entry() {
                 {{"coat_alpha", ParamKind::Texture, "0", "Roughness of the coat; 0 is smooth."},
                  {"material", ParamKind::String, "none", "Named metal, or none for reflectance 1."},
                  {"eta", ParamKind::Texture, "0", "Real part of the metal's index."},
-                 {"k", ParamKind::Texture, "1", "Imaginary part of it."},
+                 {"k", ParamKind::Texture, "1", "Imaginary part of the metal's index."},
                  {"reflectance", ParamKind::Texture, "",
-                  "Instead of the metal: its reflectance at normal incidence in air."},
+                  "Reflectance of the metal at normal incidence in air, instead of material, eta "
+                  "and k."},
                  {"int_ior", ParamKind::FloatOrName, "bk7",
                   "Index of refraction of the coat, at least that outside."},
                  {"ext_ior", ParamKind::FloatOrName, "air", "Index of refraction outside."},

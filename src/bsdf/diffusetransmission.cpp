@@ -39,13 +39,14 @@ private:
 }  // namespace
 
 MaterialEntry diffusetransmission_entry() {
-    return {
-        {"bsdf",
-         "diffusetransmission",
-         "Diffuse reflection and transmission.",
-         {{"reflectance", ParamKind::Texture, "0.25", "Share of light reflected, in [0, 1]."},
-          {"transmittance", ParamKind::Texture, "0.25", "Share of light transmitted, in [0, 1]."}}},
-        make_material<DiffuseTransmission>};
+    return {{"bsdf",
+             "diffusetransmission",
+             "Diffuse reflection and transmission.",
+             {{"reflectance", ParamKind::Texture, "0.25",
+               "Fraction of light that is reflected, in [0, 1]."},
+              {"transmittance", ParamKind::Texture, "0.25",
+               "Fraction of light that is transmitted; at most 1 together with reflectance."}}},
+            make_material<DiffuseTransmission>};
 }
 
 }  // namespace etendue

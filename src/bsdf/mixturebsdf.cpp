@@ -80,7 +80,7 @@ MaterialEntry mixturebsdf_entry() {
              "mixturebsdf",
              "Sum of materials with constant weights.",
              {{"weights", ParamKind::String, "",
-               "One number per material; divided by their sum where it exceeds 1."},
+               "One number for each material; if their sum exceeds 1, they are divided by it."},
               {"bsdf", ParamKind::Object, "", "The nested materials."}}},
             make_material<MixtureBsdf>};
 }

@@ -133,7 +133,7 @@ EmitterEntry area_entry() {
              "Emission from the front of a shape, or from both sides.",
              {{"radiance", ParamKind::Texture, "1", "Radiance in W/(m² sr)."},
               {"power", ParamKind::Float, "that of the radiance",
-               "Emitted power (luminance), to which the radiance is scaled."},
+               "Emitted power in W, weighted by luminance, to which the radiance is scaled."},
               {"two_sided", ParamKind::Bool, "false", "Whether the back emits, too."}}},
             [](const Params& p, EmitterContext& c) {
                 if (!c.shape()) p.fail("emitter \"area\" must be nested in a shape");

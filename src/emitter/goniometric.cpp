@@ -42,7 +42,8 @@ std::unique_ptr<Emitter> make(const Params& p, RgbImage image, const Transform& 
 EmitterEntry goniometric_entry() {
     return {{"emitter",
              "goniometric",
-             "Point light whose intensity by direction is an image; importance-sampled.",
+             "Point light whose intensity in each direction is given by an image; "
+             "importance-sampled.",
              {{"filename", ParamKind::String, "",
                "Image over all directions, of any supported format."},
               {"intensity", ParamKind::Rgb, "1", "Factor on the image, in W/sr."},

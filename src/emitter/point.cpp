@@ -95,8 +95,9 @@ EmitterEntry spot_entry() {
               {"beam_width", ParamKind::Float, "3/4 of cutoff_angle",
                "Half-angle in degrees up to which the intensity is full."},
               {"falloff", ParamKind::String, "angle",
-               "Decrease from beam_width to cutoff_angle: angle (linear in it), or, of the cosine, "
-               "smooth (x² (3 - 2x), pbrt-v4), quartic (x⁴, pbrt-v3) or quadratic (x², glTF)."},
+               "Decrease from beam_width to cutoff_angle: angle (linear in the angle), or a "
+               "function of x, the cosine scaled to [0, 1]: smooth (x² (3 - 2x), pbrt-v4), "
+               "quartic (x⁴, pbrt-v3) or quadratic (x², glTF)."},
               {"to_world", ParamKind::Transform, "identity",
                "Its origin is the light's position, and its +z axis is that of the beam."}}},
             [](const Params& p, EmitterContext&) {

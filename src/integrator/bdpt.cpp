@@ -145,8 +145,8 @@ IntegratorEntry bdpt_entry() {
          "path) or cache (random vertices of all light paths of the pass).",
          true});
     params.push_back({"cache_draws", ParamKind::Int, "0",
-                      "Number of connections from each eye vertex to the cache; 0: as many as a "
-                      "light path has connectible vertices on average.",
+                      "Number of connections from each eye vertex to the cache, at most 1024; 0: "
+                      "as many as a light path has connectible vertices on average.",
                       true});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back(Guiding::param());

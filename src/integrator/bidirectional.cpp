@@ -11,8 +11,8 @@ std::vector<ParamInfo> Bidirectional::params() {
     std::vector<ParamInfo> params = depth_params();
     params.push_back(
         {"roulette", ParamKind::Float, "0.15",
-         "Threshold of the Russian roulette before shadow rays, as a fraction of the pixel's "
-         "luminance in earlier passes: a join that would contribute less is tested with a "
+         "Threshold of the Russian roulette before shadow rays, in [0, 1], as a fraction of the "
+         "pixel's luminance in earlier passes: a join that would contribute less is tested with a "
          "probability proportional to its contribution; 0: all joins are tested."});
     params.push_back({"eorr", ParamKind::Bool, "false",
                       "Efficiency-optimised roulette: the threshold is √(V/T) instead, where V is "

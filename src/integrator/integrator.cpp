@@ -189,10 +189,11 @@ DepthOptions DepthOptions::from(const IntegratorParams& params) {
 std::vector<ParamInfo> depth_params() {
     return {
         {"max_depth", ParamKind::Int, "-1",
-         "Number of edges of the longest paths (1: only directly visible light); -1: no limit."},
+         "Number of edges of the longest paths, at least 1 (1: only directly visible light); -1: "
+         "no limit."},
         {"rr_depth", ParamKind::Int, "5",
-         "Index of the first vertex of a sub-path at which Russian roulette is applied; the lens "
-         "or emitter has index 0."}};
+         "Index, at least 1, of the first vertex of a sub-path at which Russian roulette is "
+         "applied; the lens or emitter has index 0."}};
 }
 
 }  // namespace etendue

@@ -17,12 +17,14 @@ constexpr int kPilotRoulette = 10;
 
 std::vector<ParamInfo> MarkovIntegrator::params() {
     return {{"p_large", ParamKind::Float, "0.3",
-             "Probability of a large step, which is an independent sample and counts as one too."},
+             "Probability of a large step, in [0.01, 1]. Large steps also serve as independent "
+             "samples of the image."},
             {"chains", ParamKind::Int, "256",
              "Number of chains in each group; it does not depend on the number of threads."},
             {"groups", ParamKind::Int, "16",
-             "Number of independent groups of chains, even. The groups take turns, one per pass; "
-             "the error is estimated from their differences once each has had a pass."}};
+             "Number of independent groups of chains, an even number from 2 to 1024. The groups "
+             "take turns, one per pass; the error is estimated from their differences once each "
+             "has had a pass."}};
 }
 
 MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions& depth)

@@ -56,13 +56,14 @@ IntegratorEntry mlt_entry() {
     for (ParamInfo& p : params)
         if (p.name == std::string("p_large")) p.fallback = "0.15";
     params.push_back({"user_paths", ParamKind::String, "",
-                      "JSON file of light paths that matter, as `etendue paths` makes and checks "
-                      "them; proposals near them are mixed with bidirectional mutations."});
+                      "JSON file of important light sub-paths, which `etendue paths` makes and "
+                      "checks; proposals near them are mixed with bidirectional mutations."});
     params.push_back({"user_ratio", ParamKind::Float, "1",
-                      "Proposals near user paths for each bidirectional mutation."});
+                      "Number of proposals near user paths for each bidirectional mutation, 0.01 "
+                      "to 100."});
     return {{"integrator", "mlt",
-             "Metropolis light transport on paths, which mutations change in part, or move a "
-             "little. Unbiased.",
+             "Metropolis light transport on paths: mutations replace a part of a path, or move it "
+             "slightly. Unbiased.",
              params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MltIntegrator>(p);

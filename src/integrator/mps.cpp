@@ -47,16 +47,17 @@ IntegratorEntry mps_entry() {
          "importance at its position) or path (its flux times the clamped response of the lens "
          "to a random path from there)."});
     params.push_back({"p_large", ParamKind::Float, "0.3",
-                      "Probability of a large step, which is an independent light path."});
+                      "Probability of a large step, which is an independent light path; in [0.01, "
+                      "1]."});
     params.push_back({"chains", ParamKind::Int, "256",
                       "Number of chains; it does not depend on the number of threads."});
     params.push_back(
         {"precision", ParamKind::Float, "0.02",
-         "Required relative standard error of the normalisation; determines the number "
-         "of light paths of the start-up."});
+         "Required relative standard error of the normalisation, 0.001 to 0.5; determines the "
+         "number of light paths of the start-up."});
     params.push_back(
         {"least_share", ParamKind::Float, "0.25",
-         "A photon with less than this fraction of the power of one mutation is kept "
+         "A photon with less than this fraction, in [0, 1], of the power of one mutation is kept "
          "with a probability proportional to its power, which is increased accordingly.",
          true});
     return {{"integrator", "mps",

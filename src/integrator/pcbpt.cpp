@@ -250,16 +250,18 @@ IntegratorEntry pcbpt_entry() {
          "Largest memory for these light paths in MiB, and also for the importance records."});
     params.push_back(
         {"connections", ParamKind::Float, "0",
-         "K: average number of connections of each eye vertex; 0: chosen so that connections and "
-         "records together cost as much as the connections of bdpt, but at least 0.125."});
+         "K: average number of connections of each eye vertex, at most 1024; 0: chosen so that "
+         "connections and records together cost as much as the connections of bdpt, but at least "
+         "0.125."});
     params.push_back(
         {"record_fraction", ParamKind::Float, "0.001",
-         "Number of eye paths that create importance records, divided by the number of pixels."});
-    params.push_back(
-        {"neighbours", ParamKind::Int, "6",
-         "Number of records between which the mass function is interpolated, at most 16."});
+         "Number of eye paths that create importance records, divided by the number of pixels; in "
+         "[0, 1]."});
+    params.push_back({"neighbours", ParamKind::Int, "6",
+                      "Number of records between which the probability mass function is "
+                      "interpolated, 1 to 16."});
     params.push_back({"uniform", ParamKind::Float, "0.5",
-                      "Fraction of connections drawn uniformly, at least 0.001."});
+                      "Fraction of connections that are drawn uniformly, in [0.001, 1]."});
     params.push_back(Guiding::param());
     params.push_back({"weights", ParamKind::String, "upper",
                       "Count of a connection in the weights: upper (1, since all pixels share the "
@@ -270,12 +272,12 @@ IntegratorEntry pcbpt_entry() {
                       "paths), next_event, or both.",
                       true});
     params.push_back({"cache", ParamKind::Bool, "true",
-                      "Whether the mass function is interpolated from records; false evaluates it "
-                      "at every eye vertex, which is slow.",
+                      "Whether the probability mass function is interpolated from records; false "
+                      "evaluates it at every eye vertex, which is slow.",
                       true});
     params.push_back({"pmf", ParamKind::String, "weighted",
-                      "What the mass function follows: contribution, or weighted (contribution "
-                      "times MIS weight).",
+                      "What the probability mass function is proportional to: contribution, or "
+                      "weighted (contribution times MIS weight).",
                       true});
     return {{"integrator", "pcbpt",
              "Bidirectional path tracing with probabilistic connections. Unbiased.", params},

@@ -10,7 +10,8 @@ std::vector<ParamInfo> PhotonMapping::params() {
     std::vector<ParamInfo> params = Bidirectional::params();
     params.push_back({"roughness", ParamKind::Float, "0.1",
                       "Photons are used at surfaces whose sharpest smooth lobe is at least this "
-                      "rough (α of GGX; diffuse: 1); at other surfaces eye paths continue."});
+                      "rough (α of GGX, in [0, 1]; diffuse: 1); at other surfaces eye paths "
+                      "continue."});
     return params;
 }
 

@@ -394,7 +394,8 @@ std::vector<ParamInfo> photon_map_params(const ParamInfo& paths) {
          "first one."});
     params.push_back(
         {"nearest", ParamKind::Int, "60",
-         "Number of photons in a density estimate; the farthest only determines the radius."});
+         "Number of photons in a density estimate, 2 to 512; the farthest only determines the "
+         "radius."});
     params.push_back(
         {"radius", ParamKind::Float, "0",
          "Largest radius of a density estimate, in scene units; 0: 3 % of the radius of "
@@ -407,10 +408,11 @@ std::vector<ParamInfo> photon_map_params(const ParamInfo& paths) {
                       "n-th photon, which is computed when it is first needed; 0: each gather ray "
                       "makes its own density estimate."});
     params.push_back({"cache_error", ParamKind::Float, "0",
-                      "Error allowed by the irradiance cache (a in [Ward et al. 1988], usually 0.1 "
-                      "to 0.4); 0: no cache."});
+                      "Error allowed by the irradiance cache, in [0, 1] (a in [Ward et al. 1988], "
+                      "usually 0.1 to 0.4); 0: no cache."});
     params.push_back({"cache_rays", ParamKind::Int, "256",
-                      "Number of final gather rays for each record of the irradiance cache."});
+                      "Number of final gather rays for each record of the irradiance cache, at "
+                      "least 16."});
     return params;
 }
 

@@ -12,8 +12,9 @@ namespace etendue {
 std::vector<ParamInfo> radius_params(const char* doc) {
     return {{"radius", ParamKind::Float, "0", doc},
             {"alpha", ParamKind::Float, "0.75",
-             "Controls how fast the radius shrinks: in pass i it is radius·i^((alpha-1)/2). 1: it "
-             "stays constant, and the image stays biased."}};
+             "Controls how fast the radius shrinks, in (0, 1]: in pass i = 1, 2, ... it is "
+             "radius·i^((alpha-1)/2) [Knaus & Zwicker 2011, eq. 15]. 1: it stays constant, and "
+             "the image stays biased."}};
 }
 
 RadiusParams::RadiusParams(const IntegratorParams& p)

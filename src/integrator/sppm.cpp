@@ -135,7 +135,8 @@ IntegratorEntry sppm_entry() {
 IntegratorEntry ppm_entry() {
     std::vector<ParamInfo> all = params();
     all.push_back({"eye_paths", ParamKind::Int, "16",
-                   "Number of eye paths of each pixel; pass i uses eye path i modulo eye_paths."});
+                   "Number of eye paths of each pixel, at least 1; pass i uses eye path i modulo "
+                   "eye_paths."});
     return {{"integrator", "ppm",
              "Progressive photon mapping: all passes share a fixed set of eye paths. Consistent "
              "for the light that these eye paths see; biased with a fixed radius.",

@@ -240,7 +240,8 @@ std::vector<ParamInfo> params() {
                       "glossy vertex), eye, light, or both (one path for each).",
                       true});
     params.push_back({"short_rate", ParamKind::Float, "1",
-                      "Fraction of the pairs used for paths of three edges.", true});
+                      "Fraction, in [0, 1], of the pairs that are used for paths of three edges.",
+                      true});
     params.push_back({"clamp", ParamKind::Bool, "true",
                       "Whether the weights limit the probability of a pair to 1.", true});
     return params;

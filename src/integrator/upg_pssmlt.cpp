@@ -304,8 +304,8 @@ IntegratorEntry upg_pssmlt_entry() {
                       "Largest distance between the vertices of a pair, in scene units; 0: chosen "
                       "so that an eye path finds about eight pairs."});
     return {{"integrator", "upg+pssmlt",
-             "Unbiased photon gathering in Markov chains over the numbers of bidirectional path "
-             "tracing. Unbiased.",
+             "Unbiased photon gathering combined with Markov chains in the primary sample space "
+             "of bidirectional path tracing. Unbiased.",
              params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<UpgPssmltIntegrator>(p);

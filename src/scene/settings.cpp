@@ -111,7 +111,8 @@ const std::vector<IntegratorAlias>& integrator_aliases() {
         add({"pssmlt"}, "Metropolis light transport in primary sample space.", "pssmlt");
         add({"mlt"}, "Metropolis light transport.", "mlt");
         all.back().info.params.push_back({"user_paths", ParamKind::String, "",
-                                          "JSON file of light paths that matter, see mlt."});
+                                          "JSON file of important light sub-paths; see the "
+                                          "integrator mlt."});
         add({"erpt", "vpl", "ao", "field", "depth"}, "Not supported.", "path", true);
         add({"adaptive", "irrcache", "multichannel", "aov", "moment", "stokes"},
             "A wrapper around other integrators.", "");

@@ -32,10 +32,10 @@ std::vector<ParamInfo> with_common(std::vector<ParamInfo> params) {
 // What formats need whose meshes without vertex normals are flat.
 constexpr ParamInfo kComputeNormals = {
     "compute_normals", ParamKind::Bool, "true",
-    "A mesh without vertex normals gets smooth ones; else it is flat, and a to_world that mirrors "
-    "does not turn its faces around."};
+    "Whether a mesh without vertex normals gets smooth ones. If false, it is flat, and a "
+    "mirroring to_world does not reverse its faces."};
 constexpr ParamInfo kFlipFlatNormals = {"flip_flat_normals", ParamKind::Bool, "false",
-                                        "Turns a mesh that is flat inside out."};
+                                        "Reverses the normals of a flat mesh."};
 
 std::vector<ParamInfo> mesh_params(const char* flip) {
     return with_common(
@@ -265,8 +265,9 @@ const std::vector<ShapeEntry>& shape_registry() {
          [](const Params& p, const Warn& w) { return make_file_mesh<read_obj>(p, w, true); }},
         {{"shape", "ply", "PLY mesh, ascii or binary.", mesh_params("false")},
          [](const Params& p, const Warn& w) { return make_file_mesh<read_ply>(p, w, false); }},
-        {{"shape", "mesh", "Triangles that the scene file holds itself.",
-          with_common({{"mesh", ParamKind::Int, "", "Number of the mesh among those of the file."},
+        {{"shape", "mesh", "Triangles that are part of the scene file (pbrt, glTF).",
+          with_common({{"mesh", ParamKind::Int, "",
+                        "Index of the mesh among those of the scene file, from 0."},
                        {"face_normals", ParamKind::Bool, "false",
                         "Flat shading: vertex normals are ignored."},
                        kComputeNormals,
@@ -310,7 +311,7 @@ const std::vector<PluginInfo>& group_infos() {
           {"shapegroup", ParamKind::Object, "", "Reference to the group."}}},
         {"shape",
          "merge",
-         "Several shapes, as if each stood for itself.",
+         "Several shapes, as if each were given separately.",
          {{"shape", ParamKind::Object, "", "Nested shapes."}}}};
     return infos;
 }

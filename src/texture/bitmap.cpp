@@ -226,9 +226,10 @@ TextureEntry bitmap_entry() {
           {"raw", ParamKind::Bool, "false",
            "Whether integer formats hold linear data instead of sRGB."},
           {"channel", ParamKind::String, "all",
-           "all (the colours), one of r, g, b and a as grey, or opacity: a, or 1 without it."},
+           "all (the colour); r, g, b or a (this channel as grey); or opacity (a, or 1 if the "
+           "image has no a)."},
           {"image", ParamKind::Int, "",
-           "Instead of filename: number of the image among those of the scene file."},
+           "Index of the image among those of the scene file, from 0, instead of filename."},
           {"to_uv", ParamKind::Transform, "identity", "Affine map of (u, v) before the look-up."}}},
         make_bitmap};
 }

@@ -35,7 +35,8 @@ public:
             params.insert(params.begin(),
                           {{"octaves", ParamKind::Int, "8", "Number of octaves, 1 to 64."},
                            {"roughness", ParamKind::Float, "0.5",
-                            "Amplitude of an octave over that of the one before, in [0, 1]."}});
+                            "Amplitude of an octave divided by that of the previous one, in [0, "
+                            "1]."}});
         return {{"texture", name, doc, std::move(params)},
                 [](const Params& p, TextureContext&) -> std::unique_ptr<Texture> {
                     return std::make_unique<NoiseSum>(p);

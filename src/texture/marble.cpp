@@ -48,9 +48,9 @@ public:
                  "Veined marble in space.",
                  {{"octaves", ParamKind::Int, "8", "Number of octaves of noise, 1 to 64."},
                   {"roughness", ParamKind::Float, "0.5",
-                   "Amplitude of an octave over that of the one before, in [0, 1]."},
-                  {"scale", ParamKind::Float, "1", "Factor of the coordinates."},
-                  {"variation", ParamKind::Float, "0.2", "Factor of the noise in the phase."},
+                   "Amplitude of an octave divided by that of the previous one, in [0, 1]."},
+                  {"scale", ParamKind::Float, "1", "Factor on the coordinates."},
+                  {"variation", ParamKind::Float, "0.2", "Factor on the noise in the phase."},
                   to_texture_info()}},
                 [](const Params& params, TextureContext&) -> std::unique_ptr<Texture> {
                     return std::make_unique<Marble>(params);

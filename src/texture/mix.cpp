@@ -47,7 +47,7 @@ TextureEntry mix_entry() {
              "Linear mixture of two textures.",
              {{"value0", ParamKind::Texture, "0", "Where the weight is 0."},
               {"value1", ParamKind::Texture, "1", "Where the weight is 1."},
-              {"weight", ParamKind::Texture, "0.5", "Share of value1, in [0, 1]."}}},
+              {"weight", ParamKind::Texture, "0.5", "Fraction of value1, in [0, 1]."}}},
             [](const Params& params, TextureContext& context) -> std::unique_ptr<Texture> {
                 return std::make_unique<Mix>(params, context);
             }};

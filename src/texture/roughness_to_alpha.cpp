@@ -41,7 +41,7 @@ private:
 TextureEntry roughness_to_alpha_entry() {
     return {{"texture",
              "roughness_to_alpha",
-             "The α of microfacets from pbrt's roughness.",
+             "Microfacet roughness α from a roughness of pbrt.",
              {{"roughness", ParamKind::Texture, "", "pbrt's roughness; required."},
               {"curve", ParamKind::String, "pbrt4",
                "pbrt4 (the square root) or pbrt3 (a polynomial of the logarithm)."}}},

@@ -17,8 +17,7 @@ protected:
     Vec3 point(const TexturePoint& at) const { return to_texture_.point(at.p); }
 
     static ParamInfo to_texture_info() {
-        return {"to_texture", ParamKind::Transform, "identity",
-                "From the world to the space of the pattern."};
+        return {"to_texture", ParamKind::Transform, "identity", "World-to-pattern transform."};
     }
 
 private:
