@@ -225,7 +225,8 @@ void add_compare_command(CLI::App& app) {
         ->check(must_be_above_0);
     c.add_option("--reference-method", command->reference_method,
                  "Integrator of the reference (default: bdpt)");
-    c.add_option("--references", command->kept_references, "Folder where references are kept")
+    c.add_option("--references", command->kept_references,
+                 "Folder in which rendered references are stored")
         ->capture_default_str();
     c.add_option("--report", command->report, "Folder for the report")->capture_default_str();
     c.add_option("--techniques-max-depth", command->technique_depth,

@@ -75,7 +75,7 @@ void add_convert_command(CLI::App& app) {
                  "Value of a scene parameter, name=value; repeatable")
         ->allow_extra_args(false);
     c.add_flag("--lenient", options->scene.lenient,
-               "Leave out what cannot be read, with a warning for each thing");
+               "Leave out what cannot be read, with a warning for each case");
     c.callback([options] { convert(options->scene, options->output); });
 }
 

@@ -124,7 +124,7 @@ void add_diff_command(CLI::App& app) {
     c.add_option("--layer", command->layer,
                  "Compare this layer, e.g. albedo, instead of the image");
     c.add_option("--ignore-above", command->ignore_above,
-                 "Leave out pixels whose reference is brighter than this, such as lamps");
+                 "Leave out pixels whose reference is brighter than this radiance, such as lamps");
     c.add_option("--flip", command->flip,
                  "Variant of FLIP: hdr, ldr or none; auto: hdr for .exr, .pfm and .hdr")
         ->capture_default_str()

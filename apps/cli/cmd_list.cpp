@@ -91,7 +91,8 @@ void add_list_command(CLI::App& app) {
     CLI::Option* markdown = c.add_flag("--markdown", command->markdown, "Print Markdown");
     c.add_flag(
         "--mitsuba", command->mitsuba,
-        "Print, in Markdown, what becomes of everything in the manuals of Mitsuba 0.6 and 3");
+        "Print, in Markdown, the support of each plug-in and parameter in the manuals of Mitsuba "
+        "0.6 and 3");
     c.add_flag("--json", command->json, "Print JSON")->excludes(markdown);
     c.callback([command] { command->run(); });
 }

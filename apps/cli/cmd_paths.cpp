@@ -56,7 +56,7 @@ void add_paths_command(CLI::App& app) {
     options->scene.add_to(c);
     CLI::Option* pick =
         c.add_option("--pick", options->count,
-                     "Save up to this many paths of a short run, by their contributions")
+                     "Save up to this many paths, drawn in proportion to their contributions")
             ->check(CLI::Range(1, 10000));
     c.add_option("--pixel", options->pixel, "Column and row of the pixel that the paths reach: x,y")
         ->delimiter(',')

@@ -228,7 +228,7 @@ void add_render_command(CLI::App& app) {
         "-i,--integrator", command->integrator,
         "Integrator with parameters: bdpt or bdpt:max_depth=12,rr_depth=5 (default: the scene's)");
     c.add_option("--spp", command->spp, "Samples per pixel")->check(must_be_above_0);
-    c.add_option("--time", command->seconds, "Seconds to render, to the nearest pass")
+    c.add_option("--time", command->seconds, "Seconds to render; may be exceeded by half a pass")
         ->check(must_be_above_0);
     c.add_option("--error", command->error,
                  "Stop at this estimated relative RMS error of the image, e.g. 0.01")

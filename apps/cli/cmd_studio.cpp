@@ -134,27 +134,27 @@ void StudioCommand::run() const {
 void add_studio_command(CLI::App& app) {
     auto command = std::make_shared<StudioCommand>();
     CLI::App& c = *app.add_subcommand(
-        "studio", "Show a progressive rendering in a browser, compare methods, draw light paths");
+        "studio", "Show a progressive rendering in a browser, compare methods, edit light paths");
     command->scene.add_to(c);
     c.add_option("-i,--integrator", command->integrator,
                  "Integrator of the first run, with parameters (default: the scene's)");
     add_sampler_option(c, command->sampler);
     c.add_flag("--idle", command->idle, "Render nothing until the page asks for it");
     c.add_option("-o,--output", command->output,
-                 "Folder for images and light paths that are saved; on Ctrl-C the images of all "
-                 "runs are written there, beside existing files")
+                 "Folder for saved images and light paths; on Ctrl-C the images of all runs are "
+                 "written there, without replacing files")
         ->capture_default_str();
     c.add_option("--reference", command->reference,
-                 "Image of the same size, to be compared with: .exr, .pfm or .hdr");
+                 "Reference image of the same size: .exr, .pfm or .hdr");
     c.add_option("--threads", command->threads, "Number of threads; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
-    c.add_option("--port", command->port, "Port of the page; 0: any that is free")
+    c.add_option("--port", command->port, "Port of the page; 0: any free port")
         ->capture_default_str()
         ->check(CLI::Range(0, 65535));
     c.add_option("--listen", command->listen,
-                 "Address of the page; others than 127.0.0.1 can be reached without encryption "
-                 "from other machines (consider ssh -L instead)")
+                 "Address to listen at; an address other than 127.0.0.1 can be reached from other "
+                 "machines, without encryption (consider ssh -L instead)")
         ->capture_default_str();
     c.add_option("--grace", command->grace,
                  "Seconds that the current pass may continue after Ctrl-C or SIGTERM")

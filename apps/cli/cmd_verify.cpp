@@ -299,14 +299,14 @@ void add_verify_command(CLI::App& app) {
         "length with at least 2 % of the light, would be found with 90 % probability");
     add_sampler_option(c, command->sampler, ", as for render");
     auto* against = c.add_option("--against", command->against,
-                                 "Methods to compare with: the first one, and the others on "
-                                 "classes of paths that they sample much better")
+                                 "Methods to compare with: the first one, and each other one on "
+                                 "the classes of paths that it estimates much better")
                         ->capture_default_str();
     c.add_option("--reference", command->reference,
                  "Reference image, an .exr with a layer \"variance\", instead of --against")
         ->excludes(against)
         ->excludes(detect);
-    c.add_option("--tiles", command->options.tiles, "Tiles across and down the image")
+    c.add_option("--tiles", command->options.tiles, "Number of tiles along each side of the image")
         ->capture_default_str()
         ->check(CLI::Range(1, 64));
     c.add_option("--json", command->json, "Write all results to this JSON file");

@@ -45,7 +45,7 @@ void SceneOptions::add_reading_options(CLI::App& command) {
         .add_option("-D,--define", defines, "Value of a scene parameter, name=value; repeatable")
         ->allow_extra_args(false);
     command.add_flag("--lenient", lenient,
-                     "Leave out what cannot be rendered, with a warning for each thing");
+                     "Leave out or replace what cannot be rendered, with a warning for each case");
     command.add_flag("--watertight", watertight,
                      "Let no ray pass between adjacent triangles; rays take up to a fifth longer");
     command.add_option("--sensor", sensor,
