@@ -4,13 +4,16 @@ A scene is loaded as a `Description`, which is plain data and can be edited. `De
 `render` returns a `Result`, whose images are NumPy arrays:
 
     import etendue as et
-    d = et.load("scenes/demo.xml")
-    d["glass.center"] = (0.6, 0.42, 0.8)
-    result = et.render(d.build(resolution=(320, 240)), "upg+bdpt:max_depth=12", time=10)
-    result.save("demo.exr")
+    d = et.load("scenes/cornell.xml")
+    d["white.bsdf.reflectance"] = (0.9, 0.8, 0.7)
+    result = et.render(d.build(resolution=(320, 320)), "upg+bdpt:max_depth=12", time=10)
+    result.save("cornell.exr")
 
-Images are arrays of shape (H, W, 3), float32, linear sRGB; the first row is the top one. With the same seed, images are
-bit-identical to those of the program `etendue`.
+Images are arrays of shape (H, W, 3), float32, in linear RGB with the primaries of sRGB; the first row is the top one. With
+the same seed, images are bit-identical to those of the program `etendue`.
+
+Errors: SceneError, a ValueError, for the contents of a scene; ValueError, TypeError and IndexError for other arguments;
+RuntimeError for files, and for names and parameters of integrators. The messages are those of the program.
 """
 
 from ._cpu import check_cpu as _check_cpu

@@ -33,13 +33,17 @@ def read_image(file: str | PathLike[str], layer: str = "") -> Image:
     """Reads an image of radiance: .exr, .hdr, .pfm, .png (decoded from sRGB) or .jpg. Linear RGB, shape (H, W, 3).
 
     layer: this layer of an .exr, such as "albedo", instead of the image.
+
+    Raises RuntimeError if the file cannot be read or has no such layer.
     """
     return _etendue.read_image(fspath(file), layer)
 
 
 def write_image(file: str | PathLike[str], image: ArrayLike) -> None:
     """Writes linear RGB of shape (H, W, 3) as .exr, .pfm, .hdr or .png (sRGB, clamped to [0, 1]); or 8-bit sRGB codes of
-    that shape, as tonemap() makes them, as .png.
+    that shape, as tonemap() makes them, as .png. An existing file is replaced only when the new one is complete.
+
+    Raises RuntimeError for another extension or if the file cannot be written, and ValueError for another shape.
     """
     if isinstance(image, np.ndarray) and image.dtype == np.uint8:
         if Path(file).suffix.lower() != ".png":
@@ -58,7 +62,7 @@ def tonemap(
 
     operator: "aces", "reinhard", or "srgb", which only clamps.
     exposure: in stops; radiance is multiplied by 2^exposure first.
-    white: luminance that reinhard maps to white; 0: the largest of the image.
+    white: luminance, after exposure, that reinhard maps to white; 0: the largest of the image.
     """
     return _etendue.tonemap(_pixels(image), operator, exposure, white)
 
@@ -91,9 +95,12 @@ def diff(
     """Compares an image with a reference of the same shape (H, W, 3), as `etendue diff`. Images are arrays, files or
     Results, in linear RGB.
 
-    reference2: a second, independent reference, which removes the noise of both from squared errors.
-    flip: the variant of FLIP.
+    reference2: a second, independent reference. Squared errors are then (X - R1)(X - R2), so that the noise of the
+        references cancels on average.
+    flip: the variant of FLIP [Andersson et al. 2020, 2021]: "hdr", "ldr" or "none".
     ignore_above: leaves out pixels whose reference is brighter than this radiance, such as lamps.
+
+    Raises ValueError if the sizes differ.
     """
     second = None if reference2 is None else _pixels(reference2)
     text, flip_map, rel_se_map = _etendue.diff(_pixels(image), _pixels(reference), second, flip, ignore_above)

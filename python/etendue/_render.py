@@ -273,10 +273,10 @@ def render(
 
     integrator: a name with parameters, such as "upg+bdpt:max_depth=12"; "" for the integrator of the scene; or an
         Integrator.
-    spp, time, error: limits: samples per pixel, seconds, relative error of the image. The first limit that is reached
-        ends the rendering. Without a limit, the samples per pixel of the scene, or 64.
+    spp, time, error: limits: samples per pixel, seconds, relative error of the image (see Result.error). The first limit
+        that is reached ends the rendering. Without a limit, the samples per pixel of the scene, or 64.
     seed: seed of all random numbers.
-    sampler: "sobol" or "independent".
+    sampler: "sobol" or "independent". With "sobol", errors and variances are upper bounds.
     threads: number of threads; 0 for one per core.
     aovs: auxiliary images to render: albedo, normal, depth, position, uv, variance.
     techniques: makes an image of each technique, for paths of at most this many edges; True: 6.
@@ -288,6 +288,8 @@ def render(
     Ctrl-C discards the current pass and returns the result of the passes before it, with stopped_by "interrupted". If no
     pass is complete yet, it raises KeyboardInterrupt. Other Python threads continue during the rendering. A forked process
     cannot render; use the start method "spawn".
+
+    Raises RuntimeError for an unknown integrator, parameter or layer, and ValueError for limits that are not above 0.
     """
     _etendue.check_aovs(list(aovs))
     depth = 6 if techniques is True else int(techniques)

@@ -157,9 +157,9 @@ class VerifyReport:
 
     def frame(self) -> Any:
         """One row for each method, as a pandas.DataFrame, or a list of dicts without pandas. All dimensionless:
-        image_ratio to the reference, image_p its least p-value of three channels, detectable the smallest relative error
-        of the image that would have been found with 90 % probability, out_of_reach and too_rare shares of the light, slope
-        of log error over log samples.
+        image_ratio is the ratio to the reference, image_p the smallest p-value of the three channels, detectable the smallest
+        relative error of the image that would have been found with 90 % probability. out_of_reach and too_rare are shares
+        of the light, and slope is that of the logarithm of the error over the logarithm of the number of runs.
         """
         return frame_of(self._rows())
 
@@ -214,11 +214,14 @@ def compare(
     techniques: int = 5,
     progress: bool | None = None,
 ) -> CompareReport:
-    """Compares methods at equal time (seconds) or equal samples per pixel (spp), like `etendue compare`.
+    """Compares methods at equal time (seconds) or equal samples per pixel (spp), like `etendue compare`. One of time and spp
+    must be given.
 
     scenes: one or several files, Descriptions or Scenes. methods: names with parameters, or Integrators.
     runs, seed: number of independent runs, which have consecutive seeds, and the first seed.
-    paths, lengths: paths shown in the images; lengths in edges, None for no limit.
+    sampler: "sobol" or "independent". threads: number of threads; 0 for one per core.
+    paths: "all", or "inner" for those that join two sub-paths inside the scene (s >= 1 and t >= 2).
+    lengths: shortest and longest path shown in the images, in edges; None for no limit.
     reference: image files, one for each scene. Without them, references are rendered by reference_method (bdpt) in
         reference_time seconds (10 times time) or with reference_spp (16 times spp), and stored in the folder references.
     techniques: longest path with technique images, in edges; 0: none.
@@ -257,14 +260,22 @@ def verify(
     threads: int = 0,
     progress: bool | None = None,
 ) -> VerifyReport:
-    """Tests whether methods are unbiased, like `etendue verify`: compares means over independent runs with references.
+    """Tests whether methods are unbiased, like `etendue verify`: compares means over independent runs with references by
+    Welch's t-test.
 
     methods: names with parameters, or Integrators. lengths determines max_depth, which must not be given.
     time: seconds for all runs of one method (30 if spp is not given); with detect, for the whole verification.
-    spp: samples per pixel of one run. detect: renders until a relative error of this size would be found.
+    spp: samples per pixel of one run.
+    detect: renders until a relative error of this size, such as 0.005, would be found with 90 % probability: an error of
+        the image, or of a path length with at least 2 % of the light.
     lengths: shortest and longest path, in edges. runs: independent renderings, at least 8.
-    alpha: probability of a false alarm in all comparisons together.
-    tiles: number of tiles across and down the image.
+    alpha: probability of a false alarm in all comparisons together, in (0, 1).
+    against: methods to compare with: the first one, and each other one on the classes of paths that it estimates much
+        better.
+    tiles: number of tiles along each side of the image.
+    seed: seed of all random numbers. sampler: "sobol" or "independent".
+    threads: number of runs rendered at the same time; 0 for one per core.
+    progress: shows a status line; None: on terminals.
 
     Ctrl-C ends the verification after the current run and raises KeyboardInterrupt.
     """

@@ -15,10 +15,12 @@ Vector = tuple[float, float, float]
 
 
 def load(file: str | PathLike[str], defines: Mapping[str, object] = {}, *, lenient: bool = False) -> Description:
-    """Reads a scene file: .xml of Mitsuba 0.6 and 3, .pbrt of pbrt-v3 and v4.
+    """Reads a scene file: .xml of Mitsuba 0.6 and 3, .pbrt of pbrt-v3 and v4, or .gltf and .glb of glTF 2.0.
 
     defines: values of the parameters of the scene ($name), like the option -D of the program.
-    lenient: unknown elements cause warnings instead of errors.
+    lenient: unknown elements are left out, with a warning in Description.warnings, instead of causing errors.
+
+    Raises RuntimeError if the file cannot be read, and SceneError, with the line, if its contents are not valid.
     """
     return _etendue.load(fspath(file), {name: str(value) for name, value in defines.items()}, lenient)
 
@@ -26,9 +28,12 @@ def load(file: str | PathLike[str], defines: Mapping[str, object] = {}, *, lenie
 def load_string(
     xml: str, defines: Mapping[str, object] = {}, *, name: str = "scene.xml", lenient: bool = False
 ) -> Description:
-    """Reads the text of a Mitsuba scene file.
+    """Reads a scene from xml, the text of a Mitsuba scene file.
 
+    defines, lenient: see load().
     name: file name for messages. Names of other files in the scene are relative to the folder of this file.
+
+    Raises SceneError, with the line, if the text is not valid.
     """
     return _etendue.load_string(xml, {key: str(value) for key, value in defines.items()}, name, lenient)
 
@@ -41,6 +46,8 @@ def load_dict(d: dict[str, Any], *, folder: str | PathLike[str] = ".") -> Descri
     Keys are names of parameters and objects. An object whose key is a category ("bsdf", "shape_2") has no name.
 
     folder: folder in which the files of the scene are searched.
+
+    Raises SceneError, with the keys that lead to the place, if the dicts are not valid.
     """
     return _etendue.load_dict(d, fspath(folder))
 
@@ -50,7 +57,10 @@ def _matrix(rows: list[Any]) -> NDArray[np.float64]:
 
 
 def look_at(origin: Vector, target: Vector, up: Vector = (0, 1, 0)) -> NDArray[np.float64]:
-    """The to_world transform, a 4x4 matrix, of a sensor at origin that looks at target. Points are in scene units."""
+    """The to_world transform, a 4x4 matrix, of a sensor at origin that looks at target. Points are in scene units.
+
+    Raises ValueError if origin and target are equal, or if up points along the viewing direction.
+    """
     return _matrix(_etendue.look_at(origin, target, up))
 
 
@@ -67,7 +77,7 @@ def scale(x: float, y: float | None = None, z: float | None = None) -> NDArray[n
 
 
 def rotate(axis: Vector, degrees: float) -> NDArray[np.float64]:
-    """A right-handed rotation by degrees about an axis, as a 4x4 matrix."""
+    """A right-handed rotation by an angle in degrees about an axis (any length except 0), as a 4x4 matrix."""
     return _matrix(_etendue.rotate(axis, degrees))
 
 
@@ -76,6 +86,8 @@ def plugins(category: str = "", name: str = "") -> list[dict[str, Any]]:
 
     category, name: return only these plug-ins, such as plugins("bsdf", "diffuse"). The category "integrator" contains the
         integrators of render().
+
+    Raises RuntimeError for an unknown category or name.
     """
     result: list[dict[str, Any]] = json.loads(_etendue.plugins(category, name))
     return result

@@ -1,8 +1,9 @@
 """Path space, as used by the integrators in C++: sub-paths, joins, densities, MIS weights.
 
 A path is x_0 (on an emitter), x_1, ..., x_k (on the lens). A technique (s, t) makes it from s vertices of a light path
-y_0, y_1, ... and t vertices of an eye path z_0, z_1, ... Positions are in scene units, radiance and throughputs in
-linear RGB. All densities are per unit area of the scene, even if a direction was sampled.
+y_0, y_1, ... and t vertices of an eye path z_0, z_1, ... [Veach 1997, ch. 10]. Positions are in scene units, radiance and
+throughputs in linear RGB. All densities are per unit area of the scene, even if a direction was sampled; at infinity
+they are per steradian. Citations refer to docs/references.bib.
 """
 
 from collections.abc import Sequence
@@ -38,7 +39,7 @@ def eye_path(
 
     With the seed, sampler and pass of a rendering, the random numbers are those of that rendering. max_vertices: limit of
     the number of vertices, including z_0. rr_depth: index of the first vertex with Russian roulette; None: no roulette.
-    counts: sample counts for the MIS weights of joins.
+    counts: sample counts for the MIS weights of joins. Raises IndexError for a pixel outside the image.
     """
     return _etendue.eye_path(scene, pixel, seed, pass_, max_vertices, rr_depth, counts, sampler)
 
@@ -72,7 +73,8 @@ def join(
     none if the contribution is zero, otherwise one, or for s = 0 one for each emitter at infinity. t is at least 1.
 
     seed: seed of the point that is sampled on an emitter (s = 1) or on a finite lens (t = 1). counts: must be the counts
-    with which the sub-paths were traced, so that the MIS weights are correct; None: these counts.
+    with which the sub-paths were traced, so that the MIS weights are correct; None: these counts. Raises IndexError if a
+    sub-path is too short.
     """
     return _etendue.join(scene, y, s, z, t, seed, counts)
 
@@ -80,8 +82,9 @@ def join(
 def evaluate(
     scene: Scene, x: Sequence[Vertex], delta: Sequence[bool] | None = None
 ) -> tuple[NDArray[np.float32], PathPdfs]:
-    """Evaluates a path by the slow definition. Returns the measurement contribution f of the whole path x, RGB of shape
-    (3,), without visibility, in radiance per unit area for each vertex; and the densities of its vertices from both sides.
+    """Evaluates a path by the slow definition. Returns the measurement contribution f of the whole path x [Veach 1997,
+    §8.2], RGB of shape (3,), without visibility, in radiance per unit area for each vertex; and the densities of its
+    vertices from both sides.
 
     x: from the emitter to the lens, such as Join.vertices(). delta: whether the path scatters by a delta event at each
     vertex, such as Join.delta.
@@ -91,7 +94,9 @@ def evaluate(
 
 
 def mis_weight(pdfs: PathPdfs, technique: Technique, counts: Counts) -> float:
-    """The weight of the power heuristic with exponent 2, as the explicit sum over all techniques. Dimensionless."""
+    """The MIS weight by the power heuristic with exponent 2, (n p)² divided by the sum of the (n_i p_i)² of all techniques
+    [Veach 1997, §9.2], in [0, 1].
+    """
     return _etendue.mis_weight(pdfs, technique, counts)
 
 
