@@ -1,19 +1,22 @@
 #pragma once
-// One Markov chain [Metropolis et al. 1953; Hastings 1970], with expected values of acceptance, and with large steps that
-// count as independent samples too [Kelemen et al. 2002].
+// One Markov chain [Metropolis et al. 1953; Hastings 1970]. States are added with their expected weights, and large steps
+// also serve as independent samples [Kelemen et al. 2002].
 //
-// The image is Σ over states of F times a factor. Steps of the chain alone would count b·a/I. Independent samples of F are
-// there too, p_L T of them a step, so the two are weighed by the balance heuristic with a constant c in place of b:
+// The image is the mean over the steps of F times a factor, where F is the contribution of a state. As states of the chain,
+// the states of a step have the factors b·a/I, with a the probability of being in this state after the step. As independent
+// samples, large steps have density p_L T. The balance heuristic combines the two estimators, with a constant c in place of
+// b:
 //     w = I / (I + c p_L T),      chain: b·a·w/I,      large step: (1 - w)/(p_L T).
-// Any c will do that is fixed before the chain begins; that of the chain's own run would be correlated with its states.
+// The estimate is unbiased for any c that is fixed before the chain starts. A c from the chain's own run would be
+// correlated with its states.
 
 #include "mcmc/state.h"
 
 namespace etendue {
 
-/// Of the steps of one kind on states of one length.
+/// Counts of the steps of one kind on states of one length.
 struct StepCounts {
-    uint64_t proposed = 0, failed = 0, zero = 0;  ///< zero: I(y) = 0
+    uint64_t proposed = 0, failed = 0, zero = 0;  ///< zero: proposals with I(y) = 0
     double accepted = 0;                          ///< Sum of acceptance probabilities.
 
     StepCounts& operator+=(const StepCounts& o) {
@@ -23,22 +26,22 @@ struct StepCounts {
     }
 };
 
-/// What the steps of a chain, or of many, did.
+/// Statistics of the steps of one chain, or of several.
 struct ChainStats {
-    static constexpr int kLengths = 16;   ///< Longer paths count with the last.
+    static constexpr int kLengths = 16;   ///< Longer paths are counted with the last length.
     static constexpr int kMutations = 8;  ///< 0: large steps, then StateSpace::mutations().
 
-    /// By mutation, and by the length of x (of large steps, y).
+    /// By mutation, and by the path length of x (for large steps, of y).
     std::array<std::array<StepCounts, kLengths>, kMutations> steps{};
-    uint64_t longest_stay = 0;  ///< Steps without an accepted one.
+    uint64_t longest_stay = 0;  ///< Largest number of successive steps without an accepted one.
     uint64_t large_steps = 0;
-    double large_sum = 0;                     ///< Of I/T over large steps.
+    double large_sum = 0;                     ///< Sum of I/T over large steps.
     double chain_light = 0, large_light = 0;  ///< Σ I·factor, of the two parts of the estimator.
 
     ChainStats& operator+=(const ChainStats& o);
 };
 
-/// Of all chains of a class, constant.
+/// Constants of all chains of a class.
 struct ChainTerms {
     double p_large = 0.3;
     double c = 0;
@@ -46,16 +49,16 @@ struct ChainTerms {
 
 class Chain {
 public:
-    /// Not started: makes large steps only, as it does where the pool it would start from is black.
+    /// A chain that has not started. It makes only large steps, as does a chain whose pool contributes nothing.
     Chain(const StateSpace& space, int chain_class);
 
     void start_black() { is_started_ = false; }
-    /// At the state that `key` draws.
+    /// Starts at the independent state that `key` determines.
     void start(uint64_t key, const ChainContext& c);
     void copy(const Chain& from);
 
-    /// Makes steps first … first+count-1; random numbers follow from `key` and the step's number. Adds b·…/steps and so
-    /// on as above, times `scale`.
+    /// Makes steps first … first+count-1, whose random numbers are functions of `key` and the number of the step. Adds the
+    /// states with the factors given above, times `scale`.
     void advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t first,
                  uint64_t count, const ChainContext& c, StateSink& states, ChainStats& stats);
 

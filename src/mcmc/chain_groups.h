@@ -1,12 +1,13 @@
 #pragma once
-// Groups of chains: how they start, whose turn it is, what their steps are worth.
+// Groups of chains: their start-up, their turns, and the scale of their contributions.
 //
-// A group begins with a pool of independent samples. Its mean importance b_g is the normalisation, and the chains start at
-// states of the pool, resampled by importance: then E[b_g h(x)] = ∫ I h for any size of the pool and after any number of
-// steps that keep I, so there is no start-up bias [Veach 1997, §11.3.1]. This holds for the same pool's b_g only. What
-// later large steps know of b comes from other groups: a pass of g is scaled by b_g plus the mean over all other groups h
-// of b'_h - b_h, where b'_h is the mean over h's pool and all large steps of its earlier passes. That mean has
-// expectation 0 and is independent of g, and over all groups the scales average to the mean of b'.
+// A group starts with a pool of independent samples. The mean importance b_g of the pool is its normalisation, and its
+// chains start at states of the pool, resampled in proportion to importance. Then E[b_g h(x)] = ∫ I h for any size of the
+// pool and after any number of steps that leave I invariant, so there is no start-up bias [Veach 1997, §11.3.1]. This
+// requires b_g to come from the same pool. Later large steps improve the estimate of b through the other groups: a pass of
+// g is scaled by b_g plus the mean of b'_h - b_h over all other groups h, where b'_h is the mean over the pool of h and all
+// large steps of its earlier passes. This mean has the expectation 0 and is independent of g. Averaged over all groups, the
+// scale is the mean of b'.
 
 #include <functional>
 
@@ -16,14 +17,14 @@ namespace etendue {
 
 struct ChainOptions {
     int groups = 16;
-    int chains = 256;  ///< Of a group, all classes together.
+    int chains = 256;  ///< Number in a group, for all classes together.
     double p_large = 0.3;
 };
 
-/// What is fixed of a class before its chains begin.
+/// Parameters of a class that are fixed before its chains start.
 struct ClassPlan {
     int chains = 0;
-    uint64_t pool = 0;  ///< Samples.
+    uint64_t pool = 0;  ///< Number of samples in the pool.
     double c = 0;       ///< See chain.h.
 };
 
@@ -31,25 +32,25 @@ class ChainGroups {
 public:
     ChainGroups(const StateSpace& space, const ChainOptions& options, std::vector<ClassPlan> plan);
 
-    /// Makes the steps of pass `pass.index`, which belong to group index mod groups: one a pixel, rounded up so that all
-    /// chains make the same number. Nothing of it stays unless commit() follows.
+    /// Makes the steps of pass `pass.index`, which belong to the group with the number index mod groups: one step per
+    /// pixel, rounded up so that all chains make the same number. The pass is discarded unless commit() follows.
     void advance(const PassContext& pass);
-    /// The same with a place of its own for the states of each chain, instead of the film.
+    /// The same, with a sink for the states of each chain instead of the film.
     using MakeSink = std::function<std::unique_ptr<StateSink>(
         uint64_t chain, int chain_class, const ChainContext& c, SplatSink& film)>;
     void advance(const PassContext& pass, const MakeSink& make_sink);
     void commit();
 
-    /// All that later passes depend on. load() throws std::runtime_error where it is of other chains.
+    /// Everything that later passes depend on. load() throws std::runtime_error if the data belong to other chains.
     void save(LearnedState& to) const;
     void load(LearnedState& from);
 
-    /// Mean of b' over the groups that have begun, of all classes together, and its standard error relative to it.
+    /// Mean of b' over the groups that have started, summed over the classes; and its relative standard error.
     double b() const;
     double relative_error_of_b() const;
-    /// Of all committed passes.
+    /// Statistics of all committed passes.
     const ChainStats& stats() const { return stats_; }
-    /// Of the last pass: what b'_g alone would make of its splats, relative to what they are.
+    /// For the last pass: the scale that b'_g alone would give, divided by the scale that was used.
     double own_scale() const { return own_scale_; }
 
 private:
@@ -64,11 +65,11 @@ private:
     struct Group {
         std::vector<Chain> chains;  ///< By class.
         std::vector<Normalisation> normalisation;
-        uint64_t steps = 0;  ///< That each chain has made.
+        uint64_t steps = 0;  ///< Number of steps that each chain has made.
     };
 
     void start(const PassContext& pass, uint64_t key, Group& group) const;
-    /// Of a pass of group g, which may have begun with this pass (`group`).
+    /// Scale of a pass of group g; `group` is its state, since it may have started in this pass.
     double scale(size_t g, const Group& group, int chain_class) const;
     double later_b(const Group& group) const;
 
@@ -83,7 +84,7 @@ private:
     double own_scale_ = 1;
 };
 
-/// Indices of `count` of the weighted items, by systematic resampling: item i comes count·w_i/Σw times in the mean.
+/// Draws `count` indices of weighted items by systematic resampling: item i occurs count·w_i/Σw times on average.
 std::vector<size_t> resample(std::span<const double> weights, size_t count, double u);
 
 }  // namespace etendue

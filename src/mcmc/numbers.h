@@ -1,7 +1,8 @@
 #pragma once
-// Points of primary sample space: 32-bit integers on a torus, by address, and their mutations, which are symmetric to the
-// bit. A state is the numbers it reads. A number that a proposal reads and the present state did not is drawn afresh: all
-// that were not read are independent and uniform, given the state, so none of their history matters.
+// Points of primary sample space: 32-bit integers on a torus, identified by address, and their mutations, which are exactly
+// symmetric. A state consists of the numbers that it reads. A number that a proposal reads, but the present state did not
+// read, is drawn anew: given the state, the numbers that were not read are independent and uniform, so their history does
+// not matter.
 
 #include <array>
 #include <vector>
@@ -15,7 +16,7 @@ namespace etendue {
 class NumberTable {
 public:
     void clear() { ++epoch_; }
-    /// The number there, or nullptr where it has not been read.
+    /// The number at this address, or nullptr if it has not been read.
     const uint32_t* find(Stream stream, uint64_t vertex, uint32_t slot) const;
     void set(Stream stream, uint64_t vertex, uint32_t slot, uint32_t bits);
     void save(LearnedState& to) const {
@@ -28,7 +29,7 @@ public:
     }
 
 private:
-    static constexpr uint32_t kSlots = 8;  ///< At most, of a vertex.
+    static constexpr uint32_t kSlots = 8;  ///< Largest number of slots of a vertex.
     struct Number {
         uint32_t bits = 0, epoch = 0;
     };
@@ -37,23 +38,23 @@ private:
     };
     static Place place(Stream stream, uint64_t vertex, uint32_t slot);
 
-    std::array<std::vector<Number>, 5> tables_;  ///< By stream; grown and kept.
+    std::array<std::vector<Number>, 5> tables_;  ///< By stream; they never shrink.
     uint32_t epoch_ = 1;
 };
 
 /// Where the numbers of a state come from.
 enum class NumberStep : uint8_t {
-    Fresh,  ///< All are drawn.
-    Small,  ///< Each moves by ±2^-13 … 2^-3, the exponent uniform; those of Stream::Selection stay.
-    Block,  ///< Each vertex's numbers are drawn with probability kBlockProbability, or else stay.
-    Same,   ///< All stay.
+    Fresh,  ///< All numbers are drawn anew.
+    Small,  ///< Each changes by ±2^-13 … 2^-3, with a uniform exponent, except those of Stream::Selection.
+    Block,  ///< The numbers of each vertex are drawn anew with probability kBlockProbability, and otherwise kept.
+    Same,   ///< All numbers are kept.
 };
 
 class NumberSource final : public PrimarySource {
 public:
     static constexpr double kBlockProbability = 0.2;
 
-    /// Numbers of a new state go to `next`, which is cleared; `present` may be nullptr where all are drawn.
+    /// Clears `next` and stores the numbers of the new state there. `present` may be nullptr if all numbers are drawn anew.
     NumberSource(NumberStep step, uint64_t key, const NumberTable* present, NumberTable* next)
         : step_(step), key_(key), present_(present), next_(next) {
         if (next_) next_->clear();

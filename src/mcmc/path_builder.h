@@ -1,5 +1,5 @@
 #pragma once
-// Makes a full path from what is kept of another one, and vertices sampled from either end of the gap.
+// Makes a full path from the parts of another path that are kept, and new vertices from either end of the gap.
 
 #include "mcmc/path_state.h"
 #include "mcmc/user_paths.h"
@@ -8,36 +8,37 @@ namespace etendue {
 
 class PathBuilder {
 public:
-    /// Keeps x_0 … x_l and x_m … x_k; nothing on the light's side where l = -1, on the eye's where m = k+1. `x` may be
-    /// nullptr, and nothing is kept.
+    /// Keeps x_0 … x_l and x_m … x_k. With l = -1 nothing is kept on the light's side, with m = k+1 nothing on the eye's
+    /// side. If `x` is nullptr, nothing is kept.
     PathBuilder(const PathMeasure& measure, Sampler& sampler, Workspace& work, const PathState* x,
                 int l, int m);
 
-    /// Samples vertices from x_l on, or from an emitter on; a single one there is a next event. If nothing is kept of the
-    /// eye's side, and nothing is sampled from there, the last one is where a ray crosses the lens.
+    /// Samples `count` vertices, starting from x_l or from an emitter; a single vertex on an emitter is a next event. If the
+    /// eye's side keeps no vertex and samples none (`ends_at_lens`), the last vertex is the point where the ray hits the
+    /// lens. False if a walk ends early.
     bool sample_light(int count, bool ends_at_lens = false);
-    /// The same from x_m, or the lens. Without any from the light's side the last one has to lie on an emitter.
+    /// The same from x_m or from the lens. If the light's side has no vertex, the last one must lie on an emitter.
     bool sample_eye(int count);
 
-    /// The eye sub-path from the kept lens through a film point, up to its first surface.
+    /// Starts the eye sub-path at the kept lens point, through a film point in pixels, and walks to its first surface.
     bool start_eye(Vec2 film);
-    /// The same from a lens point sampled for a film point anywhere.
+    /// The same with a film point anywhere and a new lens point.
     bool start_eye_anywhere();
-    /// The light sub-path from the kept x_0, or a new one, up to its first surface.
+    /// Starts the light sub-path at the kept x_0 or at a new one, and walks to its first surface.
     bool start_light(const Emitter& emitter, const EmissionSample& e);
-    /// The light sub-path close to one of the user's.
+    /// Makes a light sub-path close to one of the user paths.
     bool follow(const UserPaths& paths);
-    /// One more vertex where the last one has delta events alone.
+    /// Appends a vertex at a vertex that has only delta events.
     bool sample_eye_delta();
-    /// One more vertex by a given event.
+    /// Appends a vertex by a given event.
     bool step_light(const BsdfSample& s);
     bool step_eye(const BsdfSample& s);
     /// The last vertices so far.
     const Vertex& light_end() const { return work_.y[work_.y.size() - 1]; }
     const Vertex& eye_end() const { return work_.z[work_.z.size() - 1]; }
 
-    /// Joins both sides, with a shadow ray where no ray has found the edge. False where the path brings nothing, or has
-    /// not one of the lengths that states have. The target is not yet known.
+    /// Joins both sides, with a shadow ray if no ray has tested this edge. False if the path contributes nothing, or if its
+    /// length is not one of those of states. The target is not computed yet.
     bool finish(PathState& y);
 
 private:

@@ -6,13 +6,13 @@
 
 namespace etendue {
 
-/// Mutations in path space, and how often each is chosen where all suit.
+/// Mutations in path space, and their weights: one of those that can change a path is chosen in proportion.
 struct PathMutations {
     enum Kind : int { Bidirectional, Lens, Caustic, MultiChain, LensSubpath, UserPath, kCount };
     static constexpr std::array<const char*, kCount> kNames{
         "bidirectional", "lens", "caustic", "multi_chain", "lens_subpath", "user_path"};
     std::array<double, kCount> weights{2, 2, 2, 2, 1, 0};
-    std::optional<UserPaths> user_paths{};  ///< Needed where their weight is not 0.
+    std::optional<UserPaths> user_paths{};  ///< Required if their weight is not 0.
 };
 
 class PathSpace final : public StateSpace {
@@ -41,7 +41,7 @@ private:
     PathTarget target_;
     PathMutations options_;
     std::array<std::unique_ptr<PathMutation>, PathMutations::kCount> mutations_;
-    TechniqueCounts counts_;  ///< Of the weights of joins, for those who want them.
+    TechniqueCounts counts_;  ///< For the MIS weights of the joins that repeat() reports.
 };
 
 }  // namespace etendue

@@ -2,9 +2,9 @@
 // States of Markov chains in path space [Veach 1997, ch. 11]: full paths x_0 (emitter) … x_k (lens), with the densities of
 // their vertices from either side.
 //
-// Conventions are those of path_pdfs.h: a delta event leaves out the factor δ of the direction toward the eye given that
-// toward the light, in f and in the densities of both sides, and keeps the geometry term of the edge behind it. Areas
-// are in units of PathMeasure::unit_area, so that products over long paths stay within the range of numbers.
+// The conventions are those of path_pdfs.h. At a delta event, f and the densities of both sides leave out the factor δ of
+// the direction toward the eye given the direction toward the light, and keep the geometry term of the edge behind the
+// event. Areas are in units of PathMeasure::unit_area, so that products over long paths neither overflow nor underflow.
 
 #include "mcmc/state.h"
 #include "mcmc/target_map.h"
@@ -12,17 +12,17 @@
 
 namespace etendue {
 
-/// What densities of paths refer to; the same for all states of a space.
+/// The measure to which densities of paths refer; the same for all states of a space.
 struct PathMeasure {
     const Scene& scene;
-    FilmRegion film;        ///< Where eye paths start.
+    FilmRegion film;        ///< Region of the film, in pixels, in which eye paths start.
     int shortest, longest;  ///< Lengths of states, in edges.
-    double unit_area;       ///< Square of a typical length of the scene.
+    double unit_area;       ///< Square of a typical length of the scene, in squared scene units.
 
     PathMeasure(const Scene& of, const FilmRegion& region, int shortest_path, int longest_path);
 };
 
-/// What the target of a path is made of: W, and how large steps choose length and technique.
+/// The terms of the target of a path: W, and the probabilities with which large steps choose length and technique.
 struct PathTarget {
     PathMeasure measure;
     TargetMap map;
@@ -32,17 +32,18 @@ struct PathTarget {
 
 /// A vertex of a full path.
 struct PathVertex {
-    /// `is_delta` and `event` are of the path's scattering here; x_0 is of Kind::Emitter.
+    /// `is_delta` and `event` describe how the path scatters here; x_0 has Kind::Emitter.
     Vertex v;
-    /// Densities as sampled from the light's side and from the eye's. That of x_{k-1} from x_k is spread over the film.
+    /// Densities per unit_area, as sampled from the light's side and from the eye's side. That of x_{k-1} as sampled from
+    /// x_k is that of a film point anywhere on the film.
     double light = 1, eye = 1;
-    double next_event = 0;  ///< Of x_0: its density as next events from x_1 sample it.
+    double next_event = 0;  ///< For x_0: its density as next event estimation samples it from x_1.
     /// Probabilities of a delta event from either side.
     float light_pmf = 1, eye_pmf = 1;
     /// The factor of f that belongs to this vertex, with the edge before it.
     Rgb value;
     Rgb attenuation;          ///< On the edge to the next vertex.
-    float transmittance = 1;  ///< Of masks there; 0 where the edge is blocked.
+    float transmittance = 1;  ///< Of the masks on this edge; 0 if the edge is blocked.
     float opacity = 1;        ///< Probability that a ray meets the surface.
 };
 
@@ -59,7 +60,7 @@ public:
     bool is_connected_at(int i) const {
         return !x_[size_t(i)].v.is_delta && !x_[size_t(i) + 1].v.is_delta;
     }
-    /// Density of x_i given x_{i+1}, or x_{i-1}, where one direction is sampled with density 1 per solid angle.
+    /// Density of x_i per unit_area, given x_{i+1} or x_{i-1}, if directions have density 1 per steradian.
     double geometry_from_eye(int i) const { return geometry(i + 1, i); }
     double geometry_from_light(int i) const { return geometry(i - 1, i); }
     Vec2 film{};
@@ -72,20 +73,21 @@ public:
     void append(const PathVertex& v);
     void copy(const PathState& from);
 
-    /// Computes scattering and densities at x_first … x_last, where vertices or their neighbours have changed. False where
-    /// the path brings nothing.
+    /// Computes scattering and densities at x_first … x_last, the vertices that have changed or have a changed neighbour.
+    /// False if the path contributes nothing.
     bool evaluate(int first, int last);
-    /// Traces the edge from x_i to x_{i+1}. Where nothing is masked, only those edges need it that no ray has found.
+    /// Traces the edge from x_i to x_{i+1}. In scenes without masks, only edges that no ray has tested need this.
     bool trace_edge(int i, RenderStats& stats);
-    /// Sets the target and what the path adds to the film, once all else is known. Both are relative to the density of
-    /// large steps, as if they were states of primary sample space.
+    /// Sets the target and the contribution to the film, when everything else is known. Both are divided by the density of
+    /// large steps, as if the state were one of primary sample space.
     void finish();
-    /// Makes the path one that brings nothing.
+    /// Makes this a path that contributes nothing.
     void set_black();
-    /// Density of the path among those sampled from both ends by C(s, k+1-s).
+    /// Density with which the technique C(s, k+1-s) samples the path.
     double density(int s) const;
     double large_step_density() const { return large_step_density_; }
-    /// As the joins of all techniques with their weights, whose sum it is; y and z of `work` become the path.
+    /// Reports the path as the joins of all techniques with their MIS weights, whose sum is its contribution. y and z of
+    /// `work` then hold the path.
     void tell(const TechniqueCounts& counts, Workspace& work, ContributionSink& sink) const;
 
     void save(LearnedState& to) const override;

@@ -1,6 +1,6 @@
 #pragma once
-// A short run of independent samples, thrown away afterwards, that fixes what chains must have fixed before they begin: the
-// weights W of the target, the constant c, how large pools are, and how chains and techniques are shared out.
+// A short run of independent samples that fixes the parameters of chains before they start: the weights W of the target,
+// the constant c, the sizes of pools, and the probabilities of path lengths and techniques. Its samples are then discarded.
 
 #include <map>
 
@@ -12,7 +12,7 @@ namespace etendue {
 struct Pilot {
     TargetMap map;
     double b = 0;                  ///< Mean of the target.
-    double relative_variance = 0;  ///< Of the target of one sample.
+    double relative_variance = 0;  ///< Variance of the target of one sample, divided by b².
     uint64_t samples = 0;
     /// Mean of the target by length and number of light vertices.
     std::map<std::pair<int, int>, double> by_technique;  ///< (edges, s)
@@ -21,11 +21,11 @@ struct Pilot {
     void load(LearnedState& from);
 };
 
-/// Samples of `sample`'s class 0, doubled until as many again promise b within 2 %, at most two a pixel.
+/// Samples class 0 of `sample`. The number of samples is doubled until the relative standard error of b is at most 2 %; at
+/// most two samples per pixel, and 2^18 in total.
 Pilot run_pilot(const PassContext& pass, const PrimarySample& sample);
 
-/// Samples of a group's pool: their mean is known as well as all groups' steps need it, and there are some for each chain
-/// to choose from.
+/// Number of samples in the pool of a group: a quarter of the pilot's, and at least four for each chain.
 uint64_t pool_samples(uint64_t pilot_samples, const ChainOptions& options);
 
 }  // namespace etendue

@@ -1,6 +1,6 @@
 #pragma once
-// Chains in primary sample space [Kelemen et al. 2002]: a state is the numbers that a sample reads, and all that the sample
-// brings.
+// Chains in primary sample space [Kelemen et al. 2002]: a state consists of the random numbers that a sample reads, and all
+// contributions of the sample.
 
 #include <functional>
 
@@ -10,16 +10,16 @@
 
 namespace etendue {
 
-/// The sample, as a function of its numbers (context.sampler) and its class: adds joins to context.sink.
+/// A sample as a function of its random numbers (context.sampler) and its class; adds its joins to context.sink.
 using PrimarySample = std::function<void(int chain_class, const SampleContext&, Workspace&)>;
 
 /// Collects the joins of one sample of the whole film.
 class SplatCollector final : public ContributionSink {
 public:
-    /// Replaces what is in `state`. `map` may be nullptr: then the target is the luminance.
+    /// Replaces the contents of `state`. If `map` is nullptr, the target is the luminance.
     SplatCollector(const Film& film, const TargetMap* map, ChainState& state, Workspace& work);
     void add(const Join& join, Rgb contribution) override;
-    /// Gets every join's luminance too, as it is before W.
+    /// Is also called with the luminance of every join, before the factor W.
     std::function<void(const Join&, double luminance)> observer;
 
 private:
@@ -63,12 +63,13 @@ public:
                      ChainState& y) const override;
 
 protected:
-    /// Makes y of its numbers, which it reads from `source`.
+    /// Computes the state y from its numbers, which it reads from `source`.
     virtual void evaluate(int chain_class, NumberSource& source, const ChainContext& c,
                           ChainState& y) const = 0;
 
 private:
-    static constexpr double kBlockShare = 0.25;  ///< Of the mutations.
+    static constexpr double kBlockShare =
+        0.25;  ///< Fraction of the mutations that are block steps.
 
     int classes_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// States of Markov chains, and the spaces they move in. The engine (chain.h, chain_groups.h) knows nothing else of a method.
+// States of Markov chains, and their spaces. chain.h and chain_groups.h use a method only through these interfaces.
 
 #include <array>
 #include <memory>
@@ -11,18 +11,18 @@
 
 namespace etendue {
 
-/// What a state adds to the film, weighted.
+/// A weighted contribution of a state to the film.
 struct Splat {
-    Vec2 film;
+    Vec2 film;  ///< In pixels.
     Rgb value;
 };
 
 struct ChainState {
-    /// I: the chain's density times the normalisation b. Positive wherever a splat is.
+    /// I: the stationary density of the chain times the normalisation b. Positive if the state has a splat.
     double target = 0;
-    /// T: density of this state among independent ones, in the measure of I. 1 in primary sample space.
+    /// T: density of independent states, in the measure of I; 1 in primary sample space.
     double independent_density = 1;
-    int edges = 0;  ///< Length of the path that has the largest part of the target; for statistics.
+    int edges = 0;  ///< Length of the path with the largest part of the target, for statistics.
     std::vector<Splat> splats;
 
     virtual ~ChainState() = default;
@@ -42,7 +42,7 @@ struct ChainState {
     double importance() const { return target / independent_density; }
 };
 
-/// What a task of one chain works with.
+/// Context of the steps of one chain.
 struct ChainContext {
     const SampleContext& sample;  ///< Of the whole film.
     Workspace& work;
@@ -51,37 +51,37 @@ struct ChainContext {
 /// A proposal y for a present state x.
 struct Proposal {
     int mutation = 0;         ///< Index into StateSpace::mutations().
-    bool has_failed = false;  ///< Nothing could be proposed: x stays.
+    bool has_failed = false;  ///< Nothing could be proposed; the chain stays at x.
     double Q_ratio = 1;       ///< Q(y→x) / Q(x→y).
 };
 
-/// States of one or more classes; every class has chains of its own. All random numbers are functions of a key.
+/// A space of states of one or more classes, each with its own chains. All random numbers are functions of a key.
 class StateSpace {
 public:
     virtual ~StateSpace() = default;
     virtual int classes() const { return 1; }
-    /// Names of what propose() may do.
+    /// Names of the mutations that propose() makes.
     virtual std::span<const char* const> mutations() const = 0;
     virtual std::unique_ptr<ChainState> make_state() const = 0;
     virtual void copy(const ChainState& from, ChainState& to) const = 0;
-    /// Makes y an independent state, distributed by T.
+    /// Sets y to an independent state with density T.
     virtual void draw(int chain_class, uint64_t key, const ChainContext& c,
                       ChainState& y) const = 0;
     virtual Proposal propose(int chain_class, const ChainState& x, uint64_t key,
                              const ChainContext& c, ChainState& y) const = 0;
-    /// Makes x's contributions again, to `sink`, with its sub-paths in c.work.
+    /// Reports the contributions of x to `sink` again, with its sub-paths in c.work.
     virtual void repeat(int chain_class, const ChainState& x, const ChainContext& c,
                         ContributionSink& sink) const = 0;
-    /// Adds `factor` times what x brings to the film.
+    /// Adds `factor` times the contribution of x to the film.
     virtual void contribute(int chain_class, const ChainState& x, double factor,
                             const ChainContext& c, SplatSink& film) const;
 };
 
-/// Where the states of a chain go.
+/// Receives the states of a chain.
 class StateSink {
 public:
     virtual ~StateSink() = default;
-    /// F of the state counts so many times (see chain.h).
+    /// The contribution F of the state is to be multiplied by `factor` (see chain.h).
     virtual void add(const ChainState& state, double factor) = 0;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// W: what a contribution's luminance counts in the target of chains, by film point.
+// W: the factor of a contribution's luminance in the target of chains, as a function of the film point.
 
 #include <vector>
 
@@ -8,14 +8,14 @@
 
 namespace etendue {
 
-/// W = 1/√(L² + 0.01 L̄²), where L is what a short run knows of the luminance near a point: chains then spend their steps
-/// by relative errors. 1 everywhere until it has learned.
+/// W = 1/√(L² + 0.01 L̄²), where L is the luminance near a film point, estimated by a short run, and L̄ its mean. Chains then
+/// distribute their steps by relative errors. 1 everywhere before learn().
 class TargetMap {
 public:
     explicit TargetMap(const FilmGeometry& geometry = {});
-    /// What samples of the whole film bring to a point.
+    /// Adds the luminance that a sample of the whole film contributes at a film point, in pixels.
     void add(Vec2 film, double luminance) { sums_[tile_at(film)] += luminance; }
-    /// Sets L from the sums of so many samples. What was added stays, and add() may go on.
+    /// Sets L from the sums of `samples` samples. The sums are kept, so that more samples can be added.
     void learn(uint64_t samples);
 
     double operator()(Vec2 film) const;
@@ -36,7 +36,7 @@ public:
     }
 
 private:
-    static constexpr int kTile = 16;  ///< Pixels, across.
+    static constexpr int kTile = 16;  ///< Width and height of a tile in pixels.
 
     size_t tile_at(Vec2 film) const {
         const auto [x, y] = geometry_.pixel_near(film);

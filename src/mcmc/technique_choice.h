@@ -1,5 +1,6 @@
 #pragma once
-// How independent samples of one path each choose its length and technique: by what a pilot found, and a fifth otherwise.
+// Probabilities with which independent samples of single paths choose the length and the technique: four fifths in
+// proportion to the light that a pilot run found, and one fifth by a fixed distribution.
 
 #include <vector>
 
@@ -7,11 +8,11 @@
 
 namespace etendue {
 
-/// p(s|k) of C(s, k+1-s): by the energy of each technique, and a fifth uniform over those that there are.
+/// p(s|k) of C(s, k+1-s): four fifths in proportion to the light of each technique, one fifth uniform over the techniques.
 class TechniqueChoice {
 public:
-    /// Tabulates `lengths` of them from `shortest` on; beyond, all techniques are as likely. `hits`, `hits_lens`: whether
-    /// there are C(0,k+1) and C(k+1,0).
+    /// Tabulates `lengths` path lengths from `shortest` on; at longer paths all techniques are equally likely. `hits` and
+    /// `hits_lens` tell whether C(0,k+1) and C(k+1,0) exist.
     TechniqueChoice(int shortest, int lengths, bool hits, bool hits_lens, const Pilot& pilot);
     double pmf(int k, int s) const;
     int choose(int k, double u) const;
@@ -25,7 +26,7 @@ private:
     std::vector<std::vector<double>> pmf_;  ///< By length, then s.
 };
 
-/// p(k): by energy, and a fifth geometric, so that every length has some.
+/// p(k): four fifths in proportion to the light of each length, one fifth geometric, so that every length is possible.
 class LengthChoice {
 public:
     LengthChoice(int shortest, int longest, const Pilot& pilot);
@@ -38,7 +39,7 @@ private:
 
     int shortest_, longest_;
     double by_energy_ = 0;
-    std::vector<double> energy_;  ///< Shares, from the shortest length on.
+    std::vector<double> energy_;  ///< Shares of the light, from the shortest length on.
 };
 
 }  // namespace etendue
