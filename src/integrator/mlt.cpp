@@ -1,7 +1,8 @@
-// Metropolis light transport in path space [Veach 1997, ch. 11]: a state is a full path, and mutations replace a part of it,
-// or move it a little. Unbiased.
+// Metropolis light transport in path space [Veach 1997, ch. 11]: a state is a full path, and mutations replace a part of it
+// or move it slightly. Unbiased.
 //
-// Large steps are paths of one technique, as in mmlt, and seeds are such paths too. Direct light is apart.
+// Large steps, and the states from which chains start, are paths made by one technique each, as in mmlt. Direct light is
+// computed without chains.
 
 #include "integrator/mlt.h"
 
@@ -22,7 +23,8 @@ public:
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
-        constexpr int kTabulated = 24;  // Lengths whose techniques the pilot may have learned.
+        constexpr int kTabulated =
+            24;  // Number of lengths for which the pilot's techniques are used.
         const Scene& scene = pass.scene;
         const TechniqueCounts n = counts(scene, 0);
         const int longest = paths_.max_depth();

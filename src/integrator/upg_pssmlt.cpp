@@ -1,11 +1,12 @@
-// Unbiased photon gathering in Markov chains [Qin et al. 2015, §5]: pssmlt, whose states also gather from light paths that
-// are traced apart.
+// Unbiased photon gathering in Markov chains [Qin et al. 2015, §5]: pssmlt, with states that also gather from stored light
+// paths.
 //
-// A state is the numbers of an eye and a light sub-path, as in pssmlt. Its target is the joins of the two, and what its eye
-// sub-path gathers from a map that is frozen before the chains begin: without shadow rays, with 1/p_c of the disc in place
-// of trials. A floor makes it positive wherever there may be a pair. The image has the joins, and gathers with trials from
-// another map, which each pass traces afresh: given the state these have the right mean, whatever the target is. One chain
-// over changing maps would need one target and one b for each.
+// A state consists of the numbers of an eye and a light sub-path, as in pssmlt. Its target is the sum of the joins of the
+// two and of the gathers of its eye sub-path from a light map that is traced once, before the chains start. For the target,
+// gathers use no shadow rays, and the reciprocal probability of the disc instead of trials. A constant is added wherever
+// there may be a pair, so that the target is positive there. For the image, gathers use shadow rays and trials, and another
+// map, which every pass traces anew. Given the state, these have the correct mean for any target. If the target depended on
+// the map of the pass, each map would need its own target and its own b.
 
 #include "integrator/upg_pssmlt.h"
 
@@ -24,12 +25,12 @@
 namespace etendue {
 namespace {
 
-/// Of a pass's light paths, in memory.
+/// Largest memory for the light paths of a pass, in bytes.
 constexpr uint64_t kMemory = uint64_t(6) << 30;
-/// Share of b that every state with a place for pairs has as its target besides.
+/// Fraction of b that is added to the target of every state that may form pairs.
 constexpr double kFloor = 0.05;
 
-/// What random numbers of light paths are for.
+/// Purposes of random numbers of light paths.
 enum Purpose : uint64_t { kRadius, kFrozen, kFresh, kTrials };
 
 /// Light paths to gather from.
@@ -38,7 +39,7 @@ struct LightMap {
     LightVertexGrid grid;
 };
 
-/// What sub-paths and gathers have in common for the whole run.
+/// The parameters of sub-paths and gathers, which are fixed for the whole run.
 struct Gathering {
     const Bidirectional& paths;
     TechniqueCounts counts;
@@ -50,7 +51,7 @@ struct Gathering {
                 density, roulette, paths.max_depth(), kGatherConstants.flatness,
                 0,       work};
     }
-    /// Calls use(t) for the eye vertices z_{t-1} that may belong to a pair.
+    /// Calls use(t) for each eye vertex z_{t-1} that may belong to a pair.
     template <class Use>
     void for_each_place(const Workspace& work, const Use& use) const {
         for (int t = 2; t <= work.z.size(); ++t)
@@ -59,7 +60,7 @@ struct Gathering {
     void trace_eye_path(const SampleContext& c, Workspace& work) const {
         paths.trace_eye_path(c, counts, work, &density);
     }
-    /// The same from the numbers of a state.
+    /// The same with the numbers of a state.
     void repeat_eye_path(const NumberState& state, const ChainContext& c,
                          ContributionSink& sink) const {
         NumberSource numbers(NumberStep::Same, 0, &state.numbers, nullptr);
@@ -73,7 +74,7 @@ struct Gathering {
                            [&](int t) { paths.add_connections(c, counts, t, work); });
     }
 
-    /// Traces N_L light paths, whose random numbers are a function of `key`.
+    /// Traces N_L light paths, whose random numbers are functions of `key`.
     void trace(const PassContext& pass, uint64_t key, LightMap& map, float radius) const {
         constexpr uint64_t kChunk = 1024;
         const uint64_t chunks = (pass.light_paths + kChunk - 1) / kChunk;
@@ -98,7 +99,7 @@ class NoSink final : public ContributionSink {
     void add(const Join&, Rgb) override {}
 };
 
-/// Mean number of pairs of an eye path.
+/// Mean number of pairs per eye path.
 double mean_pairs(const PassContext& pass, const Gathering& gathering, const LightMap& map,
                   uint64_t key) {
     constexpr uint64_t kPaths = 2048;
@@ -163,7 +164,7 @@ private:
     double floor_;
 };
 
-/// Adds a chain's states to the film, with what they gather from the pass's map.
+/// Adds the states of a chain to the film, with their gathers from the map of the pass.
 class GatheringStates final : public StateSink {
 public:
     GatheringStates(const StateSpace& space, const Gathering& gathering, const LightMap& fresh,
@@ -243,7 +244,7 @@ public:
     }
 
 protected:
-    /// All of it is a function of the seed, so that a rendering that is resumed has the same.
+    /// Everything here is a function of the seed, so that a resumed rendering computes the same.
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         constexpr int kRounds = 3;
         const float size = pass.scene.bounds().is_empty() ? 1 : pass.scene.bounds().radius();

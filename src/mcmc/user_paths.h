@@ -1,9 +1,9 @@
 #pragma once
-// User paths [Fan, Chenney & Lai 2005, §5]: light sub-paths that a user knows to matter, from an emitter to a surface that
-// scatters in all directions. Proposals follow one of them with each direction drawn from a narrow cone.
+// User paths [Fan et al. 2005, §5]: light sub-paths that a user knows to be important, from an emitter to a surface that
+// scatters light in all directions. Proposals follow one of them, with each direction drawn from a narrow cone.
 //
-// Unlike in the paper, directions are uniform in solid angle, and the first point of an area emitter moves too, within a
-// small disc: a fixed point would have no density there.
+// There are two deviations from the paper. Directions are uniform in solid angle. The first point on an area emitter is
+// random within a small disc, because a fixed point would have no density there.
 
 #include <optional>
 #include <span>
@@ -21,17 +21,17 @@ struct GivenPath {
 
     std::string name;          ///< May be empty.
     std::vector<Vec3> points;  ///< World space, from the emitter on.
-    std::vector<float> cones;  ///< Half-angles in degrees: one for all segments, or one each.
+    std::vector<float> cones;  ///< Half-angles in degrees: one for all segments, or one for each.
     std::optional<float>
-        radius;  ///< Of the disc about the first point; a hundredth of the scene's if not given.
+        radius;  ///< Of the disc about the first point, in scene units; empty: 1 % of the scene's.
 };
 
-/// Reads the JSON text of `file`. Throws std::runtime_error with file and place.
+/// Reads the JSON text of `file`. Throws std::runtime_error with the file and the path or line.
 std::vector<GivenPath> parse_user_paths(const std::string& text, const std::string& file);
 std::vector<GivenPath> read_user_paths(const std::string& file);
 std::string to_json(std::span<const GivenPath> paths);
 
-/// A path that lies on the scene's surfaces.
+/// A user path whose points lie on surfaces of the scene.
 struct UserPath {
     struct Point {
         Vec3 p, ng;
@@ -46,10 +46,10 @@ struct UserPath {
     std::vector<Point> points;
 };
 
-/// A given path on the scene's surfaces, or why it is refused.
+/// A user path on the scene's surfaces, or the reason why it cannot be used.
 struct CheckedPath {
     std::optional<UserPath> path;
-    int point = 0;  ///< The refused point, from 0.
+    int point = 0;  ///< Index of the point with the problem, from 0.
     std::string problem;
 };
 CheckedPath check_user_path(const Scene& scene, const GivenPath& given);
@@ -61,17 +61,17 @@ class UserPaths {
 public:
     UserPaths(const Scene& scene, std::vector<UserPath> paths)
         : scene_(&scene), paths_(std::move(paths)) {}
-    /// Throws std::runtime_error where the file has a path that is refused, or has none.
+    /// Throws std::runtime_error if a path of the file cannot be used, or if it has none.
     static UserPaths load(const Scene& scene, const std::string& file);
 
-    /// Makes y_0 … y_m close to one of the paths; false where no path results.
+    /// Makes y_0 … y_m close to one of the user paths; false if a ray misses.
     bool sample(const WalkContext& walk, Sampler& sampler, SubPath& y) const;
-    /// Area density of y_0 … y_m, with the delta events that their vertices have. It does not know of masks.
+    /// Area density of y_0 … y_m with the delta events at their vertices, without the effect of masks.
     double density(std::span<const Vertex* const> y) const;
 
 private:
     double density(const UserPath& path, std::span<const Vertex* const> y) const;
-    /// The point of the emitter above or below `q`, a point of the disc.
+    /// The point of the emitter above or below `q`, a point of the disc; false if there is none.
     bool find_on_emitter(const UserPath& path, Vec3 q, SurfaceHit& hit) const;
 
     const Scene* scene_;

@@ -1,6 +1,6 @@
 #pragma once
-// Bidirectional mutation [Veach 1997, §11.4.1]: deletes some edges in the middle of a path, and samples others from both
-// ends of the gap, as bidirectional path tracing does.
+// Bidirectional mutation [Veach 1997, §11.4.1]: deletes some edges of a path, and samples new ones from both ends of the
+// gap, as bidirectional path tracing does.
 
 #include "mcmc/mutation/mutation.h"
 
@@ -13,11 +13,11 @@ public:
     bool suits(const PathState&) const override { return true; }
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
                  MutationWay& way) const override;
-    /// The true density: not only that of the vertices from that side that made them.
+    /// Sum over all splits of the new vertices between the two sides, not only the split that made them.
     double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
 
 private:
-    /// Numbers of vertices that may be sampled from the light's side of the gap, of n in all.
+    /// Range of the number of vertices, of n in total, that may be sampled from the light's side of the gap.
     struct Splits {
         int first, last;
         double pmf() const { return 1.0 / (last - first + 1); }

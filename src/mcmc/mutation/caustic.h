@@ -1,6 +1,7 @@
 #pragma once
 // Caustic perturbation [Veach 1997, §11.4.3]: the direction from the emitter, or from the last vertex before a chain of
-// delta events, is turned a little; the light sub-path follows the same events as before, to the vertex that the lens sees.
+// delta events, is turned by a small angle. The light sub-path follows the same events as before, to the vertex that the
+// lens sees.
 
 #include "mcmc/mutation/perturbation.h"
 
@@ -18,7 +19,7 @@ public:
 private:
     /// The vertex whose direction is turned.
     static int first(const PathState& x);
-    /// Angles, or from infinity distances, by which x_{k-1} moves as far as the film's range moves it.
+    /// Angles in radians (for emitters at infinity, distances in scene units) that move x_{k-1} as far as film_range() does.
     LogRange range(const PathState& x, int first) const;
 
     const PathMeasure& measure_;

@@ -1,8 +1,7 @@
 #pragma once
-// Lens perturbation and multi-chain perturbation [Veach 1997, §11.4.2 and §11.4.4]: a film point moves a little, and the
-// eye sub-path from there follows the same delta events as before, up to a vertex that is joined to what is kept; or up to
-// the emitter. Where a vertex that is no delta event lies between two chains of delta events, its direction is turned a
-// little too.
+// Lens perturbation and multi-chain perturbation [Veach 1997, §11.4.2 and §11.4.4]: the film point moves slightly, and the
+// eye sub-path follows the same delta events as before, up to a vertex that is joined to the kept part, or up to the
+// emitter. At a vertex between two chains of delta events, the direction is turned by a small angle.
 
 #include "mcmc/mutation/perturbation.h"
 
@@ -11,7 +10,7 @@ namespace etendue {
 class EyeChainMutation final : public PathMutation {
 public:
     enum class Kind {
-        Lens,       ///< One chain of delta events, or none.
+        Lens,       ///< At most one chain of delta events.
         MultiChain  ///< More than one.
     };
     EyeChainMutation(Kind kind, const PathMeasure& measure);

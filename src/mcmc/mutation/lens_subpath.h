@@ -1,6 +1,7 @@
 #pragma once
-// Lens sub-path mutation [Veach 1997, §11.4.5]: a new film point, anywhere, and a walk from there to the first vertex that
-// can be connected, which is joined to what is kept. Film points are independent of earlier ones.
+// Lens sub-path mutation [Veach 1997, §11.4.5]: draws a new film point anywhere, and walks from there to the first vertex
+// that can be connected, which is joined to the kept part. Film points are independent of earlier ones; they are not
+// stratified.
 
 #include "mcmc/mutation/mutation.h"
 
@@ -14,7 +15,7 @@ public:
     double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
 
 private:
-    /// The first vertex from the eye that could be connected, if it is not the emitter's.
+    /// Index of the first vertex from the eye that can be connected; 0 if only the emitter remains.
     static int end(const PathState& x);
 };
 

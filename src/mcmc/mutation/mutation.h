@@ -1,5 +1,5 @@
 #pragma once
-// Mutations of paths: each proposes, and knows the density of what it proposes.
+// Mutations of paths: each makes proposals and evaluates their density Q.
 
 #include <memory>
 
@@ -7,12 +7,12 @@
 
 namespace etendue {
 
-/// How a proposal y was made of x: what was kept, x_0 … x_l and x_m … x_k. Proposals that keep the same make up a step of
-/// their own, which keeps the target: Q refers to them alone.
+/// How a proposal y was made from x: x_0 … x_l and x_m … x_k are kept. Q is the density among the proposals that keep these
+/// parts; for each choice of them, the steps leave the target invariant.
 struct MutationWay {
     int l = -1;
-    int m = 0, m_y = 0;  ///< Index of the same vertex in x, and in y.
-    float angle = 0;     ///< By which a direction was changed.
+    int m = 0, m_y = 0;  ///< Index of the same vertex in x and in y.
+    float angle = 0;     ///< Angle in radians by which a direction was turned.
 
     MutationWay back() const { return {l, m_y, m, angle}; }
 };
@@ -30,12 +30,12 @@ struct MutationContext {
 class PathMutation {
 public:
     virtual ~PathMutation() = default;
-    /// Whether it can change x. Where it cannot, it is not chosen; of what can, one is by weight.
+    /// Whether it can change x. One of the mutations for which this is true is chosen, in proportion to their weights.
     virtual bool suits(const PathState& x) const = 0;
-    /// Makes y without its target; false where there is nothing to propose.
+    /// Makes y without its target; false if there is nothing to propose.
     virtual bool propose(const PathState& x, const MutationContext& c, PathState& y,
                          MutationWay& way) const = 0;
-    /// Density of y, made of x in this way; up to a factor that is the same on the way back.
+    /// Density of the proposal y from x in this way, up to a factor that is the same for the way back.
     virtual double Q(const PathState& x, const PathState& y, const MutationWay& way) const = 0;
 };
 

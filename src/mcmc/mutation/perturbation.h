@@ -1,24 +1,24 @@
 #pragma once
-// What perturbations share: how far they go, and directions that change by a small angle.
+// Shared by the perturbations: distances, and directions that are turned by a small angle.
 
 #include "mcmc/mutation/mutation.h"
 
 namespace etendue {
 
-/// Lengths, or angles, whose logarithm is uniform between two bounds.
+/// Distances or angles whose logarithm is uniformly distributed between two bounds.
 struct LogRange {
     float low, high;
     float sample(float u) const;
     bool contains(float r) const { return r >= low && r <= high; }
 };
 
-/// Pixels by which a film point moves [Veach 1997, §11.4.2]: from a tenth of one to √(0.05 A/π), A being the film's area.
+/// Distances in pixels by which a film point moves [Veach 1997, §11.4.2]: from 0.1 to √(0.05 A/π), with the film's area A.
 LogRange film_range(const PathMeasure& measure);
 
-/// `axis` turned by `angle` toward the azimuth of `u`.
+/// `axis` turned by `angle` (radians) toward the azimuth 2π u.
 Vec3 turned(Vec3 axis, float angle, float u);
 
-/// The delta event of the same kind as that at `like`, from the last vertex of a walk; empty where there is none.
+/// The delta event at `at` that has the same kind as the one at `like`; empty if there is none.
 std::optional<BsdfSample> follow(const Vertex& at, const Vertex& like, TransportMode mode);
 
 }  // namespace etendue

@@ -1,7 +1,8 @@
 #pragma once
-// User path proposals [Fan, Chenney & Lai 2005, §5.1]: a light sub-path close to one that a user has given replaces that of
-// the present path, up to the first vertex from the eye that is no delta event. Hardly any path could be made so again on
-// the way back; so their density is added to that of bidirectional mutations that keep the same [eq. 7], by PathSpace::Q().
+// Proposals from user paths [Fan et al. 2005, §5.1]: a light sub-path close to a user path replaces that of the present
+// path, up to the first vertex from the eye that is not a delta event. Few paths could be proposed in this way on the way
+// back. PathSpace::Q() therefore adds their density to that of bidirectional mutations that keep the same part
+// [Fan et al. 2005, eq. 7].
 
 #include "mcmc/mutation/mutation.h"
 #include "mcmc/user_paths.h"
@@ -17,7 +18,7 @@ public:
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
                  MutationWay& way) const override;
     double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
-    /// Whether a mutation that goes this way keeps what proposals from user paths keep.
+    /// Whether a mutation of this way keeps the same part as proposals from user paths.
     static bool is_way(const PathState& x, const MutationWay& way) {
         return way.l == -1 && way.m == kept(x);
     }
