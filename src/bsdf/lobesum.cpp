@@ -1,11 +1,10 @@
-// Sum of simple lobes, each with a factor of its own and none that knows of the others: `uber`, `plastic` and
-// `translucent` of pbrt-v3.
+// Sum of simple lobes with independent factors: `uber`, `plastic` and `translucent` of pbrt-v3.
 //   diffuse_reflectance (0.25), diffuse_transmittance (0)      diffuse
 //   glossy_reflectance (0.25), glossy_transmittance (0)        microfacets with a dielectric's Fresnel term
 //   specular_reflectance (0), specular_transmittance (0)       the same, smooth
 //   distribution (beckmann), alpha (0.1), or alpha_u, alpha_v  of the microfacets
 //   eta (1.5)                                                  η below the surface over η above
-// Colours or textures. Reflects on both sides. More light than there is may be reflected where the factors say so.
+// Colours or textures. Reflects on both sides. The factors may add up to more than 1; energy is then not conserved.
 
 #include "bsdf/ior.h"
 

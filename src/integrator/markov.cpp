@@ -10,7 +10,7 @@
 namespace etendue {
 namespace {
 
-/// First vertex at which the pilot's walks have roulette, at the latest. Without it they would not end in a closed room.
+/// Largest rr_depth of the pilot's walks. Without Russian roulette, walks would not end in a closed room.
 constexpr int kPilotRoulette = 10;
 
 }  // namespace
@@ -51,7 +51,7 @@ bool MarkovIntegrator::hits_emitters(const Scene& scene) {
 
 PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
                                                      const Bidirectional& paths) const {
-    // Those of bidirectional path tracing alone: more may depend on what begin() chose before.
+    // The counts of bidirectional path tracing alone; those of derived classes may depend on an earlier begin().
     const TechniqueCounts n = MarkovIntegrator::counts(scene, 0);
     return
         [&paths, n](int, const SampleContext& c, Workspace& work) { paths.add_sample(c, n, work); };

@@ -1,5 +1,5 @@
 #pragma once
-// What the integrators with Markov chains share: options, the pilot, direct light apart, statistics.
+// Base class of the integrators with Markov chains: options, the pilot run, direct light without chains, statistics.
 
 #include <cstddef>
 #include <optional>
@@ -11,20 +11,21 @@
 namespace etendue {
 
 using Figures = std::vector<std::pair<std::string, double>>;
-/// Adds what the steps did, by mutation and by length from `shortest` on.
+/// Adds the statistics of steps to `out`, by mutation, and by path length from `shortest` on.
 void add_step_figures(const ChainStats& stats, std::span<const char* const> mutations, int shortest,
                       Figures& out);
 
 class MarkovIntegrator : public Integrator {
 public:
-    /// Edges of the shortest path that chains make. Shorter ones are taken by independent samples, one a pixel and pass.
+    /// Length in edges of the shortest paths that chains make. Shorter paths are made by one independent sample per pixel
+    /// and pass.
     static constexpr int kShortest = 3;
 
-    /// Of chains; `rr_depth` where walks have roulette.
+    /// The parameters of chains; integrators whose walks use Russian roulette add `rr_depth`.
     static std::vector<ParamInfo> params();
 
     void trace(const PassContext& pass) final;
-    /// Chains can be made only once the scene is known: until then what was loaded is kept as it is.
+    /// Chains can be made only when the scene is known; until then the loaded data are kept unchanged.
     void save(LearnedState& to) const final;
     void load(LearnedState& from) final;
     void collect(std::span<const std::unique_ptr<PassSums>>) final {
@@ -34,7 +35,7 @@ public:
     }
     void sample(const SampleContext& context, Workspace& work) const final;
 
-    /// Of the chains; all that they make can be made in all these ways.
+    /// The counts of the chains' techniques.
     TechniqueCounts counts(const Scene& scene, uint64_t) const override {
         return Bidirectional::counts(scene, whole_film_paths(scene));
     }
@@ -51,7 +52,7 @@ public:
 protected:
     MarkovIntegrator(const IntegratorParams& params, const DepthOptions& depth);
 
-    /// States, and how chains are shared among their classes.
+    /// The space of states, and the parameters of its classes.
     struct Chains {
         std::unique_ptr<StateSpace> space;
         std::vector<ClassPlan> plan;
@@ -62,29 +63,29 @@ protected:
         groups.advance(pass);
     }
 
-    /// A sample of all techniques, as of `bdpt`, by the walks of `paths`.
+    /// A sample of all techniques of `bdpt`, with the walks of `paths`.
     PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;
-    /// N_L of the weights: the film's eye paths are spread over so many pixels.
+    /// N_L in the weights: the number of pixels over which the eye paths of the film are distributed.
     static uint64_t whole_film_paths(const Scene& scene);
 
-    /// Whether eye paths can hit any.
+    /// Whether eye paths can hit an emitter of the scene.
     static bool hits_emitters(const Scene& scene);
 
     ChainOptions options_;
     Bidirectional paths_;
 
 private:
-    /// Of the shorter paths. Eye paths make all of them, unless some emitter has no extent.
+    /// The counts for the shorter paths. Eye paths make all of them, unless an emitter has no extent.
     static TechniqueCounts direct_counts(const Scene& scene, uint64_t light_paths);
 
     Bidirectional direct_;
-    Bidirectional pilot_paths_;  ///< With roulette, even where the chains' walks have none.
+    Bidirectional pilot_paths_;  ///< With Russian roulette, even if the walks of chains have none.
     std::unique_ptr<StateSpace> space_;
-    std::unique_ptr<ChainGroups> groups_;  ///< Once the first pass has begun.
-    bool has_begun_ = false;               ///< A pass stayed. Until then each begins anew.
+    std::unique_ptr<ChainGroups> groups_;  ///< Set when the first pass starts.
+    bool has_begun_ = false;  ///< Whether a pass was kept; until then each starts anew.
     std::optional<Pilot> pilot_;
     uint64_t pool_ = 0;
-    std::vector<std::byte> loaded_;  ///< Of the groups, until they are made.
+    std::vector<std::byte> loaded_;  ///< Loaded data of the groups, until they are made.
 };
 
 }  // namespace etendue

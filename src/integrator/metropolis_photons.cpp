@@ -12,22 +12,22 @@
 namespace etendue {
 namespace {
 
-/// What random numbers of this source are for.
+/// Purposes of the random numbers of this source.
 enum Purpose : uint64_t { kScale = 0x6d7073, kPilot, kChains, kDeposits };
 
 /// Vertices of Stream::Selection in states with target Path.
 enum PathNumber : uint64_t { kStoragePoint, kRemainder };
 
-/// Which maps a photon goes into.
+/// The maps that store a photon.
 struct Maps {
     bool global, caustic;
 };
 
-/// Where a state may leave a photon.
+/// A vertex at which a state may store a photon.
 struct Candidate {
     MapPhoton photon;  ///< Its power is F, without the factor r.
     Maps maps;
-    double part;  ///< Of the target.
+    double part;  ///< Its part of the target.
 };
 
 struct PhotonState : NumberState {
@@ -43,10 +43,10 @@ struct StoragePoint {
     bool is_caustic;
 };
 
-/// What remainders are worth, where the target is PhotonTarget::Path. Any function will do that depends on the path alone,
-/// is fixed before the chains begin, and lies in [0, 1].
+/// The value of a remainder for PhotonTarget::Path: its response divided by h_0, and at most 1. Any function in [0, 1] that
+/// depends only on the path and is fixed before the chains start would be correct.
 struct Clamp {
-    double gathered = 0, caustic = 0;  ///< Responses from which on it is 1: h_0.
+    double gathered = 0, caustic = 0;  ///< h_0: the value is 1 for responses of at least h_0.
     double operator()(const StoragePoint& at, double response) const {
         const double h0 = at.is_caustic ? caustic : gathered;
         return h0 > 0 ? std::min(1.0, response / h0) : double(response > 0);
@@ -55,17 +55,17 @@ struct Clamp {
 
 }  // namespace
 
-/// States are the numbers of a light path. With the target Importons they leave a photon at any of its diffuse vertices, in
-/// proportion to flux and importance; with the target Path one of these vertices is chosen by a number of its own, and more
-/// numbers make the rest of the path to the lens.
+/// A state consists of the numbers of a light path. With the target Importons, it stores a photon at one of its diffuse
+/// vertices, chosen in proportion to flux times importance. With the target Path, another number chooses this vertex, and
+/// further numbers determine the remainder of the path to the lens.
 class PhotonSpace final : public NumberSpace {
 public:
     PhotonSpace(const PhotonMapping& mapping, const FilmGeometry& geometry,
                 const ReconstructionFilter& filter)
         : NumberSpace(1), mapping_(mapping), region_(reached_region(geometry, filter)) {}
 
-    const PhotonImportance* importance = nullptr;  ///< Of target Importons.
-    Clamp clamp;                                   ///< Of target Path.
+    const PhotonImportance* importance = nullptr;  ///< For the target Importons.
+    Clamp clamp;                                   ///< For the target Path.
 
     std::unique_ptr<ChainState> make_state() const override {
         return std::make_unique<PhotonState>();
@@ -76,7 +76,7 @@ public:
     /// No joins: photons are no contributions to the film.
     void repeat(int, const ChainState&, const ChainContext&, ContributionSink&) const override {}
 
-    /// A light path of independent numbers, work.y.
+    /// Traces work.y, a light path with independent numbers.
     void draw_light_path(uint64_t key, const ChainContext& c) const {
         NumberTable numbers;
         NumberSource source(NumberStep::Fresh, key, nullptr, &numbers);
@@ -93,8 +93,8 @@ public:
         return points;
     }
 
-    /// Luminance in the image, per unit of flux, of a remainder that the numbers of `sampler` draw; 0 where there is none.
-    /// It goes on along work.y where that was traced beyond the storage point, or else extends it.
+    /// Luminance in the image, per unit of flux, of a remainder that is drawn with the numbers of `sampler`; 0 if there is
+    /// none. The remainder follows work.y beyond the storage point as far as it was traced, and then extends it.
     double response(const ChainContext& c, Sampler& sampler, const StoragePoint& at,
                     bool extends) const {
         SubPath& y = c.work.y;
@@ -222,7 +222,7 @@ private:
 
 namespace {
 
-/// Makes photons of the states of one chain.
+/// Makes photons from the states of one chain.
 class PhotonDeposits final : public StateSink {
 public:
     struct Result {
@@ -239,7 +239,7 @@ public:
     void add(const ChainState& chain_state, double factor) override {
         const auto& state = static_cast<const PhotonState&>(chain_state);
         const uint64_t key = hash_combine(key_, number_++);
-        // Few photons of small power tell less than fewer of equal power.
+        // A few photons of equal power give less noise than many photons of small power.
         const double share = factor * state.target / unit_;
         if (share < least_) {
             if (!(to_unit_double(hash_combine(key, 0)) * least_ < share)) return;
@@ -248,7 +248,7 @@ public:
         ++out_.deposits;
         if (!space_.importance)
             factor *= space_.reciprocal(state, hash_combine(key, 1), c_, out_.trials);
-        // A state that stays leaves photons at more of its vertices.
+        // A state that stays for several steps stores photons at several of its vertices.
         const size_t count = size_t(std::clamp(std::lround(share), 1L, 64L));
         parts_.clear();
         for (const Candidate& k : state.candidates) parts_.push_back(k.part);
@@ -289,7 +289,8 @@ void for_each_independent(const PassContext& context, uint64_t count, const Use&
 
 constexpr uint64_t kScaleSamples = 4096;
 
-/// The floor of importance: a share of its mean over the flux of photons, so that every look finds some.
+/// The constant that is added to the importance, a fraction of its mean over the flux of photons, so that every density
+/// estimate finds photons.
 float importance_floor(const PassContext& context, const PhotonMapping& mapping,
                        const PhotonSpace& space, const PhotonImportance& density) {
     constexpr double kShareOfMean = 0.02;
@@ -353,7 +354,7 @@ MetropolisPhotons::~MetropolisPhotons() = default;
 MetropolisPhotons::Pilot MetropolisPhotons::run_pilot(const PassContext& context,
                                                       const PhotonSpace& space) const {
     constexpr uint64_t kFewest = 4096, kMost = uint64_t(1) << 20;
-    // Half as exact as the pool has to be.
+    // A lower precision than that of the pool suffices.
     const double precision = 2 * options_.precision;
     const uint64_t key = hash_combine(context.seed, kPilot);
     std::vector<double> targets;

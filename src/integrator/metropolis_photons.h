@@ -1,13 +1,13 @@
 #pragma once
-// Metropolis photon sampling [Fan et al. 2005]: photons of Markov chains, as many as matter to the image, into the same maps
-// as those of traced light paths. See mps.cpp for the method.
+// Metropolis photon sampling [Fan et al. 2005]: a source of photons from Markov chains, for the same maps as photons of
+// traced light paths. See mps.cpp for the method.
 
 #include "integrator/markov.h"
 #include "integrator/photon_source.h"
 
 namespace etendue {
 
-/// What a photon is worth to chains.
+/// The target function of the chains for a photon.
 enum class PhotonTarget : uint8_t {
     Importons,  ///< Its flux times a density of importons.
     Path,       ///< Its flux where a random path from it to the lens is not blocked.
@@ -18,8 +18,8 @@ struct MetropolisPhotonOptions {
     uint64_t mutations = 500000;
     int chains = 256;
     double p_large = 0.3;
-    double precision = 0.02;    ///< Relative standard error of B* that the start-up must reach.
-    double least_share = 0.25;  ///< Photons of smaller shares of a step have roulette.
+    double precision = 0.02;    ///< Required relative standard error of the normalisation b.
+    double least_share = 0.25;  ///< Photons with a smaller share of a step's power pass roulette.
     uint64_t max_bytes = uint64_t(1) << 32;
 };
 
@@ -27,7 +27,7 @@ class PhotonSpace;
 
 class MetropolisPhotons final : public PhotonSource {
 public:
-    /// trace() throws std::runtime_error where the photons would take more than max_bytes.
+    /// trace() throws std::runtime_error if the photons need more than max_bytes.
     MetropolisPhotons(const PhotonMapping& mapping, const MetropolisPhotonOptions& options);
     ~MetropolisPhotons() override;
 
@@ -37,7 +37,7 @@ public:
     Figures figures() const override;
 
 private:
-    /// Of the target, from independent samples that are thrown away.
+    /// Statistics of the target, from independent samples that are then discarded.
     struct Pilot {
         double b = 0, relative_variance = 0;
         uint64_t samples = 0;
@@ -46,9 +46,9 @@ private:
 
     const PhotonMapping& mapping_;
     MetropolisPhotonOptions options_;
-    std::optional<PhotonImportance> importance_;  ///< Once there is a map; the same for all.
+    std::optional<PhotonImportance> importance_;  ///< Set by the first trace(), then fixed.
 
-    // Of the last trace.
+    // Statistics of the last trace().
     Pilot pilot_;
     uint64_t pool_ = 0, photons_ = 0, deposits_ = 0, trials_ = 0;
     double b_ = 0;

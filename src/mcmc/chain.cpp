@@ -88,8 +88,8 @@ void StateSpace::contribute(int chain_class, const ChainState& x, double factor,
 
 void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t first,
                     uint64_t count, const ChainContext& c, StateSink& states, ChainStats& stats) {
-    double x_share = 0;  // Of the present state, not yet added: the sum of b·a.
-    double x_large = 0;  // Whether it came by a large step.
+    double x_share = 0;  // Sum of b·a of the present state that is not yet added.
+    double x_large = 0;  // 1 if it comes from a large step that is not yet added.
     for (uint64_t step = first; step < first + count; ++step) {
         const uint64_t step_key = hash_combine(key, step);
         const bool is_large = to_unit_double(hash_combine(step_key, 0)) < terms.p_large;

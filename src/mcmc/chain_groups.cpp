@@ -11,7 +11,7 @@
 namespace etendue {
 namespace {
 
-/// What random numbers of a group are for.
+/// Purposes of the random numbers of a group.
 enum Purpose : uint64_t { kPool, kResampling, kSteps };
 
 class StatesToFilm final : public StateSink {
@@ -40,7 +40,7 @@ std::vector<size_t> resample(std::span<const double> weights, size_t count, doub
     for (size_t i = 0; i < count; ++i) {
         const double at = (double(i) + u) / double(count) * total;
         while (sum <= at && item + 1 < weights.size()) sum += weights[++item];
-        // Rounding may leave the last item one without weight.
+        // By rounding, the last item may be one without weight.
         size_t chosen = item;
         while (!(weights[chosen] > 0)) --chosen;
         out.push_back(chosen);

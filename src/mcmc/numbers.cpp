@@ -13,7 +13,7 @@ uint64_t hash_address(uint64_t key, Stream stream, uint64_t vertex, uint32_t slo
     return hash_combine(key, uint64_t(stream) << 56 ^ vertex << 8 ^ slot);
 }
 
-/// `bits` moved either way with the same probability.
+/// `bits` moved up or down, with the same probability.
 uint32_t moved(uint32_t bits, uint64_t random) {
     constexpr double kSmallest = -13, kLargest = -3;
     const double exponent = kSmallest + (kLargest - kSmallest) * to_unit_double(random);
@@ -56,7 +56,7 @@ uint32_t NumberSource::bits(Stream stream, uint64_t vertex, uint32_t slot) {
         step_ == NumberStep::Fresh ? nullptr : present_->find(stream, vertex, slot);
     const auto fresh = [&] { return uint32_t(hash_address(key_, stream, vertex, slot) >> 32); };
     const auto redraws_block = [&] {
-        // A slot that no vertex has stands for the whole block.
+        // The decision for the whole block uses a slot that no vertex has.
         return to_unit_double(hash_address(key_, stream, vertex, 0xff)) < kBlockProbability;
     };
     uint32_t bits;

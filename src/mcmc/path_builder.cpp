@@ -7,7 +7,7 @@
 namespace etendue {
 namespace {
 
-/// Weights are none of a path's business.
+/// The counts of walks whose MIS weights are not needed.
 constexpr TechniqueCounts kNoCounts{};
 
 SubPath& side(Workspace& work, TransportMode mode) {
@@ -64,7 +64,7 @@ template <TransportMode mode>
 bool PathBuilder::step(const BsdfSample& s) {
     SubPath& path = side(work_, mode);
     const int size = path.size();
-    // A kept vertex has no throughput of its own, which append() goes on with.
+    // append() continues from the throughput of the kept vertex, which has none.
     path[size - 1].beta = Rgb(1);
     if (!append<mode>(walk_, sampler_, s, path)) return false;
     ++(mode == TransportMode::Radiance ? new_eye_ : new_light_);
@@ -129,7 +129,7 @@ bool PathBuilder::sample_light(int count, bool ends_at_lens) {
     while (new_light_ < surfaces)
         if (!sample_step<TransportMode::Importance>()) return false;
     if (!ends_at_lens) return true;
-    // The ray of the last flight goes on to some surface or to none: what lies behind the lens does not matter.
+    // The last ray may continue beyond the lens; surfaces behind it do not matter.
     const int size = work_.y.size();
     sample_step<TransportMode::Importance>();
     work_.y.truncate(size);
@@ -283,7 +283,7 @@ bool PathBuilder::finish(PathState& y) {
             is_joined = false;
         }
     }
-    const int joint = y.size() - 1;  // The edge from here on joins both sides.
+    const int joint = y.size() - 1;  // The edge that starts here joins both sides.
     const int first_eye = keeps_eye();
     for (int i = first_eye + sampled_eye; i-- > first_eye;) y.append(eye[i]);
     int changed = y.size();  // The last vertex with another neighbour.

@@ -11,7 +11,7 @@
 namespace etendue {
 namespace {
 
-/// x_0 … x_m, up to the first vertex from the eye that is no delta event; empty where that is no user path.
+/// x_0 … x_m, up to the first vertex from the eye that is not a delta event; empty if this cannot be a user path.
 std::vector<Vec3> light_points(const PathState& x) {
     int m = x.last() - 1;
     while (m > 0 && x[m].v.is_delta) --m;

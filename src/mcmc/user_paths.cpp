@@ -122,9 +122,10 @@ std::string to_json(std::span<const GivenPath> paths) {
 
 namespace {
 
-/// Of the scene's radius: how far a point may lie from its surface, and how large the disc on an emitter is.
+/// Largest distance of a point from its surface, and default radius of the disc on an emitter, relative to the radius of the
+/// scene's bounds.
 constexpr float kTolerance = 1e-3f, kDisc = 1e-2f;
-/// Degrees by which a path may miss a mirror direction, or a refracted one.
+/// Largest deviation from the reflected or refracted direction, in degrees.
 constexpr double kLawTolerance = 2;
 
 double degrees(Vec3 a, Vec3 b) {
@@ -140,7 +141,7 @@ std::string to_text(Vec3 p) {
     return fmt::format("({:.5g}, {:.5g}, {:.5g})", p.x, p.y, p.z);
 }
 
-/// The surface point nearest to `p`, about.
+/// Approximately the surface point nearest to `p`.
 struct Nearest {
     SurfaceHit hit;
     float distance = kInf;
@@ -149,7 +150,7 @@ Nearest nearest_surface(const Scene& scene, Vec3 p, float tolerance) {
     constexpr int kDirections = 512;
     Nearest best;
     const auto try_direction = [&](Vec3 d) {
-        // From a little before the point, so that a surface on which it lies is met.
+        // The ray starts before the point, so that it hits a surface that contains the point.
         SurfaceHit hit;
         if (!scene.intersect({p - d * (tolerance / 2), d, kInf}, 0, hit)) return;
         const float distance = length(hit.geometry.p - p);

@@ -5,12 +5,12 @@
 
 namespace etendue {
 
-/// A function of the position alone, in a space of its own (parameter `to_texture`, from the world).
+/// A function of the position alone, in the texture's own space (parameter `to_texture`: world-to-texture transform).
 class SolidTexture : public Texture {
 public:
     explicit SolidTexture(const Params& params) : to_texture_(params.transform("to_texture")) {}
 
-    /// Steps of gradients: those that pbrt takes where it knows of no pixel, 0.0005.
+    /// Makes the step of gradients 0.0005, as in pbrt without a pixel footprint.
     void resolution(int& width, int& height) const override { width = height = 200; }
 
 protected:

@@ -7,19 +7,19 @@
 namespace etendue {
 namespace {
 
-/// Weight of deleting so many edges; those from an emitter, or the lens, to nothing count too.
+/// Weight of deleting this number of edges, where an edge beyond the emitter or the lens counts, too.
 double deletion_weight(int edges) {
     return edges == 1 ? 0.25 : edges == 2 ? 0.5 : std::exp2(-edges);
 }
 
-/// Weight of inserting so many more edges than were deleted.
+/// Weight of inserting `more` edges more than are deleted.
 constexpr int kMostMore = 12;
 double insertion_weight(int more) {
     const int n = std::abs(more);
     return n == 0 ? 0.5 : n == 1 ? 0.15 : n <= kMostMore ? 0.2 * std::exp2(-n) : 0.0;
 }
 
-/// Of a path of so many edges: x_{-1} and x_{k+1} stand for no vertex.
+/// Largest number of edges that can be deleted, including those to x_{-1} and x_{k+1}, which are not vertices.
 int most_deleted(int edges) {
     return edges + 2;
 }
@@ -60,7 +60,7 @@ double BidirectionalMutation::insertion_pmf(int inserted, int deleted, int edges
 
 BidirectionalMutation::Splits BidirectionalMutation::splits(const PathState& x, int l, int m,
                                                             int n) const {
-    // Where nothing is sampled from a side, what is kept there is connected to; or, if nothing is, hit.
+    // If no vertex is sampled on a side, the kept vertex there is connected; if none is kept, the emitter or lens is hit.
     const bool joins_light = l >= 0 ? x[l].v.is_connectible : hits_;
     const bool joins_eye = m <= x.last() ? x[m].v.is_connectible : hits_lens_;
     return {joins_light ? 0 : 1, joins_eye ? n : n - 1};
@@ -106,7 +106,7 @@ double BidirectionalMutation::Q(const PathState& x, const PathState& y,
     const Splits s = splits(x, way.l, way.m, n);
     if (s.last < s.first) return 0;
     const auto from_light = [&](int i, int count) {
-        // Alone, x_0 is made by a next event.
+        // If x_0 is the only vertex on the light's side, a next event samples it.
         if (i == 0) return count == 1 ? y[0].next_event : y[0].light;
         return y[i].light * double(y[i - 1].transmittance * y[i].opacity);
     };

@@ -18,7 +18,7 @@ LogRange CausticMutation::range(const PathState& x, int first) const {
     constexpr float kLargestAngle = 1;
     const int k = x.last();
     const Vertex &lens = x[k].v, &seen = x[k - 1].v;
-    // How far x_{k-1} moves with a pixel: the density of directions is that of a pixel's.
+    // Distance that x_{k-1} moves if the film point moves by one pixel; pdf_direction() is per pixel.
     const float pdf_dir = measure_.scene.sensor().pdf_direction(lens.p, direction(lens, seen));
     const float distance = lens.is_infinite ? 1.0f : length(seen.p - lens.p);
     float a_pixel = distance / std::sqrt(pdf_dir);
@@ -72,7 +72,7 @@ bool CausticMutation::propose(const PathState& x, const MutationContext& c, Path
 }
 
 double CausticMutation::Q(const PathState& x, const PathState& y, const MutationWay& way) const {
-    // The logarithm of the angle is uniform over a range of the same length there and back, but not the same range.
+    // The logarithm of the angle is uniform over ranges of equal length in both directions, but the ranges differ.
     if (!range(x, way.l).contains(way.angle)) return 0;
     double p = y.geometry_from_light(way.l + 1);
     for (int i = way.l + 2; i < y.last(); ++i) p *= y[i].light / double(y[i - 1].light_pmf);

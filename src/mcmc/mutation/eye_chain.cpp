@@ -61,7 +61,7 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
 
 double EyeChainMutation::Q(const PathState&, const PathState& y, const MutationWay& way) const {
     if (way.l < 0 && y.emitter().is_delta()) return 0;  // The chain cannot hit it.
-    // Film points and turns are as likely there as back.
+    // Film points and turned directions have the same density in both directions.
     const int k = y.last();
     double p = y[k - 1].eye;
     for (int i = k - 2; i > way.l; --i)
