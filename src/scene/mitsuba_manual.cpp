@@ -82,22 +82,8 @@ std::vector<ManualEntry> shapes() {
         {"shape", "bsplinecurve", kMitsuba3, "", "", "", {}, kCurve},
         {"shape", "linearcurve", kMitsuba3, "", "", "", {}, kCurve},
         {"shape", "sdfgrid", kMitsuba3, "", "", "", {}, "signed distance fields are not supported"},
-        {"shape",
-         "ellipsoids",
-         kMitsuba3,
-         "",
-         "",
-         "",
-         {},
-         "primitives of radiance fields are not supported"},
-        {"shape",
-         "ellipsoidsmesh",
-         kMitsuba3,
-         "",
-         "",
-         "",
-         {},
-         "primitives of radiance fields are not supported"},
+        {"shape", "ellipsoids", kMitsuba3, "", "", "", {}, "radiance fields are not supported"},
+        {"shape", "ellipsoidsmesh", kMitsuba3, "", "", "", {}, "radiance fields are not supported"},
     };
 }
 
@@ -110,7 +96,8 @@ std::vector<ManualEntry> bsdfs() {
         "flip_invalid_normals use_shadowing_function", kAccepted,
         "must be false where given: they depend on which direction is that of the view"};
     constexpr const char* kLayer =
-        "a layer over another material has no closed form; with --lenient the nested material";
+        "a layer over another material has no closed form; with --lenient, the nested material is "
+        "used";
     return {
         {"bsdf", "diffuse", kBothManuals, "reflectance", "diffuse_reflectance"},
         {"bsdf",
@@ -119,7 +106,7 @@ std::vector<ManualEntry> bsdfs() {
          "reflectance alpha use_fast_approx",
          "diffuse_reflectance",
          "",
-         {{"use_fast_approx", kAccepted, "the approximation is always used"}},
+         {{"use_fast_approx", kAccepted, "the fast approximation is always used"}},
          nullptr,
          "orennayar"},
         {"bsdf", "dielectric", kBothManuals, kIors},
@@ -146,7 +133,7 @@ std::vector<ManualEntry> bsdfs() {
          "",
          {{"diffuse_reflectance_sampling_rate main_specular_sampling_rate clearcoat_sampling_rate "
            "diffuse_sampling main_specular_sampling clearcoat_sampling",
-           kAccepted, "the lobes are sampled by their strengths"}}},
+           kAccepted, "lobes are sampled in proportion to their strengths"}}},
         {"bsdf", "twosided", kBothManuals, ""},
         {"bsdf", "mask", kBothManuals, "opacity"},
         {"bsdf", "blendbsdf", kBothManuals, "weight"},
@@ -208,11 +195,11 @@ std::vector<ManualEntry> textures() {
          "filename filter_type wrap_mode to_uv",
          "wrap_mode_u wrap_mode_v gamma channel cache max_anisotropy",
          "raw bitmap data format",
-         {{"wrap_mode_u wrap_mode_v", kRefused, "u and v must have the same mode"},
+         {{"wrap_mode_u wrap_mode_v", kRefused, "u and v must have the same wrap mode"},
           {"gamma", kRefused, "must be 1 (linear) or -1 (sRGB)"},
           {"cache max_anisotropy", kAccepted, "images are kept in memory and not filtered"},
-          {"format", kAccepted, "8-bit and 16-bit images stay as they are"},
-          {"bitmap data", kRefused, "images come from files"}}},
+          {"format", kAccepted, "images are stored as they are in the file"},
+          {"bitmap data", kRefused, "images must be files"}}},
         {"texture", "checkerboard", kBothManuals, "color0 color1 to_uv"},
         {"texture", "gridtexture", kMitsuba06, "color0 color1 line_width to_uv"},
         {"texture", "scale", kMitsuba06, "scale"},
@@ -241,7 +228,7 @@ std::vector<ManualEntry> emitters() {
          "intensity cutoff_angle beam_width to_world texture",
          kWeight,
          "",
-         {kSamplingWeight, {"texture", kRefused, "a texture of the beam is not supported"}}},
+         {kSamplingWeight, {"texture", kRefused, "textures of spot lights are not supported"}}},
         {"emitter",
          "directional",
          kBothManuals,
@@ -257,16 +244,16 @@ std::vector<ManualEntry> emitters() {
          "gamma cache sampling_weight",
          "bitmap mis_compensation",
          {kSamplingWeight,
-          {"gamma", kRefused, "give the image in linear colours"},
+          {"gamma", kRefused, "the image must have linear colours"},
           {"cache", kAccepted, "the image is kept in memory"},
-          {"bitmap", kRefused, "images come from files"}}},
+          {"bitmap", kRefused, "images must be files"}}},
         {"emitter",
          "sky",
          kMitsuba06,
          kDaylight,
          "stretch resolution scale sampling_weight to_world",
          "",
-         {kSamplingWeight, {"stretch", kRefused, "the sky is a half sphere"}}},
+         {kSamplingWeight, {"stretch", kRefused, "the sky is always a hemisphere"}}},
         {"emitter",
          "sun",
          kMitsuba06,
@@ -281,7 +268,7 @@ std::vector<ManualEntry> emitters() {
          kDaylight,
          "stretch resolution sky_scale sun_scale sun_radius_scale sampling_weight",
          "sky_scale sun_scale sun_aperture complex_sun to_world",
-         {kSamplingWeight, {"stretch", kRefused, "the sky is a half sphere"}}},
+         {kSamplingWeight, {"stretch", kRefused, "the sky is always a hemisphere"}}},
         {"emitter",
          "collimated",
          kMitsuba06,
@@ -289,7 +276,7 @@ std::vector<ManualEntry> emitters() {
          "",
          "",
          {},
-         "a beam without width is seen by no path"},
+         "no path can hit a beam of zero width"},
         {"emitter", "projector", kMitsuba3, "", "", "", {}, "projectors are not supported"},
         {"emitter",
          "directionalarea",
@@ -298,7 +285,7 @@ std::vector<ManualEntry> emitters() {
          "",
          "",
          {},
-         "emission in one direction from a surface is not supported"},
+         "surfaces that emit in one direction are not supported"},
         {"emitter",
          "timed_sunsky",
          kMitsuba3,
@@ -306,7 +293,7 @@ std::vector<ManualEntry> emitters() {
          "",
          "",
          {},
-         "the mean of the daylight over time is not supported"},
+         "daylight averaged over time is not supported"},
     };
 }
 
@@ -345,15 +332,8 @@ std::vector<ManualEntry> sensors() {
          "",
          "",
          {},
-         "lenses of parallel views are not supported"},
-        {"sensor",
-         "spherical",
-         kMitsuba06,
-         "",
-         "",
-         "",
-         {},
-         "views in all directions are not supported"},
+         "telecentric lenses are not supported"},
+        {"sensor", "spherical", kMitsuba06, "", "", "", {}, "spherical cameras are not supported"},
         {"sensor",
          "perspective_rdist",
          kMitsuba06,
@@ -361,7 +341,7 @@ std::vector<ManualEntry> sensors() {
          "",
          "",
          {},
-         "distortion of lenses is not supported"},
+         "lens distortion is not supported"},
         {"sensor", "irradiancemeter", kBothManuals, "", "", "", {}, kMeter},
         {"sensor", "radiancemeter", kBothManuals, "", "", "", {}, kMeter},
         {"sensor", "fluencemeter", kMitsuba06, "", "", "", {}, kMeter},
@@ -415,7 +395,8 @@ std::vector<ManualEntry> films_and_samplers() {
 }
 
 std::vector<ManualEntry> media() {
-    constexpr const char* kScatters = "scattering media are not supported; with --lenient vacuum";
+    constexpr const char* kScatters = "scattering media are not supported; with --lenient, vacuum "
+                                      "is used";
     return {
         {"medium",
          "homogeneous",
@@ -423,14 +404,14 @@ std::vector<ManualEntry> media() {
          "sigma_t albedo scale",
          "material sigma_a sigma_s phase",
          "sample_emitters phase",
-         {{"material", kRefused, kScatters}, {"phase", kAccepted, "nothing is scattered"}}},
+         {{"material", kRefused, kScatters}, {"phase", kAccepted, "media do not scatter"}}},
         {"medium", "heterogeneous", kBothManuals, "", "", "", {}, kScatters},
     };
 }
 
 std::vector<ManualEntry> integrators() {
     const auto no_effect = [](const char* names) {
-        return ManualNote{names, kAccepted, "a parameter of Mitsuba's algorithm"};
+        return ManualNote{names, kAccepted, "without effect; a parameter of Mitsuba's algorithm"};
     };
     constexpr const char* kShared = "max_depth rr_depth hide_emitters";
     constexpr const char* kGradients = "reparam_max_depth sppc sppp sppi guiding guiding_proj "

@@ -14,7 +14,9 @@ const std::vector<FilmEntry>& film_registry() {
             {"crop_width", ParamKind::Int, "width", "Width of the part that is rendered."},
             {"crop_height", ParamKind::Int, "height", "Height of the part that is rendered."},
             {"rfilter", ParamKind::Object, "gaussian", "Reconstruction filter."},
-            {"file_format", ParamKind::String, "", "Accepted; the output's name decides."},
+            {"file_format", ParamKind::String, "",
+             "Accepted; the extension of the output file "
+             "selects the format."},
             {"pixel_format", ParamKind::String, "", "Accepted; RGB is always written."},
             {"component_format", ParamKind::String, "", "Accepted; floats are written."},
             {"banner", ParamKind::Bool, "", "Accepted; without effect."},
