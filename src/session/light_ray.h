@@ -1,6 +1,6 @@
 #pragma once
-// Rays through the scene for those who draw light paths: what a ray meets, where mirrors and glass send it, and the
-// points of mirrors and glass that join two others.
+// Rays for editing user paths: the surfaces that a ray hits, its continuation at mirrors and glass, and the points on
+// mirrors and glass that connect two other points.
 
 #include <optional>
 #include <span>
@@ -14,7 +14,7 @@ namespace etendue {
 /// A surface point on a light ray.
 struct RayPoint {
     Vec3 p, ng;
-    std::string shape;  ///< Its name, or number.
+    std::string shape;  ///< Name or number of the shape.
     bool emits = false;
     bool is_specular =
         false;  ///< A mirror or clear glass; light leaves it only in the directions of `events`.
@@ -26,18 +26,18 @@ struct RayPoint {
     std::vector<Event> events;
 };
 
-/// The ray and, after every specular surface, its continuation by the event with the largest weight; ends with the
-/// first surface that scatters in all directions. At most `most` points.
+/// The points that the ray hits. At a specular surface, it continues by the event with the largest weight. The last point
+/// is on the first surface that scatters in all directions, or is the point with the number `most`.
 std::vector<RayPoint> trace_light(const Scene& scene, Vec3 origin, Vec3 direction, int most);
 
 /// The eye ray through the centre of a film point, followed in the same way.
 std::vector<RayPoint> trace_eye(const Scene& scene, Vec2 film, int most);
 
-/// The points with those of the specular surfaces around `index` moved so that they obey the laws of reflection and
-/// refraction; the other points stay. At most 20 steps of Newton's method on the direction of the light.
+/// Moves the points on specular surfaces around `index` until they obey the laws of reflection and refraction, by at most
+/// 20 steps of Newton's method on the direction of the light. The other points do not move.
 struct Snapped {
     std::vector<Vec3> points;
-    std::string problem;  ///< Empty where points were found.
+    std::string problem;  ///< The reason if no points were found; otherwise empty.
 };
 Snapped snap(const Scene& scene, std::span<const Vec3> points, size_t index);
 

@@ -1,5 +1,6 @@
 #pragma once
-// The paths that made a pixel, traced again: random numbers have addresses, so nothing is recorded during rendering.
+// The paths that contributed to a pixel, traced again. Random numbers have addresses, so nothing is recorded during the
+// rendering.
 
 #include <string>
 #include <vector>
@@ -14,14 +15,14 @@ struct ReplayRequest {
     uint64_t seed = 0;
     uint64_t pixel = 0;  ///< Index within the crop.
     uint32_t first_pass = 0, passes = 1;
-    bool splats = false;  ///< Also those of the light paths of the first of the passes.
+    bool splats = false;  ///< Whether to trace the light paths of the first pass as well.
     size_t most_paths = 10000;
-    double seconds = 2;  ///< After which it ends early.
+    double seconds = 2;  ///< Time limit.
 };
 
 struct ReplayedPath {
     struct Point {
-        Vec3 p;  ///< A direction where `is_infinite`.
+        Vec3 p;  ///< Position; if `is_infinite`, the direction toward it.
         char event =
             'D';  ///< L on the emitter, S at a delta event, D at other surfaces, E on the lens.
         bool is_infinite = false;
@@ -30,21 +31,21 @@ struct ReplayedPath {
     Technique technique;
     uint32_t pass;
     float mis_weight;
-    Rgb value;  ///< What the pass's value of the pixel has of it.
+    Rgb value;  ///< Its weighted contribution to the pixel in this pass.
 };
 
 struct Replay {
-    std::vector<ReplayedPath> paths;  ///< Those with a contribution, by luminance.
-    Rgb sum;                   ///< Of all contributions with t ≥ 2, also of paths left out.
-    uint32_t passes = 0;       ///< That were traced.
-    uint64_t light_paths = 0;  ///< That were traced for splats.
-    size_t left_out = 0;       ///< Paths beyond `most_paths`.
+    std::vector<ReplayedPath> paths;  ///< Paths with a contribution, by luminance.
+    Rgb sum;                   ///< Sum of all contributions with t ≥ 2, also of paths left out.
+    uint32_t passes = 0;       ///< Number of passes that were traced.
+    uint64_t light_paths = 0;  ///< Number of light paths that were traced for splats.
+    size_t left_out = 0;       ///< Number of paths beyond `most_paths`.
 };
 
-/// Why an integrator's paths cannot be traced again; empty where they can.
+/// The reason why paths of an integrator cannot be traced again; empty if they can.
 std::string replay_problem(const IntegratorSpec& integrator);
-/// Joins pass no Russian roulette, so sums agree with the image on average, and exactly if it was rendered without.
-/// Throws std::runtime_error with replay_problem().
+/// Joins pass no Russian roulette before shadow rays. The sum therefore agrees with the image on average, and exactly if
+/// the image was rendered with roulette=0. Throws std::runtime_error with replay_problem().
 Replay replay(const Scene& scene, const ReplayRequest& request);
 
 }  // namespace etendue

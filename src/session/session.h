@@ -1,6 +1,6 @@
 #pragma once
 // An interactive session: a thread that loads a scene and renders runs, one per method. Other threads start and stop runs,
-// and read snapshots. The images are those of `etendue render`, bit by bit, however often a run is stopped or shown.
+// and read snapshots. The images are bit-identical to those of `etendue render`, however often a run is stopped or shown.
 
 #include <atomic>
 #include <condition_variable>
@@ -20,22 +20,23 @@ namespace etendue {
 
 struct RunRequest {
     std::string integrator;  ///< As text; empty for the scene's.
-    std::string user_paths;  ///< File of the parameter of this name, where it is not empty.
+    std::string
+        user_paths;  ///< Value of the integrator's parameter `user_paths`; empty: not given.
     SamplerKind sampler = SamplerKind::Sobol;
     uint64_t seed = 0;
     RenderLimits limits;      ///< Without any, the run ends when it is stopped.
-    int technique_depth = 0;  ///< Reduced until the technique images fit into kTechniqueBytes.
+    int technique_depth = 0;  ///< In edges; reduced until the images fit into kTechniqueBytes.
 };
 
 enum class RunState { Rendering, Stopped, Finished, Failed };
 const char* to_string(RunState state);
 
-/// What the spread of a run's passes says about a pixel.
+/// Meaning of the interval of a pixel that is computed from the spread of a run's passes.
 enum class IntervalKind {
     Confidence,  ///< 95 % confidence interval.
-    Upper,       ///< Passes of a Sobol' sampler spread more than their mean errs.
+    Upper,       ///< Upper bound: passes of a Sobol' sampler are negatively correlated.
     NoiseOnly,   ///< Without the bias of a consistent or biased method.
-    None,        ///< Passes belong to Markov chains.
+    None,        ///< No interval: the passes belong to Markov chains.
 };
 const char* to_string(IntervalKind kind);
 
@@ -62,7 +63,7 @@ struct RunStatus {
     IntervalKind interval = IntervalKind::Confidence;
     std::vector<std::pair<std::string, double>> figures;
     std::vector<ConvergencePoint> history;  ///< Points that are about equally spaced in log time.
-    bool is_of_this_scene = true;           ///< False once the scene was loaded again.
+    bool is_of_this_scene = true;           ///< False after the scene was loaded again.
 };
 
 /// The technique images of a run after a number of passes.
@@ -76,7 +77,7 @@ public:
     using Load = std::function<Scene()>;
     static constexpr size_t kTechniqueBytes = size_t(512) << 20;
 
-    /// Loads the scene in the session's thread. `threads`: of each rendering; 0: one per core.
+    /// Loads the scene in the session's thread. `threads`: number of threads of each rendering; 0: one per core.
     Session(Load load, int threads);
     ~Session();  ///< Discards the current pass.
     Session(const Session&) = delete;
@@ -84,11 +85,11 @@ public:
 
     // -- From any thread.
 
-    /// nullptr while the first scene is loaded, or if that failed.
+    /// nullptr while the first scene is being loaded, or if it could not be loaded.
     std::shared_ptr<const Scene> scene() const { return scene_.load(); }
-    /// Why the scene could not be loaded; empty while it is loading or where it was loaded.
+    /// The reason why the scene could not be loaded; empty otherwise.
     std::string load_error() const;
-    /// Loads the scene again. Runs of the old one are stopped; they keep their scene.
+    /// Loads the scene again. Runs of the earlier version are stopped; they keep their scene.
     void reload();
 
     /// Returns the run's id. Throws std::runtime_error with the integrator's own message.
@@ -97,27 +98,27 @@ public:
     void stop(int run);
     /// Discards the current pass, and stops.
     void discard(int run);
-    /// Continues a run that was stopped or has finished, to `limits` if any are given.
+    /// Continues a run that was stopped or has finished, up to `limits` if any are given.
     void resume(int run, const RenderLimits& limits);
-    /// Forgets the run and its image.
+    /// Removes the run and its image.
     void remove(int run);
-    /// Writes the image between two passes; then calls `done`, in the session's thread, with an error or an empty text.
+    /// Writes the image between two passes. Then calls `done` in the session's thread, with an error or an empty text.
     void save(int run, const std::string& file, std::function<void(std::string)> done);
     /// Stops all runs; with `drop`, discards the current pass.
     void stop_all(bool drop);
-    /// Waits until the current pass is over and all that was asked for so far is done.
+    /// Waits until the current pass and all commands so far are finished.
     void settle();
 
     /// Throws std::runtime_error for an unknown run, as do all functions that take one.
     RunStatus status(int run) const;
     std::vector<RunStatus> runs() const;
-    /// Changes whenever any status does.
+    /// A number that changes whenever the status of a run changes.
     uint64_t revision() const { return revision_.load(); }
 
-    /// The latest snapshot, or nullptr; asks for a newer one.
+    /// Returns the latest snapshot, or nullptr, and requests a newer one.
     std::shared_ptr<const Snapshot> snapshot(int run);
     std::shared_ptr<const TechniqueSnapshot> techniques(int run);
-    /// Counts processor time that was spent on a snapshot outside the session.
+    /// Charges processor time, in seconds, that was spent on a snapshot outside the session.
     void spent(double cpu_seconds);
 
 private:
@@ -130,7 +131,7 @@ private:
     std::shared_ptr<Run> next_run() const;
     void take_turn(Run& run);
     void after_pass(Run& run, const Progress& progress);
-    /// Publishes a snapshot. This is done at the first pass after it was asked for that the budget allows.
+    /// Publishes a snapshot if one was requested and the budget allows it.
     void show(Run& run);
     void finish_turn(Run& run, RunState state, const std::string& message = {});
     void changed() { ++revision_; }
@@ -140,7 +141,7 @@ private:
     std::atomic<std::shared_ptr<const Scene>> scene_;
     std::atomic<uint64_t> revision_{1};
 
-    mutable std::mutex mutex_;  ///< Guards all below, and the status of runs.
+    mutable std::mutex mutex_;  ///< Guards all members below, and the status of runs.
     std::condition_variable wake_;
     std::string load_error_;
     std::deque<std::function<void()>> commands_;

@@ -1,5 +1,5 @@
 #pragma once
-// Copies of a film between passes, for readers in other threads, and the budget of time that they may take.
+// Copies of a film between passes, for readers in other threads, and the time that they may take.
 
 #include <chrono>
 #include <memory>
@@ -23,7 +23,7 @@ struct Snapshot {
 /// spread.
 double interval_half_width(double variance, uint64_t passes);
 
-/// Reuses the memory of snapshots that no reader holds any more: fresh pages cost more than the copy.
+/// Reuses the memory of snapshots that no reader holds any more, because new pages cost more time than the copy.
 class SnapshotPool {
 public:
     /// A snapshot with undefined contents, which returns to the pool when its last owner releases it.

@@ -28,20 +28,20 @@ struct Reply {
     int status = 200;
     std::string type = "application/json";
     std::string body;
-    std::string etag;  ///< Empty: none.
+    std::string etag;  ///< Empty if there is none.
 
     static Reply json(std::string text) { return {200, "application/json", std::move(text), {}}; }
     /// {"error": message}
     static Reply error(int status, std::string_view message);
 };
 
-/// What a server serves. All but `done` is called by the server's thread.
+/// The interface between server and application. The server's thread calls all functions except `done`.
 class Handler {
 public:
     virtual ~Handler() = default;
     /// Calls `done` once, from any thread.
     virtual void handle(const Request& request, std::function<void(Reply)> done) = 0;
-    /// Whether a request that this function lets pass is answered by a stream of events. A refusal is set in `refused`.
+    /// Whether the reply to a request is a stream of events. If the request is rejected, sets `refused`.
     virtual bool is_events(const Request& request, std::optional<Reply>& refused) = 0;
     /// Changes with the next event.
     virtual uint64_t revision() = 0;
