@@ -46,11 +46,11 @@ def parse_arguments():
     parser.add_argument("names", nargs="+", metavar="NAME", help="figures to make, or all")
     parser.add_argument("--etendue", default=str(ROOT / "build/release/etendue"), help="the program")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs/figures",
-                        help="folder for what is made (docs/figures)")
+                        help="output folder (default: docs/figures)")
     parser.add_argument("--threads", type=int, default=os.cpu_count())
-    parser.add_argument("--scale", type=float, default=1, help="factor of all times")
+    parser.add_argument("--scale", type=float, default=1, help="factor on all times")
     parser.add_argument("--quick", action="store_true",
-                        help="seconds for each figure, to try the program: --scale %g" % QUICK)
+                        help="take only seconds for each figure, as a test of the program; same as --scale %g" % QUICK)
     arguments = parser.parse_args()
     unknown = [n for n in arguments.names if n not in FIGURES and n != "all"]
     if unknown:

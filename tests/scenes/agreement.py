@@ -40,7 +40,7 @@ def ensure_packages():
 
 def add_arguments(parser):
     parser.add_argument("--etendue", default=str(ROOT / "build/release/etendue"))
-    parser.add_argument("--variant", help="of Mitsuba; llvm_ad_rgb where LLVM 16 or later is found")
+    parser.add_argument("--variant", help="variant of Mitsuba (default: llvm_ad_rgb if LLVM 16 or later is found)")
     parser.add_argument("--threads", type=int, default=os.cpu_count())
 
 

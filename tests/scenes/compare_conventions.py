@@ -318,12 +318,12 @@ def run_case(name, mitsuba, ours, folder, args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("cases", nargs="*", help="parts of the names of cases; default: all")
+    parser.add_argument("cases", nargs="*", help="parts of the names of cases (default: all)")
     agreement.add_arguments(parser)
     parser.add_argument("--runs", type=int, default=8)
-    parser.add_argument("--spp", type=int, default=128, help="of each run")
+    parser.add_argument("--spp", type=int, default=128, help="samples per pixel of each run")
     parser.add_argument(
-        "--json", default="compare-conventions.json", help="report; cases of earlier runs stay in it"
+        "--json", default="compare-conventions.json", help="JSON report; cases of earlier runs are kept"
     )
     parser.add_argument("--pictures", help="existing folder for the mean image of each renderer")
     parser.add_argument("--table", action="store_true", help="only print the JSON file as a table")
