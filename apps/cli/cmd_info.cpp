@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "render/defaults.h"
 #include "scene_options.h"
 
 namespace etendue {
@@ -54,7 +55,7 @@ void info(const SceneOptions& options, bool as_json) {
                        s.sensor_names()[i], i == s.sensor_index() ? " (used)" : "");
     fmt::print("  rendering   {}, {} spp\n",
                s.defaults().integrator.empty() ? "path" : s.defaults().integrator,
-               s.defaults().spp);
+               default_spp(s));
     fmt::print("  shapes      {}: {} triangles, {} quadrics, {} instances\n", s.shapes().size(),
                st.triangles, st.quadrics, st.instances);
     fmt::print("  materials   {}\n", st.materials);

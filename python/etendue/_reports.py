@@ -267,12 +267,12 @@ def verify(
     time: seconds for all runs of one method (30 if spp is not given); with detect, for the whole verification.
     spp: samples per pixel of one run.
     detect: renders until a relative error of this size, such as 0.005, would be found with 90 % probability: an error of
-        the image, or of a path length with at least 2 % of the light.
-    lengths: shortest and longest path, in edges. runs: independent renderings, at least 8.
-    alpha: probability of a false alarm in all comparisons together, in (0, 1).
+        the image, or of a path length with at least 2 % of the light. From 0.0001 to below 1.
+    lengths: shortest and longest path, in edges. runs: independent renderings, 8 to 4096.
+    alpha: probability of a false alarm in all comparisons together, from 1e-9 to 0.5.
     against: methods to compare with: the first one, and each other one on the classes of paths that it estimates much
         better.
-    tiles: number of tiles along each side of the image.
+    tiles: number of tiles along each side of the image, 1 to 64.
     seed: seed of all random numbers. sampler: "sobol" or "independent".
     threads: number of runs rendered at the same time; 0 for one per core.
     progress: shows a status line; None: on terminals.

@@ -77,7 +77,8 @@ def scale(x: float, y: float | None = None, z: float | None = None) -> NDArray[n
 
 
 def rotate(axis: Vector, degrees: float) -> NDArray[np.float64]:
-    """A right-handed rotation by an angle in degrees about an axis (any length except 0), as a 4x4 matrix."""
+    """A right-handed rotation by an angle in degrees about an axis (any length except 0; otherwise ValueError), as a 4x4
+    matrix."""
     return _matrix(_etendue.rotate(axis, degrees))
 
 

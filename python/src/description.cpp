@@ -598,7 +598,9 @@ void bind_description(nb::module_& m) {
     m.def(
         "rotate",
         [vec](const std::array<float, 3>& axis, double degrees) {
-            return matrix(Transform::rotate(vec(axis), degrees));
+            const Vec3 v = vec(axis);
+            if (!(length2(v) > 0)) throw nb::value_error("the axis of a rotation must not be zero");
+            return matrix(Transform::rotate(v, degrees));
         },
         "axis"_a, "degrees"_a);
 }

@@ -252,7 +252,12 @@ void bind_reports(nb::module_& m) {
             VerifyOptions o;
             if (shortest < 1 || longest < shortest || longest > PathClass::kMostEdges)
                 throw nb::value_error("lengths must be (shortest, longest), within 1 to 24 edges");
-            if (runs < 8) throw nb::value_error("runs must be at least 8");
+            if (runs < 8 || runs > 4096) throw nb::value_error("runs must be from 8 to 4096");
+            if (tiles < 1 || tiles > 64) throw nb::value_error("tiles must be from 1 to 64");
+            if (!(alpha >= 1e-9 && alpha <= 0.5))
+                throw nb::value_error("alpha must lie between 1e-9 and 0.5");
+            if (detect && !(*detect >= 1e-4 && *detect < 1))
+                throw nb::value_error("detect must be a share from 0.0001 to below 1, such as 0.005");
             if (spp && time && !detect)
                 throw nb::value_error("time and spp exclude each other, except with detect");
             o.shortest = shortest;

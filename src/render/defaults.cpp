@@ -23,9 +23,14 @@ IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
     return spec;
 }
 
+uint64_t default_spp(const Scene& scene) {
+    const int given = scene.defaults().spp;
+    return given > 0 ? uint64_t(given) : 64;
+}
+
 void set_default_limit(RenderLimits& limits, const Scene& scene) {
     if (limits.spp || limits.seconds || limits.error) return;
-    limits.spp = scene.defaults().spp > 0 ? uint64_t(scene.defaults().spp) : 64;
+    limits.spp = default_spp(scene);
 }
 
 std::optional<SamplerKind> sampler_kind(std::string_view name) {

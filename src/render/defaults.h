@@ -13,7 +13,10 @@ namespace etendue {
 /// from the scene's integrator, if this one has them.
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
 
-/// If `limits` has no limit, sets the sample count of the scene file, or 64.
+/// Samples per pixel that the scene file asks for, or 64.
+uint64_t default_spp(const Scene& scene);
+
+/// If `limits` has no limit, sets default_spp().
 void set_default_limit(RenderLimits& limits, const Scene& scene);
 
 /// "independent" or "sobol"; empty for other names.

@@ -32,9 +32,9 @@ void LightVertexCache::add(uint64_t chunk, const SubPath& y) {
     const uint64_t bytes = uint64_t(y.size()) * vertex_bytes_;
     if (taken_bytes_.fetch_add(bytes, std::memory_order_relaxed) + bytes > max_bytes_)
         throw std::runtime_error(
-            fmt::format("the light vertices of a pass need more than {} MiB; give fewer "
-                        "light_paths, limit max_depth, or raise the integrator's parameter "
-                        "\"memory\"",
+            fmt::format("the light vertices of a pass need more than {} MiB; limit max_depth, or, "
+                        "where the integrator has these parameters, give fewer light_paths or "
+                        "more memory",
                         max_bytes_ >> 20));
     const Vertex& y0 = y[0];
     head.emitter = y0.emitter;
@@ -77,8 +77,9 @@ void LightVertexCache::assemble() {
         paths += c.heads.size(), total += c.vertices.size();
     }
     if (total >= UINT32_MAX || paths >= size_t(1) << 30)
-        throw std::runtime_error("a pass has more light vertices than can be numbered; give fewer "
-                                 "light_paths, or limit max_depth");
+        throw std::runtime_error("a pass has more light vertices than can be numbered; limit "
+                                 "max_depth, or give fewer light_paths where the integrator has "
+                                 "this parameter");
     heads_.resize(paths);
     vertices_.resize(total);
     places_.resize(total);

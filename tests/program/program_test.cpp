@@ -380,6 +380,8 @@ TEST_F(ProgramTest, PrintsHelpVersionListsAndInfo) {
         EXPECT_EQ(r.errors, "");
     }
     EXPECT_EQ(nlohmann::json::parse(run({"info", scene.string(), "--json"}).output)["quadrics"], 1);
+    // A scene without a sampler is rendered with 64 samples per pixel.
+    EXPECT_NE(run({"info", scene.string()}).output.find(", 64 spp"), std::string::npos);
 }
 
 }  // namespace

@@ -70,7 +70,8 @@ def test_verify_has_the_figures_of_the_command_line(program: str, scenes: Path, 
 
 @pytest.mark.parametrize(
     "arguments, message",
-    [({"runs": 2}, "runs must be at least 8"), ({"lengths": (3, 2)}, "lengths must be"),
+    [({"runs": 2}, "runs must be from 8"), ({"tiles": 0}, "tiles must be"), ({"alpha": 2.0}, "alpha must lie"),
+     ({"detect": 2.0}, "detect must be a share"), ({"lengths": (3, 2)}, "lengths must be"),
      ({"methods": "bdp"}, 'there is no integrator "bdp"'), ({"spp": 1, "time": 1.0}, "exclude each other")])
 def test_wrong_arguments_of_verify(cornell: et.Scene, arguments: dict[str, object], message: str) -> None:
     with pytest.raises((RuntimeError, ValueError), match=message):

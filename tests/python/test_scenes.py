@@ -165,6 +165,11 @@ def test_parameters_are_checked_when_the_scene_is_built() -> None:
         d.build()
 
 
+def test_a_rotation_needs_an_axis() -> None:
+    with pytest.raises(ValueError, match="the axis of a rotation must not be zero"):
+        et.rotate((0, 0, 0), 90)
+
+
 def test_errors_of_files_are_those_of_the_program(tmp_path: Path, program: str) -> None:
     file = tmp_path / "bad.xml"
     file.write_text('<scene version="3.0.0">\n<bsdf type="difuse"/>\n<sensor type="perspective"/></scene>')
