@@ -54,8 +54,7 @@ void info(const SceneOptions& options, bool as_json) {
             fmt::print("  {}    {}: {}{}\n", i == 0 ? "sensors " : "        ", i,
                        s.sensor_names()[i], i == s.sensor_index() ? " (used)" : "");
     fmt::print("  rendering   {}, {} spp\n",
-               s.defaults().integrator.empty() ? "path" : s.defaults().integrator,
-               default_spp(s));
+               s.defaults().integrator.empty() ? "path" : s.defaults().integrator, default_spp(s));
     fmt::print("  shapes      {}: {} triangles, {} quadrics, {} instances\n", s.shapes().size(),
                st.triangles, st.quadrics, st.instances);
     fmt::print("  materials   {}\n", st.materials);

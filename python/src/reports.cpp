@@ -257,7 +257,8 @@ void bind_reports(nb::module_& m) {
             if (!(alpha >= 1e-9 && alpha <= 0.5))
                 throw nb::value_error("alpha must lie between 1e-9 and 0.5");
             if (detect && !(*detect >= 1e-4 && *detect < 1))
-                throw nb::value_error("detect must be a share from 0.0001 to below 1, such as 0.005");
+                throw nb::value_error(
+                    "detect must be a share from 0.0001 to below 1, such as 0.005");
             if (spp && time && !detect)
                 throw nb::value_error("time and spp exclude each other, except with detect");
             o.shortest = shortest;
