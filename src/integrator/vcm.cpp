@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 #include "integrator/bidirectional.h"
 #include "integrator/light_path_options.h"
 #include "integrator/radius_params.h"
@@ -34,9 +36,13 @@ class VcmIntegrator final : public Integrator {
 public:
     explicit VcmIntegrator(const IntegratorParams& p)
         : paths_(p, Guiding(p)), radius_params_(p), connects_(p.flag("connections")),
-          merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p) {
+          merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p),
+          continuation_(is_exact_ ? 1.0f : p.number("continuation")) {
         if (!connects_ && !merges_)
             throw std::runtime_error("vcm: connections and merges cannot both be false");
+        if (!(continuation_ > 0 && continuation_ <= 1))
+            throw std::runtime_error(
+                fmt::format("vcm: continuation must lie in (0, 1], but is {}", continuation_));
         if (is_exact_ && !merges_) throw std::runtime_error("vcm: exact=true requires merges=true");
     }
 
@@ -98,6 +104,7 @@ public:
             n.pairs.inner_disc = n.pairs.disc * sqr(kInnerRadius);
             n.pairs.clamps = false;
         }
+        n.continued = continuation_;
         n.guide = paths_.guiding().guide();
         return n;
     }
@@ -174,6 +181,7 @@ private:
     RadiusParams radius_params_;
     bool connects_, merges_, is_exact_;
     LightPathOptions light_;
+    float continuation_;  ///< See TechniqueCounts::continued.
 
     std::optional<float> default_radius_;  ///< In scene units.
 
@@ -201,6 +209,12 @@ IntegratorEntry vcm_entry() {
                                             "this radius."))
         params.push_back(p);
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
+    params.push_back(
+        {"continuation", ParamKind::Float, "0.25",
+         "Probability, in (0, 1], with which an eye path continues after its first vertex that is "
+         "not a mirror or clear glass. Merges at this vertex make most of the image, so the rest of "
+         "the path is worth less than its cost. The MIS weights know this probability. Has no "
+         "effect with exact=true."});
     params.push_back({"connections", ParamKind::Bool, "true",
                       "Whether sub-paths are connected to each other, to emitters and to the lens.",
                       true});

@@ -33,7 +33,8 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     const double p_L = double(emission_pmf(counts.guide, emitter)) * e.pdf_y0 / v.pdf_fwd;
     double others = 0;
     if (last >= 2 && !z[last - 1].is_delta)
-        others += sqr(counts.next_event * p_NE) + sqr(counts.connect_emission * p_L);
+        others += sqr(double(counts.reaching(z[last - 1].sees_lens))) *
+                  (sqr(counts.next_event * p_NE) + sqr(counts.connect_emission * p_L));
     if (counts.uses_light_paths()) {
         const double rev_prev =
             v.is_infinite
@@ -48,7 +49,7 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     return Join{.technique = connection_technique(0, t),
                 .emitter = &emitter,
                 .contribution = v.beta * e.Le,
-                .mis_weight = power_heuristic(counts.hit, others),
+                .mis_weight = power_heuristic(counts.hit * counts.reaching(v.sees_lens), others),
                 .film = z.film,
                 .needs_test = false};
 }
@@ -79,14 +80,16 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                       : scene.attenuation(medium, v.p, v.ng, d.p, ng_b);
     }
 
-    double others = emitter.is_delta() ? 0.0 : sqr(double(counts.hit) * f.pdf * to_x0 / p_NE);
+    double others = emitter.is_delta() ? 0.0
+                                       : sqr(double(counts.hit * counts.reaching(false)) * f.pdf *
+                                             to_x0 / p_NE);
     if (counts.uses_light_paths()) {
         const float pdf_d = emission_pdf(counts.guide, emitter, d.p, -d.wi, d.pdf_d);
         const double rev_last = double(pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
         const double rev_prev = f.pdf_rev * v.to_predecessor;
         const double p_L = double(emission_pmf(counts.guide, emitter)) * d.pdf_y0;
         others += sqr(p_L / p_NE) *
-                  (sqr(double(counts.connect_emission)) +
+                  (sqr(double(counts.connect_emission * counts.reaching(v.sees_lens))) +
                    outward_sum<Side::Eye>(
                        z, last, false, {rev_last, rev_prev, gloss_of_emitter(emitter.is_area()), t},
                        counts));
@@ -94,7 +97,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .emitter = &emitter,
                 .contribution = C,
-                .mis_weight = power_heuristic(counts.next_event, others),
+                .mis_weight = power_heuristic(counts.next_event * counts.reaching(v.sees_lens), others),
                 .film = z.film,
                 .a = v.p,
                 .ng_a = v.ng,
@@ -140,7 +143,7 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     edge.rev_b = double(fa.pdf) * abs_dot(b.ng, edge.w) * inv_dist2;
     if (a.is_infinite) edge.rev_a = fb.pdf;
     edge.total =
-        squares +
+        squares * sqr(double(counts.reaching(b.sees_lens))) +
         outward_sum<Side::Light>(
             y, s - 1, false,
             {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f, gloss(b, false), s + t - 1},
@@ -173,7 +176,9 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
     const auto edge = connect(scene, y, s, z, t, counts);
     if (!edge) return {};
     const Technique technique{Strategy::Connect, s, t};
-    return joined(*edge, technique, double(counts.of(technique)), y, y[s - 1], z, z[t - 1]);
+    const Vertex &a = y[s - 1], &b = z[t - 1];
+    return joined(*edge, technique, double(counts.of(technique) * counts.reaching(b.sees_lens)), y,
+                  a, z, b);
 }
 
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
@@ -209,7 +214,7 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
     if (f.f.is_zero()) return {};
     // Relative to the split after x_m, which has p_L(x_m) but not p_E(x_m).
     const double total =
-        split_squares<Side::Eye>(z, t - 1, false, counts) +
+        split_squares<Side::Eye>(z, t - 1, false, 0, counts) +
         outward_sum<Side::Light>(
             y, s - 1, false,
             {b.pdf_fwd, f.pdf * a.to_predecessor, b.sees_lens ? kLensGloss : uint8_t(0), edges},

@@ -33,19 +33,24 @@ inline double emission_squares(double next_event_ratio, const TechniqueCounts& n
 }
 
 /// Σ c_i² of a sub-path over the techniques split between v[i-1] and v[i]: their samples, times the ratio of their own
-/// density to the walk's where they sample y_0 in another way. `delta` tells whether the event at v[i] is one.
+/// density to the walk's where they sample y_0 in another way. `delta` tells whether the event at v[i] is one, `inward`
+/// is the gloss of the vertex beyond v[i].
 template <Side side>
-inline double split_squares(const SubPath& v, int i, bool delta, const TechniqueCounts& n) {
+inline double split_squares(const SubPath& v, int i, bool delta, uint8_t inward,
+                            const TechniqueCounts& n) {
     if constexpr (side == Side::Light) {
-        if (i == 0) return v[0].emitter->is_delta() ? 0.0 : sqr(double(n.hit));
-        if (delta) return 0;
-        if (i == 1) return emission_squares(v[1].next_event_ratio, n);
+        if (delta && i > 0) return 0;
+        // The eye sub-path ends at v[i].
+        const double reaching = sqr(double(n.reaching(inward == kLensGloss)));
+        if (i == 0) return v[0].emitter->is_delta() ? 0.0 : reaching * sqr(double(n.hit));
+        if (i == 1) return reaching * emission_squares(v[1].next_event_ratio, n);
+        return v[i - 1].is_delta ? 0.0 : reaching * sqr(double(n.connect));
     } else {
         if (i == 0) return sqr(double(n.hit_lens));
         if (delta) return 0;
         if (i == 1) return sqr(double(n.splat));
+        return v[i - 1].is_delta ? 0.0 : sqr(double(n.connect * n.reaching(v[i - 1].sees_lens)));
     }
-    return v[i - 1].is_delta ? 0.0 : sqr(double(n.connect));
 }
 
 /// m_i² of a sub-path, for the inner vertex v[i] of a path: n·p of a merge is N_L π d² p_L(x_m) p_E(x_m) times the
@@ -74,7 +79,7 @@ inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, 
 template <Side side>
 inline double squares_at(const SubPath& v, int i, bool delta, double rev, uint8_t inward, int edges,
                          const TechniqueCounts& n) {
-    double b = split_squares<side>(v, i, delta, n);
+    double b = split_squares<side>(v, i, delta, inward, n);
     if (n.uses_pairs() && !delta) b += pair_squares<side>(v, i, rev, inward, edges, n);
     return b;
 }
@@ -82,7 +87,7 @@ inline double squares_at(const SubPath& v, int i, bool delta, double rev, uint8_
 /// The other side of a join, seen from the last vertex of one side.
 struct Across {
     double rev_last, rev_prev;  ///< Densities of v[last], v[last-1] as sampled from the other side.
-    uint8_t gloss = 0;          ///< Of the next vertex; read only where there are gathers.
+    uint8_t gloss = 0;          ///< Of the next vertex.
     int edges = 0;              ///< Length of the whole path.
 };
 

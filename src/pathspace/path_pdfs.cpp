@@ -32,7 +32,8 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     const int k = vertices() - 1, m = q.s - 1;
     const double n = counts.of(q);
     if (!(n > 0)) return 0;
-    if (!is_pair(q.strategy)) return n * density(q);
+    if (!is_pair(q.strategy))
+        return n * density(q) * (q.t >= 2 ? counts.reaching(sees_lens[size_t(q.s)]) : 1);
     if (m < 1 || m >= k || k < counts.pairs.min_edges || is_delta[m]) return 0;
     double others = 1;  // of all vertices but x_m
     for (int i = 0; i < m; ++i) others *= light[i];
@@ -100,7 +101,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.is_delta = delta;
     for (int i = 0; i < n; ++i) p.pair_level.push_back(x[size_t(i)]->pair_level);
     p.sees_lens.assign(size_t(n), false);
-    for (int i = k - 1; i >= 1; --i)
+    for (int i = k - 1; i >= 0; --i)
         p.sees_lens[i] = i == k - 1 || (p.sees_lens[i + 1] && delta[size_t(i) + 1] &&
                                         !scene.sensor().has_finite_lens());
     for (int i = 0; i < n; ++i)

@@ -109,6 +109,9 @@ struct TechniqueCounts {
     float merge = 0,
           gather = 0;  ///< For each inner vertex of the path; at least one of the two is 0.
     PairModel pairs{};
+    /// Probability with which an eye walk continues past the first vertex where it chooses a direction at random, the
+    /// last one that sees the lens (Vertex). The techniques beyond count this share of a sample. 1 where there are gathers.
+    float continued = 1;
     const Guide* guide = nullptr;  ///< Guide of both walks; nullptr if they have none.
 
     friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
@@ -129,8 +132,11 @@ struct TechniqueCounts {
     /// path. If x_m sees the lens (Vertex), this eye path contains no random choice, and the merges count in full.
     double merge_area(uint8_t pair_level, bool sees_lens) const {
         return sees_lens ? double(merge) * double(pairs.disc)
-                         : double(merge) * pair_share(pair_level) * double(pairs.inner_disc);
+                         : double(merge) * pair_share(pair_level) * double(pairs.inner_disc) *
+                               double(continued);
     }
+    /// Number of eye sub-paths, of one sample, that reach a vertex.
+    float reaching(bool sees_lens) const { return sees_lens ? 1 : continued; }
     float of(const Technique& q) const {
         switch (q.strategy) {
         case Strategy::Hit: return hit;

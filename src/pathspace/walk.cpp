@@ -16,6 +16,12 @@ Survival survival(const SubPath& path) {
     return Survival(left > 0 ? std::min(0.95f, left) : 0x1p-16f);
 }
 
+/// Vertex::sees_lens of the vertex that follows `v`.
+bool next_sees_lens(const Vertex& v, bool is_delta, const Scene& scene) {
+    return v.kind == Vertex::Kind::Sensor ||
+           (v.sees_lens && is_delta && !scene.sensor().has_finite_lens());
+}
+
 /// Result of tracing a ray.
 enum class Met { Surface, Nothing, SurfaceEdgeOn };
 
@@ -43,8 +49,7 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, Tra
     v.beta = beta;
     // hit.t is the distance from the offset origin of the ray; densities need the distance between the vertices.
     const Vertex& previous = path[path.size() - 2];
-    v.sees_lens = previous.kind == Vertex::Kind::Sensor ||
-                  (previous.sees_lens && previous.is_delta && !scene.sensor().has_finite_lens());
+    v.sees_lens = next_sees_lens(previous, previous.is_delta, scene);
     const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
     v.pdf_fwd = pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
     v.to_predecessor = previous.has_cosine && !previous.is_infinite
@@ -56,8 +61,10 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, Tra
 }
 
 /// Appends the vertex at infinity of an eye path that left the scene; it belongs to all emitters at infinity.
-void append_escape(SubPath& path, Vec3 d, Rgb beta, float pdf) {
+void append_escape(const Scene& scene, SubPath& path, Vec3 d, Rgb beta, float pdf) {
     Vertex& v = path.append();
+    const Vertex& previous = path[path.size() - 2];
+    v.sees_lens = next_sees_lens(previous, previous.is_delta, scene);
     v.kind = Vertex::Kind::Emitter;
     v.is_infinite = true;
     v.p = d;
@@ -110,7 +117,7 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const 
     const Met met = append_surface(walk, sampler, z, TransportMode::Radiance, start, beta,
                                    ray.pdf_dir, kVacuum);
     if (met == Met::Nothing && !walk.scene.infinite_emitters().empty())
-        append_escape(z, ray.d, beta, ray.pdf_dir);
+        append_escape(walk.scene, z, ray.d, beta, ray.pdf_dir);
 }
 
 namespace {
@@ -208,7 +215,15 @@ std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sa
     }
     // This is the last slot, because a walk without guide does not read a number here.
     const float u_guide = v.guide ? sampler.next_1d() : 0.0f;
-    return v.sample(u_lobe, u_direction, u_guide, mode);
+    const auto s = v.sample(u_lobe, u_direction, u_guide, mode);
+    const float continued = walk.counts.continued;
+    if (mode == TransportMode::Radiance && continued < 1 && s && v.sees_lens &&
+        !next_sees_lens(v, s->is_delta, walk.scene)) {
+        const Survival both(v.survival.value() * continued);
+        if (!(sampler.next_1d() * v.survival.value() < both.value())) return {};
+        v.survival = both;
+    }
+    return s;
 }
 
 template <TransportMode mode>
@@ -228,7 +243,7 @@ bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubP
     const Met met = append_surface(walk, sampler, path, mode, ray, beta, s.pdf, medium);
     if (met == Met::Surface) return true;
     if (!eye || met == Met::SurfaceEdgeOn || walk.scene.infinite_emitters().empty()) return false;
-    append_escape(path, s.wi, beta, s.pdf);
+    append_escape(walk.scene, path, s.wi, beta, s.pdf);
     return true;
 }
 

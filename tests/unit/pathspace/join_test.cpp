@@ -94,6 +94,7 @@ protected:
             counts.pairs.disc = 0.3f;
             counts.pairs.inner_disc = 0.1f;
             counts.pairs.min_edges = merges ? 2 : 3;
+            if (merges) counts.continued = 0.5f;
             if (extra() == Extra::Variants) {
                 counts.pairs.rule = PairRule::Both;
                 counts.pairs.clamps = false;
@@ -115,7 +116,7 @@ protected:
         return extra() == Extra::Merges || extra() == Extra::Variants ? &levels : nullptr;
     }
 
-    /// Both sub-paths of sample `index`, without roulette.
+    /// Both sub-paths of sample `index`, without roulette by throughput.
     void trace(uint32_t index) {
         sampler.start(index, index % (kPixels * kPixels));
         const WalkContext walk{scene, counts, stats, {6, 1000}, learned()};
@@ -139,7 +140,8 @@ protected:
         Tally& tally = tally_of(join.technique.strategy, x, delta);
         tally.add(p_sampled / p, 1);
         for (int c = 0; c < 3; ++c)
-            if (value.f[c] > 0) tally.add(join.contribution[c] * p / value.f[c], 1);
+            if (value.f[c] > 0)
+                tally.add(join.contribution[c] * p * survival(join.technique.t) / value.f[c], 1);
         tally.add(join.mis_weight, mis_weight(value.pdfs, join.technique, counts));
         ++checked;
     }
@@ -159,6 +161,12 @@ protected:
         for (size_t i = size_t(begin); i < x.size(); ++i)
             if (delta[i]) product *= eye_jacobian(*x[i]);
         return product;
+    }
+    /// Probability that the roulette of TechniqueCounts::continued lets the eye walk reach z_{t-1}.
+    double survival(int t) const {
+        double p = 1;
+        for (int i = 1; i <= t - 2; ++i) p *= double(z[i].survival.value());
+        return p;
     }
     /// Which events of the walks are delta events; those at x_a and x_b, where the path was joined, are not.
     static std::vector<bool> delta_events(const std::vector<const Vertex*>& x, int a, int b) {
@@ -248,7 +256,7 @@ protected:
             density_of(merged, s) * density_of(z, t) * double(disc) * eye_jacobian(x, delta, s);
         Tally& tally = tally_of(Strategy::Merge, x, delta);
         for (int c = 0; c < 3; ++c)
-            if (value.f[c] > 0) tally.add(j->contribution[c] * p / value.f[c], 1);
+            if (value.f[c] > 0) tally.add(j->contribution[c] * p * survival(t) / value.f[c], 1);
         tally.add(j->mis_weight, mis_weight(value.pdfs, j->technique, counts));
         // The same flux without its path.
         const auto alone = join_photon({a.p, a.wo, a.beta, y[0].emitter, s}, z, t, disc);
