@@ -212,7 +212,8 @@ IntegratorEntry vcm_entry() {
     params.push_back(
         {"continuation", ParamKind::Float, "0.25",
          "Probability, in (0, 1], with which an eye path continues after its first vertex that is "
-         "not a mirror or clear glass. Merges at this vertex make most of the image, so the rest of "
+         "not a mirror or clear glass. Merges at this vertex make most of the image, so the rest "
+         "of "
          "the path is worth less than its cost. The MIS weights know this probability. Has no "
          "effect with exact=true."});
     params.push_back({"connections", ParamKind::Bool, "true",

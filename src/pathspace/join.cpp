@@ -80,9 +80,9 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                       : scene.attenuation(medium, v.p, v.ng, d.p, ng_b);
     }
 
-    double others = emitter.is_delta() ? 0.0
-                                       : sqr(double(counts.hit * counts.reaching(false)) * f.pdf *
-                                             to_x0 / p_NE);
+    double others = emitter.is_delta()
+                        ? 0.0
+                        : sqr(double(counts.hit * counts.reaching(false)) * f.pdf * to_x0 / p_NE);
     if (counts.uses_light_paths()) {
         const float pdf_d = emission_pdf(counts.guide, emitter, d.p, -d.wi, d.pdf_d);
         const double rev_last = double(pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
@@ -97,7 +97,8 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .emitter = &emitter,
                 .contribution = C,
-                .mis_weight = power_heuristic(counts.next_event * counts.reaching(v.sees_lens), others),
+                .mis_weight =
+                    power_heuristic(counts.next_event * counts.reaching(v.sees_lens), others),
                 .film = z.film,
                 .a = v.p,
                 .ng_a = v.ng,
