@@ -95,7 +95,7 @@ def evaluate(
 
 def mis_weight(pdfs: PathPdfs, technique: Technique, counts: Counts) -> float:
     """The MIS weight by the power heuristic with exponent 2, (n p)² divided by the sum of the (n_i p_i)² of all techniques
-    [Veach 1997, §9.2], in [0, 1].
+    [Veach 1997, §9.2]; dimensionless, in [0, 1].
     """
     return _etendue.mis_weight(pdfs, technique, counts)
 
