@@ -37,7 +37,7 @@ public:
     explicit VcmIntegrator(const IntegratorParams& p)
         : paths_(p, Guiding(p)), radius_params_(p), connects_(p.flag("connections")),
           merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p),
-          continuation_(is_exact_ ? 1.0f : p.number("continuation")) {
+          continuation_(p.number("continuation")) {
         if (!connects_ && !merges_)
             throw std::runtime_error("vcm: connections and merges cannot both be false");
         if (!(continuation_ > 0 && continuation_ <= 1))
@@ -104,7 +104,7 @@ public:
             n.pairs.inner_disc = n.pairs.disc * sqr(kInnerRadius);
             n.pairs.clamps = false;
         }
-        n.continued = continuation_;
+        if (!is_exact_) n.continued = continuation_;
         n.guide = paths_.guiding().guide();
         return n;
     }
