@@ -46,6 +46,7 @@ int fitting_depth(const Scene& scene, int depth) {
 const char* to_string(RunState state) {
     switch (state) {
     case RunState::Rendering: return "rendering";
+    case RunState::Stopping: return "stopping";
     case RunState::Stopped: return "stopped";
     case RunState::Finished: return "finished";
     case RunState::Failed: return "failed";
@@ -126,7 +127,7 @@ void Session::load_scene() {
         load_error_.clear();
         for (const auto& run : runs_) {
             run->status.is_of_this_scene = false;
-            if (run->status.state == RunState::Rendering) run->status.state = RunState::Stopped;
+            request_stop(run);
         }
         scene_.store(std::move(scene));
     } catch (const std::bad_alloc&) {
@@ -189,11 +190,8 @@ void Session::take_turn(Run& run) {
 
 void Session::finish_turn(Run& run, RunState state, const std::string& message) {
     // The last image of a run is shown whatever the budget, since no other follows.
-    const bool is_last = [&] {
-        const std::lock_guard lock(mutex_);
-        return state != RunState::Rendering || run.status.state != RunState::Rendering;
-    }();
-    if (is_last && run.renderer && run.renderer->film().passes() > 0) show(run);
+    if (state != RunState::Rendering && run.renderer && run.renderer->film().passes() > 0)
+        show(run);
     {
         const std::lock_guard lock(mutex_);
         turn_of_ = 0;
@@ -201,6 +199,28 @@ void Session::finish_turn(Run& run, RunState state, const std::string& message) 
         run.status.message = message;
     }
     changed();
+}
+
+void Session::request_stop(const std::shared_ptr<Run>& run) {
+    if (run->status.state != RunState::Rendering) return;
+    run->status.state = RunState::Stopping;
+    commands_.push_back([this, run] { finish_stop(*run); });
+    changed();
+    turn_over_ = true;
+    wake_.notify_all();
+}
+
+void Session::finish_stop(Run& run) {
+    std::string message;
+    try {
+        if (run.renderer && run.renderer->film().passes() > 0) show(run);
+    } catch (const std::bad_alloc&) {
+        message = "not enough memory";
+    }
+    const std::lock_guard lock(mutex_);
+    if (run.status.state != RunState::Stopping) return;
+    run.status.state = message.empty() ? RunState::Stopped : RunState::Failed;
+    run.status.message = message;
 }
 
 void Session::after_pass(Run& run, const Progress& p) {
@@ -294,22 +314,14 @@ int Session::start(const RunRequest& request) {
 }
 
 void Session::stop(int id) {
-    {
-        const std::lock_guard lock(mutex_);
-        RunStatus& s = find(id)->status;
-        if (s.state == RunState::Rendering) s.state = RunState::Stopped;
-    }
-    post([] {});
+    const std::lock_guard lock(mutex_);
+    request_stop(find(id));
 }
 
 void Session::discard(int id) {
-    {
-        const std::lock_guard lock(mutex_);
-        RunStatus& s = find(id)->status;
-        if (s.state == RunState::Rendering) s.state = RunState::Stopped;
-        if (turn_of_ == id) drop_ = true;
-    }
-    post([] {});
+    const std::lock_guard lock(mutex_);
+    request_stop(find(id));
+    if (turn_of_ == id) drop_ = true;
 }
 
 void Session::resume(int id, const RenderLimits& limits) {
@@ -355,13 +367,9 @@ void Session::save(int id, const std::string& file, std::function<void(std::stri
 }
 
 void Session::stop_all(bool drop) {
-    {
-        const std::lock_guard lock(mutex_);
-        for (const auto& run : runs_)
-            if (run->status.state == RunState::Rendering) run->status.state = RunState::Stopped;
-        if (drop && turn_of_ != 0) drop_ = true;
-    }
-    post([] {});
+    const std::lock_guard lock(mutex_);
+    for (const auto& run : runs_) request_stop(run);
+    if (drop && turn_of_ != 0) drop_ = true;
 }
 
 void Session::settle() {

@@ -28,7 +28,8 @@ struct RunRequest {
     int technique_depth = 0;  ///< In edges; reduced until the images fit into kTechniqueBytes.
 };
 
-enum class RunState { Rendering, Stopped, Finished, Failed };
+/// `Stopping`: until the pass in flight is complete and its image is shown.
+enum class RunState { Rendering, Stopping, Stopped, Finished, Failed };
 const char* to_string(RunState state);
 
 /// Meaning of the interval of a pixel that is computed from the spread of a run's passes.
@@ -134,6 +135,10 @@ private:
     /// Publishes a snapshot if one was requested and the budget allows it.
     void show(Run& run);
     void finish_turn(Run& run, RunState state, const std::string& message = {});
+    /// Shows the last image of a run that is to be stopped.
+    void finish_stop(Run& run);
+    /// Marks a run as stopping, and lets the session's thread do the rest. Needs the mutex.
+    void request_stop(const std::shared_ptr<Run>& run);
     void changed() { ++revision_; }
 
     const Load load_;

@@ -26,7 +26,7 @@ export function significant(v, digits = 3) {
 /** @param {number} s */
 const time = s => s < 100 ? `${s.toFixed(1)} s` : `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')} min`;
 
-const kSymbols = {rendering: '▶', stopped: '⏸', finished: '✓', failed: '✗'};
+const kSymbols = {rendering: '▶', stopping: '⏳', stopped: '⏸', finished: '✓', failed: '✗'};
 
 /** @param {any} run */
 export function describe(run) {
@@ -68,7 +68,7 @@ export class RunList {
         for (const run of runs) {
             let row = this.rows.get(run.id);
             if (!row) this.rows.set(run.id, row = this.makeRow(run));
-            const isRendering = run.state === 'rendering';
+            const isRendering = run.state === 'rendering', isInPass = isRendering || run.state === 'stopping';
             row.state.textContent = /** @type {any} */ (kSymbols)[run.state];
             row.state.title = run.state;
             const text = `${run.state}: ${describe(run)}${run.old_scene ? ' (earlier version of the scene)' : ''}${run.message ? `: ${run.message}` : ''}`;
@@ -80,7 +80,7 @@ export class RunList {
                 row.toggle.setAttribute('aria-label', `${label} run ${run.id}`);
                 row.toggle.onclick = () => this.tell.act(label.toLowerCase(), run.id);
             }
-            row.discard.disabled = !isRendering;
+            row.discard.disabled = !isInPass;
             row.box.classList.toggle('shown', run.id === this.tell.shown());
         }
     }

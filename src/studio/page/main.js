@@ -20,10 +20,10 @@ let state = null;
 const runs = new Map();
 /**
  * What the two places of the view show.
- * @typedef {{run: number, view: string, passes: number, isAsked: boolean, busy: boolean}} Shown
+ * @typedef {{run: number, view: string, passes: number, isAsked: boolean, busy: boolean, again: boolean}} Shown
  */
 /** @type {[Shown, Shown | null]} */
-const shown = [{run: 0, view: 'image', passes: 0, isAsked: false, busy: false}, null];
+const shown = [{run: 0, view: 'image', passes: 0, isAsked: false, busy: false, again: false}, null];
 /** @type {Space | null} */
 let space = null;
 /** @type {PathEditor | null} */
@@ -72,11 +72,12 @@ if (!view.hasGraphics) banner('graphics', 'This browser has no WebGL2: only numb
 const kLabels = {image: '', error: 'relative standard error', first: 'first picture: albedo × cosine, no light yet'};
 
 /**
- * Asks for a newer picture of one place, at most one at a time.
+ * Requests a newer picture of one place. One request is under way at a time; a call in the meantime is made up for at its end.
  * @param {0 | 1} place
  */
 async function refresh(place) {
     const s = shown[place];
+    if (s?.busy) s.again = true;
     if (!s || s.busy || document.hidden || !view.hasGraphics || !state?.scene) return;
     const isOfRun = s.run > 0 && (['image', 'error', 'variance'].includes(s.view) || s.view.includes(':'));
     if (!isOfRun && s.passes > 0) return;
@@ -106,6 +107,10 @@ async function refresh(place) {
     } finally {
         s.busy = false;
     }
+    if (s.again) {
+        s.again = false;
+        await refresh(place);
+    }
 }
 
 /**
@@ -124,7 +129,7 @@ function label() {
 
 /** @param {0 | 1} place @param {number} run @param {string} what */
 function showIn(place, run, what) {
-    if (place === 0 || run > 0 || what === 'reference') shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false};
+    if (place === 0 || run > 0 || what === 'reference') shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false, again: false};
     else shown[1] = null;
     if (place === 1 && !shown[1]) view.show(1, null);
     refresh(place).then(label);

@@ -195,7 +195,30 @@ TEST(Session, FailureToLoadIsKept) {
     const int run = session.start(request("path", 1u << 30));
     session.reload();
     ASSERT_TRUE(wait_for([&] { return !session.status(run).is_of_this_scene; }));
-    EXPECT_EQ(session.status(run).state, RunState::Stopped);
+    EXPECT_TRUE(wait_for([&] { return session.status(run).state == RunState::Stopped; }));
+}
+
+TEST(Session, StoppedRunsShowTheirLastPass) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    // Two runs, so that one is stopped within its turn, and the other between its turns.
+    const int runs[] = {session.start(request("path", 1u << 30)),
+                        session.start(request("bdpt", 1u << 30))};
+    for (uint64_t round = 1; round <= 3; ++round) {
+        for (const int run : runs)
+            ASSERT_TRUE(wait_for([&] { return session.status(run).passes >= round; }));
+        for (const int run : runs) session.stop(run);
+        for (const int run : runs) {
+            RunStatus status;
+            ASSERT_TRUE(wait_for([&] {
+                status = session.status(run);
+                return status.state == RunState::Stopped;
+            }));
+            EXPECT_EQ(status.snapshot_passes, status.passes);
+            EXPECT_EQ(session.snapshot(run)->passes, status.passes);
+        }
+        for (const int run : runs) session.resume(run, {});
+    }
 }
 
 TEST(SnapshotBudget, KeepsTheShare) {
