@@ -18,6 +18,11 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
         target_compile_options(etendue_options INTERFACE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
     endif()
 endif()
+if(ETENDUE_UNITY)
+    # These are meant for headers, and about names of the same file. Here one source includes others.
+    target_compile_options(etendue_options INTERFACE
+        -Wno-shadow $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+endif()
 if(ETENDUE_ARCH)
     target_compile_options(etendue_options INTERFACE -march=${ETENDUE_ARCH})
 endif()
@@ -33,7 +38,7 @@ if(ETENDUE_SANITIZE)
 endif()
 
 # Standard headers that most sources include, precompiled once for all layers. Sources must still include what they use,
-# since the preset `clang` has no precompiled headers.
+# since the presets `clang` and `tsan` have no precompiled headers.
 set(ETENDUE_COMMON_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <map> <memory> <optional> <span> <string>
     <string_view> <utility> <variant> <vector>)
 function(etendue_precompiled_headers target)

@@ -479,12 +479,19 @@ void bind_core(nb::module_& m) {
         "any pixel, 0 for strategies that are not used. Dimensionless.")
         .def(
             "__init__",
-            [](F* self, float hit, float next_event, float connect, float splat) {
-                new (self)
-                    F{.hit = hit, .next_event = next_event, .connect = connect, .splat = splat};
+            [](F* self, float hit, float next_event, float connect, float splat, float continued) {
+                if (!(continued > 0 && continued <= 1))
+                    throw nb::value_error(
+                        fmt::format("continued must be above 0 and at most 1, not {}", continued)
+                            .c_str());
+                new (self) F{.hit = hit,
+                             .next_event = next_event,
+                             .connect = connect,
+                             .splat = splat,
+                             .continued = continued};
             },
             nb::kw_only(), "hit"_a = 0.0f, "next_event"_a = 0.0f, "connect"_a = 0.0f,
-            "splat"_a = 0.0f)
+            "splat"_a = 0.0f, "continued"_a = 1.0f)
         .def_ro("hit", &F::hit,
                 "Samples of C(0,t), the eye path hits an emitter; a number for each eye path.")
         .def_ro("next_event", &F::next_event,
@@ -498,9 +505,13 @@ void bind_core(nb::module_& m) {
         .def_ro("merge", &F::merge,
                 "Samples of M(s,t), merges of near vertices: the number of light paths.")
         .def_ro("gather", &F::gather, "Samples of U(s,t), gathers: the number of light paths.")
+        .def_ro("continued", &F::continued,
+                "Probability, above 0 and at most 1, with which eye walks continue past the first "
+                "vertex where they choose a direction at random.")
         .def("__repr__", [](const F& c) {
-            return fmt::format("Counts(hit={}, next_event={}, connect={}, splat={})", c.hit,
-                               c.next_event, c.connect, c.splat);
+            return fmt::format("Counts(hit={}, next_event={}, connect={}, splat={}{})", c.hit,
+                               c.next_event, c.connect, c.splat,
+                               c.continued < 1 ? fmt::format(", continued={}", c.continued) : "");
         });
 
     nb::class_<Technique>(

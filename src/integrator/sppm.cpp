@@ -19,7 +19,7 @@ namespace {
 
 /// Default radius, relative to the radius of the scene's bounds. It is larger than in `vcm`, where merges are one
 /// technique among many.
-constexpr float kDefaultRadius = 0.01f;
+constexpr float kRadiusInScenes = 0.01f;
 
 class SppmIntegrator final : public Integrator {
 public:
@@ -31,7 +31,7 @@ public:
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
-        radius_ = radius_params_.schedule(kDefaultRadius * pass.scene.bounds().radius())
+        radius_ = radius_params_.schedule(kRadiusInScenes * pass.scene.bounds().radius())
                       .radius(pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
         mapping_.paths().trace_light_paths(pass, {}, pass.light_paths, cache_);
@@ -107,7 +107,7 @@ private:
     LightVertexGrid grid_;
 };
 
-std::vector<ParamInfo> params() {
+std::vector<ParamInfo> sppm_params() {
     std::vector<ParamInfo> params = PhotonMapping::params();
     for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
                                             "1 % of the radius of the scene's bounds."))
@@ -126,14 +126,14 @@ IntegratorEntry sppm_entry() {
         {"integrator", "sppm",
          "Stochastic progressive photon mapping: new eye paths in every pass. Consistent; biased "
          "with a fixed radius.",
-         params()},
+         sppm_params()},
         [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
             return std::make_unique<SppmIntegrator>(p, 0);
         }};
 }
 
 IntegratorEntry ppm_entry() {
-    std::vector<ParamInfo> all = params();
+    std::vector<ParamInfo> all = sppm_params();
     all.push_back({"eye_paths", ParamKind::Int, "16",
                    "Number of eye paths of each pixel, at least 1; pass i uses eye path i modulo "
                    "eye_paths."});

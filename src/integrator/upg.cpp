@@ -223,7 +223,7 @@ private:
     LightVertexGrid grid_;
 };
 
-std::vector<ParamInfo> params() {
+std::vector<ParamInfo> upg_params() {
     std::vector<ParamInfo> params = Bidirectional::params();
     params.push_back({"radius", ParamKind::Float, "0",
                       "Largest distance between the vertices of a pair, in scene units; 0: chosen "
@@ -251,7 +251,8 @@ std::vector<ParamInfo> params() {
 
 IntegratorEntry upg_entry() {
     return {{"integrator", "upg",
-             "Unbiased photon gathering alone. Unbiased for the paths that it can make.", params()},
+             "Unbiased photon gathering alone. Unbiased for the paths that it can make.",
+             upg_params()},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<UpgIntegrator>(p, false);
             }};
@@ -259,7 +260,7 @@ IntegratorEntry upg_entry() {
 
 IntegratorEntry upg_bdpt_entry() {
     return {{"integrator", "upg+bdpt",
-             "Unbiased photon gathering with bidirectional path tracing. Unbiased.", params()},
+             "Unbiased photon gathering with bidirectional path tracing. Unbiased.", upg_params()},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<UpgIntegrator>(p, true);
             }};

@@ -22,7 +22,7 @@ namespace etendue {
 namespace {
 
 /// The default radius, in units of pixel_radius(). A smaller one makes caustics noisier, a larger one blurs them.
-constexpr float kDefaultRadius = 6;
+constexpr float kRadiusInPixels = 6;
 /// Upper limit of the default radius, relative to the radius of the scene's bounds. Without it, small images would be
 /// blurred.
 constexpr float kLargestRadius = 0.01f;
@@ -126,7 +126,7 @@ private:
     /// The radius of pass `index`.
     float radius(const Scene& scene, uint32_t index) {
         if (radius_params_.first == 0 && !default_radius_)
-            default_radius_ = std::min(kDefaultRadius * pixel_radius(scene),
+            default_radius_ = std::min(kRadiusInPixels * pixel_radius(scene),
                                        kLargestRadius * scene.bounds().radius());
         return radius_params_.schedule(default_radius_.value_or(0)).radius(index);
     }

@@ -89,7 +89,8 @@ void LightVertexCache::assemble() {
         auto [path, first] = begins[chunk];
         std::copy(c.vertices.begin(), c.vertices.end(), vertices_.begin() + ptrdiff_t(first));
         std::copy(c.places.begin(), c.places.end(), places_.begin() + ptrdiff_t(first));
-        std::copy(c.guides.begin(), c.guides.end(), guides_.begin() + ptrdiff_t(first));
+        if (is_guided_)
+            std::copy(c.guides.begin(), c.guides.end(), guides_.begin() + ptrdiff_t(first));
         for (Head head : c.heads) {
             head.begin += uint32_t(first), head.end += uint32_t(first);
             for (uint32_t i = head.begin; i < head.end; ++i)

@@ -26,6 +26,13 @@ class PathTracer(et.Integrator):
                     c.add(x)
 
 
+class ShortPathTracer(PathTracer):
+    """Walks end early, and the weights know it."""
+
+    def counts(self, light_paths: int) -> core.Counts:
+        return core.Counts(hit=1, next_event=1, continued=0.4)
+
+
 class TooBright(PathTracer):
     """A planted error: paths of two edges are a twentieth too bright."""
 
@@ -97,18 +104,19 @@ def test_a_vertex_samples_what_it_evaluates(small: et.Scene) -> None:
         np.testing.assert_allclose(f, weight * pdf, rtol=1e-3)
 
 
-def test_joins_have_the_slow_definitions_values_and_weights(small: et.Scene) -> None:
+@pytest.mark.parametrize("counts", [BDPT, core.Counts(hit=1, next_event=1, connect=1, splat=1, continued=0.5)])
+def test_joins_have_the_slow_definitions_values_and_weights(small: et.Scene, counts: core.Counts) -> None:
     """Contribution = f / p, and the weight is the explicit sum."""
     made: set[tuple[int, int]] = set()
     for i in range(250):
-        z = core.eye_path(small, (i % 16, (5 * i) % 16), seed=i, max_vertices=4)
-        y = core.light_path(small, i, seed=i, max_vertices=4)
+        z = core.eye_path(small, (i % 16, (5 * i) % 16), seed=i, max_vertices=4, counts=counts)
+        y = core.light_path(small, i, seed=i, max_vertices=4, counts=counts)
         for t in range(1, len(z) + 1):
             for s in range(2 if t == 1 else 0, len(y) + 1):
                 for x in core.join(small, y, s, z, t, seed=i):
                     q = x.technique
                     f, pdfs = core.evaluate(small, x.vertices(), x.delta)
-                    np.testing.assert_allclose(x.mis_weight, core.mis_weight(pdfs, q, BDPT), rtol=2e-3, atol=1e-6)
+                    np.testing.assert_allclose(x.mis_weight, core.mis_weight(pdfs, q, counts), rtol=2e-3, atol=1e-6)
                     made.add((q.s, q.t))
                     if q.t > 1:  # f is that of the whole film's measurement; splats are of one light path
                         ratio = x.contribution * pdfs.density(q) / np.maximum(f, 1e-30)
@@ -147,6 +155,9 @@ def test_counts(small: et.Scene) -> None:
     assert core.counts(small, "path").next_event == 1 and core.counts(small, "path").connect == 0
     assert core.counts(small, "light").splat == 256
     assert core.counts(small, PathTracer()).hit == 1
+    assert core.counts(small, "vcm").continued == 0.25 and BDPT.continued == 1
+    with pytest.raises(ValueError, match="continued must be above 0 and at most 1, not 2"):
+        core.Counts(hit=1, continued=2)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +171,7 @@ def test_an_integrator_in_python_renders(small: et.Scene, mine: et.Integrator, o
 
 @pytest.mark.parametrize(
     "integrator, verdict",
-    [(PathTracer(), "consistent"), (TooBright(), "deviates"), (WrongWeights(), "deviates"),
+    [(PathTracer(), "consistent"), (ShortPathTracer(), "consistent"), (TooBright(), "deviates"), (WrongWeights(), "deviates"),
      (LightTracer(), "consistent")])
 def test_verify_judges_integrators_in_python(small: et.Scene, integrator: et.Integrator, verdict: str) -> None:
     report = et.verify(small, integrator, spp=24, runs=16, lengths=(1, 3), seed=1, tiles=2)

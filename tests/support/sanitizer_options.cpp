@@ -5,7 +5,6 @@ extern "C" {
 
 const char* __tsan_default_suppressions();
 const char* __lsan_default_suppressions();
-const char* __asan_default_options();
 
 /// Embree builds its trees by TBB on its own threads, which call back for bounds and memory and use the program's copies
 /// of standard functions. The program itself uses only arenas and thread-specific storage of TBB (see
@@ -18,13 +17,8 @@ const char* __tsan_default_suppressions() {
 }
 
 /// For a truncated file OpenImageIO 2.4 passes the error text to libpng, which leaves by longjmp(), so that the text is
-/// never freed.
+/// never freed. The stack of this leak ends in the standard library unless ASAN_OPTIONS has fast_unwind_on_malloc=0.
 const char* __lsan_default_suppressions() {
     return "leak:PNGInput::PngReadCallback\n";
-}
-
-/// Otherwise the stack of this leak ends in the standard library.
-const char* __asan_default_options() {
-    return "fast_unwind_on_malloc=0";
 }
 }

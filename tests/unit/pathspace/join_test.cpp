@@ -68,7 +68,8 @@ enum class Extra { None, Merges, Gathers, Variants, Stored, Guided, GuidedMerges
 struct RandomLevels final : LearnedPlaces {
     uint8_t pair_level(Vec3 p) const override {
         uint64_t key = 0;
-        for (int i = 0; i < 3; ++i) key = hash_combine(key, uint64_t(std::floor(p[i] * 4)));
+        for (int i = 0; i < 3; ++i)
+            key = hash_combine(key, uint64_t(int64_t(std::floor(p[i] * 4))));
         return uint8_t(key % 70);
     }
 };
