@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "guide_info.h"
 #include "render/defaults.h"
 #include "scene_options.h"
 
@@ -13,33 +14,36 @@ std::string mebibytes(size_t bytes) {
     return fmt::format("{:.1f} MiB", double(bytes) / (1 << 20));
 }
 
-void info(const SceneOptions& options, bool as_json) {
+void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
+    guide.check();
     const Scene s = load_scene(options);
+    const nlohmann::json learned = guide.is_wanted ? guide.run(s) : nlohmann::json();
     const Scene::Statistics& st = s.statistics();
     const Bounds3& b = s.bounds();
     double power = 0;
     for (const auto& e : s.emitters()) power += e->power();
     if (as_json) {
-        const nlohmann::json j{{"scene", s.file()},
-                               {"shapes", s.shapes().size()},
-                               {"triangles", st.triangles},
-                               {"quadrics", st.quadrics},
-                               {"instances", st.instances},
-                               {"materials", st.materials},
-                               {"textures", st.textures},
-                               {"emitters", s.emitters().size()},
-                               {"emitters_at_infinity", s.infinite_emitters().size()},
-                               {"emitted_power", power},
-                               {"bounds", {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}}},
-                               {"width", s.film().width},
-                               {"height", s.film().height},
-                               {"filter", s.filter().name()},
-                               {"sensors", s.sensor_names()},
-                               {"sensor", s.sensor_index()},
-                               {"geometry_bytes", st.geometry_bytes},
-                               {"texture_bytes", st.texture_bytes},
-                               {"accelerator_bytes", st.accelerator_bytes},
-                               {"warnings", s.warnings()}};
+        nlohmann::json j{{"scene", s.file()},
+                         {"shapes", s.shapes().size()},
+                         {"triangles", st.triangles},
+                         {"quadrics", st.quadrics},
+                         {"instances", st.instances},
+                         {"materials", st.materials},
+                         {"textures", st.textures},
+                         {"emitters", s.emitters().size()},
+                         {"emitters_at_infinity", s.infinite_emitters().size()},
+                         {"emitted_power", power},
+                         {"bounds", {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}}},
+                         {"width", s.film().width},
+                         {"height", s.film().height},
+                         {"filter", s.filter().name()},
+                         {"sensors", s.sensor_names()},
+                         {"sensor", s.sensor_index()},
+                         {"geometry_bytes", st.geometry_bytes},
+                         {"texture_bytes", st.texture_bytes},
+                         {"accelerator_bytes", st.accelerator_bytes},
+                         {"warnings", s.warnings()}};
+        if (guide.is_wanted) j["guide"] = learned;
         fmt::print("{}\n", j.dump(2));
         return;
     }
@@ -67,6 +71,7 @@ void info(const SceneOptions& options, bool as_json) {
     fmt::print("  memory      geometry {}, hierarchy {}, textures {}\n",
                mebibytes(st.geometry_bytes), mebibytes(st.accelerator_bytes),
                mebibytes(st.texture_bytes));
+    if (guide.is_wanted) fmt::print("{}", guide_text(learned));
     for (const std::string& w : s.warnings()) fmt::print("  warning     {}\n", w);
 }
 
@@ -75,13 +80,15 @@ void info(const SceneOptions& options, bool as_json) {
 void add_info_command(CLI::App& app) {
     struct Options {
         SceneOptions scene;
+        GuideInfo guide;
         bool json = false;
     };
     auto options = std::make_shared<Options>();
     CLI::App& c = *app.add_subcommand("info", "Summarise a scene");
     options->scene.add_to(c);
+    options->guide.add_to(c);
     c.add_flag("--json", options->json, "Print JSON");
-    c.callback([options] { info(options->scene, options->json); });
+    c.callback([options] { info(options->scene, options->guide, options->json); });
 }
 
 }  // namespace etendue

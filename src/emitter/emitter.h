@@ -75,6 +75,9 @@ public:
     /// Finite emitters: a direction of emission from a point with normal `ng`, with density eval_emission().pdf_d.
     virtual Vec3 sample_direction(Vec3 ng, Vec2 u) const = 0;
 
+    /// Infinite emitters: emission of light that arrives from direction `d`, however that was chosen; `pdf_y0` is that
+    /// of sample_emission().
+    virtual EmissionSample sample_emission_from(Vec3 /*d*/, Vec2 /*u_d*/) const { return {}; }
     /// Finite emitters: upper bound of pdf_d at any point; kInf where none is known.
     virtual float max_pdf_d() const { return kInf; }
     /// The disc on which light from infinity starts: for light that travels along -d it is normal to d and centred at

@@ -6,7 +6,14 @@
 namespace etendue {
 
 EmissionSample InfiniteEmitter::sample_emission(FinePoint u_y0, Vec2 u_d) const {
-    const Sample s = sample_arrival(u_y0);
+    return emission(sample_arrival(u_y0), u_d);
+}
+
+EmissionSample InfiniteEmitter::sample_emission_from(Vec3 d, Vec2 u_d) const {
+    return emission({d, radiance(d), pdf_direction(d)}, u_d);
+}
+
+EmissionSample InfiniteEmitter::emission(const Sample& s, Vec2 u_d) const {
     const Vec2 disk = sample_uniform_disk(u_d);
     const Frame frame = Frame::from_normal(s.d);
     const Vec3 p = center_ + (frame.s * disk.x + frame.t * disk.y + s.d) * radius_;

@@ -9,6 +9,7 @@ namespace etendue {
 class InfiniteEmitter : public Emitter {
 public:
     EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const final;
+    EmissionSample sample_emission_from(Vec3 d, Vec2 u_d) const final;
     bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const final;
     EmitterHit eval_infinite(Vec3 d) const final;
     Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const final;
@@ -25,6 +26,7 @@ protected:
         Rgb L;
         float pdf;
     };
+    EmissionSample emission(const Sample& from, Vec2 u_d) const;
     virtual Sample sample_arrival(FinePoint u) const = 0;
     virtual Rgb radiance(Vec3 d) const = 0;
     virtual float pdf_direction(Vec3 d) const = 0;

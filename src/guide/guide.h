@@ -9,8 +9,27 @@ namespace etendue {
 
 class Guide {
 public:
+    /// The directions from which an emitter at infinity sends light, as class 0.
+    struct AtInfinity {
+        uint32_t emitter;  ///< Emitter::index
+        GuideFit fit;
+    };
+
     GuideTree surfaces;
     GuideTree emission;  ///< Of the directions from y_0, as TransportMode::Importance and class 0.
+    float emission_gain =
+        0;  ///< Mean gain of all light paths by the directions from y_0, or of y_0 at infinity.
+
+    /// Guides an emitter at infinity, unless its share is 0.
+    void add_at_infinity(const AtInfinity& learned) {
+        if (learned.fit.share[0] > 0) at_infinity_.push_back(learned);
+    }
+    /// The learned directions of an emitter at infinity, or nullptr.
+    const GuideFit* at_infinity(uint32_t emitter) const {
+        for (const AtInfinity& a : at_infinity_)
+            if (a.emitter == emitter) return &a.fit;
+        return nullptr;
+    }
 
     /// Sets the relative probabilities with which light paths choose emitters, by Emitter::index.
     void set_emission(std::vector<double> weights) {
@@ -23,24 +42,32 @@ public:
     uint32_t sample_emitter(double u) const { return emission_choice_.sample(u).index; }
     float emission_pmf(uint32_t index) const { return emission_choice_.pmf(index); }
 
-    size_t memory_bytes() const { return surfaces.memory_bytes() + emission.memory_bytes(); }
+    size_t memory_bytes() const {
+        return surfaces.memory_bytes() + emission.memory_bytes() +
+               at_infinity_.capacity() * sizeof(AtInfinity);
+    }
 
     template <class State>
     void save(State& to) const {
         surfaces.save(to);
         emission.save(to);
+        to.put(emission_gain);
+        to.put(at_infinity_);
         to.put(emission_weights_);
     }
     template <class State>
     void load(State& from) {
         surfaces.load(from);
         emission.load(from);
+        from.get(emission_gain);
+        from.get(at_infinity_);
         std::vector<double> weights;
         from.get(weights);
         set_emission(std::move(weights));
     }
 
 private:
+    std::vector<AtInfinity> at_infinity_;
     std::vector<double> emission_weights_;
     AliasTable emission_choice_;
 };

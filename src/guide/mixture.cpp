@@ -51,6 +51,19 @@ inline GuideMixture::Seen GuideMixture::see(const GuideView& view, int first) co
     return seen;
 }
 
+std::vector<GuideMixture::SeenLobe> GuideMixture::seen_lobes(const GuideView& view) const {
+    std::vector<SeenLobe> lobes;
+    float total = 0;
+    for (int k = 0; k < size_; ++k) {
+        const Seen seen = see(view, k - k % kLanes);
+        const auto j = size_t(k % kLanes);
+        lobes.push_back({{seen.x[j], seen.y[j], seen.z[j]}, seen.mass[j]});
+        total += seen.mass[j];
+    }
+    for (SeenLobe& lobe : lobes) lobe.share /= total;
+    return lobes;
+}
+
 float GuideMixture::pdf(const GuideView& view, Vec3 w) const {
     alignas(32) std::array<float, kLanes> sum{}, mass{};
     for (int first = 0; first < size_; first += kLanes) {

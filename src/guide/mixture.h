@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 #include "bsdf/lobe.h"
 #include "math/vec.h"
@@ -38,6 +39,14 @@ public:
     /// There must be room.
     void add(const Lobe& lobe);
     Lobe lobe(int k) const;
+
+    /// A lobe as seen from a place: its mean there, and its share of the directions.
+    struct SeenLobe {
+        Vec3 mean;
+        float share;
+    };
+    /// All lobes, in their order; of a mixture that may be empty.
+    std::vector<SeenLobe> seen_lobes(const GuideView& view) const;
 
     /// g(w), for the unit vector w. Of a mixture that is not empty, as all below.
     float pdf(const GuideView& view, Vec3 w) const;

@@ -5,26 +5,34 @@
 
 namespace etendue {
 
-Guide random_guide(Vec3 center, float radius, std::vector<double> emission, float kappa,
-                   uint64_t seed) {
+Guide random_guide(Vec3 center, float radius, std::vector<double> emission,
+                   const std::vector<uint32_t>& at_infinity, float kappa, uint64_t seed) {
     constexpr float kShare = 0.5f;
     auto u = [seed, n = uint64_t(0)]() mutable {
         return to_unit_float(uint32_t(hash_combine(seed, n++)));
+    };
+    const auto make_random = [&](GuideMixture& mixture, float inv_r) {
+        for (int k = 0; k < GuideMixture::kMostLobes; ++k) {
+            const float x = u(), y = u(), weight = u() + 0.1f;
+            mixture.add({sample_uniform_sphere({x, y}), k % 2 == 0 ? 0.0f : inv_r, kappa, weight});
+        }
     };
     GuideCell cell;
     cell.center = center;
     for (GuideCell::Field& field : cell.fields) {
         field.share.fill(kShare);
-        for (int k = 0; k < GuideMixture::kMostLobes; ++k) {
-            const float x = u(), y = u(), weight = u() + 0.1f;
-            field.mixture.add(
-                {sample_uniform_sphere({x, y}), k % 2 == 0 ? 0.0f : 1 / radius, kappa, weight});
-        }
+        make_random(field.mixture, 1 / radius);
     }
     Guide guide;
     guide.surfaces = guide.emission = GuideTree(cell);
     for (double& weight : emission) weight *= 0.1 + double(u());
     if (emission.size() > 1) guide.set_emission(std::move(emission));
+    for (const uint32_t emitter : at_infinity) {
+        Guide::AtInfinity learned{emitter, {}};
+        learned.fit.share.fill(kShare);
+        make_random(learned.fit.mixture, 0);
+        guide.add_at_infinity(learned);
+    }
     return guide;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <map>
 
 #include "guide/random_guide.h"
 #include "math/hash.h"
@@ -18,9 +19,8 @@ constexpr uint64_t kMostWalks = kMostSamples / (2 * kMostVertices);
 
 /// The start of a light walk, and its vertices with smooth lobes.
 struct EmissionRecord {
-    GuideSample sample;  ///< Of y_0, without weight.
-    uint32_t emitter;
-    bool is_infinite;
+    GuideSample sample;  ///< Of y_0, without weight; at infinity, of the direction to y_0.
+    const Emitter* emitter;
     std::vector<PlacedWeight> reached;  ///< With the power that arrives there.
 };
 
@@ -70,16 +70,19 @@ void record_light_walk(const SubPath& y, Block& block) {
         if (s.weight > 0) block.samples.push_back(s);
     }
     if (y.size() < 2) return;
-    EmissionRecord r{{}, y[0].emitter->index, y[0].is_infinite, {}};
+    EmissionRecord r{{}, y[0].emitter, {}};
     for (int i = 1; i < y.size(); ++i)
         if (y[i].is_connectible)
             r.reached.push_back({y[i].p, facing_normal(y[i]), luminance(y[i].beta)});
-    if (!y[0].is_infinite) {
+    r.sample.mode = uint8_t(TransportMode::Importance);
+    if (y[0].is_infinite) {
+        r.sample.direction = PackedDirection(y[0].p);
+        r.sample.unguided_pdf = y[0].emitter->eval_infinite(y[0].p).pdf_y0;
+    } else {
         const Vec3 w = direction(y[0], y[1]);
         r.sample.p = y[0].p;
         r.sample.inv_distance = 1 / length(y[1].p - y[0].p);
         r.sample.direction = PackedDirection(w);
-        r.sample.mode = uint8_t(TransportMode::Importance);
         r.sample.unguided_pdf = y[0].eval_unguided(w, TransportMode::Importance).pdf;
     }
     if (!r.reached.empty()) block.emission.push_back(std::move(r));
@@ -103,11 +106,27 @@ void append(std::vector<T>& to, const std::vector<T>& more) {
     to.insert(to.end(), more.begin(), more.end());
 }
 
+/// Evenly chosen pointers to at most so many of the samples.
+std::vector<const GuideSample*> thinned(const std::vector<GuideSample>& samples) {
+    constexpr size_t kMost = 8192;
+    const size_t step = (samples.size() + kMost - 1) / kMost;
+    std::vector<const GuideSample*> chosen;
+    for (size_t i = 0; i < samples.size(); i += step) chosen.push_back(&samples[i]);
+    return chosen;
+}
+
+double sum_of_weights(const std::vector<GuideSample>& samples) {
+    double sum = 0;
+    for (const GuideSample& s : samples) sum += double(s.weight);
+    return sum;
+}
+
 /// Emission is learned by what walks bring to the places that the lens sees: an estimate of their splats.
 void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& records, uint64_t seed,
                     Guide& guide) {
     constexpr double kByPower = 0.3;
-    std::vector<GuideSample> samples;
+    std::vector<GuideSample> finite;
+    std::map<uint32_t, std::vector<GuideSample>> at_infinity;  // by Emitter::index
     std::vector<double> by_emitter(scene.emitters().size());
     double sum = 0;
     for (const EmissionRecord& r : records) {
@@ -115,12 +134,23 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
         for (const PlacedWeight& v : r.reached)
             s.weight += v.weight * guide.surfaces.cell(v.p).importance[GuideCell::octant(v.n)];
         if (!(s.weight > 0)) continue;
-        by_emitter[r.emitter] += double(s.weight);
+        by_emitter[r.emitter->index] += double(s.weight);
         sum += double(s.weight);
-        if (!r.is_infinite) samples.push_back(s);
+        if (!r.emitter->is_infinite())
+            finite.push_back(s);
+        else if (!r.emitter->is_delta())
+            at_infinity[r.emitter->index].push_back(s);
     }
-    guide.emission = GuideTree(samples, seed);
-    if (!(sum > 0) || !scene.has_emitter_choice()) return;
+    if (!(sum > 0)) return;
+    guide.emission = GuideTree(finite, seed);
+    double gain = sum_of_weights(finite) * double(guide.emission.gain(TransportMode::Importance));
+    for (const auto& [emitter, samples] : at_infinity) {
+        const GuideFit fit = fit_guide(thinned(samples), {}, hash_combine(seed, emitter));
+        gain += sum_of_weights(samples) * double(fit.gain);
+        guide.add_at_infinity({emitter, fit});
+    }
+    guide.emission_gain = float(gain / sum);
+    if (!scene.has_emitter_choice()) return;
     for (size_t i = 0; i < by_emitter.size(); ++i)
         by_emitter[i] = kByPower * double(scene.emitters()[i]->selection_pmf) +
                         (1 - kByPower) * by_emitter[i] / sum;
@@ -144,12 +174,9 @@ Guiding::Guiding(const IntegratorParams& p) {
 bool Guiding::gains_little(GuidedWalks walks) const {
     // The logarithm of what a guided sample costs, training included, in samples without guide.
     constexpr float kLeastGain = 0.4f;  // nats
-    const auto gains = [](const GuideTree& tree, TransportMode mode) {
-        return tree.gain(mode) >= kLeastGain;
-    };
-    const bool eye = gains(guide_->surfaces, TransportMode::Radiance),
-               light = gains(guide_->surfaces, TransportMode::Importance) ||
-                       gains(guide_->emission, TransportMode::Importance);
+    const bool eye = guide_->surfaces.gain(TransportMode::Radiance) >= kLeastGain,
+               light = guide_->surfaces.gain(TransportMode::Importance) >= kLeastGain ||
+                       guide_->emission_gain >= kLeastGain;
     switch (walks) {
     case GuidedWalks::Eye:
     case GuidedWalks::BothWithPairs: return !eye;
@@ -172,9 +199,13 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
         constexpr float kKappa = 1000;
         const Bounds3& bounds = pass.scene.bounds();
         std::vector<double> pmf;
-        for (const auto& e : pass.scene.emitters()) pmf.push_back(double(e->selection_pmf));
-        guide_ = std::make_unique<Guide>(
-            random_guide(bounds.center(), bounds.radius(), std::move(pmf), kKappa, seed));
+        std::vector<uint32_t> at_infinity;
+        for (const auto& e : pass.scene.emitters()) {
+            pmf.push_back(double(e->selection_pmf));
+            if (e->is_infinite() && !e->is_delta()) at_infinity.push_back(e->index);
+        }
+        guide_ = std::make_unique<Guide>(random_guide(bounds.center(), bounds.radius(),
+                                                      std::move(pmf), at_infinity, kKappa, seed));
     } else if (pass.index == 0) {
         const uint64_t first = std::max(kFewestWalks, std::min(pass.pixels, kMostWalks) >> kRounds);
         for (int round = 0; round < kRounds; ++round)
@@ -248,8 +279,7 @@ void Guiding::add_figures(std::vector<std::pair<std::string, double>>& figures) 
     figures.push_back({"guide_gain_eye", double(guide_->surfaces.gain(TransportMode::Radiance))});
     figures.push_back(
         {"guide_gain_light", double(guide_->surfaces.gain(TransportMode::Importance))});
-    figures.push_back(
-        {"guide_gain_emission", double(guide_->emission.gain(TransportMode::Importance))});
+    figures.push_back({"guide_gain_emission", double(guide_->emission_gain)});
     figures.push_back({"guide_bytes", double(guide_->memory_bytes())});
 }
 

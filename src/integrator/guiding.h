@@ -24,6 +24,8 @@ public:
     void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks);
     /// What guides walks until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
+    /// Whether the guide gains so little that `auto` does without it. There must be a guide.
+    bool gains_little(GuidedWalks walks) const;
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);
@@ -32,8 +34,6 @@ public:
 
 private:
     enum class Mode { Off, On, Auto, Random };
-    /// Whether it gains so little that it is not worth its time.
-    bool gains_little(GuidedWalks walks) const;
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
                                    uint64_t walks, uint64_t seed) const;
 

@@ -30,7 +30,8 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
     const double p_NE = double(emitter.selection_pmf) * e.pdf / v.pdf_fwd;
-    const double p_L = double(emission_pmf(counts.guide, emitter)) * e.pdf_y0 / v.pdf_fwd;
+    const double p_L = double(emission_pmf(counts.guide, emitter)) *
+                       origin_pdf(counts.guide, emitter, v.p, e.pdf_y0) / v.pdf_fwd;
     double others = 0;
     if (last >= 2 && !z[last - 1].is_delta)
         others += sqr(double(counts.reaching(z[last - 1].sees_lens))) *
@@ -87,7 +88,8 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const float pdf_d = emission_pdf(counts.guide, emitter, d.p, -d.wi, d.pdf_d);
         const double rev_last = double(pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
         const double rev_prev = f.pdf_rev * v.to_predecessor;
-        const double p_L = double(emission_pmf(counts.guide, emitter)) * d.pdf_y0;
+        const double p_L = double(emission_pmf(counts.guide, emitter)) *
+                           origin_pdf(counts.guide, emitter, d.p, d.pdf_y0);
         others += sqr(p_L / p_NE) *
                   (sqr(double(counts.connect_emission * counts.reaching(v.sees_lens))) +
                    outward_sum<Side::Eye>(

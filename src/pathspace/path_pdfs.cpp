@@ -120,7 +120,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.light[0] = emission_pmf(guide, emitter);
     p.next_event = emitter.selection_pmf;
     if (p.can_hit_emitter) {
-        p.light[0] *= hit.pdf_y0;
+        p.light[0] *= origin_pdf(guide, emitter, x[0]->p, hit.pdf_y0);
         p.next_event *= hit.pdf;
     }
     p.light[1] = to_area(emission_pdf(guide, emitter, x[0]->p, w0, emission.pdf_d), *x[0], *x[1]);

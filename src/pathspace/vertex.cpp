@@ -9,47 +9,46 @@ constexpr TransportMode other(TransportMode mode) {
     return mode == TransportMode::Radiance ? TransportMode::Importance : TransportMode::Radiance;
 }
 
-float share(const Vertex& v, const GuideCell& cell, TransportMode mode) {
-    const bool is_surface = v.kind == Vertex::Kind::Surface;
-    return cell.field(mode).share[is_surface ? size_t(guide_class(v.gloss)) : size_t(0)];
-}
-
-/// For a walk that arrives at `v` from `from`.
-GuideView view(const Vertex& v, const GuideCell& cell, Vec3 from) {
-    const bool leaves_on_its_side =
-        v.kind == Vertex::Kind::Surface && !v.shape->material->is_transmissive();
-    const Vec3 normal = !leaves_on_its_side ? Vec3{} : dot(v.ng, from) < 0 ? -v.ng : v.ng;
-    return {cell.center - v.p, normal};
-}
-
 float delta_probability(const Vertex& v, Vec3 from, TransportMode mode) {
     return v.kind == Vertex::Kind::Surface ? v.bsdf.delta_probability(from, mode) : 0.0f;
 }
 
 }  // namespace
 
+float guide_share(const Vertex& v, const GuideCell& cell, TransportMode mode) {
+    const bool is_surface = v.kind == Vertex::Kind::Surface;
+    return cell.field(mode).share[is_surface ? size_t(guide_class(v.gloss)) : size_t(0)];
+}
+
+GuideView guide_view(const Vertex& v, const GuideCell& cell, Vec3 from) {
+    const bool leaves_on_its_side =
+        v.kind == Vertex::Kind::Surface && !v.shape->material->is_transmissive();
+    const Vec3 normal = !leaves_on_its_side ? Vec3{} : dot(v.ng, from) < 0 ? -v.ng : v.ng;
+    return {cell.center - v.p, normal};
+}
+
 void Vertex::set_guide(const GuideCell& cell, TransportMode mode, bool both) {
     guide = nullptr;
     if (!is_connectible) return;
-    const float rev_share = both ? share(*this, cell, other(mode)) : 0.0f;
-    if (!(share(*this, cell, mode) > 0 || rev_share > 0)) return;
+    const float rev_share = both ? guide_share(*this, cell, other(mode)) : 0.0f;
+    if (!(guide_share(*this, cell, mode) > 0 || rev_share > 0)) return;
     guide = &cell;
     guide_rev =
-        rev_share > 0 ? cell.field(other(mode)).mixture.pdf(view(*this, cell, wo), wo) : 0.0f;
+        rev_share > 0 ? cell.field(other(mode)).mixture.pdf(guide_view(*this, cell, wo), wo) : 0.0f;
 }
 
 float guided_pdf(const Vertex& v, const GuideCell& cell, Vec3 from, Vec3 w, TransportMode mode,
                  float unguided) {
-    const float a = share(v, cell, mode);
+    const float a = guide_share(v, cell, mode);
     if (!(a > 0 && unguided > 0)) return unguided;
     return (1 - a) * unguided + a * (1 - delta_probability(v, from, mode)) *
-                                    cell.field(mode).mixture.pdf(view(v, cell, from), w);
+                                    cell.field(mode).mixture.pdf(guide_view(v, cell, from), w);
 }
 
 void Vertex::mix_guide(Vec3 w, TransportMode mode, float& pdf, float& reverse) const {
     pdf = guided_pdf(*this, *guide, wo, w, mode, pdf);
     const TransportMode rev = other(mode);
-    if (const float a = share(*this, *guide, rev); a > 0 && reverse > 0)
+    if (const float a = guide_share(*this, *guide, rev); a > 0 && reverse > 0)
         reverse = (1 - a) * reverse + a * (1 - delta_probability(*this, w, rev)) * guide_rev;
 }
 
@@ -58,10 +57,10 @@ std::optional<BsdfSample> Vertex::sample_guided(float u_lobe, Vec2 u, float u_gu
     std::optional<BsdfSample> s = sample_unguided(u_lobe, u, mode);
     if (s && s->is_delta) return s;
     BsdfEval e;
-    const float a = share(*this, *guide, mode);
+    const float a = guide_share(*this, *guide, mode);
     if (u_guide < a) {
         const Vec3 w = guide->field(mode).mixture.sample(
-            view(*this, *guide, wo), std::fmin(u_guide / a, kOneMinusEpsilon), u);
+            guide_view(*this, *guide, wo), std::fmin(u_guide / a, kOneMinusEpsilon), u);
         e = eval_unguided(w, mode);
         if (!(e.pdf > 0)) return {};
         s.emplace();
@@ -93,14 +92,21 @@ float Vertex::max_pdf_unguided(const DirectionCone& cone) const {
 }
 
 float Vertex::max_guided_pdf(float unguided, const DirectionCone& cone, TransportMode mode) const {
-    const float a = share(*this, *guide, mode);
+    const float a = guide_share(*this, *guide, mode);
     if (!(a > 0)) return unguided;
-    const float guided = guide->field(mode).mixture.max_pdf(view(*this, *guide, wo), cone);
+    const float guided = guide->field(mode).mixture.max_pdf(guide_view(*this, *guide, wo), cone);
     return (1 - a) * unguided + a * (1 - delta_probability(*this, wo, mode)) * guided;
 }
 
 float guided_emission_pmf(const Guide& guide, const Emitter& emitter) {
     return guide.chooses_emitters() ? guide.emission_pmf(emitter.index) : emitter.selection_pmf;
+}
+
+float origin_pdf(const Guide* guide, const Emitter& emitter, Vec3 d, float unguided) {
+    const GuideFit* fit = guide ? guide->at_infinity(emitter.index) : nullptr;
+    if (!fit || !(unguided > 0)) return unguided;
+    const float a = fit->share[0];
+    return (1 - a) * unguided + a * fit->mixture.pdf({}, d);
 }
 
 const GuideCell* emission_cell(const Guide* guide, const Emitter& emitter, Vec3 p) {

@@ -14,6 +14,7 @@ namespace etendue {
 
 class Guide;
 struct GuideCell;
+struct GuideView;
 
 /// A probability in steps of 2^-10, so that the compactly stored value is exactly the one used in the decision.
 class Survival {
@@ -153,6 +154,14 @@ private:
 float guided_pdf(const Vertex& v, const GuideCell& cell, Vec3 from, Vec3 w, TransportMode mode,
                  float unguided);
 
+/// The share of guided directions at `v` for walks in `mode`.
+float guide_share(const Vertex& v, const GuideCell& cell, TransportMode mode);
+/// How a walk that arrives at `v` from `from` sees the lobes of the cell.
+GuideView guide_view(const Vertex& v, const GuideCell& cell, Vec3 from);
+
+/// Density of y_0 = `d` of an emitter at infinity for light paths, in solid angle, where that without guide is
+/// `unguided`; of finite emitters `unguided`, in area.
+float origin_pdf(const Guide* guide, const Emitter& emitter, Vec3 d, float unguided);
 /// Density p_d of emission along `w` from y_0 at `p`, where that without guide is `unguided`.
 float emission_pdf(const Guide* guide, const Emitter& emitter, Vec3 p, Vec3 w, float unguided);
 float guided_emission_pmf(const Guide& guide, const Emitter& emitter);

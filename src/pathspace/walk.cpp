@@ -81,7 +81,8 @@ float next_event_ratio(const Vertex& y0, Vec3 w, const Guide* guide) {
                              ? y0.emitter->eval_infinite(y0.p)
                              : y0.emitter->eval_surface(y0.ng, y0.uv, y0.location.prim, w);
     const float choices = y0.emitter->selection_pmf / emission_pmf(guide, *y0.emitter);
-    return e.pdf_y0 > 0 ? choices * e.pdf / e.pdf_y0 : choices;
+    const float pdf_y0 = origin_pdf(guide, *y0.emitter, y0.p, e.pdf_y0);
+    return pdf_y0 > 0 ? choices * e.pdf / pdf_y0 : choices;
 }
 
 void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, Sampler& sampler,
@@ -131,6 +132,17 @@ void guide_emission(Vertex& y0, Vec2 u_d, float u_guide, EmissionSample& e) {
     if (!y0.has_cosine) y0.ng = e.d;
     e.Le = y0.emitter->eval_emission(y0.ng, y0.uv, e.d).Le_cos;
     if (y0.has_cosine) e.Le *= 1 / abs_dot(y0.ng, e.d);
+}
+
+/// Replaces y_0 at infinity by one of the guide or the emitter. Its density is 0 if there is none.
+void guide_origin(const Guide& guide, const GuideFit& fit, const Emitter& emitter, Vec2 u_y0,
+                  Vec2 u_d, float u_guide, EmissionSample& e) {
+    const float a = fit.share[0];
+    if (u_guide < a) {
+        const Vec3 d = fit.mixture.sample({}, std::fmin(u_guide / a, kOneMinusEpsilon), u_y0);
+        e = emitter.sample_emission_from(d, u_d);
+    }
+    e.pdf_y0 = origin_pdf(&guide, emitter, -e.d, e.pdf_y0);
 }
 
 /// Makes y_0, at the point of an emission.
@@ -183,6 +195,8 @@ bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
     const FinePoint u_y0 = sampler.next_2d_fine();
     const Vec2 u_d = sampler.next_2d();
     EmissionSample e = emitter.sample_emission(u_y0, u_d);
+    if (const GuideFit* fit = guide ? guide->at_infinity(emitter.index) : nullptr)
+        guide_origin(*guide, *fit, emitter, to_float(u_y0), u_d, sampler.next_1d(), e);
     if (!(e.pdf_y0 > 0)) return false;
     Vertex& y0 = append_emitter(walk, emitter, e, y);
     if (y0.guide) guide_emission(y0, u_d, sampler.next_1d(), e);

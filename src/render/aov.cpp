@@ -48,13 +48,10 @@ void check_aovs(const std::vector<std::string>& names) {
                 fmt::format("unknown layer \"{}\" (known: {})", n, fmt::join(known, ", ")));
 }
 
-std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names,
-                                  int samples, uint64_t seed, int threads) {
-    std::vector<AovImage> images;
-    const uint64_t pixels = scene.film().pixel_count();
-    for (const std::string& n : names)
-        if (n != "variance") images.push_back({n, std::vector<Rgb>(pixels)});
-    if (images.empty()) return images;
+std::vector<std::vector<Rgb>> average_first_hits(const Scene& scene, size_t layers, int samples,
+                                                 uint64_t seed, int threads,
+                                                 const FirstHitValue& value) {
+    std::vector<std::vector<Rgb>> images(layers, std::vector<Rgb>(scene.film().pixel_count()));
     const Film film(scene.film(), scene.filter());
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     arena.execute([&] {
@@ -70,13 +67,25 @@ std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::str
                     sampler.start(uint32_t(i), pixel);
                     start_eye_path(walk, film, pixel, sampler, z);
                     if (z.size() < 2 || z[1].kind != Vertex::Kind::Surface) continue;
-                    for (AovImage& image : images)
-                        image.pixels[pixel] +=
-                            value(image.name, z[1], z) * (z.film_weight / float(samples));
+                    for (size_t layer = 0; layer < layers; ++layer)
+                        images[layer][pixel] += value(z, layer) * (z.film_weight / float(samples));
                 }
             }
         });
     });
+    return images;
+}
+
+std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names,
+                                  int samples, uint64_t seed, int threads) {
+    std::vector<AovImage> images;
+    for (const std::string& n : names)
+        if (n != "variance") images.push_back({n, {}});
+    if (images.empty()) return images;
+    auto pixels = average_first_hits(
+        scene, images.size(), samples, seed, threads,
+        [&](const SubPath& z, size_t i) { return value(images[i].name, z[1], z); });
+    for (size_t i = 0; i < images.size(); ++i) images[i].pixels = std::move(pixels[i]);
     return images;
 }
 

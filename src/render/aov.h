@@ -1,10 +1,11 @@
 #pragma once
 // Auxiliary images of the first visible surface at each pixel.
 
+#include <functional>
 #include <string>
 #include <vector>
 
-#include "scene/scene.h"
+#include "pathspace/vertex.h"
 
 namespace etendue {
 
@@ -24,6 +25,12 @@ struct AovImage {
 };
 /// Eye rays per pixel for the layers of an image.
 inline constexpr int kAovSamples = 16;
+/// Averages over `samples` eye rays per pixel, weighted by the film's filter, for `layers` images: `value(z, layer)` of a
+/// ray whose first surface is z_1, 0 of others.
+using FirstHitValue = std::function<Rgb(const SubPath& z, size_t layer)>;
+std::vector<std::vector<Rgb>> average_first_hits(const Scene& scene, size_t layers, int samples,
+                                                 uint64_t seed, int threads,
+                                                 const FirstHitValue& value);
 /// Averages over `samples` eye rays per pixel for each name except `variance`.
 std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::string>& names,
                                   int samples, uint64_t seed, int threads);

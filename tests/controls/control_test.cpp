@@ -122,6 +122,8 @@ std::vector<Planted> planted() {
         {"GuideFieldsSwapped", lit_room, "bdpt:roulette=0,guide=random", Image | Lengths, 0},
         {"GuideJitter", lit_room, "bdpt:roulette=0,guide=random", Lengths, 0},
         {"GuideCosineOfSampling", lit_room, "bdpt:roulette=0,guide=random", Lengths, 0},
+        {"OriginNotInHits", front_camera(kSize) + room() + "<emitter type=\"constant\"/>",
+         "bdpt:roulette=0,guide=random", Lengths, 0},
         {"TrialsWithoutGuide", lit_room, "upg+bdpt:radius=0.3,roulette=0,guide=random", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},

@@ -94,7 +94,7 @@ std::vector<AgreementCase> cases() {
         {"several",
          front + room() + area_lamp() + two + environment("0.3,0.4,0.5") +
              point_light("0.4,0.8,3.6", "9,6,3") + kSun,
-         true},
+         true, 240},
         {"mask",
          front + room() + area_lamp() +
              rectangle("<scale value=\"0.6\"/><rotate x=\"1\" angle=\"-60\"/>", kMasked),
@@ -230,8 +230,9 @@ const auto kName = [](const ::testing::TestParamInfo<AgreementCase>& p) {
 };
 INSTANTIATE_TEST_SUITE_P(Quick, Agreement, ::testing::ValuesIn(cases()), kName);
 INSTANTIATE_TEST_SUITE_P(Long, LongAgreement, ::testing::ValuesIn(cases()), kName);
-INSTANTIATE_TEST_SUITE_P(Quick, GuidedAgreement,
-                         ::testing::ValuesIn(cases({"rough", "several", "gloss"})), kName);
+INSTANTIATE_TEST_SUITE_P(
+    Quick, GuidedAgreement,
+    ::testing::ValuesIn(cases({"rough", "constant_on_diffuse", "several", "gloss"})), kName);
 INSTANTIATE_TEST_SUITE_P(Long, LongGuidedAgreement, ::testing::ValuesIn(cases()), kName);
 
 }  // namespace

@@ -161,6 +161,60 @@ TEST_P(GuidedVertex, IsBelowItsBound) {
 INSTANTIATE_TEST_SUITE_P(Materials, GuidedVertex, ::testing::ValuesIn(cases()),
                          [](const auto& p) { return std::string(p.param.name); });
 
+/// Directions at infinity from which light paths start, where the emitter has a density of its own.
+TEST(GuidedOrigin, IsSampledByItsDensity) {
+    const Scene scene =
+        test::build(test::front_camera(8) + test::room() +
+                    "<emitter type=\"sky\"><vector name=\"sun_direction\" x=\"0.3\" y=\"0.6\" "
+                    "z=\"0.5\"/></emitter>");
+    const Emitter& sky = *scene.infinite_emitters().front();
+    Random random(6);
+    Guide::AtInfinity learned{sky.index, {}};
+    constexpr double kShare = 0.6;
+    learned.fit.share.fill(float(kShare));
+    for (int k = 0; k < 5; ++k)
+        learned.fit.mixture.add({random.unit_vector(), 0, random.between(2, 25), 1});
+    Guide guide;
+    guide.add_at_infinity(learned);
+    const TechniqueCounts counts{.hit = 1, .connect = 1, .guide = &guide};
+    RenderStats stats;
+    const WalkContext walk{scene, counts, stats, {2, 1000}};
+    Sampler sampler(SamplerKind::Independent, 4);
+    SubPath y;
+    testing::Chi2Grid grid(-1, 1, 16, -M_PI, M_PI, 32);
+    double flux = 0, unguided_flux = 0;
+    constexpr uint32_t kPaths = 200000;
+    for (uint32_t i = 0; i < kPaths; ++i) {
+        const auto arrives = [&] { return y.size() > 1 ? double(y[1].beta.g) / kPaths : 0.0; };
+        sampler.start(i, 0);
+        const bool starts = start_light_path(walk, sampler, y);
+        flux += starts ? arrives() : 0;
+        if (starts) {
+            const Vec3 d = y[0].p;
+            grid.add(double(d.z), std::atan2(double(d.y), double(d.x)));
+            const float pdf = origin_pdf(&guide, sky, d, sky.eval_infinite(d).pdf_y0);
+            ASSERT_NEAR(y[0].pdf_fwd / pdf, 1, 1e-4);
+        } else {
+            grid.add_outside();
+        }
+        const TechniqueCounts plain{.hit = 1, .connect = 1};
+        if (start_light_path({scene, plain, stats, {2, 1000}}, sampler, y))
+            unguided_flux += arrives();
+    }
+    const auto result = grid.test(
+        [&](double cos, double phi) {
+            const double sin = std::sqrt(1 - cos * cos);
+            const Vec3 d{float(sin * std::cos(phi)), float(sin * std::sin(phi)), float(cos)};
+            return double(origin_pdf(&guide, sky, d, sky.eval_infinite(d).pdf_y0));
+        },
+        3);
+    EXPECT_GT(result.p_value, 1e-3) << result.total_probability;
+    // Some of the guide's directions lie below the horizon; they start no path.
+    EXPECT_GT(result.total_probability, 1.1 - kShare);
+    EXPECT_LT(result.total_probability, 0.9);
+    EXPECT_NEAR(flux / unguided_flux, 1, 0.02);
+}
+
 /// A guide that has learned nothing changes no bit of a walk.
 TEST(UntrainedGuide, LeavesWalksAsTheyAre) {
     const Scene scene = test::build(test::mixed_room(test::front_camera(8)));

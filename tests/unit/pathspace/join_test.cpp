@@ -106,8 +106,13 @@ protected:
             // The density of a lobe changes by κ dθ, which enlarges the difference of directions that Tally describes.
             constexpr float kKappa = 10;
             std::vector<double> pmf;
-            for (const auto& e : scene.emitters()) pmf.push_back(double(e->selection_pmf));
-            guide = random_guide(scene.bounds().center(), scene.bounds().radius(), pmf, kKappa, 3);
+            std::vector<uint32_t> at_infinity;
+            for (const auto& e : scene.emitters()) {
+                pmf.push_back(double(e->selection_pmf));
+                if (e->is_infinite() && !e->is_delta()) at_infinity.push_back(e->index);
+            }
+            guide = random_guide(scene.bounds().center(), scene.bounds().radius(), pmf, at_infinity,
+                                 kKappa, 3);
             counts.guide = &guide;
         }
     }

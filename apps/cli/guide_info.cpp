@@ -1,0 +1,189 @@
+#include "guide_info.h"
+
+#include <cmath>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "image/image_io.h"
+#include "render/defaults.h"
+#include "render/learned_guide.h"
+
+namespace etendue {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array<const char*, kGuideClasses> kGloss{"matte", "somewhat glossy", "glossy"};
+
+json to_json(Vec3 v) {
+    return {v.x, v.y, v.z};
+}
+
+json to_json(const GuidedPlace::Field& field) {
+    json lobes = json::array();
+    for (const GuidedPlace::Lobe& l : field.lobes()) {
+        json lobe{{"share", l.share},
+                  {"weight", l.weight},
+                  {"kappa", l.kappa},
+                  {"direction", to_json(l.direction)}};
+        if (std::isfinite(l.distance)) lobe["distance"] = l.distance;
+        lobes.push_back(lobe);
+    }
+    return {{"share", field.share}, {"lobes", lobes}};
+}
+
+json to_json(const GuidedPlace& place, const std::vector<int>& pixel) {
+    json j{{"pixel", pixel},
+           {"delta_events", place.delta_events},
+           {"emission", to_json(place.emission)}};
+    if (!place.is_surface) return j;
+    j["shape"] = place.shape;
+    j["position"] = to_json(place.p);
+    j["normal"] = to_json(place.normal);
+    j["cell_center"] = to_json(place.cell_center);
+    j["gloss"] = kGloss[size_t(place.gloss_class)];
+    j["eye_walks"] = to_json(place.eye);
+    j["light_walks"] = to_json(place.light);
+    return j;
+}
+
+std::string vector_text(const json& v) {
+    return fmt::format("({:.4g}, {:.4g}, {:.4g})", v[0].get<float>(), v[1].get<float>(),
+                       v[2].get<float>());
+}
+
+/// The lobes of one field, as a table.
+std::string field_text(const char* title, const json& field) {
+    const json& lobes = field["lobes"];
+    if (lobes.empty()) return fmt::format("    {}: nothing learned\n", title);
+    std::string text = fmt::format(
+        "    {}: {:.3f} of the directions from {} {}\n"
+        "      share   weight      kappa  direction                        distance\n",
+        title, field["share"].get<double>(), lobes.size(), lobes.size() == 1 ? "lobe" : "lobes");
+    for (const json& l : lobes) {
+        const json& d = l["direction"];
+        text += fmt::format(
+            "      {:.4f}  {:.4f}  {:9.4g}  ({:8.5f}, {:8.5f}, {:8.5f})  {}\n",
+            l["share"].get<double>(), l["weight"].get<double>(), l["kappa"].get<double>(),
+            d[0].get<double>(), d[1].get<double>(), d[2].get<double>(),
+            l.contains("distance") ? fmt::format("{:9.4g}", l["distance"].get<double>())
+                                   : "  infinite");
+    }
+    return text;
+}
+
+std::string place_text(const json& place) {
+    std::string text = fmt::format("  pixel       {},{}", place["pixel"][0].get<int>(),
+                                   place["pixel"][1].get<int>());
+    const int events = place["delta_events"].get<int>();
+    const std::string by_way = events == 0 ? ""
+                                           : fmt::format(", after {} mirror{} or smooth glass",
+                                                         events, events == 1 ? "" : "s");
+    if (!place.contains("shape"))
+        return text + fmt::format(": the environment{}\n", by_way) +
+               field_text("emission from infinity", place["emission"]);
+    text += fmt::format(": \"{}\", {}{}\n    position {}, normal {}, centre of the cell {}\n",
+                        place["shape"].get<std::string>(), place["gloss"].get<std::string>(),
+                        by_way, vector_text(place["position"]), vector_text(place["normal"]),
+                        vector_text(place["cell_center"]));
+    text += field_text("eye walks, toward radiance", place["eye_walks"]);
+    text += field_text("light walks, toward importance", place["light_walks"]);
+    if (!place["emission"]["lobes"].empty())
+        text += field_text("emission, toward importance", place["emission"]);
+    return text;
+}
+
+}  // namespace
+
+void GuideInfo::add_to(CLI::App& command) {
+    CLI::Option* guide = command.add_flag(
+        "--guide", is_wanted, "Train the guide of the method and summarise what it has learned");
+    command
+        .add_option("-i,--integrator", integrator,
+                    "Method with parameters whose guide is trained (default: the scene's)")
+        ->needs(guide);
+    command
+        .add_option("--shares", shares,
+                    "Image to write: share of guided directions at the first surfaces, red for eye "
+                    "walks, green for light walks")
+        ->needs(guide);
+    CLI::Option* at =
+        command
+            .add_option("--pixel", pixel, "List the lobes at this column and row of the image: x,y")
+            ->delimiter(',')
+            ->expected(2)
+            ->needs(guide);
+    command
+        .add_option("--directions", directions,
+                    "Image to write: learned directions at the pixel, red for eye walks, green for "
+                    "light walks, blue for emission")
+        ->needs(at);
+    command.add_option("--seed", seed, "Seed of the training")->capture_default_str()->needs(guide);
+    command.add_option("--threads", threads, "Number of threads; 0: one per core")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 4096))
+        ->needs(guide);
+}
+
+void GuideInfo::check() const {
+    for (const std::string& file : {shares, directions})
+        if (!file.empty()) check_image_extension(file);
+}
+
+json GuideInfo::run(const Scene& scene) const {
+    const LearnedGuide learned(scene, choose_integrator(scene, integrator), seed, threads);
+    const Guide& guide = learned.guide();
+    json place;
+    if (!pixel.empty()) {
+        const GuidedPlace at = learned.at_pixel(pixel[0], pixel[1]);
+        place = to_json(at, pixel);
+        constexpr int kHeight = 256;
+        if (!directions.empty()) write_image(directions, at.directions(2 * kHeight, kHeight));
+    }
+    const Image image = learned.shares();
+    if (!shares.empty()) write_image(shares, image);
+    const auto mean = LearnedGuide::mean_shares(image);
+    json kept = json::array(), choices = json::array();
+    for (const auto& [method, is_kept] : learned.kept_by_auto())
+        if (is_kept) kept.push_back(method);
+    for (const auto& c : learned.emitter_choices(5))
+        choices.push_back({{"emitter", c.name}, {"guided", c.guided}, {"by_power", c.by_power}});
+    json j{{"method", learned.method()},
+           {"cells", guide.surfaces.cells().size()},
+           {"bytes", guide.memory_bytes()},
+           {"gain_eye", guide.surfaces.gain(TransportMode::Radiance)},
+           {"gain_light", guide.surfaces.gain(TransportMode::Importance)},
+           {"gain_emission", guide.emission_gain},
+           {"share_eye", mean[0]},
+           {"share_light", mean[1]},
+           {"kept_by_auto", kept},
+           {"emitter_choices", choices}};
+    if (!place.is_null()) j["place"] = place;
+    return j;
+}
+
+std::string guide_text(const json& j) {
+    const auto number = [&](const char* name) { return j[name].get<double>(); };
+    std::string text =
+        fmt::format("  guide       of {}, {} cells, {:.1f} MiB\n", j["method"].get<std::string>(),
+                    j["cells"].get<size_t>(), number("bytes") / (1 << 20));
+    text += fmt::format("    eye walks   gain {:.2f} nats, share {:.3f} at the first surfaces\n",
+                        number("gain_eye"), number("share_eye"));
+    text += fmt::format("    light walks gain {:.2f} nats, share {:.3f} at the first surfaces\n",
+                        number("gain_light"), number("share_light"));
+    text += fmt::format("    emission    gain {:.2f} nats\n", number("gain_emission"));
+    for (const json& c : j["emitter_choices"])
+        text +=
+            fmt::format("    \"{}\" emits a share of {:.3f} of the light paths, by power {:.3f}\n",
+                        c["emitter"].get<std::string>(), c["guided"].get<double>(),
+                        c["by_power"].get<double>());
+    const auto kept = j["kept_by_auto"].get<std::vector<std::string>>();
+    text += fmt::format("    guide=auto  {}\n",
+                        kept.empty() ? "guides no method here"
+                                     : fmt::format("guides {}", fmt::join(kept, ", ")));
+    return j.contains("place") ? text + place_text(j["place"]) : text;
+}
+
+}  // namespace etendue
