@@ -16,11 +16,6 @@ namespace {
 
 constexpr int kDeepestObjects = 64;
 
-std::string directory_of(const std::string& file) {
-    const auto directory = std::filesystem::path(file).parent_path();
-    return directory.empty() ? std::string(".") : directory.string();
-}
-
 Vec3 vec3(const std::vector<double>& v) {
     return {float(v[0]), float(v[1]), float(v[2])};
 }
@@ -231,7 +226,8 @@ std::vector<Transform> GltfReader::gpu_instances(const JsonValue& node) {
     const auto get = [&](int which, size_t i, std::vector<double> fallback) {
         const GltfBuffers::Values& v = values[which];
         if (!names[which]) return fallback;
-        if (v.count != count) names[which].fail("has fewer elements than the other attributes");
+        if (v.count != count)
+            names[which].fail(fmt::format("has {} elements, other attributes {}", v.count, count));
         const auto first = v.numbers.begin() + ptrdiff_t(i * v.components);
         return std::vector<double>(first, first + ptrdiff_t(v.components));
     };
@@ -270,7 +266,8 @@ void GltfReader::add_camera(const JsonValue& camera, const Transform& to_world) 
         for (const char* name : {"xmag", "ymag"})
             if (!o[name]) o[name].fail("is missing");
         const double x = std::fabs(o["xmag"].number(1)), y = std::fabs(o["ymag"].number(1));
-        if (!(x > 0 && y > 0)) o.fail("xmag and ymag must not be zero");
+        if (!(x > 0 && y > 0))
+            o.fail(fmt::format("xmag and ymag must not be zero, but are {} and {}", x, y));
         aspect = x / y;
         placed = placed * Transform::scale({float(x), float(x), 1});
     } else {
@@ -373,20 +370,11 @@ Container open_container(std::string_view bytes, const std::string& file) {
     return found;
 }
 
-std::optional<std::string> read_from_disk(const std::string& path) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) return {};
-    return read_file_bytes(path);
-}
-
 }  // namespace
 
 SceneDescription read_gltf(const std::string& file, const ReadOptions& options) {
-    ReadOptions with_disk = options;
-    if (!with_disk.read_file) with_disk.read_file = read_from_disk;
-    const auto bytes = with_disk.read_file(file);
-    if (!bytes) throw SceneError({file, 0}, "cannot read the scene file");
-    return parse_gltf(*bytes, file, with_disk);
+    const ReadOptions all = with_disk(options);
+    return parse_gltf(read_scene_bytes(file, all), file, all);
 }
 
 SceneDescription parse_gltf(std::string_view bytes, const std::string& file,

@@ -1,7 +1,6 @@
 #include "readers/pbrt.h"
 
 #include <deque>
-#include <filesystem>
 
 #include <fmt/format.h>
 
@@ -10,22 +9,12 @@
 #include "readers/pbrt_reader.h"
 
 namespace etendue {
-namespace {
-
-std::optional<std::string> read_from_disk(const std::string& path) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) return {};
-    return read_file_bytes(path);
-}
-
-}  // namespace
 
 SceneDescription read_pbrt(const std::string& file, const ReadOptions& options) {
-    ReadOptions with_disk = options;
-    if (!with_disk.read_file) with_disk.read_file = read_from_disk;
-    const auto text = with_disk.read_file(file);
-    if (!text) throw SceneError({file, 0}, "cannot read the scene file");
-    return parse_pbrt(is_gzip(*text) ? unpack_gzip(*text, file) : *text, file, with_disk);
+    const ReadOptions all = with_disk(options);
+    std::string text = read_scene_bytes(file, all);
+    if (is_gzip(text)) text = unpack_gzip(text, file);
+    return parse_pbrt(text, file, all);
 }
 
 SceneDescription parse_pbrt(std::string_view text, const std::string& file,

@@ -149,9 +149,10 @@ void PbrtArguments::check(const PbrtEntry& entry, PbrtVersion version,
             continue;
         }
         if (!fits(v.type, info->kind))
-            throw SceneError(
-                v.where(), fmt::format("parameter \"{}\" of {} {} must be {}, not a {}", v.name,
-                                       kind_, quote(name_), wanted(info->kind), type_name(v.type)));
+            throw SceneError(v.where(),
+                             fmt::format("parameter \"{}\" of {} {} must be {}, not of type {}",
+                                         v.name, kind_, quote(name_), wanted(info->kind),
+                                         type_name(v.type)));
         if (v.size() == 0)
             throw SceneError(v.where(), fmt::format("parameter \"{}\" has no value", v.name));
         if (std::any_of(kept.begin(), kept.end(),
@@ -197,7 +198,9 @@ int PbrtArguments::integer(std::string_view name, int fallback, int lo, int hi) 
 float PbrtArguments::number(std::string_view name, float fallback, float lo, float hi) const {
     const PbrtValue* v = find_one(name);
     if (!v) return fallback;
-    if (v->numbers.empty()) fail(name, fmt::format("parameter \"{}\" must be a float here", name));
+    if (v->numbers.empty())
+        fail(name, fmt::format("parameter \"{}\" must be a float here, not of type {}", name,
+                               type_name(v->type)));
     const float x = v->numbers[0];
     if (!(x >= lo && x <= hi))
         fail(name, hi == kInf

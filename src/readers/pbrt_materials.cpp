@@ -136,7 +136,8 @@ float read_eta(PbrtScene& scene, const PbrtArguments& args, const char* name, fl
         return *c;
     }
     const float eta = pbrt_number(*v, scene);
-    if (!(eta > 0)) args.fail(name, fmt::format("parameter \"{}\" must be above zero", name));
+    if (!(eta > 0))
+        args.fail(name, fmt::format("parameter \"{}\" is {}, but must be above zero", name, eta));
     return eta;
 }
 
@@ -494,7 +495,7 @@ std::vector<PbrtParamInfo> roughness(const char* fallback) {
 
 std::vector<PbrtParamInfo> metal_params() {
     return {{"eta", ParamKind::Texture, "copper", "Real part of the index of refraction."},
-            {"k", ParamKind::Texture, "copper", "Imaginary part of it."}};
+            {"k", ParamKind::Texture, "copper", "Imaginary part of the index of refraction."}};
 }
 
 PbrtParamInfo texture(const char* name, const char* fallback, const char* doc) {
@@ -504,7 +505,7 @@ PbrtParamInfo texture(const char* name, const char* fallback, const char* doc) {
 std::vector<PbrtEntry> make_entries() {
     const std::vector<PbrtParamInfo> index = {
         texture("eta", "1.5", "Index of refraction; of a spectrum that at 588 nm."),
-        texture("index", "1.5", "As eta.")};
+        texture("index", "1.5", "Another name of eta, which counts if both are given.")};
     const PbrtParamInfo sigma = texture(
         "sigma", "0", "Standard deviation of the facets' slopes in degrees: becomes orennayar.");
     const std::vector<PbrtParamInfo> coat = {
@@ -515,16 +516,16 @@ std::vector<PbrtEntry> make_entries() {
         {"nsamples", ParamKind::Int, "", "Accepted; without effect."},
         {"twosided", ParamKind::Bool, "true", "Accepted; both sides are always coated."}};
     return {
-        {"", kV3And4, "As interface.", {}, make_interface},
+        {"", kV3And4, "The same as interface.", {}, make_interface},
         {"interface", kV4, "Becomes null.", {}, make_interface},
         {"none", kV3, "Becomes null.", {}, make_interface},
         {"mix",
          kV3And4,
          "Becomes blendbsdf; v3: with the luminance of amount.",
          {{"materials", ParamKind::String, "", "Names of two materials.", kV4},
-          {"namedmaterial1", ParamKind::String, "", "Name of one.", kV3},
-          {"namedmaterial2", ParamKind::String, "", "Name of the other one.", kV3},
-          texture("amount", "0.5", "Share of the second one; v3: of the first one.")},
+          {"namedmaterial1", ParamKind::String, "", "Name of the first material.", kV3},
+          {"namedmaterial2", ParamKind::String, "", "Name of the second material.", kV3},
+          texture("amount", "0.5", "Weight of the second material; v3: of the first material.")},
          make_mix},
         {"diffuse", kV4, "Becomes diffuse.",
          std::vector<PbrtParamInfo>{texture("reflectance", "0.5", "Albedo."), sigma} + maps(),
@@ -539,31 +540,39 @@ std::vector<PbrtEntry> make_entries() {
         {"conductor", kV4, "Becomes conductor where α is below 0.001, else roughconductor.",
          roughness("0") + metal_params() +
              std::vector<PbrtParamInfo>{texture(
-                 "reflectance", "", "Instead of eta and k: reflectance at normal incidence.")},
+                 "reflectance", "", "Reflectance at normal incidence, instead of eta and k.")},
          make_conductor},
         {"dielectric", kV4, "Becomes dielectric where α is below 0.001, else roughdielectric.",
          roughness("0") + std::vector<PbrtParamInfo>{index[0]}, make_dielectric},
         {"thindielectric", kV4, "Becomes thindielectric.",
          std::vector<PbrtParamInfo>{index[0]} + maps(), make_thindielectric},
         {"diffusetransmission", kV4, "Becomes diffusetransmission.",
-         std::vector<PbrtParamInfo>{texture("reflectance", "0.25", "Share reflected."),
-                                    texture("transmittance", "0.25", "Share transmitted."),
-                                    {"scale", ParamKind::Float, "1", "Factor of both."}} +
+         std::vector<PbrtParamInfo>{
+             texture("reflectance", "0.25", "Fraction of the light that is reflected."),
+             texture("transmittance", "0.25", "Fraction of the light that is transmitted."),
+             {"scale", ParamKind::Float, "1",
+              "Factor by which reflectance and transmittance are multiplied."}} +
              maps(),
          make_diffusetransmission},
         {"coatedconductor", kV4, "Becomes coatedconductor, a closed form of what pbrt simulates.",
          std::vector<PbrtParamInfo>{
              texture("conductor.eta", "copper", "Real part of the metal's index of refraction."),
-             texture("conductor.k", "copper", "Imaginary part of it."),
-             texture("reflectance", "", "Instead of both: reflectance at normal incidence."),
+             texture("conductor.k", "copper", "Imaginary part of the index of refraction."),
+             texture("reflectance", "",
+                     "Reflectance of the metal at normal incidence, instead of its eta and k."),
              texture("conductor.roughness", "0", "Roughness of the metal."),
-             texture("conductor.uroughness", "conductor.roughness", "Along the first tangent."),
-             texture("conductor.vroughness", "conductor.roughness", "Along the second tangent."),
+             texture("conductor.uroughness", "conductor.roughness",
+                     "Roughness of the metal along the first tangent."),
+             texture("conductor.vroughness", "conductor.roughness",
+                     "Roughness of the metal along the second tangent."),
              texture("interface.roughness", "0", "Roughness of the coat."),
-             texture("interface.uroughness", "interface.roughness", "Along the first tangent."),
-             texture("interface.vroughness", "interface.roughness", "Along the second tangent."),
+             texture("interface.uroughness", "interface.roughness",
+                     "Roughness of the coat along the first tangent."),
+             texture("interface.vroughness", "interface.roughness",
+                     "Roughness of the coat along the second tangent."),
              texture("interface.eta", "1.5", "Index of refraction of the coat."),
-             {"remaproughness", ParamKind::Bool, "true", "As that of other materials."}} +
+             {"remaproughness", ParamKind::Bool, "true",
+              "Whether roughnesses are converted to α as in other materials."}} +
              coat + maps(),
          make_coatedconductor},
         {"measured", kV4, "Rejected: measured BSDFs are not supported.", {}, nullptr},
@@ -573,14 +582,16 @@ std::vector<PbrtEntry> make_entries() {
          std::vector<PbrtParamInfo>{texture("Kr", "0.9", "Reflectance.")} + maps(), make_mirror},
         {"glass", kV3, "Becomes dielectric, or roughdielectric where it is rough.",
          roughness("0") + index +
-             std::vector<PbrtParamInfo>{texture("Kr", "1", "Factor of the reflection."),
-                                        texture("Kt", "1", "Factor of the transmission.")},
+             std::vector<PbrtParamInfo>{
+                 texture("Kr", "1", "Factor by which reflected light is multiplied."),
+                 texture("Kt", "1", "Factor by which transmitted light is multiplied.")},
          make_glass},
         {"metal", kV3, "Becomes roughconductor.", roughness("0.01") + metal_params(), make_metal},
         {"plastic", kV3, "Becomes lobesum.",
          roughness("0.1") +
-             std::vector<PbrtParamInfo>{texture("Kd", "0.25", "Diffuse albedo."),
-                                        texture("Ks", "0.25", "Factor of the glossy reflection.")},
+             std::vector<PbrtParamInfo>{
+                 texture("Kd", "0.25", "Diffuse albedo."),
+                 texture("Ks", "0.25", "Factor by which the glossy reflection is multiplied.")},
          make_plastic},
         {"substrate", kV3, "Becomes fresnelblend.",
          roughness("0.1") +
@@ -592,31 +603,32 @@ std::vector<PbrtEntry> make_entries() {
          roughness("0.1") + index +
              std::vector<PbrtParamInfo>{
                  texture("Kd", "0.25", "Diffuse albedo."),
-                 texture("Ks", "0.25", "Factor of the glossy reflection."),
-                 texture("Kr", "0", "Factor of the mirror reflection."),
-                 texture("Kt", "0", "Factor of the transmission."),
-                 texture("opacity", "1", "Share of light that does not go straight on.")},
+                 texture("Ks", "0.25", "Factor by which the glossy reflection is multiplied."),
+                 texture("Kr", "0", "Factor by which the mirror reflection is multiplied."),
+                 texture("Kt", "0", "Factor by which transmitted light is multiplied."),
+                 texture("opacity", "1",
+                         "Fraction of the light that does not pass straight through.")},
          make_uber},
         {"translucent", kV3, "Becomes lobesum; constants only.",
          roughness("0.1") +
-             std::vector<PbrtParamInfo>{texture("Kd", "0.25", "Diffuse albedo."),
-                                        texture("Ks", "0.25", "Glossy albedo."),
-                                        texture("reflect", "0.5", "Share reflected."),
-                                        texture("transmit", "0.5", "Share transmitted.")},
+             std::vector<PbrtParamInfo>{
+                 texture("Kd", "0.25", "Diffuse albedo."), texture("Ks", "0.25", "Glossy albedo."),
+                 texture("reflect", "0.5", "Fraction of the light that is reflected."),
+                 texture("transmit", "0.5", "Fraction of the light that is transmitted.")},
          make_translucent},
         {"disney", kV3, "Becomes principled.",
          std::vector<PbrtParamInfo>{
              texture("color", "0.5", "Base colour."),
-             texture("metallic", "0", "Share of metal."),
+             texture("metallic", "0", "Weight of the metal among the base materials."),
              texture("eta", "1.5", "Index of refraction."),
              texture("roughness", "0.5", "Roughness, the root of α."),
              texture("speculartint", "0", "Tint of the specular reflection."),
              texture("anisotropic", "0", "Anisotropy."),
              texture("sheen", "0", "Sheen."),
-             texture("sheentint", "0.5", "Its tint."),
+             texture("sheentint", "0.5", "Tint of the sheen."),
              texture("clearcoat", "0", "Clear coat."),
-             texture("clearcoatgloss", "1", "Its gloss."),
-             texture("spectrans", "0", "Share of glass."),
+             texture("clearcoatgloss", "1", "Gloss of the clear coat."),
+             texture("spectrans", "0", "Weight of the glass among the base materials."),
              texture("scatterdistance", "", "Rejected."),
              texture("flatness", "", "Rejected."),
              texture("difftrans", "", "Rejected."),

@@ -39,10 +39,13 @@ Transform read_matrix(PbrtTokenizer& in) {
 /// World to camera: the camera at `eye` has its z axis toward `target`, x to the right.
 Transform look_at_matrix(Vec3 eye, Vec3 target, Vec3 up, const PbrtTokenizer& in) {
     const Vec3 d = target - eye;
-    if (!(length2(d) > 0)) in.fail("LookAt needs two different points");
+    if (!(length2(d) > 0))
+        in.fail(fmt::format("LookAt needs two different points, but both are {} {} {}", eye.x,
+                            eye.y, eye.z));
     const Vec3 z = normalize(d), x = cross(up, z);
     if (!(length(x) > 1e-6f * length(up)))
-        in.fail("LookAt's up vector must not point along the view");
+        in.fail(fmt::format("LookAt's up vector {} {} {} must not point along the view", up.x, up.y,
+                            up.z));
     const Vec3 right = normalize(x), y = cross(z, right);
     return Transform(Transform::Matrix{{{right.x, y.x, z.x, eye.x},
                                         {right.y, y.y, z.y, eye.y},
@@ -222,7 +225,9 @@ void PbrtReader::translate(PbrtTokenizer& in) {
 
 void PbrtReader::scale(PbrtTokenizer& in) {
     const Vec3 s = read_vec3(in);
-    if (!(s.x != 0 && s.y != 0 && s.z != 0)) in.fail("the factors of Scale must not be zero");
+    if (!(s.x != 0 && s.y != 0 && s.z != 0))
+        in.fail(
+            fmt::format("the factors of Scale must not be zero, but are {} {} {}", s.x, s.y, s.z));
     scene_.state.ctm = scene_.state.ctm * Transform::scale(s);
 }
 

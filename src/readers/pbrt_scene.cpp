@@ -5,16 +5,12 @@
 
 #include <fmt/format.h>
 
+#include "readers/file_bytes.h"
 #include "readers/mitsuba_values.h"
 #include "readers/pbrt_spectrum.h"
 
 namespace etendue {
 namespace {
-
-std::string directory_of(const std::string& file) {
-    const auto directory = std::filesystem::path(file).parent_path();
-    return directory.empty() ? std::string(".") : directory.string();
-}
 
 std::vector<std::string> names_of(const std::map<std::string, int>& map) {
     std::vector<std::string> names;
