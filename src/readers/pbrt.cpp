@@ -32,11 +32,11 @@ const std::vector<PluginInfo>& pbrt_plugins() {
         };
         const auto add = [&](const char* category, const std::vector<PbrtEntry>& entries) {
             for (const PbrtEntry& e : entries) {
-                if (!*e.name) continue;
-                PluginInfo info{category, e.name, with_version(e.versions, e.doc), {}};
+                if (e.name.empty()) continue;
+                PluginInfo info{category, e.name.data(), with_version(e.versions, e.doc), {}};
                 for (const PbrtParamInfo& p : e.params)
                     info.params.push_back(
-                        {p.name, p.kind, p.fallback,
+                        {p.name.data(), p.kind, p.fallback,
                          p.versions == e.versions ? p.doc : with_version(p.versions, p.doc)});
                 all.push_back(std::move(info));
             }

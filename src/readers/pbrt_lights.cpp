@@ -96,7 +96,7 @@ Transform from_z_up() {
 int make_infinite(PbrtScene& scene, const PbrtArguments& args) {
     const char* file = scene.is_v3() ? "mapname" : "filename";
     if (args.has("portal"))
-        scene.warn(args.find("portal")->where(), "the portal is ignored: the light stays the same");
+        scene.warn(args.find("portal")->where, "the portal is ignored: the light stays the same");
     if (!args.has(file)) {
         const int emitter = scene.add("emitter", "constant", args.where());
         scene.set(emitter, "radiance",
@@ -115,7 +115,7 @@ int make_infinite(PbrtScene& scene, const PbrtArguments& args) {
         scene.set(emitter, "projection", std::string("equalarea"));
         scene.set(emitter, "tint", light_colour(scene, args, "L"));
         if (args.number("illuminance", -1) > 0)
-            scene.refuse(args.find("illuminance")->where(),
+            scene.refuse(args.find("illuminance")->where,
                          "the illuminance of an image is not supported: give its scale",
                          "the image as it is");
     }

@@ -15,7 +15,7 @@ namespace {
 
 // ---- What most materials share
 
-int wrap(PbrtScene& scene, const char* wrapper, int nested, const SourceLocation& where) {
+int wrap(PbrtScene& scene, const char* wrapper, int nested, PbrtPlace where) {
     const int object = scene.add("bsdf", wrapper, where);
     scene.add_child(object, "", nested);
     return object;
@@ -129,8 +129,7 @@ float read_eta(PbrtScene& scene, const PbrtArguments& args, const char* name, fl
     if (v->type == PbrtType::Texture) {
         const auto c = scene.constant(args, name, fallback);
         if (!c) {
-            scene.refuse(v->where(), "an index of refraction from a texture is not supported",
-                         "1.5");
+            scene.refuse(v->where, "an index of refraction from a texture is not supported", "1.5");
             return 1.5f;
         }
         return *c;
@@ -156,7 +155,7 @@ int add_diffuse(PbrtScene& scene, const PbrtArguments& args, const char* colour,
 float read_sigma(PbrtScene& scene, const PbrtArguments& args) {
     const auto sigma = scene.constant(args, "sigma", 0.0f);
     if (!sigma)
-        scene.refuse(args.find("sigma")->where(), "a texture of sigma is not supported",
+        scene.refuse(args.find("sigma")->where, "a texture of sigma is not supported",
                      "20 degrees");
     return clamp(sigma.value_or(20.0f), 0, 90);
 }
@@ -173,7 +172,7 @@ int nested_material(PbrtScene& scene, const PbrtArguments& args, const PbrtValue
     if (it != scene.named_materials.end()) return it->second;
     std::vector<std::string> known;
     for (const auto& [other, object] : scene.named_materials) known.push_back(other);
-    throw SceneError(value.where(),
+    throw SceneError(value.where,
                      fmt::format("{} \"{}\" mixes {}, which is no named material{}", args.kind(),
                                  args.name(), quote(name), hint(name, known)));
 }
@@ -240,7 +239,7 @@ int add_metal(PbrtScene& scene, const PbrtArguments& args, const PbrtRoughness& 
             scene.set(metal, "material", std::string("none"));
             scene.add_child(metal, "specular_reflectance",
                             scene.texture(args, "reflectance", false));
-            scene.warn(args.find("reflectance")->where(),
+            scene.warn(args.find("reflectance")->where,
                        "a metal's reflectance from a texture does not rise toward grazing angles");
             return metal;
         }
@@ -277,7 +276,7 @@ int make_thindielectric(PbrtScene& scene, const PbrtArguments& args) {
 void refuse_coat_medium(PbrtScene& scene, const PbrtArguments& args) {
     const auto albedo = scene.constant(args, "albedo", Rgb(0), PbrtSpectrum::Albedo);
     if (!albedo || albedo->max() > 0)
-        scene.refuse(args.find("albedo")->where(),
+        scene.refuse(args.find("albedo")->where,
                      "a coat that scatters (albedo above 0) is not supported", "a clear one");
 }
 
@@ -285,7 +284,7 @@ void refuse_coat_medium(PbrtScene& scene, const PbrtArguments& args) {
 void set_thickness(PbrtScene& scene, int object, const PbrtArguments& args) {
     std::optional<float> thickness = scene.constant(args, "thickness", 0.01f);
     if (!thickness) {
-        scene.refuse(args.find("thickness")->where(),
+        scene.refuse(args.find("thickness")->where,
                      "the thickness of a coat must be a number, not a texture", "0.01");
         thickness = 0.01f;
     }
@@ -426,7 +425,7 @@ int make_translucent(PbrtScene& scene, const PbrtArguments& args) {
     const auto colour = [&](const char* name, float fallback) {
         const auto c = scene.constant(args, name, Rgb(fallback), PbrtSpectrum::Albedo);
         if (!c)
-            scene.refuse(args.find(name)->where(),
+            scene.refuse(args.find(name)->where,
                          "a translucent material with textures is not supported", "0.25");
         return c.value_or(Rgb(0.25f));
     };
@@ -442,11 +441,11 @@ int make_translucent(PbrtScene& scene, const PbrtArguments& args) {
 
 int make_disney(PbrtScene& scene, const PbrtArguments& args) {
     if (args.flag("thin", false))
-        scene.refuse(args.find("thin")->where(), "the thin Disney material is not supported",
+        scene.refuse(args.find("thin")->where, "the thin Disney material is not supported",
                      "the solid one");
     for (const char* name : {"scatterdistance", "flatness", "difftrans"})
         if (args.has(name))
-            scene.reject(args.find(name)->where(),
+            scene.reject(args.find(name)->where,
                          fmt::format("{} of the Disney material is not supported", quote(name)));
     const int object = scene.add("bsdf", "principled", args.where());
     scene.bind(object, "base_color", args, "color", Rgb(0.5f));

@@ -17,7 +17,7 @@ int make_homogeneous(PbrtScene& scene, const PbrtArguments& args) {
         return -1;
     }
     if (args.has("Le"))
-        scene.reject(args.find("Le")->where(), "a medium that emits light is not supported");
+        scene.reject(args.find("Le")->where, "a medium that emits light is not supported");
     const int medium = scene.add("medium", "homogeneous", args.where());
     scene.set(
         medium, "sigma_a",

@@ -45,7 +45,7 @@ int make_plymesh(PbrtScene& scene, const PbrtArguments& args) {
     scene.set(shape, "filename", args.text("filename", ""));
     set_mesh_orientation(scene, shape);
     if (args.has("displacement"))
-        scene.reject(args.find("displacement")->where(), "displaced meshes are not supported");
+        scene.reject(args.find("displacement")->where, "displaced meshes are not supported");
     return finish(scene, args, shape);
 }
 
@@ -106,7 +106,7 @@ int make_trianglemesh(PbrtScene& scene, const PbrtArguments& args) {
 
 int make_bilinearmesh(PbrtScene& scene, const PbrtArguments& args) {
     if (args.has("emissionfilename"))
-        scene.reject(args.find("emissionfilename")->where(),
+        scene.reject(args.find("emissionfilename")->where,
                      "emission distributions of bilinear meshes are not supported");
     const MeshData vertices = read_vertices(args);
     return add_mesh(scene, args,

@@ -14,7 +14,7 @@ namespace etendue {
 namespace {
 
 [[noreturn]] void fail(const PbrtValue& value, const std::string& message) {
-    throw SceneError(value.where(), fmt::format("parameter \"{}\": {}", value.name, message));
+    throw SceneError(value.where, fmt::format("parameter \"{}\": {}", value.name, message));
 }
 
 struct Glass {
@@ -97,7 +97,7 @@ std::vector<std::string> known_names() {
 SpectrumSamples samples_of(const PbrtValue& value, const PbrtScene& scene) {
     if (!value.strings.empty()) {
         std::string path;
-        const std::string text = scene.load(value.strings[0], value.where(), path);
+        const std::string text = scene.load(value.strings[0], value.where, path);
         return parse_spectrum_file(text, path);
     }
     if (value.numbers.size() % 2 != 0)
@@ -108,7 +108,7 @@ SpectrumSamples samples_of(const PbrtValue& value, const PbrtScene& scene) {
         samples.wavelengths.push_back(value.numbers[i]);
         samples.values.push_back(value.numbers[i + 1]);
     }
-    check_samples(samples, value.where());
+    check_samples(samples, value.where);
     return samples;
 }
 

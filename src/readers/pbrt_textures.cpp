@@ -18,7 +18,7 @@ bool is_float(const PbrtArguments& args) {
 Transform mapping(PbrtScene& scene, const PbrtArguments& args) {
     if (const std::string m = args.text("mapping", "uv"); m != "uv")
         scene.refuse(
-            args.find("mapping")->where(),
+            args.find("mapping")->where,
             fmt::format("the mapping {} is not supported: textures are functions of (u, v)",
                         quote(m)),
             "\"uv\"");
@@ -54,7 +54,7 @@ bool is_raw(PbrtScene& scene, const PbrtArguments& args) {
     if (encoding == "linear") return true;
     if (encoding != "sRGB" && encoding != "gamma 2.2")
         scene.refuse(
-            args.find("encoding")->where(),
+            args.find("encoding")->where,
             fmt::format("the encoding {} is not supported (known: sRGB, linear)", quote(encoding)),
             "\"sRGB\"");
     return false;
@@ -67,7 +67,7 @@ int make_imagemap(PbrtScene& scene, const PbrtArguments& args) {
     set_to_uv(scene, image, flip * mapping(scene, args));
     const std::string wrap = args.text("wrap", "repeat");
     if (wrap == "black")
-        scene.refuse(args.find("wrap")->where(), "the wrap mode \"black\" is not supported",
+        scene.refuse(args.find("wrap")->where, "the wrap mode \"black\" is not supported",
                      "\"clamp\"");
     else if (wrap != "repeat" && wrap != "clamp")
         args.fail("wrap",
@@ -77,7 +77,7 @@ int make_imagemap(PbrtScene& scene, const PbrtArguments& args) {
         scene.set(image, "filter_type", std::string("nearest"));
     if (is_raw(scene, args)) scene.set(image, "raw", true);
     if (args.flag("invert", false))
-        scene.reject(args.find("invert")->where(), "inverted images are not supported");
+        scene.reject(args.find("invert")->where, "inverted images are not supported");
     const float scale = args.number("scale", 1);
     if (scale == 1) return image;
     const int scaled = scene.add("texture", "scale", args.where());

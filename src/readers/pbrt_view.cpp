@@ -85,7 +85,7 @@ int make_perspective(PbrtScene& scene, const PbrtArguments& args) {
 int make_orthographic(PbrtScene& scene, const PbrtArguments& args) {
     read_shutter(scene, args);
     if (args.number("lensradius", 0, 0) > 0)
-        scene.reject(args.find("lensradius")->where(),
+        scene.reject(args.find("lensradius")->where,
                      "an orthographic camera with a lens is not supported");
     const int sensor = scene.add("sensor", "orthographic", args.where());
     const ScreenWindow w = screen_window(scene, args);
@@ -134,11 +134,11 @@ int make_film(PbrtScene& scene, const PbrtArguments& args) {
     } else {
         scene.exposure *= args.number("iso", 100, 0) / 100;
         if (const std::string sensor = args.text("sensor", "cie1931"); sensor != "cie1931")
-            scene.refuse(args.find("sensor")->where(),
+            scene.refuse(args.find("sensor")->where,
                          fmt::format("the measured sensor \"{}\" is not supported", sensor),
                          "\"cie1931\"");
         if (args.number("whitebalance", 0, 0) != 0)
-            scene.reject(args.find("whitebalance")->where(), "white balance is not supported");
+            scene.reject(args.find("whitebalance")->where, "white balance is not supported");
     }
     const int film = scene.add("film", "hdrfilm", args.where());
     scene.set(film, "width", int64_t(scene.film_width));

@@ -75,7 +75,7 @@ TEST(PbrtTokenizer, TellsWordsStringsNumbersAndBracketsApart) {
     PbrtTokenizer in("  Word# comment \" [\n\"a \\\"b\\\" c\"[-1.5e2 +3]7", file);
     EXPECT_EQ(in.word(), "Word");
     EXPECT_EQ(unescape(in.string()), "a \"b\" c");
-    EXPECT_EQ(in.line(), 2);
+    EXPECT_EQ(in.where().line, 2);
     EXPECT_TRUE(in.skip('['));
     EXPECT_EQ(in.number<float>("a number"), -150);
     EXPECT_EQ(in.number<int>("an integer"), 3);
