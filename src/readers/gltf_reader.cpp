@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -49,21 +48,10 @@ Transform turned() {
     return Transform::scale({-1, 1, -1});
 }
 
-/// What is read, or has no effect on an image of light paths.
-const std::set<std::string> kKnownExtensions = {"KHR_materials_emissive_strength",
-                                                "KHR_materials_ior",
-                                                "KHR_materials_transmission",
-                                                "KHR_materials_volume",
-                                                "KHR_materials_clearcoat",
-                                                "KHR_materials_sheen",
-                                                "KHR_materials_specular",
-                                                "KHR_materials_anisotropy",
-                                                "KHR_materials_unlit",
-                                                "KHR_materials_variants",
-                                                "KHR_texture_transform",
-                                                "KHR_lights_punctual",
-                                                "KHR_mesh_quantization",
-                                                "EXT_mesh_gpu_instancing"};
+bool is_known_extension(const std::string& name) {
+    const std::vector<std::string>& known = gltf_extensions();
+    return std::find(known.begin(), known.end(), name) != known.end();
+}
 
 }  // namespace
 
@@ -136,10 +124,10 @@ SceneDescription GltfReader::read() {
 
 void GltfReader::check_extensions() {
     for (const JsonValue& e : root_["extensionsRequired"].elements())
-        if (const std::string name = e.text(""); !kKnownExtensions.count(name))
+        if (const std::string name = e.text(""); !is_known_extension(name))
             reject(e, fmt::format("the extension {} is not supported", name));
     for (const JsonValue& e : root_["extensionsUsed"].elements())
-        if (const std::string name = e.text(""); !kKnownExtensions.count(name))
+        if (const std::string name = e.text(""); !is_known_extension(name))
             warn(fmt::format("the extension {} is not supported and has no effect", name));
     if (root_["extensions"]["KHR_materials_variants"])
         warn("variants of materials are not supported: the default materials are used");
@@ -393,6 +381,24 @@ SceneDescription parse_gltf(std::string_view bytes, const std::string& file,
         throw SceneError({file, 0}, "malformed JSON: a number is too large");
     }
     return GltfReader(file, options, document, parts.chunk).read();
+}
+
+const std::vector<std::string>& gltf_extensions() {
+    static const std::vector<std::string> names = {"KHR_materials_emissive_strength",
+                                                   "KHR_materials_ior",
+                                                   "KHR_materials_transmission",
+                                                   "KHR_materials_volume",
+                                                   "KHR_materials_clearcoat",
+                                                   "KHR_materials_sheen",
+                                                   "KHR_materials_specular",
+                                                   "KHR_materials_anisotropy",
+                                                   "KHR_materials_unlit",
+                                                   "KHR_materials_variants",
+                                                   "KHR_texture_transform",
+                                                   "KHR_lights_punctual",
+                                                   "KHR_mesh_quantization",
+                                                   "EXT_mesh_gpu_instancing"};
+    return names;
 }
 
 }  // namespace etendue

@@ -179,8 +179,8 @@ int make_area(PbrtScene& scene, const PbrtArguments& args) {
 }
 
 std::vector<PbrtParamInfo> with_shared(std::vector<PbrtParamInfo> params, const char* colour,
-                                       const char* colour_doc) {
-    params.push_back({colour, ParamKind::Rgb, "1", colour_doc});
+                                       const char* colour_doc, int colour_versions = kV3And4) {
+    params.push_back({colour, ParamKind::Rgb, "1", colour_doc, colour_versions});
     params.push_back(
         {"scale", ParamKind::Float, "1", "Factor by which the light is multiplied.", kV4});
     params.push_back(
@@ -252,7 +252,7 @@ const std::vector<PbrtEntry>& pbrt_lights() {
                       {"fov", ParamKind::Float, "90, v3: 45",
                        "Full angle in degrees over the shorter side."},
                       kPower},
-                     "I", "Colour by which the image is multiplied; only pbrt-v3 has it."),
+                     "I", "Colour by which the image is multiplied.", kV3),
          make_projection},
     };
     return entries;
