@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "readers/mitsuba_xml.h"
+#include "readers/scene_file.h"
 #include "scene/builder.h"
 
 namespace etendue::bench {
@@ -81,11 +81,11 @@ void Report::print(const nlohmann::ordered_json& line) const {
     std::fflush(stdout);
 }
 
-SceneFile shared_scene(const std::string& folder, const std::string& name) {
+SceneFile shared_scene(const std::string& folder, const std::string& name, const char* file) {
     const char* given = std::getenv("ETENDUE_SCENES");
     const std::filesystem::path root =
         given ? given : std::filesystem::path(ETENDUE_SOURCE_DIR) / ".." / "shared" / "scenes";
-    return {name, root / folder / "scene.xml"};
+    return {name, root / folder / file};
 }
 
 SceneFile own_scene(const std::string& name) {
@@ -100,7 +100,7 @@ std::optional<Scene> load_or_skip(const Report& report, const SceneFile& file,
     }
     BuildOptions options;
     options.resolution = resolution;
-    return build_scene(read_mitsuba_xml(file.path.string()), options);
+    return build_scene(read_scene_file(file.path.string()), options);
 }
 
 IntegratorSpec integrator_for(const Scene& scene, const std::string& name) {

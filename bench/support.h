@@ -88,8 +88,9 @@ struct SceneFile {
 
     std::filesystem::path sibling(const char* file) const { return path.parent_path() / file; }
 };
-/// `name`/scene.xml in $ETENDUE_SCENES, or in shared/scenes beside the project.
-SceneFile shared_scene(const std::string& folder, const std::string& name);
+/// `file` in the folder `folder` of $ETENDUE_SCENES, or of shared/scenes beside the project.
+SceneFile shared_scene(const std::string& folder, const std::string& name,
+                       const char* file = "scene.xml");
 /// scenes/`name`.xml of the project.
 SceneFile own_scene(const std::string& name);
 /// The scene, or a line that says the file is missing. A file that cannot be read is an error.

@@ -30,7 +30,8 @@ void check_paths(const Scene& scene, const std::string& file) {
         usable += checked.path.has_value();
         if (!checked.path) fmt::print("{}\n", to_string(checked, given[i], i, file));
     }
-    fmt::print("{}: {} of {} paths can be used\n", file, usable, given.size());
+    fmt::print("{}: {} of {} path{} can be used\n", file, usable, given.size(),
+               given.size() == 1 ? "" : "s");
     if (usable < given.size()) throw std::runtime_error(file + ": some paths cannot be used");
 }
 
@@ -45,7 +46,7 @@ void PathsCommand::run() {
     pick.x = pixel[0], pick.y = pixel[1];
     const std::vector<GivenPath> picked = pick_paths(s, pick);
     write_file_atomically(output, to_json(picked));
-    fmt::print("{}: {} paths\n", output, picked.size());
+    fmt::print("{}: {} path{}\n", output, picked.size(), picked.size() == 1 ? "" : "s");
 }
 
 }  // namespace

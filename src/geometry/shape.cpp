@@ -27,10 +27,12 @@ double TriangleMesh::area() const {
 }
 
 void TriangleMesh::compute_face_normals() {
-    face_normals.clear();
-    for (const auto& [a, b, c] : triangles)
-        face_normals.push_back(
-            normalize(cross(positions[b] - positions[a], positions[c] - positions[a])));
+    face_normals.resize(triangles.size());
+    for (size_t i = 0; i < triangles.size(); ++i) {
+        const auto& [a, b, c] = triangles[i];
+        face_normals[i] =
+            normalize(cross(positions[b] - positions[a], positions[c] - positions[a]));
+    }
 }
 
 SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tangents) const {

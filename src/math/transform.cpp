@@ -23,16 +23,18 @@ bool invert(Transform::Matrix a, Transform::Matrix& inv) {
         for (int r = c + 1; r < 4; ++r)
             if (std::fabs(a[r][c]) > std::fabs(a[pivot][c])) pivot = r;
         if (!(std::fabs(a[pivot][c]) > 0)) return false;
-        std::swap(a[c], a[pivot]);
-        std::swap(inv[c], inv[pivot]);
+        if (pivot != c) {
+            std::swap(a[c], a[pivot]);
+            std::swap(inv[c], inv[pivot]);
+        }
         const double s = 1.0 / a[c][c];
         for (int k = 0; k < 4; ++k) {
             a[c][k] *= s;
             inv[c][k] *= s;
         }
         for (int r = 0; r < 4; ++r) {
-            if (r == c) continue;
             const double f = a[r][c];
+            if (r == c || f == 0) continue;
             for (int k = 0; k < 4; ++k) {
                 a[r][k] -= f * a[c][k];
                 inv[r][k] -= f * inv[c][k];

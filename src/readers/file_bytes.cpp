@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 
 #include "description/scene_description.h"
@@ -33,6 +34,27 @@ std::string read_file_bytes(const std::string& path) {
     if (std::ferror(file.get())) fail();
     bytes.resize(used);
     return bytes;
+}
+
+std::string directory_of(const std::string& file) {
+    const auto directory = std::filesystem::path(file).parent_path();
+    return directory.empty() ? std::string(".") : directory.string();
+}
+
+ReadOptions with_disk(ReadOptions options) {
+    if (!options.read_file)
+        options.read_file = [](const std::string& path) -> std::optional<std::string> {
+            std::error_code error;
+            if (!std::filesystem::is_regular_file(path, error)) return {};
+            return read_file_bytes(path);
+        };
+    return options;
+}
+
+std::string read_scene_bytes(const std::string& file, const ReadOptions& options) {
+    auto bytes = options.read_file(file);
+    if (!bytes) throw SceneError({file, 0}, "cannot read the scene file");
+    return *std::move(bytes);
 }
 
 }  // namespace etendue

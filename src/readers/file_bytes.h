@@ -1,11 +1,19 @@
 #pragma once
-// Whole files as bytes.
+// Whole files as bytes, and the files of a scene.
 
 #include <string>
+
+#include "readers/read_options.h"
 
 namespace etendue {
 
 /// Contents of a file. Throws SceneError where it cannot be read.
 std::string read_file_bytes(const std::string& path);
+/// The folder of a file; "." for the current one.
+std::string directory_of(const std::string& file);
+/// The options, with `read_file` reading from disk where it is not set.
+ReadOptions with_disk(ReadOptions options);
+/// Contents of the scene file itself. Throws SceneError where it cannot be read.
+std::string read_scene_bytes(const std::string& file, const ReadOptions& options);
 
 }  // namespace etendue

@@ -4,6 +4,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "description/scene_description.h"
 #include "readers/read_options.h"
@@ -17,5 +18,8 @@ SceneDescription read_gltf(const std::string& file, const ReadOptions& options =
 /// names are relative to its folder. Files are opened through `options.read_file` only.
 SceneDescription parse_gltf(std::string_view bytes, const std::string& file,
                             const ReadOptions& options = {});
+
+/// Names of the extensions that are read, or have no effect on an image of light paths.
+const std::vector<std::string>& gltf_extensions();
 
 }  // namespace etendue

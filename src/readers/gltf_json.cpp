@@ -8,10 +8,19 @@ void JsonValue::fail(const std::string& message) const {
     throw SceneError(where(), fmt::format("{}: {}", path_.empty() ? "/" : path_, message));
 }
 
+void JsonValue::fail_type(const char* expected) const {
+    constexpr size_t kMost = 40;
+    const std::string found =
+        value_->is_structured()
+            ? std::string(value_->is_array() ? "an array" : "an object")
+            : value_->dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+    fail(fmt::format("{}, but is {}", expected, found.substr(0, kMost)));
+}
+
 JsonValue JsonValue::operator[](std::string_view member) const {
     std::string path = fmt::format("{}/{}", path_, member);
     if (!value_) return {nullptr, file_, std::move(path)};
-    if (!value_->is_object()) fail("must be an object");
+    if (!value_->is_object()) fail_type("must be an object");
     const auto it = value_->find(std::string(member));
     return {it == value_->end() ? nullptr : &*it, file_, std::move(path)};
 }
@@ -19,7 +28,7 @@ JsonValue JsonValue::operator[](std::string_view member) const {
 std::vector<JsonValue> JsonValue::elements() const {
     std::vector<JsonValue> found;
     if (!value_) return found;
-    if (!value_->is_array()) fail("must be an array");
+    if (!value_->is_array()) fail_type("must be an array");
     for (size_t i = 0; i < value_->size(); ++i)
         found.push_back({&(*value_)[i], file_, fmt::format("{}/{}", path_, i)});
     return found;
@@ -28,14 +37,14 @@ std::vector<JsonValue> JsonValue::elements() const {
 std::vector<std::string> JsonValue::members() const {
     std::vector<std::string> names;
     if (!value_) return names;
-    if (!value_->is_object()) fail("must be an object");
+    if (!value_->is_object()) fail_type("must be an object");
     for (const auto& [name, value] : value_->items()) names.push_back(name);
     return names;
 }
 
 double JsonValue::number(double fallback, double lo, double hi) const {
     if (!value_) return fallback;
-    if (!value_->is_number()) fail("must be a number");
+    if (!value_->is_number()) fail_type("must be a number");
     const double v = value_->get<double>();
     if (!(v >= lo && v <= hi))
         fail(lo == -kUnlimited || hi == kUnlimited
@@ -56,19 +65,19 @@ std::vector<double> JsonValue::numbers(size_t count, std::vector<double> fallbac
 
 bool JsonValue::flag(bool fallback) const {
     if (!value_) return fallback;
-    if (!value_->is_boolean()) fail("must be true or false");
+    if (!value_->is_boolean()) fail_type("must be true or false");
     return value_->get<bool>();
 }
 
 std::string JsonValue::text(std::string_view fallback) const {
     if (!value_) return std::string(fallback);
-    if (!value_->is_string()) fail("must be a string");
+    if (!value_->is_string()) fail_type("must be a string");
     return value_->get<std::string>();
 }
 
 int64_t JsonValue::integer(int64_t fallback, int64_t lo, int64_t hi) const {
     if (!value_) return fallback;
-    if (!value_->is_number_integer()) fail("must be an integer");
+    if (!value_->is_number_integer()) fail_type("must be an integer");
     const bool fits = !value_->is_number_unsigned() ||
                       value_->get<uint64_t>() <= uint64_t(std::numeric_limits<int64_t>::max());
     const int64_t v = fits ? value_->get<int64_t>() : std::numeric_limits<int64_t>::max();

@@ -46,6 +46,9 @@ public:
 private:
     static constexpr double kUnlimited = 1e30;
 
+    /// Fails with what the value is.
+    [[noreturn]] void fail_type(const char* expected) const;
+
     const nlohmann::json* value_;
     const std::string* file_;
     std::string path_;

@@ -18,7 +18,8 @@ JsonValue extension(const JsonValue& m, const char* name) {
 Rgb colour(const JsonValue& value, Rgb fallback) {
     const std::vector<double> c = value.numbers(3, {fallback.r, fallback.g, fallback.b});
     for (const double x : c)
-        if (!(x >= 0)) value.fail("components must not be negative");
+        if (!(x >= 0))
+            value.fail(fmt::format("has the component {}, which must not be negative", x));
     return {float(c[0]), float(c[1]), float(c[2])};
 }
 

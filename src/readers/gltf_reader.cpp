@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -15,11 +14,6 @@ namespace etendue {
 namespace {
 
 constexpr int kDeepestObjects = 64;
-
-std::string directory_of(const std::string& file) {
-    const auto directory = std::filesystem::path(file).parent_path();
-    return directory.empty() ? std::string(".") : directory.string();
-}
 
 Vec3 vec3(const std::vector<double>& v) {
     return {float(v[0]), float(v[1]), float(v[2])};
@@ -54,21 +48,10 @@ Transform turned() {
     return Transform::scale({-1, 1, -1});
 }
 
-/// What is read, or has no effect on an image of light paths.
-const std::set<std::string> kKnownExtensions = {"KHR_materials_emissive_strength",
-                                                "KHR_materials_ior",
-                                                "KHR_materials_transmission",
-                                                "KHR_materials_volume",
-                                                "KHR_materials_clearcoat",
-                                                "KHR_materials_sheen",
-                                                "KHR_materials_specular",
-                                                "KHR_materials_anisotropy",
-                                                "KHR_materials_unlit",
-                                                "KHR_materials_variants",
-                                                "KHR_texture_transform",
-                                                "KHR_lights_punctual",
-                                                "KHR_mesh_quantization",
-                                                "EXT_mesh_gpu_instancing"};
+bool is_known_extension(const std::string& name) {
+    const std::vector<std::string>& known = gltf_extensions();
+    return std::find(known.begin(), known.end(), name) != known.end();
+}
 
 }  // namespace
 
@@ -141,10 +124,10 @@ SceneDescription GltfReader::read() {
 
 void GltfReader::check_extensions() {
     for (const JsonValue& e : root_["extensionsRequired"].elements())
-        if (const std::string name = e.text(""); !kKnownExtensions.count(name))
+        if (const std::string name = e.text(""); !is_known_extension(name))
             reject(e, fmt::format("the extension {} is not supported", name));
     for (const JsonValue& e : root_["extensionsUsed"].elements())
-        if (const std::string name = e.text(""); !kKnownExtensions.count(name))
+        if (const std::string name = e.text(""); !is_known_extension(name))
             warn(fmt::format("the extension {} is not supported and has no effect", name));
     if (root_["extensions"]["KHR_materials_variants"])
         warn("variants of materials are not supported: the default materials are used");
@@ -231,7 +214,8 @@ std::vector<Transform> GltfReader::gpu_instances(const JsonValue& node) {
     const auto get = [&](int which, size_t i, std::vector<double> fallback) {
         const GltfBuffers::Values& v = values[which];
         if (!names[which]) return fallback;
-        if (v.count != count) names[which].fail("has fewer elements than the other attributes");
+        if (v.count != count)
+            names[which].fail(fmt::format("has {} elements, other attributes {}", v.count, count));
         const auto first = v.numbers.begin() + ptrdiff_t(i * v.components);
         return std::vector<double>(first, first + ptrdiff_t(v.components));
     };
@@ -270,7 +254,8 @@ void GltfReader::add_camera(const JsonValue& camera, const Transform& to_world) 
         for (const char* name : {"xmag", "ymag"})
             if (!o[name]) o[name].fail("is missing");
         const double x = std::fabs(o["xmag"].number(1)), y = std::fabs(o["ymag"].number(1));
-        if (!(x > 0 && y > 0)) o.fail("xmag and ymag must not be zero");
+        if (!(x > 0 && y > 0))
+            o.fail(fmt::format("xmag and ymag must not be zero, but are {} and {}", x, y));
         aspect = x / y;
         placed = placed * Transform::scale({float(x), float(x), 1});
     } else {
@@ -373,20 +358,11 @@ Container open_container(std::string_view bytes, const std::string& file) {
     return found;
 }
 
-std::optional<std::string> read_from_disk(const std::string& path) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) return {};
-    return read_file_bytes(path);
-}
-
 }  // namespace
 
 SceneDescription read_gltf(const std::string& file, const ReadOptions& options) {
-    ReadOptions with_disk = options;
-    if (!with_disk.read_file) with_disk.read_file = read_from_disk;
-    const auto bytes = with_disk.read_file(file);
-    if (!bytes) throw SceneError({file, 0}, "cannot read the scene file");
-    return parse_gltf(*bytes, file, with_disk);
+    const ReadOptions all = with_disk(options);
+    return parse_gltf(read_scene_bytes(file, all), file, all);
 }
 
 SceneDescription parse_gltf(std::string_view bytes, const std::string& file,
@@ -405,6 +381,24 @@ SceneDescription parse_gltf(std::string_view bytes, const std::string& file,
         throw SceneError({file, 0}, "malformed JSON: a number is too large");
     }
     return GltfReader(file, options, document, parts.chunk).read();
+}
+
+const std::vector<std::string>& gltf_extensions() {
+    static const std::vector<std::string> names = {"KHR_materials_emissive_strength",
+                                                   "KHR_materials_ior",
+                                                   "KHR_materials_transmission",
+                                                   "KHR_materials_volume",
+                                                   "KHR_materials_clearcoat",
+                                                   "KHR_materials_sheen",
+                                                   "KHR_materials_specular",
+                                                   "KHR_materials_anisotropy",
+                                                   "KHR_materials_unlit",
+                                                   "KHR_materials_variants",
+                                                   "KHR_texture_transform",
+                                                   "KHR_lights_punctual",
+                                                   "KHR_mesh_quantization",
+                                                   "EXT_mesh_gpu_instancing"};
+    return names;
 }
 
 }  // namespace etendue

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "readers/file_bytes.h"
 #include "readers/mitsuba_upgrade.h"
 #include "readers/mitsuba_values.h"
 #include "readers/nesting.h"
@@ -30,11 +31,6 @@ std::vector<std::string> words(std::string_view list) {
         begin = end + 1;
     }
     return found;
-}
-
-std::string directory_of(const std::string& file) {
-    const auto directory = std::filesystem::path(file).parent_path();
-    return directory.empty() ? std::string(".") : directory.string();
 }
 
 std::string join(const std::string& directory, const std::string& name) {

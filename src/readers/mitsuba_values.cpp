@@ -186,7 +186,8 @@ SpectrumSamples parse_spectrum_file(std::string_view text, const std::string& fi
 
 void check_samples(const SpectrumSamples& samples, const SourceLocation& where) {
     if (samples.wavelengths.size() < 2)
-        throw SceneError(where, "a spectrum needs at least two wavelengths");
+        throw SceneError(where, fmt::format("a spectrum needs at least two wavelengths, found {}",
+                                            samples.wavelengths.size()));
     for (size_t i = 1; i < samples.wavelengths.size(); ++i)
         if (!(samples.wavelengths[i - 1] < samples.wavelengths[i]))
             throw SceneError(where,

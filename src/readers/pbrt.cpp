@@ -1,7 +1,6 @@
 #include "readers/pbrt.h"
 
 #include <deque>
-#include <filesystem>
 
 #include <fmt/format.h>
 
@@ -10,22 +9,12 @@
 #include "readers/pbrt_reader.h"
 
 namespace etendue {
-namespace {
-
-std::optional<std::string> read_from_disk(const std::string& path) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error)) return {};
-    return read_file_bytes(path);
-}
-
-}  // namespace
 
 SceneDescription read_pbrt(const std::string& file, const ReadOptions& options) {
-    ReadOptions with_disk = options;
-    if (!with_disk.read_file) with_disk.read_file = read_from_disk;
-    const auto text = with_disk.read_file(file);
-    if (!text) throw SceneError({file, 0}, "cannot read the scene file");
-    return parse_pbrt(is_gzip(*text) ? unpack_gzip(*text, file) : *text, file, with_disk);
+    const ReadOptions all = with_disk(options);
+    std::string text = read_scene_bytes(file, all);
+    if (is_gzip(text)) text = unpack_gzip(text, file);
+    return parse_pbrt(text, file, all);
 }
 
 SceneDescription parse_pbrt(std::string_view text, const std::string& file,
@@ -43,11 +32,11 @@ const std::vector<PluginInfo>& pbrt_plugins() {
         };
         const auto add = [&](const char* category, const std::vector<PbrtEntry>& entries) {
             for (const PbrtEntry& e : entries) {
-                if (!*e.name) continue;
-                PluginInfo info{category, e.name, with_version(e.versions, e.doc), {}};
+                if (e.name.empty()) continue;
+                PluginInfo info{category, e.name.data(), with_version(e.versions, e.doc), {}};
                 for (const PbrtParamInfo& p : e.params)
                     info.params.push_back(
-                        {p.name, p.kind, p.fallback,
+                        {p.name.data(), p.kind, p.fallback,
                          p.versions == e.versions ? p.doc : with_version(p.versions, p.doc)});
                 all.push_back(std::move(info));
             }

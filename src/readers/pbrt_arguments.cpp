@@ -10,7 +10,7 @@ namespace etendue {
 namespace {
 
 struct TypeName {
-    const char* name;
+    std::string_view name;
     PbrtType type;
 };
 constexpr TypeName kTypes[] = {
@@ -27,9 +27,8 @@ constexpr TypeName kTypes[] = {
 
 /// Type and name of a declaration such as "point3 P".
 void read_declaration(PbrtTokenizer& in, PbrtValue& value) {
-    value.file = &in.file();
     const std::string_view text = in.string();
-    value.line = in.line();
+    value.where = in.where();
     const size_t begin = text.find_first_not_of(" \t");
     const size_t end = std::min(text.find_first_of(" \t", begin), text.size());
     const size_t name = text.find_first_not_of(" \t", end);
@@ -45,6 +44,7 @@ void read_declaration(PbrtTokenizer& in, PbrtValue& value) {
         in.fail(fmt::format("unknown type of parameter {}{}", quote(type), hint(type, names)));
     }
     value.type = known->type;
+    if (value.type == PbrtType::Rgb || value.type == PbrtType::Vector) value.numbers.reserve(3);
     const std::string_view rest = text.substr(name);
     value.name = unescape(rest.substr(0, rest.find_last_not_of(" \t") + 1));
 }
@@ -89,7 +89,7 @@ bool fits(PbrtType type, ParamKind kind) {
     }
 }
 
-const char* type_name(PbrtType type) {
+std::string_view type_name(PbrtType type) {
     for (const TypeName& t : kTypes)
         if (t.type == type) return t.name;
     return "";
@@ -113,19 +113,18 @@ const char* wanted(ParamKind kind) {
 std::vector<PbrtValue> read_pbrt_values(PbrtTokenizer& in) {
     std::vector<PbrtValue> values;
     while (in.peek() == '"') {
-        PbrtValue value;
+        if (values.empty()) values.reserve(4);
+        PbrtValue& value = values.emplace_back();
         read_declaration(in, value);
         if (in.skip('[')) {
             while (!in.skip(']')) {
                 if (!in.peek())
-                    throw SceneError(value.where(),
-                                     "a list begins here that has no closing bracket");
+                    throw SceneError(value.where, "a list begins here that has no closing bracket");
                 read_item(in, value);
             }
         } else {
             read_item(in, value);
         }
-        values.push_back(std::move(value));
     }
     return values;
 }
@@ -133,7 +132,7 @@ std::vector<PbrtValue> read_pbrt_values(PbrtTokenizer& in) {
 void PbrtArguments::check(const PbrtEntry& entry, PbrtVersion version,
                           const std::function<void(const SourceLocation&, const std::string&,
                                                    const std::string&)>& reject) {
-    std::vector<PbrtValue> kept;
+    size_t kept = 0;
     for (PbrtValue& v : values_) {
         const auto info =
             std::find_if(entry.params.begin(), entry.params.end(), [&](const PbrtParamInfo& p) {
@@ -143,23 +142,24 @@ void PbrtArguments::check(const PbrtEntry& entry, PbrtVersion version,
             std::vector<std::string> known;
             for (const PbrtParamInfo& p : entry.params)
                 if (p.versions & int(version)) known.emplace_back(p.name);
-            reject(v.where(),
+            reject(v.where,
                    fmt::format("{} {} has no parameter {}", kind_, quote(name_), quote(v.name)),
                    hint(v.name, known));
             continue;
         }
         if (!fits(v.type, info->kind))
             throw SceneError(
-                v.where(), fmt::format("parameter \"{}\" of {} {} must be {}, not a {}", v.name,
-                                       kind_, quote(name_), wanted(info->kind), type_name(v.type)));
+                v.where, fmt::format("parameter \"{}\" of {} {} must be {}, not of type {}", v.name,
+                                     kind_, quote(name_), wanted(info->kind), type_name(v.type)));
         if (v.size() == 0)
-            throw SceneError(v.where(), fmt::format("parameter \"{}\" has no value", v.name));
-        if (std::any_of(kept.begin(), kept.end(),
+            throw SceneError(v.where, fmt::format("parameter \"{}\" has no value", v.name));
+        if (std::any_of(values_.begin(), values_.begin() + ptrdiff_t(kept),
                         [&](const PbrtValue& k) { return k.name == v.name; }))
-            throw SceneError(v.where(), fmt::format("parameter \"{}\" is given twice", v.name));
-        kept.push_back(std::move(v));
+            throw SceneError(v.where, fmt::format("parameter \"{}\" is given twice", v.name));
+        if (&v != &values_[kept]) values_[kept] = std::move(v);
+        ++kept;
     }
-    values_ = std::move(kept);
+    values_.erase(values_.begin() + ptrdiff_t(kept), values_.end());
 }
 
 void PbrtArguments::add_defaults(const std::vector<PbrtValue>& values) {
@@ -197,7 +197,9 @@ int PbrtArguments::integer(std::string_view name, int fallback, int lo, int hi) 
 float PbrtArguments::number(std::string_view name, float fallback, float lo, float hi) const {
     const PbrtValue* v = find_one(name);
     if (!v) return fallback;
-    if (v->numbers.empty()) fail(name, fmt::format("parameter \"{}\" must be a float here", name));
+    if (v->numbers.empty())
+        fail(name, fmt::format("parameter \"{}\" must be a float here, not of type {}", name,
+                               type_name(v->type)));
     const float x = v->numbers[0];
     if (!(x >= lo && x <= hi))
         fail(name, hi == kInf
@@ -243,7 +245,7 @@ void PbrtArguments::fail(const std::string& message) const {
 
 void PbrtArguments::fail(std::string_view name, const std::string& message) const {
     const PbrtValue* v = find(name);
-    throw SceneError(v ? v->where() : where_, message);
+    throw SceneError(v ? v->where : where_, message);
 }
 
 }  // namespace etendue

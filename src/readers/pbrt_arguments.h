@@ -33,13 +33,11 @@ enum class PbrtType {
 struct PbrtValue {
     PbrtType type;
     std::string name;
-    const std::string* file;
-    int line;
+    PbrtPlace where;
     std::vector<float> numbers;
     std::vector<int> integers;  ///< of Integer and Bool
     std::vector<std::string> strings;
 
-    SourceLocation where() const { return {*file, line}; }
     size_t size() const { return numbers.size() + integers.size() + strings.size(); }
 };
 
@@ -47,7 +45,7 @@ struct PbrtValue {
 std::vector<PbrtValue> read_pbrt_values(PbrtTokenizer& in);
 
 struct PbrtParamInfo {
-    const char* name;
+    std::string_view name;
     ParamKind kind;
     const char* fallback;
     const char* doc;
@@ -59,7 +57,7 @@ class PbrtScene;
 
 /// What a directive may name: `Shape "sphere"`, `Material "matte"`, ...
 struct PbrtEntry {
-    const char* name;
+    std::string_view name;
     int versions;
     const char* doc;  ///< What it becomes; of one without `make` the reason.
     std::vector<PbrtParamInfo> params;
@@ -73,15 +71,15 @@ enum class PbrtSpectrum { Illuminant, Albedo, Unbounded };
 class PbrtArguments {
 public:
     PbrtArguments() = default;
-    PbrtArguments(std::string kind, std::string name, SourceLocation where,
+    PbrtArguments(std::string kind, std::string name, PbrtPlace where,
                   std::vector<PbrtValue> values)
-        : kind_(std::move(kind)), name_(std::move(name)), where_(std::move(where)),
+        : kind_(std::move(kind)), name_(std::move(name)), where_(where),
           values_(std::move(values)) {}
 
     /// Of the directive: "Shape", and the name that follows it.
     const std::string& kind() const { return kind_; }
     const std::string& name() const { return name_; }
-    const SourceLocation& where() const { return where_; }
+    PbrtPlace where() const { return where_; }
     const std::vector<PbrtValue>& values() const { return values_; }
 
     /// Drops what the table does not have, after `reject` was told; throws where a type does not fit.
@@ -109,7 +107,7 @@ private:
     const PbrtValue* find_one(std::string_view name) const;
 
     std::string kind_, name_;
-    SourceLocation where_;
+    PbrtPlace where_;
     std::vector<PbrtValue> values_;
 };
 

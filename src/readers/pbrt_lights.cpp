@@ -25,11 +25,16 @@ float photometric_factor(const PbrtArguments& args, const char* name, double uni
     return wanted > 0 ? float(wanted / unit) : 1.0f;
 }
 
+[[noreturn]] void fail_aim(const PbrtArguments& args, Vec3 from) {
+    args.fail("to", fmt::format("a light's from and to must differ, but both are {} {} {}", from.x,
+                                from.y, from.z));
+}
+
 /// Where a light stands, and where +z of its space points.
 Transform aimed(const PbrtScene& scene, const PbrtArguments& args, Vec3 default_to) {
     const Vec3 from = args.vector("from", {0, 0, 0}), to = args.vector("to", default_to);
     const Vec3 d = to - from;
-    if (!(length2(d) > 0)) args.fail("to", "a light's from and to must differ");
+    if (!(length2(d) > 0)) fail_aim(args, from);
     const Frame f = Frame::from_normal(normalize(d));
     const Transform local(Transform::Matrix{{{f.s.x, f.t.x, f.n.x, from.x},
                                              {f.s.y, f.t.y, f.n.y, from.y},
@@ -73,9 +78,9 @@ int make_spot(PbrtScene& scene, const PbrtArguments& args) {
 
 int make_distant(PbrtScene& scene, const PbrtArguments& args) {
     const int emitter = scene.add("emitter", "directional", args.where());
-    const Vec3 travel = args.vector("to", {0, 0, 1}) - args.vector("from", {0, 0, 0});
-    const Vec3 d = scene.state.ctm.vector(travel);
-    if (!(length2(d) > 0)) args.fail("to", "a light's from and to must differ");
+    const Vec3 from = args.vector("from", {0, 0, 0});
+    const Vec3 d = scene.state.ctm.vector(args.vector("to", {0, 0, 1}) - from);
+    if (!(length2(d) > 0)) fail_aim(args, from);
     scene.set(emitter, "direction", d);
     scene.set(emitter, "irradiance",
               light_colour(scene, args, "L") * photometric_factor(args, "illuminance", 1));
@@ -91,7 +96,7 @@ Transform from_z_up() {
 int make_infinite(PbrtScene& scene, const PbrtArguments& args) {
     const char* file = scene.is_v3() ? "mapname" : "filename";
     if (args.has("portal"))
-        scene.warn(args.find("portal")->where(), "the portal is ignored: the light stays the same");
+        scene.warn(args.find("portal")->where, "the portal is ignored: the light stays the same");
     if (!args.has(file)) {
         const int emitter = scene.add("emitter", "constant", args.where());
         scene.set(emitter, "radiance",
@@ -110,7 +115,7 @@ int make_infinite(PbrtScene& scene, const PbrtArguments& args) {
         scene.set(emitter, "projection", std::string("equalarea"));
         scene.set(emitter, "tint", light_colour(scene, args, "L"));
         if (args.number("illuminance", -1) > 0)
-            scene.refuse(args.find("illuminance")->where(),
+            scene.refuse(args.find("illuminance")->where,
                          "the illuminance of an image is not supported: give its scale",
                          "the image as it is");
     }
@@ -174,10 +179,12 @@ int make_area(PbrtScene& scene, const PbrtArguments& args) {
 }
 
 std::vector<PbrtParamInfo> with_shared(std::vector<PbrtParamInfo> params, const char* colour,
-                                       const char* colour_doc) {
-    params.push_back({colour, ParamKind::Rgb, "1", colour_doc});
-    params.push_back({"scale", ParamKind::Float, "1", "Factor of it.", kV4});
-    params.push_back({"scale", ParamKind::Rgb, "1", "Factor of it.", kV3});
+                                       const char* colour_doc, int colour_versions = kV3And4) {
+    params.push_back({colour, ParamKind::Rgb, "1", colour_doc, colour_versions});
+    params.push_back(
+        {"scale", ParamKind::Float, "1", "Factor by which the light is multiplied.", kV4});
+    params.push_back(
+        {"scale", ParamKind::Rgb, "1", "Colour by which the light is multiplied.", kV3});
     params.push_back({"nsamples", ParamKind::Int, "", "Accepted; without effect.", kV3});
     params.push_back({"samples", ParamKind::Int, "", "Accepted; without effect.", kV3});
     return params;
@@ -203,7 +210,7 @@ const std::vector<PbrtEntry>& pbrt_area_lights() {
         return std::vector<PbrtEntry>{{"diffuse", kV3And4,
                                        "Becomes the emitter area of the shapes that follow.",
                                        params, make_area},
-                                      {"area", kV3, "As diffuse.", params, make_area}};
+                                      {"area", kV3, "Another name of diffuse.", params, make_area}};
     }();
     return entries;
 }
@@ -216,7 +223,7 @@ const std::vector<PbrtEntry>& pbrt_lights() {
                        "Square image in equal-area octahedral projection.", kV4},
                       kIlluminance,
                       {"portal", ParamKind::Vector, "", "Ignored, with a warning.", kV4}},
-                     "L", "Radiance; v3: factor of the image."),
+                     "L", "Radiance; v3: also a colour by which the image is multiplied."),
          make_infinite},
         {"distant", kV3And4, "Becomes directional.",
          with_shared({kFrom, kTo, kIlluminance}, "L", "Irradiance."), make_distant},
@@ -237,7 +244,7 @@ const std::vector<PbrtEntry>& pbrt_lights() {
                       {"filename", ParamKind::String, "",
                        "Square image in equal-area octahedral projection.", kV4},
                       kPower},
-                     "I", "Factor of the image."),
+                     "I", "Colour by which the image is multiplied."),
          make_goniometric},
         {"projection", kV3And4, "Becomes projection; its pixels are not interpolated.",
          with_shared({{"mapname", ParamKind::String, "", "Image.", kV3},
@@ -245,7 +252,7 @@ const std::vector<PbrtEntry>& pbrt_lights() {
                       {"fov", ParamKind::Float, "90, v3: 45",
                        "Full angle in degrees over the shorter side."},
                       kPower},
-                     "I", "Factor of the image; v3 only."),
+                     "I", "Colour by which the image is multiplied.", kV3),
          make_projection},
     };
     return entries;

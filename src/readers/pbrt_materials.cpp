@@ -15,7 +15,7 @@ namespace {
 
 // ---- What most materials share
 
-int wrap(PbrtScene& scene, const char* wrapper, int nested, const SourceLocation& where) {
+int wrap(PbrtScene& scene, const char* wrapper, int nested, PbrtPlace where) {
     const int object = scene.add("bsdf", wrapper, where);
     scene.add_child(object, "", nested);
     return object;
@@ -129,14 +129,14 @@ float read_eta(PbrtScene& scene, const PbrtArguments& args, const char* name, fl
     if (v->type == PbrtType::Texture) {
         const auto c = scene.constant(args, name, fallback);
         if (!c) {
-            scene.refuse(v->where(), "an index of refraction from a texture is not supported",
-                         "1.5");
+            scene.refuse(v->where, "an index of refraction from a texture is not supported", "1.5");
             return 1.5f;
         }
         return *c;
     }
     const float eta = pbrt_number(*v, scene);
-    if (!(eta > 0)) args.fail(name, fmt::format("parameter \"{}\" must be above zero", name));
+    if (!(eta > 0))
+        args.fail(name, fmt::format("parameter \"{}\" is {}, but must be above zero", name, eta));
     return eta;
 }
 
@@ -155,7 +155,7 @@ int add_diffuse(PbrtScene& scene, const PbrtArguments& args, const char* colour,
 float read_sigma(PbrtScene& scene, const PbrtArguments& args) {
     const auto sigma = scene.constant(args, "sigma", 0.0f);
     if (!sigma)
-        scene.refuse(args.find("sigma")->where(), "a texture of sigma is not supported",
+        scene.refuse(args.find("sigma")->where, "a texture of sigma is not supported",
                      "20 degrees");
     return clamp(sigma.value_or(20.0f), 0, 90);
 }
@@ -172,7 +172,7 @@ int nested_material(PbrtScene& scene, const PbrtArguments& args, const PbrtValue
     if (it != scene.named_materials.end()) return it->second;
     std::vector<std::string> known;
     for (const auto& [other, object] : scene.named_materials) known.push_back(other);
-    throw SceneError(value.where(),
+    throw SceneError(value.where,
                      fmt::format("{} \"{}\" mixes {}, which is no named material{}", args.kind(),
                                  args.name(), quote(name), hint(name, known)));
 }
@@ -239,7 +239,7 @@ int add_metal(PbrtScene& scene, const PbrtArguments& args, const PbrtRoughness& 
             scene.set(metal, "material", std::string("none"));
             scene.add_child(metal, "specular_reflectance",
                             scene.texture(args, "reflectance", false));
-            scene.warn(args.find("reflectance")->where(),
+            scene.warn(args.find("reflectance")->where,
                        "a metal's reflectance from a texture does not rise toward grazing angles");
             return metal;
         }
@@ -276,7 +276,7 @@ int make_thindielectric(PbrtScene& scene, const PbrtArguments& args) {
 void refuse_coat_medium(PbrtScene& scene, const PbrtArguments& args) {
     const auto albedo = scene.constant(args, "albedo", Rgb(0), PbrtSpectrum::Albedo);
     if (!albedo || albedo->max() > 0)
-        scene.refuse(args.find("albedo")->where(),
+        scene.refuse(args.find("albedo")->where,
                      "a coat that scatters (albedo above 0) is not supported", "a clear one");
 }
 
@@ -284,7 +284,7 @@ void refuse_coat_medium(PbrtScene& scene, const PbrtArguments& args) {
 void set_thickness(PbrtScene& scene, int object, const PbrtArguments& args) {
     std::optional<float> thickness = scene.constant(args, "thickness", 0.01f);
     if (!thickness) {
-        scene.refuse(args.find("thickness")->where(),
+        scene.refuse(args.find("thickness")->where,
                      "the thickness of a coat must be a number, not a texture", "0.01");
         thickness = 0.01f;
     }
@@ -425,7 +425,7 @@ int make_translucent(PbrtScene& scene, const PbrtArguments& args) {
     const auto colour = [&](const char* name, float fallback) {
         const auto c = scene.constant(args, name, Rgb(fallback), PbrtSpectrum::Albedo);
         if (!c)
-            scene.refuse(args.find(name)->where(),
+            scene.refuse(args.find(name)->where,
                          "a translucent material with textures is not supported", "0.25");
         return c.value_or(Rgb(0.25f));
     };
@@ -441,11 +441,11 @@ int make_translucent(PbrtScene& scene, const PbrtArguments& args) {
 
 int make_disney(PbrtScene& scene, const PbrtArguments& args) {
     if (args.flag("thin", false))
-        scene.refuse(args.find("thin")->where(), "the thin Disney material is not supported",
+        scene.refuse(args.find("thin")->where, "the thin Disney material is not supported",
                      "the solid one");
     for (const char* name : {"scatterdistance", "flatness", "difftrans"})
         if (args.has(name))
-            scene.reject(args.find(name)->where(),
+            scene.reject(args.find(name)->where,
                          fmt::format("{} of the Disney material is not supported", quote(name)));
     const int object = scene.add("bsdf", "principled", args.where());
     scene.bind(object, "base_color", args, "color", Rgb(0.5f));
@@ -494,7 +494,7 @@ std::vector<PbrtParamInfo> roughness(const char* fallback) {
 
 std::vector<PbrtParamInfo> metal_params() {
     return {{"eta", ParamKind::Texture, "copper", "Real part of the index of refraction."},
-            {"k", ParamKind::Texture, "copper", "Imaginary part of it."}};
+            {"k", ParamKind::Texture, "copper", "Imaginary part of the index of refraction."}};
 }
 
 PbrtParamInfo texture(const char* name, const char* fallback, const char* doc) {
@@ -504,7 +504,7 @@ PbrtParamInfo texture(const char* name, const char* fallback, const char* doc) {
 std::vector<PbrtEntry> make_entries() {
     const std::vector<PbrtParamInfo> index = {
         texture("eta", "1.5", "Index of refraction; of a spectrum that at 588 nm."),
-        texture("index", "1.5", "As eta.")};
+        texture("index", "1.5", "Another name of eta, which counts if both are given.")};
     const PbrtParamInfo sigma = texture(
         "sigma", "0", "Standard deviation of the facets' slopes in degrees: becomes orennayar.");
     const std::vector<PbrtParamInfo> coat = {
@@ -515,16 +515,16 @@ std::vector<PbrtEntry> make_entries() {
         {"nsamples", ParamKind::Int, "", "Accepted; without effect."},
         {"twosided", ParamKind::Bool, "true", "Accepted; both sides are always coated."}};
     return {
-        {"", kV3And4, "As interface.", {}, make_interface},
+        {"", kV3And4, "The same as interface.", {}, make_interface},
         {"interface", kV4, "Becomes null.", {}, make_interface},
         {"none", kV3, "Becomes null.", {}, make_interface},
         {"mix",
          kV3And4,
          "Becomes blendbsdf; v3: with the luminance of amount.",
          {{"materials", ParamKind::String, "", "Names of two materials.", kV4},
-          {"namedmaterial1", ParamKind::String, "", "Name of one.", kV3},
-          {"namedmaterial2", ParamKind::String, "", "Name of the other one.", kV3},
-          texture("amount", "0.5", "Share of the second one; v3: of the first one.")},
+          {"namedmaterial1", ParamKind::String, "", "Name of the first material.", kV3},
+          {"namedmaterial2", ParamKind::String, "", "Name of the second material.", kV3},
+          texture("amount", "0.5", "Weight of the second material; v3: of the first material.")},
          make_mix},
         {"diffuse", kV4, "Becomes diffuse.",
          std::vector<PbrtParamInfo>{texture("reflectance", "0.5", "Albedo."), sigma} + maps(),
@@ -539,31 +539,39 @@ std::vector<PbrtEntry> make_entries() {
         {"conductor", kV4, "Becomes conductor where α is below 0.001, else roughconductor.",
          roughness("0") + metal_params() +
              std::vector<PbrtParamInfo>{texture(
-                 "reflectance", "", "Instead of eta and k: reflectance at normal incidence.")},
+                 "reflectance", "", "Reflectance at normal incidence, instead of eta and k.")},
          make_conductor},
         {"dielectric", kV4, "Becomes dielectric where α is below 0.001, else roughdielectric.",
          roughness("0") + std::vector<PbrtParamInfo>{index[0]}, make_dielectric},
         {"thindielectric", kV4, "Becomes thindielectric.",
          std::vector<PbrtParamInfo>{index[0]} + maps(), make_thindielectric},
         {"diffusetransmission", kV4, "Becomes diffusetransmission.",
-         std::vector<PbrtParamInfo>{texture("reflectance", "0.25", "Share reflected."),
-                                    texture("transmittance", "0.25", "Share transmitted."),
-                                    {"scale", ParamKind::Float, "1", "Factor of both."}} +
+         std::vector<PbrtParamInfo>{
+             texture("reflectance", "0.25", "Fraction of the light that is reflected."),
+             texture("transmittance", "0.25", "Fraction of the light that is transmitted."),
+             {"scale", ParamKind::Float, "1",
+              "Factor by which reflectance and transmittance are multiplied."}} +
              maps(),
          make_diffusetransmission},
         {"coatedconductor", kV4, "Becomes coatedconductor, a closed form of what pbrt simulates.",
          std::vector<PbrtParamInfo>{
              texture("conductor.eta", "copper", "Real part of the metal's index of refraction."),
-             texture("conductor.k", "copper", "Imaginary part of it."),
-             texture("reflectance", "", "Instead of both: reflectance at normal incidence."),
+             texture("conductor.k", "copper", "Imaginary part of the index of refraction."),
+             texture("reflectance", "",
+                     "Reflectance of the metal at normal incidence, instead of its eta and k."),
              texture("conductor.roughness", "0", "Roughness of the metal."),
-             texture("conductor.uroughness", "conductor.roughness", "Along the first tangent."),
-             texture("conductor.vroughness", "conductor.roughness", "Along the second tangent."),
+             texture("conductor.uroughness", "conductor.roughness",
+                     "Roughness of the metal along the first tangent."),
+             texture("conductor.vroughness", "conductor.roughness",
+                     "Roughness of the metal along the second tangent."),
              texture("interface.roughness", "0", "Roughness of the coat."),
-             texture("interface.uroughness", "interface.roughness", "Along the first tangent."),
-             texture("interface.vroughness", "interface.roughness", "Along the second tangent."),
+             texture("interface.uroughness", "interface.roughness",
+                     "Roughness of the coat along the first tangent."),
+             texture("interface.vroughness", "interface.roughness",
+                     "Roughness of the coat along the second tangent."),
              texture("interface.eta", "1.5", "Index of refraction of the coat."),
-             {"remaproughness", ParamKind::Bool, "true", "As that of other materials."}} +
+             {"remaproughness", ParamKind::Bool, "true",
+              "Whether roughnesses are converted to α as in other materials."}} +
              coat + maps(),
          make_coatedconductor},
         {"measured", kV4, "Rejected: measured BSDFs are not supported.", {}, nullptr},
@@ -573,14 +581,16 @@ std::vector<PbrtEntry> make_entries() {
          std::vector<PbrtParamInfo>{texture("Kr", "0.9", "Reflectance.")} + maps(), make_mirror},
         {"glass", kV3, "Becomes dielectric, or roughdielectric where it is rough.",
          roughness("0") + index +
-             std::vector<PbrtParamInfo>{texture("Kr", "1", "Factor of the reflection."),
-                                        texture("Kt", "1", "Factor of the transmission.")},
+             std::vector<PbrtParamInfo>{
+                 texture("Kr", "1", "Factor by which reflected light is multiplied."),
+                 texture("Kt", "1", "Factor by which transmitted light is multiplied.")},
          make_glass},
         {"metal", kV3, "Becomes roughconductor.", roughness("0.01") + metal_params(), make_metal},
         {"plastic", kV3, "Becomes lobesum.",
          roughness("0.1") +
-             std::vector<PbrtParamInfo>{texture("Kd", "0.25", "Diffuse albedo."),
-                                        texture("Ks", "0.25", "Factor of the glossy reflection.")},
+             std::vector<PbrtParamInfo>{
+                 texture("Kd", "0.25", "Diffuse albedo."),
+                 texture("Ks", "0.25", "Factor by which the glossy reflection is multiplied.")},
          make_plastic},
         {"substrate", kV3, "Becomes fresnelblend.",
          roughness("0.1") +
@@ -592,31 +602,32 @@ std::vector<PbrtEntry> make_entries() {
          roughness("0.1") + index +
              std::vector<PbrtParamInfo>{
                  texture("Kd", "0.25", "Diffuse albedo."),
-                 texture("Ks", "0.25", "Factor of the glossy reflection."),
-                 texture("Kr", "0", "Factor of the mirror reflection."),
-                 texture("Kt", "0", "Factor of the transmission."),
-                 texture("opacity", "1", "Share of light that does not go straight on.")},
+                 texture("Ks", "0.25", "Factor by which the glossy reflection is multiplied."),
+                 texture("Kr", "0", "Factor by which the mirror reflection is multiplied."),
+                 texture("Kt", "0", "Factor by which transmitted light is multiplied."),
+                 texture("opacity", "1",
+                         "Fraction of the light that does not pass straight through.")},
          make_uber},
         {"translucent", kV3, "Becomes lobesum; constants only.",
          roughness("0.1") +
-             std::vector<PbrtParamInfo>{texture("Kd", "0.25", "Diffuse albedo."),
-                                        texture("Ks", "0.25", "Glossy albedo."),
-                                        texture("reflect", "0.5", "Share reflected."),
-                                        texture("transmit", "0.5", "Share transmitted.")},
+             std::vector<PbrtParamInfo>{
+                 texture("Kd", "0.25", "Diffuse albedo."), texture("Ks", "0.25", "Glossy albedo."),
+                 texture("reflect", "0.5", "Fraction of the light that is reflected."),
+                 texture("transmit", "0.5", "Fraction of the light that is transmitted.")},
          make_translucent},
         {"disney", kV3, "Becomes principled.",
          std::vector<PbrtParamInfo>{
              texture("color", "0.5", "Base colour."),
-             texture("metallic", "0", "Share of metal."),
+             texture("metallic", "0", "Weight of the metal among the base materials."),
              texture("eta", "1.5", "Index of refraction."),
              texture("roughness", "0.5", "Roughness, the root of α."),
              texture("speculartint", "0", "Tint of the specular reflection."),
              texture("anisotropic", "0", "Anisotropy."),
              texture("sheen", "0", "Sheen."),
-             texture("sheentint", "0.5", "Its tint."),
+             texture("sheentint", "0.5", "Tint of the sheen."),
              texture("clearcoat", "0", "Clear coat."),
-             texture("clearcoatgloss", "1", "Its gloss."),
-             texture("spectrans", "0", "Share of glass."),
+             texture("clearcoatgloss", "1", "Gloss of the clear coat."),
+             texture("spectrans", "0", "Weight of the glass among the base materials."),
              texture("scatterdistance", "", "Rejected."),
              texture("flatness", "", "Rejected."),
              texture("difftrans", "", "Rejected."),

@@ -17,7 +17,7 @@ int make_homogeneous(PbrtScene& scene, const PbrtArguments& args) {
         return -1;
     }
     if (args.has("Le"))
-        scene.reject(args.find("Le")->where(), "a medium that emits light is not supported");
+        scene.reject(args.find("Le")->where, "a medium that emits light is not supported");
     const int medium = scene.add("medium", "homogeneous", args.where());
     scene.set(
         medium, "sigma_a",
@@ -37,7 +37,7 @@ const std::vector<PbrtEntry>& pbrt_media() {
          "Becomes homogeneous, where sigma_s is 0; rejected where light scatters.",
          {{"sigma_a", ParamKind::Rgb, "0.0011 0.0024 0.014", "Absorption, 1/length."},
           {"sigma_s", ParamKind::Rgb, "2.55 3.21 3.77", "Scattering; must be 0."},
-          {"scale", ParamKind::Float, "1", "Factor of both."},
+          {"scale", ParamKind::Float, "1", "Factor by which sigma_a and sigma_s are multiplied."},
           {"g", ParamKind::Float, "0", "Accepted; without effect."},
           {"preset", ParamKind::String, "", "Rejected: all of them scatter."},
           {"Le", ParamKind::Rgb, "", "Rejected.", kV4},

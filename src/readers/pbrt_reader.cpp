@@ -39,10 +39,13 @@ Transform read_matrix(PbrtTokenizer& in) {
 /// World to camera: the camera at `eye` has its z axis toward `target`, x to the right.
 Transform look_at_matrix(Vec3 eye, Vec3 target, Vec3 up, const PbrtTokenizer& in) {
     const Vec3 d = target - eye;
-    if (!(length2(d) > 0)) in.fail("LookAt needs two different points");
+    if (!(length2(d) > 0))
+        in.fail(fmt::format("LookAt needs two different points, but both are {} {} {}", eye.x,
+                            eye.y, eye.z));
     const Vec3 z = normalize(d), x = cross(up, z);
     if (!(length(x) > 1e-6f * length(up)))
-        in.fail("LookAt's up vector must not point along the view");
+        in.fail(fmt::format("LookAt's up vector {} {} {} must not point along the view", up.x, up.y,
+                            up.z));
     const Vec3 right = normalize(x), y = cross(z, right);
     return Transform(Transform::Matrix{{{right.x, y.x, z.x, eye.x},
                                         {right.y, y.y, z.y, eye.y},
@@ -154,7 +157,7 @@ void PbrtReader::read_directive(PbrtTokenizer& in, std::string_view word) {
 }
 
 void PbrtReader::include(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     const std::string name = unescape(in.string());
     if (++includes_ > kMostIncludes)
         throw SceneError(where,
@@ -173,9 +176,9 @@ void PbrtReader::include(PbrtTokenizer& in) {
 }
 
 PbrtArguments PbrtReader::arguments(PbrtTokenizer& in, const char* kind, const char* defaults) {
-    SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     std::string name = unescape(in.string());
-    PbrtArguments args(kind, std::move(name), std::move(where), read_pbrt_values(in));
+    PbrtArguments args(kind, std::move(name), where, read_pbrt_values(in));
     if (const auto it = scene_.state.defaults.find(defaults); it != scene_.state.defaults.end())
         args.add_defaults(it->second);
     return args;
@@ -190,7 +193,7 @@ int PbrtReader::make(PbrtArguments& args, const std::vector<PbrtEntry>& table,
     if (it == table.end()) {
         std::vector<std::string> known;
         for (const PbrtEntry& e : table)
-            if ((e.versions & version) && *e.name) known.emplace_back(e.name);
+            if ((e.versions & version) && !e.name.empty()) known.emplace_back(e.name);
         const std::string what = fmt::format("unknown {} {}", args.kind(), quote(args.name()));
         if (!scene_.options.lenient)
             throw SceneError(args.where(), what + hint(args.name(), known));
@@ -222,7 +225,9 @@ void PbrtReader::translate(PbrtTokenizer& in) {
 
 void PbrtReader::scale(PbrtTokenizer& in) {
     const Vec3 s = read_vec3(in);
-    if (!(s.x != 0 && s.y != 0 && s.z != 0)) in.fail("the factors of Scale must not be zero");
+    if (!(s.x != 0 && s.y != 0 && s.z != 0))
+        in.fail(
+            fmt::format("the factors of Scale must not be zero, but are {} {} {}", s.x, s.y, s.z));
     scene_.state.ctm = scene_.state.ctm * Transform::scale(s);
 }
 
@@ -251,7 +256,7 @@ void PbrtReader::coordinate_system(PbrtTokenizer& in) {
 }
 
 void PbrtReader::coord_sys_transform(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     const std::string name = unescape(in.string());
     const auto it = coordinate_systems_.find(name);
     if (it == coordinate_systems_.end())
@@ -261,7 +266,7 @@ void PbrtReader::coord_sys_transform(PbrtTokenizer& in) {
 }
 
 void PbrtReader::active_transform(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     const std::string which(in.word());
     if (which != "All" && which != "StartTime" && which != "EndTime")
         throw SceneError(where,
@@ -278,18 +283,18 @@ void PbrtReader::transform_times(PbrtTokenizer& in) {
 
 // ---- Attributes
 
-void PbrtReader::push(const char* what, const SourceLocation& where) {
+void PbrtReader::push(const char* what, PbrtPlace where) {
     if (stack_.size() >= kDeepestNesting)
         throw SceneError(where, fmt::format("{} nests more than {} deep", what, kDeepestNesting));
     stack_.push_back({what, where, scene_.state});
 }
 
-void PbrtReader::pop(const char* what, const char* closing, const SourceLocation& where) {
+void PbrtReader::pop(const char* what, const char* closing, PbrtPlace where) {
     if (stack_.empty()) throw SceneError(where, fmt::format("{} without {}", closing, what));
     const Saved& last = stack_.back();
     if (std::string_view(last.what) != what)
         throw SceneError(where, fmt::format("{}, but the last thing opened is the {} at {}:{}",
-                                            closing, last.what, last.where.file, last.where.line));
+                                            closing, last.what, *last.where.file, last.where.line));
 }
 
 void PbrtReader::attribute_begin(PbrtTokenizer& in) {
@@ -313,7 +318,7 @@ void PbrtReader::transform_end(PbrtTokenizer& in) {
 }
 
 void PbrtReader::attribute(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     const std::string target = unescape(in.string());
     const std::vector<std::string> known = {"shape", "light", "material", "medium", "texture"};
     if (std::find(known.begin(), known.end(), target) == known.end())
@@ -329,7 +334,7 @@ void PbrtReader::reverse_orientation(PbrtTokenizer&) {
 }
 
 void PbrtReader::color_space(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     const std::string name = unescape(in.string());
     if (name != "srgb")
         scene_.refuse(
@@ -340,7 +345,7 @@ void PbrtReader::color_space(PbrtTokenizer& in) {
 // ---- Media, textures, materials
 
 void PbrtReader::medium_interface(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     scene_.state.inside = unescape(in.string());
     scene_.state.outside = in.peek() == '"' ? unescape(in.string()) : scene_.state.inside;
     if (!in_world_ && !scene_.state.outside.empty())
@@ -364,7 +369,7 @@ void PbrtReader::make_named_medium(PbrtTokenizer& in) {
 }
 
 void PbrtReader::texture(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     const std::string name = unescape(in.string()), type = unescape(in.string());
     const bool is_float = type == "float";
     if (!is_float && type != "spectrum" && type != "color")
@@ -435,7 +440,7 @@ void PbrtReader::shape(PbrtTokenizer& in) {
 }
 
 void PbrtReader::object_begin(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     const std::string name = unescape(in.string());
     if (scene_.group >= 0)
         throw SceneError(where, "objects cannot be nested: ObjectBegin before ObjectEnd");
@@ -454,7 +459,7 @@ void PbrtReader::object_end(PbrtTokenizer& in) {
 }
 
 void PbrtReader::object_instance(PbrtTokenizer& in) {
-    const SourceLocation where = in.where();
+    const PbrtPlace where = in.where();
     const std::string name = unescape(in.string());
     if (scene_.group >= 0) throw SceneError(where, "an object cannot hold an instance");
     const auto it = scene_.objects.find(name);
@@ -517,7 +522,7 @@ void PbrtReader::world_end(PbrtTokenizer&) {
 
 void PbrtReader::make_view() {
     const bool v3 = scene_.is_v3();
-    const SourceLocation start{scene_.description.file, 0};
+    const PbrtPlace start{&scene_.description.file, 0};
     const auto complete = [&](PbrtArguments& args, const char* kind,
                               const char* fallback) -> PbrtArguments& {
         if (args.kind().empty()) args = {kind, fallback, start, {}};

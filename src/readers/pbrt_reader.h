@@ -20,7 +20,7 @@ public:
 private:
     enum class Place { Options, World, Anywhere };  ///< Before or after WorldBegin.
     struct Directive {
-        const char* name;
+        std::string_view name;
         int versions;
         Place place;
         void (PbrtReader::*read)(PbrtTokenizer& in);
@@ -78,14 +78,14 @@ private:
     /// Type of a named material or medium, taken out of its parameters.
     PbrtArguments take_type(PbrtArguments args, const char* kind);
     int make_material(PbrtArguments& args);
-    void push(const char* what, const SourceLocation& where);
-    void pop(const char* what, const char* closing, const SourceLocation& where);
+    void push(const char* what, PbrtPlace where);
+    void pop(const char* what, const char* closing, PbrtPlace where);
     void make_view();
     void finish(const SourceLocation& end);
 
     struct Saved {
         const char* what;  ///< "AttributeBegin", ...
-        SourceLocation where;
+        PbrtPlace where;
         PbrtState state;
     };
 

@@ -5,16 +5,12 @@
 
 #include <fmt/format.h>
 
+#include "readers/file_bytes.h"
 #include "readers/mitsuba_values.h"
 #include "readers/pbrt_spectrum.h"
 
 namespace etendue {
 namespace {
-
-std::string directory_of(const std::string& file) {
-    const auto directory = std::filesystem::path(file).parent_path();
-    return directory.empty() ? std::string(".") : directory.string();
-}
 
 std::vector<std::string> names_of(const std::map<std::string, int>& map) {
     std::vector<std::string> names;
@@ -33,11 +29,11 @@ PbrtScene::PbrtScene(const std::string& file, const ReadOptions& options) : opti
     description.search_paths.push_back(directory_of(file));
 }
 
-int PbrtScene::add(const char* category, const char* type, const SourceLocation& where) {
+int PbrtScene::add(const char* category, const char* type, SourceLocation where) {
     description.objects.push_back({.category = category,
                                    .type = type,
                                    .id = {},
-                                   .where = where,
+                                   .where = std::move(where),
                                    .params = {},
                                    .children = {}});
     return int(description.objects.size()) - 1;
@@ -69,7 +65,7 @@ int PbrtScene::texture(const PbrtArguments& args, std::string_view name, bool is
     if (const auto it = textures.find(id); it != textures.end()) return it->second;
     const auto& others = is_float ? spectrum_textures : float_textures;
     throw SceneError(
-        v->where(),
+        v->where,
         fmt::format("there is no {} texture {}{}", is_float ? "float" : "spectrum", quote(id),
                     others.contains(id)
                         ? fmt::format(", only one of the type {}", is_float ? "spectrum" : "float")

@@ -18,7 +18,7 @@ struct PbrtState {
     bool reverse_orientation = false;
     int material = -1;           ///< Object, -1 for the default one.
     std::string named_material;  ///< Instead, where it is not empty.
-    SourceLocation material_where;
+    PbrtPlace material_where;
     std::optional<PbrtArguments> area_light;
     std::string inside, outside;  ///< Media.
     /// pbrt-v4's Attribute: parameters that hold for every shape, light, ... that follows.
@@ -32,7 +32,7 @@ public:
     bool is_v3() const { return version == PbrtVersion::V3; }
 
     /// A new object, which nothing refers to yet.
-    int add(const char* category, const char* type, const SourceLocation& where);
+    int add(const char* category, const char* type, SourceLocation where);
     void set(int object, const char* name, ParamValue value);
     void add_child(int parent, const char* name, int object);
     const SceneObject& object(int index) const { return description.objects[size_t(index)]; }

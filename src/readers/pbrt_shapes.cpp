@@ -45,7 +45,7 @@ int make_plymesh(PbrtScene& scene, const PbrtArguments& args) {
     scene.set(shape, "filename", args.text("filename", ""));
     set_mesh_orientation(scene, shape);
     if (args.has("displacement"))
-        scene.reject(args.find("displacement")->where(), "displaced meshes are not supported");
+        scene.reject(args.find("displacement")->where, "displaced meshes are not supported");
     return finish(scene, args, shape);
 }
 
@@ -106,7 +106,7 @@ int make_trianglemesh(PbrtScene& scene, const PbrtArguments& args) {
 
 int make_bilinearmesh(PbrtScene& scene, const PbrtArguments& args) {
     if (args.has("emissionfilename"))
-        scene.reject(args.find("emissionfilename")->where(),
+        scene.reject(args.find("emissionfilename")->where,
                      "emission distributions of bilinear meshes are not supported");
     const MeshData vertices = read_vertices(args);
     return add_mesh(scene, args,
@@ -152,13 +152,19 @@ float phi_max(const PbrtArguments& args) {
     return args.number("phimax", 360, 1e-3f, 360) * kPi / 180;
 }
 
+[[noreturn]] void fail_order(const PbrtArguments& args, const char* lower, float x,
+                             const char* upper, float y) {
+    args.fail(lower, fmt::format("the {} of a {} is {}, but must be below its {}, {}", lower,
+                                 args.name(), x, upper, y));
+}
+
 int make_sphere(PbrtScene& scene, const PbrtArguments& args) {
     const float r = args.number("radius", 1, 1e-20f);
     const float z0 = clamp(args.number("zmin", -r), -r, r),
                 z1 = clamp(args.number("zmax", r), -r, r);
     const bool is_whole = z0 <= -r && z1 >= r && phi_max(args) >= 2 * kPi;
     if (!is_whole || !is_similarity(scene.state.ctm, true)) {
-        if (!(z0 < z1)) args.fail("zmin", "a sphere's zmin must be below its zmax");
+        if (!(z0 < z1)) fail_order(args, "zmin", z0, "zmax", z1);
         return add_tessellated(scene, args, sphere_surface(r, z0, z1, phi_max(args)));
     }
     const int shape = add_shape(scene, args, "sphere");
@@ -170,7 +176,7 @@ int make_sphere(PbrtScene& scene, const PbrtArguments& args) {
 int make_cylinder(PbrtScene& scene, const PbrtArguments& args) {
     const float r = args.number("radius", 1, 1e-20f);
     const float z0 = args.number("zmin", -1), z1 = args.number("zmax", 1);
-    if (!(z0 < z1)) args.fail("zmin", "a cylinder's zmin must be below its zmax");
+    if (!(z0 < z1)) fail_order(args, "zmin", z0, "zmax", z1);
     if (phi_max(args) < 2 * kPi || !is_similarity(scene.state.ctm, false))
         return add_tessellated(scene, args, cylinder_surface(r, z0, z1, phi_max(args)));
     const int shape = add_shape(scene, args, "cylinder");
@@ -184,7 +190,7 @@ int make_cylinder(PbrtScene& scene, const PbrtArguments& args) {
 int make_disk(PbrtScene& scene, const PbrtArguments& args) {
     const float r = args.number("radius", 1, 1e-20f), inner = args.number("innerradius", 0, 0);
     const float h = args.number("height", 0);
-    if (!(inner < r)) args.fail("innerradius", "a disk's innerradius must be below its radius");
+    if (!(inner < r)) fail_order(args, "innerradius", inner, "radius", r);
     if (inner > 0 || phi_max(args) < 2 * kPi)
         return add_tessellated(scene, args, disk_surface(r, inner, h, phi_max(args)));
     const int shape = scene.add("shape", "disk", args.where());
@@ -202,7 +208,7 @@ int make_cone(PbrtScene& scene, const PbrtArguments& args) {
 
 int make_paraboloid(PbrtScene& scene, const PbrtArguments& args) {
     const float z0 = args.number("zmin", 0, 0), z1 = args.number("zmax", 1, 1e-20f);
-    if (!(z0 < z1)) args.fail("zmin", "a paraboloid's zmin must be below its zmax");
+    if (!(z0 < z1)) fail_order(args, "zmin", z0, "zmax", z1);
     return add_tessellated(
         scene, args, paraboloid_surface(args.number("radius", 1, 1e-20f), z0, z1, phi_max(args)));
 }
@@ -223,7 +229,7 @@ std::vector<PbrtParamInfo> vertex_params() {
             {"indices", ParamKind::Int, "", "Points of each face."},
             {"N", ParamKind::Vector, "", "Normals of the points; flat without them."},
             {"uv", ParamKind::Vector, "", "Texture coordinates of the points."},
-            {"st", ParamKind::Vector, "", "As uv."},
+            {"st", ParamKind::Vector, "", "Another name of uv, which counts if both are given."},
             {"S", ParamKind::Vector, "", "Accepted; tangents follow uv."},
             {"faceIndices", ParamKind::Int, "", "Accepted; without effect."},
             {"discarddegenerateUVs", ParamKind::Bool, "", "Accepted; without effect."}};
@@ -250,7 +256,7 @@ const std::vector<PbrtEntry>& pbrt_shapes() {
              with_alpha({{"P", ParamKind::Vector, "", "Points."},
                          {"indices", ParamKind::Int, "", "Points of each triangle."},
                          {"levels", ParamKind::Int, "3", "How often each triangle becomes four."},
-                         {"nlevels", ParamKind::Int, "3", "As levels.", kV3},
+                         {"nlevels", ParamKind::Int, "3", "Another name of levels.", kV3},
                          {"scheme", ParamKind::String, "loop", "Accepted; without effect."}}),
              make_loopsubdiv},
             {"sphere", kV3And4, "Becomes sphere; a mesh where it is cut off or scaled unevenly.",
@@ -269,7 +275,7 @@ const std::vector<PbrtEntry>& pbrt_shapes() {
             {"disk", kV3And4, "Becomes disk; a mesh where it has a hole or is cut off.",
              with_alpha({{"radius", ParamKind::Float, "1", "Radius."},
                          {"innerradius", ParamKind::Float, "0", "Radius of the hole."},
-                         {"height", ParamKind::Float, "0", "Its z."},
+                         {"height", ParamKind::Float, "0", "z of the disk."},
                          kPhiMax}),
              make_disk},
             {"cone", kV3, "Becomes mesh.",

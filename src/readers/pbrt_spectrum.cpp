@@ -14,7 +14,7 @@ namespace etendue {
 namespace {
 
 [[noreturn]] void fail(const PbrtValue& value, const std::string& message) {
-    throw SceneError(value.where(), fmt::format("parameter \"{}\": {}", value.name, message));
+    throw SceneError(value.where, fmt::format("parameter \"{}\": {}", value.name, message));
 }
 
 struct Glass {
@@ -52,7 +52,9 @@ Rgb normalized(Rgb c, const PbrtValue& value) {
 Rgb blackbody(const PbrtValue& value, PbrtSpectrum kind, bool v3) {
     const size_t expected = v3 ? 2 : 1;
     if (value.numbers.size() != expected && !(v3 && value.numbers.size() == 1))
-        fail(value, v3 ? "expected a temperature and a scale" : "expected one temperature");
+        fail(value, fmt::format("expected {}, found {} numbers",
+                                v3 ? "a temperature and a scale" : "one temperature",
+                                value.numbers.size()));
     const double kelvin = value.numbers[0];
     if (!(kelvin >= 100)) fail(value, fmt::format("{} K is not a temperature of light", kelvin));
     const Rgb c = blackbody_rgb(kelvin);
@@ -95,16 +97,18 @@ std::vector<std::string> known_names() {
 SpectrumSamples samples_of(const PbrtValue& value, const PbrtScene& scene) {
     if (!value.strings.empty()) {
         std::string path;
-        const std::string text = scene.load(value.strings[0], value.where(), path);
+        const std::string text = scene.load(value.strings[0], value.where, path);
         return parse_spectrum_file(text, path);
     }
-    if (value.numbers.size() % 2 != 0) fail(value, "expected pairs of a wavelength and a value");
+    if (value.numbers.size() % 2 != 0)
+        fail(value, fmt::format("expected pairs of a wavelength and a value, found {} numbers",
+                                value.numbers.size()));
     SpectrumSamples samples;
     for (size_t i = 0; i < value.numbers.size(); i += 2) {
         samples.wavelengths.push_back(value.numbers[i]);
         samples.values.push_back(value.numbers[i + 1]);
     }
-    check_samples(samples, value.where());
+    check_samples(samples, value.where);
     return samples;
 }
 
@@ -119,7 +123,9 @@ Rgb spectrum(const PbrtValue& value, PbrtSpectrum kind, const PbrtScene& scene) 
                    ? normalized(spectrum_to_rgb(std::vector{300.0, 900.0}, std::vector{1.0, 1.0}),
                                 value)
                    : Rgb(value.numbers[0]);
-    if (value.strings.size() > 1) fail(value, "expected one name or file of a spectrum");
+    if (value.strings.size() > 1)
+        fail(value, fmt::format("expected one name or file of a spectrum, found {}",
+                                value.strings.size()));
     if (!value.strings.empty() && !is_file(value.strings[0])) {
         const std::string& name = value.strings[0];
         const auto c = named(name);
@@ -150,7 +156,8 @@ Rgb pbrt_colour(const PbrtValue& value, PbrtSpectrum kind, const PbrtScene& scen
     default: c = spectrum(value, kind, scene);
     }
     if (!is_finite(c) || std::min({c.r, c.g, c.b}) < 0)
-        fail(value, "a colour must be finite and not negative");
+        fail(value, fmt::format("a colour must be finite and not negative, but is {} {} {}", c.r,
+                                c.g, c.b));
     return c;
 }
 

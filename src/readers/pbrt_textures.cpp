@@ -18,7 +18,7 @@ bool is_float(const PbrtArguments& args) {
 Transform mapping(PbrtScene& scene, const PbrtArguments& args) {
     if (const std::string m = args.text("mapping", "uv"); m != "uv")
         scene.refuse(
-            args.find("mapping")->where(),
+            args.find("mapping")->where,
             fmt::format("the mapping {} is not supported: textures are functions of (u, v)",
                         quote(m)),
             "\"uv\"");
@@ -54,7 +54,7 @@ bool is_raw(PbrtScene& scene, const PbrtArguments& args) {
     if (encoding == "linear") return true;
     if (encoding != "sRGB" && encoding != "gamma 2.2")
         scene.refuse(
-            args.find("encoding")->where(),
+            args.find("encoding")->where,
             fmt::format("the encoding {} is not supported (known: sRGB, linear)", quote(encoding)),
             "\"sRGB\"");
     return false;
@@ -67,7 +67,7 @@ int make_imagemap(PbrtScene& scene, const PbrtArguments& args) {
     set_to_uv(scene, image, flip * mapping(scene, args));
     const std::string wrap = args.text("wrap", "repeat");
     if (wrap == "black")
-        scene.refuse(args.find("wrap")->where(), "the wrap mode \"black\" is not supported",
+        scene.refuse(args.find("wrap")->where, "the wrap mode \"black\" is not supported",
                      "\"clamp\"");
     else if (wrap != "repeat" && wrap != "clamp")
         args.fail("wrap",
@@ -77,7 +77,7 @@ int make_imagemap(PbrtScene& scene, const PbrtArguments& args) {
         scene.set(image, "filter_type", std::string("nearest"));
     if (is_raw(scene, args)) scene.set(image, "raw", true);
     if (args.flag("invert", false))
-        scene.reject(args.find("invert")->where(), "inverted images are not supported");
+        scene.reject(args.find("invert")->where, "inverted images are not supported");
     const float scale = args.number("scale", 1);
     if (scale == 1) return image;
     const int scaled = scene.add("texture", "scale", args.where());
@@ -174,19 +174,20 @@ int make_bilerp(PbrtScene& scene, const PbrtArguments& args) {
 std::vector<PbrtParamInfo> with_mapping(std::vector<PbrtParamInfo> params) {
     const std::vector<PbrtParamInfo> more = {
         {"mapping", ParamKind::String, "uv", "Others than uv are rejected."},
-        {"uscale", ParamKind::Float, "1", "Factor of u."},
-        {"vscale", ParamKind::Float, "1", "Factor of v."},
-        {"udelta", ParamKind::Float, "0", "Added to u."},
-        {"vdelta", ParamKind::Float, "0", "Added to v."},
-        {"v1", ParamKind::Vector, "", "Of rejected mappings."},
-        {"v2", ParamKind::Vector, "", "Of rejected mappings."}};
+        {"uscale", ParamKind::Float, "1", "Factor by which u is multiplied."},
+        {"vscale", ParamKind::Float, "1", "Factor by which v is multiplied."},
+        {"udelta", ParamKind::Float, "0", "Number that is added to u."},
+        {"vdelta", ParamKind::Float, "0", "Number that is added to v."},
+        {"v1", ParamKind::Vector, "", "Only for mappings that are rejected."},
+        {"v2", ParamKind::Vector, "", "Only for mappings that are rejected."}};
     params.insert(params.end(), more.begin(), more.end());
     return params;
 }
 
 std::vector<PbrtParamInfo> octaves() {
-    return {{"octaves", ParamKind::Int, "8", "Number of octaves."},
-            {"roughness", ParamKind::Float, "0.5", "Ratio of their amplitudes."}};
+    return {
+        {"octaves", ParamKind::Int, "8", "Number of octaves."},
+        {"roughness", ParamKind::Float, "0.5", "Ratio of the amplitudes of successive octaves."}};
 }
 
 }  // namespace
@@ -197,7 +198,8 @@ const std::vector<PbrtEntry>& pbrt_textures() {
          with_mapping(
              {{"filename", ParamKind::String, "", "Image."},
               {"wrap", ParamKind::String, "repeat", "repeat or clamp; black is rejected."},
-              {"scale", ParamKind::Float, "1", "Factor of the values."},
+              {"scale", ParamKind::Float, "1",
+               "Factor by which the values of the image are multiplied."},
               {"gamma", ParamKind::Bool, "true", "Whether 8-bit codes are sRGB.", kV3},
               {"trilinear", ParamKind::Bool, "", "Accepted; images are filtered bilinearly.", kV3},
               {"encoding", ParamKind::String, "sRGB", "sRGB or linear.", kV4},
@@ -214,33 +216,33 @@ const std::vector<PbrtEntry>& pbrt_textures() {
         {"scale",
          kV3And4,
          "Becomes scale.",
-         {{"tex", ParamKind::Texture, "1", "One factor.", kV4},
-          {"scale", ParamKind::Texture, "1", "The other one.", kV4},
-          {"tex1", ParamKind::Texture, "1", "One factor."},
-          {"tex2", ParamKind::Texture, "1", "The other one."}},
+         {{"tex", ParamKind::Texture, "1", "First factor.", kV4},
+          {"scale", ParamKind::Texture, "1", "Second factor.", kV4},
+          {"tex1", ParamKind::Texture, "1", "First factor."},
+          {"tex2", ParamKind::Texture, "1", "Second factor."}},
          make_scale},
         {"mix",
          kV3And4,
          "Becomes mix.",
-         {{"tex1", ParamKind::Texture, "0", "Where amount is 0."},
-          {"tex2", ParamKind::Texture, "1", "Where amount is 1."},
-          {"amount", ParamKind::Texture, "0.5", "Share of tex2."}},
+         {{"tex1", ParamKind::Texture, "0", "Value where amount is 0."},
+          {"tex2", ParamKind::Texture, "1", "Value where amount is 1."},
+          {"amount", ParamKind::Texture, "0.5", "Weight of tex2."}},
          make_mix},
         {"checkerboard", kV3And4, "Becomes checkerboard, or checkerboard3d.",
-         with_mapping({{"tex1", ParamKind::Texture, "1", "The squares of the diagonal."},
-                       {"tex2", ParamKind::Texture, "0", "The others."},
+         with_mapping({{"tex1", ParamKind::Texture, "1", "Value of the squares on the diagonal."},
+                       {"tex2", ParamKind::Texture, "0", "Value of the other squares."},
                        {"dimension", ParamKind::Int, "2", "3 becomes checkerboard3d."},
                        {"aamode", ParamKind::String, "", "Accepted; without effect.", kV3}}),
          make_checkerboard},
         {"bilerp", kV3And4, "Becomes bilerp.",
          with_mapping({{"v00", ParamKind::Texture, "0", "Value at (0, 0)."},
-                       {"v01", ParamKind::Texture, "1", "At (0, 1)."},
-                       {"v10", ParamKind::Texture, "0", "At (1, 0)."},
-                       {"v11", ParamKind::Texture, "1", "At (1, 1)."}}),
+                       {"v01", ParamKind::Texture, "1", "Value at (0, 1)."},
+                       {"v10", ParamKind::Texture, "0", "Value at (1, 0)."},
+                       {"v11", ParamKind::Texture, "1", "Value at (1, 1)."}}),
          make_bilerp},
         {"dots", kV3And4, "Becomes dots, in places of etendue's own.",
          with_mapping({{"inside", ParamKind::Texture, "1", "Value of the dots."},
-                       {"outside", ParamKind::Texture, "0", "Value around them."}}),
+                       {"outside", ParamKind::Texture, "0", "Value around the dots."}}),
          make_dots},
         {"uv", kV3, "Rejected: there is no such texture.", {}, nullptr},
         {"directionmix",
@@ -256,9 +258,9 @@ const std::vector<PbrtEntry>& pbrt_textures() {
          kV3And4,
          "Becomes marble, with pbrt-v4's spline; the noise is etendue's own.",
          {{"octaves", ParamKind::Int, "8", "Number of octaves."},
-          {"roughness", ParamKind::Float, "0.5", "Ratio of their amplitudes."},
-          {"scale", ParamKind::Float, "1", "Factor of the coordinates."},
-          {"variation", ParamKind::Float, "0.2", "Factor of the noise."}},
+          {"roughness", ParamKind::Float, "0.5", "Ratio of the amplitudes of successive octaves."},
+          {"scale", ParamKind::Float, "1", "Factor by which the coordinates are multiplied."},
+          {"variation", ParamKind::Float, "0.2", "Factor by which the noise is multiplied."}},
          make_noise},
         {"ptex", kV3And4, "Rejected: Ptex files are not supported.", {}, nullptr},
     };

@@ -35,11 +35,6 @@ void PbrtTokenizer::skip_comment() {
     if (at_ != end_) ++line_;
 }
 
-bool PbrtTokenizer::ends_word(const char* at) const {
-    return at == end_ || *at == ' ' || *at == '\n' || *at == '\t' || *at == '\r' || *at == ']' ||
-           *at == '[' || *at == '"' || *at == '#';
-}
-
 void PbrtTokenizer::fail_number(const char* expected) {
     if (at_ == end_) fail(fmt::format("expected {}, but the file ends", expected));
     if (*at_ == '"')

@@ -1,6 +1,7 @@
 #pragma once
 // The text of a pbrt file: words, strings, numbers and brackets between blanks and comments.
 
+#include <array>
 #include <charconv>
 #include <string>
 #include <string_view>
@@ -9,6 +10,14 @@
 #include "description/source_location.h"
 
 namespace etendue {
+
+/// A line of a file whose name is stored elsewhere, so that it is cheap to copy.
+struct PbrtPlace {
+    const std::string* file = nullptr;
+    int line = 0;
+
+    operator SourceLocation() const { return {file ? *file : std::string(), line}; }
+};
 
 class PbrtTokenizer {
 public:
@@ -42,9 +51,7 @@ public:
         return value;
     }
 
-    const std::string& file() const { return *file_; }
-    int line() const { return line_; }
-    SourceLocation where() const { return {*file_, line_}; }
+    PbrtPlace where() const { return {file_, line_}; }
     [[noreturn]] void fail(const std::string& message) const { throw SceneError(where(), message); }
 
 private:
@@ -60,7 +67,14 @@ private:
         }
     }
     void skip_comment();
-    bool ends_word(const char* at) const;
+    static constexpr std::array<bool, 256> kEndsWord = [] {
+        std::array<bool, 256> ends{};
+        for (const unsigned char c : {' ', '\n', '\t', '\r', ']', '[', '"', '#'}) ends[c] = true;
+        return ends;
+    }();
+    bool ends_word(const char* at) const {
+        return at == end_ || kEndsWord[static_cast<unsigned char>(*at)];
+    }
     template <class T>
     static bool is_finite(T value) {
         return value - value == 0;

@@ -25,7 +25,9 @@ ScreenWindow screen_window(const PbrtScene& scene, const PbrtArguments& args) {
                                    : double(scene.film_width) / scene.film_height;
     if (const auto& w = args.numbers("screenwindow", 4); !w.empty()) {
         if (w.size() != 4 || !(w[0] < w[1] && w[2] < w[3]))
-            args.fail("screenwindow", "expected four numbers: left, right, bottom, top");
+            args.fail("screenwindow",
+                      fmt::format("expected four numbers: left < right, bottom < top, found {}",
+                                  fmt::join(w, " ")));
         return {w[0], w[1], w[2], w[3], true};
     }
     // The shorter side of the image spans [-1, 1].
@@ -37,7 +39,9 @@ ScreenWindow screen_window(const PbrtScene& scene, const PbrtArguments& args) {
 void read_shutter(PbrtScene& scene, const PbrtArguments& args) {
     const float time = args.number("shutterclose", 1) - args.number("shutteropen", 0);
     if (scene.is_v3()) return;
-    if (!(time > 0)) args.fail("shutterclose", "the shutter must close after it opens");
+    if (!(time > 0))
+        args.fail("shutterclose",
+                  fmt::format("the shutter must close after it opens, not {} earlier", -time));
     scene.exposure *= time;
 }
 
@@ -81,7 +85,7 @@ int make_perspective(PbrtScene& scene, const PbrtArguments& args) {
 int make_orthographic(PbrtScene& scene, const PbrtArguments& args) {
     read_shutter(scene, args);
     if (args.number("lensradius", 0, 0) > 0)
-        scene.reject(args.find("lensradius")->where(),
+        scene.reject(args.find("lensradius")->where,
                      "an orthographic camera with a lens is not supported");
     const int sensor = scene.add("sensor", "orthographic", args.where());
     const ScreenWindow w = screen_window(scene, args);
@@ -100,17 +104,23 @@ int make_orthographic(PbrtScene& scene, const PbrtArguments& args) {
 void read_crop(const PbrtArguments& args, int width, int height, int (&crop)[4]) {
     crop[0] = 0, crop[1] = width, crop[2] = 0, crop[3] = height;
     if (const auto& b = args.integers("pixelbounds"); !b.empty()) {
-        if (b.size() != 4) args.fail("pixelbounds", "expected four integers: x0, x1, y0, y1");
+        if (b.size() != 4)
+            args.fail("pixelbounds",
+                      fmt::format("expected four integers: x0, x1, y0, y1, found {}", b.size()));
         for (int i = 0; i < 4; ++i) crop[i] = std::clamp(b[size_t(i)], 0, i < 2 ? width : height);
     }
     if (const auto& w = args.numbers("cropwindow", 4); !w.empty()) {
-        if (w.size() != 4) args.fail("cropwindow", "expected four numbers: x0, x1, y0, y1");
+        if (w.size() != 4)
+            args.fail("cropwindow",
+                      fmt::format("expected four numbers: x0, x1, y0, y1, found {}", w.size()));
         for (int i = 0; i < 4; ++i) {
             const int size = i < 2 ? width : height;
             crop[i] = int(std::ceil(float(size) * clamp(w[size_t(i)], 0, 1)));
         }
     }
-    if (crop[0] >= crop[1] || crop[2] >= crop[3]) args.fail("the film's crop has no pixels");
+    if (crop[0] >= crop[1] || crop[2] >= crop[3])
+        args.fail(fmt::format("the film's crop has no pixels: x from {} to {}, y from {} to {}",
+                              crop[0], crop[1], crop[2], crop[3]));
 }
 
 int make_film(PbrtScene& scene, const PbrtArguments& args) {
@@ -124,11 +134,11 @@ int make_film(PbrtScene& scene, const PbrtArguments& args) {
     } else {
         scene.exposure *= args.number("iso", 100, 0) / 100;
         if (const std::string sensor = args.text("sensor", "cie1931"); sensor != "cie1931")
-            scene.refuse(args.find("sensor")->where(),
+            scene.refuse(args.find("sensor")->where,
                          fmt::format("the measured sensor \"{}\" is not supported", sensor),
                          "\"cie1931\"");
         if (args.number("whitebalance", 0, 0) != 0)
-            scene.reject(args.find("whitebalance")->where(), "white balance is not supported");
+            scene.reject(args.find("whitebalance")->where, "white balance is not supported");
     }
     const int film = scene.add("film", "hdrfilm", args.where());
     scene.set(film, "width", int64_t(scene.film_width));
@@ -151,13 +161,16 @@ float radius(const PbrtScene& scene, const PbrtArguments& args, float v3, float 
     const float fallback = scene.is_v3() ? v3 : v4;
     const float x = args.number(names[0], fallback, 0.01f, 16),
                 y = args.number(names[1], fallback, 0.01f, 16);
-    if (x != y) args.fail(names[0], "a filter must be as wide as it is high");
+    if (x != y)
+        args.fail(names[0],
+                  fmt::format("a filter must be as wide as it is high, not {} by {}", x, y));
     return x;
 }
 
 int make_box(PbrtScene& scene, const PbrtArguments& args) {
-    if (radius(scene, args, 0.5f, 0.5f) != 0.5f)
-        scene.refuse(args.where(), "a box filter must have the radius 0.5", "a box of one pixel");
+    if (const float r = radius(scene, args, 0.5f, 0.5f); r != 0.5f)
+        scene.refuse(args.where(), fmt::format("a box filter must have the radius 0.5, not {}", r),
+                     "a box of one pixel");
     return scene.add("rfilter", "box", args.where());
 }
 
@@ -177,8 +190,10 @@ int make_gaussian(PbrtScene& scene, const PbrtArguments& args) {
 }
 
 int make_mitchell(PbrtScene& scene, const PbrtArguments& args) {
-    if (radius(scene, args, 2, 2) != 2)
-        scene.refuse(args.where(), "a Mitchell filter must have the radius 2", "one of radius 2");
+    if (const float r = radius(scene, args, 2, 2); r != 2)
+        scene.refuse(args.where(),
+                     fmt::format("a Mitchell filter must have the radius 2, not {}", r),
+                     "one of radius 2");
     const int filter = scene.add("rfilter", "mitchell", args.where());
     scene.set(filter, "b", double(args.number("B", 1 / 3.0f)));
     scene.set(filter, "c", double(args.number("C", 1 / 3.0f)));
@@ -240,8 +255,10 @@ std::vector<PbrtParamInfo> camera_params() {
              "Left, right, bottom, top of the view."},
             {"lensradius", ParamKind::Float, "0", "Radius of the lens; 0: pinhole."},
             {"focaldistance", ParamKind::Float, "1e6", "Distance of the plane in focus."},
-            {"shutteropen", ParamKind::Float, "0", "Nothing moves; the time is v4's exposure."},
-            {"shutterclose", ParamKind::Float, "1", "As shutteropen."}};
+            {"shutteropen", ParamKind::Float, "0",
+             "Nothing moves; v4: shutterclose - shutteropen multiplies the image."},
+            {"shutterclose", ParamKind::Float, "1",
+             "End of the exposure, which begins at shutteropen."}};
 }
 
 std::vector<PbrtParamInfo> film_params() {
@@ -249,10 +266,12 @@ std::vector<PbrtParamInfo> film_params() {
         {"xresolution", ParamKind::Int, "1280 (v3: 640)", "Width in pixels."},
         {"yresolution", ParamKind::Int, "720 (v3: 480)", "Height in pixels."},
         {"cropwindow", ParamKind::Vector, "0 1 0 1", "Part that is rendered: x0, x1, y0, y1."},
-        {"pixelbounds", ParamKind::Int, "", "The same in pixels.", kV4},
+        {"pixelbounds", ParamKind::Int, "", "Part that is rendered, in pixels: x0, x1, y0, y1.",
+         kV4},
         {"filename", ParamKind::String, "", "Accepted; the command line names the output."},
         {"diagonal", ParamKind::Float, "", "Accepted; only realistic cameras need it."},
-        {"scale", ParamKind::Float, "1", "Factor of the image; here of every light.", kV3},
+        {"scale", ParamKind::Float, "1", "Factor of the image, by which every light is multiplied.",
+         kV3},
         {"maxsampleluminance", ParamKind::Float, "", "Accepted; samples are never clamped.", kV3},
         {"iso", ParamKind::Float, "100",
          "Sensitivity: the image is multiplied by iso/100; here every light.", kV4},
@@ -367,7 +386,7 @@ const std::vector<PbrtEntry>& pbrt_samplers() {
             {"randomization", ParamKind::String, "", "Accepted; without effect."},
             {"xsamples", ParamKind::Int, "4",
              "Of stratified: samples of a pixel are xsamples·ysamples."},
-            {"ysamples", ParamKind::Int, "4", "As xsamples."}};
+            {"ysamples", ParamKind::Int, "4", "Of stratified: see xsamples."}};
         for (const auto& [name, versions] : {std::pair("halton", kV3And4),
                                              {"sobol", kV3And4},
                                              {"stratified", kV3And4},

@@ -6,6 +6,9 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <utility>
+
+#include <fmt/format.h>
 
 #include "readers/file_bytes.h"
 #include "readers/gzip.h"
@@ -119,7 +122,7 @@ private:
         const std::string_view name = word();
         in_.skip_blanks();
         const int64_t count = in_.integer("number of elements");
-        if (count < 0) in_.fail("negative number of elements");
+        if (count < 0) in_.fail(fmt::format("negative number of elements: {}", count));
         header_.elements.push_back({name, uint64_t(count), {}});
     }
     void property() {
@@ -168,7 +171,6 @@ public:
         }
     }
     [[noreturn]] void fail(const std::string& message) const { in_.fail(message); }
-    SourceLocation where() const { return in_.where(); }
 
 private:
     void next() {
@@ -182,8 +184,9 @@ template <bool kSwap>
 class BinaryBody {
 public:
     static constexpr bool kAscii = false;
-    BinaryBody(std::string_view bytes, const std::string& file)
-        : at_(bytes.data()), end_(at_ + bytes.size()), file_(&file) {}
+    /// The bytes of a file from `begin` on.
+    BinaryBody(std::string_view bytes, size_t begin, const std::string& file)
+        : first_(bytes.data()), at_(first_ + begin), end_(first_ + bytes.size()), file_(&file) {}
 
     size_t remaining() const { return size_t(end_ - at_); }
     double value(Type type) {
@@ -207,26 +210,56 @@ public:
         require(count, size_of(type));
         at_ += count * size_of(type);
     }
-    [[noreturn]] void fail(const std::string& message) const { throw SceneError(where(), message); }
-    SourceLocation where() const { return {*file_, 0}; }
-
-private:
+    /// Checks that `count` records of `bytes` bytes each come next.
     void require(uint64_t count, size_t bytes) const {
         if (count > remaining() / bytes) fail("the file ends early");
     }
+    const char* position() const { return at_; }
+    /// Passes over bytes that require() has checked.
+    void advance(size_t bytes) { at_ += bytes; }
+    /// The number of a type at any place, as a float.
+    static float number_at(const char* at, Type type) {
+        switch (type) {
+        case Type::Float32: return load_at<float>(at);
+        case Type::Float64: return float(load_at<double>(at));
+        case Type::Int8: return load_at<int8_t>(at);
+        case Type::Uint8: return load_at<uint8_t>(at);
+        case Type::Int16: return load_at<int16_t>(at);
+        case Type::Uint16: return load_at<uint16_t>(at);
+        case Type::Int32: return float(load_at<int32_t>(at));
+        default: return float(load_at<uint32_t>(at));
+        }
+    }
+    /// Passes over one list of three indices below `limit`, with a length of one byte, if such a list comes next.
+    bool take_triangle(uint32_t limit, MeshData::Triangle& triangle) {
+        constexpr size_t kBytes = 1 + sizeof triangle;
+        if (remaining() < kBytes || *at_ != 3) return false;
+        for (size_t i = 0; i < 3; ++i) triangle[i] = load_at<uint32_t>(at_ + 1 + 4 * i);
+        if (std::max({triangle[0], triangle[1], triangle[2]}) >= limit) return false;
+        at_ += kBytes;
+        return true;
+    }
+    [[noreturn]] void fail(const std::string& message) const {
+        throw SceneError({*file_, 0}, fmt::format("{} (at byte {})", message, at_ - first_));
+    }
+
+private:
     template <class T>
-    T load() {
-        require(1, sizeof(T));
+    static T load_at(const char* at) {
         char raw[sizeof(T)];
-        std::memcpy(raw, at_, sizeof(T));
-        at_ += sizeof(T);
+        std::memcpy(raw, at, sizeof(T));
         if constexpr (kSwap) std::reverse(raw, raw + sizeof(T));
         T value;
         std::memcpy(&value, raw, sizeof(T));
         return value;
     }
+    template <class T>
+    T load() {
+        require(1, sizeof(T));
+        return load_at<T>(std::exchange(at_, at_ + sizeof(T)));
+    }
 
-    const char *at_, *end_;
+    const char *first_, *at_, *end_;
     const std::string* file_;
 };
 
@@ -305,11 +338,29 @@ private:
         for (size_t k = 0; k < slots.size(); ++k)
             if (slots[k] == kColorSlot) color_scale = unit_scale(e.properties[k].type);
 
-        mesh_.positions.reserve(e.count);
-        if (has_normals) mesh_.normals.reserve(e.count);
-        if (has_uvs) mesh_.uvs.reserve(e.count);
-        if (has_colors) mesh_.colors.reserve(e.count);
+        mesh_.positions.resize(e.count);
+        if (has_normals) mesh_.normals.resize(e.count);
+        if (has_uvs) mesh_.uvs.resize(e.count);
+        if (has_colors) mesh_.colors.resize(e.count);
+        for_records(e, slots, [&](uint64_t i, const VertexRecord& r) {
+            const float* v = r.values;
+            if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2]))
+                in_.fail("position of vertex " + std::to_string(i) + " is not finite");
+            mesh_.positions[i] = {v[0], v[1], v[2]};
+            if (has_normals) mesh_.normals[i] = {v[3], v[4], v[5]};
+            if (has_uvs) mesh_.uvs[i] = {v[6], v[7]};
+            if (has_colors) mesh_.colors[i] = Vec3{v[8], v[9], v[10]} * color_scale;
+        });
+    }
+    /// Calls `use(i, record)` for each vertex.
+    template <class Use>
+    void for_records(const Element& e, const std::vector<int>& slots, const Use& use) {
         VertexRecord r{};
+        if constexpr (!Body::kAscii) {
+            const auto is_list = [](const Property& p) { return p.count_type.has_value(); };
+            if (std::none_of(e.properties.begin(), e.properties.end(), is_list))
+                return for_fixed_records(e, slots, use);
+        }
         for (uint64_t i = 0; i < e.count; ++i) {
             for (size_t k = 0; k < slots.size(); ++k) {
                 if (slots[k] == kNoSlot)
@@ -317,13 +368,29 @@ private:
                 else
                     r.values[slots[k]] = float(in_.value(e.properties[k].type));
             }
-            const float* v = r.values;
-            if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2]))
-                in_.fail("position of vertex " + std::to_string(i) + " is not finite");
-            mesh_.positions.push_back({v[0], v[1], v[2]});
-            if (has_normals) mesh_.normals.push_back({v[3], v[4], v[5]});
-            if (has_uvs) mesh_.uvs.push_back({v[6], v[7]});
-            if (has_colors) mesh_.colors.push_back(Vec3{v[8], v[9], v[10]} * color_scale);
+            use(i, r);
+        }
+    }
+    /// The same for binary records without lists, which all have the same size.
+    template <class Use>
+    void for_fixed_records(const Element& e, const std::vector<int>& slots, const Use& use) {
+        struct Field {
+            int slot;
+            Type type;
+            size_t offset;
+        };
+        std::vector<Field> fields;
+        size_t bytes = 0;
+        for (size_t k = 0; k < slots.size(); ++k) {
+            if (slots[k] != kNoSlot) fields.push_back({slots[k], e.properties[k].type, bytes});
+            bytes += size_of(e.properties[k].type);
+        }
+        in_.require(e.count, bytes);
+        VertexRecord r{};
+        for (uint64_t i = 0; i < e.count; ++i, in_.advance(bytes)) {
+            for (const Field& f : fields)
+                r.values[f.slot] = Body::number_at(in_.position() + f.offset, f.type);
+            use(i, r);
         }
     }
 
@@ -336,13 +403,29 @@ private:
         if (!is_integer(indices->type)) in_.fail("vertex_indices must be integers");
 
         mesh_.triangles.reserve(mesh_.triangles.size() + e.count);
-        for (uint64_t i = 0; i < e.count; ++i)
+        for (uint64_t i = triangles(e); i < e.count; ++i)
             for (auto p = e.properties.begin(); p != e.properties.end(); ++p) {
                 if (p == indices)
                     polygon(*p);
                 else
                     skip(*p);
             }
+    }
+    /// Reads the faces up to the first that is not a triangle, or is invalid, in the most frequent binary layout. Returns
+    /// their number.
+    uint64_t triangles(const Element& e) {
+        uint64_t count = 0;
+        if constexpr (!Body::kAscii) {
+            const Property& p = e.properties[0];
+            if (e.properties.size() > 1 || size_of(*p.count_type) != 1 || size_of(p.type) != 4)
+                return 0;
+            const auto limit = uint32_t(
+                std::min<size_t>(mesh_.positions.size(), std::numeric_limits<int32_t>::max()));
+            MeshData::Triangle triangle;
+            for (; count < e.count && in_.take_triangle(limit, triangle); ++count)
+                mesh_.triangles.push_back(triangle);
+        }
+        return count;
     }
     void polygon(const Property& p) {
         const uint64_t count = list_count(p);
@@ -373,7 +456,7 @@ private:
 
     uint64_t list_count(const Property& p) {
         const int64_t count = in_.integer(*p.count_type);
-        if (count < 0) in_.fail("negative length of a list");
+        if (count < 0) in_.fail(fmt::format("negative length of a list: {}", count));
         return uint64_t(count);
     }
     void skip(const Property& p) { in_.skip(p.type, p.count_type ? list_count(p) : 1); }
@@ -397,12 +480,14 @@ MeshData parse_body(const Header& header, Body body) {
 MeshData parse_ply(std::string_view bytes, const std::string& name, const MeshOptions& options) {
     TextCursor in(bytes, name);
     const Header header = HeaderParser(in).parse();
-    const std::string_view rest(in.position(), in.remaining());
+    const size_t begin = bytes.size() - in.remaining();
     MeshData mesh;
     switch (header.format) {
     case Format::Ascii: mesh = parse_body(header, AsciiBody(in)); break;
-    case Format::LittleEndian: mesh = parse_body(header, BinaryBody<false>(rest, name)); break;
-    case Format::BigEndian: mesh = parse_body(header, BinaryBody<true>(rest, name)); break;
+    case Format::LittleEndian:
+        mesh = parse_body(header, BinaryBody<false>(bytes, begin, name));
+        break;
+    case Format::BigEndian: mesh = parse_body(header, BinaryBody<true>(bytes, begin, name)); break;
     }
     mesh.name = name;
     finish_mesh(mesh, options, {name, 0});
@@ -410,8 +495,9 @@ MeshData parse_ply(std::string_view bytes, const std::string& name, const MeshOp
 }
 
 MeshData read_ply(const std::string& path, const MeshOptions& options) {
-    const std::string bytes = read_file_bytes(path);
-    return parse_ply(is_gzip(bytes) ? unpack_gzip(bytes, path) : bytes, path, options);
+    std::string bytes = read_file_bytes(path);
+    if (is_gzip(bytes)) bytes = unpack_gzip(bytes, path);
+    return parse_ply(bytes, path, options);
 }
 
 }  // namespace etendue

@@ -10,6 +10,7 @@
 #include "film/filter.h"
 #include "scene/model_builder.h"
 #include "scene/plugin_lookup.h"
+#include "scene/preload.h"
 #include "scene/settings.h"
 #include "scene/shape_registry.h"
 
@@ -20,7 +21,7 @@ class SceneBuilder {
 public:
     SceneBuilder(const SceneDescription& description, const BuildOptions& options)
         : description_(description), options_(options), plugins_(description, options.lenient),
-          models_(plugins_) {}
+          models_(plugins_), preload_(description, models_.images()) {}
 
     Scene build() {
         scene_.file_ = description_.file;
@@ -152,7 +153,8 @@ private:
         const Params p = plugins_.params(index);
         SceneShape s;
         auto made = plugins_.attempt(index, [&] {
-            return entry->make(p, [&](const std::string& m) { plugins_.warn(p.where(), m); });
+            return preload_.take_shape(*entry, p,
+                                       [&](const std::string& m) { plugins_.warn(p.where(), m); });
         });
         if (!made) return {};
         scene_.owned_shapes_.push_back(std::move(made));
@@ -451,6 +453,7 @@ private:
     BuildOptions options_;
     PluginLookup plugins_;
     ModelBuilder models_;
+    Preload preload_;
     Scene scene_;
     std::map<int, std::vector<Instance>> group_of_;
     std::vector<bool> is_child_;  ///< Whether another object refers to an object.

@@ -34,6 +34,7 @@ public:
     MediumId make_medium(int index);
     /// Constructs all emitters of the object and returns the first one. With `on_shape` it must be an area emitter.
     const Emitter* make_emitters(int index, const Shape* on_shape = nullptr);
+    TextureCache& images() override { return *models_.images; }
     /// The material of shapes without one: diffuse.
     const Material* default_material(Rgb reflectance);
 
@@ -49,7 +50,6 @@ private:
     bool is_solid(int texture) const;
     const Material* stand_in(int index);
     const Shape* shape() const override { return emitting_shape_; }
-    TextureCache& images() override { return *models_.images; }
 
     PluginLookup& plugins_;
     Models models_;

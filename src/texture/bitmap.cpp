@@ -171,6 +171,15 @@ Rgb BitmapTexture::image_mean(const Texels& texels) const {
     return {float(sum[0] / n), float(sum[1] / n), float(sum[2] / n)};
 }
 
+std::optional<BitmapFile> bitmap_file(const Params& params) {
+    if (params.has("image")) return {};
+    try {
+        return BitmapFile{resolve_file(params), params.flag("raw", false)};
+    } catch (const SceneError&) {
+        return {};
+    }
+}
+
 namespace {
 
 /// The opacity of an image without an alpha channel.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "image/image.h"
@@ -7,6 +8,14 @@
 #include "texture/uv_transform.h"
 
 namespace etendue {
+
+/// The image file of a bitmap, and whether it is read as linear data.
+struct BitmapFile {
+    std::string name;
+    bool raw;
+};
+/// Empty where the scene file holds the image itself, or where there is no such file.
+std::optional<BitmapFile> bitmap_file(const Params& params);
 
 enum class TextureFilter { Bilinear, Nearest };
 enum class TextureWrap { Repeat, Mirror, Clamp };

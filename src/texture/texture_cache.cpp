@@ -39,24 +39,30 @@ size_t sanitize(std::vector<uint8_t>&, bool) {
 
 }  // namespace
 
-const PixelBuffer& TextureCache::load(const std::string& path, bool raw) {
-    const std::string name = std::filesystem::weakly_canonical(path).string();
-    if (const auto it = images_.find({name, raw}); it != images_.end()) return *it->second;
-    return keep(read_pixels(path, raw), name, raw);
-}
-
-const PixelBuffer& TextureCache::decode(const std::string& bytes, const std::string& name,
-                                        bool raw) {
-    if (const auto it = images_.find({name, raw}); it != images_.end()) return *it->second;
-    return keep(decode_pixels(bytes, name, raw), name, raw);
-}
-
-const PixelBuffer& TextureCache::keep(PixelBuffer image, const std::string& name, bool raw) {
+template <class Read>
+const PixelBuffer& TextureCache::find_or_read(const std::string& name, bool raw, const Read& read) {
+    const std::pair key(name, raw);
+    {
+        const std::lock_guard lock(mutex_);
+        if (const auto it = images_.find(key); it != images_.end()) return *it->second;
+    }
+    PixelBuffer image = read();
     const size_t bad = std::visit([&](auto& data) { return sanitize(data, raw); }, image.data);
     if (bad > 0)
         throw std::runtime_error("image \"" + name + "\" has " + std::to_string(bad) +
                                  " values that are infinite or NaN");
-    return *(images_[{name, raw}] = std::make_unique<PixelBuffer>(std::move(image)));
+    const std::lock_guard lock(mutex_);
+    return *images_.try_emplace(key, std::make_unique<PixelBuffer>(std::move(image))).first->second;
+}
+
+const PixelBuffer& TextureCache::load(const std::string& path, bool raw) {
+    return find_or_read(std::filesystem::weakly_canonical(path).string(), raw,
+                        [&] { return read_pixels(path, raw); });
+}
+
+const PixelBuffer& TextureCache::decode(const std::string& bytes, const std::string& name,
+                                        bool raw) {
+    return find_or_read(name, raw, [&] { return decode_pixels(bytes, name, raw); });
 }
 
 size_t TextureCache::memory_bytes() const {

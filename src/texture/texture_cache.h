@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -9,7 +10,8 @@
 
 namespace etendue {
 
-/// The images of a scene's textures, each loaded once. Must outlive the textures made with it.
+/// The images of a scene's textures, each loaded once. Must outlive the textures made with it. Images can be loaded by
+/// several threads.
 class TextureCache {
 public:
     /// Loads an image with read_pixels(). Negative values become zero unless `raw`. Throws std::runtime_error where the
@@ -20,8 +22,11 @@ public:
     size_t memory_bytes() const;
 
 private:
-    const PixelBuffer& keep(PixelBuffer image, const std::string& name, bool raw);
+    /// The image `name`, which `read` returns the first time.
+    template <class Read>
+    const PixelBuffer& find_or_read(const std::string& name, bool raw, const Read& read);
 
+    std::mutex mutex_;
     std::map<std::pair<std::string, bool>, std::unique_ptr<const PixelBuffer>> images_;
 };
 

@@ -75,7 +75,7 @@ TEST(PbrtTokenizer, TellsWordsStringsNumbersAndBracketsApart) {
     PbrtTokenizer in("  Word# comment \" [\n\"a \\\"b\\\" c\"[-1.5e2 +3]7", file);
     EXPECT_EQ(in.word(), "Word");
     EXPECT_EQ(unescape(in.string()), "a \"b\" c");
-    EXPECT_EQ(in.line(), 2);
+    EXPECT_EQ(in.where().line, 2);
     EXPECT_TRUE(in.skip('['));
     EXPECT_EQ(in.number<float>("a number"), -150);
     EXPECT_EQ(in.number<int>("an integer"), 3);
@@ -558,12 +558,14 @@ TEST(Pbrt, ErrorsNameTheLineAndWhatIsNear) {
         {"Shape \"sphere\" \"flot radius\" 1", 2,
          "unknown type of parameter \"flot\" (did you mean \"float\"?)"},
         {"Shape \"sphere\" \"radius\" 1", 2, "expected a parameter such as \"float radius\""},
-        {"Shape \"sphere\" \"integer radius\" 1", 2, "must be a float, not a integer"},
+        {"Shape \"sphere\" \"integer radius\" 1", 2, "must be a float, not of type integer"},
         {"Shape \"sphere\" \"float radius\" [1 2]", 2, "must be one value, but has 2"},
         {"Shape \"sphere\" \"float radius\" []", 2, "has no value"},
         {"Shape \"sphere\" \"float radius\" 1 \"float radius\" 1", 2, "given twice"},
         {"Shape \"sphere\" \"float radius\" [1", 2, "no closing bracket"},
-        {"Shape \"sphere\" \"float radius\" -1", 2, "must be at least"},
+        {"Shape \"sphere\" \"float radius\" -1", 2, "is -1, but must be at least"},
+        {"Shape \"sphere\" \"float zmin\" 0.5 \"float zmax\" 0.25", 2,
+         "the zmin of a sphere is 0.5, but must be below its zmax, 0.25"},
         {"Shape \"curve\"", 2, "Shape \"curve\": curves are not supported"},
         {"Shape \"cone\"", 2, "unknown Shape \"cone\""},
         {"Shape \"trianglemesh\"", 2, "needs \"point3 P\""},
@@ -591,8 +593,13 @@ TEST(Pbrt, ErrorsNameTheLineAndWhatIsNear) {
         {"ObjectInstance \"o\"", 2, "there is no object \"o\""},
         {"CoordSysTransform \"c\"", 2, "there is no coordinate system \"c\""},
         {"Transform [1 0 0 0 0 1 0 0 0 0 0 0 0 0 0 1]", 2, "not invertible"},
-        {"Scale 1 0 1", 2, "must not be zero"},
-        {"LookAt 0 0 0 0 1 0 0 1 0", 2, "up vector"},
+        {"Scale 1 0 1", 2, "must not be zero, but are 1 0 1"},
+        {"LookAt 0 0 0 0 1 0 0 1 0", 2, "up vector 0 1 0"},
+        {"LookAt 1 2 3 1 2 3 0 1 0", 2, "both are 1 2 3"},
+        {"LightSource \"distant\" \"point3 from\" [0 0 1]", 2, "both are 0 0 1"},
+        {"Material \"dielectric\" \"float eta\" -3", 2,
+         "parameter \"eta\" is -3, but must be above zero"},
+        {"Material \"diffuse\" \"rgb reflectance\" [1 -2 3]", 2, "but is 1 -2 3"},
         {"Include \"none.pbrt\"", 2, "cannot read the file \"none.pbrt\""},
         {"MakeNamedMedium \"m\" \"string type\" \"homogeneous\"", 2,
          "a medium that scatters is not supported"},

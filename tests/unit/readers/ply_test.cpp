@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
+
+#include <fmt/format.h>
 
 #include "expect_mesh.h"
 #include "expect_scene_error.h"
@@ -113,6 +116,83 @@ TEST_P(PlyBinary, AllTypesInAnyOrder) {
     const size_t body = bytes.find("end_header\n") + 11;
     for (size_t n = body; n < bytes.size(); ++n)
         EXPECT_THROW(parse(std::string_view(bytes).substr(0, n)), SceneError) << n;
+}
+
+/// A binary file in the most frequent layout: floats, then faces with lengths of one byte and indices of four.
+struct PlainMesh {
+    bool big_endian;
+    std::string bytes;
+    size_t vertices, faces;  ///< Where they begin.
+
+    PlainMesh(bool big, const std::vector<std::vector<uint32_t>>& polygons) : big_endian(big) {
+        bytes = std::string("ply\nformat binary_") + (big ? "big" : "little") +
+                "_endian 1.0\nelement vertex 5\n" + kXyz +
+                "property uchar flags\nproperty float u\nproperty float v\nelement face " +
+                std::to_string(polygons.size()) +
+                "\nproperty list uchar uint vertex_indices\nend_header\n";
+        vertices = bytes.size();
+        const Vec2 corners[5] = {{0, 0}, {1, 0}, {2, 1}, {1, 2}, {0, 1}};
+        for (const Vec2 p : corners) {
+            for (const float x : {p.x, p.y, -1.5f}) put(bytes, x, big);
+            put<uint8_t>(bytes, 3, big);
+            for (const float x : {p.x / 2, p.y / 2}) put(bytes, x, big);
+        }
+        faces = bytes.size();
+        for (const auto& polygon : polygons) {
+            put(bytes, uint8_t(polygon.size()), big);
+            for (const uint32_t v : polygon) put(bytes, v, big);
+        }
+    }
+};
+
+TEST_P(PlyBinary, PolygonsAndTrianglesInAnyOrder) {
+    const PlainMesh plain(GetParam(), {{0, 1, 2}, {0, 2, 3}, {0, 1, 2, 3, 4}, {1, 2}, {2, 3, 4}});
+    const MeshData m = parse(plain.bytes);
+    EXPECT_EQ(m.positions,
+              (std::vector<Vec3>{
+                  {0, 0, -1.5f}, {1, 0, -1.5f}, {2, 1, -1.5f}, {1, 2, -1.5f}, {0, 1, -1.5f}}));
+    EXPECT_EQ(m.uvs[2], (Vec2{1, 0.5f}));
+    EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{
+                               {0, 1, 2}, {0, 2, 3}, {0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {2, 3, 4}}));
+    EXPECT_EQ(m.dropped_degenerate, 1u);
+}
+
+TEST_P(PlyBinary, IndicesOutOfRange) {
+    for (const uint32_t bad : {5u, 0x80000000u, 0xffffffffu}) {
+        const PlainMesh plain(GetParam(), {{0, 1, 2}, {0, 2, 3}, {0, 1, bad}, {0, 1, 2}});
+        // Two triangles of 13 bytes, and a third.
+        expect_scene_error(0,
+                           fmt::format("vertex index {} must lie in [0, 4] (at byte {})", bad,
+                                       plain.faces + 3 * 13),
+                           [&] { parse(plain.bytes); });
+    }
+}
+
+TEST_P(PlyBinary, TruncatedAnywhere) {
+    const PlainMesh plain(GetParam(), {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}});
+    const auto cut = [&](size_t n) { parse(std::string_view(plain.bytes).substr(0, n)); };
+    for (size_t n = plain.vertices; n < plain.bytes.size(); ++n)
+        EXPECT_THROW(cut(n), SceneError) << n;
+    expect_scene_error(0,
+                       fmt::format("the header declares 5 elements \"vertex\", more than the file "
+                                   "can contain (at byte {})",
+                                   plain.vertices),
+                       [&] { cut(plain.faces - 1); });
+    // The second index of the last face begins at its byte 5.
+    expect_scene_error(0, fmt::format("the file ends early (at byte {})", plain.faces + 26 + 5),
+                       [&] { cut(plain.faces + 26 + 7); });
+}
+
+TEST_P(PlyBinary, PositionThatIsNotFinite) {
+    PlainMesh plain(GetParam(), {{0, 1, 2}});
+    std::string nan;
+    put(nan, std::nanf(""), plain.big_endian);
+    constexpr size_t kRecord = 21;
+    plain.bytes.replace(plain.vertices + 3 * kRecord + 4, 4, nan);
+    expect_scene_error(0,
+                       fmt::format("position of vertex 3 is not finite (at byte {})",
+                                   plain.vertices + 3 * kRecord),
+                       [&] { parse(plain.bytes); });
 }
 
 INSTANTIATE_TEST_SUITE_P(ByteOrders, PlyBinary, ::testing::Values(false, true),
