@@ -38,7 +38,7 @@ if(ETENDUE_SANITIZE)
 endif()
 
 # Standard headers that most sources include, precompiled once for all layers. Sources must still include what they use,
-# since the presets `clang` and `tsan` have no precompiled headers.
+# since the preset `clang` has no precompiled headers.
 set(ETENDUE_COMMON_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <map> <memory> <optional> <span> <string>
     <string_view> <utility> <variant> <vector>)
 function(etendue_precompiled_headers target)
