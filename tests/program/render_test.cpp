@@ -178,9 +178,9 @@ TEST_F(InterruptTest, ThePassIsDroppedAfterTheGrace) {
 }
 
 TEST_F(InterruptTest, ThePassesBeforeTheDroppedOneAreWritten) {
-    const Program program = start({"-i", "bdpt", "--resolution", "300x200", "--threads", "1",
+    const Program program = start({"-i", "bdpt", "--resolution", "150x100", "--threads", "1",
                                    "--time", "600", "--grace", "0"});
-    // Long enough for more than one pass; each takes a fraction of a second.
+    // Long enough for more than one pass, each of which takes a tenth of a second, also on a busy machine.
     wait_for_start(program);
     wait(4);
     program.interrupt();
@@ -191,7 +191,7 @@ TEST_F(InterruptTest, ThePassesBeforeTheDroppedOneAreWritten) {
     const int passes = j["spp"];
     const std::vector<float> pixels = read_image(image).data;
     ASSERT_EQ(
-        run({"-i", "bdpt", "--resolution", "300x200", "--spp", std::to_string(passes)}).status, 0);
+        run({"-i", "bdpt", "--resolution", "150x100", "--spp", std::to_string(passes)}).status, 0);
     EXPECT_EQ(read_image(image).data, pixels) << passes;
     EXPECT_EQ(report()["walk_rays"], j["walk_rays"]);
 }
