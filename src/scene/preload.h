@@ -2,6 +2,7 @@
 // Reads the files of a scene's shapes and textures with all cores, before the scene is built in the order of its file.
 
 #include <exception>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
