@@ -238,7 +238,9 @@ CHILD = """
 
 def interrupt(scene: str, size: tuple[int, int], wait: float, callback: str = "None") -> tuple[str, float]:
     code = textwrap.dedent(CHILD.format(scene=scene, size=size, callback=callback))
-    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    # A process that was started in the background ignores interrupts, and its children do.
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True,
+                             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     assert child.stdout and child.stdout.readline() == "ready\n"
     time.sleep(wait)
     child.send_signal(signal.SIGINT)
