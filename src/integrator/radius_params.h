@@ -21,8 +21,9 @@ struct RadiusParams {
     bool shrinks() const { return alpha < 1; }
 };
 
-/// Radius of a disc with the area of a pixel, projected to the first surface: the median over the image. Independent of
-/// the crop. 0 if no eye ray hits a surface.
-float pixel_radius(const Scene& scene);
+/// Default radius of merges in the first pass: that of a disc with the area of 36 pixels as the median pixel sees the
+/// scene, but at most 1 % of the radius of the scene's bounds. So the number of photons in a disc does not grow with the
+/// resolution if there is one light path for each pixel, and small images are not blurred. Independent of the crop.
+float default_merge_radius(const Scene& scene);
 
 }  // namespace etendue

@@ -7,6 +7,7 @@
 
 #include "integrator/sppm.h"
 
+#include <optional>
 #include <stdexcept>
 
 #include "integrator/light_path_options.h"
@@ -16,10 +17,6 @@
 
 namespace etendue {
 namespace {
-
-/// Default radius, relative to the radius of the scene's bounds. It is larger than in `vcm`, where merges are one
-/// technique among many.
-constexpr float kRadiusInScenes = 0.01f;
 
 class SppmIntegrator final : public Integrator {
 public:
@@ -31,8 +28,9 @@ public:
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
-        radius_ = radius_params_.schedule(kRadiusInScenes * pass.scene.bounds().radius())
-                      .radius(pass.index);
+        if (radius_params_.first == 0 && !default_radius_)
+            default_radius_ = default_merge_radius(pass.scene);
+        radius_ = radius_params_.schedule(default_radius_.value_or(0)).radius(pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
         mapping_.paths().trace_light_paths(pass, {}, pass.light_paths, cache_);
         cache_.assemble();
@@ -100,6 +98,8 @@ private:
     LightPathOptions light_;
     uint32_t eye_paths_;
 
+    std::optional<float> default_radius_;  ///< In scene units.
+
     // Of the pass.
     uint32_t pass_ = 0;
     float radius_ = 0;
@@ -110,7 +110,9 @@ private:
 std::vector<ParamInfo> sppm_params() {
     std::vector<ParamInfo> params = PhotonMapping::params();
     for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
-                                            "1 % of the radius of the scene's bounds."))
+                                            "that of a disc with the area of 36 pixels, as the "
+                                            "median pixel sees the scene, but at most 1 % of the "
+                                            "radius of the scene's bounds."))
         params.push_back(p);
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back({"next_event", ParamKind::Bool, "true",

@@ -21,16 +21,9 @@
 namespace etendue {
 namespace {
 
-/// The default radius, in units of pixel_radius(). A smaller one makes caustics noisier, a larger one blurs them.
-constexpr float kRadiusInPixels = 6;
-/// Upper limit of the default radius, relative to the radius of the scene's bounds. Without it, small images would be
-/// blurred.
-constexpr float kLargestRadius = 0.01f;
 /// Ratio of the radius of merges behind a diffuse or glossy eye vertex to that of other merges. The former share a
 /// random eye path, so each of them adds less information. They matter for light that no other technique finds.
 constexpr float kInnerRadius = 0.3f;
-/// Ratio of half the width of a cell of the grid to the radius. Most searches have the inner one.
-constexpr float kHalfWidth = 0.5f;
 
 class VcmIntegrator final : public Integrator {
 public:
@@ -82,7 +75,7 @@ public:
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
-        if (merges_) grid_.build(cache_, radius_, is_exact_ ? radius_ : kHalfWidth * radius_);
+        if (merges_) grid_.build(cache_, radius_);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -126,8 +119,7 @@ private:
     /// The radius of pass `index`.
     float radius(const Scene& scene, uint32_t index) {
         if (radius_params_.first == 0 && !default_radius_)
-            default_radius_ = std::min(kRadiusInPixels * pixel_radius(scene),
-                                       kLargestRadius * scene.bounds().radius());
+            default_radius_ = default_merge_radius(scene);
         return radius_params_.schedule(default_radius_.value_or(0)).radius(index);
     }
     /// Number of light vertices by cell, in the previous pass.

@@ -6,7 +6,7 @@
 
 namespace etendue {
 
-void LightVertexGrid::build(const LightVertexCache& cache, float radius, float half_width) {
+void LightVertexGrid::build(const LightVertexCache& cache, float radius) {
     cache_ = &cache;
     radius_ = radius;
     // Entries are counted, then written, in blocks, so that their order does not depend on threads.
@@ -40,7 +40,7 @@ void LightVertexGrid::build(const LightVertexCache& cache, float radius, float h
     double flux = 0;
     for (const Block& b : blocks) flux += b.flux;
     mean_flux_ = entries.empty() ? 0.0f : float(flux / double(entries.size()));
-    grid_.build(entries, half_width);
+    grid_.build(entries, radius);
 }
 
 }  // namespace etendue

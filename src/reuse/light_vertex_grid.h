@@ -23,14 +23,13 @@ struct Chosen {};
 /// Grid over the connectible vertices y_i, i ≥ 1, of a cache.
 class LightVertexGrid {
 public:
-    /// Memory per vertex while the grid is built: its entry and a copy, its bucket's index, and up to four buckets with
-    /// two numbers each and a level of PairDensity.
-    static constexpr uint64_t kVertexBytes = 2 * sizeof(PointGrid::Entry) + 10 * sizeof(uint32_t);
+    /// Memory per vertex while the grid is built: its entry and a copy, its position, its bucket's index, and up to four
+    /// buckets with two numbers each and a level of PairDensity.
+    static constexpr uint64_t kVertexBytes =
+        2 * sizeof(PointGrid::Entry) + sizeof(Vec3) + 10 * sizeof(uint32_t);
 
-    /// For searches of `radius`; where most of them are smaller, `half_width` of the cells should be as well. The cache
-    /// must outlive the grid, and not change before the next build().
-    void build(const LightVertexCache& cache, float radius, float half_width);
-    void build(const LightVertexCache& cache, float radius) { build(cache, radius, radius); }
+    /// For searches up to `radius`. The cache must outlive the grid, and not change before the next build().
+    void build(const LightVertexCache& cache, float radius);
 
     float radius() const { return radius_; }
     /// Mean of GatherCandidate::flux.

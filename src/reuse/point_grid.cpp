@@ -31,6 +31,13 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
     entries_.resize(entries.size());
     std::vector<uint32_t> next(begins_.begin(), begins_.end() - 1);
     for_each_part([&](size_t i) { entries_[next[bucket[i]]++] = entries[i]; });
+    blocks_.resize((entries_.size() + kBlock - 1) / kBlock);
+    tbb::parallel_for(size_t(0), entries_.size(), [&](size_t i) {
+        Block& b = blocks_[i / kBlock];
+        b.x[i % kBlock] = entries_[i].p.x;
+        b.y[i % kBlock] = entries_[i].p.y;
+        b.z[i % kBlock] = entries_[i].p.z;
+    });
 }
 
 CellCounts PointGrid::counts() const {

@@ -1,6 +1,9 @@
 #pragma once
 // Fixed-radius search among points: a hashed grid, built by counting sort.
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <span>
 #include <vector>
 
@@ -55,14 +58,13 @@ public:
             for (int i = 0; i < count; ++i) {
                 const uint32_t bucket = begin[i];
                 begin[i] = begins_[bucket], end[i] = begins_[bucket + 1];
-                if (begin[i] < end[i]) __builtin_prefetch(&entries_[begin[i]]);
+                if (begin[i] < end[i]) __builtin_prefetch(&blocks_[begin[i] / kBlock]);
             }
             for (int i = 0; i < count; ++i)
-                for (uint32_t k = begin[i]; k < end[i]; ++k) {
-                    const Entry& e = entries_[k];
+                for_each_in(begin[i], end[i], p, radius2, [&](const Entry& e) {
                     // Other cells may share the bucket.
-                    if (length2(e.p - p) < radius2 && cells_.cell_of(e.p) == cells[i]) use(e);
-                }
+                    if (cells_.cell_of(e.p) == cells[i]) use(e);
+                });
             count = 0;
         };
         cells_.for_each_near(p, radius, [&](const CellHash::Cell& cell) {
@@ -76,12 +78,39 @@ public:
     /// Number of entries that for_each_near() tests.
     size_t candidates(Vec3 p, float radius) const;
     size_t memory_bytes() const {
-        return entries_.capacity() * sizeof(Entry) + begins_.capacity() * sizeof(uint32_t);
+        return entries_.capacity() * sizeof(Entry) + blocks_.capacity() * sizeof(Block) +
+               begins_.capacity() * sizeof(uint32_t);
     }
 
 private:
+    /// Positions of consecutive entries, for tests of several at a time.
+    static constexpr uint32_t kBlock = 8;
+    struct alignas(32) Block {
+        std::array<float, kBlock> x, y, z;
+    };
+
+    /// Calls use(entry) for the entries from `begin` to `end` that are nearer to `p` than the root of `radius2`.
+    template <class Use>
+    void for_each_in(uint32_t begin, uint32_t end, Vec3 p, float radius2, const Use& use) const {
+        for (uint32_t first = begin; first < end;) {
+            const uint32_t of_block = first / kBlock * kBlock;
+            const uint32_t last = std::min(end, of_block + kBlock);
+            const Block& b = blocks_[of_block / kBlock];
+            std::array<float, kBlock> d2;
+            for (size_t i = 0; i < kBlock; ++i)
+                d2[i] = sqr(b.x[i] - p.x) + sqr(b.y[i] - p.y) + sqr(b.z[i] - p.z);
+            uint32_t near = 0;
+            for (size_t i = 0; i < kBlock; ++i) near |= uint32_t(d2[i] < radius2) << i;
+            near &= (1u << (last - of_block)) - (1u << (first - of_block));
+            for (; near != 0; near &= near - 1)
+                use(entries_[of_block + uint32_t(std::countr_zero(near))]);
+            first = last;
+        }
+    }
+
     CellHash cells_;
     std::vector<Entry> entries_;    ///< Sorted by bucket.
+    std::vector<Block> blocks_;     ///< The positions of `entries_`.
     std::vector<uint32_t> begins_;  ///< First entry of each bucket, and the number of entries.
 };
 
