@@ -34,7 +34,7 @@ public:
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
         mapping_.paths().trace_light_paths(pass, {}, pass.light_paths, cache_);
         cache_.assemble();
-        grid_.build(cache_, radius_);
+        grid_.build(cache_, radius_, mapping_.shortest() - 1);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -74,7 +74,7 @@ private:
         if (!is_diffuse && !c.scene.has_delta_emitters()) return;
         const int max_depth = mapping_.paths().max_depth();
         const auto choose = [&](const GatherCandidate& y) -> std::optional<Chosen> {
-            if (y.s < mapping_.shortest() || y.s + t - 2 > max_depth) return {};
+            if (y.s + t - 2 > max_depth) return {};
             return Chosen{};
         };
         grid_.for_each_near(

@@ -75,7 +75,7 @@ public:
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
-        if (merges_) grid_.build(cache_, radius_);
+        if (merges_) grid_.build(cache_, radius_, first_merge());
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -96,6 +96,7 @@ public:
             n.pairs.disc = kPi * sqr(radius_);
             n.pairs.inner_disc = n.pairs.disc * sqr(kInnerRadius);
             n.pairs.clamps = false;
+            n.pairs.first_merge = first_merge();
         }
         if (!is_exact_) n.continued = continuation_;
         n.guide = paths_.guiding().guide();
@@ -122,6 +123,8 @@ private:
             default_radius_ = default_merge_radius(scene);
         return radius_params_.schedule(default_radius_.value_or(0)).radius(index);
     }
+    /// Connections include next events, which make direct light with less noise than merges do.
+    int first_merge() const { return connects_ && !is_exact_ ? 2 : 1; }
     /// Number of light vertices by cell, in the previous pass.
     CellCounts cells() const {
         return grid_.points().is_empty() ? loaded_ : grid_.points().counts();

@@ -212,7 +212,7 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
                                const TechniqueCounts& counts) {
     const Vertex &a = y[s - 1], &b = z[t - 1];
     const int edges = s + t - 2;
-    if (edges < counts.pairs.min_edges) return {};
+    if (edges < counts.pairs.min_edges || s - 1 < counts.pairs.first_merge) return {};
     const BsdfEval f = b.eval(a.wo, TransportMode::Radiance);
     if (f.f.is_zero()) return {};
     // Relative to the split after x_m, which has p_L(x_m) but not p_E(x_m).

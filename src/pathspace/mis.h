@@ -63,6 +63,7 @@ inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, 
     const double fwd = v[i].pdf_fwd;
     constexpr bool eye = side == Side::Eye;
     if (n.merge > 0) {
+        if ((eye ? edges - i : i) < n.pairs.first_merge) return 0;
         const bool sees_lens = eye ? v[i].sees_lens : inward == kLensGloss;  // see join_merge()
         return sqr(n.merge_area(v[i].pair_level, sees_lens) * fwd);
     }

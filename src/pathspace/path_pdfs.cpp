@@ -39,7 +39,9 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     for (int i = 0; i < m; ++i) others *= light[i];
     for (int i = m + 1; i <= k; ++i) others *= eye[i];
     if (q.strategy == Strategy::Merge)
-        return counts.merge_area(pair_level[m], sees_lens[m]) * others * light[m] * eye[m];
+        return m < counts.pairs.first_merge
+                   ? 0
+                   : counts.merge_area(pair_level[m], sees_lens[m]) * others * light[m] * eye[m];
     if (!drops(counts.pairs.rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
     const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
     return counts.weighed_gathers(pair_level[m], k) * others * kept *

@@ -79,6 +79,8 @@ struct PairModel {
     float inner_disc =
         0;              ///< The same for merges of eye vertices that do not see the lens (Vertex).
     int min_edges = 2;  ///< Length, in edges, of the shortest paths made from pairs.
+    /// Least m of an x_m where vertices are merged. 2: next events make all direct light, with less noise.
+    int first_merge = 1;
     float short_rate = 1;  ///< Share of gathers made for paths of three edges.
     PairRule rule = PairRule::Gloss;
     bool clamps = true;  ///< Whether weights clamp probabilities to 1 [Qin et al. 2015, eq. 24].

@@ -6,7 +6,7 @@
 
 namespace etendue {
 
-void LightVertexGrid::build(const LightVertexCache& cache, float radius) {
+void LightVertexGrid::build(const LightVertexCache& cache, float radius, int first) {
     cache_ = &cache;
     radius_ = radius;
     // Entries are counted, then written, in blocks, so that their order does not depend on threads.
@@ -22,7 +22,8 @@ void LightVertexGrid::build(const LightVertexCache& cache, float radius) {
             const size_t end = std::min(vertices.size(), (block + 1) * kBlock);
             size_t rank = 0;
             for (size_t i = block * kBlock; i < end; ++i)
-                if (vertices[i].is_connectible) use(block, rank++, uint32_t(i));
+                if (vertices[i].is_connectible && (first == 1 || cache.depth(uint32_t(i)) >= first))
+                    use(block, rank++, uint32_t(i));
         });
     };
     for_each_connectible([&](size_t block, size_t, uint32_t) { ++blocks[block + 1].begin; });

@@ -20,7 +20,7 @@ struct GatherCandidate {
 /// A choice without data, for for_each_near().
 struct Chosen {};
 
-/// Grid over the connectible vertices y_i, i ≥ 1, of a cache.
+/// Grid over connectible vertices of a cache.
 class LightVertexGrid {
 public:
     /// Memory per vertex while the grid is built: its entry and a copy, its position, its bucket's index, and up to four
@@ -28,8 +28,9 @@ public:
     static constexpr uint64_t kVertexBytes =
         2 * sizeof(PointGrid::Entry) + sizeof(Vec3) + 10 * sizeof(uint32_t);
 
-    /// For searches up to `radius`. The cache must outlive the grid, and not change before the next build().
-    void build(const LightVertexCache& cache, float radius);
+    /// Of the vertices y_i, i ≥ first ≥ 1, for searches up to `radius`. The cache must outlive the grid, and not change
+    /// before the next build().
+    void build(const LightVertexCache& cache, float radius, int first = 1);
 
     float radius() const { return radius_; }
     /// Mean of GatherCandidate::flux.

@@ -96,6 +96,7 @@ protected:
             counts.pairs.inner_disc = 0.1f;
             counts.pairs.min_edges = merges ? 2 : 3;
             if (merges) counts.continued = 0.5f;
+            if (extra() == Extra::GuidedMerges) counts.pairs.first_merge = 2;
             if (extra() == Extra::Variants) {
                 counts.pairs.rule = PairRule::Both;
                 counts.pairs.clamps = false;
