@@ -121,7 +121,10 @@ Rgb spectrum_plugin_colour(const SceneObject& spectrum, SpectrumRole role) {
                                                      hint(type, {"blackbody", "d65", "irregular",
                                                                  "regular", "srgb", "uniform"})));
     params.finish();
-    if (!is_finite(c)) throw SceneError(spectrum.where, "the spectrum's colour is not finite");
+    if (!is_finite(c))
+        throw SceneError(
+            spectrum.where,
+            fmt::format("the spectrum's colour is not finite: ({}, {}, {})", c.r, c.g, c.b));
     return c;
 }
 

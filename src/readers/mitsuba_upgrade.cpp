@@ -113,8 +113,8 @@ void upgrade_daylight(SceneObject& object) {
     const Transform from_z_up(
         Transform::Matrix{{{0, -1, 0, 0}, {0, 0, 1, 0}, {1, 0, 0, 0}, {0, 0, 0, 1}}});
     for (Param& p : object.params)
-        if (auto* to_world = std::get_if<Transform>(&p.value); to_world && p.name == "to_world") {
-            *to_world = *to_world * from_z_up;
+        if (const auto* to_world = p.as<Transform>(); to_world && p.name == "to_world") {
+            p.value = *to_world * from_z_up;
             return;
         }
     object.params.push_back({"to_world", from_z_up, object.where});

@@ -135,7 +135,7 @@ TEST(BrokenScenes, AreRefusedWithFileAndLine) {
             try {
                 read_mitsuba_xml(file);
             } catch (const SceneError& e) {
-                EXPECT_EQ(fs::path(e.where().file).lexically_normal(),
+                EXPECT_EQ(fs::path(e.where().file.str()).lexically_normal(),
                           fs::path(faulty).lexically_normal());
                 throw;
             }
