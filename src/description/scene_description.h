@@ -32,6 +32,9 @@ private:
 enum class ParamType { Bool, Int, Float, String, Vector, Rgb, Transform };
 using ParamValue = std::variant<bool, int64_t, double, std::string, Vec3, Rgb, SharedTransform>;
 
+/// Type and value, as in `float 0.5`.
+std::string to_string(const ParamValue& value);
+
 struct Param {
     std::string name;
     ParamValue value;

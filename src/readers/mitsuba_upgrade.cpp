@@ -36,7 +36,8 @@ std::optional<Param> take(SceneObject& object, std::string_view name) {
 double number(const Param& p) {
     if (const auto* i = std::get_if<int64_t>(&p.value)) return double(*i);
     if (const auto* d = std::get_if<double>(&p.value)) return *d;
-    throw SceneError(p.where, fmt::format("parameter \"{}\" must be a number", p.name));
+    throw SceneError(p.where, fmt::format("parameter \"{}\" must be a number, not {}", p.name,
+                                          to_string(p.value)));
 }
 
 void rename(SceneObject& object, std::string_view from, const std::string& to) {

@@ -36,7 +36,6 @@ int PbrtScene::add(const char* category, const char* type, SourceLocation where)
                                    .where = std::move(where),
                                    .params = {},
                                    .children = {}});
-    description.objects.back().params.reserve(2);  // as many as most shapes have
     return int(description.objects.size()) - 1;
 }
 

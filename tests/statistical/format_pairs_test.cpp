@@ -715,5 +715,34 @@ INSTANTIATE_TEST_SUITE_P(FormatPairs, Conversions,
                          ::testing::Values("mitsuba06", "mitsuba3", "pbrt3", "pbrt4", "gltf"),
                          [](const auto& format) { return std::string(format.param); });
 
+// ---- A scene of others that exists in three formats
+
+TEST(ScenesOfThreeFormats, VeachAjarHasTheSameImage) {
+    const fs::path root = testing::shared_scenes();
+    if (root.empty()) GTEST_SKIP() << "no shared scenes";
+    SceneDescription xml = read_scene_file((root / "veach-ajar-mts3/scene.xml").string());
+    // The metal of the floor has a checkerboard, which the files of pbrt lack.
+    size_t removed = 0;
+    for (SceneObject& object : xml.objects)
+        if (object.type == "roughconductor")
+            removed += std::erase_if(object.children, [](const SceneObject::Child& c) {
+                return c.name == "specular_reflectance";
+            });
+    EXPECT_EQ(removed, 1u);
+    BuildOptions options;
+    options.resolution = {48, 27};
+    options.lenient = true;
+    ReadOptions lenient;
+    lenient.lenient = true;
+    const auto tiles = [&](const SceneDescription& description, uint64_t seed) {
+        const Scene scene = build_scene(description, options);
+        return render_tiles(scene, "bdpt", {.passes = 256, .tiles = 3, .seed = seed});
+    };
+    const Tiles mitsuba_tiles = tiles(xml, 1);
+    for (const char* file : {"veach-ajar-pbrt3/scene.pbrt", "veach-ajar-pbrt4/scene-v4.pbrt"})
+        expect_same_image(tiles(read_scene_file((root / file).string(), lenient), 2), mitsuba_tiles,
+                          0.15, file);
+}
+
 }  // namespace
 }  // namespace etendue::test
