@@ -6,16 +6,6 @@
 namespace etendue {
 namespace {
 
-/// Mean of `value(m)` over the facets m visible from `wo`, by the midpoint rule with n × n points.
-template <class F>
-double mean_over_visible_normals(int n, const Microfacet& distribution, Vec3 wo, const F& value) {
-    double sum = 0;
-    for (int i = 0; i < n * n; ++i)
-        sum += value(distribution.sample_visible(
-            wo, {(float(i % n) + 0.5f) / float(n), (float(i / n) + 0.5f) / float(n)}));
-    return sum / (n * n);
-}
-
 /// Share of the light from `wo` that a rough dielectric refracts at the first facet: the mean of (1 − F(wo·m)) G1(wi).
 double rough_transmittance(const Microfacet& distribution, float eta, Vec3 wo) {
     return mean_over_visible_normals(32, distribution, wo, [&](Vec3 m) {
@@ -62,13 +52,6 @@ std::shared_ptr<SharedTransmittance> SharedTransmittance::of(Microfacet::Kind ki
     return shared;
 }
 
-const RoughTransmittance& SharedTransmittance::make() const {
-    const std::lock_guard lock(making_);
-    if (!value_) value_.emplace(distribution_, eta_);
-    made_.store(&*value_, std::memory_order_release);
-    return *value_;
-}
-
 RoughCoat::RoughCoat(Microfacet::Kind kind, TextureRef alpha, float eta)
     : kind_(kind), alpha_(alpha) {
     const auto add = [&](float value) {
@@ -77,13 +60,7 @@ RoughCoat::RoughCoat(Microfacet::Kind kind, TextureRef alpha, float eta)
     if (alpha.is_constant())
         add(alpha.eval_scalar(Vec2()));
     else
-        for (int i = 0; i < kRows; ++i) add(sqr(float(i) / (kRows - 1)));
-}
-
-const RoughTransmittance& RoughCoat::transmittance(float alpha) const {
-    if (transmittance_.size() == 1) return transmittance_.front()->get();
-    const float row = std::sqrt(clamp(alpha, 0, 1)) * (kRows - 1) + 0.5f;
-    return transmittance_[std::min(size_t(row), size_t(kRows - 1))]->get();
+        for (size_t i = 0; i < kAlphaRows; ++i) add(alpha_of_row(i));
 }
 
 float reflectance_below_coat(float eta, float thickness) {

@@ -36,6 +36,35 @@ inline float coat_attenuation(float thickness, float cos_o, float cos_i) {
 /// `eta` is η of the coat over η outside.
 float reflectance_below_coat(float eta, float thickness);
 
+/// Mean of `value(m)` over the facets m visible from `wo`, by the midpoint rule with n × n points.
+template <class F>
+double mean_over_visible_normals(int n, const Microfacet& distribution, Vec3 wo, const F& value) {
+    double sum = 0;
+    for (int i = 0; i < n * n; ++i)
+        sum += value(distribution.sample_visible(
+            wo, {(float(i % n) + 0.5f) / float(n), (float(i / n) + 0.5f) / float(n)}));
+    return sum / (n * n);
+}
+
+/// A value that the first thread to need it makes.
+template <class T>
+class MadeOnce {
+public:
+    template <class Make>
+    const T& get(const Make& make) const {
+        if (const T* made = made_.load(std::memory_order_acquire)) return *made;
+        const std::lock_guard lock(making_);
+        if (!value_) value_.emplace(make());
+        made_.store(&*value_, std::memory_order_release);
+        return *value_;
+    }
+
+private:
+    mutable std::mutex making_;
+    mutable std::optional<T> value_;
+    mutable std::atomic<const T*> made_ = nullptr;  ///< `value_` once complete.
+};
+
 /// Rough transmittance T(θ) of a dielectric boundary: the share of light from outside that is refracted at the first
 /// facet and not masked afterwards.
 class RoughTransmittance {
@@ -69,19 +98,25 @@ public:
     SharedTransmittance(const Microfacet& distribution, float eta)
         : distribution_(distribution), eta_(eta) {}
     const RoughTransmittance& get() const {
-        const RoughTransmittance* made = made_.load(std::memory_order_acquire);
-        return made ? *made : make();
+        return value_.get([this] { return RoughTransmittance(distribution_, eta_); });
     }
 
 private:
-    const RoughTransmittance& make() const;
-
     Microfacet distribution_;
     float eta_;
-    mutable std::mutex making_;
-    mutable std::optional<RoughTransmittance> value_;
-    mutable std::atomic<const RoughTransmittance*> made_ = nullptr;  ///< `value_` once complete.
+    MadeOnce<RoughTransmittance> value_;
 };
+
+/// Number of roughnesses for which tables are made where α is textured; they are equidistant in √α.
+constexpr int kAlphaRows = 33;
+inline float alpha_of_row(size_t row) {
+    return sqr(float(row) / (kAlphaRows - 1));
+}
+/// The row nearest to α.
+inline size_t alpha_row(float alpha) {
+    const float row = std::sqrt(clamp(alpha, 0, 1)) * (kAlphaRows - 1) + 0.5f;
+    return std::min(size_t(row), size_t(kAlphaRows - 1));
+}
 
 /// A coat with an isotropic roughness, constant or textured.
 class RoughCoat {
@@ -90,14 +125,15 @@ public:
 
     float alpha(const TexturePoint& at) const { return alpha_.eval_scalar(at); }
     Microfacet distribution(float alpha) const { return {kind_, alpha, alpha}; }
-    /// The transmittance for `alpha`; where it is textured, for the nearest of kRows roughnesses, the same for both
+    /// The transmittance for `alpha`; where it is textured, for the nearest of kAlphaRows roughnesses, the same for both
     /// ends of a path.
-    const RoughTransmittance& transmittance(float alpha) const;
+    const RoughTransmittance& transmittance(float alpha) const {
+        return transmittance_[row(alpha)]->get();
+    }
+    size_t rows() const { return transmittance_.size(); }
+    size_t row(float alpha) const { return rows() == 1 ? 0 : alpha_row(alpha); }
 
 private:
-    /// Number of roughnesses for which a textured α has transmittances; they are equidistant in √α.
-    static constexpr int kRows = 33;
-
     Microfacet::Kind kind_;
     TextureRef alpha_;
     std::vector<std::shared_ptr<const SharedTransmittance>> transmittance_;

@@ -7,17 +7,75 @@
 //   int_ior (bk7), ext_ior (air)         indices of the coat and outside
 //   thickness (0)                        optical thickness of the coat: thickness times absorption coefficient
 // Exact for a smooth coat over a smooth metal. A rough metal below a smooth coat: exact for light reflected once by the
-// metal; further interreflections continue in the same lobe, and light that meets the coat beyond the critical angle is
-// lost. Of what GGX copper reflects, these are at most 9 % with α = 0.05, and 25 % with α = 0.4. A rough coat refracts as a smooth one does, with the transmittance of a rough one, and widens the lobe of the
-// metal: facets of slope s turn refracted light by (1 − 1/η) s, twice, and the metal's facets by 2s, so the squares of
-// the roughnesses add as α² + (1 − 1/η)² α_coat² / 2. Reciprocal; loses energy but never gains any. One-sided.
+// metal. Light that it reflects beyond the critical angle of the coat leaves after further reflections; a lobe that
+// knows nothing of its first direction returns it, see TrappedLight. The albedo is that of walks between coat and metal
+// within −1.1 and 3.2 % for α from 0.05 to 0.8. A rough coat refracts as a smooth one does, with the transmittance of a
+// rough one, and widens the lobe of the metal: facets of slope s turn refracted light by (1 − 1/η) s, twice, and the
+// metal's facets by 2s, so the squares of the roughnesses add as α² + (1 − 1/η)² α_coat² / 2. Where a roughness is
+// textured, trapped light has that of the nearest of 33 values. Reciprocal; loses energy but never gains any. One-sided.
 
 #include "bsdf/coatedconductor.h"
 
+#include <fmt/format.h>
+
 #include "bsdf/ior.h"
 #include "bsdf/material.h"
+#include "math/warp.h"
 
 namespace etendue {
+
+TrappedLight::TrappedLight(const Microfacet& metal, float eta, float thickness,
+                           const float* transmittance)
+    : transmittance_(transmittance) {
+    constexpr int kPoints = 48;
+    constexpr float kGrazing = 1e-4f, kLeast = 1e-5f;
+    const auto at = [](float cos) { return Vec3{std::sqrt((1 - cos) * (1 + cos)), 0, cos}; };
+    // What the coat lets out of light with this cosine inside.
+    const auto T_out = [&](float inside) {
+        const float sin2 = sqr(eta) * (1 - inside) * (1 + inside);
+        return sin2 < 1 ? coat_transmittance(transmittance, std::sqrt(1 - sin2), eta) : 0.0f;
+    };
+    // Mean of the values of the directions into which the metal reflects light from the direction o inside.
+    const auto mean_reflected = [&](Vec3 o, const auto& value) {
+        return mean_over_visible_normals(kPoints, metal, o, [&](Vec3 m) {
+            const Vec3 i = reflect(o, m);
+            return i.z > 0 ? metal.G1(i) * value(i.z) : 0.0f;
+        });
+    };
+    double mean = 0, trapped = 0, reflected = 0, out = 0;
+    for (int j = 0; j < kSize; ++j) {
+        // The trapezoidal rule over the cosines outside, and the midpoint rule over those inside.
+        const float cos = std::fmax(float(j) / (kSize - 1), kGrazing),
+                    half = j == kSize - 1 ? 1 : 2;
+        const float To = coat_transmittance(transmittance, cos, eta);
+        share_[size_t(j)] = float(mean_reflected(at(cos_below_coat(cos, eta)), [&](float inside) {
+            const float Ti = T_out(inside);
+            return Ti > 0 ? 1 - Ti / (1 - std::fmin(1 - To, 1 - Ti)) : 1.0f;
+        }));
+        mean += double(half * To * share_[size_t(j)] * cos) / (kSize - 1);
+        // Diffuse light, as far as the coat has reflected it.
+        const float inside = (float(j) + 0.5f) / kSize;
+        const double weight = double(inside * (1 - T_out(inside)));
+        trapped += weight;
+        reflected += weight * double(coat_attenuation(thickness, inside, inside)) *
+                     mean_reflected(at(inside), [](float) { return 1.0f; });
+        out += weight * double(coat_attenuation(thickness, inside, inside)) *
+               mean_reflected(at(inside), T_out);
+    }
+    mean_ = float(mean);
+    if (mean_ < kLeast) share_.fill(0);
+    survival_ = trapped > 0 ? float(reflected / trapped) : 0;
+    escape_ = reflected > 0 ? float(out / reflected) : 0;
+}
+
+Rgb TrappedLight::returned(Rgb metal_eta, Rgb metal_k) const {
+    // 2 ∫ F(μ) μ dμ with two points of Gauss and Jacobi.
+    const Rgb F = 0.363917f * fresnel_conductor(0.355051f, metal_eta, metal_k) +
+                  0.636083f * fresnel_conductor(0.844949f, metal_eta, metal_k);
+    // Each time the metal reflects what survives, and the coat keeps 1 − escape of it.
+    const Rgb again = F * survival_;
+    return F * again * (escape_ / mean_) / (Rgb(1) - again * (1 - escape_));
+}
 
 BsdfEval CoatedConductorLobe::eval(Vec3 wo, Vec3 wi) const {
     if (!(wo.z > 0 && wi.z > 0)) return {};
@@ -31,8 +89,14 @@ BsdfEval CoatedConductorLobe::eval(Vec3 wo, Vec3 wi) const {
                 pdf_rev = quarter_D / sigma_i * (to_outside * wo.z / o.z);
     const Rgb R = coated_reflectance(fresnel_conductor(dot(o, m), metal_eta, metal_k), To, Ti,
                                      coat_attenuation(thickness, o.z, i.z));
-    BsdfEval e{.f = R * (pdf * (i.z / sigma_i)), .pdf = To * pdf, .pdf_rev = Ti * pdf_rev};
-    if (!transmittance) return e;
+    const float so = trapped->share(wo.z), si = trapped->share(wi.z);
+    BsdfEval e{.f = R * (pdf * (i.z / sigma_i)),
+               .pdf = To * lerp(so, pdf, wi.z * kInvPi),
+               .pdf_rev = Ti * lerp(si, pdf_rev, wo.z * kInvPi)};
+    if (so > 0 && si > 0)
+        e.f += trapped->returned(metal_eta, metal_k) *
+               (To * so * Ti * si * coat_attenuation(thickness, o.z, i.z) * wi.z * kInvPi);
+    if (!is_rough()) return e;
     const Vec3 h = wo + wi, mc = h / length(h);
     if (!(mc.z > 0)) return e;  // opposite grazing directions: not resolved by float
     const Microfacet facets = coat();
@@ -47,9 +111,14 @@ BsdfEval CoatedConductorLobe::eval(Vec3 wo, Vec3 wi) const {
 
 std::optional<BsdfSample> CoatedConductorLobe::sample(Vec3 wo, float u_lobe, Vec2 u) const {
     if (!(wo.z > 0)) return {};
-    if (u_lobe < 1 - T(wo.z)) {
-        if (!transmittance) return delta_event(wo, false);
+    const float To = T(wo.z);
+    if (u_lobe < 1 - To) {
+        if (!is_rough()) return delta_event(wo, false);
         const Vec3 wi = normalize(reflect(wo, coat().sample_visible(wo, u)));
+        return make_sample(wi, eval(wo, wi));
+    }
+    if (u_lobe < 1 - To + To * trapped->share(wo.z)) {
+        const Vec3 wi = sample_cosine_hemisphere(u);
         return make_sample(wi, eval(wo, wi));
     }
     const Vec3 o = below(wo), i = reflect(o, metal.sample_visible(o, u));
@@ -60,7 +129,7 @@ std::optional<BsdfSample> CoatedConductorLobe::sample(Vec3 wo, float u_lobe, Vec
 }
 
 std::optional<BsdfSample> CoatedConductorLobe::delta_event(Vec3 wo, bool transmits) const {
-    if (!(wo.z > 0) || transmits || transmittance) return {};
+    if (!(wo.z > 0) || transmits || is_rough()) return {};
     const float F = fresnel_dielectric(wo.z, eta).R;
     if (!(F > 0)) return {};
     return BsdfSample{
@@ -73,8 +142,10 @@ float CoatedConductorLobe::max_pdf(Vec3 wo, const DirectionCone& c) const {
     const DirectionCone inside =
         c.axis.z > 0 ? DirectionCone{below(c.axis), c.angle} : DirectionCone{Vec3{0, 0, 1}, kPi};
     const float To = T(wo.z);
-    float bound = To * metal.max_pdf_of_reflection(below(wo), inside) / sqr(eta);
-    if (transmittance) bound += (1 - To) * coat().max_pdf_of_reflection(wo, c);
+    float bound =
+        To * lerp(trapped->share(wo.z), metal.max_pdf_of_reflection(below(wo), inside) / sqr(eta),
+                  std::fmax(c.max_cos({0, 0, 1}), 0.0f) * kInvPi);
+    if (is_rough()) bound += (1 - To) * coat().max_pdf_of_reflection(wo, c);
     return bound;
 }
 
@@ -93,7 +164,10 @@ public:
           coat_inside_(read_ior(params, "int_ior", "bk7")),
           thickness_(params.number("thickness", 0, 0)) {
         if (eta_ < 1)
-            params.fail("int_ior", "the index of the coat must not be below that outside");
+            params.fail("int_ior",
+                        fmt::format("the index of the coat is {} times that outside, but must "
+                                    "not be below it",
+                                    eta_));
         if (params.has("reflectance")) {
             if (params.has("material") || params.has("eta") || params.has("k"))
                 params.fail("reflectance", "give either \"reflectance\", or the metal, not both");
@@ -103,6 +177,8 @@ public:
         if (!(coat.is_constant() && coat.eval_scalar(Vec2()) == 0))
             coat_.emplace(read_distribution(params), coat, eta_);
         is_mirror_ = !coat_ && roughness_.is_zero();
+        if (!(roughness_.is_constant() && coat.is_constant())) metal_rows_ = kAlphaRows;
+        trapped_ = std::make_unique<MadeOnce<TrappedLight>[]>(metal_rows_ * coat_rows());
     }
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
@@ -120,14 +196,14 @@ public:
                                  .eta = eta_,
                                  .thickness = thickness_,
                                  .coat_alpha = 0,
-                                 .transmittance = nullptr};
+                                 .trapped = nullptr};
         if (coat_) {
             lobe.coat_alpha = coat_->alpha(at);
-            lobe.transmittance = coat_->transmittance(lobe.coat_alpha).table();
             const float blur2 = 0.5f * sqr((1 - 1 / eta_) * lobe.coat_alpha);
             lobe.metal = {facets.kind(), std::sqrt(sqr(facets.alpha_x()) + blur2),
                           std::sqrt(sqr(facets.alpha_y()) + blur2)};
         }
+        lobe.trapped = &trapped(lobe.metal, lobe.coat_alpha);
         list.add(frame, lobe, weight);
     }
     bool may_be_smooth() const override { return !is_mirror_; }
@@ -137,6 +213,18 @@ public:
     }
 
 private:
+    size_t coat_rows() const { return coat_ ? coat_->rows() : 1; }
+    /// That of facets of the smaller roughness of the metal, which traps less, or of the nearest one that has a table.
+    const TrappedLight& trapped(const Microfacet& metal, float coat_alpha) const {
+        const bool one = metal_rows_ == 1;
+        const size_t metal_row = one ? 0 : alpha_row(metal.min_alpha()),
+                     coat_row = coat_ ? coat_->row(coat_alpha) : 0;
+        return trapped_[metal_row * coat_rows() + coat_row].get([&] {
+            const float alpha = one ? metal.min_alpha() : alpha_of_row(metal_row);
+            return TrappedLight({metal.kind(), alpha, alpha}, eta_, thickness_,
+                                coat_ ? coat_->transmittance(coat_alpha).table() : nullptr);
+        });
+    }
     struct Index {
         Rgb eta, k;
     };
@@ -165,6 +253,8 @@ private:
     float coat_inside_, thickness_;
     std::optional<RoughCoat> coat_;
     bool is_mirror_;
+    size_t metal_rows_ = 1;
+    std::unique_ptr<MadeOnce<TrappedLight>[]> trapped_;  ///< By rows of the metal and of the coat.
 };
 
 }  // namespace

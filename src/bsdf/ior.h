@@ -37,10 +37,11 @@ public:
     Microfacet eval(const TexturePoint& at) const {
         return {kind_, alpha_u_.eval_scalar(at), alpha_v_.eval_scalar(at)};
     }
+    bool is_constant() const { return alpha_u_.is_constant() && alpha_v_.is_constant(); }
     /// Whether both are the constant 0.
     bool is_zero() const {
-        return alpha_u_.is_constant() && alpha_v_.is_constant() &&
-               alpha_u_.eval_scalar(Vec2()) == 0 && alpha_v_.eval_scalar(Vec2()) == 0;
+        return is_constant() && alpha_u_.eval_scalar(Vec2()) == 0 &&
+               alpha_v_.eval_scalar(Vec2()) == 0;
     }
 
 private:

@@ -80,7 +80,7 @@ private:
                          [](auto a, auto b) { return a->name < b->name; });
         for (const Param* p : params) {
             out_.append(size_t(depth + 1) * 2, ' ');
-            out_ += p->name + ": " + std::visit(Printer{}, p->value) + '\n';
+            out_ += p->name + ": " + to_string(p->value) + '\n';
         }
         // Unnamed children sort first and keep their order.
         std::vector<const SceneObject::Child*> children;
@@ -97,6 +97,10 @@ private:
 };
 
 }  // namespace
+
+std::string to_string(const ParamValue& value) {
+    return std::visit(Printer{}, value);
+}
 
 std::string dump(const SceneDescription& scene) {
     return Dumper(scene).run();

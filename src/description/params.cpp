@@ -60,7 +60,7 @@ template <class T>
 const T* Params::get(std::string_view name, const char* expected) const {
     const Param* p = object().find(name);
     if (!p) return nullptr;
-    const T* v = std::get_if<T>(&p->value);
+    const T* v = p->as<T>();
     if (!v)
         throw SceneError(p->where,
                          fmt::format("parameter \"{}\" of {} \"{}\" must be {}, but is {}", name,
@@ -121,7 +121,9 @@ int Params::choice(std::string_view name, std::initializer_list<const char*> opt
 
 Vec3 Params::vector(std::string_view name, Vec3 fallback) const {
     const Vec3* v = get<Vec3>(name, "vector");
-    if (v && !is_finite(*v)) fail(name, fmt::format("parameter \"{}\" must be finite", name));
+    if (v && !is_finite(*v))
+        fail(name, fmt::format("parameter \"{}\" is ({}, {}, {}), but must be finite", name, v->x,
+                               v->y, v->z));
     return v ? *v : fallback;
 }
 

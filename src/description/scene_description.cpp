@@ -7,7 +7,7 @@ namespace etendue {
 SceneError::SceneError(const SourceLocation& where, const std::string& message)
     : std::runtime_error(where.file.empty()
                              ? message
-                             : where.file +
+                             : where.file.str() +
                                    (where.line > 0 ? ":" + std::to_string(where.line) : "") + ": " +
                                    message),
       where_(where), message_(message) {}

@@ -3,6 +3,7 @@
 // it, and only the scene builder interprets it. Names are those of Mitsuba 3 (snake_case), whatever the file's dialect.
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
@@ -15,9 +16,24 @@
 
 namespace etendue {
 
+/// A transform that copies share, so that the values of other parameters do not take its space.
+class SharedTransform {
+public:
+    SharedTransform(const Transform& transform)
+        : transform_(std::make_shared<const Transform>(transform)) {}
+    operator const Transform&() const { return *transform_; }
+    bool operator==(const SharedTransform& b) const { return *transform_ == *b.transform_; }
+
+private:
+    std::shared_ptr<const Transform> transform_;
+};
+
 /// Type of a `ParamValue`, in the order of its alternatives.
 enum class ParamType { Bool, Int, Float, String, Vector, Rgb, Transform };
-using ParamValue = std::variant<bool, int64_t, double, std::string, Vec3, Rgb, Transform>;
+using ParamValue = std::variant<bool, int64_t, double, std::string, Vec3, Rgb, SharedTransform>;
+
+/// Type and value, as in `float 0.5`.
+std::string to_string(const ParamValue& value);
 
 struct Param {
     std::string name;
@@ -25,7 +41,18 @@ struct Param {
     SourceLocation where;
 
     ParamType type() const { return ParamType(value.index()); }
+    /// The value if it has this type, otherwise nullptr.
+    template <class T>
+    const T* as() const {
+        return std::get_if<T>(&value);
+    }
 };
+
+template <>
+inline const Transform* Param::as<Transform>() const {
+    const SharedTransform* shared = std::get_if<SharedTransform>(&value);
+    return shared ? &static_cast<const Transform&>(*shared) : nullptr;
+}
 
 /// One `<bsdf>`, `<shape>`, ... of the file.
 struct SceneObject {

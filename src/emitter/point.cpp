@@ -3,6 +3,8 @@
 
 #include "emitter/point.h"
 
+#include <fmt/format.h>
+
 #include "math/frame.h"
 
 namespace etendue {
@@ -105,7 +107,9 @@ EmitterEntry spot_entry() {
                 const float cutoff = p.number("cutoff_angle", 20, 0.01f, 179.9f);
                 const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
                 if (beam > cutoff)
-                    p.fail("beam_width", "\"beam_width\" must not exceed \"cutoff_angle\"");
+                    p.fail("beam_width", fmt::format("\"beam_width\" is {}, but must not exceed "
+                                                     "\"cutoff_angle\", which is {}",
+                                                     beam, cutoff));
                 return one_emitter(std::make_unique<SpotEmitter>(
                     t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})), p.rgb("intensity", Rgb(1)),
                     cutoff, beam,

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include <fmt/format.h>
+
 #include "emitter/environment.h"
 #include "emitter/sky_model.h"
 #include "math/frame.h"
@@ -133,7 +135,9 @@ Daylight read_daylight(const Params& p) {
 Rgb read_albedo(const Params& p) {
     const Rgb albedo = p.rgb("albedo", Rgb(0.3f));
     if (albedo.max() > 1)
-        p.fail("albedo", "parameter \"albedo\" must have components of at most 1");
+        p.fail("albedo", fmt::format("parameter \"albedo\" is ({}, {}, {}), but its components "
+                                     "must be at most 1",
+                                     albedo.r, albedo.g, albedo.b));
     return albedo;
 }
 

@@ -18,7 +18,7 @@ namespace etendue {
 class JsonValue {
 public:
     /// `value` may be nullptr: an absent value. `file` and `value` must outlive the object.
-    JsonValue(const nlohmann::json* value, const std::string* file, std::string path)
+    JsonValue(const nlohmann::json* value, const FileName* file, std::string path)
         : value_(value), file_(file), path_(std::move(path)) {}
 
     explicit operator bool() const { return value_ != nullptr; }
@@ -50,7 +50,7 @@ private:
     [[noreturn]] void fail_type(const char* expected) const;
 
     const nlohmann::json* value_;
-    const std::string* file_;
+    const FileName* file_;
     std::string path_;
 };
 

@@ -284,7 +284,7 @@ int GltfReader::bitmap(const JsonValue& info, bool raw, const char* channel) {
             const auto view = image["bufferView"].index(root_["bufferViews"].elements().size());
             if (!view && uri.empty()) image.fail("has neither a uri nor a bufferView");
             scene_.images.push_back(
-                {fmt::format("{}{}", file_, image.path()),
+                {fmt::format("{}{}", file_.str(), image.path()),
                  view ? std::string(buffers_.view(*view)) : buffers_.uri(image["uri"])});
         }
         set(made, "image", at->second);

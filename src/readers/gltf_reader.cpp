@@ -96,7 +96,7 @@ void GltfReader::add_child(int parent, const char* name, int object) {
 }
 
 void GltfReader::warn(const std::string& message) {
-    scene_.warnings.push_back(fmt::format("{}: {}", file_, message));
+    scene_.warnings.push_back(fmt::format("{}: {}", file_.str(), message));
 }
 
 void GltfReader::reject(const JsonValue& where, const std::string& message) {

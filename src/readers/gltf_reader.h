@@ -83,7 +83,7 @@ private:
     void reject(const JsonValue& where, const std::string& message);
 
     const ReadOptions& options_;
-    std::string file_;
+    FileName file_;
     JsonValue root_;
     std::vector<JsonValue> nodes_, meshes_, materials_, textures_, images_, samplers_, cameras_,
         lights_;

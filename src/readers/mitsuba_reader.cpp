@@ -70,7 +70,8 @@ void MitsubaReader::reject(const SourceLocation& where, const std::string& what,
                            const std::string& more) {
     if (!options_.lenient) throw SceneError(where, what + more);
     ++scene_.left_out;
-    scene_.warnings.push_back(fmt::format("{}:{}: {}; dropped", where.file, where.line, what));
+    scene_.warnings.push_back(
+        fmt::format("{}:{}: {}; dropped", where.file.str(), where.line, what));
 }
 
 SourceLocation MitsubaReader::locate(const pugi::xml_node& node) const {
@@ -281,9 +282,9 @@ void MitsubaReader::declare_id(const std::string& id, int object, const SourceLo
     const auto [it, inserted] = ids_.emplace(id, object);
     if (inserted) return;
     const SourceLocation& first = scene_.objects[it->second].where;
-    throw SceneError(where,
-                     fmt::format("the id {} is taken by the <{}> at {}:{}", quote(id),
-                                 scene_.objects[it->second].category, first.file, first.line));
+    throw SceneError(where, fmt::format("the id {} is taken by the <{}> at {}:{}", quote(id),
+                                        scene_.objects[it->second].category, first.file.str(),
+                                        first.line));
 }
 
 int MitsubaReader::find_id(const std::string& id, const SourceLocation& where) const {

@@ -29,7 +29,8 @@ private:
         Source(const std::string& name, std::string_view contents, bool old);
         int line(ptrdiff_t offset) const;
 
-        std::string file, directory;
+        FileName file;
+        std::string directory;
         std::string_view text;
         std::vector<size_t> line_ends;
         bool old_dialect;  ///< Mitsuba 0.4 to 0.6.

@@ -191,7 +191,8 @@ void MitsubaReader::read_transform(const Element& e, const pugi::xml_node& node,
     for (const auto& row : transform.matrix())
         for (double v : row)
             if (!std::isfinite(v))
-                throw SceneError(e.where, "the transform has an entry that is not finite");
+                throw SceneError(
+                    e.where, fmt::format("the transform has an entry that is not finite: {}", v));
     add_param(e, scope, transform);
 }
 

@@ -17,19 +17,22 @@ public:
         if (!p) return *fallback;
         if (const auto* i = std::get_if<int64_t>(&p->value)) return double(*i);
         if (const auto* d = std::get_if<double>(&p->value)) return *d;
-        throw SceneError(p->where, fmt::format("parameter \"{}\" must be a number", name));
+        throw SceneError(p->where, fmt::format("parameter \"{}\" must be a number, not {}", name,
+                                               to_string(p->value)));
     }
     std::vector<double> numbers(const char* name) {
         const Param* p = find(name, true);
         if (const auto* s = std::get_if<std::string>(&p->value)) return parse_floats(*s, p->where);
         throw SceneError(p->where,
-                         fmt::format("parameter \"{}\" must be a string of numbers", name));
+                         fmt::format("parameter \"{}\" must be a string of numbers, not {}", name,
+                                     to_string(p->value)));
     }
     Rgb colour(const char* name, std::optional<Rgb> fallback = {}) {
         const Param* p = find(name, !fallback);
         if (!p) return *fallback;
         if (const auto* c = std::get_if<Rgb>(&p->value)) return *c;
-        throw SceneError(p->where, fmt::format("parameter \"{}\" must be a colour", name));
+        throw SceneError(p->where, fmt::format("parameter \"{}\" must be a colour, not {}", name,
+                                               to_string(p->value)));
     }
     void finish() const {
         for (const Param& p : spectrum_.params)
@@ -121,7 +124,10 @@ Rgb spectrum_plugin_colour(const SceneObject& spectrum, SpectrumRole role) {
                                                      hint(type, {"blackbody", "d65", "irregular",
                                                                  "regular", "srgb", "uniform"})));
     params.finish();
-    if (!is_finite(c)) throw SceneError(spectrum.where, "the spectrum's colour is not finite");
+    if (!is_finite(c))
+        throw SceneError(
+            spectrum.where,
+            fmt::format("the spectrum's colour is not finite: ({}, {}, {})", c.r, c.g, c.b));
     return c;
 }
 

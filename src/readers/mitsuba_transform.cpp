@@ -14,12 +14,16 @@ Transform look_at(const Element& e) {
     };
     const Vec3 origin = triple("origin"), target = triple("target");
     if (!(length2(target - origin) > 0))
-        throw SceneError(e.where, "<lookat>: target and origin are the same point");
+        throw SceneError(e.where, fmt::format("<lookat>: target and origin are the same point, {}",
+                                              quote(e["origin"])));
     Vec3 up = e.find("up") ? triple("up") : Vec3();
     if (up == Vec3())
         up = Frame::from_normal(normalize(target - origin)).s;  // any roll, as Mitsuba's
     const auto transform = Transform::look_at(origin, target, up);
-    if (!transform) throw SceneError(e.where, "<lookat>: up is parallel to the viewing direction");
+    if (!transform)
+        throw SceneError(e.where,
+                         fmt::format("<lookat>: up, {}, is parallel to the viewing direction",
+                                     quote(e.find("up") ? e["up"] : "0, 0, 0")));
     return *transform;
 }
 

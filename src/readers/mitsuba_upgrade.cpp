@@ -36,7 +36,8 @@ std::optional<Param> take(SceneObject& object, std::string_view name) {
 double number(const Param& p) {
     if (const auto* i = std::get_if<int64_t>(&p.value)) return double(*i);
     if (const auto* d = std::get_if<double>(&p.value)) return *d;
-    throw SceneError(p.where, fmt::format("parameter \"{}\" must be a number", p.name));
+    throw SceneError(p.where, fmt::format("parameter \"{}\" must be a number, not {}", p.name,
+                                          to_string(p.value)));
 }
 
 void rename(SceneObject& object, std::string_view from, const std::string& to) {
@@ -113,8 +114,8 @@ void upgrade_daylight(SceneObject& object) {
     const Transform from_z_up(
         Transform::Matrix{{{0, -1, 0, 0}, {0, 0, 1, 0}, {1, 0, 0, 0}, {0, 0, 0, 1}}});
     for (Param& p : object.params)
-        if (auto* to_world = std::get_if<Transform>(&p.value); to_world && p.name == "to_world") {
-            *to_world = *to_world * from_z_up;
+        if (const auto* to_world = p.as<Transform>(); to_world && p.name == "to_world") {
+            p.value = *to_world * from_z_up;
             return;
         }
     object.params.push_back({"to_world", from_z_up, object.where});

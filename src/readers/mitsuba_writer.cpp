@@ -146,7 +146,7 @@ private:
         }
         case ParamType::Transform: {
             std::string numbers;
-            for (const auto& row : std::get<Transform>(p.value).matrix())
+            for (const auto& row : p.as<Transform>()->matrix())
                 for (const double v : row)
                     numbers += fmt::format("{}{}", numbers.empty() ? "" : " ", v);
             line(depth, fmt::format("<transform name=\"{}\">", name));
@@ -196,8 +196,7 @@ private:
         if (is_flat) {
             bool flip = flag(o, "flip_normals", false) != flag(o, "flip_flat_normals", false);
             const Param* t = o.find("to_world");
-            if (t && !compute_normals && std::get<Transform>(t->value).determinant3() < 0)
-                flip = !flip;
+            if (t && !compute_normals && t->as<Transform>()->determinant3() < 0) flip = !flip;
             if (flip)
                 for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
             mesh.normals.clear();

@@ -95,8 +95,14 @@ PbrtRoughness read_roughness(PbrtScene& scene, const PbrtArguments& args, float 
     return r;
 }
 
+/// The distribution of all facets of a material, those of a coat and of what is below it.
+void set_ggx(PbrtScene& scene, int object) {
+    if (!scene.object(object).find("distribution"))
+        scene.set(object, "distribution", std::string("ggx"));
+}
+
 void set_roughness(PbrtScene& scene, int object, const PbrtRoughness& r) {
-    scene.set(object, "distribution", std::string("ggx"));
+    set_ggx(scene, object);
     const char* names[2] = {"alpha_u", "alpha_v"};
     for (size_t i = 0; i < 2; ++i)
         if (r.alpha[i])
@@ -108,7 +114,7 @@ void set_roughness(PbrtScene& scene, int object, const PbrtRoughness& r) {
 /// One α for models that have no other.
 void set_isotropic_alpha(PbrtScene& scene, const PbrtArguments& args, int object,
                          const PbrtRoughness& r, const char* name) {
-    scene.set(object, "distribution", std::string("ggx"));
+    set_ggx(scene, object);
     if (!r.is_isotropic())
         scene.refuse(
             args.where(),

@@ -123,7 +123,7 @@ SceneDescription PbrtReader::read(std::string_view text) {
 // ---- Files and directives
 
 void PbrtReader::read_file(std::string_view text, const std::string& file) {
-    const std::string& name = file_names_.emplace_back(file);
+    const FileName& name = file_names_.emplace_back(file);
     open_files_.push_back(std::filesystem::path(file).lexically_normal().string());
     PbrtTokenizer in(text, name);
     while (const char c = in.peek()) {
@@ -293,8 +293,9 @@ void PbrtReader::pop(const char* what, const char* closing, PbrtPlace where) {
     if (stack_.empty()) throw SceneError(where, fmt::format("{} without {}", closing, what));
     const Saved& last = stack_.back();
     if (std::string_view(last.what) != what)
-        throw SceneError(where, fmt::format("{}, but the last thing opened is the {} at {}:{}",
-                                            closing, last.what, *last.where.file, last.where.line));
+        throw SceneError(where,
+                         fmt::format("{}, but the last thing opened is the {} at {}:{}", closing,
+                                     last.what, last.where.file->str(), last.where.line));
 }
 
 void PbrtReader::attribute_begin(PbrtTokenizer& in) {
@@ -522,7 +523,7 @@ void PbrtReader::world_end(PbrtTokenizer&) {
 
 void PbrtReader::make_view() {
     const bool v3 = scene_.is_v3();
-    const PbrtPlace start{&scene_.description.file, 0};
+    const PbrtPlace start{&file_names_.front(), 0};
     const auto complete = [&](PbrtArguments& args, const char* kind,
                               const char* fallback) -> PbrtArguments& {
         if (args.kind().empty()) args = {kind, fallback, start, {}};

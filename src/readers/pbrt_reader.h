@@ -96,7 +96,8 @@ private:
     Transform camera_from_world_;
     bool in_world_ = false, world_ended_ = false;
     std::vector<std::string> open_files_;
-    std::deque<std::string> file_names_, texts_;  ///< Of all files: parameters refer to the names.
+    std::deque<FileName> file_names_;  ///< Of all files; parameters refer to them.
+    std::deque<std::string> texts_;
     int includes_ = 0;
 };
 

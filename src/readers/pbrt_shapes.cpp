@@ -14,6 +14,7 @@ namespace {
 
 int add_shape(PbrtScene& scene, const PbrtArguments& args, const char* type) {
     const int shape = scene.add("shape", type, args.where());
+    scene.description.objects.back().params.reserve(2);  // as many as most have
     if (!scene.state.ctm.is_identity()) scene.set(shape, "to_world", scene.state.ctm);
     return shape;
 }

@@ -13,15 +13,15 @@ namespace etendue {
 
 /// A line of a file whose name is stored elsewhere, so that it is cheap to copy.
 struct PbrtPlace {
-    const std::string* file = nullptr;
+    const FileName* file = nullptr;
     int line = 0;
 
-    operator SourceLocation() const { return {file ? *file : std::string(), line}; }
+    operator SourceLocation() const { return {file ? *file : FileName(), line}; }
 };
 
 class PbrtTokenizer {
 public:
-    PbrtTokenizer(std::string_view text, const std::string& file)
+    PbrtTokenizer(std::string_view text, const FileName& file)
         : at_(text.data()), end_(text.data() + text.size()), file_(&file) {}
 
     /// The character that the next token begins with; 0 at the end of the text.
@@ -82,7 +82,7 @@ private:
     [[noreturn]] void fail_number(const char* expected);
 
     const char *at_, *end_;
-    const std::string* file_;
+    const FileName* file_;
     int line_ = 1;
 };
 

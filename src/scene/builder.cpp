@@ -139,7 +139,9 @@ private:
                 s.exterior = models_.make_medium(c.object);
             else {
                 plugins_.problem(c.where,
-                                 "a shape's medium must be named \"interior\" or \"exterior\"");
+                                 fmt::format("a shape's medium must be named \"interior\" or "
+                                             "\"exterior\", not \"{}\"",
+                                             c.name));
                 continue;
             }
             s.is_interface = true;
@@ -220,7 +222,14 @@ private:
         const Params p = plugins_.params(index);
         const auto groups = p.children("shape");
         if (groups.size() != 1 || plugins_.object(groups[0].object).type != "shapegroup") {
-            plugins_.problem(p.where(), "an instance needs exactly one reference to a shapegroup");
+            plugins_.problem(
+                p.where(),
+                fmt::format("an instance needs exactly one reference to a shapegroup, "
+                            "but contains {} shape{}{}",
+                            groups.size(), groups.size() == 1 ? "" : "s",
+                            groups.size() == 1
+                                ? fmt::format(", a \"{}\"", plugins_.object(groups[0].object).type)
+                                : ""));
             return {};
         }
         std::vector<Instance> shown = make_group(groups[0].object);

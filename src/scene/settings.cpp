@@ -145,8 +145,10 @@ Rgb read_absorption(const Params& p) {
     const Rgb scattering = by_absorption ? p.rgb("sigma_s", Rgb(0)) : p.rgb("albedo", Rgb(0.75f));
     if (!scattering.is_zero())
         p.fail(by_absorption ? "sigma_s" : "albedo",
-               "scattering media are not supported: a homogeneous medium must have albedo 0, that "
-               "is absorption only");
+               fmt::format("scattering media are not supported: a homogeneous medium must have "
+                           "albedo 0, that is absorption only, but its {} is ({}, {}, {})",
+                           by_absorption ? "sigma_s" : "albedo", scattering.r, scattering.g,
+                           scattering.b));
     return (by_absorption ? p.rgb("sigma_a", Rgb(0)) : p.rgb("sigma_t", Rgb(1))) * scale;
 }
 

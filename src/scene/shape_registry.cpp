@@ -235,7 +235,10 @@ std::unique_ptr<Shape> make_cylinder(const Params& params, const Warn& warn) {
     const float radius = params.number("radius", 1, 1e-20f);
     const Vec3 axis = p1 - p0;
     const float height = length(axis);
-    if (!(height > 0)) params.fail("p1", "\"p0\" and \"p1\" of a cylinder must differ");
+    if (!(height > 0))
+        params.fail("p1", fmt::format("\"p0\" and \"p1\" of a cylinder must differ, but both "
+                                      "are ({}, {}, {})",
+                                      p1.x, p1.y, p1.z));
     const Transform t = params.transform("to_world");
     // Columns: two vectors of length `radius` normal to the axis, the axis, and p0. The choice of the two determines
     // where u = 0; these are those of Mitsuba 3.

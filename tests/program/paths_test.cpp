@@ -75,6 +75,16 @@ TEST_F(PathsTest, ThatAreGoodPassTheCheck) {
     EXPECT_NE(r.output.find("2 of 2 paths can be used"), std::string::npos) << r.output;
 }
 
+TEST_F(PathsTest, OnePathIsNotCalledPaths) {
+    write(paths, R"([{"points": [[0, 1, 0], [0.1, -1, 0.3]]}])");
+    EXPECT_NE(run({"paths", scene, "--check", paths}).output.find("1 of 1 path can be used"),
+              std::string::npos);
+    const fs::path picked = folder.path() / "picked.json";
+    const ProgramResult r = run({"paths", scene, "--pick", "1", "--pixel", "8,12", "--length", "3",
+                                 "--samples", "20000", "-o", picked});
+    EXPECT_EQ(r.output, picked.string() + ": 1 path\n") << r.errors;
+}
+
 TEST_F(PathsTest, ThatCannotBeUsedAreRefusedWithTheirReasons) {
     const std::vector<std::pair<std::string, std::string>> refused{
         {"[0, 1, 0], [0.1, -0.9, 0.3]", "2: is 0.1 from the nearest surface, \"floor\""},

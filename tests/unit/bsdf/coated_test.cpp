@@ -135,25 +135,28 @@ TEST_F(Coated, MirrorIsTheSumOfItsInterreflections) {
     }
 }
 
-TEST_F(Coated, RoughMetalReflectsLessThanWalksDo) {
-    // Lost is what meets the coat beyond the critical angle: measured are at most 9, 23 and 25 %, at 60°.
-    for (const auto& [alpha, loss] : {std::pair(0.05, 0.1), {0.2, 0.25}, {0.4, 0.27}}) {
-        const RoughConductorLobe below{
-            Microfacet(Microfacet::Kind::Ggx, float(alpha), float(alpha)), kCopperEta / 1.5f,
-            kCopperK / 1.5f, Rgb(1)};
-        const auto base = [&](Vec3 w, LobeRandom& random) {
-            return below.sample(w, 0, random.next_2d()).value_or(BsdfSample{});
-        };
-        for (Vec3 wo : test_directions()) {
-            const Albedo walk = walk_albedo(base, wo, 0.02f),
-                         a = sampled_albedo(metal(alpha, 0, 0.02), wo);
-            for (int c = 0; c < 3; ++c) {
-                const double error = 5 * double(walk.standard_error[c] + a.standard_error[c]);
-                EXPECT_LE(a.value[c], walk.value[c] + error) << alpha << describe(wo);
-                EXPECT_GE(a.value[c], walk.value[c] * (1 - loss) - error) << alpha << describe(wo);
+TEST_F(Coated, RoughMetalReflectsAsMuchAsWalksDo) {
+    // Measured are -1.1 % to 3.2 %. Without the lobe of trapped light, copper loses up to 9, 23 and 25 % for α = 0.05, 0.2
+    // and 0.4.
+    for (const double alpha : {0.05, 0.2, 0.4, 0.8})
+        for (const bool white : {false, true}) {
+            const Rgb eta = white ? Rgb(0) : kCopperEta / 1.5f,
+                      k = white ? Rgb(1) : kCopperK / 1.5f;
+            const RoughConductorLobe below{
+                Microfacet(Microfacet::Kind::Ggx, float(alpha), float(alpha)), eta, k, Rgb(1)};
+            const auto base = [&](Vec3 w, LobeRandom& random) {
+                return below.sample(w, 0, random.next_2d()).value_or(BsdfSample{});
+            };
+            for (Vec3 wo : test_directions()) {
+                const Albedo walk = walk_albedo(base, wo, 0.02f),
+                             a = sampled_albedo(metal(alpha, 0, 0.02, white), wo, 160);
+                for (int c = 0; c < 3; ++c) {
+                    const double error = 3 * double(walk.standard_error[c] + a.standard_error[c]);
+                    EXPECT_NEAR(a.value[c], walk.value[c], 0.035 * walk.value[c] + error)
+                        << alpha << (white ? " white " : " copper ") << describe(wo);
+                }
             }
         }
-    }
 }
 
 TEST_F(Coated, AbsorbingCoatOverADiffuseBaseIsExact) {

@@ -83,7 +83,9 @@ template <class T>
 T value(const SceneObject& o, const char* name) {
     const Param* p = o.find(name);
     if (!p) throw std::runtime_error(std::string("there is no ") + name);
-    return std::get<T>(p->value);
+    const T* v = p->as<T>();
+    if (!v) throw std::runtime_error(std::string(name) + " has another type");
+    return *v;
 }
 
 TEST(Gltf, ReadsASquare) {

@@ -47,7 +47,9 @@ template <class T>
 T value(const SceneDescription& scene, const char* name, int object = 0) {
     const Param* p = scene.objects.at(object).find(name);
     if (!p) throw std::runtime_error(std::string("no parameter ") + name);
-    return std::get<T>(p->value);
+    const T* v = p->as<T>();
+    if (!v) throw std::runtime_error(std::string(name) + " has another type");
+    return *v;
 }
 
 void expect_near(Rgb a, Rgb b) {

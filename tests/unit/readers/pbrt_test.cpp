@@ -42,7 +42,9 @@ template <class T>
 T value(const SceneObject& object, const char* name) {
     const Param* p = object.find(name);
     if (!p) throw std::runtime_error(fmt::format("{} has no parameter {}", object.type, name));
-    return std::get<T>(p->value);
+    const T* v = p->as<T>();
+    if (!v) throw std::runtime_error(std::string(name) + " has another type");
+    return *v;
 }
 const SceneObject& child(const SceneDescription& scene, const SceneObject& object,
                          std::string_view category, std::string_view name = "") {
@@ -115,7 +117,7 @@ TEST(Pbrt, VersionIsThatOfTheEndOrOfTheFilm) {
 
 Transform to_world(const SceneDescription& scene) {
     const Param* p = find(scene, "shape").find("to_world");
-    return p ? std::get<Transform>(p->value) : Transform();
+    return p ? *p->as<Transform>() : Transform();
 }
 
 TEST(Pbrt, TransformsMultiplyFromTheRight) {

@@ -38,6 +38,36 @@ TEST(SceneBuilder, RefusesCropsBeyondTheImage) {
     }
 }
 
+TEST(SceneBuilder, MessagesStateTheValueThatIsRefused) {
+    const std::string ball = "<shape type=\"sphere\">";
+    const auto bsdf = [&](const std::string& type, const std::string& params) {
+        return ball + "<bsdf type=\"" + type + "\">" + params + "</bsdf></shape>";
+    };
+    for (const auto& [body, message] : std::vector<std::pair<std::string, std::string>>{
+             {ball + "<medium type=\"homogeneous\" name=\"inside\"/></shape>",
+              "must be named \"interior\" or \"exterior\", not \"inside\""},
+             {ball + "<medium type=\"homogeneous\" name=\"interior\"><rgb name=\"albedo\" "
+                     "value=\"0, 0.5, 0.25\"/></medium></shape>",
+              "but its albedo is (0, 0.5, 0.25)"},
+             {"<shape type=\"instance\"/>", "but contains 0 shapes"},
+             {"<shape type=\"instance\">" + ball + "</shape></shape>",
+              "but contains 1 shape, a \"sphere\""},
+             {"<shape type=\"cylinder\"><point name=\"p0\" value=\"1, 2, 3\"/><point "
+              "name=\"p1\" value=\"1, 2, 3\"/></shape>",
+              "must differ, but both are (1, 2, 3)"},
+             {"<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"20\"/><float "
+              "name=\"beam_width\" value=\"30\"/></emitter>",
+              "\"beam_width\" is 30, but must not exceed \"cutoff_angle\", which is 20"},
+             {"<emitter type=\"sky\"><rgb name=\"albedo\" value=\"0.5, 2, 0\"/></emitter>",
+              "\"albedo\" is (0.5, 2, 0)"},
+             {bsdf("coatedconductor", "<float name=\"int_ior\" value=\"1\"/><float "
+                                      "name=\"ext_ior\" value=\"2\"/>"),
+              "the index of the coat is 0.5 times that outside"}}) {
+        const std::string error = error_of([&] { build(front_camera(4) + room() + body); });
+        EXPECT_NE(error.find(message), std::string::npos) << error << "\nexpected: " << message;
+    }
+}
+
 TEST(SceneBuilder, DefaultFilterIsGaussianWithAndWithoutAFilm) {
     const std::string lamp = "<emitter type=\"constant\"/>";
     EXPECT_EQ(build("<sensor type=\"perspective\"/>" + lamp).filter().name(), "gaussian");
