@@ -1,31 +1,14 @@
 // Uses `etendue studio` in a headless browser: pixels appear and change with exposure, zoom and wipe; runs are started,
-// stopped and continued; a path by way of a mirror is drawn by keys alone, and another by the pointer alone; the paths of a
-// pixel are traced again; two pages edit the same paths; the program is killed. Controls have names, the console is quiet.
+// stopped and continued; rectangles and differences are measured; a path by way of a mirror is drawn by keys alone, and
+// another by the pointer alone; the paths of a pixel are traced again; two pages edit the same paths; the program is killed.
+// Controls have names, the console is quiet.
 //
 //     node check_studio.mjs etendue scene.xml [folder for screenshots]
-//
-// Needs Node.js and Chromium; see browser.mjs.
 
-import {spawn} from 'node:child_process';
-import {existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
-import {tmpdir} from 'node:os';
+import {existsSync, readFileSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 
-import {Browser} from '../support/browser.mjs';
-
-const [program, sceneFile, screenshots] = process.argv.slice(2);
-if (!sceneFile) {
-    console.error('usage: check_studio.mjs etendue scene.xml [folder for screenshots]');
-    process.exit(2);
-}
-const kFlags = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
-const folder = mkdtempSync(join(tmpdir(), 'etendue-studio-'));
-
-let failures = 0;
-function check(holds, what) {
-    console.log(`${holds ? 'ok  ' : 'FAIL'} ${what}`);
-    if (!holds) ++failures;
-}
+import {Studio, average, box, check, checkNames, click, crossTo, differs, folder, idle, key, openBrowser, paths, pixels, runParts, sceneFile, tabTo} from './page.mjs';
 
 /// A lamp above a floor, and a mirror on the left.
 const rectangle = (id, transform, inside) =>
@@ -37,78 +20,11 @@ ${rectangle('floor', '<rotate x="1" angle="-90"/><translate y="-1"/>', '')}
 ${rectangle('lamp', '<scale value="0.3"/><rotate x="1" angle="90"/><translate y="1"/>', '<emitter type="area"/>')}
 ${rectangle('mirror', '<rotate y="1" angle="90"/><translate x="-1"/>', '<bsdf type="conductor"/>')}</scene>`;
 
-/// A running program.
-class Studio {
-    static async start(scene, ...more) {
-        const studio = new Studio();
-        studio.process = spawn(program, ['studio', scene, '-o', folder, '--threads', '1', ...more]);
-        studio.errors = '';
-        studio.process.stderr.on('data', d => { studio.errors += d; });
-        studio.ended = new Promise(fulfil => studio.process.on('exit', fulfil));
-        studio.url = await new Promise((fulfil, reject) => {
-            let text = '';
-            studio.process.stdout.on('data', d => { text += d; if (text.includes('\n')) fulfil(text.trim()); });
-            studio.process.on('exit', () => reject(new Error(`the program ended: ${studio.errors}`)));
-        });
-        return studio;
-    }
-    stop(signal = 'SIGINT') {
-        this.process.kill(signal);
-        return this.ended;
-    }
-}
-
-const kCodes = {' ': 'Space', '[': 'BracketLeft', ']': 'BracketRight'};
-async function key(browser, name, times = 1, modifiers = 0) {
-    for (let i = 0; i < times; ++i) {
-        const text = name.length === 1 && modifiers !== 2 ? name : name === 'Enter' ? '\r' : undefined;
-        const kVirtual = {Tab: 9, Enter: 13, ' ': 32};
-        const event = {key: name, code: kCodes[name] ?? name, text, modifiers, windowsVirtualKeyCode: kVirtual[name]};
-        await browser.send('Input.dispatchKeyEvent', {type: text ? 'keyDown' : 'rawKeyDown', ...event});
-        await browser.send('Input.dispatchKeyEvent', {type: 'keyUp', ...event});
-    }
-}
-/// Tab until the element is focused.
-async function tabTo(browser, selector) {
-    for (let i = 0; i < 120; ++i) {
-        if (await browser.evaluate(`document.activeElement.matches('${selector}')`)) return true;
-        await key(browser, 'Tab');
-    }
-    return false;
-}
-
-const box = (browser, selector) => browser.evaluate(`(() => { const b = document.querySelector('${selector}').getBoundingClientRect();
-    return [b.left, b.top, b.width, b.height]; })()`);
-async function click(browser, x, y) {
-    await browser.mouse('mousePressed', x, y);
-    await browser.mouse('mouseReleased', x, y);
-    await browser.settle();
-}
-/// What a canvas shows: one number for each pixel of a coarse grid.
-const pixels = (browser, id) => browser.evaluate(`(() => {
-    const c = document.getElementById('${id}');
-    const copy = Object.assign(document.createElement('canvas'), {width: c.width, height: c.height});
-    const context = copy.getContext('2d', {willReadFrequently: true});
-    context.drawImage(c, 0, 0);
-    const d = context.getImageData(0, 0, c.width, c.height).data, out = [];
-    for (let y = 4; y < c.height; y += 12) for (let x = 4; x < c.width; x += 12) { const at = 4 * (y * c.width + x); out.push(d[at] + d[at + 1] + d[at + 2]); }
-    return out;
-})()`);
-const average = values => values.reduce((a, b) => a + b, 0) / values.length;
-const differs = (a, b) => a.length !== b.length || a.some((v, i) => v !== b[i]);
 const first = 'studio.runs.get(studio.shown[0].run)';
-
-async function checkNames(browser, what) {
-    const nameless = await browser.evaluate(`[...document.querySelectorAll('button, input, select, canvas, svg, [role]')]
-        .filter(e => e.getClientRects().length && !e.textContent.trim() && !e.getAttribute('aria-label') && !e.getAttribute('aria-labelledby')
-            && !(e.labels && e.labels.length) && !e.title && e.getAttribute('role') !== 'alert' && e.getAttribute('role') !== 'status')
-        .map(e => e.outerHTML.slice(0, 120))`);
-    check(nameless.length === 0, `${what}: all controls have names ${nameless}`);
-}
 
 async function imagePart() {
     const studio = await Studio.start(sceneFile, '-i', 'path', '--resolution', '160x120');
-    const browser = new Browser({flags: kFlags, screenshots});
+    const browser = openBrowser();
     try {
         const begin = Date.now();
         await browser.open(studio.url);
@@ -205,26 +121,11 @@ async function imagePart() {
     }
 }
 
-/// Presses arrows until the crosshair is at a point of the scene.
-async function crossTo(browser, point) {
-    const [tx, ty] = await browser.evaluate(`studio.space().project(${JSON.stringify(point)})`);
-    const [x, y] = await browser.evaluate('studio.space().cross');
-    const go = async (distance, plus, minus) => {
-        const large = Math.floor(Math.abs(distance) / 0.2), small = Math.round((Math.abs(distance) - 0.2 * large) / 0.02);
-        await key(browser, distance > 0 ? plus : minus, large, 8);
-        await key(browser, distance > 0 ? plus : minus, small);
-    };
-    await go(tx - x, 'ArrowRight', 'ArrowLeft');
-    await go(ty - y, 'ArrowUp', 'ArrowDown');
-}
-const paths = 'studio.editor().paths';
-const idle = browser => browser.evaluate('studio.editor().queue');
-
 async function pathPart() {
     const scene = join(folder, 'mirror.xml'), file = join(folder, 'paths.json');
     writeFileSync(scene, mirrorScene);
     const studio = await Studio.start(scene, '-i', 'bdpt');
-    const browser = new Browser({flags: kFlags, screenshots}), other = new Browser({flags: kFlags, screenshots});
+    const browser = openBrowser(), other = openBrowser();
     try {
         await browser.open(studio.url);
         await browser.until('studio.shown[0].passes > 0', 'an image');
@@ -341,13 +242,4 @@ async function pathPart() {
     }
 }
 
-if (screenshots) mkdirSync(screenshots, {recursive: true});
-for (const part of [imagePart, pathPart])
-    try {
-        await part();
-    } catch (error) {
-        console.log(`FAIL ${error.stack}`);
-        ++failures;
-    }
-rmSync(folder, {recursive: true, force: true});
-process.exitCode = failures > 0 ? 1 : 0;
+await runParts(imagePart, pathPart);

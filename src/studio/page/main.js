@@ -66,7 +66,7 @@ function report(promise) {
 
 // ---------------------------------------------------------------------------------------- image
 
-const view = new View(at('view'), {pixel: (x, y) => showPixel(x, y), wipe: w => { tools.wipe.value = w; }});
+const view = new View(at('view'), {pixel: () => showPixel(), wipe: w => { tools.wipe.value = w; }});
 if (!view.hasGraphics) banner('graphics', 'This browser has no WebGL2: only numbers are shown.');
 
 const kLabels = {image: '', error: 'relative standard error', first: 'first picture: albedo × cosine, no light yet'};
@@ -97,7 +97,7 @@ async function refresh(place) {
             s.passes = Math.max(1, picture.passes);
             view.show(place, picture);
             label();
-            if (isOfRun && place === 0) showPixel(view.cursor[0], view.cursor[1]);
+            if (isOfRun && place === 0) showPixel();
         } else if (s.passes === 0 && place === 0 && s.view === 'image' && !view.pictures[0]) {
             const first = await server.image({view: 'first'});
             if (first && s.passes === 0 && shown[0] === s) view.show(0, first), label();
@@ -131,31 +131,53 @@ function label() {
 function showIn(place, run, what) {
     if (place === 0 || run > 0 || what === 'reference') shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false, again: false};
     else shown[1] = null;
+    tools.measured.textContent = '';
+    tools.measure.disabled = !shown[1];
     if (place === 1 && !shown[1]) view.show(1, null);
     refresh(place).then(label);
     updateRuns();
 }
 
 let pixelRequest = 0;
-/** @param {number} x @param {number} y */
-async function showPixel(x, y) {
+/** Shows the values of the selected pixel or rectangle. */
+async function showPixel() {
     const request = ++pixelRequest;
-    const place = at('pixel');
-    const parts = [element('div', {textContent: `(${x}, ${y})`})];
+    const {x, y, w, h} = view.selected();
+    const isPixel = w * h === 1;
+    const parts = [element('div', {textContent: isPixel ? `(${x}, ${y})` : `(${x}, ${y}) to (${x + w - 1}, ${y + h - 1}): ${w} × ${h} pixels`})];
     const describePixel = async (/** @type {Shown | null} */ s) => {
         if (!s || s.run === 0) return;
-        const p = await server.get(`/v1/pixel?run=${s.run}&x=${x}&y=${y}`).catch(() => null);
+        const p = await server.get(`/v1/pixel?run=${s.run}&x=${x}&y=${y}&w=${w}&h=${h}`).catch(() => null);
         if (!p?.passes) return;
-        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: 'no interval: one chain'};
-        parts.push(element('div', {className: 'soft', textContent: `run ${s.run}, ${p.passes} spp, ${/** @type {any} */ (kNames)[p.interval]}`}));
-        parts.push(element('table', {}, ['red', 'green', 'blue'].map((name, c) => element('tr', {}, [element('th', {textContent: name}),
+        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: runs.get(s.run)?.seeds ? 'no interval: several seeds' : 'no interval: one chain'};
+        const head = (/** @type {string[]} */ names) => element('tr', {}, names.map(n => element('th', {scope: 'col', textContent: n})));
+        const rows = ['red', 'green', 'blue'].map((name, c) => element('tr', {}, [element('th', {textContent: name}),
             element('td', {textContent: significant(p.mean[c], 6)}), element('td', {textContent: p.half ? `± ${significant(p.half[c], 3)}` : ''}),
-            element('td', {textContent: p.reference ? `reference ${significant(p.reference[c], 6)}` : ''})]))));
+            ...(isPixel ? [] : ['least', 'largest', 'variance'].map(k => element('td', {textContent: significant(p[k]?.[c], 4)}))),
+            element('td', {textContent: p.reference ? `${isPixel ? 'reference ' : ''}${significant(p.reference[c], 6)}` : ''})]));
+        parts.push(element('div', {className: 'soft', textContent: `run ${s.run}, ${p.passes} spp, ${/** @type {any} */ (kNames)[p.interval]}`}));
+        parts.push(element('table', {}, isPixel ? rows : [head(['', 'mean', '', 'least', 'largest', 'variance', p.reference ? 'reference' : '']), ...rows]));
+        if (p.nan + p.infinite > 0) parts.push(element('div', {className: 'error', textContent: `left out: ${p.nan} pixels NaN, ${p.infinite} infinite`}));
     };
     await describePixel(shown[0]);
     await describePixel(shown[1]);
-    if (request === pixelRequest) place.replaceChildren(...parts);
-    inspector?.setPixel(x, y, shown[0].run);
+    if (request === pixelRequest) at('pixel').replaceChildren(...parts);
+    inspector?.setPixel(view.cursor[0], view.cursor[1], shown[0].run);
+}
+
+/** Has the program measure how far the two images are apart. */
+async function measure() {
+    const [a, b] = shown;
+    if (!b) return;
+    tools.measured.textContent = '…';
+    try {
+        const d = await server.get(`/v1/difference?run=${a.run}&against=${b.view === 'reference' ? 'reference' : b.run}`);
+        const other = b.view === 'reference' ? 'the reference' : `run ${b.run}, ${d.against_passes} spp`;
+        tools.measured.textContent = `relMSE ${significant(d.rel_mse)}, ꟻLIP ${significant(d.flip)}: run ${a.run}, ${d.passes} spp, against ${other}`
+            + (d.not_finite ? `; ${d.not_finite} pixels that are not finite are left out of relMSE` : '');
+    } catch (e) {
+        tools.measured.textContent = /** @type {Error} */ (e).message;
+    }
 }
 
 function makeTools() {
@@ -171,10 +193,13 @@ function makeTools() {
         else showIn(1, Number(value), 'image');
     }});
     tools.wipe = number({id: 'wipe', min: 0, max: 1, step: 0.01, value: 0.5, oninput: () => { view.wipe = Number(tools.wipe.value); view.redraw(); }});
+    tools.measure = element('button', {type: 'button', textContent: 'Measure', title: 'relMSE and ꟻLIP of the two images', disabled: true, onclick: measure});
+    tools.measured = element('output', {});
     const field = (/** @type {string} */ text, /** @type {any} */ input, /** @type {any[]} */ ...more) => element('label', {}, [`${text} `, input, ...more]);
     at('view-tools').append(field('show', tools.view), field('exposure', tools.exposure, ' ', tools.exposureText), field('as', tools.mode),
         field('compare with', tools.against), field('wipe', tools.wipe),
-        element('button', {type: 'button', textContent: 'Flip', onclick: flip}), element('button', {type: 'button', textContent: 'Whole image', onclick: () => view.resetZoom()}));
+        element('button', {type: 'button', textContent: 'Flip', onclick: flip}), element('button', {type: 'button', textContent: 'Whole image', onclick: () => view.resetZoom()}),
+        tools.measure, tools.measured);
 }
 
 /** @param {number} stops */

@@ -126,9 +126,52 @@ TEST(DrawnShapes, KeepTheirBoundsAndTheirLimit) {
         for (const uint32_t i : s.triangles) EXPECT_LT(i, s.positions.size() / 3);
     }
     EXPECT_EQ(std::count_if(all.begin(), all.end(), [](const auto& s) { return s.emits; }), 1);
+    for (const DrawnShape& s : all) EXPECT_EQ(s.places.size(), 1u);
     size_t triangles = 0;
     for (const DrawnShape& s : drawn_shapes(scene, 500)) triangles += s.triangles.size() / 3;
     EXPECT_LT(triangles, 2400u);
+}
+
+/// A sphere about the origin, placed three times, one of them larger: each place has what rays hit there.
+TEST(DrawnShapes, AreDrawnOnceForEachInstance) {
+    const auto instance = [](const std::string& transform) {
+        return "<shape type=\"instance\"><ref id=\"group\"/><transform name=\"to_world\">" + transform +
+               "</transform></shape>";
+    };
+    const Scene scene =
+        build(sensor("0,0,9", "0,0,0", 8) + area_lamp() +
+              "<shape type=\"shapegroup\" id=\"group\">" +
+              sphere("0,0,0", "0.4", diffuse("0.5,0.5,0.5")) + "</shape>" +
+              instance("<translate x=\"-2\"/>") + instance("<translate x=\"2\"/>") +
+              instance("<rotate z=\"1\" angle=\"90\"/><scale value=\"2\"/><translate y=\"-3\"/>"));
+    const std::vector<DrawnShape> all = drawn_shapes(scene, 1'000'000);
+    ASSERT_EQ(all.size(), 2u);
+    EXPECT_EQ(all[0].places.size(), 1u);
+    const DrawnShape& ball = all[1];
+    ASSERT_EQ(ball.places.size(), 3u);
+    const auto in_world = [&](const DrawnShape::Place& m, size_t vertex) {
+        Vec3 p, q;
+        for (int axis = 0; axis < 3; ++axis)
+            p[axis] = ball.bounds.lo[axis] + (ball.bounds.hi[axis] - ball.bounds.lo[axis]) *
+                                                 float(ball.positions[3 * vertex + size_t(axis)]) /
+                                                 65535;
+        for (int row = 0; row < 3; ++row)
+            q[row] = m[size_t(4 * row)] * p.x + m[size_t(4 * row + 1)] * p.y +
+                     m[size_t(4 * row + 2)] * p.z + m[size_t(4 * row + 3)];
+        return q;
+    };
+    const Vec3 centers[] = {{-2, 0, 0}, {2, 0, 0}, {0, -3, 0}};
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t vertex = 0; vertex < ball.positions.size() / 3; vertex += 97) {
+            const Vec3 p = in_world(ball.places[i], vertex);
+            EXPECT_NEAR(length(p - centers[i]), i == 2 ? 0.8f : 0.4f, 1e-3f);
+            Ray ray;
+            ray.o = centers[i] + (p - centers[i]) * 2.0f;
+            ray.d = normalize(centers[i] - p);
+            SurfaceHit hit;
+            ASSERT_TRUE(scene.intersect(ray, 0.5f, hit));
+            EXPECT_LT(length(hit.geometry.p - p), 2e-3f);
+        }
 }
 
 }  // namespace
