@@ -83,13 +83,19 @@ SeedComparison compare(const SeedSeries& a, const SeedSeries& b) {
     if (std::min(a.luminance.size(), b.luminance.size()) < 3) return c;
     const size_t pixels = a.luminance[0]->size();
     if (b.luminance[0]->size() != pixels) return c;
-    // Both methods have the same weights, so that only their variances differ.
-    std::vector<double> weights(pixels);
+    // Both methods have the same weights, so that only their variances differ. The less noisy one determines them: a
+    // pixel that is too bright by chance would have a weight that is too small.
+    std::vector<double> weights(pixels, 1);
+    const double noise_a = spread(a.luminance, weights).variance / double(a.luminance.size()),
+                 noise_b = spread(b.luminance, weights).variance / double(b.luminance.size());
+    const double share_a = noise_a + noise_b > 0 ? noise_b / (noise_a + noise_b) : 0.5;
     double mean = 0;
-    for (const Images* images : {&a.luminance, &b.luminance})
+    std::fill(weights.begin(), weights.end(), 0.0);
+    for (const auto& [images, share] :
+         {std::pair{&a.luminance, share_a}, {&b.luminance, 1 - share_a}})
         for (const auto& image : *images)
             for (size_t i = 0; i < pixels; ++i)
-                weights[i] += double((*image)[i]) / (2 * double(images->size()));
+                weights[i] += double((*image)[i]) * share / double(images->size());
     for (const double w : weights) mean += w / double(pixels);
     for (double& w : weights) w = 1 / ((sqr(w) + 0.01 * sqr(mean)) * double(pixels));
     const Spread of_a = spread(a.luminance, weights), of_b = spread(b.luminance, weights);

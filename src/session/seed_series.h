@@ -23,7 +23,7 @@ struct SeedSeries {
 };
 
 /// Two methods, `a` and `b`. The relative variance of an image is the mean over its pixels of its variance over the
-/// seeds, divided by I² + 0.01·mean(I)², where I is the mean of all images of both methods.
+/// seeds, divided by I² + 0.01·mean(I)², where I is the mean of all images, weighted by the inverse of their variances.
 struct SeedComparison {
     struct Method {
         double variance = 0;  ///< Relative variance of one image.

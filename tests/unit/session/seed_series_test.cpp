@@ -56,6 +56,27 @@ TEST(SeedComparison, IntervalsCoverTheGain) {
     EXPECT_NEAR(width, 2 * 2.145 * std::sqrt(2 * 2.0 / 2800), 0.05);
 }
 
+/// Pixels that are mostly black, with few bright samples: 1 and 16 samples a pixel.
+TEST(SeedComparison, NoiseDoesNotBiasTheWeights) {
+    constexpr uint32_t kTrials = 20;
+    const auto rare = [](uint32_t seed, int samples) {
+        std::mt19937 random(seed);
+        std::bernoulli_distribution hits(0.1);
+        SeedSeries s;
+        for (int k = 0; k < 8; ++k) {
+            SeedSeries::Image image(2000);
+            for (float& y : image)
+                for (int i = 0; i < samples; ++i) y += hits(random) ? 10 / float(samples) : 0.0f;
+            s.add(std::move(image), 1, {});
+        }
+        return s;
+    };
+    double mean = 0;
+    for (uint32_t t = 0; t < kTrials; ++t)
+        mean += compare(rare(2 * t, 1), rare(2 * t + 1, 16)).ratio / kTrials;
+    EXPECT_NEAR(mean, 16, 1.5);
+}
+
 TEST(SeedComparison, SaysWhatIsUnknown) {
     EXPECT_FALSE(compare({}, {}).is_valid);
     EXPECT_FALSE(compare(series(1, 2, 0.2, 1), series(2, 8, 0.1, 1)).is_valid);

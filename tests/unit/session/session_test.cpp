@@ -227,36 +227,37 @@ TEST(Session, SeveralSeedsAreRenderedOneAfterTheOther) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
     RunRequest r = request("bdpt", 3);
-    r.seeds = 4;
+    r.seeds = 3;
     const int run = session.start(r), other = session.start(request("path", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
     RunStatus status = session.status(run);
-    EXPECT_EQ(status.finished_seeds, 4);
-    EXPECT_EQ(status.passes, 12u);
-    EXPECT_EQ(status.snapshot_passes, 12u);
+    EXPECT_EQ(status.finished_seeds, 3);
+    EXPECT_EQ(status.passes, 9u);
+    EXPECT_EQ(status.snapshot_passes, 9u);
     EXPECT_EQ(status.interval, IntervalKind::None);
     EXPECT_EQ(session.status(other).state, RunState::Rendering);
+    session.stop(other);
     // Continuing adds as many seeds again, also through a stop.
     session.resume(run, {});
     session.stop(run);
     session.resume(run, {});
-    ASSERT_TRUE(wait_for([&] { return session.status(run).finished_seeds == 8; }));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).finished_seeds == 6; }));
     ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
     const auto series = session.seed_series(run);
     const auto shown = session.snapshot(run);
-    ASSERT_EQ(series->luminance.size(), 8u);
+    ASSERT_EQ(series->luminance.size(), 6u);
     std::vector<Rgb> sum(shown->mean.size());
     for (const auto& image : series->luminance) {
         const std::vector<Rgb> expected = plain_image(small_room(), r);
         for (size_t i = 0; i < expected.size(); ++i) {
-            ASSERT_EQ((*image)[i], luminance(expected[i])) << r.seed;
+            ASSERT_FLOAT_EQ((*image)[i], luminance(expected[i])) << r.seed;
             sum[i] += expected[i];
         }
         ++r.seed;
     }
-    EXPECT_EQ(shown->passes, 24u);
+    EXPECT_EQ(shown->passes, 18u);
     for (size_t i = 0; i < sum.size(); ++i)
-        for (int c = 0; c < 3; ++c) ASSERT_NEAR(shown->mean[i][c], sum[i][c] / 8, 1e-5f);
+        for (int c = 0; c < 3; ++c) ASSERT_NEAR(shown->mean[i][c], sum[i][c] / 6, 1e-5f);
     EXPECT_TRUE(session.seed_series(other)->luminance.empty());
 }
 
