@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "math/statistics.h"
 #include "math/vec.h"
@@ -37,10 +38,11 @@ Spread spread(const Images& images, const std::vector<double>& weights) {
     return s;
 }
 
-/// Squared error of the logarithm of the variance, by the jackknife.
-double squared_log_error(const Spread& s) {
+/// Squared error of the logarithm of variance times time, by the jackknife.
+double squared_log_error(const Spread& s, const SeedSeries& series) {
     Moments logs;
-    for (const double v : s.without) logs.add(std::log(v));
+    for (size_t i = 0; i < s.without.size(); ++i)
+        logs.add(std::log(s.without[i] * (series.total_seconds() - series.seconds[i])));
     const auto k = double(s.without.size());
     return logs.variance() * sqr(k - 1) / k;
 }
@@ -55,16 +57,20 @@ SeedComparison::Method method(const SeedSeries& series) {
     }
     m.mean = means.mean();
     m.mean_error = std::sqrt(means.squared_error());
-    m.seconds = series.seconds / std::max(1.0, double(series.luminance.size()));
+    m.seconds = series.total_seconds() / std::max(1.0, double(series.luminance.size()));
     return m;
 }
 
 }  // namespace
 
+double SeedSeries::total_seconds() const {
+    return std::accumulate(seconds.begin(), seconds.end(), 0.0);
+}
+
 void SeedSeries::add(Image image, double seconds_of_image,
                      const std::vector<std::pair<std::string, double>>& its_figures) {
     luminance.push_back(std::make_shared<const Image>(std::move(image)));
-    seconds += seconds_of_image;
+    seconds.push_back(seconds_of_image);
     const auto n = double(luminance.size());
     for (auto& [name, mean] : figures) mean *= (n - 1) / n;
     for (const auto& [name, value] : its_figures) {
@@ -105,7 +111,7 @@ SeedComparison compare(const SeedSeries& a, const SeedSeries& b) {
     const double dof = double(a.luminance.size() + b.luminance.size() - 2);
     c.means_differ = difference > student_quantile(0.01, dof) * error;
     if (!(mean > 0 && of_a.variance > 0 && of_b.variance > 0)) return c;
-    const double squared = squared_log_error(of_a) + squared_log_error(of_b);
+    const double squared = squared_log_error(of_a, a) + squared_log_error(of_b, b);
     if (!std::isfinite(squared)) return c;
     c.ratio = of_a.variance / of_b.variance;
     c.gain = c.ratio * c.a.seconds / c.b.seconds;

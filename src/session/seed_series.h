@@ -13,10 +13,11 @@ namespace etendue {
 struct SeedSeries {
     using Image = std::vector<float>;
     std::vector<std::shared_ptr<const Image>> luminance;  ///< One image for each seed.
-    double seconds = 0;                                   ///< Sum over the seeds.
+    std::vector<double> seconds;                          ///< Of each of them.
     std::vector<std::pair<std::string, double>>
         figures;  ///< Integrator::figures(), averaged over the seeds.
 
+    double total_seconds() const;
     /// Adds a rendering.
     void add(Image image, double seconds_of_image,
              const std::vector<std::pair<std::string, double>>& its_figures);

@@ -275,7 +275,7 @@ void Session::after_pass(Run& run, const Progress& p) {
         const std::lock_guard lock(mutex_);
         RunStatus& s = run.status;
         s.passes = run.passes_of_seeds + p.passes;
-        s.seconds = run.series.load()->seconds + p.seconds;
+        s.seconds = run.series.load()->total_seconds() + p.seconds;
         s.rays_per_second = p.rays_per_second;
         s.fraction = p.fraction;
         // What follows belongs to one seed.

@@ -87,10 +87,12 @@ async function refresh(place) {
     try {
         const query = {run: s.run, view: s.view, after: s.passes};
         const pixels = state.scene.width * state.scene.height, kCoarse = 1e6;
+        // Without a run, only the first picture.
+        const isMade = isOfRun || s.view !== 'image';
         // Coarse first.
-        let picture = s.passes === 0 && pixels > kCoarse ? await server.image({...query, level: 2}) : null;
+        let picture = s.passes === 0 && isMade && pixels > kCoarse ? await server.image({...query, level: 2}) : null;
         if (picture && shown[place] === s) view.show(place, picture);
-        picture = await server.image(query) ?? picture;
+        picture = (isMade ? await server.image(query) : null) ?? picture;
         if (shown[place] !== s) return;
         s.isAsked = picture === null;
         if (picture) {

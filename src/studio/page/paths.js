@@ -43,7 +43,7 @@ export class PathEditor {
         this.list = element('div', {className: 'paths', role: 'group', 'aria-label': 'Paths'});
         this.status = element('p', {className: 'soft', role: 'status'});
         this.gain = element('div', {role: 'status'});
-        const button = (/** @type {string} */ text, /** @type {string} */ title, /** @type {() => any} */ onclick) => element('button', {type: 'button', textContent: text, title, onclick});
+        const button = (/** @type {string} */ text, /** @type {string} */ title, /** @type {() => any} */ onclick, id = '') => element('button', {type: 'button', textContent: text, title, onclick, id});
         this.length = element('input', {id: 'pick-length', type: 'number', min: 2, max: 16, value: 3});
         this.spp = element('input', {id: 'gain-spp', type: 'number', min: 1, value: 64});
         this.seeds = element('input', {id: 'gain-seeds', type: 'number', min: 3, max: 64, value: 8});
@@ -57,7 +57,7 @@ export class PathEditor {
             this.list, this.status,
             element('div', {className: 'bar'}, [button('Pick from pixel', 'Paths of a short run that reach the pixel', () => this.run(() => this.pick())),
                 element('label', {}, ['of edges ', this.length])]),
-            element('div', {className: 'bar'}, [button('Render with and without', 'Two runs of mlt in turns, with several seeds each', () => this.run(() => this.compare())),
+            element('div', {className: 'bar'}, [button('Render with and without', 'Two runs of mlt in turns, with several seeds each', () => this.run(() => this.compare()), 'render-both'),
                 element('label', {}, ['spp ', this.spp]), element('label', {}, ['seeds ', this.seeds])]), this.gain);
         space.tell = {
             click: (x, y) => { if (this.chosen >= 0) this.run(() => this.addPoint(x, y)); },

@@ -109,7 +109,7 @@ export class Space {
         this.cutInput = element('input', {type: 'range', id: 'cut', min: 0, max: 1, step: 0.005, value: 0, oninput: () => { this.cut = Number(this.cutInput.value); this.redraw(); }});
         toolbar.append(
             element('button', {type: 'button', textContent: 'Camera', title: 'Look as the camera does', onclick: () => this.lookAsCamera()}),
-            element('button', {type: 'button', textContent: 'From outside', onclick: () => this.lookFromOutside()}),
+            element('button', {type: 'button', textContent: 'From outside', title: 'Look from outside the scene', onclick: () => this.lookFromOutside()}),
             element('label', {title: 'Leave out what is nearer than this'}, ['cut away ', this.cutInput]));
         this.lookAsCamera();
         const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});

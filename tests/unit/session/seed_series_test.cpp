@@ -99,7 +99,7 @@ TEST(SeedSeries, AveragesFigures) {
     ASSERT_EQ(s.figures.size(), 2u);
     EXPECT_DOUBLE_EQ(s.figures[0].second, 0.3);
     EXPECT_DOUBLE_EQ(s.figures[1].second, 2);
-    EXPECT_DOUBLE_EQ(s.seconds, 3);
+    EXPECT_DOUBLE_EQ(s.total_seconds(), 3);
 }
 
 }  // namespace
