@@ -152,13 +152,16 @@ async function showPixel() {
         const p = await server.get(`/v1/pixel?run=${s.run}&x=${x}&y=${y}&w=${w}&h=${h}`).catch(() => null);
         if (!p?.passes) return;
         const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: runs.get(s.run)?.seeds ? 'no interval: several seeds' : 'no interval: one chain'};
-        const head = (/** @type {string[]} */ names) => element('tr', {}, names.map(n => element('th', {scope: 'col', textContent: n})));
-        const rows = ['red', 'green', 'blue'].map((name, c) => element('tr', {}, [element('th', {textContent: name}),
-            element('td', {textContent: significant(p.mean[c], 6)}), element('td', {textContent: p.half ? `± ${significant(p.half[c], 3)}` : ''}),
-            ...(isPixel ? [] : ['least', 'largest', 'variance'].map(k => element('td', {textContent: significant(p[k]?.[c], 4)}))),
-            element('td', {textContent: p.reference ? `${isPixel ? 'reference ' : ''}${significant(p.reference[c], 6)}` : ''})]));
+        const cells = (/** @type {string} */ scope, /** @type {string} */ name, /** @type {string[]} */ values) => element('tr', {}, [element('th', {scope, textContent: name}),
+            ...values.map(textContent => element(scope === 'col' ? 'th' : 'td', {textContent}))]);
+        const kChannels = ['red', 'green', 'blue'];
+        // A pixel has few values; those of a rectangle need a row each.
+        const statistics = {mean: p.mean, '±': p.half, least: p.least, largest: p.largest, variance: p.variance, reference: p.reference};
+        const rows = isPixel
+            ? kChannels.map((name, c) => cells('row', name, [significant(p.mean[c], 6), p.half ? `± ${significant(p.half[c], 3)}` : '', p.reference ? `reference ${significant(p.reference[c], 6)}` : '']))
+            : [cells('col', '', kChannels), ...Object.entries(statistics).filter(([, v]) => v).map(([name, v]) => cells('row', name, v.map((/** @type {number} */ x) => significant(x, 4))))];
         parts.push(element('div', {className: 'soft', textContent: `run ${s.run}, ${p.passes} spp, ${/** @type {any} */ (kNames)[p.interval]}`}));
-        parts.push(element('table', {}, isPixel ? rows : [head(['', 'mean', '', 'least', 'largest', 'variance', p.reference ? 'reference' : '']), ...rows]));
+        parts.push(element('table', {}, rows));
         if (p.nan + p.infinite > 0) parts.push(element('div', {className: 'error', textContent: `left out: ${p.nan} pixels NaN, ${p.infinite} infinite`}));
     };
     await describePixel(shown[0]);
