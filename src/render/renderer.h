@@ -105,7 +105,8 @@ private:
     struct Workers;
     std::unique_ptr<Workers> workers_;
     uint64_t learned_passes_ = 0;  ///< Number of passes for which the integrator has learned.
-    bool has_last_pass_ = false;  ///< Whether the integrator has the data of the last finished pass.
+    bool has_last_pass_ =
+        false;  ///< Whether the integrator has the data of the last finished pass.
     RenderStats stats_;
     double seconds_ = 0;
 };

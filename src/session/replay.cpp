@@ -153,8 +153,9 @@ Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths) 
     PathRecorder recorder(renderer.film(), pixel, most_paths, work, result);
     recorder.begin(uint32_t(renderer.film().passes()) - 1, false, 0);
     if (!renderer.sample_again(pixel, work, recorder))
-        throw std::runtime_error("the light paths of the last pass are gone, because the pass after "
-                                 "it was discarded; continue the run for another pass");
+        throw std::runtime_error(
+            "the light paths of the last pass are gone, because the pass after "
+            "it was discarded; continue the run for another pass");
     result.passes = 1;
     sort_by_luminance(result);
     return result;

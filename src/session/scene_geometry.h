@@ -14,12 +14,13 @@ struct DrawnShape {
     uint32_t shape = 0;  ///< Index in Scene::shapes().
     std::string name;
     Bounds3 bounds;  ///< In the space of the shape.
-    Rgb color;  ///< About its reflectance.
+    Rgb color;       ///< About its reflectance.
     bool emits = false;
     bool is_specular = false;         ///< A mirror or clear glass.
     std::vector<uint16_t> positions;  ///< x, y, z in 1/65535 of the bounds.
     std::vector<uint32_t> triangles;
-    using Place = std::array<float, 12>;  ///< The first three rows of a matrix, one after the other.
+    using Place =
+        std::array<float, 12>;  ///< The first three rows of a matrix, one after the other.
     std::vector<Place> places;  ///< Maps to world space, one for each time that the shape is drawn.
 };
 

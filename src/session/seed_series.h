@@ -27,15 +27,15 @@ struct SeedSeries {
 /// seeds, divided by I² + 0.01·mean(I)², where I is the mean of all images, weighted by the inverse of their variances.
 struct SeedComparison {
     struct Method {
-        double variance = 0;  ///< Relative variance of one image.
-        double seconds = 0;   ///< Time of one image.
+        double variance = 0;              ///< Relative variance of one image.
+        double seconds = 0;               ///< Time of one image.
         double mean = 0, mean_error = 0;  ///< Mean luminance of all images, and its standard error.
     };
     Method a, b;
-    double ratio = 0;           ///< Variance of `a` over that of `b`.
-    double gain = 0;            ///< Time that `a` needs for the variance of `b`, over that of `b`.
-    double low = 0, high = 0;   ///< 95 % confidence interval of `gain`, by the jackknife over seeds.
-    bool is_valid = false;      ///< False with fewer than three seeds, or if a variance is 0.
+    double ratio = 0;          ///< Variance of `a` over that of `b`.
+    double gain = 0;           ///< Time that `a` needs for the variance of `b`, over that of `b`.
+    double low = 0, high = 0;  ///< 95 % confidence interval of `gain`, by the jackknife over seeds.
+    bool is_valid = false;     ///< False with fewer than three seeds, or if a variance is 0.
     bool means_differ = false;  ///< The means differ by more than their errors explain.
 };
 SeedComparison compare(const SeedSeries& a, const SeedSeries& b);

@@ -61,7 +61,7 @@ struct RunStatus {
     int technique_depth = 0;
     int seeds = 1, finished_seeds = 0;
     RunState state = RunState::Rendering;
-    std::string message;  ///< Why the run failed.
+    std::string message;                       ///< Why the run failed.
     uint64_t passes = 0, snapshot_passes = 0;  ///< With several seeds: of all of them.
     double seconds = 0, rays_per_second = 0;
     std::optional<double> fraction;

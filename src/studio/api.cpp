@@ -656,14 +656,10 @@ Reply Api::pixel(const Request& request) {
                       .level = 0});
     const RunStatus status = session_.status(id);
     const RectangleValues values = values_in(*snapshot, {x, y, w, h});
-    json j{{"run", id},
-           {"passes", snapshot->passes},
-           {"mean", values.mean},
-           {"interval", to_string(status.interval)},
-           {"half", nullptr},
-           {"pixels", int64_t(w) * int64_t(h)},
-           {"nan", values.nan},
-           {"infinite", values.infinite}};
+    json j{{"run", id},           {"passes", snapshot->passes},
+           {"mean", values.mean}, {"interval", to_string(status.interval)},
+           {"half", nullptr},     {"pixels", int64_t(w) * int64_t(h)},
+           {"nan", values.nan},   {"infinite", values.infinite}};
     if (values.finite > 1) {
         j["least"] = values.least;
         j["largest"] = values.largest;
@@ -941,13 +937,13 @@ void Api::replay_pixel(const json& body, const Done& done) {
                                         "Markov chains, or are not kept",
                                         integrator.name));
     case ReplayedPasses::Last:
-        return session_.replay_last(
-            run, pixel, most, [done](const Replay& paths, const std::string& error) {
-                if (!error.empty()) return done(Reply::error(422, error));
-                json j = to_json(paths);
-                j["is_last_pass"] = true;
-                done(Reply::json(dump(j)));
-            });
+        return session_.replay_last(run, pixel, most,
+                                    [done](const Replay& paths, const std::string& error) {
+                                        if (!error.empty()) return done(Reply::error(422, error));
+                                        json j = to_json(paths);
+                                        j["is_last_pass"] = true;
+                                        done(Reply::json(dump(j)));
+                                    });
     case ReplayedPasses::Any: break;
     }
     ReplayRequest request;

@@ -435,8 +435,11 @@ TEST_F(StudioTest, ChecksPathsAndTracesAgain) {
 TEST_F(StudioTest, MeasuresRectanglesAndDifferences) {
     start();
     const auto run = [&](const std::string& integrator, int spp, int seed) {
-        const json request{{"action", "start"},       {"integrator", integrator}, {"spp", spp},
-                           {"sampler", "independent"}, {"seed", seed}};
+        const json request{{"action", "start"},
+                           {"integrator", integrator},
+                           {"spp", spp},
+                           {"sampler", "independent"},
+                           {"seed", seed}};
         return post("/v1/run", request).parsed()["run"].get<int>();
     };
     const int a = run("path", 4, 1), b = run("path", 64, 2);
@@ -448,9 +451,9 @@ TEST_F(StudioTest, MeasuresRectanglesAndDifferences) {
     const int n = 6 * 3;
     for (int y = 10; y < 13; ++y)
         for (int x = 7; x < 13; ++x) {
-            const json one = get("/v1/pixel?" + of_a + "&x=" + std::to_string(x) +
-                                 "&y=" + std::to_string(y))
-                                 .parsed();
+            const json one =
+                get("/v1/pixel?" + of_a + "&x=" + std::to_string(x) + "&y=" + std::to_string(y))
+                    .parsed();
             const double v = one["mean"][1], half = one["half"][1];
             sum += v, squares += v * v, error2 += half * half;
             least = std::min(least, v), largest = std::max(largest, v);
@@ -485,9 +488,9 @@ TEST_F(StudioTest, MeasuresRectanglesAndDifferences) {
 TEST_F(StudioTest, ComparesRunsWithSeveralSeeds) {
     start();
     const auto run = [&](int spp) {
-        const json request{
-            {"action", "start"}, {"integrator", "path:max_depth=3"}, {"spp", spp}, {"seeds", 6},
-            {"seed", 10 * spp},  {"sampler", "independent"}};
+        const json request{{"action", "start"}, {"integrator", "path:max_depth=3"},
+                           {"spp", spp},        {"seeds", 6},
+                           {"seed", 10 * spp},  {"sampler", "independent"}};
         return post("/v1/run", request).parsed()["run"].get<int>();
     };
     EXPECT_EQ(post("/v1/run", {{"action", "start"}, {"seeds", 3}}).status, 422);

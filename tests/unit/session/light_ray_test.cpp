@@ -102,8 +102,7 @@ TEST(CheckUserPath, IsFastEnoughToFollowThePointer) {
                   "<bsdf type=\"conductor\"/>") +
         rectangle("<scale value=\"0.3\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"4\"/>",
                   "<emitter type=\"area\"/>") +
-        rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-3\"/>",
-                  diffuse("0.5,0.5,0.5")));
+        rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-3\"/>", diffuse("0.5,0.5,0.5")));
     // A zigzag down from the lamp: 1 to the first mirror, then 2 from each to the next.
     GivenPath path{.name = "", .points = {{0, 4, 0}}, .cones = {1}, .radius = {}};
     const float down = 7.0f / 12;
@@ -163,15 +162,14 @@ TEST(DrawnShapes, KeepTheirBoundsAndTheirLimit) {
 /// A sphere about the origin, placed three times, one of them larger: each place has what rays hit there.
 TEST(DrawnShapes, AreDrawnOnceForEachInstance) {
     const auto instance = [](const std::string& transform) {
-        return "<shape type=\"instance\"><ref id=\"group\"/><transform name=\"to_world\">" + transform +
-               "</transform></shape>";
+        return "<shape type=\"instance\"><ref id=\"group\"/><transform name=\"to_world\">" +
+               transform + "</transform></shape>";
     };
-    const Scene scene =
-        build(sensor("0,0,9", "0,0,0", 8) + area_lamp() +
-              "<shape type=\"shapegroup\" id=\"group\">" +
-              sphere("0,0,0", "0.4", diffuse("0.5,0.5,0.5")) + "</shape>" +
-              instance("<translate x=\"-2\"/>") + instance("<translate x=\"2\"/>") +
-              instance("<rotate z=\"1\" angle=\"90\"/><scale value=\"2\"/><translate y=\"-3\"/>"));
+    const Scene scene = build(
+        sensor("0,0,9", "0,0,0", 8) + area_lamp() + "<shape type=\"shapegroup\" id=\"group\">" +
+        sphere("0,0,0", "0.4", diffuse("0.5,0.5,0.5")) + "</shape>" +
+        instance("<translate x=\"-2\"/>") + instance("<translate x=\"2\"/>") +
+        instance("<rotate z=\"1\" angle=\"90\"/><scale value=\"2\"/><translate y=\"-3\"/>"));
     const std::vector<DrawnShape> all = drawn_shapes(scene, 1'000'000);
     ASSERT_EQ(all.size(), 2u);
     EXPECT_EQ(all[0].places.size(), 1u);

@@ -128,7 +128,8 @@ TEST_P(LastReplayOf, SumsToTheLastPass) {
     const auto sums = [&](uint64_t passes) {
         RenderLimits limits;
         limits.spp = passes;
-        renderer.run(limits, [](const Progress&) {}, std::atomic<bool>(false));
+        renderer.run(
+            limits, [](const Progress&) {}, std::atomic<bool>(false));
         std::vector<Rgb> eye(scene.film().pixel_count());
         for (const auto& e : renderer.techniques()->images())
             for (size_t i = 0; i < eye.size(); ++i)
@@ -164,15 +165,16 @@ TEST_P(LastReplayOf, SumsToTheLastPass) {
     const std::atomic<bool> yes{true};
     RenderLimits more;
     more.spp = kPasses + 1;
-    renderer.run(more, [](const Progress&) {}, yes, yes);
+    renderer.run(
+        more, [](const Progress&) {}, yes, yes);
     EXPECT_THROW(replay_last(renderer, 27, 1), std::runtime_error);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, LastReplayOf,
                          ::testing::Values("vcm:roulette=0", "upg:roulette=0,radius=0.3",
                                            "upg+bdpt:roulette=0,radius=0.3", "pcbpt:roulette=0",
-                                           "bdpt:connections=cache,roulette=0",
-                                           "path:guide=on", "sppm:radius=0.3"));
+                                           "bdpt:connections=cache,roulette=0", "path:guide=on",
+                                           "sppm:radius=0.3"));
 
 }  // namespace
 }  // namespace etendue::test
