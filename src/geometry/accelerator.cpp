@@ -69,9 +69,9 @@ struct Accelerator::Impl {
     std::vector<RTCScene> groups;
     struct Instance {
         Transform to_world;
-        uint32_t first_shape;
+        std::pair<uint32_t, uint32_t> shapes;  ///< Of its group.
     };
-    std::vector<uint32_t> group_first;  ///< Index of each group's first shape.
+    std::vector<std::pair<uint32_t, uint32_t>> group_shapes;  ///< Indices [first, second).
     /// By geometry id of the top-level scene: index of the shape, or of the instance.
     std::vector<uint32_t> shape_of_geom;
     std::vector<Instance> instances;
@@ -149,10 +149,11 @@ uint32_t Accelerator::add_shape(const Shape& shape) {
 
 uint32_t Accelerator::add_group(const std::vector<const Shape*>& shapes) {
     RTCScene scene = impl_->new_scene();
-    impl_->group_first.push_back(impl_->shape_count);
     impl_->groups.push_back(scene);
     for (const Shape* s : shapes) impl_->attach(scene, *s);  // geometry ids count from 0
+    const uint32_t first = impl_->shape_count;
     impl_->shape_count += uint32_t(shapes.size());
+    impl_->group_shapes.emplace_back(first, impl_->shape_count);
     rtcCommitScene(scene);
     impl_->check();
     return uint32_t(impl_->groups.size() - 1);
@@ -171,7 +172,7 @@ uint32_t Accelerator::add_instance(uint32_t group, const Transform& to_world) {
     impl_->check();
     impl_->shape_of_geom.resize(id + 1);
     impl_->shape_of_geom[id] = uint32_t(impl_->instances.size());
-    impl_->instances.push_back({to_world, impl_->group_first[group]});
+    impl_->instances.push_back({to_world, impl_->group_shapes[group]});
     return uint32_t(impl_->instances.size() - 1);
 }
 
@@ -203,7 +204,7 @@ bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
         out.shape = impl_->shape_of_geom[rh.hit.geomID];
     } else {
         out.instance = impl_->shape_of_geom[rh.hit.instID[0]];
-        out.shape = impl_->instances[out.instance].first_shape + rh.hit.geomID;
+        out.shape = impl_->instances[out.instance].shapes.first + rh.hit.geomID;
     }
     return true;
 }
@@ -219,6 +220,14 @@ bool Accelerator::occluded(const Ray& ray) const {
     rtcOccluded1(impl_->top, &context, &r);
 #endif
     return r.tfar < 0;
+}
+
+size_t Accelerator::instance_count() const {
+    return impl_->instances.size();
+}
+
+std::pair<uint32_t, uint32_t> Accelerator::instance_shapes(uint32_t instance) const {
+    return impl_->instances[instance].shapes;
 }
 
 const Transform& Accelerator::instance_transform(uint32_t instance) const {

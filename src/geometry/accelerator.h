@@ -2,6 +2,7 @@
 // Ray queries over shapes and instances with Embree. No other file includes its headers.
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "geometry/ray.h"
@@ -52,7 +53,10 @@ public:
     /// Whether there is any intersection with t in (0, ray.tmax).
     bool occluded(const Ray& ray) const;
 
+    size_t instance_count() const;
     const Transform& instance_transform(uint32_t instance) const;
+    /// The indices [first, second) of the shapes that the instance shows.
+    std::pair<uint32_t, uint32_t> instance_shapes(uint32_t instance) const;
     size_t memory_bytes() const;
 
 private:

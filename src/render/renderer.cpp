@@ -220,6 +220,7 @@ Renderer::~Renderer() = default;
 
 void Renderer::pass(const std::atomic<bool>& drop) {
     const uint64_t rejected_before = film_.rejected();
+    has_last_pass_ = false;
     try {
         workers_->arena.execute([&] { trace_pass(drop); });
     } catch (...) {
@@ -234,6 +235,27 @@ void Renderer::pass(const std::atomic<bool>& drop) {
     stats_ += workers_->take_stats();
     stats_.rejected += film_.rejected() - rejected_before;
     integrator_->collect(workers_->take_sums());
+    has_last_pass_ = true;
+}
+
+Renderer::Numbers Renderer::numbers(uint32_t index) const {
+    if (!integrator_->is_learning()) return {settings_.seed, index};
+    const LearningStep step = LearningStep::of(index);
+    return {step.number > 0 ? hash_combine(settings_.seed, step.number) : settings_.seed,
+            step.pass};
+}
+
+bool Renderer::sample_again(uint64_t pixel, Workspace& work, ContributionSink& sink) const {
+    if (!has_last_pass_) return false;
+    const Numbers place = numbers(uint32_t(film_.passes() - 1));
+    const float splat_scale = light_paths_ > 0 ? float(1.0 / double(light_paths_)) : 0.0f;
+    work.is_observed = true;
+    work.sums = integrator_->make_sums();
+    Sampler sampler(settings_.sampler, place.seed);
+    sampler.start(place.pass, pixel);
+    integrator_->sample(
+        {scene_, film_, pixel, pixel / kChunk, light_paths_, splat_scale, sampler, sink}, work);
+    return true;
 }
 
 void Renderer::trace_pass(const std::atomic<bool>& drop) {
@@ -241,10 +263,8 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
     const uint64_t pixels = scene_.film().pixel_count(), light_paths = light_paths_;
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     film_.begin_pass(light_paths);
-    const LearningStep step =
-        integrator_->is_learning() ? LearningStep::of(index) : LearningStep{0, index};
-    const uint64_t seed =
-        step.number > 0 ? hash_combine(settings_.seed, step.number) : settings_.seed;
+    const Numbers place = numbers(index);
+    const uint64_t seed = place.seed;
     const auto go_on = [&] {
         if (drop.load(std::memory_order_relaxed)) throw PassDropped();
     };
@@ -264,7 +284,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
             FilmSink sink({film_, techniques_.get(), settings_, splat_scale, work});
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
-                sampler.start(step.pass, pixel);
+                sampler.start(place.pass, pixel);
                 work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
                 use(SampleContext{scene_, film_, pixel, chunk, light_paths, splat_scale, sampler,
                                   sink},

@@ -72,6 +72,11 @@ public:
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop);
 
+    /// Traces the sample of a pixel in the last pass again, with the data that the integrator keeps of that pass, such as
+    /// its light paths. Its contributions go to `sink`, its sub-paths to `work`. Must not run during run(). Returns false
+    /// if no pass was made, or if the integrator has the data of a discarded pass.
+    bool sample_again(uint64_t pixel, Workspace& work, ContributionSink& sink) const;
+
     const Film& film() const { return film_; }
     const Integrator& integrator() const { return *integrator_; }
     const RenderStats& stats() const { return stats_; }  ///< Statistics of the finished passes.
@@ -81,6 +86,12 @@ public:
 private:
     static inline const std::atomic<bool> kNeverDrop{false};
 
+    /// Seed and pass index of the random numbers of a pass.
+    struct Numbers {
+        uint64_t seed;
+        uint32_t pass;
+    };
+    Numbers numbers(uint32_t index) const;
     void pass(const std::atomic<bool>& drop);
     void trace_pass(const std::atomic<bool>& drop);
     std::optional<StopReason> reached(const RenderLimits& limits, const ErrorEstimate& error) const;
@@ -94,6 +105,8 @@ private:
     struct Workers;
     std::unique_ptr<Workers> workers_;
     uint64_t learned_passes_ = 0;  ///< Number of passes for which the integrator has learned.
+    bool has_last_pass_ =
+        false;  ///< Whether the integrator has the data of the last finished pass.
     RenderStats stats_;
     double seconds_ = 0;
 };

@@ -75,6 +75,7 @@ public:
     /// Geometry of a surface point.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
+    const Accelerator& accelerator() const { return accelerator_; }
     /// The origin of a ray of direction `d` from a surface point `p` with normal `ng`, see etendue::offset_origin().
     Vec3 offset_origin(Vec3 p, Vec3 ng, Vec3 d) const {
         return etendue::offset_origin(p, ng, d, least_offset_, size_);

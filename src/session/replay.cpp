@@ -52,15 +52,19 @@ private:
         return {v.p, v.is_delta && !is_joined ? 'S' : 'D', v.is_infinite};
     }
 
-    /// Hits have all vertices; next events and splats sample the other end, which the join's edge has.
+    /// Hits have all vertices; next events and splats sample the other end, which the join's edge has. Of a pair, z_{t-1}
+    /// stays, unless it was dropped.
     std::vector<ReplayedPath::Point> points(const Join& join) const {
-        const int s = join.technique.s, t = join.technique.t;
+        int s = join.technique.s, t = join.technique.t;
+        const SubPath& y = is_pair(join.technique.strategy) ? work_.pair : work_.y;
+        if (is_pair(join.technique.strategy)) --(join.technique.drops_eye ? t : s);
         std::vector<ReplayedPath::Point> list;
         if (join.technique.strategy == Strategy::NextEvent)
             list.push_back({join.b, 'L', join.to_infinity});
         else
-            for (int i = 0; i < std::min(s, work_.y.size()); ++i)
-                list.push_back(point(work_.y[i], i == s - 1));
+            for (int i = 0; i < std::min(s, y.size()); ++i)
+                list.push_back(
+                    point(y[i], i == s - 1 && join.technique.strategy != Strategy::Merge));
         if (t == 1)
             list.push_back({join.a, 'E', false});
         else
@@ -82,29 +86,33 @@ private:
     float splat_share_ = 0;
 };
 
-bool has_value(const IntegratorSpec& spec, const char* name, const char* value) {
-    const auto at = spec.params.find(name);
-    return at != spec.params.end() && at->second == value;
+void sort_by_luminance(Replay& replay) {
+    std::sort(replay.paths.begin(), replay.paths.end(),
+              [](const ReplayedPath& a, const ReplayedPath& b) {
+                  return luminance(a.value) > luminance(b.value);
+              });
 }
 
 }  // namespace
 
-std::string replay_problem(const IntegratorSpec& spec) {
-    if (spec.name != "path" && spec.name != "bdpt" && spec.name != "light")
-        return fmt::format("paths of path, bdpt and light can be traced again; those of {} share "
-                           "data between pixels",
-                           spec.name);
-    if (const auto guide = spec.params.find("guide");
-        guide != spec.params.end() && guide->second != "off")
-        return "guided paths depend on what earlier passes learned, and cannot be traced again";
-    if (has_value(spec, "connections", "cache"))
-        return "connections to the cache share light paths between pixels";
-    return {};
+ReplayedPasses replayed_passes(const IntegratorSpec& spec) {
+    const std::unique_ptr<Integrator> integrator = make_integrator(spec);
+    if (integrator->error_groups() > 0 || !integrator->keeps_paths()) return ReplayedPasses::None;
+    const auto is_other_than = [&](const char* name, const char* value) {
+        const auto at = spec.params.find(name);
+        return at != spec.params.end() && at->second != value;
+    };
+    const bool traces_alone = spec.name == "path" || spec.name == "bdpt" || spec.name == "light";
+    return !traces_alone || is_other_than("guide", "off") || is_other_than("connections", "path")
+               ? ReplayedPasses::Last
+               : ReplayedPasses::Any;
 }
 
 Replay replay(const Scene& scene, const ReplayRequest& request) {
-    if (const std::string problem = replay_problem(request.integrator); !problem.empty())
-        throw std::runtime_error(problem);
+    if (replayed_passes(request.integrator) != ReplayedPasses::Any)
+        throw std::runtime_error(
+            fmt::format("paths of {} cannot be traced again without the rest of their pass",
+                        request.integrator.name));
     IntegratorSpec spec = request.integrator;
     if (spec.name == "bdpt") spec.params["roulette"] = "0";
     const std::unique_ptr<Integrator> integrator = make_integrator(spec);
@@ -135,10 +143,21 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
     if (request.splats)
         for (uint64_t i = 0; i < light_paths && has_time(); ++i, ++result.light_paths)
             trace(request.first_pass, i, true);
-    std::sort(result.paths.begin(), result.paths.end(),
-              [](const ReplayedPath& a, const ReplayedPath& b) {
-                  return luminance(a.value) > luminance(b.value);
-              });
+    sort_by_luminance(result);
+    return result;
+}
+
+Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths) {
+    Replay result;
+    Workspace work;
+    PathRecorder recorder(renderer.film(), pixel, most_paths, work, result);
+    recorder.begin(uint32_t(renderer.film().passes()) - 1, false, 0);
+    if (!renderer.sample_again(pixel, work, recorder))
+        throw std::runtime_error(
+            "the light paths of the last pass are gone, because the pass after "
+            "it was discarded; continue the run for another pass");
+    result.passes = 1;
+    sort_by_luminance(result);
     return result;
 }
 

@@ -1,11 +1,13 @@
 #pragma once
 // The paths that contributed to a pixel, traced again. Random numbers have addresses, so nothing is recorded during the
-// rendering.
+// rendering. What pixels share, such as light paths, is not traced again: a method that shares data has them until its
+// next pass, so only the paths of the last pass can be traced.
 
 #include <string>
 #include <vector>
 
 #include "integrator/integrator.h"
+#include "render/renderer.h"
 
 namespace etendue {
 
@@ -42,10 +44,18 @@ struct Replay {
     size_t left_out = 0;       ///< Number of paths beyond `most_paths`.
 };
 
-/// The reason why paths of an integrator cannot be traced again; empty if they can.
-std::string replay_problem(const IntegratorSpec& integrator);
+/// Which passes of an integrator can be traced again.
+enum class ReplayedPasses {
+    Any,
+    Last,  ///< Pixels share data, or paths depend on what was learned.
+    None,  ///< Paths are states of Markov chains, or are not kept.
+};
+ReplayedPasses replayed_passes(const IntegratorSpec& integrator);
 /// Joins pass no Russian roulette before shadow rays. The sum therefore agrees with the image on average, and exactly if
-/// the image was rendered with roulette=0. Throws std::runtime_error with replay_problem().
+/// the image was rendered with roulette=0. Throws std::runtime_error unless any pass can be traced again.
 Replay replay(const Scene& scene, const ReplayRequest& request);
+/// Contributions with t ≥ 2 in the last pass, with Russian roulette before shadow rays. Must not run during
+/// renderer.run(). Throws std::runtime_error if the pass cannot be traced again.
+Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths);
 
 }  // namespace etendue

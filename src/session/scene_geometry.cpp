@@ -1,6 +1,6 @@
 #include "session/scene_geometry.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <unordered_map>
 
@@ -76,34 +76,91 @@ void describe(const Scene& scene, DrawnShape& to) {
     to.is_specular = !v.is_connectible;
 }
 
+DrawnShape::Place to_place(const Transform& to_world) {
+    DrawnShape::Place place{};
+    for (size_t row = 0; row < 3; ++row)
+        for (size_t column = 0; column < 4; ++column)
+            place[4 * row + column] = float(to_world.matrix()[row][column]);
+    return place;
+}
+
+/// Places by shape. Shapes of groups have one for each instance; those before them are in world space.
+struct Places {
+    std::vector<std::vector<DrawnShape::Place>> of;
+    size_t first_of_groups;
+};
+Places places_of(const Scene& scene) {
+    const size_t shapes = scene.shapes().size();
+    Places places{std::vector<std::vector<DrawnShape::Place>>(shapes), shapes};
+    std::vector<uint32_t> instances(shapes), seen(shapes);
+    const Accelerator& accelerator = scene.accelerator();
+    const auto count = uint32_t(accelerator.instance_count());
+    const auto for_each = [&](const auto& use) {
+        for (uint32_t i = 0; i < count; ++i) {
+            const auto [first, end] = accelerator.instance_shapes(i);
+            for (uint32_t shape = first; shape < end; ++shape) use(i, shape);
+        }
+    };
+    for_each([&](uint32_t, uint32_t shape) {
+        ++instances[shape];
+        places.first_of_groups = std::min(places.first_of_groups, size_t(shape));
+    });
+    for_each([&](uint32_t i, uint32_t shape) {
+        // Every n-th, such that few enough are left.
+        const size_t step = (instances[shape] + kMostPlaces - 1) / kMostPlaces;
+        if (seen[shape]++ % step == 0)
+            places.of[shape].push_back(to_place(accelerator.instance_transform(i)));
+    });
+    for (size_t shape = 0; shape < places.first_of_groups; ++shape)
+        places.of[shape] = {to_place(Transform())};
+    return places;
+}
+
 }  // namespace
 
 std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles) {
-    std::vector<Mesh> meshes;
-    size_t triangles = 0;
+    const Places placed = places_of(scene);
+    const auto& places = placed.of;
+    struct Part {
+        Mesh mesh;
+        Bounds3 bounds;  ///< Of what cells are measured by.
+    };
+    std::vector<Part> parts;
+    size_t triangles = 0, drawn_triangles = 0;
+    const auto count = [&](size_t shape) {
+        const size_t n = parts[shape].mesh.triangles.size() / 3;
+        triangles += n;
+        drawn_triangles += n * places[shape].size();
+    };
     for (const SceneShape& shape : scene.shapes()) {
-        meshes.push_back(mesh_of(*shape.shape));
-        triangles += meshes.back().triangles.size() / 3;
+        const bool is_in_world = parts.size() < placed.first_of_groups;
+        parts.push_back(
+            {mesh_of(*shape.shape), is_in_world ? scene.bounds() : shape.shape->bounds()});
+        count(parts.size() - 1);
     }
     // Coarser from step to step.
-    const float size = scene.bounds().is_empty() ? 1 : 2 * scene.bounds().radius();
     constexpr int kFinest = 1024, kCoarsest = 16;
-    for (int cells = kFinest; triangles > most_triangles && cells >= kCoarsest; cells /= 2) {
-        triangles = 0;
-        for (Mesh& mesh : meshes) {
+    const auto has_too_many = [&] {
+        return triangles > most_triangles || drawn_triangles > 4 * most_triangles;
+    };
+    for (int cells = kFinest; has_too_many() && cells >= kCoarsest; cells /= 2) {
+        triangles = drawn_triangles = 0;
+        for (size_t i = 0; i < parts.size(); ++i) {
+            auto& [mesh, bounds] = parts[i];
             constexpr size_t kSmall = 3 * 2400;
             if (mesh.triangles.size() > kSmall)
-                mesh = clustered(mesh, scene.bounds().lo, size / float(cells));
-            triangles += mesh.triangles.size() / 3;
+                mesh = clustered(mesh, bounds.lo, 2 * bounds.radius() / float(cells));
+            count(i);
         }
     }
     std::vector<DrawnShape> drawn;
-    for (size_t i = 0; i < meshes.size(); ++i) {
-        const Mesh& mesh = meshes[i];
-        if (mesh.triangles.empty()) continue;
+    for (size_t i = 0; i < parts.size(); ++i) {
+        const Mesh& mesh = parts[i].mesh;
+        if (mesh.triangles.empty() || places[i].empty()) continue;
         DrawnShape& to = drawn.emplace_back();
         to.shape = uint32_t(i);
         to.name = scene.shapes()[i].name;
+        to.places = places[i];
         describe(scene, to);
         for (const Vec3 p : mesh.positions) to.bounds.extend(p);
         for (const Vec3 p : mesh.positions)

@@ -1,6 +1,7 @@
 #pragma once
 // Shapes as triangles, for drawing only: rays are traced on the true geometry.
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -12,16 +13,22 @@ namespace etendue {
 struct DrawnShape {
     uint32_t shape = 0;  ///< Index in Scene::shapes().
     std::string name;
-    Bounds3 bounds;
-    Rgb color;  ///< About its reflectance.
+    Bounds3 bounds;  ///< In the space of the shape.
+    Rgb color;       ///< About its reflectance.
     bool emits = false;
     bool is_specular = false;         ///< A mirror or clear glass.
     std::vector<uint16_t> positions;  ///< x, y, z in 1/65535 of the bounds.
     std::vector<uint32_t> triangles;
+    using Place =
+        std::array<float, 12>;  ///< The first three rows of a matrix, one after the other.
+    std::vector<Place> places;  ///< Maps to world space, one for each time that the shape is drawn.
 };
 
-/// All shapes, those with many triangles simplified until there are at most `most_triangles` in all. Shapes that are
-/// only visible through instances are drawn once, in their own place.
+/// Limit of the instances that are drawn of one shape.
+inline constexpr size_t kMostPlaces = 20'000;
+
+/// All shapes, those with many triangles simplified until there are at most `most_triangles` in all, and four times as
+/// many with instances. Of a shape with more than kMostPlaces instances, some are left out.
 std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles);
 
 }  // namespace etendue

@@ -28,8 +28,8 @@ double process_cpu_seconds() {
     return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
-IntervalKind interval_kind(const Integrator& integrator, SamplerKind sampler) {
-    if (integrator.error_groups() > 0) return IntervalKind::None;
+IntervalKind interval_kind(const Integrator& integrator, SamplerKind sampler, int seeds) {
+    if (integrator.error_groups() > 0 || seeds > 1) return IntervalKind::None;
     if (integrator.estimator() != Estimator::Unbiased) return IntervalKind::NoiseOnly;
     return sampler == SamplerKind::Sobol ? IntervalKind::Upper : IntervalKind::Confidence;
 }
@@ -68,7 +68,10 @@ struct Session::Run {
     RunStatus status;  ///< Guarded by the session's mutex.
     std::atomic<std::shared_ptr<const Snapshot>> snapshot;
     std::atomic<std::shared_ptr<const TechniqueSnapshot>> techniques;
+    std::atomic<std::shared_ptr<const SeedSeries>> series{std::make_shared<const SeedSeries>()};
     std::atomic<bool> is_wanted{true}, wants_techniques{false};
+
+    bool has_seeds() const { return status.seeds > 1; }
 
     // Of the session's thread.
     std::shared_ptr<const Scene> scene;
@@ -77,6 +80,8 @@ struct Session::Run {
     std::unique_ptr<Renderer> renderer;
     PassLog log;
     SnapshotPool pool;
+    std::vector<Rgb> sum_of_seeds;
+    uint64_t passes_of_seeds = 0;
     uint64_t last_turn = 0;
 };
 
@@ -168,9 +173,12 @@ void Session::take_turn(Run& run) {
     run.last_turn = ++turns_;
     const auto begin = Clock::now();
     try {
-        if (!run.renderer)
+        if (run.integrator) {
+            run.renderer.reset();
             run.renderer =
                 std::make_unique<Renderer>(*run.scene, run.settings, std::move(run.integrator));
+            run.log = {};
+        }
         const StopReason reason = run.renderer->run(
             run.settings,
             [&](const Progress& progress) {
@@ -179,13 +187,50 @@ void Session::take_turn(Run& run) {
                 if (elapsed.count() > kTurn) turn_over_ = true;
             },
             turn_over_, drop_);
-        finish_turn(run,
-                    reason == StopReason::Interrupted ? RunState::Rendering : RunState::Finished);
+        const bool is_rendering =
+            reason == StopReason::Interrupted || (run.has_seeds() && finish_seed(run));
+        finish_turn(run, is_rendering ? RunState::Rendering : RunState::Finished);
     } catch (const std::bad_alloc&) {
         finish_turn(run, RunState::Failed, "not enough memory");
     } catch (const std::exception& e) {
         finish_turn(run, RunState::Failed, e.what());
     }
+}
+
+bool Session::finish_seed(Run& run) {
+    const Renderer& renderer = *run.renderer;
+    const std::vector<Rgb> image = renderer.film().image();
+    SeedSeries::Image luminances;
+    run.sum_of_seeds.resize(image.size());
+    for (size_t i = 0; i < image.size(); ++i) {
+        luminances.push_back(luminance(image[i]));
+        run.sum_of_seeds[i] += image[i];
+    }
+    run.passes_of_seeds += renderer.film().passes();
+    auto series = std::make_shared<SeedSeries>(*run.series.load());
+    series->add(std::move(luminances), renderer.seconds(), renderer.integrator().figures());
+
+    const std::shared_ptr<Snapshot> snapshot = run.pool.take();
+    const auto count = int(series->luminance.size());
+    *snapshot = {.run = run.status.id,
+                 .passes = run.passes_of_seeds,
+                 .width = run.scene->film().crop_width,
+                 .height = run.scene->film().crop_height,
+                 .mean = run.sum_of_seeds,
+                 .variance = std::vector<Rgb>(image.size())};
+    for (Rgb& c : snapshot->mean) c *= 1 / float(count);
+    run.snapshot.store(snapshot);
+
+    const std::lock_guard lock(mutex_);
+    RunStatus& s = run.status;
+    s.finished_seeds = count;
+    s.snapshot_passes = run.passes_of_seeds;
+    s.figures = series->figures;
+    run.series.store(std::move(series));
+    if (count >= s.seeds) return false;
+    ++run.settings.seed;
+    run.integrator = make_integrator(run.settings.integrator);
+    return true;
 }
 
 void Session::finish_turn(Run& run, RunState state, const std::string& message) {
@@ -229,10 +274,15 @@ void Session::after_pass(Run& run, const Progress& p) {
     {
         const std::lock_guard lock(mutex_);
         RunStatus& s = run.status;
-        s.passes = p.passes;
-        s.seconds = p.seconds;
+        s.passes = run.passes_of_seeds + p.passes;
+        s.seconds = run.series.load()->total_seconds() + p.seconds;
         s.rays_per_second = p.rays_per_second;
         s.fraction = p.fraction;
+        // What follows belongs to one seed.
+        if (run.has_seeds()) {
+            if (s.fraction) *s.fraction = (s.finished_seeds + *s.fraction) / s.seeds;
+            return changed();
+        }
         s.error = p.error;
         s.figures = run.renderer->integrator().figures();
         constexpr double kSpacing = 1.05;
@@ -246,6 +296,7 @@ void Session::after_pass(Run& run, const Progress& p) {
 }
 
 void Session::show(Run& run) {
+    if (run.has_seeds()) return;
     const double before = process_cpu_seconds();
     tbb::task_arena arena(threads_ > 0 ? threads_ : tbb::task_arena::automatic);
     run.is_wanted = false;
@@ -294,7 +345,8 @@ int Session::start(const RunRequest& request) {
     settings.sampler = request.sampler;
     settings.seed = request.seed;
     settings.threads = threads_;
-    settings.technique_depth = fitting_depth(*scene, request.technique_depth);
+    settings.technique_depth =
+        request.seeds > 1 ? 0 : fitting_depth(*scene, request.technique_depth);
     run->integrator = make_integrator(settings.integrator);
     RunStatus& s = run->status;
     s.integrator = settings.integrator.to_string();
@@ -302,8 +354,9 @@ int Session::start(const RunRequest& request) {
     s.seed = settings.seed;
     s.limits = settings;
     s.technique_depth = settings.technique_depth;
+    s.seeds = request.seeds;
     s.estimator = run->integrator->estimator();
-    s.interval = interval_kind(*run->integrator, settings.sampler);
+    s.interval = interval_kind(*run->integrator, settings.sampler, request.seeds);
     {
         const std::lock_guard lock(mutex_);
         s.id = ++last_id_;
@@ -330,6 +383,18 @@ void Session::resume(int id, const RenderLimits& limits) {
         return find(id);
     }();
     post([this, run, limits] {
+        // A run with several seeds continues with more of them.
+        if (run->has_seeds()) {
+            const std::lock_guard lock(mutex_);
+            RunStatus& s = run->status;
+            if (s.state == RunState::Finished) {
+                s.seeds *= 2;
+                ++run->settings.seed;
+                run->integrator = make_integrator(run->settings.integrator);
+            }
+            if (s.state != RunState::Failed) s.state = RunState::Rendering;
+            return;
+        }
         if (limits.spp || limits.seconds || limits.error)
             static_cast<RenderLimits&>(run->settings) = limits;
         const std::lock_guard lock(mutex_);
@@ -413,6 +478,27 @@ std::shared_ptr<const TechniqueSnapshot> Session::techniques(int id) {
             if (run->renderer && run->renderer->film().passes() > 0) show(*run);
         });
     return shown;
+}
+
+std::shared_ptr<const SeedSeries> Session::seed_series(int id) const {
+    const std::lock_guard lock(mutex_);
+    return find(id)->series.load();
+}
+
+void Session::replay_last(int id, uint64_t pixel, size_t most_paths,
+                          std::function<void(const Replay&, const std::string&)> done) {
+    const std::shared_ptr<Run> run = [&] {
+        const std::lock_guard lock(mutex_);
+        return find(id);
+    }();
+    post([run, pixel, most_paths, done = std::move(done)] {
+        if (!run->renderer) return done({}, "no pass is finished yet");
+        try {
+            done(etendue::replay_last(*run->renderer, pixel, most_paths), {});
+        } catch (const std::exception& e) {
+            done({}, e.what());
+        }
+    });
 }
 
 void Session::spent(double cpu_seconds) {

@@ -14,6 +14,8 @@
 
 #include "render/render_report.h"
 #include "render/renderer.h"
+#include "session/replay.h"
+#include "session/seed_series.h"
 #include "session/snapshot.h"
 
 namespace etendue {
@@ -26,6 +28,9 @@ struct RunRequest {
     uint64_t seed = 0;
     RenderLimits limits;      ///< Without any, the run ends when it is stopped.
     int technique_depth = 0;  ///< In edges; reduced until the images fit into kTechniqueBytes.
+    /// Number of renderings, with the seeds `seed`, `seed` + 1, …; the limits apply to each. The run then shows their
+    /// mean, and has a SeedSeries.
+    int seeds = 1;
 };
 
 /// `Stopping`: until the pass in flight is complete and its image is shown.
@@ -37,7 +42,7 @@ enum class IntervalKind {
     Confidence,  ///< 95 % confidence interval.
     Upper,       ///< Upper bound: passes of a Sobol' sampler are negatively correlated.
     NoiseOnly,   ///< Without the bias of a consistent or biased method.
-    None,        ///< No interval: the passes belong to Markov chains.
+    None,        ///< No interval: the passes belong to Markov chains, or the run has several seeds.
 };
 const char* to_string(IntervalKind kind);
 
@@ -54,9 +59,10 @@ struct RunStatus {
     uint64_t seed = 0;
     RenderLimits limits;
     int technique_depth = 0;
+    int seeds = 1, finished_seeds = 0;
     RunState state = RunState::Rendering;
-    std::string message;  ///< Why the run failed.
-    uint64_t passes = 0, snapshot_passes = 0;
+    std::string message;                       ///< Why the run failed.
+    uint64_t passes = 0, snapshot_passes = 0;  ///< With several seeds: of all of them.
     double seconds = 0, rays_per_second = 0;
     std::optional<double> fraction;
     ErrorEstimate error;
@@ -119,6 +125,12 @@ public:
     /// Returns the latest snapshot, or nullptr, and requests a newer one.
     std::shared_ptr<const Snapshot> snapshot(int run);
     std::shared_ptr<const TechniqueSnapshot> techniques(int run);
+    /// The finished renderings of a run with several seeds; empty for other runs.
+    std::shared_ptr<const SeedSeries> seed_series(int run) const;
+    /// Calls `done` in the session's thread with the paths of a pixel of the last pass, at most `most_paths`, or with an
+    /// error.
+    void replay_last(int run, uint64_t pixel, size_t most_paths,
+                     std::function<void(const Replay&, const std::string& error)> done);
     /// Charges processor time, in seconds, that was spent on a snapshot outside the session.
     void spent(double cpu_seconds);
 
@@ -135,6 +147,8 @@ private:
     /// Publishes a snapshot if one was requested and the budget allows it.
     void show(Run& run);
     void finish_turn(Run& run, RunState state, const std::string& message = {});
+    /// Keeps the image of a finished seed, and shows the mean of those so far. Returns whether another seed follows.
+    bool finish_seed(Run& run);
     /// Shows the last image of a run that is to be stopped.
     void finish_stop(Run& run);
     /// Marks a run as stopping, and lets the session's thread do the rest. Needs the mutex.

@@ -14,7 +14,10 @@
 #include <nlohmann/json.hpp>
 
 #include "image/atomic_file.h"
+#include "image/flip.h"
+#include "image/metrics.h"
 #include "math/content_hash.h"
+#include "math/statistics.h"
 #include "mcmc/pick_paths.h"
 #include "render/aov.h"
 #include "render/defaults.h"
@@ -136,6 +139,7 @@ json progress_of(const RunStatus& s) {
            {"rays", s.rays_per_second},
            {"error", to_json(s.error)}};
     if (s.fraction) j["fraction"] = *s.fraction;
+    if (s.seeds > 1) j["seeds"] = {s.finished_seeds, s.seeds};
     if (!s.message.empty()) j["message"] = s.message;
     if (!s.is_of_this_scene) j["old_scene"] = true;
     return j;
@@ -171,6 +175,71 @@ std::vector<float> relative_errors(const Snapshot& s) {
         errors[i] = scale > 0 ? std::sqrt(std::max(0.0f, luminance(s.variance[i]))) / scale : 0.0f;
     }
     return errors;
+}
+
+/// Calls use(index) for the pixels of a rectangle.
+template <class Use>
+void for_each_pixel(const ImageRect& r, int width, const Use& use) {
+    for (int y = r.y; y < r.y + r.height; ++y)
+        for (int x = r.x; x < r.x + r.width; ++x) use(size_t(y) * size_t(width) + size_t(x));
+}
+
+/// The pixels of a rectangle. Pixels that are not finite are counted, and otherwise left out.
+struct RectangleValues {
+    using Channels = std::array<double, 3>;
+    size_t finite = 0, nan = 0, infinite = 0;
+    Channels mean{}, least{}, largest{};
+    Channels variance{};       ///< Of the pixels.
+    Channels squared_error{};  ///< Of the mean, if the errors of pixels are independent.
+};
+RectangleValues values_in(const Snapshot& s, const ImageRect& rect) {
+    RectangleValues v;
+    std::array<Moments, 3> moments;
+    for_each_pixel(rect, s.width, [&](size_t i) {
+        const Rgb c = s.mean[i];
+        if (std::isnan(c.r) || std::isnan(c.g) || std::isnan(c.b)) {
+            ++v.nan;
+            return;
+        }
+        if (!is_finite(c)) {
+            ++v.infinite;
+            return;
+        }
+        for (size_t k = 0; k < 3; ++k) {
+            const auto value = double(c[int(k)]);
+            v.least[k] = v.finite > 0 ? std::min(v.least[k], value) : value;
+            v.largest[k] = v.finite > 0 ? std::max(v.largest[k], value) : value;
+            moments[k].add(value);
+            v.squared_error[k] += double(s.variance[i][int(k)]);
+        }
+        ++v.finite;
+    });
+    for (size_t k = 0; k < 3; ++k) {
+        v.mean[k] = moments[k].mean();
+        v.variance[k] = moments[k].variance();
+        v.squared_error[k] /= sqr(std::max(1.0, double(v.finite)));
+    }
+    return v;
+}
+
+json to_json(const SeedComparison::Method& m, const SeedSeries& series) {
+    json mutations = json::object();
+    // Figures of the steps by length have longer names.
+    const auto add = [&](const std::string& name, double value, const std::string& ending,
+                         const char* as) {
+        if (name.ends_with(ending) && name.find("_length_") == std::string::npos)
+            mutations[name.substr(0, name.size() - ending.size())][as] = value;
+    };
+    for (const auto& [name, value] : series.figures) {
+        add(name, value, "_proposed", "proposed");
+        add(name, value, "_accepted", "accepted");
+    }
+    return {{"seeds", series.luminance.size()},
+            {"variance", m.variance},
+            {"seconds", m.seconds},
+            {"mean", m.mean},
+            {"mean_error", m.mean_error},
+            {"mutations", mutations}};
 }
 
 const char* name_of(Strategy strategy) {
@@ -253,7 +322,7 @@ void append_bytes(std::string& to, const std::vector<T>& values) {
     to.append((4 - to.size() % 4) % 4, '\0');
 }
 
-/// 4 bytes: the length of the JSON text; the text, filled up with spaces to whole 4 bytes; positions and indices.
+/// 4 bytes: the length of the JSON text; the text, filled up with spaces to whole 4 bytes; positions, indices and places.
 std::string encode(const std::vector<DrawnShape>& shapes) {
     std::string data;
     json list = json::array();
@@ -271,6 +340,9 @@ std::string encode(const std::vector<DrawnShape>& shapes) {
         append_bytes(data, s.positions);
         item["indices_at"] = data.size();
         append_bytes(data, s.triangles);
+        item["places"] = s.places.size();
+        item["places_at"] = data.size();
+        append_bytes(data, s.places);
         list.push_back(std::move(item));
     }
     std::string text = dump(list);
@@ -352,6 +424,8 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
     if (path == "/v1/state") return needs(is_get), done(state());
     if (path == "/v1/image") return needs(is_get), image(request, done);
     if (path == "/v1/pixel") return needs(is_get), done(pixel(request));
+    if (path == "/v1/difference") return needs(is_get), difference(request, done);
+    if (path == "/v1/gain") return needs(is_get), gain(request, done);
     if (path == "/v1/techniques") return needs(is_get), done(techniques(request));
     if (path == "/v1/paths") {
         if (request.method == "PUT") return done(put_paths(request));
@@ -581,38 +655,70 @@ Reply Api::pixel(const Request& request) {
                       .rect = {x, y, w, h},
                       .level = 0});
     const RunStatus status = session_.status(id);
-    const double n = double(w) * double(h);
-    double mean[3] = {0, 0, 0}, variance[3] = {0, 0, 0};
-    for (int row = y; row < y + h; ++row)
-        for (int column = x; column < x + w; ++column) {
-            const size_t i = size_t(row) * size_t(snapshot->width) + size_t(column);
-            for (int c = 0; c < 3; ++c) {
-                mean[c] += double(snapshot->mean[i][c]) / n;
-                variance[c] += double(snapshot->variance[i][c]) / (n * n);
-            }
-        }
-    json j{{"run", id},
-           {"passes", snapshot->passes},
-           {"mean", mean},
-           {"interval", to_string(status.interval)},
-           {"half", nullptr}};
-    if (snapshot->passes >= 2 && status.interval != IntervalKind::None) {
-        for (int c = 0; c < 3; ++c)
-            j["half"][size_t(c)] = interval_half_width(variance[c], snapshot->passes);
+    const RectangleValues values = values_in(*snapshot, {x, y, w, h});
+    json j{{"run", id},           {"passes", snapshot->passes},
+           {"mean", values.mean}, {"interval", to_string(status.interval)},
+           {"half", nullptr},     {"pixels", int64_t(w) * int64_t(h)},
+           {"nan", values.nan},   {"infinite", values.infinite}};
+    if (values.finite > 1) {
+        j["least"] = values.least;
+        j["largest"] = values.largest;
+        j["variance"] = values.variance;
+    }
+    if (snapshot->passes >= 2 && status.interval != IntervalKind::None && values.finite > 0) {
+        for (size_t c = 0; c < 3; ++c)
+            j["half"][c] = interval_half_width(values.squared_error[c], snapshot->passes);
     }
     if (options_.reference && options_.reference->width == snapshot->width &&
         options_.reference->height == snapshot->height) {
-        double value[3] = {0, 0, 0};
-        for (int row = y; row < y + h; ++row)
-            for (int column = x; column < x + w; ++column)
-                for (int c = 0; c < 3; ++c)
-                    value[c] +=
-                        double(options_.reference->pixels[size_t(row) * size_t(snapshot->width) +
-                                                          size_t(column)][c]) /
-                        n;
+        std::array<double, 3> value{};
+        for_each_pixel({x, y, w, h}, snapshot->width, [&](size_t i) {
+            for (int c = 0; c < 3; ++c)
+                value[size_t(c)] +=
+                    double(options_.reference->pixels[i][c]) / (double(w) * double(h));
+        });
         j["reference"] = value;
     }
     return Reply::json(dump(j));
+}
+
+void Api::difference(const Request& request, const Done& done) {
+    const auto snapshot = session_.snapshot(query_integer(request, "run", 0));
+    const std::string against = request.query("against").value_or("");
+    std::shared_ptr<const Snapshot> other;
+    if (against != "reference")
+        other = session_.snapshot(query_integer(request, "against", 0));
+    else if (!options_.reference)
+        throw ApiError(404, "there is no reference");
+    if (!snapshot || (against != "reference" && !other))
+        throw ApiError(422, "one of the images has no finished pass yet");
+    const std::span<const Rgb> reference = other ? other->mean : options_.reference->pixels;
+    const int width = other ? other->width : options_.reference->width;
+    if (width != snapshot->width || reference.size() != snapshot->mean.size())
+        throw ApiError(409, "the images differ in size");
+    later(done, [snapshot, other, reference] {
+        const ImageErrors errors = image_errors(snapshot->mean, reference);
+        const FlipResult flip =
+            hdr_flip(snapshot->mean, reference, snapshot->width, snapshot->height);
+        return Reply::json(dump({{"rel_mse", errors.rel_mse},
+                                 {"not_finite", errors.not_finite},
+                                 {"flip", flip.mean},
+                                 {"passes", snapshot->passes},
+                                 {"against_passes", other ? other->passes : 0}}));
+    });
+}
+
+void Api::gain(const Request& request, const Done& done) {
+    const auto without = session_.seed_series(query_integer(request, "without", 0)),
+               with = session_.seed_series(query_integer(request, "with", 0));
+    later(done, [without, with] {
+        const SeedComparison c = compare(*without, *with);
+        json j{{"without", to_json(c.a, *without)},
+               {"with", to_json(c.b, *with)},
+               {"means_differ", c.means_differ}};
+        if (c.is_valid) j["ratio"] = c.ratio, j["gain"] = {c.gain, c.low, c.high};
+        return Reply::json(dump(j));
+    });
 }
 
 Reply Api::techniques(const Request& request) {
@@ -659,6 +765,10 @@ RunRequest Api::run_request(const json& body) const {
     request.limits = limits_of(body);
     constexpr int kMostDepth = 64;
     request.technique_depth = int(integer(body, "techniques", 0, kMostDepth, 0));
+    constexpr int kMostSeeds = 64;
+    request.seeds = int(integer(body, "seeds", 1, kMostSeeds, 1));
+    if (request.seeds > 1 && !request.limits.spp && !request.limits.seconds)
+        throw ApiError(422, "several seeds need \"spp\" or \"seconds\" for each");
     return request;
 }
 
@@ -806,23 +916,46 @@ void Api::probe(const Request& request, const Done& done) {
             return Reply::json(etendue::to_json(pick_paths(*scene, pick)));
         });
     }
-    const RunStatus status = session_.status(int(integer(body, "run", 1, INT32_MAX)));
-    ReplayRequest replay_request;
-    replay_request.integrator = IntegratorSpec::parse(status.integrator);
-    replay_request.sampler = status.sampler;
-    replay_request.seed = status.seed;
-    const auto [x, y] = pixel();
-    replay_request.pixel = g.pixel_index(x, y);
-    replay_request.first_pass = uint32_t(integer(body, "pass", 0, INT32_MAX, 0));
-    replay_request.passes = uint32_t(integer(body, "passes", 1, 100000, 16));
-    replay_request.splats = body.value("splats", json(false)) == json(true);
+    replay_pixel(body, done);
+}
+
+void Api::replay_pixel(const json& body, const Done& done) {
+    const std::shared_ptr<const Scene> scene = this->scene();
+    const FilmGeometry& g = scene->film();
+    const int run = int(integer(body, "run", 1, INT32_MAX));
+    const RunStatus status = session_.status(run);
+    if (!status.is_of_this_scene)
+        throw ApiError(409, "the run belongs to an earlier version of the scene");
+    const uint64_t pixel = g.pixel_index(int(integer(body, "x", 0, g.crop_width - 1)),
+                                         int(integer(body, "y", 0, g.crop_height - 1)));
     constexpr size_t kMostPaths = 10000;
-    replay_request.most_paths = size_t(integer(body, "most", 1, kMostPaths, 1000));
-    if (const std::string problem = replay_problem(replay_request.integrator); !problem.empty())
-        throw ApiError(422, problem);
-    later(done, [scene, replay_request] {
-        return Reply::json(dump(to_json(replay(*scene, replay_request))));
-    });
+    const auto most = size_t(integer(body, "most", 1, kMostPaths, 1000));
+    const IntegratorSpec integrator = IntegratorSpec::parse(status.integrator);
+    switch (replayed_passes(integrator)) {
+    case ReplayedPasses::None:
+        throw ApiError(422, fmt::format("paths of {} cannot be traced again: they are states of "
+                                        "Markov chains, or are not kept",
+                                        integrator.name));
+    case ReplayedPasses::Last:
+        return session_.replay_last(run, pixel, most,
+                                    [done](const Replay& paths, const std::string& error) {
+                                        if (!error.empty()) return done(Reply::error(422, error));
+                                        json j = to_json(paths);
+                                        j["is_last_pass"] = true;
+                                        done(Reply::json(dump(j)));
+                                    });
+    case ReplayedPasses::Any: break;
+    }
+    ReplayRequest request;
+    request.integrator = integrator;
+    request.sampler = status.sampler;
+    request.seed = status.seed;
+    request.pixel = pixel;
+    request.first_pass = uint32_t(integer(body, "pass", 0, INT32_MAX, 0));
+    request.passes = uint32_t(integer(body, "passes", 1, 100000, 16));
+    request.splats = body.value("splats", json(false)) == json(true);
+    request.most_paths = most;
+    later(done, [scene, request] { return Reply::json(dump(to_json(replay(*scene, request)))); });
 }
 
 }  // namespace etendue

@@ -42,6 +42,8 @@ private:
 
     Reply state();
     Reply pixel(const Request& request);
+    void difference(const Request& request, const Done& done);
+    void gain(const Request& request, const Done& done);
     Reply techniques(const Request& request);
     void image(const Request& request, const Done& done);
     Reply run(const nlohmann::json& body);
@@ -49,6 +51,7 @@ private:
     Reply get_paths(const Request& request);
     Reply put_paths(const Request& request);
     void probe(const Request& request, const Done& done);
+    void replay_pixel(const nlohmann::json& body, const Done& done);
     /// Calls `task`, which may throw, in a worker.
     void later(const Done& done, std::function<Reply()> task);
 

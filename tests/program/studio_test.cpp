@@ -408,14 +408,108 @@ TEST_F(StudioTest, ChecksPathsAndTracesAgain) {
     ASSERT_TRUE(again["paths"].is_array()) << again;
     EXPECT_GT(again["paths"].size(), 0u);
     EXPECT_GT(again["sum"][1], 0);
+    // Methods that share light paths have those of the last pass; chains have none.
     const int vcm =
-        post("/v1/run", {{"action", "start"}, {"integrator", "vcm"}, {"spp", 1}}).parsed()["run"];
-    const Answer shared = post("/v1/replay", {{"run", vcm}, {"x", 20}, {"y", 25}});
-    EXPECT_EQ(shared.status, 422);
-    EXPECT_NE(shared.body.find("share"), std::string::npos);
+        post("/v1/run", {{"action", "start"}, {"integrator", "vcm"}, {"spp", 3}}).parsed()["run"];
+    wait_for_run(vcm, "finished");
+    bool has_merges = false;
+    for (int x = 0; x < 40 && !has_merges; ++x) {
+        const json shared = post("/v1/replay", {{"run", vcm}, {"x", x}, {"y", 25}}).parsed();
+        EXPECT_EQ(shared["is_last_pass"], true) << shared;
+        for (const json& p : shared["paths"]) {
+            EXPECT_EQ(p["pass"], 2);
+            has_merges |= p["technique"]["strategy"] == "merge";
+        }
+    }
+    EXPECT_TRUE(has_merges);
+    const int mlt =
+        post("/v1/run", {{"action", "start"}, {"integrator", "mlt"}, {"spp", 1}}).parsed()["run"];
+    const Answer chains = post("/v1/replay", {{"run", mlt}, {"x", 20}, {"y", 25}});
+    EXPECT_EQ(chains.status, 422);
+    EXPECT_NE(chains.body.find("Markov chains"), std::string::npos);
     const Answer geometry = get("/v1/geometry");
     EXPECT_EQ(geometry.status, 200);
     EXPECT_GT(geometry.body.size(), 1000u);
+}
+
+TEST_F(StudioTest, MeasuresRectanglesAndDifferences) {
+    start();
+    const auto run = [&](const std::string& integrator, int spp, int seed) {
+        const json request{{"action", "start"},
+                           {"integrator", integrator},
+                           {"spp", spp},
+                           {"sampler", "independent"},
+                           {"seed", seed}};
+        return post("/v1/run", request).parsed()["run"].get<int>();
+    };
+    const int a = run("path", 4, 1), b = run("path", 64, 2);
+    wait_for_run(a, "finished");
+    wait_for_run(b, "finished");
+    const std::string of_a = "run=" + std::to_string(a);
+    // The values of a rectangle are those of its pixels.
+    double sum = 0, squares = 0, least = 1e30, largest = 0, error2 = 0;
+    const int n = 6 * 3;
+    for (int y = 10; y < 13; ++y)
+        for (int x = 7; x < 13; ++x) {
+            const json one =
+                get("/v1/pixel?" + of_a + "&x=" + std::to_string(x) + "&y=" + std::to_string(y))
+                    .parsed();
+            const double v = one["mean"][1], half = one["half"][1];
+            sum += v, squares += v * v, error2 += half * half;
+            least = std::min(least, v), largest = std::max(largest, v);
+            EXPECT_FALSE(one.contains("least"));
+        }
+    const json all = get("/v1/pixel?" + of_a + "&x=7&y=10&w=6&h=3").parsed();
+    EXPECT_NEAR(all["mean"][1], sum / n, 1e-6 * sum);
+    EXPECT_NEAR(all["least"][1], least, 1e-6 * least);
+    EXPECT_NEAR(all["largest"][1], largest, 1e-6 * largest);
+    EXPECT_NEAR(all["variance"][1], (squares - sum * sum / n) / (n - 1), 1e-4 * squares);
+    EXPECT_NEAR(all["half"][1], std::sqrt(error2) / n, 1e-5 * std::sqrt(error2));
+    EXPECT_EQ(all["pixels"], n);
+    EXPECT_EQ(all["nan"].get<int>() + all["infinite"].get<int>(), 0);
+    EXPECT_EQ(get("/v1/pixel?" + of_a + "&x=38&y=10&w=6&h=3").status, 422);
+
+    const auto difference = [&](int first, int second) {
+        return get("/v1/difference?run=" + std::to_string(first) +
+                   "&against=" + std::to_string(second));
+    };
+    const json d = difference(a, b).parsed();
+    EXPECT_GT(d["rel_mse"], 0.001) << d;
+    EXPECT_GT(d["flip"], 0.01) << d;
+    EXPECT_LT(d["flip"], 1) << d;
+    EXPECT_EQ(d["passes"], 4);
+    EXPECT_EQ(d["against_passes"], 64);
+    EXPECT_EQ(difference(b, b).parsed()["rel_mse"], 0);
+    EXPECT_EQ(difference(b, b).parsed()["flip"], 0);
+    EXPECT_EQ(difference(a, 99).status, 422);
+    EXPECT_EQ(get("/v1/difference?" + of_a + "&against=reference").status, 404);
+}
+
+TEST_F(StudioTest, ComparesRunsWithSeveralSeeds) {
+    start();
+    const auto run = [&](int spp) {
+        const json request{{"action", "start"}, {"integrator", "path:max_depth=3"},
+                           {"spp", spp},        {"seeds", 6},
+                           {"seed", 10 * spp},  {"sampler", "independent"}};
+        return post("/v1/run", request).parsed()["run"].get<int>();
+    };
+    EXPECT_EQ(post("/v1/run", {{"action", "start"}, {"seeds", 3}}).status, 422);
+    EXPECT_EQ(post("/v1/run", {{"action", "start"}, {"seeds", 65}, {"spp", 1}}).status, 422);
+    const int few = run(1), many = run(16);
+    const json status = wait_for_run(few, "finished");
+    EXPECT_EQ(status["seeds"], json::array({6, 6}));
+    EXPECT_EQ(status["passes"], 6);
+    wait_for_run(many, "finished");
+    const json g =
+        get("/v1/gain?without=" + std::to_string(few) + "&with=" + std::to_string(many)).parsed();
+    EXPECT_EQ(g["without"]["seeds"], 6) << g;
+    EXPECT_EQ(g["means_differ"], false) << g;
+    // Sixteen times as many samples.
+    EXPECT_GT(g["ratio"], 9) << g;
+    EXPECT_LT(g["ratio"], 25) << g;
+    EXPECT_LT(g["gain"][1], g["gain"][0]);
+    EXPECT_GT(g["gain"][2], g["gain"][0]);
+    EXPECT_EQ(get("/v1/image?view=image&run=" + std::to_string(few)).status, 200);
 }
 
 class LongStudioTest : public StudioTest {};
@@ -444,12 +538,14 @@ TEST_F(LongStudioTest, FourRandomClients) {
                                  "/v1/image?run=1&view=error&level=2",
                                  "/v1/geometry",
                                  "/v1/techniques?run=1",
+                                 "/v1/difference?run=1&against=2",
+                                 "/v1/gain?without=1&with=2",
                                  "/"};
         const char* methods[] = {"GET", "POST", "POST", "PUT", "HEAD", "DELETE"};
         const char* names[] = {"action",     "run",        "x",      "y",         "points",
                                "paths",      "index",      "origin", "direction", "file",
                                "spp",        "integrator", "passes", "splats",    "length",
-                               "techniques", "trace"};
+                               "techniques", "trace",      "seeds"};
         const json values[] = {1,
                                3,
                                -1,

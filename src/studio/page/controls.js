@@ -31,7 +31,8 @@ const kSymbols = {rendering: '▶', stopping: '⏳', stopped: '⏸', finished: '
 /** @param {any} run */
 export function describe(run) {
     const error = run.error ? `, relative error ${significant(run.error[0])} (${significant(run.error[1])} to ${significant(run.error[2])})` : '';
-    return `${run.passes} spp, ${time(run.seconds)}, ${significant(run.rays / 1e6)} Mrays/s${error}`;
+    const seeds = run.seeds ? `${run.seeds[0]} of ${run.seeds[1]} seeds, ` : '';
+    return `${seeds}${run.passes} spp, ${time(run.seconds)}, ${significant(run.rays / 1e6)} Mrays/s${error}`;
 }
 
 export class RunList {

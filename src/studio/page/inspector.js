@@ -44,7 +44,7 @@ export class Inspector {
             const r = await this.server.post('/v1/replay', {...this.pixel, passes: Number(this.passes.value), splats: this.splats.checked});
             this.paths = r.paths;
             const sum = r.sum.map((/** @type {number} */ v) => significant(v / Math.max(1, r.passes), 4)).join(', ');
-            this.message.textContent = `${r.paths.length} paths of ${r.passes} passes${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
+            this.message.textContent = `${r.paths.length} paths of ${r.is_last_pass ? 'the last pass' : `${r.passes} passes`}${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
                 + (r.light_paths ? `; ${r.light_paths} light paths` : '');
         } catch (e) {
             this.paths = [];

@@ -66,7 +66,7 @@ function report(promise) {
 
 // ---------------------------------------------------------------------------------------- image
 
-const view = new View(at('view'), {pixel: (x, y) => showPixel(x, y), wipe: w => { tools.wipe.value = w; }});
+const view = new View(at('view'), {pixel: () => showPixel(), wipe: w => { tools.wipe.value = w; }});
 if (!view.hasGraphics) banner('graphics', 'This browser has no WebGL2: only numbers are shown.');
 
 const kLabels = {image: '', error: 'relative standard error', first: 'first picture: albedo × cosine, no light yet'};
@@ -87,17 +87,19 @@ async function refresh(place) {
     try {
         const query = {run: s.run, view: s.view, after: s.passes};
         const pixels = state.scene.width * state.scene.height, kCoarse = 1e6;
+        // Without a run, only the first picture.
+        const isMade = isOfRun || s.view !== 'image';
         // Coarse first.
-        let picture = s.passes === 0 && pixels > kCoarse ? await server.image({...query, level: 2}) : null;
+        let picture = s.passes === 0 && isMade && pixels > kCoarse ? await server.image({...query, level: 2}) : null;
         if (picture && shown[place] === s) view.show(place, picture);
-        picture = await server.image(query) ?? picture;
+        picture = (isMade ? await server.image(query) : null) ?? picture;
         if (shown[place] !== s) return;
         s.isAsked = picture === null;
         if (picture) {
             s.passes = Math.max(1, picture.passes);
             view.show(place, picture);
             label();
-            if (isOfRun && place === 0) showPixel(view.cursor[0], view.cursor[1]);
+            if (isOfRun && place === 0) showPixel();
         } else if (s.passes === 0 && place === 0 && s.view === 'image' && !view.pictures[0]) {
             const first = await server.image({view: 'first'});
             if (first && s.passes === 0 && shown[0] === s) view.show(0, first), label();
@@ -131,31 +133,56 @@ function label() {
 function showIn(place, run, what) {
     if (place === 0 || run > 0 || what === 'reference') shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false, again: false};
     else shown[1] = null;
+    tools.measured.textContent = '';
+    tools.measure.disabled = !shown[1];
     if (place === 1 && !shown[1]) view.show(1, null);
     refresh(place).then(label);
     updateRuns();
 }
 
 let pixelRequest = 0;
-/** @param {number} x @param {number} y */
-async function showPixel(x, y) {
+/** Shows the values of the selected pixel or rectangle. */
+async function showPixel() {
     const request = ++pixelRequest;
-    const place = at('pixel');
-    const parts = [element('div', {textContent: `(${x}, ${y})`})];
+    const {x, y, w, h} = view.selected();
+    const isPixel = w * h === 1;
+    const parts = [element('div', {textContent: isPixel ? `(${x}, ${y})` : `(${x}, ${y}) to (${x + w - 1}, ${y + h - 1}): ${w} × ${h} pixels`})];
     const describePixel = async (/** @type {Shown | null} */ s) => {
         if (!s || s.run === 0) return;
-        const p = await server.get(`/v1/pixel?run=${s.run}&x=${x}&y=${y}`).catch(() => null);
+        const p = await server.get(`/v1/pixel?run=${s.run}&x=${x}&y=${y}&w=${w}&h=${h}`).catch(() => null);
         if (!p?.passes) return;
-        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: 'no interval: one chain'};
+        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: runs.get(s.run)?.seeds ? 'no interval: several seeds' : 'no interval: one chain'};
+        const cells = (/** @type {string} */ scope, /** @type {string} */ name, /** @type {string[]} */ values) => element('tr', {}, [element('th', {scope, textContent: name}),
+            ...values.map(textContent => element(scope === 'col' ? 'th' : 'td', {textContent}))]);
+        const kChannels = ['red', 'green', 'blue'];
+        // A pixel has few values; those of a rectangle need a row each.
+        const statistics = {mean: p.mean, '±': p.half, least: p.least, largest: p.largest, variance: p.variance, reference: p.reference};
+        const rows = isPixel
+            ? kChannels.map((name, c) => cells('row', name, [significant(p.mean[c], 6), p.half ? `± ${significant(p.half[c], 3)}` : '', p.reference ? `reference ${significant(p.reference[c], 6)}` : '']))
+            : [cells('col', '', kChannels), ...Object.entries(statistics).filter(([, v]) => v).map(([name, v]) => cells('row', name, v.map((/** @type {number} */ x) => significant(x, 4))))];
         parts.push(element('div', {className: 'soft', textContent: `run ${s.run}, ${p.passes} spp, ${/** @type {any} */ (kNames)[p.interval]}`}));
-        parts.push(element('table', {}, ['red', 'green', 'blue'].map((name, c) => element('tr', {}, [element('th', {textContent: name}),
-            element('td', {textContent: significant(p.mean[c], 6)}), element('td', {textContent: p.half ? `± ${significant(p.half[c], 3)}` : ''}),
-            element('td', {textContent: p.reference ? `reference ${significant(p.reference[c], 6)}` : ''})]))));
+        parts.push(element('table', {}, rows));
+        if (p.nan + p.infinite > 0) parts.push(element('div', {className: 'error', textContent: `left out: ${p.nan} pixels NaN, ${p.infinite} infinite`}));
     };
     await describePixel(shown[0]);
     await describePixel(shown[1]);
-    if (request === pixelRequest) place.replaceChildren(...parts);
-    inspector?.setPixel(x, y, shown[0].run);
+    if (request === pixelRequest) at('pixel').replaceChildren(...parts);
+    inspector?.setPixel(view.cursor[0], view.cursor[1], shown[0].run);
+}
+
+/** Has the program measure how far the two images are apart. */
+async function measure() {
+    const [a, b] = shown;
+    if (!b) return;
+    tools.measured.textContent = '…';
+    try {
+        const d = await server.get(`/v1/difference?run=${a.run}&against=${b.view === 'reference' ? 'reference' : b.run}`);
+        const other = b.view === 'reference' ? 'the reference' : `run ${b.run}, ${d.against_passes} spp`;
+        tools.measured.textContent = `relMSE ${significant(d.rel_mse)}, ꟻLIP ${significant(d.flip)}: run ${a.run}, ${d.passes} spp, against ${other}`
+            + (d.not_finite ? `; ${d.not_finite} pixels that are not finite are left out of relMSE` : '');
+    } catch (e) {
+        tools.measured.textContent = /** @type {Error} */ (e).message;
+    }
 }
 
 function makeTools() {
@@ -171,10 +198,13 @@ function makeTools() {
         else showIn(1, Number(value), 'image');
     }});
     tools.wipe = number({id: 'wipe', min: 0, max: 1, step: 0.01, value: 0.5, oninput: () => { view.wipe = Number(tools.wipe.value); view.redraw(); }});
+    tools.measure = element('button', {type: 'button', textContent: 'Measure', title: 'relMSE and ꟻLIP of the two images', disabled: true, onclick: measure});
+    tools.measured = element('output', {});
     const field = (/** @type {string} */ text, /** @type {any} */ input, /** @type {any[]} */ ...more) => element('label', {}, [`${text} `, input, ...more]);
     at('view-tools').append(field('show', tools.view), field('exposure', tools.exposure, ' ', tools.exposureText), field('as', tools.mode),
         field('compare with', tools.against), field('wipe', tools.wipe),
-        element('button', {type: 'button', textContent: 'Flip', onclick: flip}), element('button', {type: 'button', textContent: 'Whole image', onclick: () => view.resetZoom()}));
+        element('button', {type: 'button', textContent: 'Flip', onclick: flip}), element('button', {type: 'button', textContent: 'Whole image', onclick: () => view.resetZoom()}),
+        tools.measure, tools.measured);
 }
 
 /** @param {number} stops */

@@ -3,6 +3,7 @@
 
 import {Refusal} from './server.js';
 import {element, significant} from './controls.js';
+import {coneOutline} from './space.js';
 
 /** @typedef {[number, number, number]} Vec */
 /** @typedef {{name: string, points: Vec[], cone: number | number[], radius?: number, on: boolean, verdict?: {ok: boolean, point?: number, problem?: string}}} Path */
@@ -41,21 +42,23 @@ export class PathEditor {
         this.queue = Promise.resolve();
         this.list = element('div', {className: 'paths', role: 'group', 'aria-label': 'Paths'});
         this.status = element('p', {className: 'soft', role: 'status'});
-        this.gain = element('p', {role: 'status'});
-        const button = (/** @type {string} */ text, /** @type {string} */ title, /** @type {() => any} */ onclick) => element('button', {type: 'button', textContent: text, title, onclick});
+        this.gain = element('div', {role: 'status'});
+        const button = (/** @type {string} */ text, /** @type {string} */ title, /** @type {() => any} */ onclick, id = '') => element('button', {type: 'button', textContent: text, title, onclick, id});
         this.length = element('input', {id: 'pick-length', type: 'number', min: 2, max: 16, value: 3});
-        this.spp = element('input', {id: 'gain-spp', type: 'number', min: 2, value: 64});
+        this.spp = element('input', {id: 'gain-spp', type: 'number', min: 1, value: 64});
+        this.seeds = element('input', {id: 'gain-seeds', type: 'number', min: 3, max: 64, value: 8});
         const fileInput = element('input', {id: 'paths-file', value: this.file, size: 14});
         fileInput.onchange = () => { this.file = fileInput.value; this.open(); };
         parent.append(
             element('div', {className: 'bar'}, [element('label', {}, ['file ', fileInput])]),
             element('div', {className: 'bar'}, [button('New path', 'N', () => this.begin()), button('Undo', 'Ctrl+Z', () => this.undo()), button('Redo', 'Ctrl+Y', () => this.redo()),
-                button('Continue by mirrors', 'T', () => this.run(() => this.trace())), button('Obey the law', 'M', () => this.run(() => this.solve())), button('Delete', 'Del', () => this.run(() => this.remove()))]),
+                button('Continue by mirrors', 'T', () => this.run(() => this.trace())), button('Obey the law', 'M', () => this.run(() => this.solve())),
+                button('Look from point', 'V', () => this.lookFromPoint()), button('Delete', 'Del', () => this.run(() => this.remove()))]),
             this.list, this.status,
             element('div', {className: 'bar'}, [button('Pick from pixel', 'Paths of a short run that reach the pixel', () => this.run(() => this.pick())),
                 element('label', {}, ['of edges ', this.length])]),
-            element('div', {className: 'bar'}, [button('Render with and without', 'Two runs of mlt in turns', () => this.run(() => this.compare())),
-                element('label', {}, ['spp ', this.spp])]), this.gain);
+            element('div', {className: 'bar'}, [button('Render with and without', 'Two runs of mlt in turns, with several seeds each', () => this.run(() => this.compare()), 'render-both'),
+                element('label', {}, ['spp ', this.spp]), element('label', {}, ['seeds ', this.seeds])]), this.gain);
         space.tell = {
             click: (x, y) => { if (this.chosen >= 0) this.run(() => this.addPoint(x, y)); },
             press: (x, y) => this.choosePointAt(x, y),
@@ -161,7 +164,7 @@ export class PathEditor {
     onEvent(event) {
         const version = event.paths[this.file] ?? 0;
         this.seen = version;
-        this.updateGain();
+        this.updateGain().catch(e => this.tell.fail(e.message));
     }
 
     // -- Edits.
@@ -251,6 +254,13 @@ export class PathEditor {
         await this.changed();
     }
 
+    /** Looks from the selected point, or from the last one of the path. */
+    lookFromPoint() {
+        const points = this.path()?.points ?? [], p = points[this.point] ?? points[points.length - 1];
+        if (!p) return this.tell.fail('The path has no point to look from.');
+        this.space.lookFrom(p);
+    }
+
     async remove() {
         const path = this.path();
         if (!path) return;
@@ -282,25 +292,28 @@ export class PathEditor {
 
     async compare() {
         await this.changed();
-        const spp = Number(this.spp.value);
-        const request = {action: 'start', sampler: 'independent', spp};
+        const request = {action: 'start', sampler: 'independent', spp: Number(this.spp.value), seeds: Number(this.seeds.value)};
         const without = await this.tell.start({...request, integrator: 'mlt'});
         const with_ = await this.tell.start({...request, integrator: `mlt:user_paths=${this.file}`});
-        this.compared = {without, with: with_};
-        this.updateGain();
+        this.compared = {without, with: with_, seen: ''};
+        await this.updateGain();
     }
 
-    updateGain() {
-        if (!this.compared) return;
-        const a = this.tell.runs().get(this.compared.without), b = this.tell.runs().get(this.compared.with);
+    /** Requests the gain whenever another seed is finished. */
+    async updateGain() {
+        const compared = this.compared;
+        if (!compared) return;
+        const a = this.tell.runs().get(compared.without), b = this.tell.runs().get(compared.with);
         if (!a || !b) return;
-        const name = `run ${a.id} without, run ${b.id} with the paths`;
-        if (b.state === 'failed') this.gain.textContent = `${name}: ${b.message}`;
-        else if (!a.error || !b.error) this.gain.textContent = `${name}: ${a.passes} and ${b.passes} spp; no error estimate yet`;
+        const seen = JSON.stringify([a.seeds, b.seeds, a.state, b.state]);
+        if (seen === compared.seen) return;
+        compared.seen = seen;
+        const failed = [a, b].find(r => r.state === 'failed');
+        const text = `run ${a.id} without, run ${b.id} with the paths: ${a.seeds[0]} and ${b.seeds[0]} of ${a.seeds[1]} seeds. `;
+        if (failed) this.gain.textContent = `${text}Run ${failed.id} failed: ${failed.message}`;
         else {
-            const efficiency = (/** @type {any} */ r) => 1 / (r.error[0] ** 2 * r.seconds);
-            this.gain.textContent = `${name}: relative error ${significant(a.error[0])} and ${significant(b.error[0])} in ${significant(a.seconds)} and `
-                + `${significant(b.seconds)} s; with the paths, the same variance takes 1/${significant(efficiency(b) / efficiency(a))} of the time.`;
+            const gain = await this.server.get(`/v1/gain?without=${a.id}&with=${b.id}`);
+            if (this.compared === compared && compared.seen === seen) this.gain.replaceChildren(element('p', {textContent: text + gainText(gain)}), gainTable(gain));
         }
     }
 
@@ -317,6 +330,7 @@ export class PathEditor {
         else if (e.key === 'Delete') this.run(() => this.remove());
         else if (e.key === 't') this.run(() => this.trace());
         else if (e.key === 'm') this.run(() => this.solve());
+        else if (e.key === 'v') this.lookFromPoint();
         else if (document.activeElement !== this.space.canvas) return false;
         else return this.onCanvasKey(e);
         return true;
@@ -355,6 +369,9 @@ export class PathEditor {
             const color = path.verdict && !path.verdict.ok ? [1, 0.35, 0.3] : kColors[i % kColors.length];
             return {points: path.points, color: [...color, path.on ? 1 : 0.4], marks: true, chosen: i === this.chosen ? this.point : -1};
         });
+        const chosen = this.path(), cones = [chosen?.cone ?? []].flat();
+        this.space.lines.cones = chosen ? chosen.points.slice(1).flatMap((p, i) => coneOutline(chosen.points[i], p, cones[Math.min(i, cones.length - 1)])
+            .map(points => ({points, color: [1, 1, 0.85, 0.55]}))) : [];
         this.space.redraw();
         const hadFocus = this.list.contains(document.activeElement) ? /** @type {any} */ (document.activeElement).dataset.key : null;
         this.list.replaceChildren(...this.paths.map((path, i) => this.row(path, i)));
@@ -382,10 +399,47 @@ export class PathEditor {
                     const given = e.target.value.split(',').map(Number);
                     path.cone = given.length === 1 ? given[0] : given;
                 })})]), ' ',
+            element('label', {}, ['disc ', element('input', {type: 'text', size: 5, value: path.radius ?? '', title: 'Radius of the disc about the first point, in scene units; empty: 1 % of the radius of the scene',
+                'data-key': `radius${i}`, 'aria-label': `Radius of the disc of ${name}`, onchange: (/** @type {any} */ e) => edit(() => {
+                    if (e.target.value.trim() === '') delete path.radius;
+                    else path.radius = Number(e.target.value);
+                })})]), ' ',
             element('button', {type: 'button', textContent: 'Select', 'aria-pressed': String(i === this.chosen), 'aria-label': `Select ${name}`, 'data-key': `select${i}`,
                 onclick: () => { this.chosen = i; this.choosePoint(-1); }}), verdict,
             i === this.chosen ? element('div', {className: 'bar', role: 'group', 'aria-label': `Points of ${name}`}, path.points.map((p, j) => element('button', {type: 'button', textContent: String(j + 1),
                 title: p.map(v => significant(v, 4)).join(', '), 'aria-pressed': String(j === this.point), 'aria-label': `Point ${j + 1} of ${name}`, 'data-key': `point${i}.${j}`,
                 onclick: () => this.choosePoint(j)}))) : null]);
     }
+}
+
+/**
+ * What the spread over the seeds says about the time that the user paths save.
+ * @param {any} g
+ */
+function gainText(g) {
+    const pair = (/** @type {(m: any) => any} */ use) => `${significant(use(g.without))} and ${significant(use(g.with))}`;
+    const least = Math.min(g.without.seeds, g.with.seeds);
+    if (least < 3) return 'No gain yet: it is computed from three seeds of each on.';
+    const spread = `Relative variance of an image ${pair(m => m.variance)}, in ${pair(m => m.seconds)} s. `;
+    const means = g.means_differ ? `The mean luminances ${significant(g.without.mean)} ± ${significant(g.without.mean_error, 2)} and ${significant(g.with.mean)} ± `
+        + `${significant(g.with.mean_error, 2)} differ: one method rarely finds some of the light, so its variance is underestimated. ` : '';
+    if (!g.gain) return `${spread}${means}No gain: in one of the methods, the seeds do not differ.`;
+    const [gain, low, high] = g.gain;
+    return `${spread}${means}With the paths, the same variance takes 1/${significant(gain)} of the time (95 %: 1/${significant(low)} to 1/${significant(high)}); `
+        + `with as many samples, the variance is 1/${significant(g.ratio)}.`
+        + (low < 1 && high > 1 ? ' Whether they help is undecided.' : '');
+}
+
+/**
+ * Acceptance by mutation.
+ * @param {any} g
+ */
+function gainTable(g) {
+    const names = [...new Set([...Object.keys(g.without.mutations), ...Object.keys(g.with.mutations)])];
+    if (names.length === 0) return '';
+    const percent = (/** @type {any} */ m) => m?.accepted === undefined ? '–' : `${significant(100 * m.accepted)} %`;
+    const head = (/** @type {string} */ text) => element('th', {scope: 'col', textContent: text});
+    return element('table', {}, [element('tr', {}, [head('accepted'), head('without'), head('with')]),
+        ...names.map(name => element('tr', {}, [element('th', {scope: 'row', textContent: name.replaceAll('_', ' ')}),
+            element('td', {textContent: percent(g.without.mutations[name])}), element('td', {textContent: percent(g.with.mutations[name])})]))]);
 }

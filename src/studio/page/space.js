@@ -7,11 +7,18 @@ import {element} from './controls.js';
 /** @typedef {[number, number, number]} Vec */
 
 const kMeshVertex = `#version 300 es
-in vec3 position;
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec4 row0;
+layout(location = 2) in vec4 row1;
+layout(location = 3) in vec4 row2;
 uniform mat4 transform;
 uniform vec3 low, extent;
 out vec3 world;
-void main() { world = low + position * extent; gl_Position = transform * vec4(world, 1.0); }`;
+void main() {
+    vec4 p = vec4(low + position * extent, 1.0);
+    world = vec3(dot(row0, p), dot(row1, p), dot(row2, p));
+    gl_Position = transform * vec4(world, 1.0);
+}`;
 
 const kMeshFragment = `#version 300 es
 precision highp float;
@@ -55,6 +62,22 @@ function product(a, b) {
 }
 
 /**
+ * The outline of a cone: its rim at distance `length` from the apex, and four lines to it.
+ * @param {Vec} apex @param {Vec} toward @param {number} degrees Half-angle.
+ * @returns {Vec[][]} Lines.
+ */
+export function coneOutline(apex, toward, degrees) {
+    const along = add(toward, apex, -1), length = Math.hypot(...along), axis = unit(along);
+    const side = unit(cross(axis, Math.abs(axis[0]) < 0.7 ? [1, 0, 0] : [0, 1, 0])), other = cross(axis, side);
+    const c = length * Math.cos(degrees * Math.PI / 180), s = length * Math.sin(degrees * Math.PI / 180), kCorners = 32;
+    const rim = Array.from({length: kCorners + 1}, (_, i) => {
+        const phi = 2 * Math.PI * i / kCorners;
+        return add(add(add(apex, axis, c), side, s * Math.cos(phi)), other, s * Math.sin(phi));
+    });
+    return [rim, ...[0, 1, 2, 3].map(i => [apex, rim[i * kCorners / 4]])];
+}
+
+/**
  * A line through points, drawn as one color.
  * @typedef {{points: Vec[], color: number[], width?: number, marks?: boolean, chosen?: number}} Line
  */
@@ -86,7 +109,7 @@ export class Space {
         this.cutInput = element('input', {type: 'range', id: 'cut', min: 0, max: 1, step: 0.005, value: 0, oninput: () => { this.cut = Number(this.cutInput.value); this.redraw(); }});
         toolbar.append(
             element('button', {type: 'button', textContent: 'Camera', title: 'Look as the camera does', onclick: () => this.lookAsCamera()}),
-            element('button', {type: 'button', textContent: 'From outside', onclick: () => this.lookFromOutside()}),
+            element('button', {type: 'button', textContent: 'From outside', title: 'Look from outside the scene', onclick: () => this.lookFromOutside()}),
             element('label', {title: 'Leave out what is nearer than this'}, ['cut away ', this.cutInput]));
         this.lookAsCamera();
         const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
@@ -109,6 +132,17 @@ export class Space {
         this.target = this.home.center;
         this.distance = 2.6 * this.radius;
         this.redraw();
+    }
+    /**
+     * Looks from a point to the centre of the scene; turning the view then turns it about the point.
+     * @param {Vec} point
+     */
+    lookFrom(point) {
+        this.target = point;
+        this.distance = 1e-3 * this.radius;
+        this.cut = 0;
+        this.cutInput.value = 0;
+        this.setDirection(unit(add(this.home.center, point, -1)));
     }
     /** @param {Vec} d */
     setDirection(d) {
@@ -179,6 +213,14 @@ export class Space {
             gl.bufferData(gl.ARRAY_BUFFER, s.positions, gl.STATIC_DRAW);
             gl.enableVertexAttribArray(0);
             gl.vertexAttribPointer(0, 3, gl.UNSIGNED_SHORT, true, 0, 0);
+            // The rows of each instance's matrix.
+            gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+            gl.bufferData(gl.ARRAY_BUFFER, s.matrices, gl.STATIC_DRAW);
+            for (const row of [0, 1, 2]) {
+                gl.enableVertexAttribArray(1 + row);
+                gl.vertexAttribPointer(1 + row, 4, gl.FLOAT, false, 48, 16 * row);
+                gl.vertexAttribDivisor(1 + row, 1);
+            }
             gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
             gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, s.triangles, gl.STATIC_DRAW);
             gl.bindVertexArray(null);
@@ -212,7 +254,7 @@ export class Space {
             gl.uniform3fv(at('tint'), s.emits ? [1, 0.9, 0.5] : s.delta ? [0.45, 0.6, 0.75] : s.color.map((/** @type {number} */ c) => 0.08 + 0.8 * c));
             gl.uniform1f(at('isLit'), s.emits ? 1 : 0);
             gl.bindVertexArray(s.array);
-            gl.drawElements(gl.TRIANGLES, s.indices, gl.UNSIGNED_INT, 0);
+            gl.drawElementsInstanced(gl.TRIANGLES, s.indices, gl.UNSIGNED_INT, 0, s.places);
         }
         this.drawLines(gl, transform);
         this.drawCross(gl);

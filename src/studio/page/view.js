@@ -10,7 +10,8 @@ void main() { gl_Position = vec4(corner, 0.0, 1.0); }`;
 const kFragment = `#version 300 es
 precision highp float;
 uniform sampler2D first, second;
-uniform vec2 canvas, origin, size, cursor;  // pixels of the canvas; the image's corner; its size there; the cursor's pixel
+uniform vec2 canvas, origin, size;          // pixels of the canvas; the image's corner; its size there
+uniform vec4 selected;                      // corner and size of the selected rectangle, in pixels of the image
 uniform vec2 extent;                        // the image in its pixels
 uniform float exposure, wipe, scaleFirst, scaleSecond;
 uniform int mode;      // 0 image, 1 false colours, 2 difference
@@ -53,7 +54,7 @@ void main() {
     if (any(isnan(v)) || any(isinf(v))) color = vec4(1.0, 0.0, 1.0, 1.0);
     float scale = size.x / extent.x;
     if (hasSecond && mode != 2 && abs(at.x - wipe) * size.x < 1.0) color = vec4(1.0);
-    vec2 d = abs((at * extent - cursor - 0.5) * scale) - 0.5 * scale;
+    vec2 d = abs((at * extent - selected.xy - 0.5 * selected.zw) * scale) - 0.5 * selected.zw * scale;
     float edge = max(d.x, d.y);
     if (edge > 0.0 && edge < 2.0) color = vec4(edge < 1.0 ? vec3(0.0) : vec3(1.0), 1.0);
 }`;
@@ -89,7 +90,7 @@ export function fit(canvas) {
 export const clamp = (v, low, high) => Math.min(Math.max(v, low), high);
 
 export class View {
-    /** @param {HTMLCanvasElement} canvas @param {{pixel: (x: number, y: number) => void, wipe: (at: number) => void}} tell */
+    /** @param {HTMLCanvasElement} canvas @param {{pixel: () => void, wipe: (at: number) => void}} tell */
     constructor(canvas, tell) {
         this.canvas = canvas;
         this.tell = tell;
@@ -102,6 +103,8 @@ export class View {
         this.zoom = 1;
         this.center = [0.5, 0.5];
         this.cursor = [0, 0];
+        /** @type {number[] | null} The corner of the selected rectangle opposite to the cursor. */
+        this.corner = null;
         /** @type {{picture: Picture, texture: WebGLTexture}[]} */
         this.pictures = [];
         this.isDue = false;
@@ -125,6 +128,7 @@ export class View {
         if (this.width === width && this.height === height) return;
         [this.width, this.height] = [width, height];
         this.cursor = [width >> 1, height >> 1];
+        this.corner = null;
         this.resetZoom();
     }
 
@@ -203,7 +207,8 @@ export class View {
         gl.uniform2fv(at('origin'), this.origin());
         gl.uniform2f(at('size'), s * this.width, s * this.height);
         gl.uniform2f(at('extent'), this.width, this.height);
-        gl.uniform2fv(at('cursor'), this.cursor);
+        const selected = this.selected();
+        gl.uniform4f(at('selected'), selected.x, selected.y, selected.w, selected.h);
         gl.uniform1f(at('exposure'), this.exposure);
         gl.uniform1f(at('wipe'), this.wipe);
         gl.uniform1f(at('scaleFirst'), 2 ** a.picture.scale);
@@ -233,40 +238,57 @@ export class View {
     /** @param {number} x @param {number} y */
     moveCursor(x, y) {
         this.cursor = [clamp(x, 0, this.width - 1), clamp(y, 0, this.height - 1)];
-        this.tell.pixel(this.cursor[0], this.cursor[1]);
+        this.tell.pixel();
         this.redraw();
+    }
+
+    /** The pixel at the cursor, or the rectangle from the corner to it. */
+    selected() {
+        const [x, y] = this.cursor, [cx, cy] = this.corner ?? this.cursor;
+        return {x: Math.min(x, cx), y: Math.min(y, cy), w: Math.abs(x - cx) + 1, h: Math.abs(y - cy) + 1};
     }
 
     listen() {
         const canvas = this.canvas;
-        /** @type {{kind: 'wipe' | 'pan', x: number, y: number, moved: boolean} | null} */
+        const pixelAt = (/** @type {PointerEvent} */ e) => {
+            const [x, y] = this.place(e.offsetX, e.offsetY);
+            return [clamp(Math.floor(x * this.width), 0, this.width - 1), clamp(Math.floor(y * this.height), 0, this.height - 1)];
+        };
+        /** @type {{kind: 'wipe' | 'pan' | 'select', x: number, y: number, moved: boolean} | null} */
         let drag = null;
         canvas.addEventListener('pointerdown', e => {
             canvas.setPointerCapture(e.pointerId);
             canvas.focus();
             const [x] = this.place(e.offsetX, e.offsetY);
             const distance = Math.abs(x - this.wipe) * this.scale() * this.width / devicePixelRatio;
-            drag = {kind: this.pictures[1] && distance < 8 ? 'wipe' : 'pan', x: e.offsetX, y: e.offsetY, moved: false};
+            drag = {kind: e.shiftKey ? 'select' : this.pictures[1] && distance < 8 ? 'wipe' : 'pan', x: e.offsetX, y: e.offsetY, moved: false};
         });
         canvas.addEventListener('pointermove', e => {
             if (!drag) return;
             const dx = e.offsetX - drag.x, dy = e.offsetY - drag.y;
             if (!drag.moved && Math.hypot(dx, dy) < 3) return;
-            drag.moved = true;
-            if (drag.kind === 'wipe') {
+            if (drag.kind === 'select') {
+                if (!drag.moved) this.corner = pixelAt(e);
+                const [x, y] = pixelAt(e);
+                this.moveCursor(x, y);
+            } else if (drag.kind === 'wipe') {
                 this.wipe = clamp(this.place(e.offsetX, e.offsetY)[0], 0, 1);
                 this.tell.wipe(this.wipe);
             } else {
                 const s = this.scale() / devicePixelRatio;
                 this.center = [clamp(this.center[0] - dx / (s * this.width), 0, 1), clamp(this.center[1] - dy / (s * this.height), 0, 1)];
             }
+            drag.moved = true;
             [drag.x, drag.y] = [e.offsetX, e.offsetY];
             this.redraw();
         });
         canvas.addEventListener('pointerup', e => {
             if (drag && !drag.moved) {
                 const [x, y] = this.place(e.offsetX, e.offsetY);
-                if (x >= 0 && y >= 0 && x < 1 && y < 1) this.moveCursor(Math.floor(x * this.width), Math.floor(y * this.height));
+                if (x >= 0 && y >= 0 && x < 1 && y < 1) {
+                    this.corner = null;
+                    this.moveCursor(Math.floor(x * this.width), Math.floor(y * this.height));
+                }
             }
             drag = null;
         });
@@ -283,6 +305,10 @@ export class View {
             else if (e.key === 'z') this.zoomBy(1.5, here);
             else if (e.key === 'x') this.zoomBy(1 / 1.5, here);
             else if (e.key === '0') this.resetZoom();
+            else if (e.key === 'r' || e.key === 'Escape') {
+                this.corner = e.key === 'r' && !this.corner ? [...this.cursor] : null;
+                this.moveCursor(this.cursor[0], this.cursor[1]);
+            }
             else return;
             e.preventDefault();
         });

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 #include <gtest/gtest.h>
 
@@ -91,6 +92,32 @@ TEST(Snap, SlabIsThatOfSnellsLaw) {
     }
 }
 
+/// A path of eight points, by way of two facing mirrors, is checked in less than 5 ms of processor time.
+TEST(CheckUserPath, IsFastEnoughToFollowThePointer) {
+    const Scene scene = build(
+        sensor("0,0,3", "0,0,0", 16, "60") +
+        rectangle("<scale value=\"9\"/><rotate y=\"1\" angle=\"90\"/><translate x=\"-1\"/>",
+                  "<bsdf type=\"conductor\"/>") +
+        rectangle("<scale value=\"9\"/><rotate y=\"1\" angle=\"-90\"/><translate x=\"1\"/>",
+                  "<bsdf type=\"conductor\"/>") +
+        rectangle("<scale value=\"0.3\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"4\"/>",
+                  "<emitter type=\"area\"/>") +
+        rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-3\"/>", diffuse("0.5,0.5,0.5")));
+    // A zigzag down from the lamp: 1 to the first mirror, then 2 from each to the next.
+    GivenPath path{.name = "", .points = {{0, 4, 0}}, .cones = {1}, .radius = {}};
+    const float down = 7.0f / 12;
+    for (int i = 0; i < 6; ++i)
+        path.points.push_back({i % 2 == 0 ? -1.0f : 1.0f, 4 - down * float(1 + 2 * i), 0});
+    path.points.push_back({0, -3, 0});
+    ASSERT_EQ(path.points.size(), 8u);
+    EXPECT_EQ(check_user_path(scene, path).problem, "");
+    constexpr int kRepetitions = 20;
+    const std::clock_t begin = std::clock();
+    for (int i = 0; i < kRepetitions; ++i) EXPECT_TRUE(check_user_path(scene, path).path);
+    const double seconds = double(std::clock() - begin) / CLOCKS_PER_SEC / kRepetitions;
+    EXPECT_LT(seconds, 5e-3);
+}
+
 TEST(Snap, SaysWhyNot) {
     const Scene scene = mirror_room();
     const std::vector<Vec3> diffuse_middle{{0, 1, 0}, {0, -1, 0}, {0.3f, -1, 0}};
@@ -126,9 +153,51 @@ TEST(DrawnShapes, KeepTheirBoundsAndTheirLimit) {
         for (const uint32_t i : s.triangles) EXPECT_LT(i, s.positions.size() / 3);
     }
     EXPECT_EQ(std::count_if(all.begin(), all.end(), [](const auto& s) { return s.emits; }), 1);
+    for (const DrawnShape& s : all) EXPECT_EQ(s.places.size(), 1u);
     size_t triangles = 0;
     for (const DrawnShape& s : drawn_shapes(scene, 500)) triangles += s.triangles.size() / 3;
     EXPECT_LT(triangles, 2400u);
+}
+
+/// A sphere about the origin, placed three times, one of them larger: each place has what rays hit there.
+TEST(DrawnShapes, AreDrawnOnceForEachInstance) {
+    const auto instance = [](const std::string& transform) {
+        return "<shape type=\"instance\"><ref id=\"group\"/><transform name=\"to_world\">" +
+               transform + "</transform></shape>";
+    };
+    const Scene scene = build(
+        sensor("0,0,9", "0,0,0", 8) + area_lamp() + "<shape type=\"shapegroup\" id=\"group\">" +
+        sphere("0,0,0", "0.4", diffuse("0.5,0.5,0.5")) + "</shape>" +
+        instance("<translate x=\"-2\"/>") + instance("<translate x=\"2\"/>") +
+        instance("<rotate z=\"1\" angle=\"90\"/><scale value=\"2\"/><translate y=\"-3\"/>"));
+    const std::vector<DrawnShape> all = drawn_shapes(scene, 1'000'000);
+    ASSERT_EQ(all.size(), 2u);
+    EXPECT_EQ(all[0].places.size(), 1u);
+    const DrawnShape& ball = all[1];
+    ASSERT_EQ(ball.places.size(), 3u);
+    const auto in_world = [&](const DrawnShape::Place& m, size_t vertex) {
+        Vec3 p, q;
+        for (int axis = 0; axis < 3; ++axis)
+            p[axis] = ball.bounds.lo[axis] + (ball.bounds.hi[axis] - ball.bounds.lo[axis]) *
+                                                 float(ball.positions[3 * vertex + size_t(axis)]) /
+                                                 65535;
+        for (int row = 0; row < 3; ++row)
+            q[row] = m[size_t(4 * row)] * p.x + m[size_t(4 * row + 1)] * p.y +
+                     m[size_t(4 * row + 2)] * p.z + m[size_t(4 * row + 3)];
+        return q;
+    };
+    const Vec3 centers[] = {{-2, 0, 0}, {2, 0, 0}, {0, -3, 0}};
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t vertex = 0; vertex < ball.positions.size() / 3; vertex += 97) {
+            const Vec3 p = in_world(ball.places[i], vertex);
+            EXPECT_NEAR(length(p - centers[i]), i == 2 ? 0.8f : 0.4f, 1e-3f);
+            Ray ray;
+            ray.o = centers[i] + (p - centers[i]) * 2.0f;
+            ray.d = normalize(centers[i] - p);
+            SurfaceHit hit;
+            ASSERT_TRUE(scene.intersect(ray, 0.5f, hit));
+            EXPECT_LT(length(hit.geometry.p - p), 2e-3f);
+        }
 }
 
 }  // namespace

@@ -95,11 +95,86 @@ TEST(Replay, EndsAtItsLimits) {
     EXPECT_GT(r.left_out, 0u);
     request.seconds = 0;
     EXPECT_EQ(replay(scene, request).passes, 0u);
-    for (const char* shared : {"vcm", "mlt", "path:guide=paths", "bdpt:connections=cache"})
-        EXPECT_NE(replay_problem(IntegratorSpec::parse(shared)), "") << shared;
     request.integrator = IntegratorSpec::parse("vcm");
     EXPECT_THROW(replay(scene, request), std::runtime_error);
 }
+
+TEST(Replay, KnowsWhichPassesCanBeTraced) {
+    const auto passes = [](const char* text) {
+        return replayed_passes(IntegratorSpec::parse(text));
+    };
+    for (const char* alone : {"path", "bdpt:roulette=0", "light", "bdpt:connections=path"})
+        EXPECT_EQ(passes(alone), ReplayedPasses::Any) << alone;
+    for (const char* shared : {"vcm", "upg", "pcbpt", "path:guide=on", "bdpt:connections=cache"})
+        EXPECT_EQ(passes(shared), ReplayedPasses::Last) << shared;
+    for (const char* none : {"mlt", "pssmlt", "pm"})
+        EXPECT_EQ(passes(none), ReplayedPasses::None) << none;
+}
+
+class LastReplayOf : public ::testing::TestWithParam<const char*> {};
+
+/// Contributions with t ≥ 2 sum to the difference of the pixel's sums after and before the last pass.
+TEST_P(LastReplayOf, SumsToTheLastPass) {
+    const Scene scene = small_room();
+    constexpr int kPasses = 6;
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(GetParam());
+    settings.integrator.params["max_depth"] = "10";
+    settings.seed = 4;
+    settings.threads = 1;
+    settings.technique_depth = 12;
+    Renderer renderer(scene, settings);
+    EXPECT_THROW(replay_last(renderer, 0, 10), std::runtime_error);
+    const auto sums = [&](uint64_t passes) {
+        RenderLimits limits;
+        limits.spp = passes;
+        renderer.run(
+            limits, [](const Progress&) {}, std::atomic<bool>(false));
+        std::vector<Rgb> eye(scene.film().pixel_count());
+        for (const auto& e : renderer.techniques()->images())
+            for (size_t i = 0; i < eye.size(); ++i)
+                if (e.technique.t >= 2) eye[i] += e.weighted[i] * float(passes);
+        return eye;
+    };
+    const std::vector<Rgb> before = sums(kPasses - 1), after = sums(kPasses);
+    size_t paths = 0;
+    bool has_pairs = false;
+    for (uint64_t pixel = 0; pixel < before.size(); ++pixel) {
+        const Replay last = replay_last(renderer, pixel, 100000);
+        const Rgb expected = after[pixel] - before[pixel];
+        // The roulette of sppm cannot be switched off.
+        for (int c = 0; c < 3 && settings.integrator.name != "sppm"; ++c)
+            ASSERT_NEAR(last.sum[c], expected[c], 2e-4f * (1 + after[pixel][c])) << pixel;
+        for (const ReplayedPath& p : last.paths) {
+            ASSERT_EQ(int(p.points.size()), p.technique.vertices());
+            EXPECT_EQ(p.pass, uint32_t(kPasses - 1));
+            EXPECT_EQ(p.points.front().event, 'L');
+            EXPECT_EQ(p.points.back().event, 'E');
+            // All points are in the room, or on its lens.
+            for (const ReplayedPath::Point& point : p.points)
+                EXPECT_LT(length(point.p), 3.6f) << p.technique.s << ',' << p.technique.t;
+            EXPECT_NEAR(p.points.front().p.y, 0.98f, 1e-3f) << "not on the lamp";
+            has_pairs |= is_pair(p.technique.strategy);
+        }
+        paths += last.paths.size();
+    }
+    EXPECT_GT(paths, before.size() / 2);
+    const std::string name = settings.integrator.name;
+    EXPECT_EQ(has_pairs, name == "vcm" || name == "sppm" || name.starts_with("upg"));
+    // After a discarded pass, its light paths are not those of the last one.
+    const std::atomic<bool> yes{true};
+    RenderLimits more;
+    more.spp = kPasses + 1;
+    renderer.run(
+        more, [](const Progress&) {}, yes, yes);
+    EXPECT_THROW(replay_last(renderer, 27, 1), std::runtime_error);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, LastReplayOf,
+                         ::testing::Values("vcm:roulette=0", "upg:roulette=0,radius=0.3",
+                                           "upg+bdpt:roulette=0,radius=0.3", "pcbpt:roulette=0",
+                                           "bdpt:connections=cache,roulette=0", "path:guide=on",
+                                           "sppm:radius=0.3"));
 
 }  // namespace
 }  // namespace etendue::test

@@ -221,6 +221,69 @@ TEST(Session, StoppedRunsShowTheirLastPass) {
     }
 }
 
+/// The renderings of a run with several seeds are those of `render` with each seed, in turns with another run; the run
+/// shows their mean.
+TEST(Session, SeveralSeedsAreRenderedOneAfterTheOther) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    RunRequest r = request("bdpt", 3);
+    r.seeds = 3;
+    const int run = session.start(r), other = session.start(request("path", 1u << 30));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    RunStatus status = session.status(run);
+    EXPECT_EQ(status.finished_seeds, 3);
+    EXPECT_EQ(status.passes, 9u);
+    EXPECT_EQ(status.snapshot_passes, 9u);
+    EXPECT_EQ(status.interval, IntervalKind::None);
+    EXPECT_EQ(session.status(other).state, RunState::Rendering);
+    session.stop(other);
+    // Continuing adds as many seeds again, also through a stop.
+    session.resume(run, {});
+    session.stop(run);
+    session.resume(run, {});
+    ASSERT_TRUE(wait_for([&] { return session.status(run).finished_seeds == 6; }));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    const auto series = session.seed_series(run);
+    const auto shown = session.snapshot(run);
+    ASSERT_EQ(series->luminance.size(), 6u);
+    std::vector<Rgb> sum(shown->mean.size());
+    for (const auto& image : series->luminance) {
+        const std::vector<Rgb> expected = plain_image(small_room(), r);
+        for (size_t i = 0; i < expected.size(); ++i) {
+            ASSERT_FLOAT_EQ((*image)[i], luminance(expected[i])) << r.seed;
+            sum[i] += expected[i];
+        }
+        ++r.seed;
+    }
+    EXPECT_EQ(shown->passes, 18u);
+    for (size_t i = 0; i < sum.size(); ++i)
+        for (int c = 0; c < 3; ++c) ASSERT_NEAR(shown->mean[i][c], sum[i][c] / 6, 1e-5f);
+    EXPECT_TRUE(session.seed_series(other)->luminance.empty());
+}
+
+TEST(Session, ReplaysTheLastPass) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(request("vcm", 1u << 30));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).passes > 2; }));
+    std::atomic<bool> is_done{false};
+    size_t paths = 0;
+    std::string problem;
+    const auto replay = [&] {
+        is_done = false;
+        session.replay_last(run, 300, 1000, [&](const Replay& r, const std::string& error) {
+            paths = r.paths.size();
+            problem = error;
+            is_done = true;
+        });
+        return wait_for([&] { return is_done.load(); });
+    };
+    ASSERT_TRUE(replay());
+    EXPECT_EQ(problem, "");
+    EXPECT_GT(paths, 0u);
+    EXPECT_EQ(session.status(run).state, RunState::Rendering);
+}
+
 TEST(SnapshotBudget, KeepsTheShare) {
     SnapshotBudget budget;
     SnapshotBudget::Clock::time_point now{};
@@ -236,7 +299,30 @@ TEST(SnapshotBudget, KeepsTheShare) {
         ++taken;
     }
     EXPECT_GT(taken, 50);
-    EXPECT_LE(used, SnapshotBudget::kShare * kLength * 1.05);
+    constexpr double kShare = 0.02;
+    EXPECT_LE(used, kShare * kLength * 1.05);
+}
+
+TEST(Session, SnapshotsWaitForTheBudget) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(request("path", 1u << 30));
+    ASSERT_TRUE(wait_for([&] {
+        const auto shown = session.snapshot(run);
+        return shown && shown->passes > 1;
+    }));
+    // A picture whose sending took a second of processor time: none follows for 50 s, except at a stop.
+    session.spent(1);
+    session.settle();
+    const uint64_t shown = session.snapshot(run)->passes, passes = session.status(run).passes;
+    ASSERT_TRUE(wait_for([&] {
+        session.snapshot(run);
+        return session.status(run).passes > passes + 20;
+    }));
+    EXPECT_EQ(session.snapshot(run)->passes, shown);
+    session.stop(run);
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Stopped; }));
+    EXPECT_EQ(session.snapshot(run)->passes, session.status(run).passes);
 }
 
 TEST(SnapshotPool, GivesNoMemoryAwayThatAReaderHolds) {
