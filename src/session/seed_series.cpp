@@ -74,8 +74,9 @@ void SeedSeries::add(Image image, double seconds_of_image,
     const auto n = double(luminance.size());
     for (auto& [name, mean] : figures) mean *= (n - 1) / n;
     for (const auto& [name, value] : its_figures) {
-        const auto at = std::find_if(figures.begin(), figures.end(),
-                                     [&](const auto& figure) { return figure.first == name; });
+        const auto at =
+            std::find_if(figures.begin(), figures.end(),
+                         [&, &its_name = name](const auto& f) { return f.first == its_name; });
         if (at == figures.end())
             figures.emplace_back(name, value / n);
         else
