@@ -76,7 +76,7 @@ void SeedSeries::add(Image image, double seconds_of_image,
     for (const auto& [name, value] : its_figures) {
         const auto at =
             std::find_if(figures.begin(), figures.end(),
-                         [&, &its_name = name](const auto& f) { return f.first == its_name; });
+                         [&its_name = name](const auto& f) { return f.first == its_name; });
         if (at == figures.end())
             figures.emplace_back(name, value / n);
         else
