@@ -63,7 +63,8 @@ TEST(SceneBuilder, MessagesStateTheValueThatIsRefused) {
              {bsdf("coatedconductor", "<float name=\"int_ior\" value=\"1\"/><float "
                                       "name=\"ext_ior\" value=\"2\"/>"),
               "the index of the coat is 0.5 times that outside"}}) {
-        const std::string error = error_of([&] { build(front_camera(4) + room() + body); });
+        const std::string error =
+            error_of([&xml = body] { build(front_camera(4) + room() + xml); });
         EXPECT_NE(error.find(message), std::string::npos) << error << "\nexpected: " << message;
     }
 }
