@@ -21,8 +21,10 @@ struct PbrtPlace {
 
 class PbrtTokenizer {
 public:
+    /// Both must outlive the tokenizer.
     PbrtTokenizer(std::string_view text, const FileName& file)
         : at_(text.data()), end_(text.data() + text.size()), file_(&file) {}
+    PbrtTokenizer(std::string_view text, FileName&& file) = delete;
 
     /// The character that the next token begins with; 0 at the end of the text.
     char peek() {

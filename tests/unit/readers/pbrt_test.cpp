@@ -73,7 +73,7 @@ constexpr const char* kSphere = "Shape \"sphere\"\n";
 // ---- Tokens
 
 TEST(PbrtTokenizer, TellsWordsStringsNumbersAndBracketsApart) {
-    const std::string file = "f";
+    const FileName file = "f";
     PbrtTokenizer in("  Word# comment \" [\n\"a \\\"b\\\" c\"[-1.5e2 +3]7", file);
     EXPECT_EQ(in.word(), "Word");
     EXPECT_EQ(unescape(in.string()), "a \"b\" c");
@@ -88,7 +88,7 @@ TEST(PbrtTokenizer, TellsWordsStringsNumbersAndBracketsApart) {
 }
 
 TEST(PbrtTokenizer, NamesWhatIsNoNumber) {
-    const std::string file = "f";
+    const FileName file = "f";
     const auto number = [&](const char* text) {
         PbrtTokenizer in(text, file);
         in.number<float>("a number");
