@@ -117,6 +117,15 @@ export class Browser {
 
     close() {
         this.process.kill();
-        this.process.on('exit', () => rmSync(this.profile, {recursive: true, force: true}));
+        // Its helper processes may outlive it by a moment, and still write to the profile.
+        const remove = tries => {
+            try {
+                rmSync(this.profile, {recursive: true, force: true});
+            } catch (error) {
+                if (tries === 0) throw error;
+                setTimeout(remove, 200, tries - 1);
+            }
+        };
+        this.process.on('exit', () => remove(25));
     }
 }
