@@ -52,6 +52,11 @@ RadiusParams::RadiusParams(const IntegratorParams& p)
         throw std::runtime_error(fmt::format("{}: alpha must lie in (0, 1]", p.integrator()));
 }
 
+float RadiusParams::radius(const Scene& scene, uint32_t index) {
+    if (first == 0 && !default_) default_ = default_merge_radius(scene);
+    return RadiusSchedule{first > 0 ? first : *default_, alpha}.radius(index);
+}
+
 float default_merge_radius(const Scene& scene) {
     constexpr float kPixels = 6;  // A smaller one makes caustics noisier, a larger one blurs them.
     constexpr float kOfScene = 0.01f;

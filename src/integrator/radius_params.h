@@ -1,6 +1,8 @@
 #pragma once
 // Parameters of radii that shrink from pass to pass.
 
+#include <optional>
+
 #include "integrator/integrator.h"
 #include "reuse/radius_schedule.h"
 
@@ -15,10 +17,12 @@ struct RadiusParams {
     float alpha;
 
     explicit RadiusParams(const IntegratorParams& params);
-    RadiusSchedule schedule(float default_radius) const {
-        return {first > 0 ? first : default_radius, alpha};
-    }
+    /// Radius of pass `index`; by default that of the first pass is default_merge_radius().
+    float radius(const Scene& scene, uint32_t index);
     bool shrinks() const { return alpha < 1; }
+
+private:
+    std::optional<float> default_;  ///< default_merge_radius(), once it is needed.
 };
 
 /// Default radius of merges in the first pass: that of a disc with the area of 36 pixels as the median pixel sees the

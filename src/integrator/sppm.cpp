@@ -7,7 +7,6 @@
 
 #include "integrator/sppm.h"
 
-#include <optional>
 #include <stdexcept>
 
 #include "integrator/light_path_options.h"
@@ -28,9 +27,7 @@ public:
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
-        if (radius_params_.first == 0 && !default_radius_)
-            default_radius_ = default_merge_radius(pass.scene);
-        radius_ = radius_params_.schedule(default_radius_.value_or(0)).radius(pass.index);
+        radius_ = radius_params_.radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
         mapping_.paths().trace_light_paths(pass, {}, pass.light_paths, cache_);
         cache_.assemble();
@@ -97,8 +94,6 @@ private:
     RadiusParams radius_params_;
     LightPathOptions light_;
     uint32_t eye_paths_;
-
-    std::optional<float> default_radius_;  ///< In scene units.
 
     // Of the pass.
     uint32_t pass_ = 0;

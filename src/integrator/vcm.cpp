@@ -44,7 +44,8 @@ public:
         roulette_.learn(gathers_);
         if (merges_ && pass.index > 0)
             density_ = PairDensity(cells(),
-                                   radius(pass.scene, pass.index) * (is_exact_ ? 1 : kInnerRadius),
+                                   radius_params_.radius(pass.scene, pass.index) *
+                                       (is_exact_ ? 1 : kInnerRadius),
                                    kGatherConstants.merge_correlation);
     }
     void save(LearnedState& to) const override {
@@ -69,7 +70,7 @@ public:
 
     void trace(const PassContext& pass) override {
         paths_.train(pass);
-        radius_ = radius(pass.scene, pass.index);
+        radius_ = radius_params_.radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
@@ -117,12 +118,6 @@ public:
     }
 
 private:
-    /// The radius of pass `index`.
-    float radius(const Scene& scene, uint32_t index) {
-        if (radius_params_.first == 0 && !default_radius_)
-            default_radius_ = default_merge_radius(scene);
-        return radius_params_.schedule(default_radius_.value_or(0)).radius(index);
-    }
     /// Connections include next events, which make direct light with less noise than merges do.
     int first_merge() const { return connects_ && !is_exact_ ? 2 : 1; }
     /// Number of light vertices by cell, in the previous pass.
@@ -177,8 +172,6 @@ private:
     bool connects_, merges_, is_exact_;
     LightPathOptions light_;
     float continuation_;  ///< See TechniqueCounts::continued.
-
-    std::optional<float> default_radius_;  ///< In scene units.
 
     // Learned.
     GatherTotals gathers_;
