@@ -7,7 +7,6 @@
 
 #include "integrator/vcm.h"
 
-#include <algorithm>
 #include <stdexcept>
 
 #include <fmt/format.h>
