@@ -15,8 +15,8 @@ namespace {
 /// Purposes of the random numbers of this source.
 enum Purpose : uint64_t { kScale = 0x6d7073, kPilot, kChains, kDeposits };
 
-/// Vertices of Stream::Selection in states with target Path.
-enum PathNumber : uint64_t { kStoragePoint, kRemainder };
+/// Vertices of Stream::Selection in states: the first two with target Path, the third one with user paths.
+enum PathNumber : uint64_t { kStoragePoint, kRemainder, kFollowsUserPath };
 
 /// The maps that store a photon.
 struct Maps {
@@ -32,6 +32,12 @@ struct Candidate {
 
 struct PhotonState : NumberState {
     std::vector<Candidate> candidates;
+};
+
+/// Response of the lens to a remainder: luminance in the image per unit of flux at the storage point. 0: there is none.
+struct Response {
+    double value = 0;
+    int last = 0;  ///< Index of the last vertex of the light path that belongs to the path to the lens.
 };
 
 /// The rest of a path from its storage point y_i to the lens. A photon of the global map is met by gather rays from a first
@@ -58,6 +64,9 @@ struct Clamp {
 /// A state consists of the numbers of a light path. With the target Importons, it stores a photon at one of its diffuse
 /// vertices, chosen in proportion to flux times importance. With the target Path, another number chooses this vertex, and
 /// further numbers determine the remainder of the path to the lens.
+///
+/// With user paths, one number decides whether the light path follows one of them or is traced in the usual way. Both
+/// ways can make the same path, so its flux is divided by the sum of both densities [Fan et al. 2005, eq. 7].
 class PhotonSpace final : public NumberSpace {
 public:
     PhotonSpace(const PhotonMapping& mapping, const FilmGeometry& geometry,
@@ -66,6 +75,8 @@ public:
 
     const PhotonImportance* importance = nullptr;  ///< For the target Importons.
     Clamp clamp;                                   ///< For the target Path.
+    const UserPaths* user_paths = nullptr;
+    double user_share = 0;  ///< Probability that a light path follows a user path.
 
     std::unique_ptr<ChainState> make_state() const override {
         return std::make_unique<PhotonState>();
@@ -76,12 +87,12 @@ public:
     /// No joins: photons are no contributions to the film.
     void repeat(int, const ChainState&, const ChainContext&, ContributionSink&) const override {}
 
-    /// Traces work.y, a light path with independent numbers.
+    /// Traces work.y with independent numbers, without user paths.
     void draw_light_path(uint64_t key, const ChainContext& c) const {
         NumberTable numbers;
         NumberSource source(NumberStep::Fresh, key, nullptr, &numbers);
         Sampler sampler(source);
-        trace(c, sampler);
+        trace_light_path(light_walk(c), sampler, c.work.y);
     }
 
     std::vector<StoragePoint> storage_points(const SubPath& y) const {
@@ -93,13 +104,13 @@ public:
         return points;
     }
 
-    /// Luminance in the image, per unit of flux, of a remainder that is drawn with the numbers of `sampler`; 0 if there is
-    /// none. The remainder follows work.y beyond the storage point as far as it was traced, and then extends it.
-    double response(const ChainContext& c, Sampler& sampler, const StoragePoint& at,
-                    bool extends) const {
+    /// The response to a remainder that is drawn with the numbers of `sampler`. The remainder follows work.y beyond the
+    /// storage point as far as it was traced, and then extends it.
+    Response response(const ChainContext& c, Sampler& sampler, const StoragePoint& at,
+                      bool extends) const {
         SubPath& y = c.work.y;
         const double flux = double(luminance(y[at.i].beta));
-        if (at.is_caustic) return join_to_lens(c, sampler, at.i) / flux;
+        if (at.is_caustic) return {join_to_lens(c, sampler, at.i) / flux, at.i};
         sampler.seek(Stream::Selection, kRemainder);
         if (sampler.next_1d() < 0.5f) {
             if (extends) y.truncate(at.i + 1);
@@ -107,8 +118,8 @@ public:
             for (int i = at.i + 1;; ++i) {
                 if (i >= y.size() &&
                     !(extends && extend<TransportMode::Importance>(walk, sampler, y)))
-                    return 0;
-                if (mapping_.is_diffuse(y[i])) return join_to_lens(c, sampler, i) / flux;
+                    return {};
+                if (mapping_.is_diffuse(y[i])) return {join_to_lens(c, sampler, i) / flux, i};
             }
         }
         const TechniqueCounts counts{.connect = 1};
@@ -118,14 +129,15 @@ public:
         const Film::PixelSample film = c.sample.film_sample(sampler.next_2d());
         start_eye_path(walk, film, sampler.next_2d(), sampler, z);
         for (int t = 2; t <= z.size(); ++t) {
-            if (z[t - 1].kind != Vertex::Kind::Surface) return 0;
+            if (z[t - 1].kind != Vertex::Kind::Surface) return {};
             if (mapping_.takes_photons(z, t)) {
                 const auto join = join_connect(c.sample.scene, y, at.i + 1, z, t, counts);
-                return join ? seen(c, *join) * double(std::fabs(z.film_weight)) / flux : 0.0;
+                if (!join) return {};
+                return {seen(c, *join) * double(std::fabs(z.film_weight)) / flux, at.i};
             }
-            if (!extend<TransportMode::Radiance>(walk, sampler, z)) return 0;
+            if (!extend<TransportMode::Radiance>(walk, sampler, z)) return {};
         }
-        return 0;
+        return {};
     }
 
     /// Estimates 1/P, where P is the probability that trials of remainders succeed; counts them.
@@ -143,7 +155,7 @@ public:
             }
             sampler.start(n);
             ++trials;
-            const double a = clamp(at, response(c, sampler, at, true));
+            const double a = clamp(at, response(c, sampler, at, true).value);
             sampler.seek(Stream::Auxiliary, 0);
             if (sampler.next_1d_unstructured() < a) return double(n);
         }
@@ -157,10 +169,16 @@ protected:
         state.candidates.clear();
         Sampler sampler(source);
         trace(c, sampler);
+        std::vector<double> ratios;
+        if (user_paths) user_paths->density_ratios(c.work.y, ratios);
+        // Density of a traced path over that of the mixture, for the path up to vertex i.
+        const auto share = [&](int i) {
+            return user_paths ? 1 / (1 - user_share + user_share * ratios[size_t(i)]) : 1.0;
+        };
         if (importance)
-            add_importon_candidates(c.work.y, state);
+            add_importon_candidates(c.work.y, share, state);
         else
-            add_path_candidate(c, sampler, state);
+            add_path_candidate(c, sampler, share, state);
         state.target = 0;
         state.edges = 0;
         double largest = 0;
@@ -173,33 +191,53 @@ protected:
 private:
     WalkContext light_walk(const ChainContext& c) const {
         static constexpr TechniqueCounts kNone;
-        return mapping_.paths().light_walk(c.sample.scene, kNone, c.work.stats);
+        WalkContext walk = mapping_.paths().light_walk(c.sample.scene, kNone, c.work.stats);
+        if (user_paths)
+            walk.options.rr_depth = std::max(walk.options.rr_depth, user_paths->longest() - 1);
+        return walk;
     }
+    /// Traces work.y, which may follow a user path and then continues in the usual way.
     void trace(const ChainContext& c, Sampler& sampler) const {
-        trace_light_path(light_walk(c), sampler, c.work.y);
+        const WalkContext walk = light_walk(c);
+        SubPath& y = c.work.y;
+        if (user_paths) {
+            sampler.seek(Stream::Selection, kFollowsUserPath);
+            if (double(sampler.next_1d()) < user_share) {
+                bool goes_on = user_paths->sample(walk, sampler, y);
+                while (goes_on) goes_on = extend<TransportMode::Importance>(walk, sampler, y);
+                return;
+            }
+        }
+        trace_light_path(walk, sampler, y);
     }
 
-    void add_importon_candidates(const SubPath& y, PhotonState& state) const {
-        for_each_photon(mapping_, y, [&](const MapPhoton& photon) {
+    template <class Share>
+    void add_importon_candidates(const SubPath& y, const Share& share, PhotonState& state) const {
+        for_each_photon(mapping_, y, [&](MapPhoton photon) {
+            photon.power *= float(share(photon.s - 1));
             const double part = double(luminance(photon.power)) * double((*importance)(photon));
             if (part > 0 && is_finite(photon.power))
                 state.candidates.push_back({photon, {true, photon.is_caustic()}, part});
         });
     }
 
-    void add_path_candidate(const ChainContext& c, Sampler& sampler, PhotonState& state) const {
+    template <class Share>
+    void add_path_candidate(const ChainContext& c, Sampler& sampler, const Share& share,
+                            PhotonState& state) const {
         const std::vector<StoragePoint> points = storage_points(c.work.y);
         if (points.empty()) return;
         const double n = double(points.size());
         sampler.seek(Stream::Selection, kStoragePoint);
         const size_t chosen = std::min(size_t(sampler.next_1d_fine() * n), points.size() - 1);
         const StoragePoint at = points[chosen];
-        const double a = clamp(at, response(c, sampler, at, false));
+        const Response seen = response(c, sampler, at, false);
+        const double a = clamp(at, seen.value);
         if (!(a > 0)) return;
+        const double factor = n * a * share(seen.last);
         for_each_photon(mapping_, c.work.y, [&](MapPhoton photon) {
             if (photon.s - 1 != at.i) return;
-            const double part = n * a * double(luminance(photon.power));
-            photon.power *= float(n * a);
+            photon.power *= float(factor);
+            const double part = double(luminance(photon.power));
             if (part > 0 && is_finite(photon.power))
                 state.candidates.push_back({photon, {!at.is_caustic, at.is_caustic}, part});
         });
@@ -333,7 +371,7 @@ Clamp median_responses(const PassContext& context, const PhotonSpace& space) {
             const size_t chosen =
                 std::min(size_t(to_unit_double(hash_combine(key, 3)) * double(points.size())),
                          points.size() - 1);
-            values[i][is_caustic] = space.response(c, sampler, points[chosen], true);
+            values[i][is_caustic] = space.response(c, sampler, points[chosen], true).value;
         }
     });
     std::array<std::vector<double>, 2> positive;
@@ -396,6 +434,11 @@ MapPhotons MetropolisPhotons::trace(const PassContext& context, uint32_t pass,
         space.importance = &*importance_;
     } else {
         space.clamp = median_responses(context, space);
+    }
+    if (!options_.user_paths.empty()) {
+        if (!user_paths_) user_paths_ = UserPaths::load(context.scene, options_.user_paths);
+        space.user_paths = &*user_paths_;
+        space.user_share = options_.user_share;
     }
     pilot_ = run_pilot(context, space);
     if (!(pilot_.b > 0)) return photons;

@@ -4,6 +4,7 @@
 
 #include "integrator/markov.h"
 #include "integrator/photon_source.h"
+#include "mcmc/user_paths.h"
 
 namespace etendue {
 
@@ -21,13 +22,15 @@ struct MetropolisPhotonOptions {
     double precision = 0.02;    ///< Required relative standard error of the normalisation b.
     double least_share = 0.25;  ///< Photons with a smaller share of a step's power pass roulette.
     uint64_t max_bytes = uint64_t(1) << 32;
+    std::string user_paths;   ///< File; empty: none.
+    double user_share = 0.5;  ///< Fraction of the independent light paths that follow user paths.
 };
 
 class PhotonSpace;
 
 class MetropolisPhotons final : public PhotonSource {
 public:
-    /// trace() throws std::runtime_error if the photons need more than max_bytes.
+    /// trace() throws std::runtime_error if the photons need more than max_bytes, or if a user path cannot be used.
     MetropolisPhotons(const PhotonMapping& mapping, const MetropolisPhotonOptions& options);
     ~MetropolisPhotons() override;
 
@@ -47,6 +50,7 @@ private:
     const PhotonMapping& mapping_;
     MetropolisPhotonOptions options_;
     std::optional<PhotonImportance> importance_;  ///< Set by the first trace(), then fixed.
+    std::optional<UserPaths> user_paths_;         ///< The same.
 
     // Statistics of the last trace().
     Pilot pilot_;

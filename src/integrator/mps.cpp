@@ -2,7 +2,7 @@
 // light sub-paths. A state is the set of random numbers of a light path. Small steps change all of them, block steps
 // draw those of some vertices anew, and large steps draw a whole path anew. In primary sample space all steps are
 // symmetric. A step that changes only late vertices keeps the beginning of the path, like the perturbations of [Fan et
-// al. 2005].
+// al. 2005]. User paths are a second way to draw the beginning of a light path; the densities of both ways add up.
 //
 // The target of a photon with flux Φ at x is lum(Φ) times
 // - importons: the density of importance I at x, plus a floor. The power of a photon is b Φ / (lum(Φ) I).
@@ -33,7 +33,9 @@ MetropolisPhotonOptions options(const IntegratorParams& p, uint64_t max_bytes) {
             .p_large = double(p.number("p_large", 0.01f, 1.0f)),
             .precision = double(p.number("precision", 0.001f, 0.5f)),
             .least_share = double(p.number("least_share", 0, 1)),
-            .max_bytes = max_bytes};
+            .max_bytes = max_bytes,
+            .user_paths = p.string("user_paths"),
+            .user_share = double(p.number("user_share", 0.01f, 0.99f))};
 }
 
 }  // namespace
@@ -55,6 +57,12 @@ IntegratorEntry mps_entry() {
         {"precision", ParamKind::Float, "0.02",
          "Required relative standard error of the normalisation, 0.001 to 0.5; determines the "
          "number of light paths of the start-up."});
+    params.push_back({"user_paths", ParamKind::String, "",
+                      "JSON file of important light sub-paths, which `etendue paths` makes and "
+                      "checks; a part of the independent light paths follows them."});
+    params.push_back({"user_share", ParamKind::Float, "0.5",
+                      "Fraction of the independent light paths that follow user paths, in [0.01, "
+                      "0.99]."});
     params.push_back(
         {"least_share", ParamKind::Float, "0.25",
          "A photon with less than this fraction, in [0, 1], of the power of one mutation is kept "

@@ -100,7 +100,7 @@ bool PathBuilder::start_light(const Emitter& emitter, const EmissionSample& e) {
 }
 
 bool PathBuilder::follow(const UserPaths& paths) {
-    if (!paths.sample(walk_, sampler_, work_.y)) return false;
+    if (!paths.sample(walk_, sampler_, work_.y) || !light_end().is_connectible) return false;
     new_light_ = work_.y.size();
     return true;
 }

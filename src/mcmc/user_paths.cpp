@@ -354,21 +354,29 @@ bool UserPaths::find_on_emitter(const UserPath& path, Vec3 q, SurfaceHit& hit) c
            hit.shape->emitter == path.emitter;
 }
 
+int UserPaths::longest() const {
+    size_t most = 0;
+    for (const UserPath& path : paths_) most = std::max(most, path.points.size());
+    return int(most);
+}
+
 bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) const {
+    y.clear();
     sampler.seek(Stream::Selection, 0x100);
     const auto i = std::min(size_t(sampler.next_1d() * float(paths_.size())), paths_.size() - 1);
     const UserPath& path = paths_[i];
+    const Emitter& emitter = *path.emitter;
     const std::vector<UserPath::Point>& points = path.points;
     EmissionSample e{.p = points[0].p,
                      .ng = points[0].ng,
                      .d = {},
-                     .Le = Rgb(1),
+                     .Le = {},
                      .pdf_y0 = 1,
-                     .pdf_d = 1,
+                     .pdf_d = 0,
                      .uv = path.uv,
                      .prim = path.prim};
     const Vec2 u = sampler.next_2d();
-    if (path.emitter->is_area()) {
+    if (emitter.is_area()) {
         const Vec2 disc = sample_uniform_disk(u) * path.radius;
         const Frame frame = Frame::from_normal(points[0].ng);
         SurfaceHit hit;
@@ -378,8 +386,15 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
         e.prim = hit.location.prim;
     }
     e.d = sample_cone(normalize(points[1].p - e.p), points[0].versine, sampler.next_2d());
-    if (!path.emitter->is_area()) e.ng = e.d;
-    start_light_path(walk, *path.emitter, e, sampler, y);
+    if (!emitter.is_area()) e.ng = e.d;
+    const Emitter::Emission emission = emitter.eval_emission(e.ng, e.uv, e.d);
+    e.Le = emission.Le_cos, e.pdf_d = emission.pdf_d;
+    if (emitter.is_area()) {
+        e.Le *= 1 / abs_dot(e.ng, e.d);
+        e.pdf_y0 = emitter.eval_surface(e.ng, e.uv, e.prim, e.d).pdf_y0;
+    }
+    if (!(e.pdf_y0 > 0)) return false;
+    start_light_path(walk, emitter, e, sampler, y);
     if (y.size() != 2) return false;
     for (size_t j = 1; j + 1 < points.size(); ++j) {
         const Vertex& v = y[int(j)];
@@ -388,48 +403,68 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
             s = v.bsdf.sample_delta(v.wo, points[j].event, TransportMode::Importance);
         } else if (v.is_connectible) {
             sampler.seek(Stream::Selection, 0x100 + j);
-            s = BsdfSample{.wi = sample_cone(normalize(points[j + 1].p - v.p), points[j].versine,
-                                             sampler.next_2d()),
-                           .weight = Rgb(1),
-                           .pdf = 1,
-                           .pdf_rev = 1};
+            const Vec3 w = sample_cone(normalize(points[j + 1].p - v.p), points[j].versine,
+                                       sampler.next_2d());
+            const BsdfEval f = v.eval_unguided(w, TransportMode::Importance);
+            if (f.pdf > 0)
+                s = BsdfSample{.wi = w,
+                               .weight = f.f * (1 / f.pdf),
+                               .pdf = f.pdf,
+                               .pdf_rev = f.pdf_rev,
+                               .eta = f.eta};
         }
         if (!s || !append<TransportMode::Importance>(walk, sampler, *s, y)) return false;
     }
-    return y[y.size() - 1].is_connectible;
+    return true;
 }
 
-double UserPaths::density(const UserPath& path, std::span<const Vertex* const> y) const {
-    const std::vector<UserPath::Point>& points = path.points;
-    if (y.size() != points.size() || y[0]->emitter != path.emitter) return 0;
-    double p = 1;
-    if (path.emitter->is_area()) {
-        const Vec3 n = points[0].ng, to = y[0]->p - points[0].p;
-        const Vec3 q = y[0]->p - n * dot(to, n);
-        SurfaceHit hit;
-        if (length2(q - points[0].p) > sqr(path.radius) || !find_on_emitter(path, q, hit) ||
-            length2(hit.geometry.p - y[0]->p) > sqr(1e-3f * path.radius))
-            return 0;
-        p = double(abs_dot(n, y[0]->ng) / (kPi * sqr(path.radius)));
-    }
-    for (size_t j = 0; j + 1 < y.size(); ++j) {
-        const UserPath::Point& point = points[j];
-        const bool is_delta = j > 0 && y[j]->is_delta;
-        if (is_delta != point.is_delta || (is_delta && y[j]->event != point.event)) return 0;
-        if (!is_delta) {
-            const Vec3 axis = normalize(points[j + 1].p - y[j]->p);
-            if (length2(direction(*y[j], *y[j + 1]) - axis) > 2 * point.versine) return 0;
-            p *= pdf_cone(point.versine);
-        }
-        p *= double(to_area(1, *y[j], *y[j + 1]));
-    }
-    return p;
+double UserPaths::start_density(const UserPath& path, const Vertex& y0) const {
+    if (y0.emitter != path.emitter) return 0;
+    if (!path.emitter->is_area()) return 1;
+    const Vec3 n = path.points[0].ng, to = y0.p - path.points[0].p;
+    const Vec3 q = y0.p - n * dot(to, n);
+    SurfaceHit hit;
+    if (length2(q - path.points[0].p) > sqr(path.radius) || !find_on_emitter(path, q, hit) ||
+        length2(hit.geometry.p - y0.p) > sqr(1e-3f * path.radius))
+        return 0;
+    return double(abs_dot(n, y0.ng) / (kPi * sqr(path.radius)));
+}
+
+double UserPaths::step_density(const UserPath& path, int j, const Vertex& from, const Vertex& to) {
+    const UserPath::Point& point = path.points[size_t(j)];
+    const bool is_delta = j > 0 && from.is_delta;
+    if (is_delta != point.is_delta || (is_delta && from.event != point.event)) return 0;
+    const double p = double(to_area(1, from, to));
+    if (is_delta) return p;
+    const Vec3 axis = normalize(path.points[size_t(j) + 1].p - from.p);
+    if (length2(direction(from, to) - axis) > 2 * point.versine) return 0;
+    return p * pdf_cone(point.versine);
 }
 
 double UserPaths::density(std::span<const Vertex* const> y) const {
     double sum = 0;
-    for (const UserPath& path : paths_) sum += density(path, y);
+    for (const UserPath& path : paths_) {
+        if (y.size() != path.points.size()) continue;
+        double p = start_density(path, *y[0]);
+        for (size_t j = 0; j + 1 < y.size() && p > 0; ++j)
+            p *= step_density(path, int(j), *y[j], *y[j + 1]);
+        sum += p;
+    }
     return sum / double(paths_.size());
+}
+
+void UserPaths::density_ratios(const SubPath& y, std::vector<double>& ratios) const {
+    ratios.assign(size_t(y.size()), 0);
+    if (y.size() == 0) return;
+    for (const UserPath& path : paths_) {
+        const int m = int(path.points.size()) - 1;
+        double ratio = start_density(path, y[0]) / double(y[0].pdf_fwd);
+        for (int i = 0; i < y.size() && ratio > 0; ++i) {
+            if (i > 0 && i <= m)
+                ratio *= step_density(path, i - 1, y[i - 1], y[i]) / double(y[i].pdf_fwd);
+            ratios[size_t(i)] += ratio / double(paths_.size());
+        }
+    }
 }
 
 }  // namespace etendue

@@ -64,13 +64,24 @@ public:
     /// Throws std::runtime_error if a path of the file cannot be used, or if it has none.
     static UserPaths load(const Scene& scene, const std::string& file);
 
-    /// Makes y_0 … y_m close to one of the user paths; false if a ray misses.
+    /// Number of vertices of the longest path.
+    int longest() const;
+
+    /// Makes y_0 … y_m close to one of the user paths. Their throughput and densities are those of a light path that was
+    /// traced in the usual way and took the same course. False if the path ends early; y keeps the vertices up to there.
     bool sample(const WalkContext& walk, Sampler& sampler, SubPath& y) const;
-    /// Area density of y_0 … y_m with the delta events at their vertices, without the effect of masks.
+    /// Area density with which sample() makes exactly y_0 … y_m, with the delta events at their vertices, without the
+    /// effect of masks.
     double density(std::span<const Vertex* const> y) const;
+    /// For each i, the density with which y_0 … y_i begin a path that starts by sample() and continues as a traced one,
+    /// divided by that of a traced path. The walks use no Russian roulette before vertex longest() - 1, and no guide.
+    void density_ratios(const SubPath& y, std::vector<double>& ratios) const;
 
 private:
-    double density(const UserPath& path, std::span<const Vertex* const> y) const;
+    /// Area density of y_0.
+    double start_density(const UserPath& path, const Vertex& y0) const;
+    /// Area density of y_{j+1}, given y_j.
+    static double step_density(const UserPath& path, int j, const Vertex& from, const Vertex& to);
     /// The point of the emitter above or below `q`, a point of the disc; false if there is none.
     bool find_on_emitter(const UserPath& path, Vec3 q, SurfaceHit& hit) const;
 

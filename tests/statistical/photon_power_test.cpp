@@ -1,10 +1,13 @@
 // Metropolis photon sampling: the photons have the power of those of traced light paths, in all and by region, in each map.
 
+#include <fstream>
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "integrator/metropolis_photons.h"
 #include "render_tiles.h"
+#include "run_program.h"
 #include "test_scenes.h"
 
 namespace etendue::test {
@@ -24,14 +27,16 @@ public:
     /// Octants of the room, and all of them; of each the luminance and the red channel, by map.
     static constexpr size_t kRegions = 9, kSums = 2 * 2 * kRegions;
 
-    PhotonTotals(const Scene& scene, std::optional<PhotonTarget> target)
+    PhotonTotals(const Scene& scene, std::optional<PhotonTarget> target,
+                 const std::string& user_paths)
         : scene_(scene), params_(params_of_mps()), mapping_(params_, true),
           traced_(mapping_, kPaths, uint64_t(1) << 30) {
         if (target)
             metropolis_.emplace(mapping_, MetropolisPhotonOptions{.target = *target,
                                                                   .mutations = kPaths,
                                                                   .chains = 16,
-                                                                  .precision = 0.05});
+                                                                  .precision = 0.05,
+                                                                  .user_paths = user_paths});
     }
 
     void trace(const PassContext& pass) override {
@@ -82,12 +87,13 @@ private:
 };
 
 std::array<Moments, PhotonTotals::kSums>
-totals(const Scene& scene, std::optional<PhotonTarget> target, uint64_t passes) {
+totals(const Scene& scene, std::optional<PhotonTarget> target, uint64_t passes,
+       const std::string& user_paths = {}) {
     RenderSettings settings;
     settings.spp = passes;
     settings.seed = target ? 3 : 4;
     settings.threads = 1;
-    auto integrator = std::make_unique<PhotonTotals>(scene, target);
+    auto integrator = std::make_unique<PhotonTotals>(scene, target, user_paths);
     const PhotonTotals& sums = *integrator;
     Renderer renderer(scene, settings, std::move(integrator));
     renderer.run([](const Progress&) {}, std::atomic<bool>{false});
@@ -95,14 +101,32 @@ totals(const Scene& scene, std::optional<PhotonTarget> target, uint64_t passes) 
     return sums.totals;
 }
 
-class PhotonPower : public ::testing::TestWithParam<PhotonTarget> {};
+struct PowerCase {
+    PhotonTarget target;
+    bool has_user_paths;
+};
+class PhotonPower : public ::testing::TestWithParam<PowerCase> {};
+
+/// To the floor, to the floor beside the glass, and by the floor to a wall.
+constexpr const char* kUserPaths = R"([
+    {"points": [[0, 0.98, 0], [0, -1, 0.8]], "cone": 8, "radius": 0.1},
+    {"points": [[0, 0.98, 0], [0.9, -1, -0.1]], "cone": 25, "radius": 0.2},
+    {"points": [[0, 0.98, 0], [0, -1, 0.8], [-1, 0.3, 0.2]], "cone": [20, 30], "radius": 0.2}
+])";
 
 /// A lamp, glass that makes caustics, rough metal.
 TEST_P(PhotonPower, IsThatOfTracedPhotons) {
     const Scene scene = build(front_camera(8) + room() + area_lamp() +
                               sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
                               sphere("0.4,-0.4,0.3", "0.35", kGlass));
-    const auto traced = totals(scene, {}, 256), sampled = totals(scene, GetParam(), 100);
+    const TemporaryFolder folder;
+    std::string user_paths;
+    if (GetParam().has_user_paths) {
+        user_paths = folder.path() / "paths.json";
+        std::ofstream(user_paths) << kUserPaths;
+    }
+    const auto traced = totals(scene, {}, 256),
+               sampled = totals(scene, GetParam().target, 100, user_paths);
     const double level = sidak(1e-4, int(traced.size()));
     for (size_t i = 0; i < traced.size(); ++i) {
         const bool is_caustic = i >= traced.size() / 2;
@@ -122,10 +146,15 @@ TEST_P(PhotonPower, IsThatOfTracedPhotons) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, PhotonPower,
-                         ::testing::Values(PhotonTarget::Importons, PhotonTarget::Path),
+                         ::testing::Values(PowerCase{PhotonTarget::Importons, false},
+                                           PowerCase{PhotonTarget::Importons, true},
+                                           PowerCase{PhotonTarget::Path, false},
+                                           PowerCase{PhotonTarget::Path, true}),
                          [](const auto& p) {
-                             return std::string(p.param == PhotonTarget::Path ? "path"
-                                                                              : "importons");
+                             return std::string(p.param.target == PhotonTarget::Path
+                                                    ? "path"
+                                                    : "importons") +
+                                    (p.param.has_user_paths ? "_user_paths" : "");
                          });
 
 }  // namespace

@@ -134,6 +134,53 @@ TEST(UserPaths, DensityIsThatOfTheProposals) {
     }
 }
 
+/// Light paths that begin near a user path and go on as traced ones, against traced ones weighted with the ratio of the
+/// densities: number and flux of the vertices, by index, and by half of the room.
+TEST(UserPaths, DensityRatiosAreThoseToTracedPaths) {
+    const Scene scene = mirror_room();
+    const auto path = [&](std::vector<Vec3> points) {
+        return *check_user_path(
+                    scene, {.name = {}, .points = std::move(points), .cones = {12}, .radius = 0.1f})
+                    .path;
+    };
+    const UserPaths paths(scene,
+                          {path({{0, 0.98f, 0}, {0.3f, -1, 0.2f}}),
+                           path({{0, 0.98f, 0}, {-0.95f, -0.01f, 0}, {0, -1, 0}}),
+                           path({{0, 0.98f, 0}, {0.3f, -1, 0.2f}, {1, -0.2f, 0}})});
+    EXPECT_EQ(paths.longest(), 3);
+    const TechniqueCounts none{};
+    RenderStats stats;
+    const WalkContext walk{scene, none, stats, {.max_vertices = 5, .rr_depth = 2}};
+    SubPath y;
+    constexpr size_t kSums = 4 * 2 * 2;  // Vertices 1 to 4, halves of the room, number and flux.
+    std::array<Moments, kSums> followed, traced;
+    std::vector<double> ratios;
+    for (int i = 0; i < 200000; ++i)
+        for (const bool follows : {false, true}) {
+            if (follows && i >= 40000) continue;
+            Sampler sampler(SamplerKind::Independent, follows);
+            sampler.start(0, uint64_t(i));
+            std::array<double, kSums> sums{};
+            bool goes_on = follows ? paths.sample(walk, sampler, y)
+                                   : start_light_path(walk, sampler, y) && y.size() == 2;
+            while (goes_on) goes_on = extend<TransportMode::Importance>(walk, sampler, y);
+            if (!follows) paths.density_ratios(y, ratios);
+            for (int k = 1; k < y.size(); ++k) {
+                const double ratio = follows ? 1.0 : ratios[size_t(k)];
+                const size_t at = size_t(4 * (k - 1) + 2 * (y[k].p.x > 0));
+                sums[at] += ratio;
+                sums[at + 1] += ratio * double(luminance(y[k].beta));
+            }
+            for (size_t k = 0; k < kSums; ++k) (follows ? followed : traced)[k].add(sums[k]);
+        }
+    for (size_t k = 0; k < kSums; ++k) {
+        EXPECT_GT(followed[k].mean(), 0) << k;
+        EXPECT_GT(welch_p(followed[k], traced[k], 1e-3 * followed[k].mean()), sidak(1e-3, kSums))
+            << k << ": " << followed[k].mean() << " ± " << std::sqrt(followed[k].squared_error())
+            << " and " << traced[k].mean() << " ± " << std::sqrt(traced[k].squared_error());
+    }
+}
+
 TEST(UserPaths, PickedOnesPassTheirChecks) {
     const Scene scene = build(mixed_room(front_camera(16)));
     const auto picked =
