@@ -53,7 +53,8 @@ void PathsCommand::run() {
 
 void add_paths_command(CLI::App& app) {
     auto options = std::make_shared<PathsCommand>();
-    CLI::App& c = *app.add_subcommand("paths", "Pick or check light paths for the parameter user_paths of mlt and mps");
+    CLI::App& c = *app.add_subcommand(
+        "paths", "Pick or check light paths for the parameter user_paths of mlt and mps");
     options->scene.add_to(c);
     CLI::Option* pick =
         c.add_option("--pick", options->count,

@@ -37,7 +37,8 @@ struct PhotonState : NumberState {
 /// Response of the lens to a remainder: luminance in the image per unit of flux at the storage point. 0: there is none.
 struct Response {
     double value = 0;
-    int last = 0;  ///< Index of the last vertex of the light path that belongs to the path to the lens.
+    int last =
+        0;  ///< Index of the last vertex of the light path that belongs to the path to the lens.
 };
 
 /// The rest of a path from its storage point y_i to the lens. A photon of the global map is met by gather rays from a first

@@ -403,8 +403,8 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
             s = v.bsdf.sample_delta(v.wo, points[j].event, TransportMode::Importance);
         } else if (v.is_connectible) {
             sampler.seek(Stream::Selection, 0x100 + j);
-            const Vec3 w = sample_cone(normalize(points[j + 1].p - v.p), points[j].versine,
-                                       sampler.next_2d());
+            const Vec3 w =
+                sample_cone(normalize(points[j + 1].p - v.p), points[j].versine, sampler.next_2d());
             const BsdfEval f = v.eval_unguided(w, TransportMode::Importance);
             if (f.pdf > 0)
                 s = BsdfSample{.wi = w,

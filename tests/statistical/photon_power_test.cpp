@@ -86,9 +86,9 @@ private:
     std::optional<MetropolisPhotons> metropolis_;
 };
 
-std::array<Moments, PhotonTotals::kSums>
-totals(const Scene& scene, std::optional<PhotonTarget> target, uint64_t passes,
-       const std::string& user_paths = {}) {
+std::array<Moments, PhotonTotals::kSums> totals(const Scene& scene,
+                                                std::optional<PhotonTarget> target, uint64_t passes,
+                                                const std::string& user_paths = {}) {
     RenderSettings settings;
     settings.spp = passes;
     settings.seed = target ? 3 : 4;
@@ -145,17 +145,15 @@ TEST_P(PhotonPower, IsThatOfTracedPhotons) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, PhotonPower,
-                         ::testing::Values(PowerCase{PhotonTarget::Importons, false},
-                                           PowerCase{PhotonTarget::Importons, true},
-                                           PowerCase{PhotonTarget::Path, false},
-                                           PowerCase{PhotonTarget::Path, true}),
-                         [](const auto& p) {
-                             return std::string(p.param.target == PhotonTarget::Path
-                                                    ? "path"
-                                                    : "importons") +
-                                    (p.param.has_user_paths ? "_user_paths" : "");
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Targets, PhotonPower,
+    ::testing::Values(PowerCase{PhotonTarget::Importons, false},
+                      PowerCase{PhotonTarget::Importons, true},
+                      PowerCase{PhotonTarget::Path, false}, PowerCase{PhotonTarget::Path, true}),
+    [](const auto& p) {
+        return std::string(p.param.target == PhotonTarget::Path ? "path" : "importons") +
+               (p.param.has_user_paths ? "_user_paths" : "");
+    });
 
 }  // namespace
 }  // namespace etendue::test

@@ -143,10 +143,9 @@ TEST(UserPaths, DensityRatiosAreThoseToTracedPaths) {
                     scene, {.name = {}, .points = std::move(points), .cones = {12}, .radius = 0.1f})
                     .path;
     };
-    const UserPaths paths(scene,
-                          {path({{0, 0.98f, 0}, {0.3f, -1, 0.2f}}),
-                           path({{0, 0.98f, 0}, {-0.95f, -0.01f, 0}, {0, -1, 0}}),
-                           path({{0, 0.98f, 0}, {0.3f, -1, 0.2f}, {1, -0.2f, 0}})});
+    const UserPaths paths(scene, {path({{0, 0.98f, 0}, {0.3f, -1, 0.2f}}),
+                                  path({{0, 0.98f, 0}, {-0.95f, -0.01f, 0}, {0, -1, 0}}),
+                                  path({{0, 0.98f, 0}, {0.3f, -1, 0.2f}, {1, -0.2f, 0}})});
     EXPECT_EQ(paths.longest(), 3);
     const TechniqueCounts none{};
     RenderStats stats;
