@@ -7,9 +7,10 @@
 namespace etendue {
 
 void PhotonMemory::add(uint64_t photons) {
-    // A photon is stored in a chunk, in the global map and possibly in the caustic map. It has an entry in the tree of
-    // each map, and it may have an irradiance.
-    constexpr uint64_t kPhotonBytes = 3 * sizeof(MapPhoton) + 32 + sizeof(Rgb) + 1;
+    // A photon is stored in a chunk, in the global map and possibly in the caustic map. It has a position and an entry in
+    // the tree of each map, and it may have an irradiance.
+    constexpr uint64_t kPhotonBytes =
+        3 * sizeof(MapPhoton) + 32 + 2 * sizeof(Vec3) + sizeof(Rgb) + 1;
     const uint64_t more = photons * kPhotonBytes;
     if (bytes_.fetch_add(more, std::memory_order_relaxed) + more > max_bytes_)
         throw std::runtime_error(fmt::format("the photons need more than {} MiB; trace "

@@ -24,6 +24,9 @@ struct MapPhoton : Photon {
     bool is_caustic() const { return origin != Origin::Any; }
 };
 
+/// A tree of points, of nanoflann.
+class PointTree;
+
 class PhotonMap {
 public:
     static constexpr int kMostNeighbours = 512;
@@ -33,6 +36,7 @@ public:
     PhotonMap(PhotonMap&&) noexcept;
     PhotonMap& operator=(PhotonMap&&) noexcept;
 
+    /// Changes the order of the photons.
     void build(std::vector<MapPhoton> photons);
     std::span<const MapPhoton> photons() const { return photons_; }
 
@@ -47,14 +51,27 @@ public:
     /// [Loftsgaarden & Quesenberry 1965].
     void find(Vec3 p, int count, float radius, Neighbours& out) const;
 
-    /// The nearest photon within `radius` whose index is a multiple of `step`, and which hit a side whose normal is close
-    /// to `n`.
-    std::optional<uint32_t> nearest_on_side(Vec3 p, Vec3 n, int step, float radius) const;
+private:
+    std::vector<MapPhoton> photons_;
+    std::unique_ptr<PointTree> tree_;
+};
+
+/// Every n-th photon of a map, for queries by the side of the surface.
+class PhotonSides {
+public:
+    PhotonSides();
+    ~PhotonSides();
+
+    /// `photons` must outlive this object.
+    void build(const PhotonMap& photons, int step);
+    /// The nearest of these photons within `radius` that hit a side whose normal is close to `n`: its index in the map
+    /// divided by the step.
+    std::optional<uint32_t> nearest(Vec3 p, Vec3 n, float radius) const;
 
 private:
-    struct Tree;
-    std::vector<MapPhoton> photons_;
-    std::unique_ptr<Tree> tree_;
+    const PhotonMap* photons_ = nullptr;
+    size_t step_ = 1;
+    std::unique_ptr<PointTree> tree_;
 };
 
 /// Irradiance at every n-th photon of a map, from a density estimate. It is computed when it is first needed, because
@@ -72,6 +89,7 @@ private:
     Rgb compute(uint32_t photon) const;
 
     const PhotonMap* photons_ = nullptr;
+    PhotonSides places_;
     int step_ = 1, count_ = 0, longest_ = 0;
     float radius_ = 0;
     enum State : uint8_t { Unknown, InWork, Known };

@@ -60,7 +60,7 @@ TEST(PhotonMap, FindsNothingInAnEmptyMap) {
     EXPECT_FLOAT_EQ(found.disc, kPi);
 }
 
-TEST(PhotonMap, FindsTheNearestOnASide) {
+TEST(PhotonSides, FindTheNearest) {
     std::vector<MapPhoton> photons = random_photons(2000);
     testing::Random random(7);
     const Vec3 up{0, 0, 1};
@@ -68,19 +68,23 @@ TEST(PhotonMap, FindsTheNearestOnASide) {
         photons[i].side = ArrivalSide(i % 3 == 0 ? up : i % 3 == 1 ? -up : Vec3{1, 0, 0}, false);
     PhotonMap map;
     map.build(photons);
-    for (const int step : {1, 4})
+    const auto sorted = map.photons();
+    for (const int step : {1, 4}) {
+        PhotonSides sides;
+        sides.build(map, step);
         for (const float radius : {0.05f, 0.5f, 10.0f})
             for (int query = 0; query < 50; ++query) {
                 const Vec3 p = random.in_cube() * 1.2f;
                 std::optional<uint32_t> expected;
-                for (uint32_t i = 0; i < photons.size(); i += 3) {
-                    const float dist2 = length2(photons[i].p - p);
-                    if (i % uint32_t(step) == 0 && dist2 < radius * radius &&
-                        (!expected || dist2 < length2(photons[*expected].p - p)))
-                        expected = i;
+                for (uint32_t i = 0; i < sorted.size(); i += uint32_t(step)) {
+                    const float dist2 = length2(sorted[i].p - p);
+                    if (dot(sorted[i].side.normal(), up) > 0.9f && dist2 < radius * radius &&
+                        (!expected || dist2 < length2(sorted[*expected * uint32_t(step)].p - p)))
+                        expected = i / uint32_t(step);
                 }
-                EXPECT_EQ(map.nearest_on_side(p, up, step, radius), expected);
+                EXPECT_EQ(sides.nearest(p, up, radius), expected);
             }
+    }
 }
 
 }  // namespace
