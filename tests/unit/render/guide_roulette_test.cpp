@@ -13,11 +13,11 @@ constexpr auto kEye = TransportMode::Radiance, kLight = TransportMode::Importanc
 
 struct LearnedRoulette : ::testing::Test {
     /// The lamp is left of the partition, whose right side it does not see.
-    const Scene scene = test::build(
-        test::front_camera(32) + test::room() + test::area_lamp() +
-        test::rectangle("<scale x=\"1\" y=\"0.7\"/><rotate y=\"1\" angle=\"90\"/>"
-                        "<translate x=\"0.4\" y=\"-0.3\"/>",
-                        test::diffuse("0.7,0.7,0.7")));
+    const Scene scene =
+        test::build(test::front_camera(32) + test::room() + test::area_lamp() +
+                    test::rectangle("<scale x=\"1\" y=\"0.7\"/><rotate y=\"1\" angle=\"90\"/>"
+                                    "<translate x=\"0.4\" y=\"-0.3\"/>",
+                                    test::diffuse("0.7,0.7,0.7")));
     const Film film{scene.film(), scene.filter()};
     const LearnedGuide learned{scene, IntegratorSpec::parse("bdpt:guide_roulette=true"), 1, 2};
 
@@ -45,9 +45,9 @@ struct LearnedRoulette : ::testing::Test {
                 const WalkContribution at = expected_contribution(path[i], guide, mode);
                 if (!(at.beyond >= 0)) continue;
                 const float whole =
-                    mode == kEye ? luminance(path[1].beta) *
-                                       expected_contribution(path[1], guide, mode).here
-                                 : guide.light_contribution;
+                    mode == kEye
+                        ? luminance(path[1].beta) * expected_contribution(path[1], guide, mode).here
+                        : guide.light_contribution;
                 ++all.vertices;
                 all.survival += double(path[i].survival.value());
                 all.weak += luminance(path[i].beta) * at.beyond < 0.1f * whole;
