@@ -17,6 +17,10 @@ public:
 
     GuideTree surfaces;
     GuideTree emission;  ///< Of the directions from y_0, as TransportMode::Importance and class 0.
+    /// Whether walks use adjoint-driven Russian roulette [Vorba & Křivánek 2016], by GuideCell::Field::contribution.
+    bool has_roulette = false;
+    /// Mean contribution of light walks to the sum of all pixels, in the same unit.
+    float light_contribution = 0;
     float emission_gain =
         0;  ///< Mean gain of all light paths by the directions from y_0, or of y_0 at infinity.
 
@@ -51,6 +55,8 @@ public:
     void save(State& to) const {
         surfaces.save(to);
         emission.save(to);
+        to.put(has_roulette);
+        to.put(light_contribution);
         to.put(emission_gain);
         to.put(at_infinity_);
         to.put(emission_weights_);
@@ -59,6 +65,8 @@ public:
     void load(State& from) {
         surfaces.load(from);
         emission.load(from);
+        from.get(has_roulette);
+        from.get(light_contribution);
         from.get(emission_gain);
         from.get(at_infinity_);
         std::vector<double> weights;

@@ -22,8 +22,10 @@ Guide random_guide(Vec3 center, float radius, std::vector<double> emission,
     for (GuideCell::Field& field : cell.fields) {
         field.share.fill(kShare);
         make_random(field.mixture, 1 / radius);
+        for (WalkContribution& c : field.contribution) c = {1, u()};
     }
     Guide guide;
+    guide.light_contribution = 1;
     guide.surfaces = guide.emission = GuideTree(cell);
     for (double& weight : emission) weight *= 0.1 + double(u());
     if (emission.size() > 1) guide.set_emission(std::move(emission));

@@ -130,6 +130,51 @@ GuideTree::GuideTree(const std::vector<GuideSample>& samples, uint64_t seed) {
     }
 }
 
+void GuideTree::set_contributions(const std::vector<ContributionRecord>& records) {
+    constexpr double kFewest = 32;
+    // As if so many records of average throughput had been found with the mean over all cells.
+    constexpr double kPrior = 4;
+    // References of Russian roulette must not be large by chance, since many walks would end. A large `beyond` only
+    // keeps walks alive.
+    constexpr double kLargestHere = 10;
+    struct Sums {
+        double count = 0, beta = 0, here = 0, beyond = 0;
+        void add(const ContributionRecord& r) {
+            ++count;
+            beta += double(r.beta);
+            here += double(r.here);
+            beyond += double(r.beyond);
+        }
+    };
+    using ByOctant = std::array<std::array<Sums, 8>, 2>;
+    std::vector<ByOctant> cells(cells_.size());
+    std::array<Sums, 2> all;
+    for (const ContributionRecord& r : records) {
+        cells[index(r.p)][r.mode][r.octant].add(r);
+        all[r.mode].add(r);
+    }
+    std::vector<std::array<std::array<double, 8>, 2>> clamped(cells_.size());
+    for (const ContributionRecord& r : records) {
+        const size_t cell = index(r.p);
+        const Sums& s = cells[cell][r.mode][r.octant];
+        clamped[cell][r.mode][r.octant] +=
+            std::min(double(r.here), kLargestHere * double(r.beta) * s.here / s.beta);
+    }
+    for (size_t i = 0; i < cells_.size(); ++i)
+        for (size_t m = 0; m < 2; ++m)
+            for (size_t k = 0; k < 8; ++k) {
+                const Sums& s = cells[i][m][k];
+                WalkContribution& c = cells_[i].fields[m].contribution[k];
+                c = {};
+                if (!(s.count >= kFewest && s.beta > 0)) continue;
+                const double prior = kPrior * s.beta / s.count;
+                c.here = float((clamped[i][m][k] + prior * all[m].here / all[m].beta) /
+                               (s.beta + prior));
+                c.beyond =
+                    float((s.beyond + prior * all[m].beyond / all[m].beta) / (s.beta + prior));
+            }
+}
+
 void GuideTree::set_importance(const std::vector<PlacedWeight>& weights) {
     std::vector<std::array<double, 8>> sums(cells_.size());
     for (const PlacedWeight& w : weights)

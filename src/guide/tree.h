@@ -14,11 +14,28 @@ struct PlacedWeight {
     float weight;
 };
 
+/// What walks contribute to the image from a place on, on average and per unit of their throughput; negative where
+/// unknown.
+struct WalkContribution {
+    float here = -1;    ///< By joins there and at later vertices.
+    float beyond = -1;  ///< By joins at later vertices: what is lost if the walk ends there.
+};
+
+/// A vertex of a walk, and what the walk contributed from there on.
+struct ContributionRecord {
+    Vec3 p;
+    float beta = 0;                ///< Throughput.
+    float here = 0, beyond = 0;    ///< As WalkContribution, times the throughput.
+    uint8_t mode = 0, octant = 0;  ///< TransportMode of the walk; GuideCell::octant().
+};
+
 /// The learned directions of a cell. The fields are indexed by the TransportMode of the walks that they guide.
 struct GuideCell {
     struct Field {
         GuideMixture mixture;
         std::array<float, kGuideClasses> share{};  ///< See GuideFit.
+        /// Of these walks, by octant of the normal on the side of their arrival; see GuideTree::set_contributions().
+        std::array<WalkContribution, 8> contribution{};
     };
     Vec3 center;
     float surface = 0;  ///< Rough area of the surfaces in it.
@@ -42,6 +59,9 @@ public:
 
     /// Sums of the weights in each cell over its surface.
     void set_importance(const std::vector<PlacedWeight>& weights);
+
+    /// Means of the records in each cell, octant and mode; unknown where there are few records.
+    void set_contributions(const std::vector<ContributionRecord>& records);
 
     bool is_empty() const { return cells_.empty(); }
     /// The cell that holds `p`. Not where the tree is empty.

@@ -149,7 +149,7 @@ IntegratorEntry bdpt_entry() {
                       "as many as a light path has connectible vertices on average.",
                       true});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
-    params.push_back(Guiding::param());
+    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     return {{"integrator", "bdpt",
              "Bidirectional path tracing with all connections and MIS. Unbiased.", params},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {

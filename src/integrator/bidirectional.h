@@ -9,7 +9,7 @@ namespace etendue {
 class Bidirectional {
 public:
     static std::vector<ParamInfo> params();
-    /// `guiding` must be given if the integrator has the parameter Guiding::param().
+    /// `guiding` must be given if the integrator has the parameter Guiding::params().
     explicit Bidirectional(const IntegratorParams& params, Guiding guiding = {});
     /// Without Russian roulette of joins. Paths with fewer than `shortest` edges are left out.
     Bidirectional(const DepthOptions& depth, int shortest)

@@ -28,12 +28,9 @@ struct Block {
     std::vector<GuideSample> samples;
     std::vector<PlacedWeight> importons;  ///< That the lens sees.
     std::vector<EmissionRecord> emission;
+    std::vector<ContributionRecord> contributions;
+    double light_contribution = 0;  ///< Sum over the light walks.
 };
-
-/// Normal on the side from which the walk came.
-Vec3 facing_normal(const Vertex& v) {
-    return dot(v.ng, v.wo) < 0 ? -v.ng : v.ng;
-}
 
 /// What walks in the other mode can learn at v_i of a walk in `mode`: the direction it came from. They would arrive from
 /// where it went on to.
@@ -101,6 +98,80 @@ void record_eye_walk(const SubPath& z, Block& block) {
     }
 }
 
+/// The contributions of a light walk and an eye walk to the image, by the number of their vertices that take part.
+struct Contributions {
+    using Sums = std::array<float, kMostVertices + 3>;
+    Sums by_light{}, by_eye{}, hits{};  ///< Hits are a part of by_eye.
+
+    /// From these numbers of vertices on.
+    static void accumulate(Sums& sums) {
+        for (size_t i = sums.size() - 1; i > 0; --i) sums[i - 1] += sums[i];
+    }
+};
+
+/// Joins both walks as bidirectional path tracing does, as far as the counts have its techniques; each eye vertex is
+/// connected to one vertex of the light walk, which stands for all. Splats are divided by the number of light paths.
+Contributions join_walks(const WalkContext& walk, int max_depth, Sampler& sampler, const SubPath& y,
+                         const SubPath& z) {
+    const TechniqueCounts& n = walk.counts;
+    Contributions all;
+    const auto value = [&](const Join& j) {
+        const float weighted = luminance(j.contribution) * j.mis_weight;
+        return weighted > 0 ? weighted * visibility(walk.scene, j, walk.stats) : 0.0f;
+    };
+    for (int t = 2; n.hit > 0 && t <= z.size(); ++t) {
+        for_each_hit(walk.scene, z, t, n, [&](const Join& j) {
+            const float v = luminance(j.contribution) * j.mis_weight;
+            all.by_eye[size_t(t)] += v;
+            all.hits[size_t(t)] += v;
+        });
+        if (t > max_depth || !z[t - 1].is_connectible) continue;
+        if (const auto j = join_next_event(walk.scene, z, t, sampler, n))
+            all.by_eye[size_t(t)] += value(*j);
+        const int choices = std::min(y.size(), max_depth - t + 1) - 1;
+        if (n.connect == 0 || choices < 1) continue;
+        sampler.seek(Stream::Selection, uint64_t(t));
+        const int s = 2 + std::min(int(sampler.next_1d() * float(choices)), choices - 1);
+        if (const auto j = join_connect(walk.scene, y, s, z, t, n)) {
+            const float v = value(*j);
+            all.by_eye[size_t(t)] += v * float(choices);
+            all.by_light[size_t(s)] += v * float(choices);
+        }
+    }
+    for (int s = 2; n.splat > 0 && s <= std::min(y.size(), max_depth); ++s)
+        if (const auto j = join_splat(walk.scene, y, s, sampler, n))
+            all.by_light[size_t(s)] += value(*j) / n.splat;
+    Contributions::accumulate(all.by_light);
+    Contributions::accumulate(all.by_eye);
+    return all;
+}
+
+/// Records what the walk contributed from its vertices on. Not of the later half, which the limit of its length cuts short.
+void record_contributions(const SubPath& path, TransportMode mode, int max_vertices,
+                          const Contributions::Sums& sums, const Contributions::Sums& hits,
+                          std::vector<ContributionRecord>& records) {
+    for (int i = 1; i < std::min(path.size(), std::max(2, max_vertices / 2)); ++i) {
+        const Vertex& v = path[i];
+        if (!v.is_connectible || v.kind != Vertex::Kind::Surface) continue;
+        const auto vertices = size_t(i + 1);
+        records.push_back({v.p, luminance(v.beta), sums[vertices] - hits[vertices],
+                           sums[vertices + 1], uint8_t(mode),
+                           uint8_t(GuideCell::octant(facing_normal(v)))});
+    }
+}
+
+/// Of the techniques of the method, those of bidirectional path tracing.
+TechniqueCounts joins_of(GuidedWalks walks, uint64_t light_paths) {
+    const float N = float(light_paths);
+    switch (walks) {
+    case GuidedWalks::Eye: return {.hit = 1, .next_event = 1};
+    case GuidedWalks::Light: return {.splat = N};
+    case GuidedWalks::Both:
+    case GuidedWalks::BothWithPairs: break;
+    }
+    return {.hit = 1, .next_event = 1, .connect = 1, .splat = N};
+}
+
 template <class T>
 void append(std::vector<T>& to, const std::vector<T>& more) {
     to.insert(to.end(), more.begin(), more.end());
@@ -159,16 +230,20 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
 
 }  // namespace
 
-ParamInfo Guiding::param() {
-    return {"guide", ParamKind::String, "off",
-            "Learned directions for the walks: off, on, or auto (on, unless the training shows "
-            "that it gains too little). random is a useless guide for tests."};
+std::vector<ParamInfo> Guiding::params() {
+    return {{"guide", ParamKind::String, "off",
+             "Learned directions for the walks: off, on, or auto (on, unless the training shows "
+             "that it gains too little). random is a useless guide for tests."},
+            {"guide_roulette", ParamKind::Bool, "false",
+             "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
+             "walks had from the same place on. Has no effect if `guide` is off."}};
 }
 
 Guiding::Guiding(const IntegratorParams& p) {
     constexpr std::array<Choice<Mode>, 4> kModes{
         {{"off", Mode::Off}, {"on", Mode::On}, {"auto", Mode::Auto}, {"random", Mode::Random}}};
     mode_ = p.choice("guide", kModes);
+    has_roulette_ = p.flag("guide_roulette");
 }
 
 bool Guiding::gains_little(GuidedWalks walks) const {
@@ -195,6 +270,8 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
         std::has_single_bit(pass.index) && std::countr_zero(pass.index) % 2 == 0;
     if (!pass.scene.has_emitters() || (pass.index > 0 && !is_power_of_4)) return;
     const uint64_t seed = hash_combine(pass.seed, 0x67756964ull + pass.index);
+    // Walks that end early would teach less.
+    if (guide_) guide_->has_roulette = false;
     if (mode_ == Mode::Random) {
         constexpr float kKappa = 1000;
         const Bounds3& bounds = pass.scene.bounds();
@@ -209,23 +286,28 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     } else if (pass.index == 0) {
         const uint64_t first = std::max(kFewestWalks, std::min(pass.pixels, kMostWalks) >> kRounds);
         for (int round = 0; round < kRounds; ++round)
-            guide_ = trained(pass, depth, first << round, hash_combine(seed, uint64_t(round)));
+            guide_ =
+                trained(pass, depth, walks, first << round, hash_combine(seed, uint64_t(round)),
+                        has_roulette_ && round == kRounds - 1);
         if (mode_ == Mode::Auto && gains_little(walks)) {
             is_given_up_ = true;
             guide_ = nullptr;
         }
     } else {
         constexpr uint64_t kFewest = 16 * kFewestWalks;
-        guide_ = trained(pass, depth, std::clamp(pass.pixels, kFewest, kMostWalks), seed);
+        guide_ = trained(pass, depth, walks, std::clamp(pass.pixels, kFewest, kMostWalks), seed,
+                         has_roulette_);
     }
+    if (guide_) guide_->has_roulette = has_roulette_;
     trained_passes_ = pass.index + 1;
 }
 
 std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOptions& depth,
-                                        uint64_t walks, uint64_t seed) const {
-    // Of a method with both walks.
-    const TechniqueCounts counts{
-        .hit = 1, .next_event = 1, .connect = 1, .splat = 1, .guide = guide_.get()};
+                                        GuidedWalks guided, uint64_t walks, uint64_t seed,
+                                        bool for_roulette) const {
+    TechniqueCounts counts =
+        joins_of(for_roulette ? guided : GuidedWalks::Both, for_roulette ? pass.pixels : 1);
+    counts.guide = guide_.get();
     WalkOptions options = depth.walk();
     options.max_vertices = std::min(options.max_vertices, kMostVertices + 1);
     std::vector<Block> blocks((walks + kBlock - 1) / kBlock);
@@ -239,6 +321,13 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
             record_light_walk(work.y, blocks[b]);
             trace_eye_path(walk, pass.film, mix64(seed + i) % pass.pixels, sampler, work.z);
             record_eye_walk(work.z, blocks[b]);
+            if (!for_roulette) continue;
+            const Contributions c = join_walks(walk, depth.max_depth, sampler, work.y, work.z);
+            blocks[b].light_contribution += double(c.by_light[0]);
+            record_contributions(work.y, TransportMode::Importance, options.max_vertices,
+                                 c.by_light, {}, blocks[b].contributions);
+            record_contributions(work.z, TransportMode::Radiance, options.max_vertices, c.by_eye,
+                                 c.hits, blocks[b].contributions);
         }
     });
     Block all;
@@ -246,11 +335,15 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
         append(all.samples, b.samples);
         append(all.importons, b.importons);
         append(all.emission, b.emission);
+        append(all.contributions, b.contributions);
+        all.light_contribution += b.light_contribution;
     }
     auto guide = std::make_unique<Guide>();
     guide->surfaces = GuideTree(all.samples, seed);
     if (guide->surfaces.is_empty()) return guide;
     guide->surfaces.set_importance(all.importons);
+    guide->surfaces.set_contributions(all.contributions);
+    guide->light_contribution = float(all.light_contribution / double(walks));
     learn_emission(pass.scene, all.emission, hash_combine(seed, 1), *guide);
     return guide;
 }

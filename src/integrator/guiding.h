@@ -14,7 +14,7 @@ enum class GuidedWalks { Eye, Light, Both, BothWithPairs };
 
 class Guiding {
 public:
-    static ParamInfo param();
+    static std::vector<ParamInfo> params();
     Guiding() = default;
     explicit Guiding(const IntegratorParams& params);
 
@@ -34,10 +34,13 @@ public:
 
 private:
     enum class Mode { Off, On, Auto, Random };
+    /// `for_roulette`: whether the walks are joined, so that their contributions can be learned.
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
-                                   uint64_t walks, uint64_t seed) const;
+                                   GuidedWalks guided, uint64_t walks, uint64_t seed,
+                                   bool for_roulette) const;
 
     Mode mode_ = Mode::Off;
+    bool has_roulette_ = false;  ///< The option; see Guide::has_roulette.
     std::unique_ptr<Guide> guide_;
     uint32_t trained_passes_ = 0;  ///< That train() was called for.
     bool is_given_up_ = false;     ///< By Mode::Auto.

@@ -65,7 +65,7 @@ private:
 
 IntegratorEntry light_entry() {
     std::vector<ParamInfo> params = depth_params();
-    params.push_back(Guiding::param());
+    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     return {{"integrator", "light",
              "Light tracing: connects light paths to the lens. Unbiased for the paths that it can "
              "make.",

@@ -56,7 +56,7 @@ private:
 
 IntegratorEntry path_entry() {
     std::vector<ParamInfo> params = depth_params();
-    params.push_back(Guiding::param());
+    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     return {{"integrator", "path",
              "Path tracing with next event estimation and MIS; the reference method. Unbiased.",
              params},

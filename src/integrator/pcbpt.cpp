@@ -262,7 +262,7 @@ IntegratorEntry pcbpt_entry() {
                       "interpolated, 1 to 16."});
     params.push_back({"uniform", ParamKind::Float, "0.5",
                       "Fraction of connections that are drawn uniformly, in [0.001, 1]."});
-    params.push_back(Guiding::param());
+    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     params.push_back({"weights", ParamKind::String, "upper",
                       "Count of a connection in the weights: upper (1, since all pixels share the "
                       "light paths) or standard (M).",

@@ -229,7 +229,7 @@ std::vector<ParamInfo> upg_params() {
                       "Largest distance between the vertices of a pair, in scene units; 0: chosen "
                       "from earlier passes so that an eye path finds about eight pairs."});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
-    params.push_back(Guiding::param());
+    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     params.push_back(
         {"bound", ParamKind::String, "slab",
          "Directions that Bernoulli trials propose: slab (pairs lie near the tangent plane), cone "

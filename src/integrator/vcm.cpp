@@ -206,7 +206,7 @@ IntegratorEntry vcm_entry() {
     params.push_back({"connections", ParamKind::Bool, "true",
                       "Whether sub-paths are connected to each other, to emitters and to the lens.",
                       true});
-    params.push_back(Guiding::param());
+    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged.", true});
     params.push_back(
         {"exact", ParamKind::Bool, "false",

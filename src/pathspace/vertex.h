@@ -15,6 +15,7 @@ namespace etendue {
 class Guide;
 struct GuideCell;
 struct GuideView;
+struct WalkContribution;
 
 /// A probability in steps of 2^-10, so that the compactly stored value is exactly the one used in the decision.
 class Survival {
@@ -156,6 +157,12 @@ float guided_pdf(const Vertex& v, const GuideCell& cell, Vec3 from, Vec3 w, Tran
 
 /// The share of guided directions at `v` for walks in `mode`.
 float guide_share(const Vertex& v, const GuideCell& cell, TransportMode mode);
+/// What walks in `mode` that reach `v` as this one did contribute on average.
+WalkContribution expected_contribution(const Vertex& v, const Guide& guide, TransportMode mode);
+/// Normal of a surface on the side from which the walk came.
+inline Vec3 facing_normal(const Vertex& v) {
+    return dot(v.ng, v.wo) < 0 ? -v.ng : v.ng;
+}
 /// How a walk that arrives at `v` from `from` sees the lobes of the cell.
 GuideView guide_view(const Vertex& v, const GuideCell& cell, Vec3 from);
 
@@ -191,6 +198,8 @@ struct SubPath {
     Flight flight;
     float eta2 = 1;  ///< Product of η² over the refractions of an eye sub-path.
     float gain = 1;  ///< Product of BsdfSample::gain.
+    /// Expected contribution of an eye sub-path at its first connectible vertex; 0 where unknown or not yet reached.
+    float expected = 0;
 
     SubPath() = default;
     /// Copies would read BSDFs from the arena of the original.
@@ -224,6 +233,7 @@ struct SubPath {
         size_ = 0;
         arena.reset();
         eta2 = gain = 1;
+        expected = 0;
         flight.pdf_sa = 0;
     }
 

@@ -7,13 +7,56 @@
 namespace etendue {
 namespace {
 
+/// Whether no vertex between the first and the last one is connectible.
+bool is_first_connectible(const SubPath& path) {
+    for (int i = 1; i + 1 < path.size(); ++i)
+        if (path[i].is_connectible) return false;
+    return true;
+}
+
+/// Survival of adjoint-driven Russian roulette at the last vertex: the expected contribution of the rest of the walk,
+/// relative to that of the whole walk [Vorba & Křivánek 2016, §4]. For an eye walk the latter is the light that its first
+/// connectible vertex reflects, for a light walk the mean of all. Walks are not split. Empty where either one is unknown,
+/// and at surfaces too glossy for a mean over the directions of arrival. It depends on the walk up to this vertex alone,
+/// like the rule below; the weights know of neither.
+template <TransportMode mode>
+std::optional<float> adjoint_survival(const WalkContext& walk, SubPath& path) {
+    // With the window of Vorba & Křivánek, whose bounds have the ratio 5, roulette starts at a third of its centre.
+    constexpr float kFactor = 3;
+    constexpr float kLeast = 0.1f;  // where the estimate may be far too small
+    const Guide* guide = walk.counts.guide;
+    const Vertex& v = path[path.size() - 1];
+    if (!guide || !guide->has_roulette || guide->surfaces.is_empty() || !v.is_connectible)
+        return {};
+    const WalkContribution expected = expected_contribution(v, *guide, mode);
+    if (!(expected.beyond >= 0)) return {};
+    const float beta = luminance(v.beta);
+    float reference = guide->light_contribution;
+    if constexpr (mode == TransportMode::Radiance) {
+        if (is_first_connectible(path)) path.expected = beta * expected.here;
+        reference = path.expected;
+    }
+    if (!(reference > 0) || guide_class(v.gloss) == kGuideClasses - 1) return {};
+    return clamp(kFactor * beta * expected.beyond / reference, kLeast, 1.0f);
+}
+
 /// Survival of Russian roulette at the last vertex: its throughput relative to that of the first scattering vertex. The
 /// η² of refractions is removed, since it cancels when the path leaves the glass. The throughput is that of a walk
 /// without guide, because a good guide makes the throughput of the paths that it prefers small.
-Survival survival(const SubPath& path) {
+float throughput_survival(const SubPath& path) {
     const float left =
         path[path.size() - 1].beta.max() * path.eta2 * path.gain / path[1].beta.max();
-    return Survival(left > 0 ? std::min(0.95f, left) : 0x1p-16f);
+    return left > 0 ? left : 0x1p-16f;
+}
+
+/// Survival of Russian roulette at the last vertex; empty where there is none. From rr_depth on, no walk is safe.
+template <TransportMode mode>
+std::optional<Survival> survival(const WalkContext& walk, SubPath& path) {
+    constexpr float kMost = 0.95f;
+    const bool is_late = path.size() - 1 >= walk.options.rr_depth;
+    const std::optional<float> adjoint = adjoint_survival<mode>(walk, path);
+    if (!is_late) return adjoint ? std::optional(Survival(*adjoint)) : std::nullopt;
+    return Survival(std::min(kMost, adjoint ? *adjoint : throughput_survival(path)));
 }
 
 /// Vertex::sees_lens of the vertex that follows `v`.
@@ -221,10 +264,10 @@ std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sa
     sampler.seek(mode == TransportMode::Radiance ? Stream::Eye : Stream::Light, uint64_t(last));
     const float u_lobe = sampler.next_1d_if(v.bsdf.uses_lobe_choice());
     const Vec2 u_direction = sampler.next_2d();
-    const bool has_roulette = last >= walk.options.rr_depth;
-    const float u_roulette = sampler.next_1d_if(has_roulette);
-    if (has_roulette) {
-        v.survival = survival(path);
+    const std::optional<Survival> q = survival<mode>(walk, path);
+    const float u_roulette = sampler.next_1d_if(q.has_value());
+    if (q) {
+        v.survival = *q;
         if (!(u_roulette < v.survival.value())) return {};
     }
     // This is the last slot, because a walk without guide does not read a number here.

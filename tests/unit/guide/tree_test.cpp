@@ -64,6 +64,47 @@ TEST(GuideTree, LearnsALampWithParallax) {
     EXPECT_EQ(tree.gain(kLight), 0);
 }
 
+/// Vertices on the floor of the same places, whose walks contribute more the larger x is, and least on its lower side.
+std::vector<ContributionRecord> contributions(int count) {
+    Random random(9);
+    std::vector<ContributionRecord> records;
+    for (int i = 0; i < count; ++i) {
+        const Vec2 at = random.next_2d();
+        const bool is_above = i % 2 == 0, is_eye = i % 4 < 2;
+        ContributionRecord r;
+        r.p = {at.x, at.y, 0};
+        r.beta = random.next_1d() + 0.1f;
+        r.beyond = r.beta * at.x * (is_above ? 1.0f : 0.1f) * (is_eye ? 1.0f : 5.0f);
+        r.here = 2 * r.beyond;
+        r.mode = uint8_t(is_eye ? kEye : kLight);
+        r.octant = uint8_t(GuideCell::octant({0, 0, is_above ? 1.0f : -1.0f}));
+        records.push_back(r);
+    }
+    return records;
+}
+
+TEST(GuideTree, LearnsContributionsByPlaceSideAndMode) {
+    GuideTree tree(samples_under_lamp(20000), 1);
+    constexpr size_t kAbove = 0, kBelow = 4, kNowhere = 1;
+    EXPECT_LT(tree.cell({}).field(kEye).contribution[kAbove].beyond, 0) << "not known yet";
+    tree.set_contributions(contributions(40000));
+    for (const float x : {0.1f, 0.5f, 0.9f}) {
+        // The mean is that over the cell, not at its centre.
+        constexpr double kWithinCell = 0.2;
+        const GuideCell& cell = tree.cell({x, 0.4f, 0});
+        const auto& eye = cell.field(kEye).contribution;
+        const auto& light = cell.field(kLight).contribution;
+        EXPECT_NEAR(eye[kAbove].beyond, x, kWithinCell);
+        EXPECT_NEAR(eye[kAbove].here, 2 * eye[kAbove].beyond, 0.1);
+        EXPECT_NEAR(eye[kBelow].beyond / eye[kAbove].beyond, 0.1, 0.1);
+        EXPECT_NEAR(light[kAbove].beyond / eye[kAbove].beyond, 5, 1);
+        EXPECT_LT(eye[kNowhere].beyond, 0);
+        EXPECT_LT(eye[kNowhere].here, 0);
+    }
+    tree.set_contributions(contributions(100));
+    EXPECT_LT(tree.cell({}).field(kEye).contribution[kAbove].beyond, 0) << "too few records";
+}
+
 /// Writes and reads as LearnedState does.
 struct State {
     std::vector<std::byte> bytes;

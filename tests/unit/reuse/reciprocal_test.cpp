@@ -74,6 +74,7 @@ protected:
         if (const Guided guided = std::get<Guided>(GetParam()); guided != Guided::No)
             guide = random_guide({}, 1.7f, std::vector<double>(scene.emitters().size(), 1), {},
                                  guided == Guided::Wide ? 20.0f : 1000.0f, 3);
+        guide.has_roulette = std::get<Guided>(GetParam()) == Guided::Wide;
     }
 
     static const Case& given() { return std::get<Case>(GetParam()); }

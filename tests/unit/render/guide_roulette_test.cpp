@@ -1,0 +1,97 @@
+// What adjoint-driven Russian roulette learns in a room with a partition, and what becomes of walks there.
+
+#include <gtest/gtest.h>
+
+#include "pathspace/walk.h"
+#include "render/learned_guide.h"
+#include "test_scenes.h"
+
+namespace etendue {
+namespace {
+
+constexpr auto kEye = TransportMode::Radiance, kLight = TransportMode::Importance;
+
+struct LearnedRoulette : ::testing::Test {
+    /// The lamp is left of the partition, whose right side it does not see.
+    const Scene scene =
+        test::build(test::front_camera(32) + test::room() + test::area_lamp() +
+                    test::rectangle("<scale x=\"1\" y=\"0.7\"/><rotate y=\"1\" angle=\"90\"/>"
+                                    "<translate x=\"0.4\" y=\"-0.3\"/>",
+                                    test::diffuse("0.7,0.7,0.7")));
+    const Film film{scene.film(), scene.filter()};
+    const LearnedGuide learned{scene, IntegratorSpec::parse("bdpt:guide_roulette=true"), 1, 2};
+
+    /// Means over vertices from the third on whose contribution is known.
+    struct Walks {
+        double vertices = 0, survival = 0;
+        double weak = 0;  ///< Number that contribute less than a tenth of the mean.
+    };
+    template <TransportMode mode>
+    Walks trace(const Guide& guide) {
+        const TechniqueCounts counts{
+            .hit = 1, .next_event = 1, .connect = 1, .splat = 1024, .guide = &guide};
+        RenderStats stats;
+        const WalkContext walk{scene, counts, stats, {12, 1000}};
+        SubPath path;
+        Walks all;
+        for (uint32_t index = 0; index < 4000; ++index) {
+            Sampler sampler(SamplerKind::Independent, 3);
+            sampler.start(1, index);
+            if (mode == kEye)
+                trace_eye_path(walk, film, index % 1024, sampler, path);
+            else
+                trace_light_path(walk, sampler, path);
+            for (int i = 2; i + 1 < path.size(); ++i) {
+                const WalkContribution at = expected_contribution(path[i], guide, mode);
+                if (!(at.beyond >= 0)) continue;
+                const float whole =
+                    mode == kEye
+                        ? luminance(path[1].beta) * expected_contribution(path[1], guide, mode).here
+                        : guide.light_contribution;
+                ++all.vertices;
+                all.survival += double(path[i].survival.value());
+                all.weak += luminance(path[i].beta) * at.beyond < 0.1f * whole;
+            }
+        }
+        all.survival /= all.vertices;
+        all.weak /= all.vertices;
+        return all;
+    }
+    template <TransportMode mode>
+    void expect_fewer_weak_walks() {
+        Guide without = learned.guide();
+        without.has_roulette = false;
+        const Walks plain = trace<mode>(without), chosen = trace<mode>(learned.guide());
+        ASSERT_GT(plain.vertices, 1000);
+        EXPECT_EQ(plain.survival, 1);
+        EXPECT_GT(chosen.survival, 0.5);
+        EXPECT_LT(chosen.survival, 0.95);
+        EXPECT_GT(plain.weak, 0.05);
+        EXPECT_LT(chosen.weak, 0.6 * plain.weak);
+    }
+};
+
+TEST_F(LearnedRoulette, TellsTheSidesOfAWallApart) {
+    const Guide& guide = learned.guide();
+    ASSERT_TRUE(guide.has_roulette);
+    EXPECT_GT(guide.light_contribution, 0);
+    const GuideCell& cell = guide.surfaces.cell({0.4f, -0.5f, 0});
+    const auto& eye = cell.field(kEye).contribution;
+    const WalkContribution lit = eye[GuideCell::octant({-1, 0, 0})],
+                           dark = eye[GuideCell::octant({1, 0, 0})];
+    ASSERT_GT(dark.here, 0);
+    // The cell holds parts of other walls as well.
+    EXPECT_GT(lit.here, 1.1f * dark.here);
+    EXPECT_GT(lit.here, lit.beyond) << "light that joins there bring";
+}
+
+TEST_F(LearnedRoulette, EndsWeakEyeWalks) {
+    expect_fewer_weak_walks<kEye>();
+}
+
+TEST_F(LearnedRoulette, EndsWeakLightWalks) {
+    expect_fewer_weak_walks<kLight>();
+}
+
+}  // namespace
+}  // namespace etendue
