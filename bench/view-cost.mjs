@@ -1,5 +1,8 @@
-// The price of a live view: rays for each second of processor time of `etendue studio` with a page that fetches every picture
-// at full size, over that without a page; in pairs, in turns.
+// The price of a live view: processor time of a number of passes of `etendue studio` without a page, over that with a page
+// that fetches every picture at full size. Both run at the same time, each on its own core, and exchange the cores from pair
+// to pair, so whatever else the machine does concerns both. Both render the same passes, and their time is read when
+// nothing of these passes is left to do. Needs two cores; without other load, or at a high priority, the ratios of pairs
+// differ by a few tenths of a percent.
 //
 //     node view-cost.mjs etendue scene.xml [pairs] [seconds of each] [width x height]
 
@@ -8,7 +11,7 @@ import {mkdtempSync, readFileSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 
-const [program, scene, pairs = '5', seconds = '20', resolution = '1920x1080'] = process.argv.slice(2);
+const [program, scene, pairs = '6', seconds = '20', resolution = '1920x1080'] = process.argv.slice(2);
 if (!scene) {
     console.error('usage: view-cost.mjs etendue scene.xml [pairs] [seconds] [WxH]');
     process.exit(2);
@@ -16,42 +19,74 @@ if (!scene) {
 const folder = mkdtempSync(join(tmpdir(), 'etendue-view-cost-'));
 const sleep = ms => new Promise(r => setTimeout(r, ms));
 
-async function measure(isViewed) {
-    const child = spawn(program, ['studio', scene, '-i', 'path', '--sampler', 'independent', '--resolution', resolution, '--threads', '1', '-o', folder, '--grace', '0']);
-    const url = await new Promise(fulfil => child.stdout.once('data', d => fulfil(new URL(d.toString().trim()))));
-    const headers = {Authorization: `Bearer ${url.hash.slice('#token='.length)}`};
-    const get = path => fetch(url.origin + path, {headers});
-    const run = async () => (await (await get('/v1/state')).json()).runs[0];
-    while (!(await run())?.passes) await sleep(50);
-    const cpu = () => {
-        const fields = readFileSync(`/proc/${child.pid}/stat`, 'utf8').split(') ')[1].split(' ');
-        return (Number(fields[11]) + Number(fields[12])) / 100;
-    };
-    const rays = async () => { const r = await run(); return r.rays * r.seconds; };
-    const before = [await rays(), cpu()];
-    let pictures = 0;
-    for (const end = Date.now() + 1000 * Number(seconds), shown = {passes: 0}; Date.now() < end;) {
-        await sleep(100);
-        if (!isViewed) continue;
-        const image = await get(`/v1/image?run=1&view=image&after=${shown.passes}`);
-        if (image.status !== 200) continue;
-        shown.passes = new DataView(await image.arrayBuffer()).getUint32(12, true);
-        ++pictures;
+/// A process of the studio, with one thread on one core.
+class Studio {
+    static async open(core) {
+        const studio = new Studio();
+        studio.child = spawn('taskset', ['-c', String(core), program, 'studio', scene, '--idle', '--resolution', resolution,
+                                         '--threads', '1', '-o', folder, '--grace', '0'], {stdio: ['ignore', 'pipe', 'ignore']});
+        studio.url = await new Promise(fulfil => studio.child.stdout.once('data', d => fulfil(new URL(d.toString().trim()))));
+        while (!(await studio.state()).scene) await sleep(50);
+        return studio;
     }
-    const after = [await rays(), cpu()];
-    const ended = new Promise(r => child.on('exit', r));
-    child.kill('SIGKILL');
-    await ended;
-    return {rate: (after[0] - before[0]) / (after[1] - before[1]), pictures};
+    fetch(path, options = {}) {
+        return fetch(this.url.origin + path, {...options, headers: {Authorization: `Bearer ${this.url.hash.slice('#token='.length)}`}});
+    }
+    async state() { return (await this.fetch('/v1/state')).json(); }
+    async start(limits) {
+        const body = JSON.stringify({action: 'start', integrator: 'path', sampler: 'independent', ...limits});
+        return (await (await this.fetch('/v1/run', {method: 'POST', body})).json()).run;
+    }
+    /// Processor time so far, in seconds.
+    cpu() {
+        const fields = readFileSync(`/proc/${this.child.pid}/stat`, 'utf8').split(') ')[1].split(' ');
+        return (Number(fields[11]) + Number(fields[12])) / 100;
+    }
+    /// Renders the passes; returns their processor time in seconds, and the number of pictures that were fetched. The
+    /// process then renders on, so that its core is not idle while another process is measured.
+    async measure(passes, isViewed) {
+        const before = this.cpu();
+        const run = await this.start({spp: passes});
+        let pictures = 0, shown = 0;
+        while ((await this.state()).runs[0].state !== 'finished') {
+            await sleep(100);
+            if (!isViewed) continue;
+            const image = await this.fetch(`/v1/image?run=${run}&view=image&after=${shown}`);
+            if (image.status !== 200) continue;
+            shown = new DataView(await image.arrayBuffer()).getUint32(12, true);
+            ++pictures;
+        }
+        const after = this.cpu();
+        await this.start({});
+        return {seconds: after - before, pictures};
+    }
+    async close() {
+        const ended = new Promise(r => this.child.on('exit', r));
+        this.child.kill('SIGKILL');
+        await ended;
+    }
 }
 
+async function measurePair(passes, coreOfViewed) {
+    const studios = await Promise.all([Studio.open(1 - coreOfViewed), Studio.open(coreOfViewed)]);
+    try {
+        return await Promise.all(studios.map((s, i) => s.measure(passes, i === 1)));
+    } finally {
+        await Promise.all(studios.map(s => s.close()));
+    }
+}
+
+const passes = Math.max(1, Math.round(Number(seconds) / ((await measurePair(2, 0))[0].seconds / 2)));
 const ratios = [];
 for (let i = 0; i < Number(pairs); ++i) {
-    const [a, b] = i % 2 === 0 ? [await measure(false), await measure(true)] : (await measure(true).then(async v => [await measure(false), v]));
-    ratios.push(b.rate / a.rate);
-    console.log(`${(b.rate / 1e6).toFixed(3)} of ${(a.rate / 1e6).toFixed(3)} Mrays for a second of processor time, ${b.pictures} pictures: ratio ${ratios.at(-1).toFixed(4)}`);
+    const [without, viewed] = await measurePair(passes, i % 2);
+    ratios.push(without.seconds / viewed.seconds);
+    console.log(`${passes} passes: ${without.seconds.toFixed(2)} s without a view, ${viewed.seconds.toFixed(2)} s with ` +
+                `${viewed.pictures} pictures: ratio ${ratios.at(-1).toFixed(4)}`);
 }
 const mean = ratios.reduce((a, b) => a + b, 0) / ratios.length;
-const spread = Math.sqrt(ratios.reduce((s, r) => s + (r - mean) ** 2, 0) / Math.max(1, ratios.length - 1) / ratios.length);
-console.log(`ratio ${mean.toFixed(4)} ± ${spread.toFixed(4)}`);
+const error = Math.sqrt(ratios.reduce((s, r) => s + (r - mean) ** 2, 0) / Math.max(1, ratios.length - 1) / ratios.length);
+const sorted = ratios.slice().sort((a, b) => a - b);
+const median = (sorted[(sorted.length - 1) >> 1] + sorted[sorted.length >> 1]) / 2;
+console.log(`ratio: median ${median.toFixed(4)}, mean ${mean.toFixed(4)} ± ${error.toFixed(4)}`);
 rmSync(folder, {recursive: true, force: true});

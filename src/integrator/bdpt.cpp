@@ -68,6 +68,7 @@ public:
     uint64_t light_paths(const Scene& scene) const override {
         return light_.count(scene, paths_.depth(), uses_cache_ ? kVertexBytes : 0);
     }
+    bool samples_alone() const override { return !uses_cache_ && !paths_.guiding().is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
         std::vector<std::pair<std::string, double>> figures;

@@ -18,6 +18,8 @@ public:
     Guiding() = default;
     explicit Guiding(const IntegratorParams& params);
 
+    /// False with `guide=off`: then no walk is ever guided.
+    bool is_on() const { return mode_ != Mode::Off; }
     /// Trains before pass 0 and refits before passes 1, 4, 16, 64 …, from walks of its own: light walks show eye walks
     /// where radiance comes from, and eye walks show light walks where importance does. Each round is guided by the one
     /// before. For Integrator::trace(), before it traces anything.

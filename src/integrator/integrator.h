@@ -54,6 +54,9 @@ public:
     virtual uint64_t light_paths(const Scene& scene) const = 0;
     /// Whether contributions are reported together with their sub-paths, which `verify` needs to identify the paths.
     virtual bool keeps_paths() const { return true; }
+    /// Whether sample() needs nothing that trace() and learn() leave, apart from the Russian roulette of joins. Any
+    /// sample can then be traced again without the rest of its pass.
+    virtual bool samples_alone() const { return false; }
     virtual Estimator estimator() const = 0;
     /// Number of independent groups of passes, for integrators whose passes depend on each other: pass i belongs to
     /// group i modulo this number. 0 if all passes are independent.

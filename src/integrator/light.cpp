@@ -54,6 +54,7 @@ public:
         guiding_.add_figures(figures);
         return figures;
     }
+    bool samples_alone() const override { return !guiding_.is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:

@@ -86,6 +86,13 @@ private:
     float splat_share_ = 0;
 };
 
+bool has_roulette_of_joins(const IntegratorSpec& spec) {
+    if (spec.make) return false;
+    const std::vector<ParamInfo>& params = integrator_entry(spec.name).info.params;
+    return std::any_of(params.begin(), params.end(),
+                       [](const ParamInfo& p) { return p.name == std::string_view("roulette"); });
+}
+
 void sort_by_luminance(Replay& replay) {
     std::sort(replay.paths.begin(), replay.paths.end(),
               [](const ReplayedPath& a, const ReplayedPath& b) {
@@ -98,14 +105,7 @@ void sort_by_luminance(Replay& replay) {
 ReplayedPasses replayed_passes(const IntegratorSpec& spec) {
     const std::unique_ptr<Integrator> integrator = make_integrator(spec);
     if (integrator->error_groups() > 0 || !integrator->keeps_paths()) return ReplayedPasses::None;
-    const auto is_other_than = [&](const char* name, const char* value) {
-        const auto at = spec.params.find(name);
-        return at != spec.params.end() && at->second != value;
-    };
-    const bool traces_alone = spec.name == "path" || spec.name == "bdpt" || spec.name == "light";
-    return !traces_alone || is_other_than("guide", "off") || is_other_than("connections", "path")
-               ? ReplayedPasses::Last
-               : ReplayedPasses::Any;
+    return integrator->samples_alone() ? ReplayedPasses::Any : ReplayedPasses::Last;
 }
 
 Replay replay(const Scene& scene, const ReplayRequest& request) {
@@ -114,7 +114,7 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
             fmt::format("paths of {} cannot be traced again without the rest of their pass",
                         request.integrator.name));
     IntegratorSpec spec = request.integrator;
-    if (spec.name == "bdpt") spec.params["roulette"] = "0";
+    if (has_roulette_of_joins(spec)) spec.params["roulette"] = "0";
     const std::unique_ptr<Integrator> integrator = make_integrator(spec);
     const uint64_t light_paths = integrator->light_paths(scene);
     const float splat_scale = light_paths > 0 ? float(1 / double(light_paths)) : 0.0f;

@@ -135,6 +135,7 @@ void Session::load_scene() {
             request_stop(run);
         }
         scene_.store(std::move(scene));
+        ++scene_version_;
     } catch (const std::bad_alloc&) {
         error = "not enough memory";
     } catch (const std::exception& e) {

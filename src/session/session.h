@@ -94,6 +94,8 @@ public:
 
     /// nullptr while the first scene is being loaded, or if it could not be loaded.
     std::shared_ptr<const Scene> scene() const { return scene_.load(); }
+    /// Number of times that a scene was loaded; runs of earlier ones keep them.
+    uint64_t scene_version() const { return scene_version_.load(); }
     /// The reason why the scene could not be loaded; empty otherwise.
     std::string load_error() const;
     /// Loads the scene again. Runs of the earlier version are stopped; they keep their scene.
@@ -158,6 +160,7 @@ private:
     const Load load_;
     const int threads_;
     std::atomic<std::shared_ptr<const Scene>> scene_;
+    std::atomic<uint64_t> scene_version_{0};
     std::atomic<uint64_t> revision_{1};
 
     mutable std::mutex mutex_;  ///< Guards all members below, and the status of runs.

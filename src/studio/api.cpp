@@ -1,355 +1,29 @@
 #include "studio/api.h"
 
 #include <sys/stat.h>
-#include <time.h>
 
-#include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <cstring>
+#include <array>
 #include <filesystem>
-#include <stdexcept>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "image/atomic_file.h"
-#include "image/flip.h"
-#include "image/metrics.h"
 #include "math/content_hash.h"
-#include "math/statistics.h"
 #include "mcmc/pick_paths.h"
 #include "render/aov.h"
 #include "render/defaults.h"
 #include "render/plugin_list.h"
-#include "session/first_picture.h"
 #include "session/light_ray.h"
 #include "session/replay.h"
-#include "session/scene_geometry.h"
 #include "studio/guard.h"
-#include "studio/image_reply.h"
 #include "studio/page.h"
+#include "studio/reply_json.h"
+#include "studio/request_values.h"
 
 namespace etendue {
 namespace {
 
 using nlohmann::json;
-
-/// A request that cannot be carried out.
-struct ApiError : std::runtime_error {
-    ApiError(int status, const std::string& message)
-        : std::runtime_error(message), status(status) {}
-    int status;
-};
-
-/// JSON has no NaN; texts of files may not be UTF-8.
-std::string dump(const json& value) {
-    return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
-double thread_cpu_seconds() {
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
-}
-
-json to_json(Vec3 v) {
-    return json::array({v.x, v.y, v.z});
-}
-json to_json(Rgb c) {
-    return json::array({c.r, c.g, c.b});
-}
-
-Vec3 to_vec(const json& value, const char* name) {
-    if (!value.is_array() || value.size() != 3)
-        throw ApiError(422, fmt::format("\"{}\" must be [x, y, z]", name));
-    Vec3 v;
-    for (int i = 0; i < 3; ++i) {
-        if (!value[size_t(i)].is_number())
-            throw ApiError(422, fmt::format("\"{}\" must be three numbers", name));
-        v[i] = value[size_t(i)].get<float>();
-        if (!std::isfinite(v[i])) throw ApiError(422, fmt::format("\"{}\" must be finite", name));
-    }
-    return v;
-}
-
-json parse_object(const std::string& text) {
-    json body = json::parse(text, nullptr, false);
-    if (!body.is_object()) throw ApiError(400, "the body must be a JSON object");
-    return body;
-}
-
-/// An integer of the body in [low, high]; throws where it is missing, unless there is a fallback.
-int64_t integer(const json& body, const char* name, int64_t low, int64_t high,
-                std::optional<int64_t> fallback = {}) {
-    const auto at = body.find(name);
-    if (at == body.end() && fallback) return *fallback;
-    // Unsigned numbers above the range of int64_t are above `high` too.
-    const bool is_integer =
-        at != body.end() && at->is_number_integer() &&
-        !(at->is_number_unsigned() && at->get<uint64_t>() > uint64_t(INT64_MAX));
-    if (!is_integer || at->get<int64_t>() < low || at->get<int64_t>() > high)
-        throw ApiError(422, fmt::format("\"{}\" must be an integer in [{}, {}]", name, low, high));
-    return at->get<int64_t>();
-}
-
-std::string text_of(const json& body, const char* name, const std::string& fallback = {}) {
-    const auto at = body.find(name);
-    if (at == body.end()) return fallback;
-    if (!at->is_string()) throw ApiError(422, fmt::format("\"{}\" must be a text", name));
-    return at->get<std::string>();
-}
-
-double positive(const json& body, const char* name) {
-    const json& value = body[name];
-    if (!value.is_number() || !(value.get<double>() > 0))
-        throw ApiError(422, fmt::format("\"{}\" must be a number above 0", name));
-    return value.get<double>();
-}
-
-int query_integer(const Request& request, const char* name, int fallback) {
-    const std::optional<std::string> text = request.query(name);
-    if (!text) return fallback;
-    int value = 0;
-    const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
-    if (error != std::errc() || end != text->data() + text->size())
-        throw ApiError(400, fmt::format("\"{}\" must be an integer", name));
-    return value;
-}
-
-RenderLimits limits_of(const json& body) {
-    RenderLimits limits;
-    if (body.contains("spp")) limits.spp = uint64_t(integer(body, "spp", 1, int64_t(1) << 32));
-    if (body.contains("seconds")) limits.seconds = positive(body, "seconds");
-    if (body.contains("error")) limits.error = positive(body, "error");
-    return limits;
-}
-
-json to_json(const ErrorEstimate& e) {
-    return e.valid ? json::array({e.relative_rms, e.low, e.high}) : json(nullptr);
-}
-
-/// What changes from pass to pass.
-json progress_of(const RunStatus& s) {
-    json j{{"id", s.id},
-           {"state", to_string(s.state)},
-           {"passes", s.passes},
-           {"snapshot", s.snapshot_passes},
-           {"seconds", s.seconds},
-           {"rays", s.rays_per_second},
-           {"error", to_json(s.error)}};
-    if (s.fraction) j["fraction"] = *s.fraction;
-    if (s.seeds > 1) j["seeds"] = {s.finished_seeds, s.seeds};
-    if (!s.message.empty()) j["message"] = s.message;
-    if (!s.is_of_this_scene) j["old_scene"] = true;
-    return j;
-}
-
-json to_json(const RunStatus& s) {
-    json j = progress_of(s);
-    j["integrator"] = s.integrator;
-    j["sampler"] = s.sampler == SamplerKind::Sobol ? "sobol" : "independent";
-    j["seed"] = s.seed;
-    j["techniques"] = s.technique_depth;
-    j["estimator"] = to_string(s.estimator);
-    j["interval"] = to_string(s.interval);
-    if (s.limits.spp) j["limits"]["spp"] = *s.limits.spp;
-    if (s.limits.seconds) j["limits"]["seconds"] = *s.limits.seconds;
-    if (s.limits.error) j["limits"]["error"] = *s.limits.error;
-    j["figures"] = json::object();
-    for (const auto& [name, value] : s.figures) j["figures"][name] = value;
-    j["history"] = json::array();
-    for (const ConvergencePoint& p : s.history)
-        j["history"].push_back(
-            {p.passes, p.seconds, p.error.relative_rms, p.error.low, p.error.high});
-    return j;
-}
-
-/// Relative standard error of each pixel's luminance.
-std::vector<float> relative_errors(const Snapshot& s) {
-    std::vector<float> errors(s.mean.size());
-    double mean = 0;
-    for (const Rgb c : s.mean) mean += double(luminance(c)) / double(s.mean.size());
-    for (size_t i = 0; i < errors.size(); ++i) {
-        const float y = luminance(s.mean[i]), scale = std::max(std::abs(y), float(0.1 * mean));
-        errors[i] = scale > 0 ? std::sqrt(std::max(0.0f, luminance(s.variance[i]))) / scale : 0.0f;
-    }
-    return errors;
-}
-
-/// Calls use(index) for the pixels of a rectangle.
-template <class Use>
-void for_each_pixel(const ImageRect& r, int width, const Use& use) {
-    for (int y = r.y; y < r.y + r.height; ++y)
-        for (int x = r.x; x < r.x + r.width; ++x) use(size_t(y) * size_t(width) + size_t(x));
-}
-
-/// The pixels of a rectangle. Pixels that are not finite are counted, and otherwise left out.
-struct RectangleValues {
-    using Channels = std::array<double, 3>;
-    size_t finite = 0, nan = 0, infinite = 0;
-    Channels mean{}, least{}, largest{};
-    Channels variance{};       ///< Of the pixels.
-    Channels squared_error{};  ///< Of the mean, if the errors of pixels are independent.
-};
-RectangleValues values_in(const Snapshot& s, const ImageRect& rect) {
-    RectangleValues v;
-    std::array<Moments, 3> moments;
-    for_each_pixel(rect, s.width, [&](size_t i) {
-        const Rgb c = s.mean[i];
-        if (std::isnan(c.r) || std::isnan(c.g) || std::isnan(c.b)) {
-            ++v.nan;
-            return;
-        }
-        if (!is_finite(c)) {
-            ++v.infinite;
-            return;
-        }
-        for (size_t k = 0; k < 3; ++k) {
-            const auto value = double(c[int(k)]);
-            v.least[k] = v.finite > 0 ? std::min(v.least[k], value) : value;
-            v.largest[k] = v.finite > 0 ? std::max(v.largest[k], value) : value;
-            moments[k].add(value);
-            v.squared_error[k] += double(s.variance[i][int(k)]);
-        }
-        ++v.finite;
-    });
-    for (size_t k = 0; k < 3; ++k) {
-        v.mean[k] = moments[k].mean();
-        v.variance[k] = moments[k].variance();
-        v.squared_error[k] /= sqr(std::max(1.0, double(v.finite)));
-    }
-    return v;
-}
-
-json to_json(const SeedComparison::Method& m, const SeedSeries& series) {
-    json mutations = json::object();
-    // Figures of the steps by length have longer names.
-    const auto add = [&](const std::string& name, double value, const std::string& ending,
-                         const char* as) {
-        if (name.ends_with(ending) && name.find("_length_") == std::string::npos)
-            mutations[name.substr(0, name.size() - ending.size())][as] = value;
-    };
-    for (const auto& [name, value] : series.figures) {
-        add(name, value, "_proposed", "proposed");
-        add(name, value, "_accepted", "accepted");
-    }
-    return {{"seeds", series.luminance.size()},
-            {"variance", m.variance},
-            {"seconds", m.seconds},
-            {"mean", m.mean},
-            {"mean_error", m.mean_error},
-            {"mutations", mutations}};
-}
-
-const char* name_of(Strategy strategy) {
-    switch (strategy) {
-    case Strategy::Hit: return "hit";
-    case Strategy::NextEvent: return "next event";
-    case Strategy::Connect: return "connect";
-    case Strategy::Splat: return "splat";
-    case Strategy::HitLens: return "hit lens";
-    case Strategy::Merge: return "merge";
-    case Strategy::Gather: return "gather";
-    }
-    return "";
-}
-
-json to_json(const Technique& q) {
-    return {{"strategy", name_of(q.strategy)}, {"s", q.s}, {"t", q.t}, {"edges", q.vertices() - 1}};
-}
-
-/// The paths of a body, within the limits of the protocol.
-std::vector<GivenPath> paths_of(const json& list, const std::string& file) {
-    constexpr size_t kMostPaths = 1000, kMostPoints = 32;
-    if (!list.is_array()) throw ApiError(422, "\"paths\" must be a list");
-    if (list.size() > kMostPaths)
-        throw ApiError(422, fmt::format("at most {} paths are allowed", kMostPaths));
-    std::vector<GivenPath> paths;
-    try {
-        paths = parse_user_paths(dump(list), file);
-    } catch (const std::exception& e) {
-        throw ApiError(422, e.what());
-    }
-    for (const GivenPath& path : paths)
-        if (path.points.size() > kMostPoints)
-            throw ApiError(422, fmt::format("at most {} points a path are allowed", kMostPoints));
-    return paths;
-}
-
-json to_json(const RayPoint& p) {
-    json j{{"point", to_json(p.p)}, {"normal", to_json(p.ng)}, {"shape", p.shape},
-           {"emits", p.emits},      {"delta", p.is_specular},  {"events", json::array()}};
-    for (const RayPoint::Event& e : p.events)
-        j["events"].push_back({{"event", e.number % 2 == 1 ? "refraction" : "reflection"},
-                               {"direction", to_json(e.direction)},
-                               {"weight", e.weight}});
-    return j;
-}
-
-json to_json(const std::vector<RayPoint>& points) {
-    json list = json::array();
-    for (const RayPoint& p : points) list.push_back(to_json(p));
-    return list;
-}
-
-json to_json(const Replay& r) {
-    json paths = json::array();
-    for (const ReplayedPath& p : r.paths) {
-        json points = json::array();
-        std::string type;
-        for (const ReplayedPath::Point& v : p.points) {
-            points.push_back({v.p.x, v.p.y, v.p.z, v.is_infinite ? 1 : 0});
-            type += v.event;
-        }
-        paths.push_back({{"points", std::move(points)},
-                         {"type", type},
-                         {"technique", to_json(p.technique)},
-                         {"pass", p.pass},
-                         {"weight", p.mis_weight},
-                         {"value", to_json(p.value)}});
-    }
-    return {{"paths", std::move(paths)},
-            {"sum", to_json(r.sum)},
-            {"passes", r.passes},
-            {"light_paths", r.light_paths},
-            {"left_out", r.left_out}};
-}
-
-template <class T>
-void append_bytes(std::string& to, const std::vector<T>& values) {
-    to.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
-    to.append((4 - to.size() % 4) % 4, '\0');
-}
-
-/// 4 bytes: the length of the JSON text; the text, filled up with spaces to whole 4 bytes; positions, indices and places.
-std::string encode(const std::vector<DrawnShape>& shapes) {
-    std::string data;
-    json list = json::array();
-    for (const DrawnShape& s : shapes) {
-        json item{{"shape", s.shape},
-                  {"name", s.name},
-                  {"low", to_json(s.bounds.lo)},
-                  {"high", to_json(s.bounds.hi)},
-                  {"color", to_json(s.color)},
-                  {"emits", s.emits},
-                  {"delta", s.is_specular},
-                  {"vertices", s.positions.size() / 3},
-                  {"indices", s.triangles.size()},
-                  {"positions_at", data.size()}};
-        append_bytes(data, s.positions);
-        item["indices_at"] = data.size();
-        append_bytes(data, s.triangles);
-        item["places"] = s.places.size();
-        item["places_at"] = data.size();
-        append_bytes(data, s.places);
-        list.push_back(std::move(item));
-    }
-    std::string text = dump(list);
-    text.append((4 - text.size() % 4) % 4, ' ');
-    const auto size = uint32_t(text.size());
-    return std::string(reinterpret_cast<const char*>(&size), sizeof size) + text + data;
-}
 
 struct PageFile {
     std::string_view path, type, text;
@@ -384,15 +58,6 @@ std::string hash_of(const std::string& text) {
 }
 
 }  // namespace
-
-/// What is computed once for a scene, when it is first asked for.
-struct Api::SceneData {
-    std::shared_ptr<const Scene> scene;
-    std::once_flag first, layers, geometry;
-    FirstPicture first_picture;
-    std::vector<AovImage> aovs;
-    std::string geometry_bytes;
-};
 
 Api::Api(Session& session, ApiOptions options) : session_(session), options_(std::move(options)) {
     const std::filesystem::path folder = std::filesystem::path(options_.scene_file).parent_path();
@@ -434,11 +99,7 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
     if (path == "/v1/geometry") {
         needs(is_get);
         return later(done, [data = data()] {
-            constexpr size_t kMostTriangles = 250'000;
-            std::call_once(data->geometry, [&] {
-                data->geometry_bytes = encode(drawn_shapes(*data->scene, kMostTriangles));
-            });
-            return Reply{200, "application/octet-stream", data->geometry_bytes, {}};
+            return Reply{200, "application/octet-stream", data->geometry(), {}};
         });
     }
     if (path == "/v1/run")
@@ -474,13 +135,10 @@ std::shared_ptr<const Scene> Api::scene() const {
     throw ApiError(503, error.empty() ? "the scene is being loaded" : error);
 }
 
-std::shared_ptr<Api::SceneData> Api::data() {
+std::shared_ptr<SceneData> Api::data() {
     const std::shared_ptr<const Scene> current = scene();
     const std::lock_guard lock(data_mutex_);
-    if (!data_ || data_->scene != current) {
-        data_ = std::make_shared<SceneData>();
-        data_->scene = current;
-    }
+    if (!data_ || data_->scene() != current) data_ = std::make_shared<SceneData>(current);
     return data_;
 }
 
@@ -505,7 +163,7 @@ std::string Api::event() {
     json runs = json::array();
     for (const RunStatus& s : session_.runs()) runs.push_back(progress_of(s));
     return dump({{"runs", runs},
-                 {"loaded", session_.scene() != nullptr},
+                 {"scene_version", session_.scene_version()},
                  {"load_error", session_.load_error()},
                  {"scene_changed", is_scene_changed_},
                  {"paths", paths_versions_}});
@@ -514,6 +172,7 @@ std::string Api::event() {
 Reply Api::state() {
     json j{{"version", 1},
            {"scene_file", std::filesystem::path(options_.scene_file).filename().string()},
+           {"scene_version", session_.scene_version()},
            {"load_error", session_.load_error()},
            {"scene_changed", is_scene_changed_},
            {"has_reference", options_.reference.has_value()},
@@ -543,197 +202,6 @@ Reply Api::state() {
     for (const AovInfo& a : aov_registry())
         j["layers"].push_back({{"name", a.name}, {"doc", a.doc}});
     return Reply::json(dump(j));
-}
-
-// -- Images and pixels.
-
-void Api::image(const Request& request, const Done& done) {
-    // The budget of snapshots includes all that this thread does, so what it did since the last image.
-    const double cpu = thread_cpu_seconds();
-    if (charged_ > 0 && cpu > charged_) session_.spent(cpu - charged_);
-    charged_ = cpu;
-
-    const std::shared_ptr<SceneData> data = this->data();
-    const FilmGeometry& g = data->scene->film();
-    ImageHeader header;
-    header.width = g.crop_width, header.height = g.crop_height;
-    header.rect = {0, 0, g.crop_width, g.crop_height};
-    header.level = query_integer(request, "level", 0);
-    if (const auto rect = request.query("rect")) {
-        ImageRect& r = header.rect;
-        if (std::sscanf(rect->c_str(), "%9d,%9d,%9d,%9d", &r.x, &r.y, &r.width, &r.height) != 4)
-            throw ApiError(400, "\"rect\" must be x,y,width,height");
-    }
-    check(header);
-    const std::string view = request.query("view").value_or("image");
-    const auto reply = [&](std::string body) {
-        done({200, "application/octet-stream", std::move(body), {}});
-    };
-    if (view == "first")
-        return later(done, [data] {
-            std::call_once(data->first, [&] { data->first_picture = first_picture(*data->scene); });
-            const FirstPicture& p = data->first_picture;
-            ImageHeader small;
-            small.width = p.width, small.height = p.height;
-            small.rect = {0, 0, p.width, p.height};
-            return Reply{200, "application/octet-stream", encode_image(small, p.pixels), {}};
-        });
-    if (view == "reference") {
-        if (!options_.reference) throw ApiError(404, "there is no reference");
-        return reply(encode_image(header, options_.reference->pixels));
-    }
-    for (const AovInfo& a : aov_registry())
-        if (view == a.name && view != "variance")
-            return later(done, [data, header, view] {
-                std::call_once(data->layers, [&] {
-                    std::vector<std::string> names;
-                    for (const AovInfo& info : aov_registry()) names.push_back(info.name);
-                    constexpr int kSamples = 4;
-                    data->aovs = render_aovs(*data->scene, names, kSamples, 0, 1);
-                });
-                for (const AovImage& image : data->aovs)
-                    if (image.name == view)
-                        return Reply{200,
-                                     "application/octet-stream",
-                                     encode_image(header, image.pixels),
-                                     {}};
-                throw ApiError(404, "there is no such layer");
-            });
-
-    const int id = query_integer(request, "run", 0);
-    const auto after = uint64_t(query_integer(request, "after", 0));
-    header.run = uint32_t(id);
-    const auto send = [&](uint64_t passes, int width, int height, const auto& pixels) {
-        header.passes = passes;
-        // A run of a scene that was loaded before may have another size.
-        if (width != header.width || height != header.height)
-            throw ApiError(409, "the run belongs to a scene of another size");
-        reply(encode_image(header, std::span(std::as_const(pixels))));
-    };
-    const bool is_length = view.starts_with("length:");
-    if (is_length || view.starts_with("technique:") || view.starts_with("unweighted:")) {
-        const auto shown = session_.techniques(id);
-        if (!shown || shown->passes <= after) return done({204, {}, {}, {}});
-        const std::string number = view.substr(view.find(':') + 1);
-        int index = -1;
-        std::from_chars(number.data(), number.data() + number.size(), index);
-        if (!is_length) {
-            if (index < 0 || size_t(index) >= shown->images.size())
-                throw ApiError(404, "there is no such technique");
-            const TechniqueImages::Entry& e = shown->images[size_t(index)];
-            return send(shown->passes, header.width, header.height,
-                        view[0] == 't' ? e.weighted : e.unweighted);
-        }
-        std::vector<Rgb> sum(g.pixel_count());
-        for (const TechniqueImages::Entry& e : shown->images)
-            if (e.technique.vertices() - 1 == index && e.weighted.size() == sum.size())
-                for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
-        return send(shown->passes, header.width, header.height, sum);
-    }
-    const auto snapshot = session_.snapshot(id);
-    if (!snapshot || snapshot->passes <= after) return done({204, {}, {}, {}});
-    if (view == "image")
-        return send(snapshot->passes, snapshot->width, snapshot->height, snapshot->mean);
-    if (view == "variance")
-        return send(snapshot->passes, snapshot->width, snapshot->height, snapshot->variance);
-    if (view == "error")
-        return send(snapshot->passes, snapshot->width, snapshot->height,
-                    relative_errors(*snapshot));
-    throw ApiError(404, fmt::format("there is no view \"{}\"", view));
-}
-
-Reply Api::pixel(const Request& request) {
-    const int x = query_integer(request, "x", -1), y = query_integer(request, "y", -1),
-              w = query_integer(request, "w", 1), h = query_integer(request, "h", 1),
-              id = query_integer(request, "run", 0);
-    const auto snapshot = session_.snapshot(id);
-    if (!snapshot) return Reply::json(dump({{"run", id}, {"passes", 0}}));
-    check(ImageHeader{.run = 0,
-                      .passes = 0,
-                      .width = snapshot->width,
-                      .height = snapshot->height,
-                      .rect = {x, y, w, h},
-                      .level = 0});
-    const RunStatus status = session_.status(id);
-    const RectangleValues values = values_in(*snapshot, {x, y, w, h});
-    json j{{"run", id},           {"passes", snapshot->passes},
-           {"mean", values.mean}, {"interval", to_string(status.interval)},
-           {"half", nullptr},     {"pixels", int64_t(w) * int64_t(h)},
-           {"nan", values.nan},   {"infinite", values.infinite}};
-    if (values.finite > 1) {
-        j["least"] = values.least;
-        j["largest"] = values.largest;
-        j["variance"] = values.variance;
-    }
-    if (snapshot->passes >= 2 && status.interval != IntervalKind::None && values.finite > 0) {
-        for (size_t c = 0; c < 3; ++c)
-            j["half"][c] = interval_half_width(values.squared_error[c], snapshot->passes);
-    }
-    if (options_.reference && options_.reference->width == snapshot->width &&
-        options_.reference->height == snapshot->height) {
-        std::array<double, 3> value{};
-        for_each_pixel({x, y, w, h}, snapshot->width, [&](size_t i) {
-            for (int c = 0; c < 3; ++c)
-                value[size_t(c)] +=
-                    double(options_.reference->pixels[i][c]) / (double(w) * double(h));
-        });
-        j["reference"] = value;
-    }
-    return Reply::json(dump(j));
-}
-
-void Api::difference(const Request& request, const Done& done) {
-    const auto snapshot = session_.snapshot(query_integer(request, "run", 0));
-    const std::string against = request.query("against").value_or("");
-    std::shared_ptr<const Snapshot> other;
-    if (against != "reference")
-        other = session_.snapshot(query_integer(request, "against", 0));
-    else if (!options_.reference)
-        throw ApiError(404, "there is no reference");
-    if (!snapshot || (against != "reference" && !other))
-        throw ApiError(422, "one of the images has no finished pass yet");
-    const std::span<const Rgb> reference = other ? other->mean : options_.reference->pixels;
-    const int width = other ? other->width : options_.reference->width;
-    if (width != snapshot->width || reference.size() != snapshot->mean.size())
-        throw ApiError(409, "the images differ in size");
-    later(done, [snapshot, other, reference] {
-        const ImageErrors errors = image_errors(snapshot->mean, reference);
-        const FlipResult flip =
-            hdr_flip(snapshot->mean, reference, snapshot->width, snapshot->height);
-        return Reply::json(dump({{"rel_mse", errors.rel_mse},
-                                 {"not_finite", errors.not_finite},
-                                 {"flip", flip.mean},
-                                 {"passes", snapshot->passes},
-                                 {"against_passes", other ? other->passes : 0}}));
-    });
-}
-
-void Api::gain(const Request& request, const Done& done) {
-    const auto without = session_.seed_series(query_integer(request, "without", 0)),
-               with = session_.seed_series(query_integer(request, "with", 0));
-    later(done, [without, with] {
-        const SeedComparison c = compare(*without, *with);
-        json j{{"without", to_json(c.a, *without)},
-               {"with", to_json(c.b, *with)},
-               {"means_differ", c.means_differ}};
-        if (c.is_valid) j["ratio"] = c.ratio, j["gain"] = {c.gain, c.low, c.high};
-        return Reply::json(dump(j));
-    });
-}
-
-Reply Api::techniques(const Request& request) {
-    const auto shown = session_.techniques(query_integer(request, "run", 0));
-    json list = json::array();
-    if (shown)
-        for (size_t i = 0; i < shown->images.size(); ++i) {
-            json item = to_json(shown->images[i].technique);
-            double sum = 0;
-            for (const Rgb c : shown->images[i].weighted) sum += double(luminance(c));
-            item["index"] = i;
-            item["mean"] = sum / double(shown->images[i].weighted.size());
-            list.push_back(std::move(item));
-        }
-    return Reply::json(dump({{"passes", shown ? shown->passes : 0}, {"techniques", list}}));
 }
 
 // -- Runs.

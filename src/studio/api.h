@@ -17,6 +17,7 @@
 #include "session/session.h"
 #include "session/workers.h"
 #include "studio/http.h"
+#include "studio/scene_data.h"
 
 namespace etendue {
 
@@ -38,7 +39,6 @@ public:
 
 private:
     using Done = std::function<void(Reply)>;
-    struct SceneData;
 
     Reply state();
     Reply pixel(const Request& request);

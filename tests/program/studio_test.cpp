@@ -634,6 +634,14 @@ TEST_F(StudioTest, SaysWhenTheSceneChangesAndLoadsItAgain) {
     EXPECT_NE(state["load_error"].get<std::string>().find("box.xml"), std::string::npos) << state;
     // The earlier scene stays.
     EXPECT_EQ(state["scene"]["width"], 40);
+    EXPECT_EQ(state["scene_version"], 1);
+    std::ofstream(scene) << text;
+    EXPECT_EQ(post("/v1/run", {{"action", "reload"}}).status, 200);
+    for (int i = 0; i < 1000 && get("/v1/state").parsed()["scene_version"] == 1; ++i)
+        std::this_thread::sleep_for(10ms);
+    const json again = get("/v1/state").parsed();
+    EXPECT_EQ(again["scene_version"], 2);
+    EXPECT_EQ(again["load_error"], "");
 }
 
 }  // namespace

@@ -162,6 +162,30 @@ async function foreignPagePart() {
     }
 }
 
+/// A fifth page is told that there are four, and opens when one of them is closed.
+async function fifthPagePart() {
+    const studio = await Studio.start(sceneFile, '-i', 'path', '--resolution', '64x48');
+    const browser = openBrowser();
+    const origin = studio.url.split('/#')[0], headers = {Authorization: `Bearer ${studio.url.split('token=')[1]}`};
+    const pages = [];
+    try {
+        for (let i = 0; i < 4; ++i) {
+            const page = new AbortController();
+            const response = await fetch(`${origin}/v1/events`, {headers, signal: page.signal});
+            check(response.status === 200, `page ${i + 1} is open`);
+            pages.push(page);
+        }
+        await browser.open(studio.url);
+        await browser.until("document.getElementById('banner-text').textContent.includes('4 pages are open already')", 'the fifth is refused');
+        pages.pop().abort();
+        await browser.until("document.getElementById('banner').hidden && studio.shown[0].passes > 0", 'and opens when one is closed', 30);
+    } finally {
+        for (const page of pages) page.abort();
+        browser.close();
+        await studio.stop('SIGKILL');
+    }
+}
+
 /// Instances are drawn where they are, and the cone of the chosen path with it.
 async function instancePart() {
     const scene = join(folder, 'instances.xml');
@@ -304,6 +328,33 @@ async function pathPart() {
         await browser.screenshot('10-inspector');
         await checkNames(browser, 'light paths');
 
+        // They are those of one run and one version of the scene.
+        const listed = () => browser.evaluate("document.querySelectorAll('.replayed button').length");
+        check((await browser.evaluate("document.querySelector('#inspector [role=status]').textContent")).startsWith('pixel (36, 42): '), 'with their pixel');
+        await browser.evaluate("studio.server.post('/v1/run', {action: 'start', integrator: 'path', spp: 4})");
+        await browser.until('studio.runs.size === 2', 'another run');
+        check(await listed() > 3, 'paths stay while their run is shown');
+        await browser.evaluate("[...document.querySelectorAll('#run-list button')].find(b => b.getAttribute('aria-label') === 'Show run 2').click()");
+        await browser.until('studio.inspector().pixel.run === 2', 'the other run');
+        check(await listed() === 0 && await browser.evaluate('studio.space().lines.replayed.length') === 0, 'paths of another run are not shown');
+        await browser.evaluate("[...document.querySelectorAll('#inspector button')].find(b => b.textContent === 'Trace again').click()");
+        await browser.until("document.querySelectorAll('.replayed button').length > 3", 'paths of the other run');
+        writeFileSync(scene, mirrorScene.replace('y="-1"', 'y="-1.25"'));
+        await browser.until("document.getElementById('banner-text').textContent.includes('The scene changed')", 'the banner of a changed scene');
+        check(await browser.evaluate(`${paths}[0].verdict.ok`), 'the paths are still of the earlier scene');
+        await click(browser, ...await browser.evaluate("(() => { const r = document.getElementById('banner-action').getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2]; })()"));
+        await browser.until('studio.state().scene_version === 2 && studio.space().shapes.length === 3', 'the other version');
+        await browser.until(`${paths}[0].verdict && !${paths}[0].verdict.ok`, 'the paths are checked again');
+        check((await browser.evaluate(`${paths}[0].verdict.problem`)).includes('from the nearest surface'), 'and end above the floor, which has moved');
+        const low = await browser.evaluate('Math.min(...studio.space().shapes.map(s => s.low[1]))');
+        check(Math.abs(low + 1.25) < 1e-3, `the floor is drawn where it is now: ${low}`);
+        check(await listed() === 0 && await browser.evaluate('studio.space().lines.replayed.length') === 0, 'paths of the earlier scene are not shown');
+        writeFileSync(scene, mirrorScene);
+        await browser.until("document.getElementById('banner-text').textContent.includes('The scene changed')", 'the banner again');
+        await browser.evaluate("document.getElementById('banner-action').click()");
+        await browser.until(`studio.state().scene_version === 3 && ${paths}[0].verdict?.ok`, 'the first version again');
+        await browser.evaluate("studio.server.post('/v1/run', {action: 'remove', run: 2})");
+
         // Two pages: a stale edit is refused, and the newer list is shown.
         await other.open(studio.url);
         await other.until('studio.shown[0].passes > 0', 'an image in the other page');
@@ -319,7 +370,13 @@ async function pathPart() {
         await browser.evaluate("document.getElementById('gain-spp').value = 24");
         await button('Render with and without');
         await browser.until("document.getElementById('editor').textContent.includes('the same variance takes')", 'the gain', 240);
-        console.log(`     ${await browser.evaluate('studio.editor().gain.textContent')}`);
+        const gain = await browser.evaluate('studio.editor().gain.textContent');
+        console.log(`     ${gain}`);
+        const [without, with_] = await browser.evaluate('[studio.editor().compared.without, studio.editor().compared.with].map(id => [id, studio.runs.get(id).integrator])');
+        check(without[1] === 'mlt' && with_[1].startsWith('mlt:user_paths='), `without and with: ${without}; ${with_}`);
+        const series = await browser.evaluate(`studio.server.get('/v1/gain?without=${without[0]}&with=${with_[0]}')`);
+        check(gain.includes(`1/${Number(series.gain[0].toPrecision(3))} of the time`), `the gain is that of the paths: ${series.gain}`);
+        check(await browser.evaluate("[...document.querySelectorAll('#editor tr')].find(r => r.textContent.startsWith('user path')).children[1].textContent") === '–', 'the run without them has no user paths');
         check(await studio.stop() === 0, 'Ctrl-C ends with exit code 0');
         check(existsSync(join(folder, 'mirror-1.exr')), 'and writes the images');
     } finally {
@@ -329,4 +386,4 @@ async function pathPart() {
     }
 }
 
-await runParts(foreignPagePart, imagePart, instancePart, pathPart);
+await runParts(foreignPagePart, fifthPagePart, imagePart, instancePart, pathPart);

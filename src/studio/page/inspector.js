@@ -18,6 +18,9 @@ export class Inspector {
         /** @type {any[]} */
         this.paths = [];
         this.chosen = -1;
+        /** Run of the paths; 0: there are none. */
+        this.of = 0;
+        this.request = 0;
         this.place = element('span', {className: 'soft'});
         this.passes = element('input', {id: 'replay-passes', type: 'number', min: 1, value: 16});
         this.splats = element('input', {id: 'replay-splats', type: 'checkbox'});
@@ -28,25 +31,39 @@ export class Inspector {
             element('button', {type: 'button', textContent: 'Trace again', onclick: () => this.replay()}),
             element('label', {}, ['passes ', this.passes]), element('label', {title: 'Trace one pass of light paths for those that are splatted'}, [this.splats, ' splats']),
             element('label', {}, ['technique ', this.technique]),
-            element('button', {type: 'button', textContent: 'Clear', onclick: () => { this.paths = []; this.message.textContent = ''; this.fill(); }})]), this.message, this.list);
+            element('button', {type: 'button', textContent: 'Clear', onclick: () => this.clear()})]), this.message, this.list);
     }
 
     /** @param {number} x @param {number} y @param {number} run */
     setPixel(x, y, run) {
+        if (run !== this.of) this.clear();
         this.pixel = {x, y, run};
         this.place.textContent = run > 0 ? `run ${run}, pixel (${x}, ${y})` : `pixel (${x}, ${y}), no run`;
     }
 
+    clear() {
+        this.of = 0;
+        ++this.request;
+        this.message.textContent = '';
+        if (this.paths.length === 0) return;
+        this.paths = [];
+        this.fill();
+    }
+
     async replay() {
+        const request = ++this.request, {x, y, run} = this.pixel;
+        this.of = run;
         this.message.className = '';
         this.message.textContent = 'tracing …';
         try {
-            const r = await this.server.post('/v1/replay', {...this.pixel, passes: Number(this.passes.value), splats: this.splats.checked});
+            const r = await this.server.post('/v1/replay', {x, y, run, passes: Number(this.passes.value), splats: this.splats.checked});
+            if (request !== this.request) return;
             this.paths = r.paths;
             const sum = r.sum.map((/** @type {number} */ v) => significant(v / Math.max(1, r.passes), 4)).join(', ');
-            this.message.textContent = `${r.paths.length} paths of ${r.is_last_pass ? 'the last pass' : `${r.passes} passes`}${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
+            this.message.textContent = `pixel (${x}, ${y}): ${r.paths.length} paths of ${r.is_last_pass ? 'the last pass' : `${r.passes} passes`}${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
                 + (r.light_paths ? `; ${r.light_paths} light paths` : '');
         } catch (e) {
+            if (request !== this.request) return;
             this.paths = [];
             this.message.className = 'error';
             this.message.textContent = /** @type {Error} */ (e).message;

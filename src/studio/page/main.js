@@ -297,6 +297,7 @@ async function start(request) {
 // ---------------------------------------------------------------------------------------- state
 
 async function update() {
+    const before = state?.scene_version ?? 0;
     state = await server.get('/v1/state');
     for (const r of state.runs) runs.set(r.id, r);
     for (const id of runs.keys()) if (!state.runs.some((/** @type {any} */ r) => r.id === id)) runs.delete(id);
@@ -309,11 +310,26 @@ async function update() {
     }
     await updateViewOptions();
     updateRuns();
+    if (before > 0 && state.scene_version !== before) showOtherScene(state.scene);
+}
+
+/**
+ * Shows another version of the scene: pictures, geometry and verdicts are of the earlier one.
+ * @param {any} scene
+ */
+function showOtherScene(scene) {
+    const [one, other] = shown;
+    showIn(0, one.run, one.view);
+    if (other) showIn(1, other.run, other.view);
+    inspector?.clear();
+    space?.setScene(scene);
+    if (space) report(space.load());
+    editor?.run(() => /** @type {PathEditor} */ (editor).check());
 }
 
 /** @param {any} event */
 async function onEvent(event) {
-    const isNew = event.runs.length !== runs.size || event.runs.some((/** @type {any} */ r) => !runs.has(r.id)) || (event.loaded && !state.scene)
+    const isNew = event.runs.length !== runs.size || event.runs.some((/** @type {any} */ r) => !runs.has(r.id)) || event.scene_version !== state.scene_version
         || event.load_error !== state.load_error;
     if (isNew) await update();
     for (const r of event.runs) {
@@ -324,12 +340,12 @@ async function onEvent(event) {
         const last = run.history[run.history.length - 1];
         if (r.error && (!hadError || !last || r.seconds > 1.05 * last[1])) run.history.push([r.passes, r.seconds, ...r.error]);
     }
-    banner('changed', event.scene_changed ? 'The scene changed on the disk.' : '', 'Load it again', () => report(server.post('/v1/run', {action: 'reload'}).then(() => { state.scene = null; })));
+    banner('changed', event.scene_changed ? 'The scene changed on the disk.' : '', 'Load it again', () => report(server.post('/v1/run', {action: 'reload'})));
     if (shown[0].run === 0 && runs.size > 0) showIn(0, newest(), 'image');
     if (shown[0].run > 0 && !runs.has(shown[0].run) && runs.size > 0) showIn(0, newest(), 'image');
     if (runs.get(shown[0].run)?.techniques > 0 && !tools.view.dataset.key?.includes('technique:')) await updateViewOptions();
     updateRuns();
-    editor?.onEvent(event);
+    editor?.onEvent();
     await Promise.all([refresh(0), refresh(1)]);
 }
 

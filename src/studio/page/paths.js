@@ -160,10 +160,7 @@ export class PathEditor {
         }
     }
 
-    /** @param {any} event */
-    onEvent(event) {
-        const version = event.paths[this.file] ?? 0;
-        this.seen = version;
+    onEvent() {
         this.updateGain().catch(e => this.tell.fail(e.message));
     }
 

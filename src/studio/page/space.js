@@ -77,6 +77,9 @@ export function coneOutline(apex, toward, degrees) {
     return [rim, ...[0, 1, 2, 3].map(i => [apex, rim[i * kCorners / 4]])];
 }
 
+/** @param {any} scene */
+const cameraOf = scene => ({eye: /** @type {Vec} */ (scene.eye), look: /** @type {Vec} */ (scene.look), center: /** @type {Vec} */ (scene.center)});
+
 /**
  * A line through points, drawn as one color.
  * @typedef {{points: Vec[], color: number[], width?: number, marks?: boolean, chosen?: number}} Line
@@ -92,7 +95,7 @@ export class Space {
         this.label = label;
         this.server = server;
         this.radius = scene.radius;
-        this.home = {eye: /** @type {Vec} */ (scene.eye), look: /** @type {Vec} */ (scene.look), center: /** @type {Vec} */ (scene.center)};
+        this.home = cameraOf(scene);
         /** The crosshair, from -1 to 1. */
         this.cross = [0, 0];
         this.cut = 0;
@@ -120,6 +123,12 @@ export class Space {
         this.lineBuffer = gl.createBuffer();
         new ResizeObserver(() => this.redraw()).observe(canvas);
         this.listen();
+    }
+
+    /** @param {any} scene Another version, as the program describes it. */
+    setScene(scene) {
+        this.radius = scene.radius;
+        this.home = cameraOf(scene);
     }
 
     lookAsCamera() {
@@ -203,28 +212,35 @@ export class Space {
         return points[0] ?? null;
     }
 
+    /** Loads the geometry, in place of an earlier one. */
     async load() {
         const gl = this.gl;
         if (!gl) return;
-        for (const s of await this.server.geometry()) {
+        const shapes = await this.server.geometry();
+        for (const {array, buffers} of this.shapes.splice(0)) {
+            gl.deleteVertexArray(array);
+            for (const b of buffers) gl.deleteBuffer(b);
+        }
+        for (const s of shapes) {
+            const buffers = [gl.createBuffer(), gl.createBuffer(), gl.createBuffer()];
             const array = gl.createVertexArray();
             gl.bindVertexArray(array);
-            gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+            gl.bindBuffer(gl.ARRAY_BUFFER, buffers[0]);
             gl.bufferData(gl.ARRAY_BUFFER, s.positions, gl.STATIC_DRAW);
             gl.enableVertexAttribArray(0);
             gl.vertexAttribPointer(0, 3, gl.UNSIGNED_SHORT, true, 0, 0);
             // The rows of each instance's matrix.
-            gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+            gl.bindBuffer(gl.ARRAY_BUFFER, buffers[1]);
             gl.bufferData(gl.ARRAY_BUFFER, s.matrices, gl.STATIC_DRAW);
             for (const row of [0, 1, 2]) {
                 gl.enableVertexAttribArray(1 + row);
                 gl.vertexAttribPointer(1 + row, 4, gl.FLOAT, false, 48, 16 * row);
                 gl.vertexAttribDivisor(1 + row, 1);
             }
-            gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+            gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers[2]);
             gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, s.triangles, gl.STATIC_DRAW);
             gl.bindVertexArray(null);
-            this.shapes.push({...s, array});
+            this.shapes.push({...s, array, buffers});
         }
         this.redraw();
     }

@@ -3,6 +3,7 @@
 #include "session/light_ray.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <ctime>
 
@@ -80,16 +81,19 @@ TEST(Snap, SlabIsThatOfSnellsLaw) {
     const Vec3 along = Vec3{floor.x, 0, floor.z} * (1 / wanted);
     const Vec3 above = along * float(1.5 * tangent) + Vec3{0, kTop, 0},
                below = along * float(double(wanted) - tangent);
-    std::vector<Vec3> given{lamp, above + Vec3{0.1f, 0, 0.05f}, below + Vec3{-0.08f, 0, 0.1f},
-                            floor};
-    for (const size_t index : {1u, 2u}) {
-        const Snapped s = snap(scene, given, index);
-        ASSERT_EQ(s.problem, "");
-        EXPECT_LT(length(s.points[1] - above), 1e-4f);
-        EXPECT_LT(length(s.points[2] - below), 1e-4f);
-        const GivenPath path{.name = "", .points = s.points, .cones = {1}, .radius = {}};
-        EXPECT_EQ(check_user_path(scene, path).problem, "");
-    }
+    // From the second start, the miss is 0.56 after one Newton step, and 0.07 after two.
+    const std::array<std::array<Vec3, 2>, 2> starts{{{Vec3{0.1f, 0, 0.05f}, Vec3{-0.08f, 0, 0.1f}},
+                                                     {Vec3{0.5f, 0, -0.5f}, Vec3{0.5f, 0, -0.5f}}}};
+    for (const auto& [of_above, of_below] : starts)
+        for (const size_t index : {1u, 2u}) {
+            const std::vector<Vec3> given{lamp, above + of_above, below + of_below, floor};
+            const Snapped s = snap(scene, given, index);
+            ASSERT_EQ(s.problem, "");
+            EXPECT_LT(length(s.points[1] - above), 1e-5f);
+            EXPECT_LT(length(s.points[2] - below), 1e-5f);
+            const GivenPath path{.name = "", .points = s.points, .cones = {1}, .radius = {}};
+            EXPECT_EQ(check_user_path(scene, path).problem, "");
+        }
 }
 
 /// A path of eight points, by way of two facing mirrors, is checked in less than 5 ms of processor time.

@@ -15,7 +15,7 @@ Scene small_room() {
                  sphere("0.3,-0.5,0.1", "0.4", "<bsdf type=\"conductor\"/>"));
 }
 
-class ReplayOf : public ::testing::TestWithParam<const char*> {};
+class ReplayOf : public ::testing::TestWithParam<std::string> {};
 
 /// Contributions with t ≥ 2 sum to what the pixel has of them; the film's other part are splats.
 TEST_P(ReplayOf, SumsToThePixel) {
@@ -57,7 +57,57 @@ TEST_P(ReplayOf, SumsToThePixel) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, ReplayOf, ::testing::Values("path", "bdpt:roulette=0"));
+/// All integrators whose samples need no others, without roulette of joins where they have it.
+std::vector<std::string> methods_alone() {
+    std::vector<std::string> methods;
+    for (const IntegratorEntry& e : integrator_registry()) {
+        IntegratorSpec spec{e.info.name, {}};
+        if (replayed_passes(spec) != ReplayedPasses::Any) continue;
+        for (const ParamInfo& p : e.info.params)
+            if (p.name == std::string("roulette")) spec.params["roulette"] = "0";
+        methods.push_back(spec.to_string());
+    }
+    return methods;
+}
+INSTANTIATE_TEST_SUITE_P(Methods, ReplayOf, ::testing::ValuesIn(methods_alone()));
+
+/// An integrator that is in no table: path tracing by another name.
+class OwnIntegrator final : public Integrator {
+public:
+    explicit OwnIntegrator(bool samples_alone) : samples_alone_(samples_alone) {}
+    void sample(const SampleContext& c, Workspace& work) const override { path_->sample(c, work); }
+    TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
+        return path_->counts(scene, light_paths);
+    }
+    uint64_t light_paths(const Scene&) const override { return 0; }
+    bool samples_alone() const override { return samples_alone_; }
+    Estimator estimator() const override { return Estimator::Unbiased; }
+
+private:
+    std::unique_ptr<Integrator> path_ = make_integrator(IntegratorSpec::parse("path"));
+    bool samples_alone_;
+};
+
+/// The integrator answers, not its name.
+TEST(Replay, AsksTheIntegrator) {
+    const Scene scene = small_room();
+    ReplayRequest request;
+    request.pixel = 27;
+    request.passes = 4;
+    request.integrator = IntegratorSpec::parse("path");
+    const Replay expected = replay(scene, request);
+    for (const bool alone : {true, false}) {
+        request.integrator = {alone ? "own" : "path", {}, [=](const auto&) {
+                                  return std::make_unique<OwnIntegrator>(alone);
+                              }};
+        EXPECT_EQ(replayed_passes(request.integrator),
+                  alone ? ReplayedPasses::Any : ReplayedPasses::Last);
+        if (alone)
+            EXPECT_EQ(replay(scene, request).sum, expected.sum);
+        else
+            EXPECT_THROW(replay(scene, request), std::runtime_error);
+    }
+}
 
 TEST(Replay, SplatsAreThoseOfOnePass) {
     const Scene scene = small_room();
@@ -103,7 +153,8 @@ TEST(Replay, KnowsWhichPassesCanBeTraced) {
     const auto passes = [](const char* text) {
         return replayed_passes(IntegratorSpec::parse(text));
     };
-    for (const char* alone : {"path", "bdpt:roulette=0", "light", "bdpt:connections=path"})
+    for (const char* alone :
+         {"path", "bdpt:roulette=0", "light", "bdpt:connections=path", "path:guide=off"})
         EXPECT_EQ(passes(alone), ReplayedPasses::Any) << alone;
     for (const char* shared : {"vcm", "upg", "pcbpt", "path:guide=on", "bdpt:connections=cache"})
         EXPECT_EQ(passes(shared), ReplayedPasses::Last) << shared;

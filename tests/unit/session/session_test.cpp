@@ -4,6 +4,7 @@
 
 #include <cstring>
 #include <filesystem>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -219,6 +220,62 @@ TEST(Session, StoppedRunsShowTheirLastPass) {
         }
         for (const int run : runs) session.resume(run, {});
     }
+}
+
+/// Commands and queries of four threads at a time, while the scene is loaded again.
+TEST(Session, TakesCommandsOfSeveralThreads) {
+    Session session(small_room, 2);
+    ASSERT_TRUE(wait_for_scene(session));
+    for (int i = 0; i < 3; ++i) session.start(request("path", 1u << 30));
+    const auto user = [&](uint32_t seed) {
+        std::mt19937 random(seed);
+        constexpr int kCommands = 300;
+        for (int i = 0; i < kCommands; ++i) {
+            const int run = 1 + int(random() % 6);
+            try {
+                switch (random() % 12) {
+                case 0: {
+                    RunRequest r = request(random() % 2 ? "bdpt" : "vcm", 1 + random() % 100);
+                    r.technique_depth = int(random() % 4);
+                    r.seeds = 1 + int(random() % 2);
+                    session.start(r);
+                    break;
+                }
+                case 1: session.stop(run); break;
+                case 2: session.discard(run); break;
+                case 3:
+                case 4: session.resume(run, {}); break;
+                case 5:
+                    if (random() % 4 == 0) session.remove(run);
+                    break;
+                case 6:
+                    if (random() % 8 == 0) session.reload();
+                    break;
+                case 7: session.techniques(run); break;
+                case 8:
+                    session.replay_last(run, 5, 10, [](const Replay&, const std::string&) {});
+                    break;
+                case 9: session.seed_series(run); break;
+                case 10: session.spent(1e-4); break;
+                default:
+                    if (const auto shown = session.snapshot(run)) {
+                        EXPECT_EQ(shown->mean.size(), size_t(24 * 24));
+                    }
+                }
+            } catch (const std::runtime_error&) {
+                // Another thread removed the run.
+            }
+            for (const RunStatus& s : session.runs()) EXPECT_NE(s.state, RunState::Failed);
+        }
+    };
+    std::vector<std::thread> users;
+    for (uint32_t i = 0; i < 4; ++i) users.emplace_back(user, i);
+    for (std::thread& t : users) t.join();
+    session.settle();
+    session.stop_all(true);
+    session.settle();
+    for (const RunStatus& s : session.runs())
+        EXPECT_TRUE(s.state == RunState::Stopped || s.state == RunState::Finished);
 }
 
 /// The renderings of a run with several seeds are those of `render` with each seed, in turns with another run; the run
