@@ -50,7 +50,11 @@ public:
             std::any_of(scene_.roots.begin(), scene_.roots.end(), [&](int root) {
                 return scene_.objects[size_t(root)].category == "integrator";
             });
-        if (!has_integrator) line(1, "<integrator type=\"path\"/>");
+        const bool has_media =
+            std::any_of(scene_.objects.begin(), scene_.objects.end(),
+                        [](const SceneObject& o) { return o.category == "medium"; });
+        if (!has_integrator)
+            line(1, fmt::format("<integrator type=\"{}\"/>", has_media ? "volpath" : "path"));
         for (const int root : scene_.roots) write_shared(root);
         for (const int root : scene_.roots)
             if (!written_.count(root)) write_object(root, "", 1);
@@ -97,7 +101,7 @@ private:
         // Only the sample count of a sampler is used, and Mitsuba 3 does not have all of them.
         if (o.category == "sampler") o.type = "independent";
         if (o.category == "emitter" && !flag(o, "two_sided", true)) remove(o, "two_sided");
-        if (const Param* image = o.find("image"); image && o.category == "texture") write_image(o);
+        if (o.find("image")) write_image(o);
         std::string open = fmt::format("<{} type=\"{}\"", o.category, escape(o.type));
         // An object that is written several times has its id once.
         if (is_shared(index) || (!o.id.empty() && named_.insert(o.id).second))
@@ -216,8 +220,10 @@ private:
     void write_image(SceneObject& o) {
         const auto index = size_t(std::get<int64_t>(o.find("image")->value));
         const std::string& bytes = scene_.images[index].bytes;
-        const std::string name = fmt::format("{}/image{}.{}", files_folder_, index,
-                                             bytes.rfind("\xff\xd8", 0) == 0 ? "jpg" : "png");
+        const char* extension = bytes.starts_with("\xff\xd8") ? "jpg"
+                                : bytes.starts_with("PF\n")    ? "pfm"
+                                                               : "png";
+        const std::string name = fmt::format("{}/image{}.{}", files_folder_, index, extension);
         if (written_images_.insert(index).second) add_file_({name, bytes});
         remove(o, "image");
         o.params.push_back({"filename", name, o.where});
