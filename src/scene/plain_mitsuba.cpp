@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -63,6 +64,7 @@ public:
         for (size_t i = 0; i < count; ++i) replace(int(i));
         for (size_t i = 0; i < scene_.objects.size(); ++i) hoist_masks(int(i));
         for (size_t i = 0; i < count; ++i) strip(int(i));
+        keep_one_environment();
         return warnings_;
     }
 
@@ -89,6 +91,7 @@ private:
         warn(o, fmt::format("Mitsuba 3 has no {0} \"{1}\": {0} \"{2}\" stands in for it",
                             o.category, o.type, type));
         o.type = type;
+        stand_ins_.insert(&o - scene_.objects.data());
     }
 
     // ---- Parameters
@@ -202,7 +205,9 @@ private:
         const SceneObject& original = original_.objects[size_t(index)];
         int width, height;
         texture.resolution(width, height);
-        if (width * height == 1) width = height = kBakedSize;
+        // Edges between the cells of the grid stay sharp only in an image that is much finer.
+        if (original.type != "bitmap")
+            width *= 1 + kBakedSize / width, height *= 1 + kBakedSize / height;
         width = std::min(width, kLargestBaked), height = std::min(height, kLargestBaked);
         std::vector<Rgb> pixels;
         pixels.reserve(size_t(width) * size_t(height));
@@ -242,6 +247,8 @@ private:
         if (o.category == "medium") replace_medium(o);
         if (o.category == "emitter") replace_emitter(index);
         if (o.category == "bsdf") replace_bsdf(index);
+        if (o.type == "mesh_attribute" && !o.find("name"))
+            set(o, "name", std::string("vertex_color"));
     }
 
     void replace_integrator(SceneObject& o) {
@@ -391,10 +398,11 @@ private:
             set(o, "diff_trans", r + t > 0 ? 2 * t / (r + t) : 1);
             set(o, "roughness", 1.0);
             set(o, "eta", 1.001);
-            if (!has_texture(o, "transmittance"))
-                set(o, "base_color", sum);
-            else
+            if (has_texture(o, "transmittance"))
                 rename(o, "transmittance", "base_color");
+            else
+                set(o, "base_color", sum);
+            remove(o, "reflectance"), remove(o, "transmittance");
         } else if (o.type == "phong") {
             const double n = number(o, "exponent", 30);
             stand_in(o, "roughplastic");
@@ -427,7 +435,7 @@ private:
         if (o.type == "roughplastic") {
             if (o.find("alpha_u") || o.find("alpha_v"))
                 set(o, "alpha", std::sqrt(number(o, "alpha_u", 0.1) * number(o, "alpha_v", 0.1)));
-            if (has_texture(o, "alpha")) warn(o, "its roughness is uniform in Mitsuba 3");
+            remove(o, "alpha_u"), remove(o, "alpha_v");
         }
         if (o.type == "conductor" || o.type == "roughconductor") replace_metal(o);
     }
@@ -512,6 +520,21 @@ private:
         hoist_masks(added);
     }
 
+    void keep_one_environment() {
+        bool has_one = false;
+        std::erase_if(scene_.roots, [&](int root) {
+            const SceneObject& o = object(root);
+            if (o.category != "emitter" ||
+                (o.type != "constant" && o.type != "envmap" && o.type != "sunsky"))
+                return false;
+            if (has_one)
+                warn(o, fmt::format("Mitsuba 3 has one environment alone: emitter \"{}\" is left "
+                                    "out",
+                                    o.type));
+            return std::exchange(has_one, true);
+        });
+    }
+
     // ---- What is left
 
     /// Removes what Mitsuba 3 still does not have.
@@ -529,7 +552,7 @@ private:
         std::erase_if(o.params, [&](const Param& p) {
             if (p.name == "image" || documents(*entry, p.name)) return false;
             const ManualNote* note = find_manual_note(o.category, o.type, p.name);
-            if (!note || !note->is_accepted)
+            if ((!note || !note->is_accepted) && !stand_ins_.count(index))
                 warn(o, fmt::format("Mitsuba 3 has no parameter \"{}\" of {} \"{}\": left out",
                                     p.name, o.category, o.type));
             return true;
@@ -548,6 +571,7 @@ private:
     ModelBuilder models_;
     bool has_media_ = false;
     std::map<int, int> baked_;
+    std::set<std::ptrdiff_t> stand_ins_;  ///< Objects whose replacement has been reported.
     std::vector<std::string> warnings_;
 };
 
