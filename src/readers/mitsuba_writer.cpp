@@ -221,8 +221,8 @@ private:
         const auto index = size_t(std::get<int64_t>(o.find("image")->value));
         const std::string& bytes = scene_.images[index].bytes;
         const char* extension = bytes.starts_with("\xff\xd8") ? "jpg"
-                                : bytes.starts_with("PF\n")    ? "pfm"
-                                                               : "png";
+                                : bytes.starts_with("PF\n")   ? "pfm"
+                                                              : "png";
         const std::string name = fmt::format("{}/image{}.{}", files_folder_, index, extension);
         if (written_images_.insert(index).second) add_file_({name, bytes});
         remove(o, "image");

@@ -45,7 +45,7 @@ std::string pfm(int width, int height, const std::vector<Rgb>& pixels) {
 
 /// Whether Mitsuba 3 reads image files of this kind.
 bool reads_image(const std::string& file) {
-    static const std::set<std::string> known = {".exr", ".hdr", ".rgbe", ".pfm", ".png",
+    static const std::set<std::string> known = {".exr", ".hdr",  ".rgbe", ".pfm", ".png",
                                                 ".jpg", ".jpeg", ".bmp",  ".tga"};
     return known.count(image_extension(file)) > 0;
 }
@@ -145,9 +145,8 @@ private:
     }
     bool depends_on(int index, const std::function<bool(const SceneObject&)>& what) const {
         const SceneObject& o = original_.objects[size_t(index)];
-        return what(o) || std::any_of(o.children.begin(), o.children.end(), [&](const auto& c) {
-                   return depends_on(c.object, what);
-               });
+        return what(o) || std::any_of(o.children.begin(), o.children.end(),
+                                      [&](const auto& c) { return depends_on(c.object, what); });
     }
 
     void replace_textures(int index) {
@@ -155,8 +154,7 @@ private:
         const SceneObject parent = object(index);
         for (const SceneObject::Child& c : parent.children) {
             if (scene_.objects[size_t(c.object)].category != "texture") continue;
-            const bool needs_number =
-                c.name.starts_with("alpha") && parent.type == "roughplastic";
+            const bool needs_number = c.name.starts_with("alpha") && parent.type == "roughplastic";
             if (is_plain_texture(c.object) && !needs_number) continue;
             const Texture* texture = models_.make_texture(c.object);
             const bool is_uniform = !depends_on(c.object, [](const SceneObject& o) {
@@ -242,7 +240,8 @@ private:
         if (o.category == "integrator") replace_integrator(o);
         if (o.category == "film") replace_film(o);
         if (o.category == "sampler") o.type = "independent";
-        if (o.category == "rfilter" && o.type == "mitchell") rename(o, "b", "B"), rename(o, "c", "C");
+        if (o.category == "rfilter" && o.type == "mitchell")
+            rename(o, "b", "B"), rename(o, "c", "C");
         if (o.category == "sensor") replace_sensor(o);
         if (o.category == "medium") replace_medium(o);
         if (o.category == "emitter") replace_emitter(index);
@@ -274,9 +273,9 @@ private:
         o.type = "hdrfilm";
         rename(o, "high_quality_edges", "sample_border");
         // How the image is stored is not part of the scene, and Mitsuba 3 knows fewer formats.
-        for (const char* name : {"file_format", "pixel_format", "component_format", "banner",
-                                 "attach_log", "tonemap_method", "gamma", "exposure", "key", "burn",
-                                 "digits", "variable"})
+        for (const char* name :
+             {"file_format", "pixel_format", "component_format", "banner", "attach_log",
+              "tonemap_method", "gamma", "exposure", "key", "burn", "digits", "variable"})
             remove(o, name);
     }
 
@@ -332,7 +331,8 @@ private:
             // The same intensity in all directions.
             Rgb mean(1);
             if (!o.find("power"))
-                mean = mean_of(read_emission_image({original_, index}, rgb(o, "intensity", Rgb(1))));
+                mean =
+                    mean_of(read_emission_image({original_, index}, rgb(o, "intensity", Rgb(1))));
             const Param* to_world = o.find("to_world");
             const Vec3 at = to_world ? to_world->as<Transform>()->point({0, 0, 0}) : Vec3{0, 0, 0};
             stand_in(o, "point");
@@ -378,14 +378,18 @@ private:
                 const auto texel = [](float u, int n) {
                     return std::clamp(int(u * float(n)), 0, n - 1);
                 };
-                out.pixels.push_back(square.pixels[size_t(texel(uv.y, square.height)) *
-                                                       size_t(square.width) +
-                                                   size_t(texel(uv.x, square.width))]);
+                out.pixels.push_back(
+                    square.pixels[size_t(texel(uv.y, square.height)) * size_t(square.width) +
+                                  size_t(texel(uv.x, square.width))]);
             }
         return out;
     }
 
     void replace_bsdf(int index) {
+        // Options of newer versions that depend on which direction is the view's, and are on by default.
+        if (object(index).type == "bumpmap" || object(index).type == "normalmap")
+            for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
+                set(object(index), name, false);
         if (object(index).type == "mixturebsdf") return replace_mixture(index);
         SceneObject& o = object(index);
         if (o.type == "orennayar") {
@@ -414,8 +418,8 @@ private:
             set_ior(o, (1 + std::sqrt(r)) / (1 - std::sqrt(r)));
             remove(o, "specular_reflectance");
         } else if (o.type == "lobesum") {
-            const bool is_smooth = number(o, "glossy_reflectance", 0.25) == 0 &&
-                                   !has_texture(o, "glossy_reflectance");
+            const bool is_smooth =
+                number(o, "glossy_reflectance", 0.25) == 0 && !has_texture(o, "glossy_reflectance");
             const double eta = number(o, "eta", 1.5);
             stand_in(o, is_smooth ? "plastic" : "roughplastic");
             if (!is_smooth) {
@@ -464,7 +468,8 @@ private:
     /// A weighted sum is a chain of blends: each has its first material with the rest of the weight.
     void replace_mixture(int index) {
         const SceneObject mixture = object(index);
-        std::string text = mixture.find("weights") ? *mixture.find("weights")->as<std::string>() : "";
+        std::string text =
+            mixture.find("weights") ? *mixture.find("weights")->as<std::string>() : "";
         std::replace(text.begin(), text.end(), ',', ' ');
         std::istringstream in(text);
         std::vector<double> weights;

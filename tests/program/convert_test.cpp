@@ -115,9 +115,9 @@ TEST_F(ConvertTest, GltfScenes) {
 
 TEST_F(ConvertTest, ScenesForMitsuba3) {
     const std::string converted = folder.path() / "plain.xml";
-    const ProgramResult r = run(
-        {"convert", fs::path(ETENDUE_SOURCE_DIR) / "tests/scenes/formats/mitsuba06/media.xml",
-         converted});
+    const ProgramResult r =
+        run({"convert", fs::path(ETENDUE_SOURCE_DIR) / "tests/scenes/formats/mitsuba06/media.xml",
+             converted});
     ASSERT_EQ(r.status, 0) << r.errors;
     const std::string xml = read_text(converted);
     EXPECT_EQ(xml.find("sigma_a"), xml.npos);
