@@ -38,6 +38,7 @@ public:
         : scene_(scene), folder_(std::filesystem::path(path).parent_path()),
           files_folder_(files_folder), add_file_(add_file), uses_(scene.objects.size()) {
         for (const SceneObject& o : scene.objects) {
+            shows_vertex_colors_ |= o.type == "mesh_attribute";
             for (const auto& c : o.children) ++uses_[size_t(c.object)];
             if (!o.id.empty()) ids_.insert(o.id);
         }
@@ -184,7 +185,9 @@ private:
     /// Meshes that the description holds, and those with parameters that Mitsuba does not have, become PLY files.
     void write_mesh(int index, SceneObject& o) {
         const bool has_own_rules = o.find("compute_normals") || o.find("flip_flat_normals");
-        if (o.type != "mesh" && !(o.type == "ply" && has_own_rules)) return;
+        // Mitsuba 3 takes colours of 8 bits as numbers up to 255.
+        const bool is_rewritten = has_own_rules || shows_vertex_colors_;
+        if (o.type != "mesh" && !(o.type == "ply" && is_rewritten)) return;
         MeshData mesh;
         if (o.type == "mesh") {
             const Params params(scene_, index);
@@ -234,6 +237,7 @@ private:
     std::string files_folder_;
     const std::function<void(const SceneFile&)>& add_file_;
     std::vector<int> uses_;
+    bool shows_vertex_colors_ = false;
     std::set<std::string> ids_, named_;
     std::map<int, std::string> made_ids_;
     std::set<int> visited_, written_;

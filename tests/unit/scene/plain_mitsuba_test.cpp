@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "readers/mitsuba_writer.h"
 #include "readers/mitsuba_xml.h"
 #include "readers/scene_file.h"
 #include "scene/mitsuba_manual.h"
@@ -155,6 +156,18 @@ TEST(PlainMitsuba, TexturesOfUvBecomeImages) {
     EXPECT_EQ(texture.type, "bitmap");
     ASSERT_EQ(scene.images.size(), 1u);
     EXPECT_TRUE(scene.images[0].bytes.starts_with("PF\n"));
+}
+
+TEST(PlainMitsuba, ColoursOfMeshesAreWrittenAsFloats) {
+    SceneDescription scene = read_scene_file(std::string(ETENDUE_SOURCE_DIR) +
+                                             "/tests/scenes/formats/mitsuba3/textures.xml");
+    make_plain_mitsuba(scene);
+    int count = 0;
+    write_mitsuba_xml(scene, "out.xml", "files", [&](const SceneFile& file) {
+        count += file.name.ends_with(".ply") &&
+                 file.bytes.find("property float r\n") != std::string::npos;
+    });
+    EXPECT_GT(count, 0);
 }
 
 }  // namespace
