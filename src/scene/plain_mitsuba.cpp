@@ -239,6 +239,8 @@ private:
         SceneObject& o = object(index);
         if (o.category == "integrator") replace_integrator(o);
         if (o.category == "film") replace_film(o);
+        // Meshes are the same with and without them.
+        if (o.category == "shape") remove(o, "collapse"), remove(o, "max_smooth_angle");
         if (o.category == "sampler") o.type = "independent";
         if (o.category == "rfilter" && o.type == "mitchell")
             rename(o, "b", "B"), rename(o, "c", "C");
