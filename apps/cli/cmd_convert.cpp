@@ -9,6 +9,7 @@
 #include "image/atomic_file.h"
 #include "readers/mitsuba_writer.h"
 #include "scene/mitsuba_manual.h"
+#include "scene/plain_mitsuba.h"
 #include "scene_options.h"
 
 namespace etendue {
@@ -42,14 +43,18 @@ void warn_of_foreign_names(const SceneDescription& scene) {
         fmt::print(stderr, "warning: Mitsuba 3 has no {} ({} in the scene)\n", name, count);
 }
 
-void convert(const SceneOptions& options, const std::string& output) {
+void convert(const SceneOptions& options, const std::string& output, bool keep_plugins) {
     if (fs::path(output).extension() != ".xml")
         throw std::runtime_error(fmt::format("{}: the output must be an .xml file", output));
     if (fs::exists(output) && fs::equivalent(output, options.file))
         throw std::runtime_error(fmt::format("{}: the output is the scene itself", output));
-    const SceneDescription scene = read_scene(options);
+    SceneDescription scene = read_scene(options);
     for (const std::string& w : scene.warnings) fmt::print(stderr, "warning: {}\n", w);
-    warn_of_foreign_names(scene);
+    if (keep_plugins)
+        warn_of_foreign_names(scene);
+    else
+        for (const std::string& w : make_plain_mitsuba(scene))
+            fmt::print(stderr, "warning: {}\n", w);
     const fs::path folder = fs::path(output).parent_path();
     const std::string xml = write_mitsuba_xml(
         scene, output, fs::path(output).stem().string() + "_files", [&](const SceneFile& file) {
@@ -64,6 +69,7 @@ void add_convert_command(CLI::App& app) {
     struct Options {
         SceneOptions scene;
         std::string output;
+        bool keep_plugins = false;
     };
     auto options = std::make_shared<Options>();
     CLI::App& c = *app.add_subcommand("convert", "Write a scene as XML of Mitsuba 3");
@@ -76,7 +82,9 @@ void add_convert_command(CLI::App& app) {
         ->allow_extra_args(false);
     c.add_flag("--lenient", options->scene.lenient,
                "Leave out what cannot be read, with a warning for each case");
-    c.callback([options] { convert(options->scene, options->output); });
+    c.add_flag("--keep-plugins", options->keep_plugins,
+               "Keep plug-ins and parameters that Mitsuba 3 does not have, for use with etendue");
+    c.callback([options] { convert(options->scene, options->output, options->keep_plugins); });
 }
 
 }  // namespace etendue

@@ -38,6 +38,7 @@ public:
         : scene_(scene), folder_(std::filesystem::path(path).parent_path()),
           files_folder_(files_folder), add_file_(add_file), uses_(scene.objects.size()) {
         for (const SceneObject& o : scene.objects) {
+            shows_vertex_colors_ |= o.type == "mesh_attribute";
             for (const auto& c : o.children) ++uses_[size_t(c.object)];
             if (!o.id.empty()) ids_.insert(o.id);
         }
@@ -50,7 +51,11 @@ public:
             std::any_of(scene_.roots.begin(), scene_.roots.end(), [&](int root) {
                 return scene_.objects[size_t(root)].category == "integrator";
             });
-        if (!has_integrator) line(1, "<integrator type=\"path\"/>");
+        const bool has_media =
+            std::any_of(scene_.objects.begin(), scene_.objects.end(),
+                        [](const SceneObject& o) { return o.category == "medium"; });
+        if (!has_integrator)
+            line(1, fmt::format("<integrator type=\"{}\"/>", has_media ? "volpath" : "path"));
         for (const int root : scene_.roots) write_shared(root);
         for (const int root : scene_.roots)
             if (!written_.count(root)) write_object(root, "", 1);
@@ -97,7 +102,7 @@ private:
         // Only the sample count of a sampler is used, and Mitsuba 3 does not have all of them.
         if (o.category == "sampler") o.type = "independent";
         if (o.category == "emitter" && !flag(o, "two_sided", true)) remove(o, "two_sided");
-        if (const Param* image = o.find("image"); image && o.category == "texture") write_image(o);
+        if (o.find("image")) write_image(o);
         std::string open = fmt::format("<{} type=\"{}\"", o.category, escape(o.type));
         // An object that is written several times has its id once.
         if (is_shared(index) || (!o.id.empty() && named_.insert(o.id).second))
@@ -180,7 +185,9 @@ private:
     /// Meshes that the description holds, and those with parameters that Mitsuba does not have, become PLY files.
     void write_mesh(int index, SceneObject& o) {
         const bool has_own_rules = o.find("compute_normals") || o.find("flip_flat_normals");
-        if (o.type != "mesh" && !(o.type == "ply" && has_own_rules)) return;
+        // Mitsuba 3 takes colours of 8 bits as numbers up to 255.
+        const bool is_rewritten = has_own_rules || shows_vertex_colors_;
+        if (o.type != "mesh" && !(o.type == "ply" && is_rewritten)) return;
         MeshData mesh;
         if (o.type == "mesh") {
             const Params params(scene_, index);
@@ -216,8 +223,10 @@ private:
     void write_image(SceneObject& o) {
         const auto index = size_t(std::get<int64_t>(o.find("image")->value));
         const std::string& bytes = scene_.images[index].bytes;
-        const std::string name = fmt::format("{}/image{}.{}", files_folder_, index,
-                                             bytes.rfind("\xff\xd8", 0) == 0 ? "jpg" : "png");
+        const char* extension = bytes.starts_with("\xff\xd8") ? "jpg"
+                                : bytes.starts_with("PF\n")   ? "pfm"
+                                                              : "png";
+        const std::string name = fmt::format("{}/image{}.{}", files_folder_, index, extension);
         if (written_images_.insert(index).second) add_file_({name, bytes});
         remove(o, "image");
         o.params.push_back({"filename", name, o.where});
@@ -228,6 +237,7 @@ private:
     std::string files_folder_;
     const std::function<void(const SceneFile&)>& add_file_;
     std::vector<int> uses_;
+    bool shows_vertex_colors_ = false;
     std::set<std::string> ids_, named_;
     std::map<int, std::string> made_ids_;
     std::set<int> visited_, written_;

@@ -33,7 +33,7 @@ protected:
     /// Differences come from rounding alone: of matrices in the text, and of meshes.
     void expect_round_trip(const std::string& scene) const {
         const std::string converted = folder.path() / "out/converted.xml";
-        const ProgramResult r = run({"convert", scene, converted});
+        const ProgramResult r = run({"convert", "--keep-plugins", scene, converted});
         ASSERT_EQ(r.status, 0) << r.errors;
         const std::vector<Rgb> a = render(scene), b = render(converted);
         ASSERT_EQ(a.size(), b.size());
@@ -111,6 +111,18 @@ TEST_F(ConvertTest, GltfScenes) {
         {"mesh":1,"translation":[0,3,0],"rotation":[1,0,0,0]},
         {"camera":0,"translation":[0,1,5]}],
         "cameras":[{"type":"perspective","perspective":{"yfov":0.7,"aspectRatio":1.5}}]})"));
+}
+
+TEST_F(ConvertTest, ScenesForMitsuba3) {
+    const std::string converted = folder.path() / "plain.xml";
+    const ProgramResult r =
+        run({"convert", fs::path(ETENDUE_SOURCE_DIR) / "tests/scenes/formats/mitsuba06/media.xml",
+             converted});
+    ASSERT_EQ(r.status, 0) << r.errors;
+    const std::string xml = read_text(converted);
+    EXPECT_EQ(xml.find("sigma_a"), xml.npos);
+    EXPECT_NE(xml.find("sigma_t"), xml.npos);
+    EXPECT_NE(xml.find("<integrator type=\"volpath\""), xml.npos);
 }
 
 TEST_F(ConvertTest, RefusesOutputsThatWouldDoHarm) {

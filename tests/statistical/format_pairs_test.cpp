@@ -240,6 +240,18 @@ const Pair kPbrtMaterials[] = {
      R"(type="twosided"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
         <rgb name="color0" value=".8 .8 .2"/><rgb name="color1" value=".1 .1 .1"/>
         <transform name="to_uv"><scale x="2" y="3"/></transform></texture></bsdf>)"},
+    {"DiffuseTransmission4", 4,
+     R"(Material "diffusetransmission" "rgb reflectance" [.4 .3 .2] "rgb transmittance" [.1 .5 .6] "float scale" .8)",
+     R"(type="diffusetransmission"><rgb name="reflectance" value=".32 .24 .16"/>
+        <rgb name="transmittance" value=".08 .4 .48"/>)"},
+    // The colours of the lobes are products.
+    {"Translucent3", 3,
+     R"(Material "translucent" "rgb Kd" [.6 .3 .2] "rgb Ks" [.2 .4 .3] "rgb reflect" [.5 .4 .3]
+        "rgb transmit" [.4 .5 .6] "float roughness" .2 "bool remaproughness" false)",
+     R"(type="lobesum"><rgb name="diffuse_reflectance" value=".3 .12 .06"/>
+        <rgb name="diffuse_transmittance" value=".24 .15 .12"/><rgb name="glossy_reflectance" value=".1 .16 .09"/>
+        <rgb name="glossy_transmittance" value=".08 .2 .18"/><float name="eta" value="1.5"/>
+        <string name="distribution" value="ggx"/><float name="alpha" value=".2"/>)"},
     {"Matte3", 3, R"(Material "matte" "rgb Kd" [.6 .3 .2])",
      R"(type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value=".6 .3 .2"/></bsdf>)"},
     {"RoughMatte3", 3, R"(Material "matte" "rgb Kd" [.6 .3 .2] "float sigma" 30)",
@@ -357,6 +369,43 @@ const Pair kPbrtLightPairs[] = {
      R"(<emitter type="envmap"><string name="filename" value="../data/image.ppm"/>
         <transform name="to_world"><matrix value="0 0 -1 0  1 0 0 0  0 1 0 0  0 0 0 1"/>
         <rotate y="1" angle="30"/></transform><rgb name="tint" value="1 2 3"/></emitter>)"},
+    // An image in the equal-area projection has its zenith at +z in both.
+    {"InfiniteImage4", 4,
+     R"(Rotate 30 0 1 0 LightSource "infinite" "string filename" "../data/image.ppm" "float scale" 2)",
+     R"(<emitter type="envmap"><string name="filename" value="../data/image.ppm"/>
+        <string name="projection" value="equalarea"/><float name="scale" value="2"/>
+        <transform name="to_world"><rotate y="1" angle="30"/></transform></emitter>)"},
+    // The zenith of an image of intensities is +y: y and z are exchanged.
+    {"Goniometric4", 4,
+     R"(Translate -2 3 2 Rotate 40 0 0 1 LightSource "goniometric" "rgb I" [30 40 50]
+        "string filename" "../data/image.ppm")",
+     R"(<emitter type="goniometric"><string name="filename" value="../data/image.ppm"/>
+        <string name="projection" value="equalarea"/><rgb name="intensity" value="30 40 50"/>
+        <transform name="to_world"><matrix value="1 0 0 0  0 0 1 0  0 1 0 0  0 0 0 1"/>
+        <rotate z="1" angle="40"/><translate x="-2" y="3" z="2"/></transform></emitter>)"},
+    {"Projection4", 4,
+     R"(Translate 0 4 0 Rotate 90 1 0 0 LightSource "projection" "float scale" 40 "float fov" 70
+        "string filename" "../data/image.ppm")",
+     R"(<emitter type="projection"><string name="filename" value="../data/image.ppm"/>
+        <float name="fov" value="70"/><rgb name="intensity" value="40 40 40"/><transform name="to_world">
+        <rotate x="1" angle="90"/><translate y="4"/></transform></emitter>)"},
+    // The upper edge of the image is that of -y, and the angle 45 by default.
+    {"Projection3", 3,
+     R"(Translate 0 4 0 Rotate 90 1 0 0 LightSource "projection" "rgb I" [40 30 20]
+        "string mapname" "../data/image.ppm")",
+     R"(<emitter type="projection"><string name="filename" value="../data/image.ppm"/>
+        <float name="fov" value="45"/><rgb name="intensity" value="40 30 20"/><transform name="to_world">
+        <scale y="-1"/><rotate x="1" angle="90"/><translate y="4"/></transform></emitter>)"},
+    {"AreaOfAnImage4", 4,
+     R"(AreaLightSource "diffuse" "string filename" "../data/image.ppm" "float scale" 12 Translate 0 4 0
+        Rotate 90 1 0 0 Shape "plymesh" "string filename" "../data/patch.ply")",
+     R"(<shape type="ply"><string name="filename" value="../data/patch.ply"/><transform name="to_world">
+        <rotate x="1" angle="90"/><translate y="4"/></transform>
+        <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value=".5 .5 .5"/></bsdf></bsdf>
+        <emitter type="area"><texture type="scale" name="radiance"><texture type="bitmap" name="value">
+        <string name="filename" value="../data/image.ppm"/>
+        <transform name="to_uv"><scale y="-1"/><translate y="1"/></transform></texture>
+        <rgb name="scale" value="12 12 12"/></texture></emitter></shape>)"},
     {"AreaOfASphere4", 4,
      R"(AreaLightSource "diffuse" "rgb L" [12 9 6] "float scale" 2 Translate -2 3 2 Shape "sphere" "float radius" .5)",
      R"(<shape type="sphere"><point name="center" value="-2 3 2"/><float name="radius" value=".5"/>
