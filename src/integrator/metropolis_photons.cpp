@@ -1,8 +1,10 @@
 #include "integrator/metropolis_photons.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
+#include <unordered_map>
 
 #include "math/hash.h"
 #include "math/statistics.h"
@@ -300,20 +302,43 @@ public:
             const double times = double(end - i) / double(count) * state.target / k.part;
             MapPhoton photon = k.photon;
             photon.power *= float(factor * times);
-            memory_.add(1);
-            if (k.maps.global) out_.photons.global.push_back(photon);
-            if (k.maps.caustic) out_.photons.caustic.push_back(photon);
+            const bool is_new = (k.maps.global && global_.store(photon, out_.photons.global)) |
+                                (k.maps.caustic && caustic_.store(photon, out_.photons.caustic));
+            if (is_new) memory_.add(1);
             i = end;
         }
     }
 
 private:
+    /// Photons of a chain in a map. Where a proposal is rejected, or keeps the beginning of the path, a photon comes
+    /// again: its power is added to the one that is stored [Fan et al. 2005, §3.2]. Otherwise all photons of a density
+    /// estimate could be at one point.
+    class Repeats {
+    public:
+        /// Whether the photon is a new one.
+        bool store(const MapPhoton& photon, std::vector<MapPhoton>& map) {
+            uint64_t key = uint64_t(photon.s);
+            for (const float x : {photon.p.x, photon.p.y, photon.p.z, photon.wi.x, photon.wi.y})
+                key = hash_combine(key, std::bit_cast<uint32_t>(x));
+            const auto [at, is_new] = places_.try_emplace(key, map.size());
+            if (is_new)
+                map.push_back(photon);
+            else
+                map[at->second].power += photon.power;
+            return is_new;
+        }
+
+    private:
+        std::unordered_map<uint64_t, size_t> places_;  ///< Indices in the map.
+    };
+
     const PhotonSpace& space_;
     double unit_, least_;
     uint64_t key_, number_ = 0;
     ChainContext c_;
     PhotonMemory& memory_;
     Result& out_;
+    Repeats global_, caustic_;
     std::vector<double> parts_;
 };
 

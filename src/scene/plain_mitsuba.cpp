@@ -246,10 +246,13 @@ private:
             rename(o, "b", "B"), rename(o, "c", "C");
         if (o.category == "sensor") replace_sensor(o);
         if (o.category == "medium") replace_medium(o);
-        if (o.category == "emitter") replace_emitter(index);
-        if (o.category == "bsdf") replace_bsdf(index);
         if (o.type == "mesh_attribute" && !o.find("name"))
             set(o, "name", std::string("vertex_color"));
+        // These may add objects, which moves `o`.
+        if (o.category == "emitter")
+            replace_emitter(index);
+        else if (o.category == "bsdf")
+            replace_bsdf(index);
     }
 
     void replace_integrator(SceneObject& o) {

@@ -1,6 +1,7 @@
 // Metropolis photon sampling: the photons have the power of those of traced light paths, in all and by region, in each map.
 
 #include <fstream>
+#include <set>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -28,13 +29,13 @@ public:
     static constexpr size_t kRegions = 9, kSums = 2 * 2 * kRegions;
 
     PhotonTotals(const Scene& scene, std::optional<PhotonTarget> target,
-                 const std::string& user_paths)
+                 const std::string& user_paths, int chains = 16)
         : scene_(scene), params_(params_of_mps()), mapping_(params_, true),
           traced_(mapping_, kPaths, uint64_t(1) << 30) {
         if (target)
             metropolis_.emplace(mapping_, MetropolisPhotonOptions{.target = *target,
                                                                   .mutations = kPaths,
-                                                                  .chains = 16,
+                                                                  .chains = chains,
                                                                   .precision = 0.05,
                                                                   .user_paths = user_paths});
     }
@@ -49,6 +50,9 @@ public:
         };
         const MapPhotons photons = metropolis_ ? metropolis_->trace(pass, pass.index, importons)
                                                : traced_.trace(pass, pass.index, {});
+        std::set<std::array<float, 5>> places;
+        for (const MapPhoton& p : photons.global)
+            repeats += !places.insert({p.p.x, p.p.y, p.p.z, p.wi.x, p.wi.y}).second;
         std::array<double, kSums> sums{};
         for (const bool is_caustic : {false, true})
             for (const MapPhoton& p : is_caustic ? photons.caustic : photons.global) {
@@ -69,6 +73,7 @@ public:
     Estimator estimator() const override { return Estimator::Biased; }
 
     std::array<Moments, kSums> totals;
+    uint64_t repeats = 0;  ///< Photons at the place of another one, from the same direction.
 
 private:
     /// Whether the lens sees it: caustics that it does not see are left out by the target Path.
@@ -143,6 +148,19 @@ TEST_P(PhotonPower, IsThatOfTracedPhotons) {
                 << what;
         }
     }
+}
+
+TEST(PhotonRepeats, OfOneChainAddTheirPower) {
+    const Scene scene = build(front_camera(8) + room() + area_lamp());
+    RenderSettings settings;
+    settings.spp = 8;
+    settings.threads = 1;
+    auto integrator = std::make_unique<PhotonTotals>(scene, PhotonTarget::Importons, "", 1);
+    const PhotonTotals& sums = *integrator;
+    Renderer renderer(scene, settings, std::move(integrator));
+    renderer.run([](const Progress&) {}, std::atomic<bool>{false});
+    EXPECT_GT(sums.totals[2 * (PhotonTotals::kRegions - 1)].mean(), 0);
+    EXPECT_EQ(sums.repeats, 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(

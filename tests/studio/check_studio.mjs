@@ -173,14 +173,14 @@ async function fifthPagePart() {
             const page = new AbortController();
             const response = await fetch(`${origin}/v1/events`, {headers, signal: page.signal});
             check(response.status === 200, `page ${i + 1} is open`);
-            pages.push(page);
+            pages.push({page, response});  // A response without references is closed.
         }
         await browser.open(studio.url);
         await browser.until("document.getElementById('banner-text').textContent.includes('4 pages are open already')", 'the fifth is refused');
-        pages.pop().abort();
+        pages.pop().page.abort();
         await browser.until("document.getElementById('banner').hidden && studio.shown[0].passes > 0", 'and opens when one is closed', 30);
     } finally {
-        for (const page of pages) page.abort();
+        for (const {page} of pages) page.abort();
         browser.close();
         await studio.stop('SIGKILL');
     }
@@ -369,7 +369,7 @@ async function pathPart() {
         // Rendering with these paths.
         await browser.evaluate("document.getElementById('gain-spp').value = 24");
         await button('Render with and without');
-        await browser.until("document.getElementById('editor').textContent.includes('the same variance takes')", 'the gain', 240);
+        await browser.until("studio.editor().gain.textContent.includes('8 and 8 of 8 seeds') && studio.editor().gain.textContent.includes('the same variance takes')", 'the gain of all seeds', 240);
         const gain = await browser.evaluate('studio.editor().gain.textContent');
         console.log(`     ${gain}`);
         const [without, with_] = await browser.evaluate('[studio.editor().compared.without, studio.editor().compared.with].map(id => [id, studio.runs.get(id).integrator])');
