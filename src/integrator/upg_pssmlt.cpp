@@ -16,6 +16,7 @@
 
 #include <fmt/format.h>
 
+#include "integrator/light_path_options.h"
 #include "integrator/markov.h"
 #include "math/hash.h"
 #include "mcmc/whole_film.h"
@@ -25,8 +26,6 @@
 namespace etendue {
 namespace {
 
-/// Largest memory for the light paths of a pass, in bytes.
-constexpr uint64_t kMemory = uint64_t(6) << 30;
 /// Fraction of b that is added to the target of every state that may form pairs.
 constexpr double kFloor = 0.05;
 
@@ -35,6 +34,9 @@ enum Purpose : uint64_t { kRadius, kFrozen, kFresh, kTrials };
 
 /// Light paths to gather from.
 struct LightMap {
+    static constexpr uint64_t kVertexBytes =
+        LightVertexCache::kVertexBytes + LightVertexGrid::kVertexBytes;
+
     LightVertexCache cache;
     LightVertexGrid grid;
 };
@@ -42,6 +44,8 @@ struct LightMap {
 /// The parameters of sub-paths and gathers, which are fixed for the whole run.
 struct Gathering {
     const Bidirectional& paths;
+    uint64_t light_paths;  ///< Of a map.
+    uint64_t max_bytes;    ///< Memory of a map.
     TechniqueCounts counts;
     PairDensity density{};
     GatherRoulette roulette{};  ///< None.
@@ -77,13 +81,12 @@ struct Gathering {
     /// Traces N_L light paths, whose random numbers are functions of `key`.
     void trace(const PassContext& pass, uint64_t key, LightMap& map, float radius) const {
         constexpr uint64_t kChunk = 1024;
-        const uint64_t chunks = (pass.light_paths + kChunk - 1) / kChunk;
-        map.cache.begin(chunks, LightVertexCache::kVertexBytes + LightVertexGrid::kVertexBytes,
-                        kMemory);
+        const uint64_t chunks = (light_paths + kChunk - 1) / kChunk;
+        map.cache.begin(chunks, LightMap::kVertexBytes, max_bytes);
         pass.for_each_other_path(chunks, [&](uint64_t chunk, Sampler&, Workspace& work) {
             Sampler sampler(SamplerKind::Independent, key);
             const WalkContext walk = paths.light_walk(pass.scene, counts, work.stats, &density);
-            const uint64_t end = std::min(pass.light_paths, (chunk + 1) * kChunk);
+            const uint64_t end = std::min(light_paths, (chunk + 1) * kChunk);
             for (uint64_t i = chunk * kChunk; i < end; ++i) {
                 sampler.start(0, i);
                 trace_light_path(walk, sampler, work.y);
@@ -220,7 +223,7 @@ private:
 class UpgPssmltIntegrator final : public MarkovIntegrator {
 public:
     explicit UpgPssmltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::from(p)), given_radius_(p.number("radius")) {
+        : MarkovIntegrator(p, DepthOptions::from(p)), light_(p), given_radius_(p.number("radius")) {
         if (!(given_radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));
@@ -228,7 +231,7 @@ public:
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n = MarkovIntegrator::counts(scene, light_paths);
-        n.gather = float(scene.film().pixel_count());
+        n.gather = float(gathered_ > 0 ? gathered_ : scene.film().pixel_count());
         n.pairs = {.disc = kPi * sqr(radius_),
                    .min_edges = kShortest,
                    .short_rate = 1,
@@ -247,12 +250,13 @@ protected:
     /// Everything here is a function of the seed, so that a resumed rendering computes the same.
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         constexpr int kRounds = 3;
+        gathered_ = light_.count(pass.scene, paths_.depth(), kMaps * LightMap::kVertexBytes);
         const float size = pass.scene.bounds().is_empty() ? 1 : pass.scene.bounds().radius();
         const float largest = kGatherConstants.largest_radius * size;
         radius_ = given_radius_ > 0 ? given_radius_
-                                    : std::min(largest, size / std::sqrt(float(pass.light_paths)));
+                                    : std::min(largest, size / std::sqrt(float(gathered_)));
         for (int round = 0; round < kRounds; ++round) {
-            gathering_.emplace(Gathering{.paths = paths_, .counts = counts(pass.scene, 0)});
+            gathering_.emplace(gathering(pass.scene));
             gathering_->trace(pass, key(pass, kRadius, uint64_t(round)), frozen_, radius_);
             if (given_radius_ > 0) break;
             const double pairs = mean_pairs(pass, *gathering_, frozen_,
@@ -264,8 +268,8 @@ protected:
         }
         const PairDensity density(frozen_.grid.points().counts(), radius_,
                                   kGatherConstants.correlation);
-        gathering_.emplace(
-            Gathering{.paths = paths_, .counts = counts(pass.scene, 0), .density = density});
+        gathering_.emplace(gathering(pass.scene));
+        gathering_->density = density;
         gathering_->trace(pass, key(pass, kFrozen, 0), frozen_, radius_);
 
         const ClassPlan plan{
@@ -284,6 +288,17 @@ protected:
     }
 
 private:
+    static constexpr uint64_t kMaps = 2;
+
+    Gathering gathering(const Scene& scene) const {
+        return {.paths = paths_,
+                .light_paths = gathered_,
+                .max_bytes = light_.memory / kMaps,
+                .counts = counts(scene, 0)};
+    }
+
+    LightPathOptions light_;
+    uint64_t gathered_ = 0;  ///< Light paths of a map.
     static uint64_t key(const PassContext& pass, Purpose purpose, uint64_t number) {
         return hash_combine(hash_combine(hash_combine(pass.seed, 0x75706763), purpose), number);
     }
@@ -301,6 +316,13 @@ IntegratorEntry upg_pssmlt_entry() {
     for (ParamInfo& p : params)
         if (p.name == std::string("rr_depth")) p.fallback = "10";
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
+    params.push_back(
+        {"light_paths", ParamKind::Int, "0",
+         "Number of light paths in a pass to gather from. 0: one for each pixel, or as "
+         "many as fit into `memory`."});
+    params.push_back({"memory", ParamKind::Int, "6144",
+                      "Largest memory for light vertices, in MiB; those to gather from in a pass "
+                      "and those that the chains know take half of it each."});
     params.push_back({"radius", ParamKind::Float, "0",
                       "Largest distance between the vertices of a pair, in scene units; 0: chosen "
                       "so that an eye path finds about eight pairs."});

@@ -127,14 +127,17 @@ void Session::work() {
 void Session::load_scene() {
     std::string error;
     try {
-        auto scene = std::make_shared<const Scene>(load_());
+        std::shared_ptr<const Scene> scene = std::make_shared<const Scene>(load_());
         const std::lock_guard lock(mutex_);
         load_error_.clear();
         for (const auto& run : runs_) {
             run->status.is_of_this_scene = false;
             request_stop(run);
         }
-        scene_.store(std::move(scene));
+        {
+            const std::lock_guard scene_lock(scene_mutex_);
+            scene_.swap(scene);
+        }
         ++scene_version_;
     } catch (const std::bad_alloc&) {
         error = "not enough memory";

@@ -93,7 +93,10 @@ public:
     // -- From any thread.
 
     /// nullptr while the first scene is being loaded, or if it could not be loaded.
-    std::shared_ptr<const Scene> scene() const { return scene_.load(); }
+    std::shared_ptr<const Scene> scene() const {
+        const std::lock_guard lock(scene_mutex_);
+        return scene_;
+    }
     /// Number of times that a scene was loaded; runs of earlier ones keep them.
     uint64_t scene_version() const { return scene_version_.load(); }
     /// The reason why the scene could not be loaded; empty otherwise.
@@ -159,7 +162,8 @@ private:
 
     const Load load_;
     const int threads_;
-    std::atomic<std::shared_ptr<const Scene>> scene_;
+    mutable std::mutex scene_mutex_;  ///< Guards the next one alone.
+    std::shared_ptr<const Scene> scene_;
     std::atomic<uint64_t> scene_version_{0};
     std::atomic<uint64_t> revision_{1};
 

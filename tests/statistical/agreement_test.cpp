@@ -154,7 +154,7 @@ protected:
             // A group for each pass, so that passes are independent, and start-up bias were at its largest.
             for (const char* method :
                  {"pssmlt:chains=16,groups=", "mmlt:chains=48,groups=", "mlt:chains=48,groups=",
-                  "upg+pssmlt:radius=0.12,chains=16,groups="})
+                  "upg+pssmlt:radius=0.12,light_paths=200,chains=16,groups="})
                 expect_same_image(
                     indirect_tiles(scene, fmt::format("{}{}", method, c.passes), c.passes, 6), path,
                     1.5 * resolution, std::string(method) + " against path");
