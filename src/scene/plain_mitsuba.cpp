@@ -452,7 +452,8 @@ private:
         return has(o, name) && !o.find(name);
     }
     static void set_ior(SceneObject& o, double ior) {
-        set(o, "int_ior", ior);
+        constexpr double kLeast = 1.001;  // Mitsuba 3 refuses coats without an interface.
+        set(o, "int_ior", std::max(ior, kLeast));
         set(o, "ext_ior", 1.0);
     }
     /// A metal in a medium is one with the indices divided by that of the medium.

@@ -146,6 +146,14 @@ TEST(PlainMitsuba, StandInsAreReported) {
     EXPECT_EQ(colour(only(scene, "bsdf"), "reflectance"), Rgb(0.1f, 0.2f, 0.3f));
 }
 
+TEST(PlainMitsuba, CoatsHaveAnInterface) {
+    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="fresnelblend">
+        <rgb name="specular_reflectance" value="0"/></bsdf></shape>)");
+    make_plain_mitsuba(scene);
+    EXPECT_EQ(only(scene, "bsdf").type, "roughplastic");
+    EXPECT_GT(number(only(scene, "bsdf"), "int_ior"), number(only(scene, "bsdf"), "ext_ior"));
+}
+
 TEST(PlainMitsuba, TexturesOfUvBecomeImages) {
     SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="diffuse">
         <texture type="gridtexture" name="reflectance"/></bsdf></shape>)");
