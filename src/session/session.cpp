@@ -66,9 +66,9 @@ const char* to_string(IntervalKind kind) {
 
 struct Session::Run {
     RunStatus status;  ///< Guarded by the session's mutex.
-    std::atomic<std::shared_ptr<const Snapshot>> snapshot;
-    std::atomic<std::shared_ptr<const TechniqueSnapshot>> techniques;
-    std::atomic<std::shared_ptr<const SeedSeries>> series{std::make_shared<const SeedSeries>()};
+    SharedSlot<const Snapshot> snapshot;
+    SharedSlot<const TechniqueSnapshot> techniques;
+    SharedSlot<const SeedSeries> series{std::make_shared<const SeedSeries>()};
     std::atomic<bool> is_wanted{true}, wants_techniques{false};
 
     bool has_seeds() const { return status.seeds > 1; }
@@ -127,17 +127,14 @@ void Session::work() {
 void Session::load_scene() {
     std::string error;
     try {
-        std::shared_ptr<const Scene> scene = std::make_shared<const Scene>(load_());
+        auto scene = std::make_shared<const Scene>(load_());
         const std::lock_guard lock(mutex_);
         load_error_.clear();
         for (const auto& run : runs_) {
             run->status.is_of_this_scene = false;
             request_stop(run);
         }
-        {
-            const std::lock_guard scene_lock(scene_mutex_);
-            scene_.swap(scene);
-        }
+        scene_.store(std::move(scene));
         ++scene_version_;
     } catch (const std::bad_alloc&) {
         error = "not enough memory";

@@ -16,6 +16,7 @@
 #include "render/renderer.h"
 #include "session/replay.h"
 #include "session/seed_series.h"
+#include "session/shared_slot.h"
 #include "session/snapshot.h"
 
 namespace etendue {
@@ -93,10 +94,7 @@ public:
     // -- From any thread.
 
     /// nullptr while the first scene is being loaded, or if it could not be loaded.
-    std::shared_ptr<const Scene> scene() const {
-        const std::lock_guard lock(scene_mutex_);
-        return scene_;
-    }
+    std::shared_ptr<const Scene> scene() const { return scene_.load(); }
     /// Number of times that a scene was loaded; runs of earlier ones keep them.
     uint64_t scene_version() const { return scene_version_.load(); }
     /// The reason why the scene could not be loaded; empty otherwise.
@@ -162,8 +160,7 @@ private:
 
     const Load load_;
     const int threads_;
-    mutable std::mutex scene_mutex_;  ///< Guards the next one alone.
-    std::shared_ptr<const Scene> scene_;
+    SharedSlot<const Scene> scene_;
     std::atomic<uint64_t> scene_version_{0};
     std::atomic<uint64_t> revision_{1};
 

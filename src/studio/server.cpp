@@ -80,7 +80,8 @@ void set_common_fields(http::response<http::empty_body>& m) {
 
 struct Server::Impl {
     // Connections, which `io` keeps alive, count themselves.
-    int connections = 0, event_streams = 0;
+    // Threads of the workers may be the last to drop a connection.
+    std::atomic<int> connections = 0, event_streams = 0;
     Handler* handler = nullptr;
     std::string address;
     net::io_context io{1};
@@ -264,8 +265,8 @@ private:
     beast::tcp_stream stream_;
     net::steady_timer timer_;
     Handler& handler_;
-    int& connections_;
-    int& event_streams_;
+    std::atomic<int>& connections_;
+    std::atomic<int>& event_streams_;
     std::string local_address_;
     beast::flat_buffer buffer_{kMostHeaderBytes + kMostBodyBytes};
     std::optional<Parser> parser_;
