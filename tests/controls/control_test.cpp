@@ -106,7 +106,7 @@ std::vector<Planted> planted() {
         {"CountEverywhere", lit_room, "bdpt:roulette=0", Densities,
          Image | Lengths | Techniques | Weights},
         {"PdfOfEvaluation", softly_lit, "path", Techniques, 0, 256},
-        {"PdfOfSampling", softly_lit, "path", Techniques, 0},
+        {"PdfOfSampling", softly_lit, "path", Techniques, 0, 256},
         {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques | Weights,
          256},
         {"PmfOfOneRecord", divided_room, by_paper, Image | Lengths, 0, 512},
