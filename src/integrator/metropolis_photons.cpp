@@ -302,8 +302,8 @@ public:
             const double times = double(end - i) / double(count) * state.target / k.part;
             MapPhoton photon = k.photon;
             photon.power *= float(factor * times);
-            const bool is_new = (k.maps.global && global_.store(photon, out_.photons.global)) |
-                                (k.maps.caustic && caustic_.store(photon, out_.photons.caustic));
+            bool is_new = k.maps.global && global_.store(photon, out_.photons.global);
+            if (k.maps.caustic) is_new |= caustic_.store(photon, out_.photons.caustic);
             if (is_new) memory_.add(1);
             i = end;
         }
