@@ -40,25 +40,46 @@ Mesh mesh_of(const Shape& shape) {
     return mesh;
 }
 
-/// Merges the vertices of each cell of a grid with this cell size, and drops triangles that collapse.
-Mesh clustered(const Mesh& mesh, Vec3 origin, float cell) {
-    Mesh out;
+/// Index of the vertex that stands for each vertex if all in a cell of a grid are merged.
+std::vector<uint32_t> merged_vertices(const std::vector<Vec3>& positions, Vec3 origin, float cell) {
     std::unordered_map<uint64_t, uint32_t> cells;
-    std::vector<uint32_t> merged(mesh.positions.size());
-    for (size_t i = 0; i < mesh.positions.size(); ++i) {
-        const Vec3 at = (mesh.positions[i] - origin) * (1 / cell);
+    std::vector<uint32_t> merged(positions.size());
+    for (size_t i = 0; i < positions.size(); ++i) {
+        const Vec3 at = (positions[i] - origin) * (1 / cell);
         uint64_t key = 0;
         for (int axis = 0; axis < 3; ++axis)
             key = key << 21 | (uint64_t(std::max(0.0f, at[axis])) & 0x1fffff);
-        const auto [place, is_new] = cells.emplace(key, uint32_t(out.positions.size()));
-        if (is_new) out.positions.push_back(mesh.positions[i]);
-        merged[i] = place->second;
+        merged[i] = cells.emplace(key, uint32_t(i)).first->second;
     }
+    return merged;
+}
+
+/// The triangles of a mesh whose vertices are merged, without those that collapse.
+std::vector<uint32_t> merged_triangles(const Mesh& mesh, Vec3 origin, float cell) {
+    const std::vector<uint32_t> merged = merged_vertices(mesh.positions, origin, cell);
+    std::vector<uint32_t> out;
     for (size_t i = 0; i + 2 < mesh.triangles.size(); i += 3) {
         const uint32_t a = merged[mesh.triangles[i]], b = merged[mesh.triangles[i + 1]],
                        c = merged[mesh.triangles[i + 2]];
-        if (a != b && b != c && c != a) out.triangles.insert(out.triangles.end(), {a, b, c});
+        if (a != b && b != c && c != a) out.insert(out.end(), {a, b, c});
     }
+    return out;
+}
+
+/// The mesh with these of its triangles, and only the vertices that they use.
+Mesh part_of(const Mesh& mesh, std::vector<uint32_t> triangles) {
+    constexpr uint32_t kUnused = ~0u;
+    Mesh out;
+    std::vector<uint32_t> index(mesh.positions.size(), kUnused);
+    for (uint32_t& vertex : triangles) {
+        uint32_t& to = index[vertex];
+        if (to == kUnused) {
+            to = uint32_t(out.positions.size());
+            out.positions.push_back(mesh.positions[vertex]);
+        }
+        vertex = to;
+    }
+    out.triangles = std::move(triangles);
     return out;
 }
 
@@ -123,36 +144,45 @@ std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles) 
     const auto& places = placed.of;
     struct Part {
         Mesh mesh;
-        Bounds3 bounds;  ///< Of what cells are measured by.
+        std::vector<uint32_t> coarse;  ///< Empty: the same as in the mesh.
+        Bounds3 bounds;                ///< Of what cells are measured by.
+        const std::vector<uint32_t>& coarsest() const {
+            return coarse.empty() ? mesh.triangles : coarse;
+        }
     };
     std::vector<Part> parts;
-    size_t triangles = 0, drawn_triangles = 0;
-    const auto count = [&](size_t shape) {
-        const size_t n = parts[shape].mesh.triangles.size() / 3;
-        triangles += n;
-        drawn_triangles += n * places[shape].size();
-    };
     for (const SceneShape& shape : scene.shapes()) {
         const bool is_in_world = parts.size() < placed.first_of_groups;
         parts.push_back(
-            {mesh_of(*shape.shape), is_in_world ? scene.bounds() : shape.shape->bounds()});
-        count(parts.size() - 1);
+            {mesh_of(*shape.shape), {}, is_in_world ? scene.bounds() : shape.shape->bounds()});
     }
-    // Coarser from step to step.
-    constexpr int kFinest = 1024, kCoarsest = 16;
-    const auto has_too_many = [&] {
-        return triangles > most_triangles || drawn_triangles > 4 * most_triangles;
-    };
-    for (int cells = kFinest; has_too_many() && cells >= kCoarsest; cells /= 2) {
-        triangles = drawn_triangles = 0;
+    const auto has_too_many = [&](size_t most) {
+        size_t triangles = 0, drawn = 0;
         for (size_t i = 0; i < parts.size(); ++i) {
-            auto& [mesh, bounds] = parts[i];
-            constexpr size_t kSmall = 3 * 2400;
-            if (mesh.triangles.size() > kSmall)
-                mesh = clustered(mesh, bounds.lo, 2 * bounds.radius() / float(cells));
-            count(i);
+            const size_t n = parts[i].coarsest().size() / 3;
+            triangles += n;
+            drawn += n * places[i].size();
         }
-    }
+        return triangles > most || drawn > 4 * most;
+    };
+    // Coarser from step to step.
+    constexpr int kFinest = 1024, kCoarsest = 16, kCoarseFraction = 16;
+    constexpr size_t kSmall = 3 * 2400;
+    const auto merge = [&](int cells, const auto& use) {
+        for (Part& part : parts)
+            if (part.mesh.triangles.size() > kSmall)
+                use(part, merged_triangles(part.mesh, part.bounds.lo,
+                                           2 * part.bounds.radius() / float(cells)));
+    };
+    int cells = kFinest;
+    for (; has_too_many(most_triangles) && cells >= kCoarsest; cells /= 2)
+        merge(cells, [](Part& part, std::vector<uint32_t> triangles) {
+            part.mesh = part_of(part.mesh, std::move(triangles));
+        });
+    for (; has_too_many(most_triangles / kCoarseFraction) && cells >= kCoarsest; cells /= 2)
+        merge(cells, [](Part& part, std::vector<uint32_t> triangles) {
+            part.coarse = std::move(triangles);
+        });
     std::vector<DrawnShape> drawn;
     for (size_t i = 0; i < parts.size(); ++i) {
         const Mesh& mesh = parts[i].mesh;
@@ -170,6 +200,7 @@ std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles) 
                 to.positions.push_back(uint16_t(std::lround(at * 65535)));
             }
         to.triangles = mesh.triangles;
+        to.coarse_triangles = parts[i].coarse;
     }
     return drawn;
 }

@@ -19,6 +19,8 @@ struct DrawnShape {
     bool is_specular = false;         ///< A mirror or clear glass.
     std::vector<uint16_t> positions;  ///< x, y, z in 1/65535 of the bounds.
     std::vector<uint32_t> triangles;
+    /// About a sixteenth of the triangles, of the same vertices, for views that move. Empty where there are few.
+    std::vector<uint32_t> coarse_triangles;
     using Place =
         std::array<float, 12>;  ///< The first three rows of a matrix, one after the other.
     std::vector<Place> places;  ///< Maps to world space, one for each time that the shape is drawn.

@@ -34,6 +34,9 @@ std::string encode(const std::vector<DrawnShape>& shapes) {
         append_bytes(data, s.positions);
         item["indices_at"] = data.size();
         append_bytes(data, s.triangles);
+        item["coarse_indices"] = s.coarse_triangles.size();
+        item["coarse_at"] = data.size();
+        append_bytes(data, s.coarse_triangles);
         item["places"] = s.places.size();
         item["places_at"] = data.size();
         append_bytes(data, s.places);

@@ -25,7 +25,7 @@ const std::vector<Rgb>& SceneData::layer(const std::string& name) {
 
 const std::string& SceneData::geometry() {
     std::call_once(geometry_, [&] {
-        constexpr size_t kMostTriangles = 250'000;
+        constexpr size_t kMostTriangles = 1'000'000;
         geometry_bytes_ = encode(drawn_shapes(*scene_, kMostTriangles));
     });
     return geometry_bytes_;

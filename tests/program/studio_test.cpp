@@ -274,7 +274,12 @@ TEST_F(StudioTest, RefusesTheFifthPageAndTooManyConnections) {
             pages.back()->send(request);
             EXPECT_EQ(parse(pages.back()->read_until(has_event)).status, 200);
         }
-        EXPECT_EQ(get("/v1/events").status, 429);
+        const Connection fifth(port);
+        fifth.send(request);
+        const auto has_header = [](const std::string& s) {
+            return s.find("\r\n\r\n") != std::string::npos;
+        };
+        EXPECT_EQ(parse(fifth.read_until(has_header)).status, 429);
     }
     std::this_thread::sleep_for(300ms);
     {
@@ -617,6 +622,13 @@ TEST_F(StudioTest, FailsBeforeItServes) {
 
 TEST_F(StudioTest, SaysWhenTheSceneChangesAndLoadsItAgain) {
     start();
+    const json old_run =
+        post("/v1/run", {{"action", "start"}, {"integrator", "path"}, {"spp", 1}}).parsed()["run"];
+    const auto replay = [&] {
+        return post("/v1/replay", {{"run", old_run}, {"x", 20}, {"y", 15}});
+    };
+    for (int i = 0; i < 1000 && replay().status != 200; ++i) std::this_thread::sleep_for(10ms);
+    EXPECT_EQ(replay().status, 200);
     const std::string text = read_text(scene);
     std::ofstream(scene) << text << " ";
     const std::string request =
@@ -642,6 +654,9 @@ TEST_F(StudioTest, SaysWhenTheSceneChangesAndLoadsItAgain) {
     const json again = get("/v1/state").parsed();
     EXPECT_EQ(again["scene_version"], 2);
     EXPECT_EQ(again["load_error"], "");
+    const Answer stale = replay();
+    EXPECT_EQ(stale.status, 409);
+    EXPECT_NE(stale.body.find("earlier version"), std::string::npos) << stale.body;
 }
 
 }  // namespace

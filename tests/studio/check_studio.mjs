@@ -186,6 +186,40 @@ async function fifthPagePart() {
     }
 }
 
+/// A view of many triangles, which the processor draws slowly, has fewer of them while it moves.
+async function motionPart() {
+    const edge = 400;
+    const at = (row, column) => { const x = 2 * column / edge - 1, z = 2 * row / edge - 1; return `v ${x} ${0.2 * Math.sin(7 * x) * Math.cos(5 * z)} ${z}`; };
+    const rows = [...Array(edge).keys()], corner = (row, column) => row * (edge + 1) + column + 1;
+    const vertices = [...rows, edge].flatMap(row => [...rows, edge].map(column => at(row, column)));
+    const faces = rows.flatMap(row => rows.map(column => `f ${corner(row, column)} ${corner(row + 1, column)} ${corner(row + 1, column + 1)} ${corner(row, column + 1)}`));
+    writeFileSync(join(folder, 'wavy.obj'), [...vertices, ...faces, ''].join('\n'));
+    const scene = join(folder, 'wavy.xml');
+    writeFileSync(scene, mirrorScene.replace('</scene>', '<shape type="obj"><string name="filename" value="wavy.obj"/></shape></scene>'));
+    const studio = await Studio.start(scene, '--idle');
+    const browser = openBrowser();
+    try {
+        await browser.open(studio.url);
+        await browser.until('studio.state()?.scene', 'the scene');
+        await browser.evaluate("document.getElementById('tab-paths').click()");
+        await browser.until('studio.space()?.drawnTriangles >= 320000', 'all triangles are drawn at rest', 60);
+        await browser.until('studio.space().fullTime > 0', 'and measured', 60);
+        const full = await browser.evaluate('studio.space().fullTime');
+        // Where a graphics processor is fast, all triangles are drawn also in motion.
+        const most = full > 25 ? 320000 / 8 : Infinity;
+        await browser.evaluate("studio.space().orbit(0.1, 0.05); new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))");
+        const moving = await browser.evaluate('studio.space().drawnTriangles');
+        check(moving > 1000 && moving <= most, `in motion, ${moving} triangles are drawn; all took ${full.toFixed(0)} ms`);
+        await browser.until('studio.space().drawnTriangles >= 320000', 'and all of them afterwards', 60);
+        // What the page itself needs for a picture.
+        const script = await browser.evaluate('(() => { const begin = performance.now(); for (let i = 0; i < 20; ++i) studio.space().draw(); return (performance.now() - begin) / 20; })()');
+        console.log(`     the page needs ${script.toFixed(2)} ms for the commands of a picture`);
+    } finally {
+        browser.close();
+        await studio.stop('SIGKILL');
+    }
+}
+
 /// Instances are drawn where they are, and the cone of the chosen path with it.
 async function instancePart() {
     const scene = join(folder, 'instances.xml');
@@ -386,4 +420,4 @@ async function pathPart() {
     }
 }
 
-await runParts(foreignPagePart, fifthPagePart, imagePart, instancePart, pathPart);
+await runParts(foreignPagePart, fifthPagePart, imagePart, instancePart, motionPart, pathPart);

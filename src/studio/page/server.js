@@ -75,6 +75,7 @@ export class Server {
         for (const s of shapes) {
             s.positions = new Uint16Array(bytes, 4 + length + s.positions_at, 3 * s.vertices);
             s.triangles = new Uint32Array(bytes, 4 + length + s.indices_at, s.indices);
+            s.coarse = new Uint32Array(bytes, 4 + length + s.coarse_at, s.coarse_indices);
             s.matrices = new Float32Array(bytes, 4 + length + s.places_at, 12 * s.places);
         }
         return shapes;

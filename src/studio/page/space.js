@@ -104,6 +104,13 @@ export class Space {
         /** @type {any[]} */
         this.shapes = [];
         this.isDue = false;
+        /** Whether the view moves: until the timer ends. @type {ReturnType<typeof setTimeout> | undefined} */
+        this.moving = undefined;
+        /** Time in ms that the graphics processor needs for all triangles. */
+        this.fullTime = 0;
+        this.isMeasured = false;
+        /** Triangles of the last picture. */
+        this.drawnTriangles = 0;
         /**
          * Called with a point under the pointer.
          * @type {{click: (x: number, y: number) => void, drag: (x: number, y: number) => boolean, press: (x: number, y: number) => boolean, release: () => void}}
@@ -238,11 +245,42 @@ export class Space {
                 gl.vertexAttribDivisor(1 + row, 1);
             }
             gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers[2]);
-            gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, s.triangles, gl.STATIC_DRAW);
+            // All triangles, and then the coarse ones.
+            gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, 4 * (s.indices + s.coarse_indices), gl.STATIC_DRAW);
+            gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, s.triangles);
+            gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 4 * s.indices, s.coarse);
             gl.bindVertexArray(null);
             this.shapes.push({...s, array, buffers});
         }
+        this.fullTime = 0;
         this.redraw();
+    }
+
+    /** Draws a view that moves. */
+    move() {
+        const kRest = 250;
+        clearTimeout(this.moving);
+        this.moving = setTimeout(() => { this.moving = undefined; this.redraw(); }, kRest);
+        this.redraw();
+    }
+    /** Whether the view moves and all triangles would take too long. */
+    isCoarse() { return this.moving !== undefined && this.fullTime > 25; }
+    /**
+     * Measures how long the graphics processor needs for a picture of all triangles.
+     * @param {WebGL2RenderingContext} gl
+     */
+    measure(gl) {
+        const begin = performance.now(), fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+        if (!fence) return;
+        this.isMeasured = true;
+        gl.flush();
+        const look = () => {
+            if (gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.UNSIGNALED && !gl.isContextLost()) { setTimeout(look, 2); return; }
+            gl.deleteSync(fence);
+            this.isMeasured = false;
+            this.fullTime = performance.now() - begin;
+        };
+        setTimeout(look, 2);
     }
 
     redraw() {
@@ -264,14 +302,19 @@ export class Space {
         const at = (/** @type {string} */ name) => gl.getUniformLocation(/** @type {WebGLProgram} */ (this.meshProgram), name);
         gl.uniformMatrix4fv(at('transform'), false, transform);
         gl.uniform3fv(at('eye'), this.eye());
+        const isCoarse = this.isCoarse();
+        this.drawnTriangles = 0;
         for (const s of this.shapes) {
             gl.uniform3fv(at('low'), s.low);
             gl.uniform3fv(at('extent'), s.high.map((/** @type {number} */ v, /** @type {number} */ i) => v - s.low[i]));
             gl.uniform3fv(at('tint'), s.emits ? [1, 0.9, 0.5] : s.delta ? [0.45, 0.6, 0.75] : s.color.map((/** @type {number} */ c) => 0.08 + 0.8 * c));
             gl.uniform1f(at('isLit'), s.emits ? 1 : 0);
             gl.bindVertexArray(s.array);
-            gl.drawElementsInstanced(gl.TRIANGLES, s.indices, gl.UNSIGNED_INT, 0, s.places);
+            const [first, count] = isCoarse && s.coarse_indices > 0 ? [s.indices, s.coarse_indices] : [0, s.indices];
+            gl.drawElementsInstanced(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first, s.places);
+            this.drawnTriangles += count / 3 * s.places;
         }
+        if (!isCoarse && !this.isMeasured) this.measure(gl);
         this.drawLines(gl, transform);
         this.drawCross(gl);
     }
@@ -339,17 +382,17 @@ export class Space {
     orbit(dx, dy) {
         this.azimuth = (this.azimuth ?? 0) - dx;
         this.height = clamp((this.height ?? 0) - dy, -1.55, 1.55);
-        this.redraw();
+        this.move();
     }
     /** @param {number} factor */
     dolly(factor) {
         this.distance = clamp(/** @type {number} */ (this.distance) * factor, 0.01 * this.radius, 8 * this.radius);
-        this.redraw();
+        this.move();
     }
     /** @param {number} dx @param {number} dy */
     moveCross(dx, dy) {
         this.cross = [clamp(this.cross[0] + dx, -1, 1), clamp(this.cross[1] + dy, -1, 1)];
-        this.redraw();
+        this.move();
     }
 
     listen() {
@@ -372,7 +415,7 @@ export class Space {
             else if (drag.kind === 'pan') {
                 const {right, up} = this.frame(), f = /** @type {number} */ (this.distance) * 0.85 / canvas.clientHeight;
                 this.target = add(add(/** @type {Vec} */ (this.target), right, -dx * f), up, dy * f);
-                this.redraw();
+                this.move();
             } else this.tell.drag(x, y);
             [drag.x, drag.y] = [e.offsetX, e.offsetY];
         });

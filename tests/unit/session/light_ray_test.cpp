@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <filesystem>
+#include <fstream>
 
 #include <gtest/gtest.h>
 
@@ -161,6 +163,65 @@ TEST(DrawnShapes, KeepTheirBoundsAndTheirLimit) {
     size_t triangles = 0;
     for (const DrawnShape& s : drawn_shapes(scene, 500)) triangles += s.triangles.size() / 3;
     EXPECT_LT(triangles, 2400u);
+}
+
+/// A wavy surface of 2 · edge² triangles in an OBJ file, which is gone when the scene is built.
+Scene wavy_scene(int edge) {
+    const std::string file = ::testing::TempDir() + "/etendue-wavy.obj";
+    {
+        std::ofstream obj(file);
+        for (int row = 0; row <= edge; ++row)
+            for (int column = 0; column <= edge; ++column) {
+                const float x = 2 * float(column) / float(edge) - 1,
+                            z = 2 * float(row) / float(edge) - 1;
+                obj << "v " << x << " " << 0.2f * std::sin(7 * x) * std::cos(5 * z) << " " << z
+                    << "\n";
+            }
+        for (int row = 0; row < edge; ++row)
+            for (int column = 0; column < edge; ++column) {
+                const int a = row * (edge + 1) + column + 1, b = a + edge + 1;
+                obj << "f " << a << " " << b << " " << b + 1 << "\nf " << a << " " << b + 1 << " "
+                    << a + 1 << "\n";
+            }
+    }
+    Scene scene =
+        build(sensor("0,0,3", "0,0,0", 8) + area_lamp() +
+              "<shape type=\"obj\"><string name=\"filename\" value=\"" + file + "\"/></shape>");
+    std::filesystem::remove(file);
+    return scene;
+}
+
+TEST(DrawnShapes, HaveFewerTrianglesInMotion) {
+    constexpr int kEdge = 200;
+    const Scene wavy = wavy_scene(kEdge);
+    const auto drawn = drawn_shapes(wavy, 160'000);
+    const DrawnShape& mesh = *std::max_element(drawn.begin(), drawn.end(), [](auto& a, auto& b) {
+        return a.triangles.size() < b.triangles.size();
+    });
+    EXPECT_EQ(mesh.triangles.size(), size_t(6 * kEdge * kEdge));
+    EXPECT_LE(mesh.coarse_triangles.size(), 3u * 10'000);
+    EXPECT_GE(mesh.coarse_triangles.size(), 3u * 1'000);
+    Bounds3 coarse;
+    for (const uint32_t i : mesh.coarse_triangles) {
+        ASSERT_LT(i, mesh.positions.size() / 3);
+        const uint16_t* p = &mesh.positions[3 * size_t(i)];
+        coarse.extend(Vec3(p[0], p[1], p[2]) * (1 / 65535.0f));
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_LT(coarse.lo[axis], 0.1f);
+        EXPECT_GT(coarse.hi[axis], 0.9f);
+    }
+    const auto simplified = drawn_shapes(wavy, 20'000);
+    size_t triangles = 0;
+    for (const DrawnShape& s : simplified) {
+        triangles += s.triangles.size() / 3;
+        for (const uint32_t i : s.triangles) ASSERT_LT(i, s.positions.size() / 3);
+        for (const uint32_t i : s.coarse_triangles) ASSERT_LT(i, s.positions.size() / 3);
+    }
+    EXPECT_LE(triangles, 20'000u);
+    // Others have too few triangles for a coarse level.
+    for (const DrawnShape& s : drawn)
+        EXPECT_TRUE(&s == &mesh || s.coarse_triangles.empty());
 }
 
 /// A sphere about the origin, placed three times, one of them larger: each place has what rays hit there.

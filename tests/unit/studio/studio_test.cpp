@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include "image/image.h"
 #include "studio/guard.h"
 #include "studio/image_reply.h"
+#include "studio/pixel_values.h"
 #include "studio/server.h"
 
 namespace etendue::test {
@@ -112,6 +114,25 @@ uint32_t field_at(const std::string& body, size_t index) {
     uint32_t value = 0;
     std::memcpy(&value, body.data() + 4 + 4 * index, 4);
     return value;
+}
+
+TEST(RectangleValues, LeaveOutPixelsThatAreNotFinite) {
+    constexpr float kNan = std::numeric_limits<float>::quiet_NaN(),
+                    kInfinite = std::numeric_limits<float>::infinity();
+    Snapshot s;
+    s.width = 4, s.height = 2;
+    s.mean = {Rgb(99), Rgb(1, 2, 4), Rgb(kInfinite, 0, 0), Rgb(99),
+              Rgb(99), Rgb(3, 2, 8), Rgb(0, kNan, kNan),   Rgb(99)};
+    s.variance = std::vector<Rgb>(8, Rgb(0.5f));
+    const RectangleValues v = values_in(s, {.x = 1, .y = 0, .width = 2, .height = 2});
+    EXPECT_EQ(v.finite, 2);
+    EXPECT_EQ(v.nan, 1);
+    EXPECT_EQ(v.infinite, 1);
+    EXPECT_EQ(v.mean, (RectangleValues::Channels{2, 2, 6}));
+    EXPECT_EQ(v.least, (RectangleValues::Channels{1, 2, 4}));
+    EXPECT_EQ(v.largest, (RectangleValues::Channels{3, 2, 8}));
+    EXPECT_EQ(v.variance, (RectangleValues::Channels{2, 0, 8}));
+    EXPECT_EQ(v.squared_error, (RectangleValues::Channels{0.25, 0.25, 0.25}));
 }
 
 TEST(Images, KeepRectanglesLevelsAndLargeValues) {
