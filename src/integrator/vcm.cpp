@@ -154,12 +154,13 @@ private:
             search.observe(pair, join);
             if (!join) return;
             const PairEvent event = pair.event(work.pair, work.z);
-            const float r = 1 / (event.from.survival.value() * join->pair_probability);
-            const auto value =
-                paths_.test(c, *join, search.scale() * r / pair.rate, pair.number, work);
+            // Its reciprocal could overflow, where the quotient below does not.
+            const float probability = event.from.survival.value() * join->pair_probability;
+            const auto value = paths_.test(c, *join, search.scale() / (probability * pair.rate),
+                                           pair.number, work);
             if (!value) return;
             ++work.stats.visible_pairs;
-            c.sink.add(*join, *value * (r * c.splat_scale / pair.rate));
+            c.sink.add(*join, *value / Rgb(probability) * (c.splat_scale / pair.rate));
         });
     }
 

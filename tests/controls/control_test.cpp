@@ -127,7 +127,7 @@ std::vector<Planted> planted() {
         {"TrialsWithoutGuide", lit_room, "upg+bdpt:radius=0.3,roulette=0,guide=random", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},
-        {"LostSplats", by_glass, "bdpt:roulette=0", Image | Lengths, 0},
+        {"LostSplats", by_glass, "bdpt:roulette=0", Image | Lengths, 0, 256},
         {"GeometryBehindDelta", front_camera(kSize) + room() + lamp_in_smooth_glass(),
          "bdpt:roulette=0", Image | Lengths | Weights, 0},
         {"FivePercentOfOneClass", lit_room + sphere("-0.2,-0.5,0", "0.45", kMirror),

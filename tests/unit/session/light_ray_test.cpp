@@ -220,8 +220,7 @@ TEST(DrawnShapes, HaveFewerTrianglesInMotion) {
     }
     EXPECT_LE(triangles, 20'000u);
     // Others have too few triangles for a coarse level.
-    for (const DrawnShape& s : drawn)
-        EXPECT_TRUE(&s == &mesh || s.coarse_triangles.empty());
+    for (const DrawnShape& s : drawn) EXPECT_TRUE(&s == &mesh || s.coarse_triangles.empty());
 }
 
 /// A sphere about the origin, placed three times, one of them larger: each place has what rays hit there.
