@@ -193,6 +193,12 @@ void check_samples(const SpectrumSamples& samples, const SourceLocation& where) 
             throw SceneError(where,
                              fmt::format("wavelengths must increase, but {} follows {}",
                                          samples.wavelengths[i], samples.wavelengths[i - 1]));
+    constexpr double kShortest = 50;  // in nm; a spectrum of light does not end before
+    if (samples.wavelengths.back() < kShortest)
+        throw SceneError(where,
+                         fmt::format("wavelengths must be in nanometres, but the longest is {}{}",
+                                     samples.wavelengths.back(),
+                                     samples.wavelengths.back() < 10 ? " (micrometres?)" : ""));
 }
 
 }  // namespace etendue

@@ -373,6 +373,9 @@ private:
             if (p.has(name))
                 scene_.defaults_.integrator_params.emplace_back(
                     name, fmt::format("{}", p.integer(name, 0, -1, 1 << 20)));
+        if (alias->max_depth >= 0)
+            scene_.defaults_.integrator_params.emplace_back("max_depth",
+                                                            fmt::format("{}", alias->max_depth));
         if (p.has("user_paths"))
             scene_.defaults_.integrator_params.emplace_back("user_paths",
                                                             resolve_file(p, "user_paths"));

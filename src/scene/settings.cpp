@@ -102,9 +102,17 @@ const std::vector<IntegratorAlias>& integrator_aliases() {
             for (const char* name : names)
                 all.push_back({{"integrator", name, doc, params}, integrator, is_substitute});
         };
-        add({"path", "volpath", "volpathmis", "volpath_simple", "direct", "prb", "prb_basic",
-             "prbvolpath", "prb_projective", "direct_projective"},
+        add({"path", "volpath", "volpathmis", "volpath_simple", "prb", "prb_basic", "prbvolpath",
+             "prb_projective"},
             "Path tracing.", "path");
+        const size_t direct = all.size();
+        add({"direct", "direct_projective"}, "Path tracing of at most two edges.", "path");
+        for (size_t i = direct; i < all.size(); ++i) {
+            all[i].max_depth = 2;
+            std::erase_if(all[i].info.params, [](const ParamInfo& p) {
+                return p.name == std::string("max_depth") || p.name == std::string("rr_depth");
+            });
+        }
         add({"ptracer", "light"}, "Light tracing.", "light");
         add({"bdpt"}, "Bidirectional path tracing.", "bdpt");
         add({"photonmapper"}, "Photon mapping.", "pm");

@@ -26,6 +26,7 @@ struct IntegratorAlias {
     PluginInfo info;
     const char* integrator;  ///< Empty for one that only wraps others: the first of these is used.
     bool is_substitute;      ///< Whether it computes something else, so that a warning is due.
+    int max_depth = -1;      ///< Number of edges of its longest paths; -1: the parameter max_depth.
 };
 const std::vector<IntegratorAlias>& integrator_aliases();
 

@@ -69,6 +69,7 @@ constexpr BrokenScene kBrokenScenes[] = {
     {"spectrum_not_pairs.xml", 3, "expected a list of wavelength:value, found \"500\""},
     {"spectrum_three_numbers.xml", 3, "expected one number or a list of wavelength:value"},
     {"spectrum_of_one_sample.xml", 3, "at least two wavelengths"},
+    {"spectrum_in_micrometres.xml", 3, "in nanometres, but the longest is 0.7 (micrometres?)"},
     {"spectrum_not_increasing.xml", 3, "wavelengths must increase, but 400 follows 500"},
     {"spectrum_file_missing.xml", 3, "cannot read the file \"no_such.spd\""},
     {"spectrum_file_three_columns.xml", 3, "expected a wavelength and a value, found 3 numbers",

@@ -113,6 +113,13 @@ TEST(MitsubaScenes, AnythingAtTheTopCanBeReferredTo) {
     EXPECT_TRUE(has(scene.warnings(), "the one within it, \"path\", is rendered"));
 }
 
+TEST(MitsubaScenes, TheIntegratorDirectHasPathsOfTwoEdges) {
+    const Scene scene = read(front_camera(4) + kLamp + "<integrator type=\"direct\"/>");
+    EXPECT_EQ(scene.defaults().integrator, "path");
+    const std::vector<std::pair<std::string, std::string>> expected = {{"max_depth", "2"}};
+    EXPECT_EQ(scene.defaults().integrator_params, expected);
+}
+
 TEST(MitsubaScenes, TheIntegratorOfTheFileNeverStopsTheScene) {
     const Scene scene = read(front_camera(4) + kLamp + "<integrator type=\"no_such\"/>");
     EXPECT_NE(scene.defaults().integrator_problem.find("unknown integrator \"no_such\""),
