@@ -210,4 +210,25 @@ GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uin
     return fit;
 }
 
+GuideFit footprint_guide(std::span<const GuideSample* const> samples, uint64_t number) {
+    constexpr float kShare = 0.5f;
+    GuideFit fit;
+    double total = 0;
+    for (const GuideSample* s : samples) total += double(s->weight);
+    if (!(total > 0)) return fit;
+    const size_t count = std::min(samples.size(), kLobes);
+    // Fewer photons have larger footprints: the solid angle 4π/κ of a lobe is twice its part 2π/count of a hemisphere.
+    const float kappa = float(count);
+    const double offset = to_unit_double(mix64(number));
+    double sum = 0;
+    size_t made = 0;
+    for (const GuideSample* s : samples) {
+        sum += double(s->weight);
+        for (; made < count && (double(made) + offset) * total < sum * double(count); ++made)
+            fit.mixture.add({s->direction.unpack(), 0, kappa, 1 / float(count)});
+    }
+    if (!fit.mixture.is_empty()) fit.share.fill(kShare);
+    return fit;
+}
+
 }  // namespace etendue

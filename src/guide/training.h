@@ -84,4 +84,16 @@ struct GuideFit {
 /// samples' order; `number` seeds its choices.
 GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number);
 
+/// What the cells of a guide learn.
+enum class GuideLearning {
+    Mixtures,   ///< fit_guide(), for both modes.
+    Footprints  ///< footprint_guide(), for eye walks alone.
+};
+
+/// Footprints of photons [Hey & Purgathofer 2002]: at most GuideMixture::kMostLobes samples, chosen in proportion to
+/// their weights, are lobes of one width, without parallax. The share is ½ everywhere, and the gain is not estimated.
+/// Deviations from the paper: photons belong to a cell, not to the neighbourhood of the place, and lobes are von
+/// Mises-Fisher lobes. A function of the samples' order; `number` seeds the choice.
+GuideFit footprint_guide(std::span<const GuideSample* const> samples, uint64_t number);
+
 }  // namespace etendue

@@ -38,6 +38,7 @@ struct GuideTree::Builder {
 
     GuideTree& tree;
     const std::vector<GuideSample>& samples;
+    GuideLearning learning;
     std::vector<uint32_t> order{};
     std::vector<Leaf> leaves{};
 
@@ -94,15 +95,20 @@ struct GuideTree::Builder {
         for (size_t m = 0; m < 2; ++m) {
             const auto chosen = of_mode(l.ranges[m], m);
             if (chosen.empty()) continue;
-            fits[m] = fit_guide(chosen, cell.center, hash_combine(seed, 2 * leaf + m));
+            const uint64_t number = hash_combine(seed, 2 * leaf + m);
+            if (learning == GuideLearning::Mixtures)
+                fits[m] = fit_guide(chosen, cell.center, number);
+            else if (m == size_t(TransportMode::Radiance))
+                fits[m] = footprint_guide(chosen, number);
             cell.fields[m] = {fits[m].mixture, fits[m].share};
         }
     }
 };
 
-GuideTree::GuideTree(const std::vector<GuideSample>& samples, uint64_t seed) {
+GuideTree::GuideTree(const std::vector<GuideSample>& samples, uint64_t seed,
+                     GuideLearning learning) {
     if (samples.empty()) return;
-    Builder builder{*this, samples};
+    Builder builder{*this, samples, learning};
     builder.order.resize(samples.size());
     for (size_t i = 0; i < samples.size(); ++i) builder.order[i] = uint32_t(i);
     nodes_.resize(1);

@@ -53,7 +53,8 @@ class GuideTree {
 public:
     GuideTree() = default;
     /// Fits the cells in parallel; a function of the samples and their order. `seed` seeds its choices.
-    GuideTree(const std::vector<GuideSample>& samples, uint64_t seed);
+    GuideTree(const std::vector<GuideSample>& samples, uint64_t seed,
+              GuideLearning learning = GuideLearning::Mixtures);
     /// One cell for all places.
     explicit GuideTree(const GuideCell& cell) : nodes_(1), cells_{cell} {}
 

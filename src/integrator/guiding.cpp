@@ -233,15 +233,20 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
 std::vector<ParamInfo> Guiding::params() {
     return {{"guide", ParamKind::String, "off",
              "Learned directions for the walks: off, on, or auto (on, unless the training shows "
-             "that it gains too little). random is a useless guide for tests."},
+             "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
+             "alone, by footprints of photons [Hey & Purgathofer 2002]. random is a useless guide "
+             "for tests."},
             {"guide_roulette", ParamKind::Bool, "false",
              "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
              "walks had from the same place on. Has no effect if `guide` is off."}};
 }
 
 Guiding::Guiding(const IntegratorParams& p) {
-    constexpr std::array<Choice<Mode>, 4> kModes{
-        {{"off", Mode::Off}, {"on", Mode::On}, {"auto", Mode::Auto}, {"random", Mode::Random}}};
+    constexpr std::array<Choice<Mode>, 5> kModes{{{"off", Mode::Off},
+                                                  {"on", Mode::On},
+                                                  {"auto", Mode::Auto},
+                                                  {"hp02", Mode::Footprints},
+                                                  {"random", Mode::Random}}};
     mode_ = p.choice("guide", kModes);
     has_roulette_ = p.flag("guide_roulette");
 }
@@ -339,12 +344,14 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
         all.light_contribution += b.light_contribution;
     }
     auto guide = std::make_unique<Guide>();
-    guide->surfaces = GuideTree(all.samples, seed);
+    const bool has_footprints = mode_ == Mode::Footprints;
+    guide->surfaces = GuideTree(
+        all.samples, seed, has_footprints ? GuideLearning::Footprints : GuideLearning::Mixtures);
     if (guide->surfaces.is_empty()) return guide;
     guide->surfaces.set_importance(all.importons);
     guide->surfaces.set_contributions(all.contributions);
     guide->light_contribution = float(all.light_contribution / double(walks));
-    learn_emission(pass.scene, all.emission, hash_combine(seed, 1), *guide);
+    if (!has_footprints) learn_emission(pass.scene, all.emission, hash_combine(seed, 1), *guide);
     return guide;
 }
 

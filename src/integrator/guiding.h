@@ -35,7 +35,7 @@ public:
     void add_figures(std::vector<std::pair<std::string, double>>& figures) const;
 
 private:
-    enum class Mode { Off, On, Auto, Random };
+    enum class Mode { Off, On, Auto, Footprints, Random };
     /// `for_roulette`: whether the walks are joined, so that their contributions can be learned.
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
                                    GuidedWalks guided, uint64_t walks, uint64_t seed,

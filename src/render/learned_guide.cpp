@@ -30,7 +30,8 @@ IntegratorParams guided_params(IntegratorSpec& spec) {
         throw std::runtime_error(
             fmt::format("integrator \"{}\" has no guide; choose one that has (-i): {}", spec.name,
                         fmt::join(names, ", ")));
-    if (spec.params["guide"] != "random") spec.params["guide"] = "on";
+    std::string& guide = spec.params["guide"];
+    if (guide != "random" && guide != "hp02") guide = "on";
     return {spec, entry.info};
 }
 

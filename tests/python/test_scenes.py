@@ -74,7 +74,7 @@ def test_a_dict_and_its_xml_give_the_same_dump() -> None:
 
 @pytest.mark.parametrize(
     "name", ["ajar", "cornell", "demo", "environment", "furnace", "glass-caustic", "lantern", "leak", "many-lights", "ring",
-             "slit", "two-rooms"])
+             "slit", "two-rooms", "window"])
 def test_every_scene_survives_the_way_through_a_dict(scenes: Path, name: str) -> None:
     d = et.load(scenes / f"{name}.xml")
     assert et.load_dict(d.to_dict(), folder=scenes).dump() == d.dump()

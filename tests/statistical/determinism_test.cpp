@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(
     Integrators, Determinism,
     ::testing::Combine(::testing::Values("path", "light", "bdpt", "bdpt:eorr=true",
                                          "bdpt:connections=cache", "pcbpt", "vcm", "vcm:exact=true",
-                                         "upg+bdpt", "path:guide=on",
+                                         "upg+bdpt", "path:guide=on", "bdpt:guide=hp02",
                                          "upg+bdpt:guide=on,guide_roulette=true", "sppm",
                                          "ppm:eye_paths=2", "pm:light_paths=2000",
                                          "pm:light_paths=2000,cache_error=0.3,cache_rays=32",

@@ -172,6 +172,46 @@ TEST(GuideTree, IsTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(one, with(7));
 }
 
+/// Footprints of photons: eye walks alone, with one share.
+TEST(GuideTree, FootprintsGuideEyeWalksAlone) {
+    const std::vector<GuideSample> samples = samples_under_lamp(20000);
+    const GuideTree tree(samples, 1, GuideLearning::Footprints);
+    EXPECT_GT(tree.cells().size(), 4u);
+    for (const GuideCell& cell : tree.cells()) {
+        const GuideMixture& eye = cell.field(kEye).mixture;
+        EXPECT_TRUE(cell.field(kLight).mixture.is_empty());
+        for (size_t c = 0; c < size_t(kGuideClasses); ++c) {
+            EXPECT_EQ(cell.field(kEye).share[c], 0.5f);
+            EXPECT_EQ(cell.field(kLight).share[c], 0);
+        }
+        ASSERT_EQ(eye.size(), GuideMixture::kMostLobes);
+        for (int k = 0; k < eye.size(); ++k) {
+            EXPECT_EQ(eye.lobe(k).kappa, eye.lobe(0).kappa);
+            EXPECT_EQ(eye.lobe(k).inv_r, 0);
+        }
+        const Vec3 to_lamp = normalize(Vec3{0.2f, 0.3f, 1} - cell.center);
+        EXPECT_GT(eye.pdf({{}, {0, 0, 1}}, to_lamp), 1);
+    }
+}
+
+/// Photons become footprints in proportion to their weights, and fewer of them make larger ones.
+TEST(FootprintGuide, IsWeightedAndAdapts) {
+    GuideSample up, aside;
+    up.direction = PackedDirection({0, 0, 1});
+    aside.direction = PackedDirection({1, 0, 0});
+    up.weight = 3, aside.weight = 1;
+    std::vector<const GuideSample*> samples;
+    for (int i = 0; i < 50; ++i) samples.insert(samples.end(), {&up, &aside});
+    const GuideMixture many = footprint_guide(samples, 7).mixture;
+    int upward = 0;
+    for (int k = 0; k < many.size(); ++k) upward += many.lobe(k).mean.z > 0.9f;
+    EXPECT_NEAR(upward, 12, 1);
+    const GuideMixture two = footprint_guide(std::span(samples).first(2), 7).mixture;
+    ASSERT_EQ(two.size(), 2);
+    EXPECT_LT(two.lobe(0).kappa, many.lobe(0).kappa);
+    EXPECT_TRUE(footprint_guide({}, 7).mixture.is_empty());
+}
+
 TEST(GuideTree, CoincidentSamplesAreOneCell) {
     std::vector<GuideSample> samples = samples_under_lamp(10000);
     for (GuideSample& s : samples) s.p = {1, 2, 3};
