@@ -211,9 +211,9 @@ MetropolisPhotons::Pilot MetropolisPhotons::run_pilot(const PassContext& context
     }
 }
 
-std::unique_ptr<PhotonStates> MetropolisPhotons::make_states(
-    const PassContext& context,
-    const std::function<std::vector<Importon>()>& importons) {
+std::unique_ptr<PhotonStates>
+MetropolisPhotons::make_states(const PassContext& context,
+                               const std::function<std::vector<Importon>()>& importons) {
     constexpr float kRadius = 0.03f;  // Of the scene's.
     if (options_.target == PhotonTarget::Path)
         return path_photons(context, mapping_, user_paths_, options_.user_share);
@@ -262,13 +262,12 @@ MapPhotons MetropolisPhotons::trace(const PassContext& context, uint32_t pass,
     groups.advance(
         own,
         [&](uint64_t chain, int, const ChainContext& c, SplatSink&) -> std::unique_ptr<StateSink> {
-            return states_->deposits(
-                {.unit = unit,
-                 .least_share = options_.least_share,
-                 .key = hash_combine(hash_combine(own.seed, kDeposits), chain),
-                 .memory = memory,
-                 .out = results[chain]},
-                c);
+            return states_->deposits({.unit = unit,
+                                      .least_share = options_.least_share,
+                                      .key = hash_combine(hash_combine(own.seed, kDeposits), chain),
+                                      .memory = memory,
+                                      .out = results[chain]},
+                                     c);
         });
     groups.commit();
     b_ = groups.b();

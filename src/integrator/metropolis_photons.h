@@ -22,7 +22,7 @@ struct MetropolisPhotonOptions {
     double precision = 0.02;    ///< Required relative standard error of the normalisation b.
     double least_share = 0.25;  ///< Photons with a smaller share of a step's power pass roulette.
     uint64_t max_bytes = uint64_t(1) << 32;
-    std::string user_paths;   ///< File; empty: none.
+    std::string user_paths;  ///< File; empty: none.
     /// Target Importons: fraction of the independent light paths that follow user paths; Path: fraction of their proposals
     /// among these and bidirectional mutations.
     double user_share = 0.5;
@@ -47,8 +47,9 @@ private:
     };
     Pilot run_pilot(const PassContext& context, const StateSpace& space) const;
     /// nullptr if no path stores a photon.
-    std::unique_ptr<PhotonStates> make_states(
-        const PassContext& context, const std::function<std::vector<Importon>()>& importons);
+    std::unique_ptr<PhotonStates>
+    make_states(const PassContext& context,
+                const std::function<std::vector<Importon>()>& importons);
 
     const PhotonMapping& mapping_;
     MetropolisPhotonOptions options_;

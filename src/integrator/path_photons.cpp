@@ -32,9 +32,9 @@ constexpr int kLongestRemainder = 64;
 struct Deposit {
     int i;
     MapPhoton::Origin origin;
-    bool is_caustic;          ///< Whether it is in the caustic map; otherwise in the global map.
-    PathProduct flux;         ///< f_map
-    double unclamped;         ///< lum(f_map) q
+    bool is_caustic;   ///< Whether it is in the caustic map; otherwise in the global map.
+    PathProduct flux;  ///< f_map
+    double unclamped;  ///< lum(f_map) q
     double h;
 
     bool is_same(const Deposit& o) const { return i == o.i && is_caustic == o.is_caustic; }
@@ -64,7 +64,8 @@ public:
         if (!(f > 0)) return;
         int D = k - 1;
         while (D > 0 && !is_diffuse(x[D].v)) --D;
-        int first = D - 1;  // The first vertex from which only vertices that are not diffuse lead to D.
+        int first =
+            D - 1;  // The first vertex from which only vertices that are not diffuse lead to D.
         while (first > 0 && !is_diffuse(x[first].v)) --first;
         PhotonOrigins origins(mapping_, x[0].v);
         const auto add = [&](int i, MapPhoton::Origin origin, bool is_caustic, double q) {
@@ -93,9 +94,8 @@ public:
         const Vec3 wi = direction(v, x[d.i - 1].v);
         const double Y = luminance(d.flux);
         const Rgb colour(float(d.flux[0] / Y), float(d.flux[1] / Y), float(d.flux[2] / Y));
-        return {{v.p, wi, colour * float(power), &x.emitter(), d.i + 1},
-                d.origin,
-                arrival_side(v, wi)};
+        return {
+            {v.p, wi, colour * float(power), &x.emitter(), d.i + 1}, d.origin, arrival_side(v, wi)};
     }
 
     /// Makes z from x_0 … x_i and a sampled remainder, and returns the probability that this trial succeeds.
@@ -175,8 +175,7 @@ private:
         if (d.is_caustic && !has_finite_lens_) return 1 / rule_.clamped(d);
         uint64_t place = hash_combine(place_key(photon), d.is_caustic);
         // P depends on the colour of the flux.
-        for (const double f : d.flux)
-            place = hash_combine(place, std::bit_cast<uint64_t>(f));
+        for (const double f : d.flux) place = hash_combine(place, std::bit_cast<uint64_t>(f));
         const auto [at, is_new] = reciprocals_.try_emplace(place, 0.0);
         if (is_new) at->second = count_trials(x, d, key);
         return at->second;
@@ -218,8 +217,9 @@ double median(std::vector<std::array<double, 2>> values) {
 
 class PathPhotons final : public PhotonStates {
 public:
-    PathPhotons(const PassContext& context, const PhotonMapping& mapping, const PathMeasure& measure,
-                const std::optional<UserPaths>& user_paths, double user_share)
+    PathPhotons(const PassContext& context, const PhotonMapping& mapping,
+                const PathMeasure& measure, const std::optional<UserPaths>& user_paths,
+                double user_share)
         : measure_(measure), rule_(mapping, measure_) {
         // Without PM and the mutations of the eye's side, chains change x_0 … x_i more often, but know less of its remainder.
         mutations_.weights = {3, 1, 1, 1, 1, 0, 2};
@@ -236,8 +236,8 @@ public:
     const StateSpace& space() const override { return *space_; }
     std::unique_ptr<PhotonDeposits> deposits(const PhotonDeposits::Terms& terms,
                                              const ChainContext& c) const override {
-        return std::make_unique<PathDeposits>(
-            rule_, *space_, measure_.scene.sensor().has_finite_lens(), terms, c);
+        return std::make_unique<PathDeposits>(rule_, *space_,
+                                              measure_.scene.sensor().has_finite_lens(), terms, c);
     }
 
 private:
@@ -313,9 +313,9 @@ std::unique_ptr<PhotonStates> path_photons(const PassContext& context, const Pho
                                            double user_share) {
     const int longest = mapping.paths().max_depth();
     if (longest < kShortest) return nullptr;
-    const PathMeasure measure(
-        context.scene, reached_region(context.film.geometry(), context.film.filter()), kShortest,
-        longest);
+    const PathMeasure measure(context.scene,
+                              reached_region(context.film.geometry(), context.film.filter()),
+                              kShortest, longest);
     return std::make_unique<PathPhotons>(context, mapping, measure, user_paths, user_share);
 }
 

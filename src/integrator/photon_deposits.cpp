@@ -34,8 +34,7 @@ bool PhotonDeposits::Repeats::store(const MapPhoton& photon, std::vector<MapPhot
 
 uint64_t place_key(const MapPhoton& photon) {
     uint64_t key = uint64_t(photon.s);
-    for (const float x :
-         {photon.p.x, photon.p.y, photon.p.z, photon.wi.x, photon.wi.y})
+    for (const float x : {photon.p.x, photon.p.y, photon.p.z, photon.wi.x, photon.wi.y})
         key = hash_combine(key, std::bit_cast<uint32_t>(x));
     return key;
 }

@@ -8,7 +8,16 @@ namespace etendue {
 
 /// Mutations in path space, and their weights: one of those that can change a path is chosen in proportion.
 struct PathMutations {
-    enum Kind : int { Bidirectional, Lens, Caustic, MultiChain, LensSubpath, UserPath, PhotonMap, kCount };
+    enum Kind : int {
+        Bidirectional,
+        Lens,
+        Caustic,
+        MultiChain,
+        LensSubpath,
+        UserPath,
+        PhotonMap,
+        kCount
+    };
     static constexpr std::array<const char*, kCount> kNames{
         "bidirectional", "lens",      "caustic",   "multi_chain",
         "lens_subpath",  "user_path", "photon_map"};

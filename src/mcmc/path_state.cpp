@@ -203,8 +203,7 @@ PathProduct PathState::flux(int i) const {
     for (int j = 0; j < i; ++j) {
         const PathVertex& x = x_[size_t(j)];
         for (int c = 0; c < 3; ++c)
-            f[size_t(c)] *=
-                double(x.value[c]) * double(x.attenuation[c]) * double(x.transmittance);
+            f[size_t(c)] *= double(x.value[c]) * double(x.attenuation[c]) * double(x.transmittance);
     }
     return f;
 }
