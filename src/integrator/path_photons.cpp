@@ -221,8 +221,12 @@ public:
                 const PathMeasure& measure, const std::optional<UserPaths>& user_paths,
                 double user_share)
         : measure_(measure), rule_(mapping, measure_) {
-        // Without PM and the mutations of the eye's side, chains change x_0 … x_i more often, but know less of its remainder.
-        mutations_.weights = {3, 1, 1, 1, 1, 0, 2};
+        // Mutations of the eye's side have small weights, because they store few new photons.
+        mutations_.weights[PathMutations::Bidirectional] = 3;
+        for (const auto kind : {PathMutations::Lens, PathMutations::Caustic,
+                                PathMutations::MultiChain, PathMutations::LensSubpath})
+            mutations_.weights[kind] = 1;
+        mutations_.weights[PathMutations::PhotonMap] = 2;
         if (user_paths) {
             mutations_.user_paths = *user_paths;
             mutations_.weights[PathMutations::UserPath] =
