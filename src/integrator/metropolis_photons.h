@@ -3,7 +3,7 @@
 // traced light paths. See mps.cpp for the method.
 
 #include "integrator/markov.h"
-#include "integrator/photon_source.h"
+#include "integrator/photon_deposits.h"
 #include "mcmc/user_paths.h"
 
 namespace etendue {
@@ -11,7 +11,7 @@ namespace etendue {
 /// The target function of the chains for a photon.
 enum class PhotonTarget : uint8_t {
     Importons,  ///< Its flux times a density of importons.
-    Path,       ///< Its flux where a random path from it to the lens is not blocked.
+    Path,       ///< Its flux times the clamped response of the lens to a path from it.
 };
 
 struct MetropolisPhotonOptions {
@@ -22,11 +22,11 @@ struct MetropolisPhotonOptions {
     double precision = 0.02;    ///< Required relative standard error of the normalisation b.
     double least_share = 0.25;  ///< Photons with a smaller share of a step's power pass roulette.
     uint64_t max_bytes = uint64_t(1) << 32;
-    std::string user_paths;   ///< File; empty: none.
-    double user_share = 0.5;  ///< Fraction of the independent light paths that follow user paths.
+    std::string user_paths;  ///< File; empty: none.
+    /// Target Importons: fraction of the independent light paths that follow user paths; Path: fraction of their proposals
+    /// among these and bidirectional mutations.
+    double user_share = 0.5;
 };
-
-class PhotonSpace;
 
 class MetropolisPhotons final : public PhotonSource {
 public:
@@ -45,16 +45,21 @@ private:
         double b = 0, relative_variance = 0;
         uint64_t samples = 0;
     };
-    Pilot run_pilot(const PassContext& context, const PhotonSpace& space) const;
+    Pilot run_pilot(const PassContext& context, const StateSpace& space) const;
+    /// nullptr if no path stores a photon.
+    std::unique_ptr<PhotonStates>
+    make_states(const PassContext& context,
+                const std::function<std::vector<Importon>()>& importons);
 
     const PhotonMapping& mapping_;
     MetropolisPhotonOptions options_;
     std::optional<PhotonImportance> importance_;  ///< Set by the first trace(), then fixed.
     std::optional<UserPaths> user_paths_;         ///< The same.
+    std::unique_ptr<PhotonStates> states_;        ///< The same.
 
     // Statistics of the last trace().
     Pilot pilot_;
-    uint64_t pool_ = 0, photons_ = 0, deposits_ = 0, trials_ = 0;
+    uint64_t pool_ = 0, photons_ = 0, reciprocals_ = 0, trials_ = 0;
     double b_ = 0;
     ChainStats stats_;
 };

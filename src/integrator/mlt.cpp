@@ -30,7 +30,7 @@ protected:
         const int longest = paths_.max_depth();
         PathTarget target{
             PathMeasure(scene, reached_region(scene.film(), scene.filter()), kShortest, longest),
-            pilot.map, LengthChoice(kShortest, longest, pilot),
+            weighted_luminance(pilot.map), LengthChoice(kShortest, longest, pilot),
             TechniqueChoice(kShortest, std::min(kTabulated, longest - kShortest + 1),
                             hits_emitters(scene), n.hit_lens > 0, pilot)};
         const ClassPlan plan{.chains = options_.chains,

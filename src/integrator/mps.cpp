@@ -1,13 +1,13 @@
-// Metropolis photon sampling [Fan et al. 2005]: photon mapping as in pm.cpp, whose photons come from Markov chains over
-// light sub-paths. A state is the set of random numbers of a light path. Small steps change all of them, block steps
+// Metropolis photon sampling [Fan et al. 2005]: photon mapping as in pm.cpp, whose photons come from Markov chains. With the
+// target importons, a state is the set of random numbers of a light path. Small steps change all of them, block steps
 // draw those of some vertices anew, and large steps draw a whole path anew. In primary sample space all steps are
 // symmetric. A step that changes only late vertices keeps the beginning of the path, like the perturbations of [Fan et
-// al. 2005]. User paths are a second way to draw the beginning of a light path; the densities of both ways add up.
+// al. 2005]. With the target path, it is a full path, see path_photons.cpp. User paths are a second way to draw the beginning of a light path; the densities of both ways add up.
 //
 // The target of a photon with flux Φ at x is lum(Φ) times
 // - importons: the density of importance I at x, plus a floor. The power of a photon is b Φ / (lum(Φ) I).
-// - path: a = min(1, h/h_0), where h is the response of the lens to a random remainder of the path from x. The power of a
-//   photon is b Φ/lum(Φ) r, where r is the number of trials of remainders until one succeeds with probability a, so that
+// - path: q min(1, h/h_0), where q is the density of the remainder of the path from x to the lens, and h the response of
+//   the lens to this remainder. The power of a photon is b Φ/lum(Φ) r, where r is the number of trials of remainders until one succeeds with probability a, so that
 //   E[r] = 1/P(x). The printed power, Φ times a ratio of path contributions, compares densities over spaces of different
 //   dimensions.
 //
@@ -47,7 +47,7 @@ IntegratorEntry mps_entry() {
         {"target", ParamKind::String, "importons",
          "Target function of the chains for a photon: importons (its flux times the density of "
          "importance at its position) or path (its flux times the clamped response of the lens "
-         "to a random path from there)."});
+         "to a path from there)."});
     params.push_back({"p_large", ParamKind::Float, "0.3",
                       "Probability of a large step, which is an independent light path; in [0.01, "
                       "1]."});
@@ -57,12 +57,15 @@ IntegratorEntry mps_entry() {
         {"precision", ParamKind::Float, "0.02",
          "Required relative standard error of the normalisation, 0.001 to 0.5; determines the "
          "number of light paths of the start-up."});
-    params.push_back({"user_paths", ParamKind::String, "",
-                      "JSON file of important light sub-paths, which `etendue paths` makes and "
-                      "checks; a part of the independent light paths follows them."});
+    params.push_back(
+        {"user_paths", ParamKind::String, "",
+         "JSON file of important light sub-paths, which `etendue paths` makes and "
+         "checks; a part of the independent light paths (with target=path, of the proposals) "
+         "follows them."});
     params.push_back({"user_share", ParamKind::Float, "0.5",
                       "Fraction of the independent light paths that follow user paths, in [0.01, "
-                      "0.99]."});
+                      "0.99]; with target=path, of proposals near user paths among these and "
+                      "bidirectional mutations."});
     params.push_back(
         {"least_share", ParamKind::Float, "0.25",
          "A photon with less than this fraction, in [0, 1], of the power of one mutation is kept "

@@ -29,20 +29,39 @@ public:
     virtual std::vector<std::pair<std::string, double>> figures() const { return {}; }
 };
 
+/// Which vertices of a light path store a photon, from y_1 on.
+class PhotonOrigins {
+public:
+    PhotonOrigins(const PhotonMapping& mapping, const Vertex& y0)
+        : mapping_(mapping), by_delta_(y0.emitter->is_delta()) {}
+    /// The origin of a photon at the next vertex; empty if none is stored there.
+    std::optional<MapPhoton::Origin> next(const Vertex& v) {
+        using Origin = MapPhoton::Origin;
+        const Origin origin = ++i_ == 1 || !by_glossy_ ? Origin::Any
+                              : by_delta_              ? Origin::DeltaCaustic
+                                                       : Origin::Caustic;
+        by_delta_ &= v.is_delta;
+        by_glossy_ &= v.is_delta || !mapping_.is_diffuse(v);
+        const bool is_stored =
+            v.is_connectible && (mapping_.is_diffuse(v) || origin == Origin::DeltaCaustic);
+        return is_stored ? std::optional(origin) : std::nullopt;
+    }
+
+private:
+    const PhotonMapping& mapping_;
+    int i_ = 0;
+    bool by_delta_, by_glossy_ = true;
+};
+
 /// Calls use(photon) for the photons of the light path y. Their flux is that of this path alone, not divided by N_L.
 template <class Use>
 void for_each_photon(const PhotonMapping& mapping, const SubPath& y, const Use& use) {
-    bool by_delta = y.size() > 0 && y[0].emitter->is_delta(), by_glossy = true;
+    if (y.size() == 0) return;
+    PhotonOrigins origins(mapping, y[0]);
     for (int i = 1; i < y.size(); ++i) {
         const Vertex& v = y[i];
-        using Origin = MapPhoton::Origin;
-        const Origin origin = i == 1 || !by_glossy ? Origin::Any
-                              : by_delta           ? Origin::DeltaCaustic
-                                                   : Origin::Caustic;
-        if (v.is_connectible && (mapping.is_diffuse(v) || origin == Origin::DeltaCaustic))
-            use(MapPhoton{{v.p, v.wo, v.beta, y[0].emitter, i + 1}, origin, arrival_side(v)});
-        by_delta &= v.is_delta;
-        by_glossy &= v.is_delta || !mapping.is_diffuse(v);
+        if (const auto origin = origins.next(v))
+            use(MapPhoton{{v.p, v.wo, v.beta, y[0].emitter, i + 1}, *origin, arrival_side(v)});
     }
 }
 

@@ -83,7 +83,10 @@ bool PathBuilder::sample_step() {
     return s && step<mode>(*s);
 }
 
-bool PathBuilder::sample_eye_delta() {
+bool PathBuilder::sample_light_step() {
+    return sample_step<TransportMode::Importance>();
+}
+bool PathBuilder::sample_eye_step() {
     return sample_step<TransportMode::Radiance>();
 }
 bool PathBuilder::step_light(const BsdfSample& s) {

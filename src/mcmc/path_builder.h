@@ -28,8 +28,9 @@ public:
     bool start_light(const Emitter& emitter, const EmissionSample& e);
     /// Makes a light sub-path close to one of the user paths.
     bool follow(const UserPaths& paths);
-    /// Appends a vertex at a vertex that has only delta events.
-    bool sample_eye_delta();
+    /// Appends a vertex by a sampled event.
+    bool sample_light_step();
+    bool sample_eye_step();
     /// Appends a vertex by a given event.
     bool step_light(const BsdfSample& s);
     bool step_eye(const BsdfSample& s);

@@ -4,6 +4,7 @@
 #include "mcmc/mutation/caustic.h"
 #include "mcmc/mutation/eye_chain.h"
 #include "mcmc/mutation/lens_subpath.h"
+#include "mcmc/mutation/photon_map.h"
 #include "mcmc/mutation/user_path.h"
 
 namespace etendue {
@@ -18,6 +19,7 @@ PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, Techniqu
     mutations_[PathMutations::MultiChain] =
         std::make_unique<EyeChain>(EyeChain::Kind::MultiChain, measure);
     mutations_[PathMutations::LensSubpath] = std::make_unique<LensSubpathMutation>();
+    mutations_[PathMutations::PhotonMap] = std::make_unique<PhotonMapMutation>();
     if (options_.user_paths)
         mutations_[PathMutations::UserPath] =
             std::make_unique<UserPathMutation>(measure, *options_.user_paths);

@@ -8,10 +8,20 @@ namespace etendue {
 
 /// Mutations in path space, and their weights: one of those that can change a path is chosen in proportion.
 struct PathMutations {
-    enum Kind : int { Bidirectional, Lens, Caustic, MultiChain, LensSubpath, UserPath, kCount };
+    enum Kind : int {
+        Bidirectional,
+        Lens,
+        Caustic,
+        MultiChain,
+        LensSubpath,
+        UserPath,
+        PhotonMap,
+        kCount
+    };
     static constexpr std::array<const char*, kCount> kNames{
-        "bidirectional", "lens", "caustic", "multi_chain", "lens_subpath", "user_path"};
-    std::array<double, kCount> weights{2, 2, 2, 2, 1, 0};
+        "bidirectional", "lens",      "caustic",   "multi_chain",
+        "lens_subpath",  "user_path", "photon_map"};
+    std::array<double, kCount> weights{2, 2, 2, 2, 1, 0, 0};
     std::optional<UserPaths> user_paths{};  ///< Required if their weight is not 0.
 };
 

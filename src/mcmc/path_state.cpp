@@ -19,6 +19,18 @@ Vec3 surface_normal(const Vertex& v) {
 
 }  // namespace
 
+PathImportance weighted_luminance(TargetMap map) {
+    return [map = std::move(map)](const PathState& x, Rgb value) {
+        return double(luminance(value)) * map(x.film);
+    };
+}
+
+double luminance(const PathProduct& f) {
+    constexpr Rgb kRed{1, 0, 0}, kGreen{0, 1, 0}, kBlue{0, 0, 1};
+    return f[0] * double(luminance(kRed)) + f[1] * double(luminance(kGreen)) +
+           f[2] * double(luminance(kBlue));
+}
+
 PathMeasure::PathMeasure(const Scene& of, const FilmRegion& region, int shortest_path,
                          int longest_path)
     : scene(of), film(region), shortest(shortest_path), longest(longest_path), unit_area(1) {
@@ -53,11 +65,17 @@ void PathState::copy(const PathState& from) {
     splats = from.splats;
     film = from.film;
     large_step_density_ = from.large_step_density_;
-    f_ = from.f_;
 }
 
 double PathState::geometry(int from, int to) const {
     return measure_.unit_area * double(to_area(1, x_[size_t(from)].v, x_[size_t(to)].v));
+}
+
+/// The factor of f at x_i for light that arrives from x_{i-1}, without masks: |cos θ|/d² per unit_area.
+double PathState::arrival(int i) const {
+    const Vertex &before = x_[size_t(i) - 1].v, &x = x_[size_t(i)].v;
+    return measure_.unit_area * inverse_square(before, x) *
+           double(abs_dot(x.ng, direction(x, before)));
 }
 
 void PathState::scatter(int i) {
@@ -85,9 +103,7 @@ void PathState::scatter(int i) {
     // An eye path that leaves the scene chooses among the emitters at infinity.
     if (before.v.is_infinite && !emitter().is_delta())
         before.eye /= double(measure_.scene.infinite_emitters().size());
-    x.value *= float(measure_.unit_area * inverse_square(before.v, x.v) *
-                     double(abs_dot(x.v.ng, to_light))) *
-               x.opacity;
+    x.value *= float(arrival(i)) * x.opacity;
 }
 
 bool PathState::evaluate(int first, int last) {
@@ -164,17 +180,32 @@ double PathState::density(int s) const {
     const int n = size(), k = n - 1;
     if (s == 0 ? emitter().is_delta() : s < n && !is_connected_at(s - 1)) return 0;
     double p = 1;
-    // A ray that samples a vertex passes the masks before it, and meets its surface.
-    for (int i = 0; i < s; ++i) {
-        const PathVertex& x = x_[size_t(i)];
-        p *= i == 0 ? (s == 1 ? x.next_event : x.light)
-                    : x.light * double(x_[size_t(i) - 1].transmittance * x.opacity);
-    }
-    for (int i = s; i <= k; ++i) {
-        const PathVertex& x = x_[size_t(i)];
-        p *= i == k ? x.eye : x.eye * double(x.transmittance * x.opacity);
-    }
+    for (int i = 0; i < s; ++i)
+        p *= i > 0 ? ray_density_from_light(i) : s == 1 ? x_[0].next_event : x_[0].light;
+    for (int i = s; i <= k; ++i) p *= i == k ? x_[size_t(i)].eye : ray_density_from_eye(i);
     return p;
+}
+
+PathProduct PathState::contribution() const {
+    PathProduct f{1, 1, 1};
+    for (const PathVertex& x : x_)
+        for (int c = 0; c < 3; ++c)
+            f[size_t(c)] *=
+                double(x.value[c]) *
+                (&x == &x_.back() ? 1.0 : double(x.attenuation[c]) * double(x.transmittance));
+    return f;
+}
+
+PathProduct PathState::flux(int i) const {
+    // One unit_area for each vertex, x_0 included.
+    const double end = measure_.unit_area * arrival(i) * double(x_[size_t(i)].opacity);
+    PathProduct f{end, end, end};
+    for (int j = 0; j < i; ++j) {
+        const PathVertex& x = x_[size_t(j)];
+        for (int c = 0; c < 3; ++c)
+            f[size_t(c)] *= double(x.value[c]) * double(x.attenuation[c]) * double(x.transmittance);
+    }
+    return f;
 }
 
 void PathState::set_black() {
@@ -187,20 +218,16 @@ void PathState::finish() {
     const int k = last();
     set_black();
     edges = k;
-    f_ = {1, 1, 1};
-    for (const PathVertex& x : x_)
-        for (int c = 0; c < 3; ++c)
-            f_[size_t(c)] *=
-                double(x.value[c]) *
-                (&x == &x_.back() ? 1.0 : double(x.attenuation[c]) * double(x.transmittance));
     double T = 0;
     for (int s = 0; s <= k + 1; ++s)
         if (const double p = target_.techniques.pmf(k, s); p > 0) T += p * density(s);
     large_step_density_ = T *= target_.lengths.pmf(k);
     if (!(T > 0)) return;
-    const Rgb value(float(f_[0] / T), float(f_[1] / T), float(f_[2] / T));
-    const double I = double(luminance(value)) * target_.map(film);
-    if (!(I > 0) || !is_finite(value)) return;
+    const PathProduct f = contribution();
+    const Rgb value(float(f[0] / T), float(f[1] / T), float(f[2] / T));
+    if (!is_finite(value)) return;
+    const double I = target_.importance(*this, value);
+    if (!(I > 0)) return;
     target = I;
     splats.push_back({film, value});
 }

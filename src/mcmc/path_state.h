@@ -6,6 +6,8 @@
 // the direction toward the eye given the direction toward the light, and keep the geometry term of the edge behind the
 // event. Areas are in units of PathMeasure::unit_area, so that products over long paths neither overflow nor underflow.
 
+#include <functional>
+
 #include "mcmc/state.h"
 #include "mcmc/target_map.h"
 #include "mcmc/technique_choice.h"
@@ -22,13 +24,24 @@ struct PathMeasure {
     PathMeasure(const Scene& of, const FilmRegion& region, int shortest_path, int longest_path);
 };
 
-/// The terms of the target of a path: W, and the probabilities with which large steps choose length and technique.
+class PathState;
+
+/// The target of a path, divided by the density T of large steps. `value` is its contribution to the image, divided by T.
+using PathImportance = std::function<double(const PathState& x, Rgb value)>;
+/// Luminance times W.
+PathImportance weighted_luminance(TargetMap map);
+
+/// The terms of the target of a path, and the probabilities with which large steps choose length and technique.
 struct PathTarget {
     PathMeasure measure;
-    TargetMap map;
+    PathImportance importance;
     LengthChoice lengths;
     TechniqueChoice techniques;
 };
+
+/// A product over the vertices of a path, by colour. Long paths exceed the range of float.
+using PathProduct = std::array<double, 3>;
+double luminance(const PathProduct& f);
 
 /// A vertex of a full path.
 struct PathVertex {
@@ -85,7 +98,20 @@ public:
     void set_black();
     /// Density with which the technique C(s, k+1-s) samples the path.
     double density(int s) const;
+    /// Density of x_i per unit_area as a ray from x_{i-1} or from x_{i+1} samples it: it passes the masks before it, and
+    /// meets its surface.
+    double ray_density_from_light(int i) const {
+        return x_[size_t(i)].light *
+               double(x_[size_t(i) - 1].transmittance * x_[size_t(i)].opacity);
+    }
+    double ray_density_from_eye(int i) const {
+        return x_[size_t(i)].eye * double(x_[size_t(i)].transmittance * x_[size_t(i)].opacity);
+    }
     double large_step_density() const { return large_step_density_; }
+    /// f, the contribution to the image.
+    PathProduct contribution() const;
+    /// The same for the light sub-path x_0 … x_i: its flux at x_i, without scattering there. i ≥ 1.
+    PathProduct flux(int i) const;
     /// Reports the path as the joins of all techniques with their MIS weights, whose sum is its contribution. y and z of
     /// `work` then hold the path.
     void tell(const TechniqueCounts& counts, Workspace& work, ContributionSink& sink) const;
@@ -95,6 +121,7 @@ public:
 
 private:
     double geometry(int from, int to) const;
+    double arrival(int i) const;
     void scatter(int i);
     Vec3 lens_point() const;
 
@@ -103,7 +130,6 @@ private:
     std::vector<PathVertex> x_;
     ComponentArena arena_;
     double large_step_density_ = 0;
-    std::array<double, 3> f_{};
 };
 
 }  // namespace etendue

@@ -33,8 +33,8 @@ std::vector<GivenPath> pick_paths(const Scene& scene, const PickOptions& o) {
     bool hits = false;
     for (const auto& e : scene.emitters()) hits |= !e->is_delta();
     const Pilot none{.map = TargetMap(g), .by_technique = {}};
-    const PathSpace space({PathMeasure(scene, pixel, o.length, o.length), none.map,
-                           LengthChoice(o.length, o.length, none),
+    const PathSpace space({PathMeasure(scene, pixel, o.length, o.length),
+                           weighted_luminance(none.map), LengthChoice(o.length, o.length, none),
                            TechniqueChoice(o.length, 1, hits, hits_lens, none)},
                           {}, {});
     const Film film(g, scene.filter());

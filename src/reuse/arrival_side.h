@@ -72,9 +72,13 @@ private:
     uint16_t bits_ = 0;
 };
 
-/// The side on which the walk arrived at surface vertex `v`.
+/// The side of surface vertex `v` on which a walk arrives that comes from the direction `from`.
+inline ArrivalSide arrival_side(const Vertex& v, Vec3 from) {
+    return {dot(v.ng, from) < 0 ? -v.ng : v.ng, v.shape->material->is_transmissive()};
+}
+/// The side on which the walk arrived at `v`.
 inline ArrivalSide arrival_side(const Vertex& v) {
-    return {dot(v.ng, v.wo) < 0 ? -v.ng : v.ng, v.shape->material->is_transmissive()};
+    return arrival_side(v, v.wo);
 }
 
 }  // namespace etendue

@@ -19,7 +19,7 @@ bool LensSubpathMutation::propose(const PathState& x, const MutationContext& c, 
     PathBuilder builder = c.builder(&x, l, k + 1);
     if (!builder.start_eye_anywhere()) return false;
     for (int n = l + 3; !builder.eye_end().is_connectible; ++n)
-        if (n > c.measure.longest || !builder.sample_eye_delta()) return false;
+        if (n > c.measure.longest || !builder.sample_eye_step()) return false;
     if (!builder.finish(y)) return false;
     way = {.l = l, .m = k + 1, .m_y = y.last() + 1};
     return true;

@@ -28,7 +28,8 @@ public:
         const TechniqueCounts counts{
             .hit = 1, .next_event = 1, .connect = 1, .splat = N, .hit_lens = hits_lens ? N : 0.0f};
         return std::make_unique<PathSpace>(
-            PathTarget{measure(), pilot.map, LengthChoice(kShortest, kLongest, pilot),
+            PathTarget{measure(), weighted_luminance(pilot.map),
+                       LengthChoice(kShortest, kLongest, pilot),
                        TechniqueChoice(kShortest, 8, hits, hits_lens, pilot)},
             mutations, counts);
     }
