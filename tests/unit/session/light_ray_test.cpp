@@ -205,7 +205,7 @@ TEST(DrawnShapes, HaveFewerTrianglesInMotion) {
     for (const uint32_t i : mesh.coarse_triangles) {
         ASSERT_LT(i, mesh.positions.size() / 3);
         const uint16_t* p = &mesh.positions[3 * size_t(i)];
-        coarse.extend(Vec3(p[0], p[1], p[2]) * (1 / 65535.0f));
+        coarse.extend(Vec3{float(p[0]), float(p[1]), float(p[2])} * (1 / 65535.0f));
     }
     for (int axis = 0; axis < 3; ++axis) {
         EXPECT_LT(coarse.lo[axis], 0.1f);
