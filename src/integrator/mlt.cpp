@@ -34,7 +34,7 @@ protected:
             TechniqueChoice(kShortest, std::min(kTabulated, longest - kShortest + 1),
                             hits_emitters(scene), n.hit_lens > 0, pilot)};
         const ClassPlan plan{.chains = options_.chains,
-                             .pool = pool_samples(4 * pilot.samples, options_),
+                             .pool = pool_samples(4 * pilot.precise_samples, options_),
                              .c = pilot.b};
         PathMutations mutations;
         if (!user_paths_.empty()) {
@@ -56,7 +56,7 @@ IntegratorEntry mlt_entry() {
     std::vector<ParamInfo> params{depth_params()[0]};
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     for (ParamInfo& p : params)
-        if (p.name == std::string("p_large")) p.fallback = "0.15";
+        if (p.name == std::string("p_large")) p.fallback = "0.1";
     params.push_back({"user_paths", ParamKind::String, "",
                       "JSON file of important light sub-paths, which `etendue paths` makes and "
                       "checks; proposals near them are mixed with bidirectional mutations."});

@@ -93,7 +93,7 @@ private:
         double total = 0;
         for (int i = 0; i < classes; ++i)
             total += share[size_t(i)] = b[size_t(i)] / std::sqrt(double(kShortest + i));
-        const uint64_t pool = pool_samples(4 * pilot.samples, options_);
+        const uint64_t pool = pool_samples(4 * pilot.precise_samples, options_);
         const int spare = std::max(0, options_.chains - kFewest * classes);
         std::vector<ClassPlan> plan;
         double sum = 0;

@@ -20,8 +20,9 @@ public:
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
-        const ClassPlan plan{
-            .chains = options_.chains, .pool = pool_samples(pilot.samples, options_), .c = pilot.b};
+        const ClassPlan plan{.chains = options_.chains,
+                             .pool = pool_samples(pilot.precise_samples, options_),
+                             .c = pilot.b};
         return {
             std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene, paths_), pilot.map),
             {plan}};

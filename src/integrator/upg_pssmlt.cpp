@@ -272,8 +272,9 @@ protected:
         gathering_->density = density;
         gathering_->trace(pass, key(pass, kFrozen, 0), frozen_, radius_);
 
-        const ClassPlan plan{
-            .chains = options_.chains, .pool = pool_samples(pilot.samples, options_), .c = pilot.b};
+        const ClassPlan plan{.chains = options_.chains,
+                             .pool = pool_samples(pilot.precise_samples, options_),
+                             .c = pilot.b};
         return {std::make_unique<GatherSpace>(*gathering_, frozen_, pilot.map, kFloor * pilot.b),
                 {plan}};
     }

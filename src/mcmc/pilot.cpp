@@ -22,6 +22,7 @@ void Pilot::save(LearnedState& to) const {
     to.put(b);
     to.put(relative_variance);
     to.put(samples);
+    to.put(precise_samples);
     to.put(uint64_t(by_technique.size()));
     for (const auto& [technique, value] : by_technique) {
         to.put(technique.first);
@@ -35,6 +36,7 @@ void Pilot::load(LearnedState& from) {
     from.get(b);
     from.get(relative_variance);
     from.get(samples);
+    from.get(precise_samples);
     uint64_t techniques = 0;
     from.get(techniques);
     by_technique.clear();
@@ -46,8 +48,8 @@ void Pilot::load(LearnedState& from) {
     }
 }
 
-uint64_t pool_samples(uint64_t pilot_samples, const ChainOptions& options) {
-    return std::max(pilot_samples / 4, uint64_t(4 * options.chains));
+uint64_t pool_samples(uint64_t precise_samples, const ChainOptions& options) {
+    return std::max(precise_samples / 4, uint64_t(4 * options.chains));
 }
 
 Pilot run_pilot(const PassContext& pass, const PrimarySample& sample) {
@@ -73,9 +75,10 @@ Pilot run_pilot(const PassContext& pass, const PrimarySample& sample) {
             evaluate_sample(sample, 0, source, {whole.sample, work}, collector);
         };
         pass.for_each_other_path(splats.size() - done, trace);
-        for (uint64_t i = done; i < splats.size(); ++i)
-            for (const PilotSplat& s : splats[i]) pilot.map.add(s.film, double(s.luminance));
-        pilot.map.learn(splats.size());
+        pilot.map = TargetMap(pass.film.geometry(), splats.size());
+        for (const auto& of_sample : splats)
+            for (const PilotSplat& s : of_sample) pilot.map.add(s.film, double(s.luminance));
+        pilot.map.learn();
 
         Moments target;
         pilot.by_technique.clear();
@@ -93,7 +96,9 @@ Pilot run_pilot(const PassContext& pass, const PrimarySample& sample) {
         pilot.relative_variance = pilot.b > 0 ? target.variance() / sqr(pilot.b) : 0;
         // As many again have the same error.
         const double error = std::sqrt(pilot.relative_variance / double(pilot.samples));
-        if (pilot.samples >= most || (pilot.b > 0 && error <= kPrecision)) return pilot;
+        const bool is_precise = pilot.b > 0 && error <= kPrecision;
+        if (!is_precise || pilot.precise_samples == 0) pilot.precise_samples = pilot.samples;
+        if (pilot.samples >= most || (is_precise && pilot.samples >= pass.pixels)) return pilot;
     }
 }
 

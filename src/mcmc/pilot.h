@@ -14,6 +14,7 @@ struct Pilot {
     double b = 0;                  ///< Mean of the target.
     double relative_variance = 0;  ///< Variance of the target of one sample, divided by b².
     uint64_t samples = 0;
+    uint64_t precise_samples = 0;  ///< Those that sufficed for b; the others improve the map.
     /// Mean of the target by length and number of light vertices.
     std::map<std::pair<int, int>, double> by_technique;  ///< (edges, s)
 
@@ -21,11 +22,11 @@ struct Pilot {
     void load(LearnedState& from);
 };
 
-/// Samples class 0 of `sample`. The number of samples is doubled until the relative standard error of b is at most 2 %; at
-/// most two samples per pixel, and 2^18 in total.
+/// Samples class 0 of `sample`. The number of samples is doubled until there is one for each pixel and the relative standard
+/// error of b is at most 2 %; at most two samples per pixel, and 2^18 in total.
 Pilot run_pilot(const PassContext& pass, const PrimarySample& sample);
 
-/// Number of samples in the pool of a group: a quarter of the pilot's, and at least four for each chain.
-uint64_t pool_samples(uint64_t pilot_samples, const ChainOptions& options);
+/// Number of samples in the pool of a group: a quarter of Pilot::precise_samples, and at least four for each chain.
+uint64_t pool_samples(uint64_t precise_samples, const ChainOptions& options);
 
 }  // namespace etendue

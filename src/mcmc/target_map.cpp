@@ -1,16 +1,30 @@
 #include "mcmc/target_map.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "math/vec.h"
 
 namespace etendue {
+namespace {
 
-TargetMap::TargetMap(const FilmGeometry& geometry)
-    : geometry_(geometry), columns_((geometry.crop_width + kTile - 1) / kTile),
-      rows_((geometry.crop_height + kTile - 1) / kTile), sums_(size_t(columns_) * size_t(rows_)),
+/// Width of tiles of which each has about 64 samples, from 2 to 64 pixels.
+int tile_width(const FilmGeometry& geometry, uint64_t samples) {
+    constexpr double kSamples = 64;
+    const double per_pixel = double(samples) / std::max(1.0, double(geometry.pixel_count()));
+    return int(std::clamp(std::ceil(std::sqrt(kSamples / std::max(per_pixel, 1e-6))), 2.0, 64.0));
+}
+
+}  // namespace
+
+TargetMap::TargetMap(const FilmGeometry& geometry, uint64_t samples)
+    : geometry_(geometry), samples_(samples), tile_(tile_width(geometry, samples)),
+      columns_((geometry.crop_width + tile_ - 1) / tile_),
+      rows_((geometry.crop_height + tile_ - 1) / tile_), sums_(size_t(columns_) * size_t(rows_)),
       luminance_(sums_.size()) {}
 
-void TargetMap::learn(uint64_t samples) {
-    const auto pixels = [](int tile, int size) { return std::min(kTile, size - tile * kTile); };
+void TargetMap::learn() {
+    const auto pixels = [&](int tile, int size) { return std::min(tile_, size - tile * tile_); };
     double total = 0;
     std::vector<double> mean(sums_.size());
     for (int y = 0; y < rows_; ++y)
@@ -18,40 +32,41 @@ void TargetMap::learn(uint64_t samples) {
             const size_t i = size_t(y) * size_t(columns_) + size_t(x);
             const double area =
                 double(pixels(x, geometry_.crop_width)) * double(pixels(y, geometry_.crop_height));
-            mean[i] = sums_[i] / (double(samples) * area);
+            mean[i] = sums_[i] / (double(samples_) * area);
             total += sums_[i];
         }
-    // Smoothed by 1 2 1 in both directions, since a tile may have had few samples.
+    // Smoothed by 1 2 1 in both directions, since a tile may have had few samples. The mean of square roots follows the
+    // darker tiles: too large an L leaves a tile with few steps, too small an L only wastes some.
     for (int y = 0; y < rows_; ++y)
         for (int x = 0; x < columns_; ++x) {
             double sum = 0, weights = 0;
             for (int v = std::max(0, y - 1); v <= std::min(rows_ - 1, y + 1); ++v)
                 for (int u = std::max(0, x - 1); u <= std::min(columns_ - 1, x + 1); ++u) {
                     const double w = (u == x ? 2 : 1) * (v == y ? 2 : 1);
-                    sum += w * mean[size_t(v) * size_t(columns_) + size_t(u)];
+                    sum += w * std::sqrt(mean[size_t(v) * size_t(columns_) + size_t(u)]);
                     weights += w;
                 }
-            luminance_[size_t(y) * size_t(columns_) + size_t(x)] = sum / weights;
+            luminance_[size_t(y) * size_t(columns_) + size_t(x)] = sqr(sum / weights);
         }
-    const double average = total / (double(samples) * double(geometry_.pixel_count()));
+    const double average = total / (double(samples_) * double(geometry_.pixel_count()));
     floor2_ = average > 0 ? 0.01 * sqr(average) : 1.0;
 }
 
 double TargetMap::operator()(Vec2 film) const {
     // Between the centres of tiles.
-    const auto clamp = [](float v, int count) {
-        return std::min(std::max(v / kTile - 0.5f, 0.0f), float(count - 1));
+    const auto clamp = [&](float v, int count) {
+        return std::min(std::max(v / float(tile_) - 0.5f, 0.0f), float(count - 1));
     };
     const float x = clamp(film.x - float(geometry_.crop_x), columns_),
                 y = clamp(film.y - float(geometry_.crop_y), rows_);
-    const int x0 = int(x), y0 = int(y);
-    const int x1 = std::min(x0 + 1, columns_ - 1), y1 = std::min(y0 + 1, rows_ - 1);
-    const double u = double(x) - x0, v = double(y) - y0;
+    const int left = int(x), top = int(y);
+    const int right = std::min(left + 1, columns_ - 1), bottom = std::min(top + 1, rows_ - 1);
+    const double u = double(x) - left, v = double(y) - top;
     const auto at = [&](int column, int row) {
         return luminance_[size_t(row) * size_t(columns_) + size_t(column)];
     };
-    const double L = (1 - v) * ((1 - u) * at(x0, y0) + u * at(x1, y0)) +
-                     v * ((1 - u) * at(x0, y1) + u * at(x1, y1));
+    const double L = (1 - v) * ((1 - u) * at(left, top) + u * at(right, top)) +
+                     v * ((1 - u) * at(left, bottom) + u * at(right, bottom));
     return 1 / std::sqrt(L * L + floor2_);
 }
 

@@ -85,8 +85,10 @@ public:
 private:
     /// Positions of consecutive entries, for tests of several at a time.
     static constexpr uint32_t kBlock = 8;
-    struct alignas(32) Block {
-        std::array<float, kBlock> x, y, z;
+    using Lanes [[gnu::vector_size(kBlock * sizeof(float))]] = float;
+    using Bits [[gnu::vector_size(kBlock * sizeof(float))]] = int32_t;
+    struct Block {
+        Lanes x, y, z;
     };
 
     /// Calls use(entry) for the entries from `begin` to `end` that are nearer to `p` than the root of `radius2`.
@@ -96,11 +98,10 @@ private:
             const uint32_t of_block = first / kBlock * kBlock;
             const uint32_t last = std::min(end, of_block + kBlock);
             const Block& b = blocks_[of_block / kBlock];
-            std::array<float, kBlock> d2;
-            for (size_t i = 0; i < kBlock; ++i)
-                d2[i] = sqr(b.x[i] - p.x) + sqr(b.y[i] - p.y) + sqr(b.z[i] - p.z);
+            const Lanes x = b.x - p.x, y = b.y - p.y, z = b.z - p.z;
+            const Bits bits = (x * x + y * y + z * z < radius2) & Bits{1, 2, 4, 8, 16, 32, 64, 128};
             uint32_t near = 0;
-            for (size_t i = 0; i < kBlock; ++i) near |= uint32_t(d2[i] < radius2) << i;
+            for (uint32_t i = 0; i < kBlock; ++i) near |= uint32_t(bits[i]);
             near &= (1u << (last - of_block)) - (1u << (first - of_block));
             for (; near != 0; near &= near - 1)
                 use(entries_[of_block + uint32_t(std::countr_zero(near))]);
