@@ -18,8 +18,7 @@ TargetMap map_of(const FilmGeometry& g, uint64_t per_pixel, const Value& value) 
         for (int x = g.crop_x; x < g.crop_x + g.crop_width; ++x)
             for (uint64_t i = 0; i < per_pixel; ++i)
                 // A sample of the whole film is the pixel's value times the film's area.
-                map.add({float(x) + 0.5f, float(y) + 0.5f},
-                        value(x, y) * double(g.pixel_count()));
+                map.add({float(x) + 0.5f, float(y) + 0.5f}, value(x, y) * double(g.pixel_count()));
     map.learn();
     return map;
 }
