@@ -163,7 +163,9 @@ Share best_share(const std::vector<Densities>& samples) {
 
 GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number) {
     constexpr int kSteps = 8;
-    constexpr double kSamplesPerLobe = 6, kLeastGain = 0.1;
+    constexpr double kSamplesPerLobe = 6;
+    // In nats: guided directions take up to twice the time, and spread light paths that other techniques rely on.
+    constexpr double kLeastGain = 0.6;
     GuideFit fit;
     double mean = 0;
     for (const GuideSample* s : samples) mean += double(s->weight) / double(samples.size());
