@@ -236,7 +236,7 @@ std::vector<ParamInfo> Guiding::params() {
              "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
              "alone, by footprints of photons [Hey & Purgathofer 2002]. random is a useless guide "
              "for tests."},
-            {"guide_roulette", ParamKind::Bool, "false",
+            {"guide_roulette", ParamKind::Bool, "true",
              "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
              "walks had from the same place on. Has no effect if `guide` is off."}};
 }

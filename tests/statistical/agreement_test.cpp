@@ -176,8 +176,8 @@ protected:
         const TileOptions plan{factor * c.passes, 4, 2};
         const Tiles path = render_tiles(scene, "path", {2 * factor * c.passes, 4, 1});
         for (const std::string guide :
-             {"guide=on", "guide=hp02", "guide=random", "guide=on,guide_roulette=true",
-              "guide=random,guide_roulette=true"}) {
+             {"guide=on", "guide=hp02", "guide=random", "guide=on,guide_roulette=false",
+              "guide=random,guide_roulette=false"}) {
             for (const std::string method :
                  {"path:", "bdpt:", "upg+bdpt:radius=0.12,", "pcbpt:record_fraction=0.02,"}) {
                 // Alone, eye paths that a bad guide misleads would need too many samples.

@@ -83,22 +83,23 @@ TEST_P(Resume, GivesTheSameBits) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Integrators, Resume,
-    ::testing::Values("path:guide=on", "bdpt:eorr=true", "bdpt:connections=cache",
-                      "upg+bdpt:guide=on,guide_roulette=true", "vcm:radius=0.3", "vcm:exact=true",
-                      "upg", "upg+bdpt", "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
-                      "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
-                      "upg+pssmlt:groups=2,chains=16", "pm:light_paths=2000",
-                      "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
-                      "mps:mutations=2000,precision=0.2",
-                      "mps:mutations=500,precision=0.2,retrace=true"),
-    [](const auto& p) {
-        std::string name = p.param;
-        std::replace_if(
-            name.begin(), name.end(), [](char c) { return !std::isalnum(c); }, '_');
-        return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Integrators, Resume,
+                         ::testing::Values("path:guide=on,guide_roulette=false", "bdpt:eorr=true",
+                                           "bdpt:connections=cache", "upg+bdpt:guide=on",
+                                           "vcm:radius=0.3", "vcm:exact=true", "upg", "upg+bdpt",
+                                           "sppm", "pcbpt", "pssmlt:groups=2,chains=16",
+                                           "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
+                                           "upg+pssmlt:groups=2,chains=16", "pm:light_paths=2000",
+                                           "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
+                                           "mps:mutations=2000,precision=0.2",
+                                           "mps:mutations=500,precision=0.2,retrace=true"),
+                         [](const auto& p) {
+                             std::string name = p.param;
+                             std::replace_if(
+                                 name.begin(), name.end(), [](char c) { return !std::isalnum(c); },
+                                 '_');
+                             return name;
+                         });
 
 TEST(LearnedState, OfAnotherIntegratorIsRefused) {
     LearnedState state;
