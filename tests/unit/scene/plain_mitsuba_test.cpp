@@ -166,6 +166,15 @@ TEST(PlainMitsuba, TexturesOfUvBecomeImages) {
     EXPECT_TRUE(scene.images[0].bytes.starts_with("PF\n"));
 }
 
+// The pixels of a square image have one colour each, so the other image is much finer.
+TEST(PlainMitsuba, SquareEnvironmentsAreFine) {
+    SceneDescription scene = read_scene_file(std::string(ETENDUE_SOURCE_DIR) +
+                                             "/tests/scenes/formats/pbrt4/environment.pbrt");
+    make_plain_mitsuba(scene);
+    ASSERT_EQ(scene.images.size(), 1u);
+    EXPECT_TRUE(scene.images[0].bytes.starts_with("PF\n1024 512\n"));
+}
+
 // Mitsuba 3 renders no bump map of another texture: it has no gradient of it.
 TEST(PlainMitsuba, BumpMapsAreOfImages) {
     SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="bumpmap">
