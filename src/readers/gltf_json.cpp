@@ -14,7 +14,8 @@ void JsonValue::fail_type(const char* expected) const {
         value_->is_structured()
             ? std::string(value_->is_array() ? "an array" : "an object")
             : value_->dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
-    fail(fmt::format("{}, but is {}", expected, found.substr(0, kMost)));
+    fail(fmt::format("{}, but is {}{}{}", expected, value_->is_string() ? "the string " : "",
+                     found.substr(0, kMost), found.size() > kMost ? "..." : ""));
 }
 
 JsonValue JsonValue::operator[](std::string_view member) const {
@@ -87,7 +88,7 @@ int64_t JsonValue::integer(int64_t fallback, int64_t lo, int64_t hi) const {
 
 std::optional<size_t> JsonValue::index(size_t count) const {
     if (!value_) return {};
-    if (count == 0) fail("refers to an entry of an empty list");
+    if (count == 0 && value_->is_number_integer()) fail("refers to an entry of an empty list");
     return size_t(integer(0, 0, int64_t(count) - 1));
 }
 

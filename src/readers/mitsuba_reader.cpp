@@ -12,6 +12,7 @@
 #include "readers/mitsuba_values.h"
 #include "readers/nesting.h"
 #include "readers/object_graph.h"
+#include "readers/xml_tags.h"
 
 namespace etendue {
 namespace {
@@ -107,9 +108,15 @@ void MitsubaReader::read_document(std::string_view text, const std::string& file
     // parse_fragment keeps text outside the root, which is an error; with encoding_utf8 offsets are those of `text`.
     const auto parsed = document.load_buffer(
         text.data(), text.size(), pugi::parse_default | pugi::parse_fragment, pugi::encoding_utf8);
-    if (!parsed)
+    if (!parsed) {
+        const std::string what =
+            parsed.status == pugi::status_end_element_mismatch
+                ? describe_wrong_end(text, size_t(parsed.offset),
+                                     [&](size_t offset) { return source.line(ptrdiff_t(offset)); })
+                : parsed.description();
         throw SceneError({file, source.line(parsed.offset)},
-                         fmt::format("malformed XML: {}", parsed.description()));
+                         fmt::format("malformed XML: {}", what));
+    }
 
     Source* const includer = source_;
     source_ = &source;

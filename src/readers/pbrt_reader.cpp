@@ -409,7 +409,10 @@ void PbrtReader::named_material(PbrtTokenizer& in) {
     scene_.state.material_where = in.where();
     scene_.state.named_material = unescape(in.string());
     // pbrt-v4 may define the material later.
-    if (scene_.is_v3()) scene_.current_material();
+    if (scene_.is_v3())
+        scene_.current_material();
+    else if (!scene_.named_materials.contains(scene_.state.named_material))
+        not_yet_made_.emplace_back(scene_.state.named_material, scene_.state.material_where);
 }
 
 // ---- Lights and shapes
@@ -560,6 +563,7 @@ void PbrtReader::finish(const SourceLocation& end) {
     if (!stack_.empty())
         throw SceneError(stack_.back().where,
                          fmt::format("{} is never closed", stack_.back().what));
+    for (const auto& [name, where] : not_yet_made_) scene_.named_material(name, where);
 }
 
 }  // namespace etendue

@@ -92,6 +92,7 @@ private:
     PbrtScene scene_;
     std::vector<Saved> stack_;
     std::map<std::string, Transform> coordinate_systems_;
+    std::vector<std::pair<std::string, PbrtPlace>> not_yet_made_;  ///< Of NamedMaterial.
     PbrtArguments camera_, film_, filter_, sampler_, integrator_;
     Transform camera_from_world_;
     bool in_world_ = false, world_ended_ = false;

@@ -134,16 +134,17 @@ void PbrtScene::warn(const SourceLocation& where, const std::string& message) {
     description.warnings.push_back(SceneError(where, message).what());
 }
 
+int PbrtScene::named_material(const std::string& name, const SourceLocation& where) const {
+    const auto it = named_materials.find(name);
+    if (it == named_materials.end())
+        throw SceneError(where, fmt::format("there is no named material {}{}", quote(name),
+                                            hint(name, names_of(named_materials))));
+    return it->second;
+}
+
 int PbrtScene::current_material() {
-    if (!state.named_material.empty()) {
-        const auto it = named_materials.find(state.named_material);
-        if (it == named_materials.end())
-            throw SceneError(state.material_where,
-                             fmt::format("there is no named material {}{}",
-                                         quote(state.named_material),
-                                         hint(state.named_material, names_of(named_materials))));
-        return it->second;
-    }
+    if (!state.named_material.empty())
+        return named_material(state.named_material, state.material_where);
     if (state.material >= 0) return state.material;
     if (default_material_ < 0) {
         const int diffuse = add("bsdf", "diffuse", {});

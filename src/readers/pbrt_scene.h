@@ -61,6 +61,8 @@ public:
     void refuse(const SourceLocation& where, const std::string& what, const std::string& stand_in);
     void warn(const SourceLocation& where, const std::string& message);
 
+    /// The object of a named material; `where` is where it is named.
+    int named_material(const std::string& name, const SourceLocation& where) const;
     /// What a shape shows: the current material, made where none was given.
     int current_material();
     /// Adds a shape of the current group or of the scene, with its material and emitter.

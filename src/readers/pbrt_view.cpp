@@ -143,6 +143,8 @@ int make_film(PbrtScene& scene, const PbrtArguments& args) {
     const int film = scene.add("film", "hdrfilm", args.where());
     scene.set(film, "width", int64_t(scene.film_width));
     scene.set(film, "height", int64_t(scene.film_height));
+    // As far as the filter reaches, like every film of pbrt.
+    scene.set(film, "sample_border", true);
     if (crop[1] - crop[0] < scene.film_width || crop[3] - crop[2] < scene.film_height) {
         scene.set(film, "crop_offset_x", int64_t(crop[0]));
         scene.set(film, "crop_offset_y", int64_t(crop[2]));

@@ -155,7 +155,10 @@ private:
         for (const SceneObject::Child& c : parent.children) {
             if (scene_.objects[size_t(c.object)].category != "texture") continue;
             const bool needs_number = c.name.starts_with("alpha") && parent.type == "roughplastic";
-            if (is_plain_texture(c.object) && !needs_number) continue;
+            // Mitsuba 3 knows the gradient of images alone.
+            const bool needs_image =
+                parent.type == "bumpmap" && original_.objects[size_t(c.object)].type != "bitmap";
+            if (is_plain_texture(c.object) && !needs_number && !needs_image) continue;
             const Texture* texture = models_.make_texture(c.object);
             const bool is_uniform = !depends_on(c.object, [](const SceneObject& o) {
                 return o.type != "constant" && o.type != "scale" && o.type != "mix" &&
@@ -369,10 +372,11 @@ private:
         remove(o, "filename");
         set_image(o, pfm(image.width, image.height, image.pixels));
     }
-    /// An image in the equal-area projection as one of latitudes and longitudes, with about as many pixels.
+    /// An image in the equal-area projection as one of latitudes and longitudes. Its pixels have one colour each here, and
+    /// their edges stay sharp only in an image that is much finer.
     static RgbImage latitudes_and_longitudes(const RgbImage& square) {
         RgbImage out;
-        out.height = std::max(16, square.height), out.width = 2 * out.height;
+        out.height = std::max(kBakedSize, square.height), out.width = 2 * out.height;
         for (int y = 0; y < out.height; ++y)
             for (int x = 0; x < out.width; ++x) {
                 const float theta = kPi * (float(y) + 0.5f) / float(out.height),

@@ -1,6 +1,7 @@
 """Renders one scene with etendue and with Mitsuba 3 and tests whether the images agree.
 
-Shared by compare_mitsuba.py (whole scenes) and compare_conventions.py (one plug-in at a time).
+Shared by compare_mitsuba.py (whole scenes), compare_conventions.py (one plug-in at a time) and
+compare_converted.py (what `etendue convert` writes).
 Needs the PyPI packages mitsuba, numpy and scipy; ensure_packages() makes them available.
 """
 
@@ -12,6 +13,7 @@ import subprocess
 import sys
 import time
 import warnings
+import xml.etree.ElementTree as ElementTree
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FALSE_ALARM = 0.01
@@ -62,12 +64,13 @@ class Mitsuba:
 
         mitsuba.set_variant(variant)
         mitsuba.set_log_level(mitsuba.LogLevel.Error)
-        drjit.set_thread_count(args.threads)
+        drjit.set_thread_count(max(2, args.threads))  # scalar variants wait for ever with one
         self.mitsuba = mitsuba
         self.version = f"Mitsuba {mitsuba.__version__} {variant}"
 
-    def open(self, file):
-        self.scene = self.mitsuba.load_file(str(file))
+    def open(self, file, **options):
+        """options: those of load_file, as optimize=False."""
+        self.scene = self.mitsuba.load_file(str(file), parallel=False, **options)
 
     def render(self, spp, seed):
         import numpy as np
@@ -81,6 +84,7 @@ class Etendue:
         self.name = integrator
         self.args = args
         self.output = folder / "etendue.exr"
+        self.more = []  # options of the program
 
     def open(self, file, *options):
         """options: parameters of the integrator, as 'max_depth=5'."""
@@ -90,8 +94,10 @@ class Etendue:
     def render(self, spp, seed):
         command = [self.args.etendue, "render", str(self.file), "-o", str(self.output), "--quiet"]
         command += ["-i", self.integrator, "--spp", str(spp), "--seed", str(seed)]
-        command += ["--threads", str(self.args.threads)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        command += ["--threads", str(self.args.threads), *self.more]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            raise RuntimeError(done.stderr.strip())
         return read_image(self.output)
 
 
@@ -118,12 +124,44 @@ def write_stretched_environment(file, source):
 
     image = read_image(source)
     rows = len(image)
-    finer = 4  # so that both interpolate the same, nearly
-    y = np.linspace(0, rows, finer * rows) - 0.5
+    # The centres of the source's rows are among those of this grid, so that both interpolate the same.
+    grid = 2 * rows + 1
+    y = np.linspace(0, rows, grid) - 0.5
     above = np.floor(y).astype(int)
     below_share = (y - above)[:, None, None]
     row = [image[np.clip(above + i, 0, rows - 1)] for i in (0, 1)]
     write_image(file, (1 - below_share) * row[0] + below_share * row[1])
+
+
+def adapt_to_mitsuba(scene, integrator, folder):
+    """Changes `scene`, the root element of a file of `folder`: what the file means here, said in the words of
+    Mitsuba 3.9; see docs/agreement.md."""
+    if any(scene.iter("medium")):
+        integrator.set("type", "volpath")
+    # Pixels at the edge are sampled beyond the border here.
+    for film in scene.iter("film"):
+        for child in film.findall("boolean[@name='sample_border']"):
+            film.remove(child)
+        ElementTree.SubElement(film, "boolean", name="sample_border", value="true")
+    # Options of newer versions that change what the file meant when it was written.
+    for bsdf in scene.iter("bsdf"):
+        if bsdf.get("type") in ("normalmap", "bumpmap"):
+            for option in ("flip_invalid_normals", "use_shadowing_function"):
+                if bsdf.find(f"boolean[@name='{option}']") is None:
+                    ElementTree.SubElement(bsdf, "boolean", name=option, value="false")
+    # Newer versions stretch an environment by half a row at each pole.
+    for file in scene.findall("emitter[@type='envmap']/string[@name='filename']"):
+        write_stretched_environment(folder / "compare-environment.exr", folder / file.get("value"))
+        file.set("value", "compare-environment.exr")
+    # Newer versions give a constant spectrum of an emitter the colour of a flat spectrum, not white.
+    for emitter in scene.iter("emitter"):
+        for child in emitter.findall("spectrum"):
+            if ":" not in child.get("value", ":"):
+                child.tag = "rgb"
+    for parent in [*scene.iter("shape"), *scene.iter("film")]:  # parameters of 0.6 only
+        for name in ("collapse", "high_quality_edges"):
+            for child in parent.findall(f"boolean[@name='{name}']"):
+                parent.remove(child)
 
 
 def independent_runs(renderer, runs, seconds):

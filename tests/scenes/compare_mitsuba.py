@@ -84,7 +84,7 @@ class Case:
             (folder / entry.name).symlink_to(entry)
         self.ours = folder / "compare-etendue.xml"
         tree.write(self.ours)
-        self.adapt_to_mitsuba(scene, integrator, folder)
+        agreement.adapt_to_mitsuba(scene, integrator, folder)
         self.theirs = folder / "compare-mitsuba.xml"
         tree.write(self.theirs)
 
@@ -96,32 +96,6 @@ class Case:
                 scale = ElementTree.Element("scale", value=str(factor))
                 shape.find("transform").insert(0, scale)
                 radiance.set("value", str(float(radiance.get("value")) / factor**2))
-
-    @staticmethod
-    def adapt_to_mitsuba(scene, integrator, folder):
-        """What the file means here, said in the words of Mitsuba 3.9; see docs/agreement.md."""
-        if any(scene.iter("medium")):
-            integrator.set("type", "volpath")
-        # Options of newer versions that change what the file meant when it was written.
-        for bsdf in scene.iter("bsdf"):
-            if bsdf.get("type") in ("normalmap", "bumpmap"):
-                for option in ("flip_invalid_normals", "use_shadowing_function"):
-                    ElementTree.SubElement(bsdf, "boolean", name=option, value="false")
-        # Newer versions stretch an environment by half a row at each pole.
-        for file in scene.findall("emitter[@type='envmap']/string[@name='filename']"):
-            agreement.write_stretched_environment(
-                folder / "compare-environment.exr", folder / file.get("value")
-            )
-            file.set("value", "compare-environment.exr")
-        # Newer versions give a constant spectrum of an emitter the colour of a flat spectrum, not white.
-        for emitter in scene.iter("emitter"):
-            for child in emitter.findall("spectrum"):
-                if ":" not in child.get("value", ":"):
-                    child.tag = "rgb"
-        for parent in [*scene.iter("shape"), *scene.iter("film")]:  # parameters of 0.6 only
-            for name in ("collapse", "high_quality_edges"):
-                for child in parent.findall(f"boolean[@name='{name}']"):
-                    parent.remove(child)
 
 
 def renderer_line(name, result):

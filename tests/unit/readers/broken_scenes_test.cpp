@@ -1,5 +1,5 @@
 // Every file of tests/scenes/broken has one mistake, described by its name; the reader must refuse it with the message
-// in this table. The reader accepts the files in tests/scenes/broken/builder, and the scene builder must refuse them.
+// in this table; those of pbrt and glTF are in folders of these names. The reader accepts the files in tests/scenes/broken/builder, and the scene builder must refuse them.
 
 #include <filesystem>
 #include <fstream>
@@ -10,6 +10,7 @@
 
 #include "expect_scene_error.h"
 #include "readers/mitsuba_xml.h"
+#include "readers/scene_file.h"
 
 namespace etendue {
 namespace {
@@ -24,8 +25,13 @@ struct BrokenScene {
 };
 
 constexpr BrokenScene kBrokenScenes[] = {
-    {"mismatched_tag.xml", 3, "malformed XML: Start-end tags mismatch"},
-    {"unclosed_element.xml", 3, "malformed XML"},
+    {"mismatched_tag.xml", 3,
+     "malformed XML: <shape>, which begins in line 2, must be closed before </bsdf>"},
+    {"unclosed_element.xml", 3,
+     "malformed XML: <shape>, which begins in line 2, is never closed: </scene> follows"},
+    {"unclosed_at_end.xml", 4,
+     "malformed XML: <shape>, which begins in line 3, is never closed: the file ends"},
+    {"end_of_nothing.xml", 3, "malformed XML: </scene> closes nothing: no element is open"},
     {"unclosed_comment.xml", 3, "malformed XML: Error parsing comment"},
     {"unquoted_attribute.xml", 2, "malformed XML: Error parsing element attribute"},
     {"empty_file.xml", 1, "expected a <scene>"},
@@ -120,6 +126,16 @@ constexpr BrokenScene kBrokenScenes[] = {
     {"include_of_text.xml", 1, "unexpected text", "parts/three_columns.spd"},
     {"path_in_object.xml", 3, "a <path> can only stand in the <scene>"},
     {"gamma.xml", 3, "gamma 2.2 is not supported"},
+    {"pbrt/named_material_used.pbrt", 4,
+     "there is no named material \"gild\" (did you mean \"gold\"?)"},
+    {"pbrt/named_material_unused.pbrt", 4,
+     "there is no named material \"gild\" (did you mean \"gold\"?)"},
+    {"gltf/string_for_number.gltf", 0,
+     "/cameras/0/perspective/yfov: must be a number, but is the string \"0.8\""},
+    {"gltf/string_for_number_in_array.gltf", 0,
+     "/nodes/0/translation/1: must be a number, but is the string \"one\""},
+    {"gltf/string_for_index.gltf", 0,
+     "/nodes/0/camera: must be an integer, but is the string \"front\""},
 };
 
 fs::path folder() {
@@ -134,7 +150,7 @@ TEST(BrokenScenes, AreRefusedWithFileAndLine) {
             (folder() / (broken.faulty ? broken.faulty : broken.file)).string();
         expect_scene_error(broken.line, broken.message, [&] {
             try {
-                read_mitsuba_xml(file);
+                read_scene_file(file);
             } catch (const SceneError& e) {
                 EXPECT_EQ(fs::path(e.where().file.str()).lexically_normal(),
                           fs::path(faulty).lexically_normal());
@@ -147,8 +163,10 @@ TEST(BrokenScenes, AreRefusedWithFileAndLine) {
 TEST(BrokenScenes, TheTableListsEveryFile) {
     std::set<std::string> listed, found;
     for (const BrokenScene& broken : kBrokenScenes) listed.insert(broken.file);
-    for (const auto& entry : fs::directory_iterator(folder()))
-        if (entry.path().extension() == ".xml") found.insert(entry.path().filename().string());
+    for (const char* format : {"", "pbrt", "gltf"})
+        for (const auto& entry : fs::directory_iterator(folder() / format))
+            if (entry.is_regular_file())
+                found.insert((fs::path(format) / entry.path().filename()).generic_string());
     EXPECT_EQ(listed, found);
     EXPECT_GE(found.size(), 40u);
 }

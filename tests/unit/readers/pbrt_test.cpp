@@ -113,6 +113,11 @@ TEST(Pbrt, VersionIsThatOfTheEndOrOfTheFilm) {
               640);
 }
 
+TEST(Pbrt, FilmsAreSampledBeyondTheirBorder) {
+    for (const SceneDescription& scene : {parse3(""), parse4("")})
+        EXPECT_TRUE(value<bool>(child(scene, find(scene, "sensor"), "film"), "sample_border"));
+}
+
 // ---- Transforms and attributes
 
 Transform to_world(const SceneDescription& scene) {
@@ -578,6 +583,7 @@ TEST(Pbrt, ErrorsNameTheLineAndWhatIsNear) {
         {"Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]\n\"normal N\" [0 0 1]", 3,
          "there are 1 normals, but 3 points"},
         {"NamedMaterial \"a\"\nShape \"sphere\"", 2, "there is no named material \"a\""},
+        {"NamedMaterial \"a\"", 2, "there is no named material \"a\""},
         {"MakeNamedMaterial \"a\"", 2, "needs a \"string type\""},
         {"Material \"subsurface\"", 2, "scattering below the surface is not supported"},
         {"Material \"diffuse\" \"texture reflectance\" \"t\"", 2,

@@ -166,6 +166,31 @@ TEST(PlainMitsuba, TexturesOfUvBecomeImages) {
     EXPECT_TRUE(scene.images[0].bytes.starts_with("PF\n"));
 }
 
+// The pixels of a square image have one colour each, so the other image is much finer.
+TEST(PlainMitsuba, SquareEnvironmentsAreFine) {
+    SceneDescription scene = read_scene_file(std::string(ETENDUE_SOURCE_DIR) +
+                                             "/tests/scenes/formats/pbrt4/environment.pbrt");
+    make_plain_mitsuba(scene);
+    ASSERT_EQ(scene.images.size(), 1u);
+    EXPECT_TRUE(scene.images[0].bytes.starts_with("PF\n1024 512\n"));
+}
+
+// Mitsuba 3 renders no bump map of another texture: it has no gradient of it.
+TEST(PlainMitsuba, BumpMapsAreOfImages) {
+    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="bumpmap">
+        <texture type="checkerboard" name="arbitrary"/><bsdf type="diffuse">
+        <texture type="checkerboard" name="reflectance"/></bsdf></bsdf></shape>)");
+    make_plain_mitsuba(scene);
+    for (const SceneObject& o : scene.objects)
+        for (const SceneObject::Child& c : o.children) {
+            const SceneObject& texture = scene.objects[size_t(c.object)];
+            if (texture.category == "texture") {
+                EXPECT_EQ(texture.type, o.type == "bumpmap" ? "bitmap" : "checkerboard");
+            }
+        }
+    EXPECT_EQ(scene.images.size(), 1u);
+}
+
 TEST(PlainMitsuba, ColoursOfMeshesAreWrittenAsFloats) {
     SceneDescription scene = read_scene_file(std::string(ETENDUE_SOURCE_DIR) +
                                              "/tests/scenes/formats/mitsuba3/textures.xml");
