@@ -13,7 +13,8 @@
 namespace etendue::test {
 namespace {
 
-const std::string kScene = ETENDUE_SOURCE_DIR "/scenes/two-rooms.xml";
+const std::string kScene = ETENDUE_SOURCE_DIR "/scenes/two-rooms.xml",
+                  kGuided = ETENDUE_SOURCE_DIR "/scenes/lantern.xml";  ///< both walks gain
 
 class GuideInfoTest : public ::testing::Test {
 protected:
@@ -35,7 +36,8 @@ protected:
 
 TEST_F(GuideInfoTest, ImagesAgreeWithTheFigures) {
     const ProgramResult r = run({"--json", "--threads", "3", "--shares", file("shares.exr"),
-                                 "--pixel", "20,30", "--directions", file("directions.exr")});
+                                 "--pixel", "20,30", "--directions", file("directions.exr")},
+                                kGuided);
     ASSERT_EQ(r.status, 0) << r.errors;
     const auto guide = nlohmann::json::parse(r.output)["guide"];
     EXPECT_GT(guide["cells"].get<int>(), 4);
@@ -51,6 +53,7 @@ TEST_F(GuideInfoTest, ImagesAgreeWithTheFigures) {
     EXPECT_NEAR(eye / double(shares.pixel_count()), guide["share_eye"].get<double>(), 1e-4);
     EXPECT_NEAR(light / double(shares.pixel_count()), guide["share_light"].get<double>(), 1e-4);
     EXPECT_GT(eye, 0);
+    EXPECT_GT(light, 0);
     EXPECT_GE(shares.channel("cells.R"), 0);
 
     // Each density integrates to one, and is largest about one of the listed lobes.

@@ -12,14 +12,15 @@ namespace {
 constexpr auto kEye = TransportMode::Radiance, kLight = TransportMode::Importance;
 
 struct LearnedRoulette : ::testing::Test {
+    static constexpr int kWidth = 192, kPixels = kWidth * kWidth;
     /// The lamp is left of the partition, whose right side it does not see.
     const Scene scene =
-        test::build(test::front_camera(32) + test::room() + test::area_lamp() +
+        test::build(test::front_camera(kWidth) + test::room() + test::area_lamp() +
                     test::rectangle("<scale x=\"1\" y=\"0.7\"/><rotate y=\"1\" angle=\"90\"/>"
                                     "<translate x=\"0.4\" y=\"-0.3\"/>",
                                     test::diffuse("0.7,0.7,0.7")));
     const Film film{scene.film(), scene.filter()};
-    const LearnedGuide learned{scene, IntegratorSpec::parse("bdpt:guide_roulette=true"), 1, 2};
+    const LearnedGuide learned{scene, IntegratorSpec::parse("bdpt:guide=on"), 1, 2};
 
     /// Means over vertices from the third on whose contribution is known.
     struct Walks {
@@ -29,7 +30,7 @@ struct LearnedRoulette : ::testing::Test {
     template <TransportMode mode>
     Walks trace(const Guide& guide) {
         const TechniqueCounts counts{
-            .hit = 1, .next_event = 1, .connect = 1, .splat = 1024, .guide = &guide};
+            .hit = 1, .next_event = 1, .connect = 1, .splat = kPixels, .guide = &guide};
         RenderStats stats;
         const WalkContext walk{scene, counts, stats, {12, 1000}};
         SubPath path;
@@ -38,7 +39,7 @@ struct LearnedRoulette : ::testing::Test {
             Sampler sampler(SamplerKind::Independent, 3);
             sampler.start(1, index);
             if (mode == kEye)
-                trace_eye_path(walk, film, index % 1024, sampler, path);
+                trace_eye_path(walk, film, index % kPixels, sampler, path);
             else
                 trace_light_path(walk, sampler, path);
             for (int i = 2; i + 1 < path.size(); ++i) {
