@@ -369,12 +369,23 @@ int Session::start(const RunRequest& request) {
 
 void Session::stop(int id) {
     const std::lock_guard lock(mutex_);
-    request_stop(find(id));
+    stop(find(id));
+}
+
+void Session::stop(const std::shared_ptr<Run>& run) {
+    if (run->status.state == RunState::Rendering) return request_stop(run);
+    // An earlier resume() may still wait.
+    commands_.push_back([this, run] {
+        const std::lock_guard lock(mutex_);
+        request_stop(run);
+    });
+    turn_over_ = true;
+    wake_.notify_all();
 }
 
 void Session::discard(int id) {
     const std::lock_guard lock(mutex_);
-    request_stop(find(id));
+    stop(find(id));
     if (turn_of_ == id) drop_ = true;
 }
 

@@ -156,6 +156,8 @@ private:
     void finish_stop(Run& run);
     /// Marks a run as stopping, and lets the session's thread do the rest. Needs the mutex.
     void request_stop(const std::shared_ptr<Run>& run);
+    /// The same after all commands that wait. Needs the mutex.
+    void stop(const std::shared_ptr<Run>& run);
     void changed() { ++revision_; }
 
     const Load load_;

@@ -222,6 +222,24 @@ TEST(Session, StoppedRunsShowTheirLastPass) {
     }
 }
 
+/// Also where the session has not yet carried out the resumption.
+TEST(Session, AStopFollowsTheResumptionBefore) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(request("path", 1u << 30));
+    session.stop(run);
+    const auto is_stopped = [&] { return session.status(run).state == RunState::Stopped; };
+    ASSERT_TRUE(wait_for(is_stopped));
+    for (int i = 0; i < 20; ++i) {
+        session.resume(run, {});
+        session.stop(run);
+        std::atomic<bool> is_idle{false};
+        session.save(run, "", [&](const std::string&) { is_idle = true; });
+        ASSERT_TRUE(wait_for([&] { return is_idle.load(); }));  // after the commands before
+        ASSERT_TRUE(wait_for(is_stopped));
+    }
+}
+
 /// Commands and queries of four threads at a time, while the scene is loaded again.
 TEST(Session, TakesCommandsOfSeveralThreads) {
     Session session(small_room, 2);
