@@ -16,7 +16,7 @@ constexpr int kPilotRoulette = 10;
 }  // namespace
 
 std::vector<ParamInfo> MarkovIntegrator::params() {
-    return {{"p_large", ParamKind::Float, "0.3",
+    return {{"p_large", ParamKind::Float, "0.1",
              "Probability of a large step, in [0.01, 1]. Large steps also serve as independent "
              "samples of the image."},
             {"chains", ParamKind::Int, "256",

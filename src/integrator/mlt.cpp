@@ -55,8 +55,6 @@ private:
 IntegratorEntry mlt_entry() {
     std::vector<ParamInfo> params{depth_params()[0]};
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
-    for (ParamInfo& p : params)
-        if (p.name == std::string("p_large")) p.fallback = "0.1";
     params.push_back({"user_paths", ParamKind::String, "",
                       "JSON file of important light sub-paths, which `etendue paths` makes and "
                       "checks; proposals near them are mixed with bidirectional mutations."});

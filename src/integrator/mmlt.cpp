@@ -119,8 +119,6 @@ private:
 IntegratorEntry mmlt_entry() {
     std::vector<ParamInfo> params{depth_params()[0]};
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
-    for (ParamInfo& p : params)
-        if (p.name == std::string("p_large")) p.fallback = "0.1";
     params.push_back({"lengths", ParamKind::Int, "10",
                       "Number of classes of path lengths, 1 to 64, from three edges on; each has "
                       "its own chains. The last class contains all longer paths."});

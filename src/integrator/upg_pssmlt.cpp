@@ -50,6 +50,7 @@ struct Gathering {
     PairDensity density{};
     GatherRoulette roulette{};  ///< None.
 
+    /// `c` must have the number of light paths of the map.
     GatherSearch search(const SampleContext& c, const LightMap& map, Workspace& work) const {
         return {c,       counts,   map.cache,         map.grid,
                 density, roulette, paths.max_depth(), kGatherConstants.flatness,
@@ -112,7 +113,8 @@ double mean_pairs(const PassContext& pass, const Gathering& gathering, const Lig
         Sampler sampler(SamplerKind::Independent, key);
         sampler.start(0, i);
         NoSink sink;
-        const SampleContext c = whole.sample.with(sampler, sink);
+        const SampleContext c =
+            whole.sample.with(sampler, sink).with_light_paths(gathering.light_paths);
         gathering.trace_eye_path(c, work);
         const uint64_t before = work.stats.pairs;
         const GatherSearch search = gathering.search(c, map, work);
@@ -141,7 +143,8 @@ protected:
     void evaluate(int chain_class, NumberSource& source, const ChainContext& c,
                   ChainState& y) const override {
         PrimarySpace::evaluate(chain_class, source, c, y);
-        const GatherSearch search = gathering_.search(c.sample, frozen_, c.work);
+        const SampleContext of_map = c.sample.with_light_paths(gathering_.light_paths);
+        const GatherSearch search = gathering_.search(of_map, frozen_, c.work);
         const double W = c.work.z.size() > 0 ? map()(c.work.z.film) : 0.0;
         bool has_place = false;
         gathering_.for_each_place(c.work, [&](int t) {
@@ -181,7 +184,8 @@ public:
         gathering_.repeat_eye_path(static_cast<const NumberState&>(state), c_, none);
         Sampler trials(SamplerKind::Independent, hash_combine(key_, states_++));
         trials.start(0, 0);
-        const SampleContext c = c_.sample.with(trials, none);
+        const SampleContext c =
+            c_.sample.with(trials, none).with_light_paths(gathering_.light_paths);
         const GatherSearch search = gathering_.search(c, fresh_, work);
         gathering_.for_each_place(work, [&](int t) {
             search.for_each_pair(t, [&](const GatherPair& pair) { add(c, pair, factor, trials); });

@@ -51,6 +51,10 @@ struct SampleContext {
     SampleContext with(Sampler& numbers, ContributionSink& to) const {
         return {scene, film, pixel, chunk, light_paths, splat_scale, numbers, to, is_of_whole_film};
     }
+    /// The same sample where `n` light paths are stored.
+    SampleContext with_light_paths(uint64_t n) const {
+        return {scene, film, pixel, chunk, n, 1 / float(n), sampler, sink, is_of_whole_film};
+    }
 };
 
 /// Data available before a pass: the scene and the results of the finished passes.

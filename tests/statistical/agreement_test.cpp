@@ -157,7 +157,7 @@ protected:
                  {std::pair("pssmlt:chains=16,groups=", uint64_t{1}),
                   {"mmlt:chains=48,groups=", 1},
                   {"mlt:chains=48,groups=", 4},
-                  {"upg+pssmlt:radius=0.12,light_paths=200,chains=16,groups=", 1}}) {
+                  {"upg+pssmlt:radius=0.12,light_paths=800,chains=16,groups=", 1}}) {
                 const uint64_t passes = std::min<uint64_t>(1024, more * c.passes);
                 expect_same_image(
                     indirect_tiles(scene, fmt::format("{}{}", method, passes), passes, 6), path,
