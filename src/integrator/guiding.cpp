@@ -252,16 +252,18 @@ Guiding::Guiding(const IntegratorParams& p) {
 }
 
 bool Guiding::gains_little(GuidedWalks walks) const {
-    // The logarithm of what a guided sample costs, training included, in samples without guide.
-    constexpr float kLeastGain = 0.4f;  // nats
-    const bool eye = guide_->surfaces.gain(TransportMode::Radiance) >= kLeastGain,
-               light = guide_->surfaces.gain(TransportMode::Importance) >= kLeastGain ||
-                       guide_->emission_gain >= kLeastGain;
+    // In nats; these tell the scenes of docs/guiding.md apart. Guided eye walks take paths away from techniques that need
+    // no guide, so they must gain more than emission, without which most light paths may be lost. What light walks gain
+    // says little about methods that have both walks.
+    constexpr float kLeastEyeGain = 1.0f, kLeastLightGain = 0.4f;
+    const bool eye = guide_->surfaces.gain(TransportMode::Radiance) >= kLeastEyeGain,
+               light = guide_->surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
+               emission = guide_->emission_gain >= kLeastLightGain;
     switch (walks) {
     case GuidedWalks::Eye:
     case GuidedWalks::BothWithPairs: return !eye;
-    case GuidedWalks::Light: return !light;
-    case GuidedWalks::Both: return !eye && !light;
+    case GuidedWalks::Light: return !light && !emission;
+    case GuidedWalks::Both: return !eye && !emission;
     }
     return true;
 }
