@@ -374,7 +374,6 @@ void Session::stop(int id) {
 
 void Session::stop(const std::shared_ptr<Run>& run) {
     if (run->status.state == RunState::Rendering) return request_stop(run);
-    // An earlier resume() may still wait.
     commands_.push_back([this, run] {
         const std::lock_guard lock(mutex_);
         request_stop(run);

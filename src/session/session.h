@@ -156,7 +156,8 @@ private:
     void finish_stop(Run& run);
     /// Marks a run as stopping, and lets the session's thread do the rest. Needs the mutex.
     void request_stop(const std::shared_ptr<Run>& run);
-    /// The same after all commands that wait. Needs the mutex.
+    /// The same for a run in any state: one that does not render is stopped after the commands that wait, since one of
+    /// them may resume it. Needs the mutex.
     void stop(const std::shared_ptr<Run>& run);
     void changed() { ++revision_; }
 

@@ -1,6 +1,8 @@
 // The integrators agree with path tracing, tile by tile. Path tracing can sample all paths of these scenes: no delta
 // emitter is visible directly or through mirrors and glass.
 
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
