@@ -48,6 +48,14 @@ struct DirectionCone {
         const float a = std::acos(clamp(dot(axis, n), -1.0f, 1.0f)) - angle - kSlack;
         return a > 0 ? std::cos(a) : 1.0f;
     }
+    /// Upper bound of the density cos θ/π about `n` over the cone.
+    float max_cosine_pdf(Vec3 n) const {
+        const float cos = dot(axis, n), cos_cone = std::cos(angle);
+        if (cos > cos_cone) return kInvPi;
+        // cos(acos(cos) - angle), at least 0.
+        return kInvPi *
+               std::fmax(0.0f, cos * cos_cone + safe_sqrt(1 - cos * cos) * std::sin(angle));
+    }
 };
 
 /// The sample of a smooth lobe from its value and densities; empty where the density is zero.

@@ -17,6 +17,7 @@
 
 #include "integrator/bidirectional.h"
 #include "integrator/light_path_options.h"
+#include "integrator/pair_pilot.h"
 #include "reuse/gather.h"
 #include "reuse/gather_constants.h"
 #include "reuse/gather_weight_scale.h"
@@ -51,11 +52,9 @@ public:
         paths_.learn(pass);
         if (connects_) learned_.weight_scale.learn(learned_.gathers);
         learned_.roulette.learn(learned_.gathers);
+        if (pass.index == 0) return;  // see start()
         choose_radius(pass);
-        // The weights of the first pass use no density, so its statistics are not suitable for the scale.
-        learned_.learns_weight_scale = connects_ && pass.index > 0;
-        if (pass.index > 0)
-            density_ = PairDensity(cells(), learned_.radius, kGatherConstants.correlation);
+        density_ = PairDensity(cells(), learned_.radius, kGatherConstants.correlation);
     }
     void save(LearnedState& to) const override {
         paths_.save(to);
@@ -77,6 +76,7 @@ public:
 
     void trace(const PassContext& pass) override {
         paths_.train(pass, GuidedWalks::BothWithPairs);
+        if (pass.index == 0) start(pass);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
@@ -152,7 +152,7 @@ private:
         c.sampler.seek(Stream::Auxiliary, pair.number);
         const double r =
             reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
-        if (learned_.learns_weight_scale) {
+        if (connects_) {
             const double seen =
                 double(luminance(*value)) / double(luminance(join->contribution) * pair.survival);
             observe_weight_scale(c, *join, search.scale(), r, seen, work);
@@ -171,26 +171,32 @@ private:
                                       seen, GatherSums::of(work));
     }
 
+    /// Chooses the radius and the density of the first pass.
+    void start(const PassContext& pass) {
+        const PairPilot pilot = run_pair_pilot(pass, paths_, counts(pass.scene, pass.light_paths));
+        learned_.radius =
+            given_radius_ > 0 ? given_radius_
+            : pilot.pairs_per_radius2 > 0
+                ? std::min(float(std::sqrt(kGatherConstants.pairs / pilot.pairs_per_radius2)),
+                           largest_radius(pass.scene))
+                : largest_radius(pass.scene);
+        density_ = PairDensity(pilot.vertices, learned_.radius, kGatherConstants.correlation,
+                               pilot.multiple);
+    }
     /// Chooses the radius such that an eye path finds GatherConstants::pairs pairs on average, according to the passes
     /// since the last choice.
     void choose_radius(const LearnContext& pass) {
-        if (given_radius_ > 0) {
-            learned_.radius = given_radius_;
-            return;
-        }
-        const float size = pass.scene.bounds().radius(),
-                    largest = kGatherConstants.largest_radius * size;
+        if (given_radius_ > 0) return;
         const double pairs = learned_.gathers.expected_pairs - learned_.pairs_so_far,
                      paths = double(pass.so_far.eye_paths - learned_.eye_paths_so_far);
         learned_.pairs_so_far = learned_.gathers.expected_pairs;
         learned_.eye_paths_so_far = pass.so_far.eye_paths;
-        const float wanted =
-            pass.index == 0
-                ? size / std::sqrt(float(pass.light_paths))
-                : learned_.radius *
-                      float(std::clamp(std::sqrt(kGatherConstants.pairs * paths / (pairs + 1)),
-                                       0.25, 4.0));
-        learned_.radius = std::min(largest, wanted);
+        const double factor =
+            std::clamp(std::sqrt(kGatherConstants.pairs * paths / (pairs + 1)), 0.25, 4.0);
+        learned_.radius = std::min(largest_radius(pass.scene), learned_.radius * float(factor));
+    }
+    static float largest_radius(const Scene& scene) {
+        return kGatherConstants.largest_radius * scene.bounds().radius();
     }
 
     static constexpr uint64_t kVertexBytes =
@@ -211,7 +217,6 @@ private:
         GatherTotals gathers;
         double pairs_so_far = 0;  ///< Value when the radius was chosen.
         uint64_t eye_paths_so_far = 0;
-        bool learns_weight_scale = false;
         GatherWeightScale weight_scale;
         GatherRoulette roulette;
     } learned_;

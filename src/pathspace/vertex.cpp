@@ -86,13 +86,7 @@ std::optional<BsdfSample> Vertex::sample_guided(float u_lobe, Vec2 u, float u_gu
 }
 
 float Vertex::max_pdf_unguided(const DirectionCone& cone) const {
-    if (const auto normal = cosine_normal()) {
-        const float cos = dot(cone.axis, *normal), cos_cone = std::cos(cone.angle);
-        if (cos > cos_cone) return kInvPi;
-        // cos(acos(cos) - angle), at least 0.
-        return kInvPi *
-               std::fmax(0.0f, cos * cos_cone + safe_sqrt(1 - cos * cos) * std::sin(cone.angle));
-    }
+    if (const auto normal = cosine_normal()) return cone.max_cosine_pdf(*normal);
     return kind == Kind::Emitter ? emitter->max_pdf_d() : bsdf.max_pdf(wo, cone);
 }
 

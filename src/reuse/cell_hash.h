@@ -39,11 +39,14 @@ public:
             for (int y = low.y; y <= high.y; ++y)
                 for (int x = low.x; x <= high.x; ++x) use(Cell{x, y, z});
     }
+    /// Cells of a block of 4×4×4 have consecutive buckets, so that cells near each other share cache lines.
     uint32_t bucket_of(const Cell& c) const {
-        const uint64_t key = uint64_t(uint32_t(c.x)) * 0x9e3779b97f4a7c15ull ^
-                             uint64_t(uint32_t(c.y)) * 0xc2b2ae3d27d4eb4full ^
-                             uint64_t(uint32_t(c.z)) * 0x165667b19e3779f9ull;
-        return uint32_t(mix64(key)) & mask_;
+        const uint64_t key = uint64_t(uint32_t(c.x >> 2)) * 0x9e3779b97f4a7c15ull ^
+                             uint64_t(uint32_t(c.y >> 2)) * 0xc2b2ae3d27d4eb4full ^
+                             uint64_t(uint32_t(c.z >> 2)) * 0x165667b19e3779f9ull;
+        const uint32_t in_block =
+            uint32_t(c.x & 3) | uint32_t(c.y & 3) << 2 | uint32_t(c.z & 3) << 4;
+        return (uint32_t(mix64(key)) << 6 | in_block) & mask_;
     }
 
 private:

@@ -17,11 +17,12 @@ namespace etendue {
 /// n is estimated in an earlier pass. It is a function of the position only, so that weights still sum to one.
 class PairDensity final : public LearnedPlaces {
 public:
-    /// Before anything is learned: pairs have the smallest weight, so that in the first pass they contribute only to
-    /// paths that no other technique makes.
+    /// Before anything is learned: pairs have the smallest weight, so that they contribute only to paths that no other
+    /// technique makes.
     PairDensity() = default;
-    /// Learns from the light vertices of a pass; `radius` is that of pairs, `correlation` is ρ.
-    PairDensity(const CellCounts& vertices, float radius, double correlation);
+    /// Learns from light vertices, each of which stands for `multiple` of a pass; `radius` is that of pairs,
+    /// `correlation` is ρ.
+    PairDensity(const CellCounts& vertices, float radius, double correlation, double multiple = 1);
 
     /// Level of the share 1/(1 + ρ n) at `p`; the rounding error is about 2 %.
     uint8_t pair_level(Vec3 p) const override {

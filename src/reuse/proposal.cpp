@@ -25,11 +25,6 @@ std::optional<Vec3> thinned(const Region& region, const BoundedCells& cells, con
     return point.d;
 }
 
-template <class Region>
-BoundedCells divide(const Region& region, const WalkDensity& density, double enough) {
-    return {region, [&](const DirectionCone& c) { return density.max_pdf(c); }, enough};
-}
-
 std::optional<Vec3> where_positive(const WalkDensity& density, Vec3 w) {
     return density.pdf(w) > 0 ? std::optional(w) : std::nullopt;
 }
@@ -128,7 +123,8 @@ std::optional<RegionProposal<Region>> RegionProposal<Region>::make(const Region&
     constexpr double kEnough = 1.1;
     const RegionPoint center = region.at({0.5f, 0.5f});
     const double without_loss = region.measure() * double(density.pdf(center.d) * center.scale);
-    const BoundedCells cells = divide(region, density, kEnough * without_loss);
+    const BoundedCells cells(
+        region, [&](const DirectionCone& c) { return density.max_pdf(c); }, kEnough * without_loss);
     return RegionProposal{cells.mass(), region, cells};
 }
 
@@ -143,13 +139,13 @@ template struct RegionProposal<SeenDisc>;
 template struct RegionProposal<SeenBand>;
 
 std::optional<CosineDiscProposal> CosineDiscProposal::make(const SeenDisc& disc, Vec3 normal,
-                                                           const WalkDensity& density,
                                                            double below) {
     // Rejections cost time here, but no trials.
     constexpr double kEnough = 2, kMost = 16;
     const double mass = disc.cosine_mass(normal);
     if (!(mass > 0 && mass < below)) return {};
-    const BoundedCells cells = divide(disc, density, kEnough * mass);
+    const BoundedCells cells(
+        disc, [&](const DirectionCone& c) { return c.max_cosine_pdf(normal); }, kEnough * mass);
     if (!(cells.mass() < kMost * mass)) return {};
     return CosineDiscProposal{mass, normal, disc, cells};
 }

@@ -91,8 +91,8 @@ struct CosineDiscProposal {
     SeenDisc disc;
     BoundedCells cells;
 
-    static std::optional<CosineDiscProposal> make(const SeenDisc& disc, Vec3 normal,
-                                                  const WalkDensity& density, double below);
+    /// Empty if the mass would be 0 or not less than `below`.
+    static std::optional<CosineDiscProposal> make(const SeenDisc& disc, Vec3 normal, double below);
     std::optional<Vec3> propose(const WalkDensity& density, Sampler& sampler, RenderStats&) const;
 };
 

@@ -72,9 +72,8 @@ private:
         const bool is_high = view.height > kLow * half_height;
         if (is_high) {
             const SeenDisc disc(view);
-            const auto cosine = ball.cosine
-                                    ? CosineDiscProposal::make(disc, *ball.cosine, density_, mass())
-                                    : std::nullopt;
+            const auto cosine =
+                ball.cosine ? CosineDiscProposal::make(disc, *ball.cosine, mass()) : std::nullopt;
             if (cosine)
                 proposal_ = *cosine;
             else

@@ -16,12 +16,12 @@ struct Chosen {
     uint64_t pairs;  ///< That were looked at.
 };
 
-/// After the choice before pass 4, which passes 1 to 3 tell.
-Chosen chosen(const Scene& scene, const std::string& integrator, uint64_t seed) {
+/// After the choice before the last of `passes`.
+Chosen chosen(const Scene& scene, const std::string& integrator, uint64_t seed, int passes = 5) {
     RenderSettings settings;
     settings.integrator = IntegratorSpec::parse(integrator);
     settings.seed = seed;
-    settings.spp = 5;
+    settings.spp = passes;
     Renderer renderer(scene, settings);
     const std::atomic<bool> interrupted{false};
     renderer.run([](const Progress&) {}, interrupted);
@@ -51,6 +51,18 @@ TEST(GatherRadius, DoesNotDependOnRoulette) {
     EXPECT_NEAR(ratio.mean(), 1, 4 * error);
     EXPECT_GT(std::fabs(left - 1), 6 * error) << "the number after roulette could be taken for it";
     RecordProperty("ratio", std::to_string(ratio.mean()) + " ± " + std::to_string(error));
+}
+
+/// The walks before the first pass tell its radius.
+TEST(GatherRadius, OfTheFirstPassFindsAboutEightPairs) {
+    const Scene scene = build(front_camera(16) + room() + area_lamp());
+    constexpr int kSeeds = 8;
+    Moments pairs;
+    for (uint64_t seed = 0; seed < kSeeds; ++seed)
+        pairs.add(double(chosen(scene, "upg+bdpt:light_paths=60000", seed, 1).pairs) / sqr(16.0));
+    RecordProperty("pairs", std::to_string(pairs.mean()));
+    EXPECT_GT(pairs.mean(), 4);
+    EXPECT_LT(pairs.mean(), 16);
 }
 
 }  // namespace
