@@ -16,7 +16,7 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        list.add(frame, DiffuseLobe{reflectance_.eval(point.texture_point())}, weight);
+        list.add(frame, DiffuseLobe{reflectance_.eval(point)}, weight);
     }
     bool needs_tangents() const override { return false; }
     Rgb mean_albedo() const override { return reflectance_.mean(); }

@@ -50,7 +50,8 @@ namespace {
 void start_eye_path(const SampleContext& c, const WalkContext& walk, SubPath& z) {
     c.sampler.seek(Stream::Eye, 0);
     const Film::PixelSample at = c.film_sample(c.sampler.next_2d());
-    etendue::start_eye_path(walk, at, c.sampler.next_2d(), c.sampler, z);
+    const Vec2 u_lens = c.sampler.next_2d_if(c.scene.sensor().has_finite_lens());
+    etendue::start_eye_path(walk, at, u_lens, c.sampler, z);
 }
 
 }  // namespace

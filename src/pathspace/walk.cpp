@@ -132,7 +132,8 @@ void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, S
                     SubPath& z) {
     sampler.seek(Stream::Eye, 0);
     const Film::PixelSample at = film.sample_pixel(pixel, sampler.next_2d());
-    start_eye_path(walk, at, sampler.next_2d(), sampler, z);
+    const Vec2 u_lens = sampler.next_2d_if(walk.scene.sensor().has_finite_lens());
+    start_eye_path(walk, at, u_lens, sampler, z);
 }
 
 void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
@@ -308,7 +309,8 @@ template <TransportMode mode>
 void close(const WalkContext& walk, SubPath& path) {
     constexpr Side side = mode == TransportMode::Radiance ? Side::Eye : Side::Light;
     const int last = path.size() - 1;
-    if (last < 2) return;
+    // Without light paths, hits and next events are all there is.
+    if (last < 2 || !walk.counts.uses_light_paths()) return;
     // Level last-2 is known now; the levels below it were stored at the predecessor.
     path[last].weight_sum = level_sum<side>(path, last - 2, path[last - 1].weight_sum, walk.counts);
 }

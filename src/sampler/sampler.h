@@ -81,6 +81,12 @@ public:
         ++slot_;
         return 0;
     }
+    /// next_2d() where `is_needed`; otherwise skips the slots and returns 0.
+    Vec2 next_2d_if(bool is_needed) {
+        if (is_needed) return next_2d();
+        slot_ += kind_ == SamplerKind::PrimarySample ? 2 : 1;
+        return {};
+    }
     /// A number with 53 bits for decisions that do not benefit from Sobol' points: pseudo-random, or from the
     /// PrimarySource.
     double next_1d_unstructured() {

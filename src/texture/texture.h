@@ -66,6 +66,12 @@ public:
     Vec2 gradient(const TexturePoint& at) const {
         return texture_ ? texture_->gradient(at) : Vec2();
     }
+    /// eval() at a surface point, whose texture_point() is made only where there is a texture.
+    template <class Point>
+    requires requires(const Point& at) { TexturePoint(at.texture_point()); }
+    Rgb eval(const Point& at) const {
+        return texture_ ? texture_->eval(at.texture_point()) : constant_;
+    }
     Rgb mean() const { return texture_ ? texture_->mean() : constant_; }
     void resolution(int& width, int& height) const {
         width = height = 1;
