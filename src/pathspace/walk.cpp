@@ -309,7 +309,7 @@ template <TransportMode mode>
 void close(const WalkContext& walk, SubPath& path) {
     constexpr Side side = mode == TransportMode::Radiance ? Side::Eye : Side::Light;
     const int last = path.size() - 1;
-    // Without light paths, hits and next events are all there is.
+    // The weights of hits and next events alone do not read the sum.
     if (last < 2 || !walk.counts.uses_light_paths()) return;
     // Level last-2 is known now; the levels below it were stored at the predecessor.
     path[last].weight_sum = level_sum<side>(path, last - 2, path[last - 1].weight_sum, walk.counts);
