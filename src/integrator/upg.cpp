@@ -20,6 +20,7 @@
 #include "integrator/pair_pilot.h"
 #include "reuse/gather.h"
 #include "reuse/gather_constants.h"
+#include "reuse/gather_radius.h"
 #include "reuse/gather_weight_scale.h"
 
 namespace etendue {
@@ -53,8 +54,8 @@ public:
         if (connects_) learned_.weight_scale.learn(learned_.gathers);
         learned_.roulette.learn(learned_.gathers);
         if (pass.index == 0) return;  // see start()
-        choose_radius(pass);
-        density_ = PairDensity(cells(), learned_.radius, kGatherConstants.correlation);
+        learned_.radius.learn(pass.film, pass.so_far, learned_.gathers);
+        density_ = PairDensity(cells(), learned_.radius.value(), kGatherConstants.correlation);
     }
     void save(LearnedState& to) const override {
         paths_.save(to);
@@ -82,7 +83,7 @@ public:
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
-        grid_.build(cache_, learned_.radius);
+        grid_.build(cache_, learned_.radius.value());
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -109,7 +110,7 @@ public:
         TechniqueCounts n;
         if (connects_) n = Bidirectional::counts(scene, light_paths);
         n.gather = float(light_paths) * (connects_ ? learned_.weight_scale.value() : 1.0f);
-        n.pairs = {.disc = kPi * sqr(learned_.radius),
+        n.pairs = {.disc = kPi * sqr(learned_.radius.value()),
                    .min_edges = 3,
                    .short_rate = short_rate_,
                    .rule = rule_,
@@ -123,7 +124,7 @@ public:
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
         std::vector<std::pair<std::string, double>> figures{
-            {"radius", learned_.radius},
+            {"radius", learned_.radius.value()},
             {"weight_scale", connects_ ? learned_.weight_scale.value() : 1}};
         paths_.guiding().add_figures(figures);
         return figures;
@@ -152,53 +153,32 @@ private:
         c.sampler.seek(Stream::Auxiliary, pair.number);
         const double r =
             reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
-        if (connects_) {
-            const double seen =
-                double(luminance(*value)) / double(luminance(join->contribution) * pair.survival);
-            observe_weight_scale(c, *join, search.scale(), r, seen, work);
-        }
+        const double chance = double(luminance(join->contribution) / luminance(*value));
+        if (connects_) observe(c, pair, *join, search.scale(), r, chance, work);
         c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.rate));
     }
 
-    /// `scale`: the value that a unit of contribution adds to the pixel. `seen`: the transmittance of the join, divided
-    /// by its survival probability in Russian roulette.
-    void observe_weight_scale(const SampleContext& c, const Join& join, float scale, double r,
-                              double seen, Workspace& work) const {
-        const float pixel = c.film.expected_luminance(c.pixel);
+    /// Records a visible pair for later passes. `scale`: the value that a unit of contribution adds to the pixel; `chance`:
+    /// the probability that its shadow ray was traced, divided by the transmittance.
+    void observe(const SampleContext& c, const GatherPair& pair, const Join& join, float scale,
+                 double r, double chance, Workspace& work) const {
+        const float pixel = c.film.expected_luminance(work.z.film);
         if (!(pixel > 0)) return;
-        learned_.weight_scale.observe(double(luminance(join.contribution) * scale / pixel),
-                                      double(join.mis_weight), double(join.pair_probability), r,
-                                      seen, GatherSums::of(work));
+        const double weight_scale = double(learned_.weight_scale.value());
+        const GatherMoment moment = GatherMoment::of(
+            double(luminance(join.contribution) * scale / pixel), double(join.mis_weight),
+            weight_scale, double(join.pair_probability), r, 1 / (chance * double(pair.survival)));
+        GatherRadius::observe(moment, weight_scale, GatherSums::of(work));
+        GatherWeightScale::observe(moment, GatherSums::of(work));
     }
 
     /// Chooses the radius and the density of the first pass.
     void start(const PassContext& pass) {
         const PairPilot pilot = run_pair_pilot(pass, paths_, counts(pass.scene, pass.light_paths));
-        learned_.radius =
-            given_radius_ > 0 ? given_radius_
-            : pilot.pairs_per_radius2 > 0
-                ? std::min(float(std::sqrt(kGatherConstants.pairs / pilot.pairs_per_radius2)),
-                           largest_radius(pass.scene))
-                : largest_radius(pass.scene);
-        density_ = PairDensity(pilot.vertices, learned_.radius, kGatherConstants.correlation,
-                               pilot.multiple);
+        learned_.radius.start(given_radius_, pass.scene.bounds().radius(), pilot.pairs_per_radius2);
+        density_ = PairDensity(pilot.vertices, learned_.radius.value(),
+                               kGatherConstants.correlation, pilot.multiple);
     }
-    /// Chooses the radius such that an eye path finds GatherConstants::pairs pairs on average, according to the passes
-    /// since the last choice.
-    void choose_radius(const LearnContext& pass) {
-        if (given_radius_ > 0) return;
-        const double pairs = learned_.gathers.expected_pairs - learned_.pairs_so_far,
-                     paths = double(pass.so_far.eye_paths - learned_.eye_paths_so_far);
-        learned_.pairs_so_far = learned_.gathers.expected_pairs;
-        learned_.eye_paths_so_far = pass.so_far.eye_paths;
-        const double factor =
-            std::clamp(std::sqrt(kGatherConstants.pairs * paths / (pairs + 1)), 0.25, 4.0);
-        learned_.radius = std::min(largest_radius(pass.scene), learned_.radius * float(factor));
-    }
-    static float largest_radius(const Scene& scene) {
-        return kGatherConstants.largest_radius * scene.bounds().radius();
-    }
-
     static constexpr uint64_t kVertexBytes =
         LightVertexCache::kVertexBytes + LightVertexGrid::kVertexBytes;
 
@@ -213,10 +193,8 @@ private:
     bool clamps_;
 
     struct Learned {
-        float radius = 0;
+        GatherRadius radius;
         GatherTotals gathers;
-        double pairs_so_far = 0;  ///< Value when the radius was chosen.
-        uint64_t eye_paths_so_far = 0;
         GatherWeightScale weight_scale;
         GatherRoulette roulette;
     } learned_;
@@ -230,9 +208,11 @@ private:
 
 std::vector<ParamInfo> upg_params() {
     std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back({"radius", ParamKind::Float, "0",
-                      "Largest distance between the vertices of a pair, in scene units; 0: chosen "
-                      "from earlier passes so that an eye path finds about eight pairs."});
+    params.push_back(
+        {"radius", ParamKind::Float, "0",
+         "Largest distance between the vertices of a pair, in scene units; 0: such that an "
+         "eye path finds about eight pairs. upg+bdpt then chooses it from earlier "
+         "passes, for the least product of variance and time."});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     params.push_back(

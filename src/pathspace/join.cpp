@@ -191,8 +191,9 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
     const double probability = counts.pairs.probability(drops_eye ? edge->rev_a : edge->rev_b);
-    const double count =
-        counts.weighed_gathers((drops_eye ? y[s - 1] : z[t - 1]).pair_level, s + t - 2);
+    const Vertex& x_m = drops_eye ? y[s - 1] : z[t - 1];
+    const bool sees_lens = drops_eye ? t == 2 : x_m.sees_lens;
+    const double count = counts.weighed_gathers(x_m.pair_level, sees_lens, s + t - 2);
     Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * probability, y, a, z, b);
     join.pair_probability = float(probability);
     return join;

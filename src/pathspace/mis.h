@@ -62,9 +62,10 @@ inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, 
     if (i == 0 || !v[i].is_connectible || edges < n.pairs.min_edges) return 0;
     const double fwd = v[i].pdf_fwd;
     constexpr bool eye = side == Side::Eye;
+    // Of a light path, only a vertex next to the lens can see it: beyond a delta event, no technique could join them.
+    const bool sees_lens = eye ? v[i].sees_lens : inward == kLensGloss;
     if (n.merge > 0) {
         if ((eye ? edges - i : i) < n.pairs.first_merge) return 0;
-        const bool sees_lens = eye ? v[i].sees_lens : inward == kLensGloss;  // see join_merge()
         return sqr(n.merge_area(v[i].pair_level, sees_lens) * fwd);
     }
     const uint8_t outward = gloss(v[i - 1], v[i - 1].is_delta);
@@ -73,7 +74,7 @@ inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, 
     if (drops(n.pairs.rule, eye, before, after)) sum += sqr(n.pairs.probability(fwd));
     if (rev > 0 && drops(n.pairs.rule, !eye, before, after))
         sum += sqr(n.pairs.probability(rev) * (fwd / rev));
-    return sum > 0 ? sum * sqr(n.weighed_gathers(v[i].pair_level, edges)) : 0;
+    return sum > 0 ? sum * sqr(n.weighed_gathers(v[i].pair_level, sees_lens, edges)) : 0;
 }
 
 /// b_i of a sub-path. `delta`, `rev`, `inward` as above; `edges`: length of the path, or any larger number.

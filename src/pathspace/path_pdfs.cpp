@@ -44,7 +44,7 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
                    : counts.merge_area(pair_level[m], sees_lens[m]) * others * light[m] * eye[m];
     if (!drops(counts.pairs.rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
     const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
-    return counts.weighed_gathers(pair_level[m], k) * others * kept *
+    return counts.weighed_gathers(pair_level[m], sees_lens[m], k) * others * kept *
            counts.pairs.probability(dropped);
 }
 

@@ -126,12 +126,12 @@ struct TechniqueCounts {
     float gathers(int edges) const {
         return edges < pairs.min_edges ? 0.0f : edges == 3 ? gather * pairs.short_rate : gather;
     }
-    /// Count of gathers in MIS weights at an x_m of this level.
-    double weighed_gathers(uint8_t pair_level, int edges) const {
-        return double(gathers(edges)) * pair_share(pair_level);
+    /// Count of gathers in MIS weights at an x_m of this level. All pairs of an eye vertex share its eye path. If x_m sees
+    /// the lens (Vertex), this eye path contains no random choice, and the pairs count in full.
+    double weighed_gathers(uint8_t pair_level, bool sees_lens, int edges) const {
+        return double(gathers(edges)) * (sees_lens ? 1 : pair_share(pair_level));
     }
-    /// Count of merges in MIS weights at an x_m, times the area of the disc. All merges of an eye vertex share its eye
-    /// path. If x_m sees the lens (Vertex), this eye path contains no random choice, and the merges count in full.
+    /// Count of merges in MIS weights at such an x_m, times the area of the disc.
     double merge_area(uint8_t pair_level, bool sees_lens) const {
         return sees_lens ? double(merge) * double(pairs.disc)
                          : double(merge) * pair_share(pair_level) * double(pairs.inner_disc) *

@@ -16,7 +16,10 @@ inline constexpr size_t kGatherLengths = 8;
 
 /// Sums of one worker in a pass, in fixed point.
 struct GatherSums final : PassSums {
-    std::array<uint64_t, kWeightScales> second_moments{};
+    /// GatherMoment::fixed() by candidates of GatherWeightScale.
+    std::array<uint64_t, kWeightScales> weight_moments{};
+    /// The same with the number of gathers, and with GatherRadius::kMore times that number.
+    uint64_t moment = 0, moment_of_more = 0;
     struct Joins {
         uint64_t count = 0, squares = 0;
     };
@@ -27,7 +30,9 @@ struct GatherSums final : PassSums {
     static GatherSums& of(Workspace& work) { return static_cast<GatherSums&>(*work.sums); }
 
     void add(const GatherSums& o) {
-        for (size_t i = 0; i < second_moments.size(); ++i) second_moments[i] += o.second_moments[i];
+        for (size_t i = 0; i < kWeightScales; ++i) weight_moments[i] += o.weight_moments[i];
+        moment += o.moment;
+        moment_of_more += o.moment_of_more;
         for (size_t i = 0; i < joins.size(); ++i) {
             joins[i].count += o.joins[i].count;
             joins[i].squares += o.joins[i].squares;
@@ -38,7 +43,8 @@ struct GatherSums final : PassSums {
 
 /// Sums over all finished passes.
 struct GatherTotals {
-    std::array<double, kWeightScales> second_moments{};
+    std::array<double, kWeightScales> weight_moments{};
+    double moment = 0, moment_of_more = 0;
     struct Joins {
         double count = 0, squares = 0;
     };
@@ -49,8 +55,10 @@ struct GatherTotals {
     void add(std::span<const std::unique_ptr<PassSums>> workers) {
         GatherSums pass;
         for (const auto& w : workers) pass.add(static_cast<const GatherSums&>(*w));
-        for (size_t i = 0; i < second_moments.size(); ++i)
-            second_moments[i] += double(pass.second_moments[i]);
+        for (size_t i = 0; i < kWeightScales; ++i)
+            weight_moments[i] += double(pass.weight_moments[i]);
+        moment += double(pass.moment);
+        moment_of_more += double(pass.moment_of_more);
         for (size_t i = 0; i < joins.size(); ++i) {
             joins[i].count += double(pass.joins[i].count);
             joins[i].squares += double(pass.joins[i].squares);

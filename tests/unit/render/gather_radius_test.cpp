@@ -33,14 +33,14 @@ Chosen chosen(const Scene& scene, const std::string& integrator, uint64_t seed, 
 
 TEST(GatherRadius, DoesNotDependOnRoulette) {
     const Scene scene = build(front_camera(16) + room() + area_lamp());
-    const std::string integrator = "upg+bdpt:light_paths=60000,max_depth=5";
+    const std::string integrator = "upg:light_paths=60000,max_depth=5";
     constexpr int kSeeds = 8;
     // Radii are such that their squares are inversely proportional to the numbers of pairs: of these the mean is right,
     // however much roulette spreads them.
     Moments ratio;
     double left = 0;
     for (uint64_t seed = 0; seed < kSeeds; ++seed) {
-        const Chosen with = chosen(scene, integrator + ",roulette=0.5", seed),
+        const Chosen with = chosen(scene, integrator + ",roulette=1", seed),
                      without = chosen(scene, integrator + ",roulette=0", seed);
         ratio.add(sqr(without.radius / with.radius));
         left += double(with.pairs) / double(without.pairs) / kSeeds;
@@ -65,6 +65,24 @@ TEST(GatherRadius, OfTheFirstPassFindsAboutEightPairs) {
     RecordProperty("pairs", std::to_string(pairs.mean()));
     EXPECT_GT(pairs.mean(), 4);
     EXPECT_LT(pairs.mean(), 16);
+}
+
+/// Behind a shade, connections rarely see the lamp's light, and pairs are worth their time. In the open they are not.
+TEST(GatherRadius, IsLargerWherePairsAreWorthMore) {
+    const std::string shade =
+        rectangle("<scale value=\"0.5\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.85\"/>",
+                  diffuse("0.5,0.5,0.5"));
+    const auto relative_to_eight_pairs = [](const Scene& scene) {
+        return chosen(scene, "upg+bdpt:light_paths=4000", 0, 17).radius /
+               chosen(scene, "upg:light_paths=4000", 0, 17).radius;
+    };
+    const double open = relative_to_eight_pairs(build(front_camera(32) + room() + area_lamp())),
+                 shaded = relative_to_eight_pairs(
+                     build(front_camera(32) + room() + area_lamp() + shade));
+    RecordProperty("open", std::to_string(open));
+    RecordProperty("shaded", std::to_string(shaded));
+    EXPECT_LT(open, 1);
+    EXPECT_GT(shaded, 1.3);
 }
 
 }  // namespace

@@ -13,7 +13,9 @@ float chosen(double covered, double weight) {
     constexpr double kFound = 0.01;
     GatherSums stats;
     const GatherWeightScale first;
-    first.observe(1, weight, kFound, 1 / (covered * kFound), 1, stats);
+    GatherWeightScale::observe(
+        GatherMoment::of(1, weight, double(first.value()), kFound, 1 / (covered * kFound), 1),
+        stats);
     GatherWeightScale next;
     std::vector<std::unique_ptr<PassSums>> workers;
     workers.push_back(std::make_unique<GatherSums>(stats));
@@ -41,8 +43,8 @@ TEST(GatherWeightScale, FollowsTheLeastSecondMoment) {
 
 TEST(GatherWeightScale, IgnoresPathsWithoutOtherTechniques) {
     GatherSums stats;
-    GatherWeightScale().observe(1, 1, 0.01, 100, 1, stats);
-    for (const uint64_t m : stats.second_moments) EXPECT_EQ(m, 0u);
+    GatherWeightScale::observe(GatherMoment::of(1, 1, 1, 0.01, 100, 1), stats);
+    for (const uint64_t m : stats.weight_moments) EXPECT_EQ(m, 0u);
 }
 
 }  // namespace
