@@ -1,6 +1,7 @@
 #include "geometry/accelerator.h"
 
 #include <atomic>
+#include <bit>
 #include <stdexcept>
 #include <string>
 
@@ -23,6 +24,16 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
     RTCBounds* out = args->bounds_o;
     out->lower_x = b.lo.x, out->lower_y = b.lo.y, out->lower_z = b.lo.z;
     out->upper_x = b.hi.x, out->upper_y = b.hi.y, out->upper_z = b.hi.z;
+}
+
+/// Embree reads four numbers at once. Stores of single ones would make it wait for them.
+void set_ray(const Ray& ray, RTCRay& to) {
+    using Lanes [[gnu::vector_size(16), gnu::may_alias]] = float;
+    constexpr uint32_t kAllShapes = ~0u;
+    Lanes* const lanes = reinterpret_cast<Lanes*>(&to);
+    lanes[0] = Lanes{ray.o.x, ray.o.y, ray.o.z, 0};                      // and tnear
+    lanes[1] = Lanes{ray.d.x, ray.d.y, ray.d.z, 0};                      // and time
+    lanes[2] = Lanes{ray.tmax, std::bit_cast<float>(kAllShapes), 0, 0};  // tfar, mask, id, flags
 }
 
 bool intersect_analytic(const AnalyticShape& shape, const RTCRay& ray, AnalyticShape::Hit& hit) {
@@ -183,8 +194,7 @@ void Accelerator::commit() {
 
 bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
     RTCRayHit rh;
-    rh.ray = {ray.o.x, ray.o.y, ray.o.z,  0,           ray.d.x, ray.d.y,
-              ray.d.z, 0,       ray.tmax, 0xffffffffu, 0,       0};
+    set_ray(ray, rh.ray);
     rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 #if RTC_VERSION_MAJOR >= 4
@@ -210,8 +220,8 @@ bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
 }
 
 bool Accelerator::occluded(const Ray& ray) const {
-    RTCRay r{ray.o.x, ray.o.y, ray.o.z,  0,           ray.d.x, ray.d.y,
-             ray.d.z, 0,       ray.tmax, 0xffffffffu, 0,       0};
+    RTCRay r;
+    set_ray(ray, r);
 #if RTC_VERSION_MAJOR >= 4
     rtcOccluded1(impl_->top, &r, nullptr);
 #else

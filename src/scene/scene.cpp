@@ -40,7 +40,8 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
 }
 
 void Scene::fill_hit(const RayHit& raw, SurfaceHit& hit) const {
-    hit.geometry = surface(raw);
+    ::new (&hit.geometry)
+        SurfaceGeometry(surface(raw));  // in place: a copy would wait for its parts
     hit.shape = &shapes_[raw.shape];
     hit.location = raw;
     hit.t = raw.t;
