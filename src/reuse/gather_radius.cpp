@@ -68,10 +68,10 @@ void GatherRadius::learn(const Film& film, const RenderStats& so_far, const Gath
     float largest = k.largest_first_radius;
     const RelativeVariance variance = relative_variance(film);
     if (totals.moment > 0 && variance.mean > 0) {
-        const double factor = factor_of_pairs(
+        const double change = factor_of_pairs(
             variance.part_of_square * since.gain / (since.eye_paths * variance.mean),
             since.gather_time / (since.gather_time + since.other_time));
-        wanted = std::clamp(pairs * factor, k.pairs / k.pairs_range, k.pairs * k.pairs_range);
+        wanted = std::clamp(pairs * change, k.pairs / k.pairs_range, k.pairs * k.pairs_range);
         largest = k.largest_radius;
     }
     const double factor = std::clamp(std::sqrt(wanted / pairs), 0.25, 4.0);

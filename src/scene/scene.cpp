@@ -41,7 +41,7 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
 
 void Scene::fill_hit(const RayHit& raw, SurfaceHit& hit) const {
     ::new (&hit.geometry)
-        SurfaceGeometry(surface(raw));  // in place: a copy would wait for its parts
+        SurfaceGeometry(surface(raw));  // in place: a copy would wait for the stores of its parts
     hit.shape = &shapes_[raw.shape];
     hit.location = raw;
     hit.t = raw.t;
