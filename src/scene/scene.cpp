@@ -1,5 +1,7 @@
 #include "scene/scene.h"
 
+#include <new>
+
 #include "math/frame.h"
 #include "texture/texture_cache.h"
 
