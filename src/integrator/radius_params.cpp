@@ -44,8 +44,8 @@ std::vector<ParamInfo> radius_params(const char* doc) {
              "the image stays biased."}};
 }
 
-RadiusParams::RadiusParams(const IntegratorParams& p, float pixels)
-    : first(p.number("radius")), alpha(p.number("alpha")), pixels_(pixels) {
+RadiusParams::RadiusParams(const IntegratorParams& p)
+    : first(p.number("radius")), alpha(p.number("alpha")) {
     if (!(first >= 0))
         throw std::runtime_error(fmt::format("{}: radius must not be negative", p.integrator()));
     if (!(alpha > 0 && alpha <= 1))
@@ -53,13 +53,14 @@ RadiusParams::RadiusParams(const IntegratorParams& p, float pixels)
 }
 
 float RadiusParams::radius(const Scene& scene, uint32_t index) {
-    if (first == 0 && !default_) default_ = default_merge_radius(scene, pixels_);
+    if (first == 0 && !default_) default_ = default_merge_radius(scene);
     return RadiusSchedule{first > 0 ? first : *default_, alpha}.radius(index);
 }
 
-float default_merge_radius(const Scene& scene, float pixels) {
+float default_merge_radius(const Scene& scene) {
+    constexpr float kPixels = 6;  // A smaller one makes caustics noisier, a larger one blurs them.
     constexpr float kOfScene = 0.01f;
-    return std::min(std::sqrt(pixels) * pixel_radius(scene), kOfScene * scene.bounds().radius());
+    return std::min(kPixels * pixel_radius(scene), kOfScene * scene.bounds().radius());
 }
 
 }  // namespace etendue

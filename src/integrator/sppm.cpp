@@ -17,14 +17,11 @@
 namespace etendue {
 namespace {
 
-/// Area of the default disc, in pixels.
-constexpr float kDiscPixels = 36;
-
 class SppmIntegrator final : public Integrator {
 public:
     /// `eye_paths`: number of eye paths of each pixel; 0: new eye paths in every pass.
     SppmIntegrator(const IntegratorParams& p, int eye_paths)
-        : mapping_(p, p.flag("next_event")), radius_params_(p, kDiscPixels), light_(p),
+        : mapping_(p, p.flag("next_event")), radius_params_(p), light_(p),
           eye_paths_(uint32_t(eye_paths)) {}
 
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }

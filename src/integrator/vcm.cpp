@@ -22,15 +22,12 @@ namespace {
 
 /// Ratio of the radius of merges behind a diffuse or glossy eye vertex to that of other merges. The former share a
 /// random eye path, so each of them adds less information. They matter for light that no other technique finds.
-constexpr float kInnerRadius = 0.45f;
-/// Area of the default disc, in pixels. It is smaller than that of `sppm`, since splats make most caustics with little
-/// noise and without blur.
-constexpr float kDiscPixels = 16;
+constexpr float kInnerRadius = 0.3f;
 
 class VcmIntegrator final : public Integrator {
 public:
     explicit VcmIntegrator(const IntegratorParams& p)
-        : paths_(p, Guiding(p)), radius_params_(p, kDiscPixels), connects_(p.flag("connections")),
+        : paths_(p, Guiding(p)), radius_params_(p), connects_(p.flag("connections")),
           merges_(p.flag("merges")), is_exact_(p.flag("exact")), light_(p),
           continuation_(p.number("continuation")) {
         if (!connects_ && !merges_)
@@ -193,10 +190,10 @@ private:
 IntegratorEntry vcm_entry() {
     std::vector<ParamInfo> params = Bidirectional::params();
     for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
-                                            "that of a disc with the area of 16 pixels, as the "
+                                            "that of a disc with the area of 36 pixels, as the "
                                             "median pixel sees the scene, but at most 1 % of the "
                                             "radius of the scene's bounds. Eye vertices that the "
-                                            "film point does not determine merge within 0.45 times "
+                                            "film point does not determine merge within 0.3 times "
                                             "this radius."))
         params.push_back(p);
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);

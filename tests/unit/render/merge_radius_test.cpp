@@ -9,7 +9,7 @@ namespace etendue::test {
 namespace {
 
 float radius(const std::string& camera) {
-    return default_merge_radius(build(camera + room() + area_lamp()), 36);
+    return default_merge_radius(build(camera + room() + area_lamp()));
 }
 
 /// The back wall fills most of the image; from z = 3.4 to -1 the image is 2·4.4·tan(22.5°) wide there.
@@ -22,7 +22,7 @@ TEST(DefaultMergeRadius, IsThatOfADiscOf36PixelsInLargeImages) {
 
 TEST(DefaultMergeRadius, IsAtMostOnePercentOfTheScene) {
     const Scene scene = build(front_camera(16) + room() + area_lamp());
-    EXPECT_EQ(default_merge_radius(scene, 36), 0.01f * scene.bounds().radius());
+    EXPECT_EQ(default_merge_radius(scene), 0.01f * scene.bounds().radius());
     // No eye ray hits a surface.
     EXPECT_NEAR(radius(sensor("0,0,3.4", "0,0,5", 2048)), 0.01f * scene.bounds().radius(), 1e-3);
 }
