@@ -26,7 +26,7 @@ void bounds_callback(const RTCBoundsFunctionArguments* args) {
     out->upper_x = b.hi.x, out->upper_y = b.hi.y, out->upper_z = b.hi.z;
 }
 
-/// Embree reads four numbers at once. Stores of single ones would make it wait for them.
+/// Embree loads four numbers at once. Such a load stalls on the stores of single numbers that precede it.
 void set_ray(const Ray& ray, RTCRay& to) {
     using Lanes [[gnu::vector_size(16), gnu::may_alias]] = float;
     constexpr uint32_t kAllShapes = ~0u;

@@ -153,21 +153,24 @@ private:
         c.sampler.seek(Stream::Auxiliary, pair.number);
         const double r =
             reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
-        const double chance = double(luminance(join->contribution) / luminance(*value));
-        if (connects_) observe(c, pair, *join, search.scale(), r, chance, work);
+        if (connects_) {
+            const double seen =
+                double(luminance(*value)) / double(luminance(join->contribution) * pair.survival);
+            observe(c, *join, search.scale(), r, seen, work);
+        }
         c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.rate));
     }
 
-    /// Records a visible pair for later passes. `scale`: the value that a unit of contribution adds to the pixel; `chance`:
-    /// the probability that its shadow ray was traced, divided by the transmittance.
-    void observe(const SampleContext& c, const GatherPair& pair, const Join& join, float scale,
-                 double r, double chance, Workspace& work) const {
+    /// Records a visible pair for later passes. `scale`: the value that a unit of contribution adds to the pixel. `seen`:
+    /// the transmittance of the join, divided by its survival probability in Russian roulette.
+    void observe(const SampleContext& c, const Join& join, float scale, double r, double seen,
+                 Workspace& work) const {
         const float pixel = c.film.expected_luminance(work.z.film);
         if (!(pixel > 0)) return;
         const double weight_scale = double(learned_.weight_scale.value());
         const GatherMoment moment = GatherMoment::of(
             double(luminance(join.contribution) * scale / pixel), double(join.mis_weight),
-            weight_scale, double(join.pair_probability), r, 1 / (chance * double(pair.survival)));
+            weight_scale, double(join.pair_probability), r, seen);
         GatherRadius::observe(moment, weight_scale, GatherSums::of(work));
         GatherWeightScale::observe(moment, GatherSums::of(work));
     }
@@ -179,6 +182,7 @@ private:
         density_ = PairDensity(pilot.vertices, learned_.radius.value(),
                                kGatherConstants.correlation, pilot.multiple);
     }
+
     static constexpr uint64_t kVertexBytes =
         LightVertexCache::kVertexBytes + LightVertexGrid::kVertexBytes;
 

@@ -62,7 +62,7 @@ inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, 
     if (i == 0 || !v[i].is_connectible || edges < n.pairs.min_edges) return 0;
     const double fwd = v[i].pdf_fwd;
     constexpr bool eye = side == Side::Eye;
-    // Of a light path, only a vertex next to the lens can see it: beyond a delta event, no technique could join them.
+    // A light vertex sees the lens only where it is next to it: no technique splits a path beside a delta event.
     const bool sees_lens = eye ? v[i].sees_lens : inward == kLensGloss;
     if (n.merge > 0) {
         if ((eye ? edges - i : i) < n.pairs.first_merge) return 0;

@@ -78,7 +78,7 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, Tra
     const float u = sampler.next_1d_if(scene.has_masks());
     Passage passage{medium};
     const bool found = scene.intersect(ray, u, hit, passage);
-    Flight& flight = path.flight;  // part by part: a copy would wait for the stores of its parts
+    Flight& flight = path.flight;  // by member: a vector copy stalls on stores of members
     flight.o = ray.o;
     flight.d = ray.d;
     flight.length = found ? hit.t : kInf;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "film/film.h"
 #include "reuse/gather_constants.h"
 
 namespace etendue {
@@ -56,11 +57,7 @@ void GatherRadius::learn(const Film& film, const RenderStats& so_far, const Gath
                        k.pair_time * double(so_far.pairs) + k.trial_time * double(so_far.trials),
                    .other_time = double(so_far.rays() - so_far.trial_rays - so_far.visible_pairs),
                    .gain = (totals.moment - totals.moment_of_more) / GatherMoment::kUnit};
-    const Sums since{.eye_paths = now.eye_paths - before_.eye_paths,
-                     .pairs = now.pairs - before_.pairs,
-                     .gather_time = now.gather_time - before_.gather_time,
-                     .other_time = now.other_time - before_.other_time,
-                     .gain = now.gain - before_.gain};
+    const Sums since = now - before_;
     before_ = now;
 
     const double pairs = (since.pairs + 1) / since.eye_paths;

@@ -42,6 +42,11 @@ private:
     /// Sums over passes. `gain`: of M(1) - M(kMore).
     struct Sums {
         double eye_paths = 0, pairs = 0, gather_time = 0, other_time = 0, gain = 0;
+
+        Sums operator-(const Sums& o) const {
+            return {eye_paths - o.eye_paths, pairs - o.pairs, gather_time - o.gather_time,
+                    other_time - o.other_time, gain - o.gain};
+        }
     };
 
     float radius_ = 0, scene_radius_ = 0;

@@ -42,8 +42,8 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
 }
 
 void Scene::fill_hit(const RayHit& raw, SurfaceHit& hit) const {
-    ::new (&hit.geometry)
-        SurfaceGeometry(surface(raw));  // in place: a copy would wait for the stores of its parts
+    // In place: a vector copy would stall on the stores that have just written its members.
+    ::new (&hit.geometry) SurfaceGeometry(surface(raw));
     hit.shape = &shapes_[raw.shape];
     hit.location = raw;
     hit.t = raw.t;
