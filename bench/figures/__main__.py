@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 
+import mps
 import pcbpt
 import upg
 from output import save, text_table
@@ -19,6 +20,7 @@ from runs import REFERENCE_SECONDS, ROOT, Runs, Skipped
 # Function that makes the figure, and seconds of its methods. References take REFERENCE_SECONDS more for each scene and each
 # selection of paths; figures made by the same call share them.
 FIGURES = {
+    "upg-pssmlt": (upg.chains, 480),
     "upg-convergence": (upg.convergence, 150),
     "upg-speed": (upg.speed, 90),
     "upg-trials": (upg.trials, 60),
@@ -26,13 +28,17 @@ FIGURES = {
     "upg-leak": (upg.leak, 120),
     "upg-depth": (upg.depth, 240),
     "upg-endpoint": (upg.endpoint, 160),
+    "upg-guide": (upg.guided, 1200),
     "equal-time": (upg.equal_time, 300),
+    "pcbpt-guide": (pcbpt.guided, 1200),
     "pcbpt-cache": (pcbpt.cache, 120),
     "pcbpt-weights": (pcbpt.weights, 40),
     "pcbpt-paths": (pcbpt.light_paths, 120),
     "pcbpt-phases": (pcbpt.phases, 30),
     "pcbpt-inner": (pcbpt.inner, 100),
     "pcbpt-convergence": (pcbpt.convergence, 150),
+    "mps-user-paths": (mps.user_paths, 960),
+    "mps-equal-time": (mps.equal_time, 960),
 }
 QUICK = 0.015
 

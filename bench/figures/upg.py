@@ -2,8 +2,22 @@
 
 import numpy as np
 
+from equal_time import LARGE, at_equal_time, equal_time_rows
 from output import Figure, panels, plot_lines, plot_pictures
 from runs import FIRST_SEED, mean_curve, power_law, scene_settings
+
+# --------------------------------------------------------------------------- figure 6: Markov chains
+
+CHAIN_METHODS = ("pssmlt", "upg", "upg+pssmlt", "upg+bdpt")
+
+
+def chains(runs, seconds):
+    """Fig. 6: pssmlt, upg and upg+pssmlt, for paths of three edges and more, which upg can make alone."""
+    scenes = runs.available("veach-ajar")
+    return at_equal_time(runs, scenes, CHAIN_METHODS, seconds, lengths="3..", paper={
+        "images": "pssmlt converges slowly for many bounces; upg+pssmlt has no spikes, unlike upg",
+        "text": "upg+pssmlt does not perform as well as upg+bdpt"})
+
 
 # ------------------------------------------------------------------------------------ figure 7: bias
 
@@ -350,6 +364,26 @@ def endpoint(runs, seconds):
     axes[0].legend()
     paper = {"scene": "living room", "rmse at equal time": PAPER_DROPS}
     return Figure(results, rows, figure, paper)
+
+
+# ---------------------------------------------------------------------------- figure 12: guided paths
+
+GUIDED_METHODS = ("bdpt", "bdpt:guide=on", "upg+bdpt", "upg+bdpt:guide=on")
+
+
+def guided(runs, seconds):
+    """Fig. 12: bdpt and upg+bdpt, guided and not, at equal time, training included; upg+bdpt also at equal samples."""
+    scenes = runs.available("veach-ajar", "lantern")
+    figure = at_equal_time(runs, scenes, GUIDED_METHODS, seconds * 4 / 5, paper={
+        "at equal time": "upg+bdpt better than guided bdpt",
+        "at equal samples": "guided upg+bdpt somewhat better than upg+bdpt"})
+    for scene in scenes:
+        spp = min(m["spp"] for m in figure.results[scene]["methods"][2:])
+        samples = runs.compare(scene, GUIDED_METHODS[2:], spp=max(1, round(spp)), runs=2,
+                               size=LARGE[scene])
+        figure.results[scene] = {"equal_time": figure.results[scene], "equal_samples": samples}
+        figure.rows += equal_time_rows(f"{scene}, equal samples", samples)
+    return figure
 
 
 # ------------------------------------------------------------------------------ figure 14: equal time

@@ -16,6 +16,7 @@
 #include "integrator/radius_params.h"
 #include "reuse/gather.h"
 #include "reuse/gather_constants.h"
+#include "reuse/merge_kernel.h"
 
 namespace etendue {
 namespace {
@@ -75,7 +76,7 @@ public:
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
-        if (merges_) grid_.build(cache_, radius_, first_merge());
+        if (merges_) grid_.build(cache_, reach() * radius_, first_merge());
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -119,6 +120,8 @@ public:
 private:
     /// Connections include next events, which make direct light with less noise than merges do.
     int first_merge() const { return connects_ && !is_exact_ ? 2 : 1; }
+    /// Distance of the farthest vertices that are used, divided by the radius.
+    float reach() const { return is_exact_ ? 1 : MergeKernel::kReach; }
     /// Number of light vertices by cell, in the previous pass.
     CellCounts cells() const {
         return grid_.points().is_empty() ? loaded_ : grid_.points().counts();
@@ -133,12 +136,13 @@ private:
             return Chosen{};
         };
         const float radius = z.sees_lens ? radius_ : kInnerRadius * radius_;
-        grid_.for_each_near(z.p, radius, choose, [&](const GatherCandidate& y, Chosen) {
+        grid_.for_each_near(z.p, reach() * radius, choose, [&](const GatherCandidate& y, Chosen) {
             cache_.restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair, false);
             const auto join = join_merge(work.pair, y.s, work.z, t, n);
             if (!join) return;
             ++work.stats.pairs;
-            c.sink.add(*join, join->contribution * c.splat_scale);
+            const float weight = MergeKernel::weight(length2(y.p - z.p), radius);
+            c.sink.add(*join, join->contribution * (weight * c.splat_scale));
         });
     }
 
