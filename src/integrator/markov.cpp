@@ -12,26 +12,34 @@ namespace {
 
 /// Largest rr_depth of the pilot's walks. Without Russian roulette, walks would not end in a closed room.
 constexpr int kPilotRoulette = 10;
+/// Longest time of the mutations of a pass, relative to that of its samples of direct light.
+constexpr double kLongest = 8;
 
 }  // namespace
 
 std::vector<ParamInfo> MarkovIntegrator::params() {
-    return {{"p_large", ParamKind::Float, "0.1",
-             "Probability of a large step, in [0.01, 1]. Large steps also serve as independent "
-             "samples of the image."},
-            {"chains", ParamKind::Int, "256",
-             "Number of chains in each group; it does not depend on the number of threads."},
-            {"groups", ParamKind::Int, "16",
-             "Number of independent groups of chains, an even number from 2 to 1024. The groups "
-             "take turns, one per pass; the error is estimated from their differences once each "
-             "has had a pass."}};
+    return {
+        {"p_large", ParamKind::Float, "0.1",
+         "Probability of a large step, in [0.01, 1]. Large steps also serve as independent "
+         "samples of the image."},
+        {"mutations", ParamKind::Float, "0",
+         "Number of mutations per pixel and pass, up to 1024; a pass also makes one independent "
+         "sample of direct light per pixel. 0: chosen by the noise of both."},
+        {"chains", ParamKind::Int, "256",
+         "Number of chains in each group; it does not depend on the number of threads."},
+        {"groups", ParamKind::Int, "16",
+         "Number of independent groups of chains, an even number from 2 to 1024. The groups "
+         "take turns, one per pass; the error is estimated from their differences once each "
+         "has had a pass."}};
 }
 
-MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions& depth)
+MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions& depth,
+                                   StepWorth worth)
     : options_{.groups = p.integer("groups", 2, 1024),
                .chains = p.integer("chains", 1, 1 << 20),
-               .p_large = double(p.number("p_large", 0.01f, 1.0f))},
-      paths_(depth, kShortest),
+               .p_large = double(p.number("p_large", 0.01f, 1.0f)),
+               .mutations = double(p.number("mutations", 0.0f, 1024.0f))},
+      paths_(depth, kShortest), worth_(worth),
       direct_({std::min(depth.max_depth, kShortest - 1), depth.rr_depth}, 1),
       pilot_paths_({depth.max_depth, std::min(depth.rr_depth, kPilotRoulette)}, kShortest) {
     if (options_.groups % 2 != 0)
@@ -61,13 +69,21 @@ void MarkovIntegrator::trace(const PassContext& pass) {
     if (paths_.max_depth() < kShortest || !pass.scene.has_emitters()) return;
     const bool is_loaded = !loaded_.empty();
     if (!has_begun_) {
-        if (!is_loaded) pilot_ = run_pilot(pass, bidirectional_sample(pass.scene, pilot_paths_));
+        if (!is_loaded) {
+            const TechniqueCounts n = direct_counts(pass.scene, pass.light_paths);
+            pilot_ = run_pilot(pass, bidirectional_sample(pass.scene, pilot_paths_),
+                               [&](int, const SampleContext& c, Workspace& work) {
+                                   direct_.add_sample(c, n, work);
+                               });
+        }
         Chains chains = begin(pass, *pilot_);
         pool_ = 0;
         for (const ClassPlan& plan : chains.plan) pool_ += plan.pool;
         groups_.reset();
         space_ = std::move(chains.space);
-        groups_ = std::make_unique<ChainGroups>(*space_, options_, std::move(chains.plan));
+        ChainOptions options = options_;
+        options.mutations = mutations_per_pixel();
+        groups_ = std::make_unique<ChainGroups>(*space_, options, std::move(chains.plan));
     }
     if (is_loaded) {
         LearnedState state(std::exchange(loaded_, {}));
@@ -75,6 +91,16 @@ void MarkovIntegrator::trace(const PassContext& pass) {
         has_begun_ = true;
     }
     advance(pass, *space_, *groups_);
+}
+
+double MarkovIntegrator::mutations_per_pixel() const {
+    if (options_.mutations > 0) return options_.mutations;
+    // With M mutations for each sample of direct light, the product of variance and time is
+    // (V_d + V_c/M) (T_d + M T_c). It is least for M² = V_c T_d / (V_d T_c).
+    const double V_c = worth_.correlation * pilot_->chain_variance, V_d = pilot_->direct_variance,
+                 most = std::max(1.0, kLongest / worth_.cost);
+    if (!(V_c < sqr(most) * V_d * worth_.cost)) return most;
+    return std::max(1.0, std::sqrt(V_c / (V_d * worth_.cost)));
 }
 
 void MarkovIntegrator::save(LearnedState& to) const {
@@ -119,6 +145,7 @@ std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {
         {"normalisation_relative_error", groups_->relative_error_of_b()},
         {"pilot_samples", pilot_->samples},
         {"pool_samples", pool_},
+        {"mutations_per_pixel", mutations_per_pixel()},
         {"longest_stay", groups_->stats().longest_stay}};
     add_step_figures(groups_->stats(), space_->mutations(), kShortest, out);
     return out;

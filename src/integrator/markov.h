@@ -50,7 +50,12 @@ public:
     std::vector<std::pair<std::string, double>> figures() const override;
 
 protected:
-    MarkovIntegrator(const IntegratorParams& params, const DepthOptions& depth);
+    /// What a mutation is worth: about the mean over the scenes of docs/benchmarks.md.
+    struct StepWorth {
+        double correlation;  ///< Variance of a mean over mutations, relative to independent states.
+        double cost;         ///< Time of a mutation, divided by that of a sample of direct light.
+    };
+    MarkovIntegrator(const IntegratorParams& params, const DepthOptions& depth, StepWorth worth);
 
     /// The space of states, and the parameters of its classes.
     struct Chains {
@@ -78,6 +83,10 @@ private:
     /// The counts for the shorter paths. Eye paths make all of them, unless an emitter has no extent.
     static TechniqueCounts direct_counts(const Scene& scene, uint64_t light_paths);
 
+    /// Mutations per pixel and pass, as given or from the pilot.
+    double mutations_per_pixel() const;
+
+    StepWorth worth_;
     Bidirectional direct_;
     Bidirectional pilot_paths_;  ///< With Russian roulette, even if the walks of chains have none.
     std::unique_ptr<StateSpace> space_;

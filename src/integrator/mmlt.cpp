@@ -59,7 +59,7 @@ private:
 class MmltIntegrator final : public MarkovIntegrator {
 public:
     explicit MmltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::without_roulette(p)),
+        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 15, .cost = 1}),
           lengths_(p.integer("lengths", 1, 64)) {}
 
 protected:

@@ -16,7 +16,7 @@ namespace {
 class PssmltIntegrator final : public MarkovIntegrator {
 public:
     explicit PssmltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::from(p)) {}
+        : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 10, .cost = 4}) {}
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {

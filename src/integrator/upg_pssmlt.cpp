@@ -227,7 +227,8 @@ private:
 class UpgPssmltIntegrator final : public MarkovIntegrator {
 public:
     explicit UpgPssmltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::from(p)), light_(p), given_radius_(p.number("radius")) {
+        : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 10, .cost = 6}), light_(p),
+          given_radius_(p.number("radius")) {
         if (!(given_radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));

@@ -116,7 +116,8 @@ void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
     }
 
     const size_t chains = working_.chains.size();
-    const uint64_t steps = (pass.pixels + chains - 1) / chains;
+    const uint64_t steps =
+        uint64_t(std::ceil(options_.mutations * double(pass.pixels) / double(chains)));
     std::vector<double> scales;
     for (size_t k = 0; k < plan_.size(); ++k) scales.push_back(scale(g, working_, int(k)));
     std::vector<ChainStats> stats(chains);

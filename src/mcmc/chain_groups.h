@@ -19,6 +19,7 @@ struct ChainOptions {
     int groups = 16;
     int chains = 256;  ///< Number in a group, for all classes together.
     double p_large = 0.3;
+    double mutations = 1;  ///< Steps per pixel and pass, for all chains of a group together.
 };
 
 /// Parameters of a class that are fixed before its chains start.
@@ -32,7 +33,7 @@ class ChainGroups {
 public:
     ChainGroups(const StateSpace& space, const ChainOptions& options, std::vector<ClassPlan> plan);
 
-    /// Makes the steps of pass `pass.index`, which belong to the group with the number index mod groups: one step per
+    /// Makes the steps of pass `pass.index`, which belong to the group with the number index mod groups: `mutations` per
     /// pixel, rounded up so that all chains make the same number. The pass is discarded unless commit() follows.
     void advance(const PassContext& pass);
     /// The same, with a sink for the states of each chain instead of the film.

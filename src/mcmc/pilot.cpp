@@ -14,6 +14,52 @@ struct PilotSplat {
     float luminance;
     int edges, s;
 };
+using PilotSplats = std::vector<PilotSplat>;
+
+/// One sample of the pilot, and two of direct light through the same film point.
+struct PilotSample {
+    PilotSplats splats, direct, other_direct;
+};
+
+PilotSplats draw(const PassContext& pass, const PrimarySample& sample, NumberSource& source,
+                 const ChainContext& c) {
+    PilotSplats splats;
+    ChainState state;
+    SplatCollector collector(pass.film, nullptr, state, c.work);
+    collector.observer = [&](const Join& j, double luminance) {
+        splats.push_back({j.film, float(luminance), j.technique.vertices() - 1, j.technique.s});
+    };
+    evaluate_sample(sample, 0, source, c, collector);
+    return splats;
+}
+
+PilotSample draw(const PassContext& pass, const PrimarySample& sample, const PrimarySample& direct,
+                 uint64_t key, Workspace& work) {
+    const WholeFilm whole(pass);
+    const ChainContext c{whole.sample, work};
+    PilotSample out;
+    NumberTable numbers;
+    NumberSource source(NumberStep::Fresh, key, nullptr, &numbers);
+    out.splats = draw(pass, sample, source, c);
+
+    constexpr uint64_t kDirect = 0x646972656374;
+    const uint64_t direct_key = hash_combine(key, kDirect);
+    NumberTable film_point;
+    for (uint32_t slot : {0u, 1u})
+        film_point.set(Stream::Eye, 0, slot, uint32_t(hash_combine(direct_key, slot) >> 32));
+    for (PilotSplats* to : {&out.direct, &out.other_direct}) {
+        const uint64_t k = hash_combine(direct_key, to == &out.direct ? 2 : 3);
+        NumberSource others(NumberStep::Same, k, &film_point, &numbers);
+        *to = draw(pass, direct, others, c);
+    }
+    return out;
+}
+
+double weighted(const PilotSplats& splats, const TargetMap& map) {
+    double sum = 0;
+    for (const PilotSplat& s : splats) sum += double(s.luminance) * map(s.film);
+    return sum;
+}
 
 }  // namespace
 
@@ -21,6 +67,8 @@ void Pilot::save(LearnedState& to) const {
     map.save(to);
     to.put(b);
     to.put(relative_variance);
+    to.put(direct_variance);
+    to.put(chain_variance);
     to.put(samples);
     to.put(precise_samples);
     to.put(uint64_t(by_technique.size()));
@@ -35,6 +83,8 @@ void Pilot::load(LearnedState& from) {
     map.load(from);
     from.get(b);
     from.get(relative_variance);
+    from.get(direct_variance);
+    from.get(chain_variance);
     from.get(samples);
     from.get(precise_samples);
     uint64_t techniques = 0;
@@ -52,48 +102,51 @@ uint64_t pool_samples(uint64_t precise_samples, const ChainOptions& options) {
     return std::max(precise_samples / 4, uint64_t(4 * options.chains));
 }
 
-Pilot run_pilot(const PassContext& pass, const PrimarySample& sample) {
+Pilot run_pilot(const PassContext& pass, const PrimarySample& sample, const PrimarySample& direct) {
     constexpr uint64_t kFewest = 1024, kMost = uint64_t(1) << 18;
     constexpr double kPrecision = 0.02;
     const uint64_t most = std::clamp(2 * pass.pixels, kFewest, kMost);
     const uint64_t seed = hash_combine(pass.seed, 0x70696c6f74);
-    std::vector<std::vector<PilotSplat>> splats;
+    std::vector<PilotSample> drawn;
     Pilot pilot{.map = TargetMap(pass.film.geometry()), .by_technique = {}};
     while (true) {
-        const uint64_t done = splats.size();
-        splats.resize(std::min(most, std::max(kFewest, 2 * done)));
-        const auto trace = [&](uint64_t i, Sampler&, Workspace& work) {
-            const WholeFilm whole(pass);
-            NumberTable numbers;
-            NumberSource source(NumberStep::Fresh, hash_combine(seed, done + i), nullptr, &numbers);
-            ChainState state;
-            SplatCollector collector(pass.film, nullptr, state, work);
-            collector.observer = [&](const Join& j, double luminance) {
-                splats[done + i].push_back(
-                    {j.film, float(luminance), j.technique.vertices() - 1, j.technique.s});
-            };
-            evaluate_sample(sample, 0, source, {whole.sample, work}, collector);
-        };
-        pass.for_each_other_path(splats.size() - done, trace);
-        pilot.map = TargetMap(pass.film.geometry(), splats.size());
-        for (const auto& of_sample : splats)
-            for (const PilotSplat& s : of_sample) pilot.map.add(s.film, double(s.luminance));
+        const uint64_t done = drawn.size();
+        drawn.resize(std::min(most, std::max(kFewest, 2 * done)));
+        pass.for_each_other_path(drawn.size() - done, [&](uint64_t i, Sampler&, Workspace& work) {
+            drawn[done + i] = draw(pass, sample, direct, hash_combine(seed, done + i), work);
+        });
+        pilot.map = TargetMap(pass.film.geometry(), drawn.size());
+        TargetMap all = pilot.map;  // with direct light
+        for (const PilotSample& of : drawn) {
+            for (const PilotSplat& s : of.splats) {
+                pilot.map.add(s.film, double(s.luminance));
+                all.add(s.film, double(s.luminance));
+            }
+            for (const PilotSplats* splats : {&of.direct, &of.other_direct})
+                for (const PilotSplat& s : *splats) all.add(s.film, double(s.luminance) / 2);
+        }
         pilot.map.learn();
+        all.learn();
 
-        Moments target;
+        Moments target, direct_variance, chain_variance;
         pilot.by_technique.clear();
-        for (const auto& of_sample : splats) {
-            double sum = 0;
-            for (const PilotSplat& s : of_sample) {
-                const double value = double(s.luminance) * pilot.map(s.film);
+        for (const PilotSample& of : drawn) {
+            double sum = 0, noise = 0;
+            for (const PilotSplat& s : of.splats) {
+                const double W = pilot.map(s.film), value = double(s.luminance) * W;
                 sum += value;
-                pilot.by_technique[{s.edges, s.s}] += value / double(splats.size());
+                noise += value * sqr(all(s.film) / W);
+                pilot.by_technique[{s.edges, s.s}] += value / double(drawn.size());
             }
             target.add(sum);
+            chain_variance.add(noise);
+            direct_variance.add(sqr(weighted(of.direct, all) - weighted(of.other_direct, all)) / 2);
         }
-        pilot.samples = splats.size();
+        pilot.samples = drawn.size();
         pilot.b = target.mean();
         pilot.relative_variance = pilot.b > 0 ? target.variance() / sqr(pilot.b) : 0;
+        pilot.direct_variance = direct_variance.mean();
+        pilot.chain_variance = pilot.b * chain_variance.mean();
         // As many again have the same error.
         const double error = std::sqrt(pilot.relative_variance / double(pilot.samples));
         const bool is_precise = pilot.b > 0 && error <= kPrecision;

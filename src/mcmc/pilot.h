@@ -13,6 +13,9 @@ struct Pilot {
     TargetMap map;
     double b = 0;                  ///< Mean of the target.
     double relative_variance = 0;  ///< Variance of the target of one sample, divided by b².
+    /// Variances of a pixel with the weights W of the whole image, direct light included: their means over the pixels.
+    double direct_variance = 0;  ///< Of one sample of direct light, given the film point.
+    double chain_variance = 0;   ///< Of one independent state of density I/b per pixel.
     uint64_t samples = 0;
     uint64_t precise_samples = 0;  ///< Those that sufficed for b; the others improve the map.
     /// Mean of the target by length and number of light vertices.
@@ -22,9 +25,9 @@ struct Pilot {
     void load(LearnedState& from);
 };
 
-/// Samples class 0 of `sample`. The number of samples is doubled until there is one for each pixel and the relative standard
+/// Samples class 0 of `sample`, and twice as often `direct`, the paths that chains do not make. The number of samples is doubled until there is one for each pixel and the relative standard
 /// error of b is at most 2 %; at most two samples per pixel, and 2^18 in total.
-Pilot run_pilot(const PassContext& pass, const PrimarySample& sample);
+Pilot run_pilot(const PassContext& pass, const PrimarySample& sample, const PrimarySample& direct);
 
 /// Number of samples in the pool of a group: a quarter of Pilot::precise_samples, and at least four for each chain.
 uint64_t pool_samples(uint64_t precise_samples, const ChainOptions& options);
