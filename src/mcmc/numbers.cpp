@@ -15,7 +15,7 @@ uint64_t hash_address(uint64_t key, Stream stream, uint64_t vertex, uint32_t slo
 
 /// `bits` moved up or down, with the same probability.
 uint32_t moved(uint32_t bits, uint64_t random) {
-    constexpr double kSmallest = -13, kLargest = -3;
+    constexpr double kSmallest = -13, kLargest = -5;
     const double exponent = kSmallest + (kLargest - kSmallest) * to_unit_double(random);
     const auto distance = uint32_t(std::exp2(32 + exponent));
     return random & 1 ? bits + distance : bits - distance;

@@ -45,7 +45,7 @@ private:
 /// Where the numbers of a state come from.
 enum class NumberStep : uint8_t {
     Fresh,  ///< All numbers are drawn anew.
-    Small,  ///< Each changes by ±2^-13 … 2^-3, with a uniform exponent, except those of Stream::Selection.
+    Small,  ///< Each changes by ±2^-13 … 2^-5, with a uniform exponent, except those of Stream::Selection.
     Block,  ///< The numbers of each vertex are drawn anew with probability kBlockProbability, and otherwise kept.
     Same,   ///< All numbers are kept.
 };

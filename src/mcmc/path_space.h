@@ -21,7 +21,7 @@ struct PathMutations {
     static constexpr std::array<const char*, kCount> kNames{
         "bidirectional", "lens",      "caustic",   "multi_chain",
         "lens_subpath",  "user_path", "photon_map"};
-    std::array<double, kCount> weights{2, 4, 2, 4, 1, 0, 0};
+    std::array<double, kCount> weights{1, 4, 2, 4, 1, 0, 0};
     std::optional<UserPaths> user_paths{};  ///< Required if their weight is not 0.
 };
 

@@ -68,8 +68,7 @@ protected:
                           ChainState& y) const = 0;
 
 private:
-    static constexpr double kBlockShare =
-        0.25;  ///< Fraction of the mutations that are block steps.
+    static constexpr double kBlockShare = 0.1;  ///< Fraction of the mutations that are block steps.
 
     int classes_;
 };
