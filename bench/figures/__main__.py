@@ -18,7 +18,8 @@ from output import save, text_table
 from runs import REFERENCE_SECONDS, ROOT, Runs, Skipped
 
 # Function that makes the figure, and seconds of its methods. References take REFERENCE_SECONDS more for each scene and each
-# selection of paths; figures made by the same call share them.
+# selection of paths, those of large images (equal_time.py) ten times as long as an image; figures made by the same call
+# share them.
 FIGURES = {
     "upg-pssmlt": (upg.chains, 480),
     "upg-convergence": (upg.convergence, 150),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from equal_time import LARGE
+from equal_time import LARGE, compare_large
 from output import Figure, panels
 from runs import FIRST_SEED
 
@@ -87,8 +87,8 @@ def equal_time(runs, seconds):
     rows = [["scene", "method", "photons", "spp", "RMS of relative errors", "trimmed", "mean ratio"]]
     results, ratios = {}, []
     for scene in scenes:
-        comparison = runs.compare(scene, TABLE_METHODS, seconds=seconds / len(scenes), runs=2,
-                                  size=LARGE[scene])
+        comparison = compare_large(runs, scene, TABLE_METHODS, seconds / len(scenes),
+                                   reference_method="mlt")
         results[scene] = comparison
         for m in comparison["methods"]:
             stats, _ = runs.render(scene, m["method"], spp=1, size=LARGE[scene])

@@ -90,9 +90,10 @@ class Runs:
         return max(2, round(min(speeds) * self.scale * seconds))
 
     def compare(self, scene, methods, *, seconds=None, spp=None, runs=1, paths="all",
-                lengths="1..", size=None):
-        """A summary of the results of `etendue compare` for each method. `seconds`, which is scaled, is the time of all
-        methods and runs together."""
+                lengths="1..", size=None, reference_seconds=REFERENCE_SECONDS,
+                reference_method="bdpt"):
+        """A summary of the results of `etendue compare` for each method. `seconds`, which is scaled like
+        `reference_seconds`, is the time of all methods and runs together."""
         report = self.folder / "report"
         arguments = ["compare", scene_file(scene), "--methods", *methods, "--runs", runs]
         if spp:
@@ -101,8 +102,8 @@ class Runs:
             arguments += ["--time", max(0.05, self.scale * seconds / len(methods) / runs)]
         arguments += ["--resolution", "{}x{}".format(*(size or SCENES[scene][1]))]
         arguments += ["--paths", paths, "--lengths", lengths, "--techniques-max-depth", 0]
-        arguments += ["--reference-time", self.scale * REFERENCE_SECONDS]
-        arguments += ["--reference-method", "bdpt", "--references", self.folder / "references"]
+        arguments += ["--reference-time", self.scale * reference_seconds]
+        arguments += ["--reference-method", reference_method, "--references", self.folder / "references"]
         arguments += ["--report", report, "--seed", FIRST_SEED, "--threads", self.threads]
         self._call(*arguments, "--quiet")
         return _comparison(json.loads((report / "report.json").read_text()), scene)

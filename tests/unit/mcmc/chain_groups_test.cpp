@@ -55,7 +55,7 @@ TEST(ChainGroups, StartUpIsUnbiased) {
 }
 
 TEST(ChainGroups, FindAll) {
-    expect_exact(run_toy({{.groups = 4, .chains = 8, .p_large = 0.3}, 64, 16, 256, 600}), 0.005);
+    expect_exact(run_toy({{.groups = 4, .chains = 8, .p_large = 0.3}, 64, 16, 256, 1000}), 0.005);
 }
 
 TEST(ChainGroups, AnyConstantWillDo) {
