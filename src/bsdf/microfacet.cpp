@@ -114,7 +114,8 @@ HalfwayBound halfway_of_refraction(Vec3 wo, const DirectionCone& c, float eta) {
 
 float Microfacet::max_D(float theta) const {
     if (theta >= 0.5f * kPi) return 0;
-    const float cos2 = theta > 0 ? sqr(std::cos(theta)) : 1.0f, sin2 = 1 - cos2;
+    // Of a peaked distribution, sin²θ decides; 1 - cos²θ would have lost its digits.
+    const float sin2 = theta > 0 ? sqr(std::sin(theta)) : 0.0f, cos2 = 1 - sin2;
     const float max_alpha2 = sqr(std::fmax(alpha_x_, alpha_y_)), norm = kPi * alpha_x_ * alpha_y_;
     if (kind_ == Kind::Ggx) {
         // Monotone for α ≤ 1 only; beyond that the peak lies at the horizon.

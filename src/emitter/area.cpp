@@ -94,7 +94,8 @@ public:
     }
     double power() const override { return power_; }
     bool is_area() const override { return true; }
-    float max_pdf_d() const override { return kInvPi; }
+    float max_pdf_d() const override { return pdf_direction(1); }
+    bool emits_by_cosine() const override { return !two_sided_; }
 
 private:
     /// cos θ of light that leaves along `w`; at most zero where none does.

@@ -80,6 +80,8 @@ public:
     virtual EmissionSample sample_emission_from(Vec3 /*d*/, Vec2 /*u_d*/) const { return {}; }
     /// Finite emitters: upper bound of pdf_d at any point; kInf where none is known.
     virtual float max_pdf_d() const { return kInf; }
+    /// Whether pdf_d is cos θ/π about the normal, and zero behind.
+    virtual bool emits_by_cosine() const { return false; }
     /// The disc on which light from infinity starts: for light that travels along -d it is normal to d and centred at
     /// center + d·radius.
     struct Disc {

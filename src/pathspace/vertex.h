@@ -132,7 +132,7 @@ struct Vertex {
     /// The normal n where directions without guide have the density cos θ/π about n; empty for other densities.
     std::optional<Vec3> cosine_normal() const {
         if (kind != Kind::Emitter) return bsdf.diffuse_normal();
-        return emitter->is_area() ? std::optional(ng) : std::nullopt;
+        return emitter->emits_by_cosine() ? std::optional(ng) : std::nullopt;
     }
 
     /// Medium on the edge that leaves along `w`.

@@ -49,6 +49,11 @@ std::vector<Case> cases() {
          two_sided("<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.4\"/><bsdf "
                    "type=\"diffuse\"/><bsdf type=\"conductor\"/></bsdf>"),
          kLamp},
+        {"lamp_with_two_sides", test::diffuse("0.5,0.5,0.5"),
+         test::rectangle("<scale value=\"0.25\"/><rotate x=\"1\" angle=\"70\"/>",
+                         test::diffuse("0.5,0.5,0.5") +
+                             "<emitter type=\"area\"><boolean name=\"two_sided\" "
+                             "value=\"true\"/></emitter>")},
         {"point", test::diffuse("0.5,0.5,0.5"),
          "<emitter type=\"point\"><point name=\"position\" value=\"0,0.6,0.3\"/></emitter>"},
         {"spot", test::diffuse("0.5,0.5,0.5"),
