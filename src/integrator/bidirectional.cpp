@@ -157,8 +157,9 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
     Rgb contribution = j.contribution;
     const bool is_splat = j.technique.t <= 1;
     if (is_splat) c.film.prefetch_splat(j.film);
-    const float q = join_survival(luminance(contribution) * j.mis_weight * scale,
-                                  threshold(c, is_splat ? &j.film : nullptr));
+    const float q = join_survival(
+        luminance(contribution) * j.mis_weight * scale,
+        c.is_of_whole_film ? film_threshold(j.film) : threshold(c, is_splat ? &j.film : nullptr));
     if (q < 1) {
         c.sampler.seek(Stream::Roulette, number);
         if (!(c.sampler.next_1d_unstructured() < double(q))) {
@@ -175,7 +176,8 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
 void Bidirectional::add(const SampleContext& c, const std::optional<Join>& j, Workspace& work,
                         float factor, uint32_t draw) const {
     if (!j || j->technique.vertices() - 1 < shortest_) return;
-    const float scale = j->technique.t <= 1 ? c.splat_scale : std::fabs(work.z.film_weight);
+    const float splat_scale = c.is_of_whole_film ? 1.0f : c.splat_scale,
+                scale = j->technique.t <= 1 ? splat_scale : std::fabs(work.z.film_weight);
     const uint64_t number = join_number(j->technique.s, j->technique.t, draw);
     if (const auto value = test(c, *j, scale * factor, number, work))
         c.sink.add(*j, *value * factor);

@@ -15,6 +15,12 @@ public:
     Bidirectional(const DepthOptions& depth, int shortest)
         : depth_(depth), shortest_(shortest), roulette_(0), is_optimised_(false) {}
 
+    /// Russian roulette of joins for samples of the whole film, which must not depend on the film: `threshold` is that
+    /// of join_survival() at a film point, for contributions of a sample to the whole film.
+    void set_roulette(std::function<float(Vec2 film)> threshold) {
+        film_threshold_ = std::move(threshold);
+    }
+
     /// Sample counts of bidirectional path tracing, without merges and gathers.
     static TechniqueCounts counts(const Scene& scene, uint64_t light_paths) {
         const float N = float(light_paths);
@@ -125,6 +131,8 @@ public:
 private:
     /// Threshold of join_survival() for contributions at the film point `splat`, or to the own pixel if it is nullptr.
     float threshold(const SampleContext& c, const Vec2* splat) const;
+    /// The same for a sample of the whole film.
+    float film_threshold(Vec2 film) const { return film_threshold_ ? film_threshold_(film) : 0; }
 
     DepthOptions depth_;
     Guiding guiding_;
@@ -132,6 +140,7 @@ private:
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
     bool is_optimised_;              ///< Whether thresholds_ replaces roulette_.
     std::vector<float> thresholds_;  ///< By pixel; empty until they are learned.
+    std::function<float(Vec2)> film_threshold_;  ///< Empty: no roulette.
 };
 
 }  // namespace etendue

@@ -33,6 +33,13 @@ std::vector<ParamInfo> MarkovIntegrator::params() {
          "has had a pass."}};
 }
 
+std::vector<ParamInfo> MarkovIntegrator::sub_path_params() {
+    std::vector<ParamInfo> params = depth_params();
+    for (ParamInfo& p : params)
+        if (p.name == std::string("rr_depth")) p.fallback = "3";
+    return params;
+}
+
 MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions& depth,
                                    StepWorth worth)
     : options_{.groups = p.integer("groups", 2, 1024),
@@ -63,6 +70,13 @@ PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
     const TechniqueCounts n = MarkovIntegrator::counts(scene, 0);
     return
         [&paths, n](int, const SampleContext& c, Workspace& work) { paths.add_sample(c, n, work); };
+}
+
+void MarkovIntegrator::use_roulette(const Pilot& pilot) {
+    constexpr double kSmall = 0.1;  // Part of the target of a state.
+    paths_.set_roulette([threshold = kSmall * pilot.typical, map = pilot.map](Vec2 film) {
+        return float(threshold / map(film));
+    });
 }
 
 void MarkovIntegrator::trace(const PassContext& pass) {

@@ -21,8 +21,11 @@ public:
     /// and pass.
     static constexpr int kShortest = 3;
 
-    /// The parameters of chains; integrators whose walks use Russian roulette add `rr_depth`.
+    /// The parameters of chains.
     static std::vector<ParamInfo> params();
+    /// The parameters of sub-paths with Russian roulette. A mutation evaluates all joins of two sub-paths, and most of
+    /// those of long ones contribute little: walks end earlier than usual.
+    static std::vector<ParamInfo> sub_path_params();
 
     void trace(const PassContext& pass) final;
     /// Chains can be made only when the scene is known; until then the loaded data are kept unchanged.
@@ -67,6 +70,9 @@ protected:
     virtual void advance(const PassContext& pass, const StateSpace&, ChainGroups& groups) {
         groups.advance(pass);
     }
+
+    /// From now on, paths_ tests joins that have a small part of the target of a state with a probability in proportion.
+    void use_roulette(const Pilot& pilot);
 
     /// A sample of all techniques of `bdpt`, with the walks of `paths`.
     PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;

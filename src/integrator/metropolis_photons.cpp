@@ -35,7 +35,9 @@ struct PhotonState : NumberState {
 /// ways can make the same path, so its flux is divided by the sum of both densities [Fan et al. 2005, eq. 7].
 class ImportonSpace final : public NumberSpace {
 public:
-    explicit ImportonSpace(const PhotonMapping& mapping) : NumberSpace(1), mapping_(mapping) {}
+    /// Successive states are to store photons at different places: their steps are wider than those of chains on images.
+    explicit ImportonSpace(const PhotonMapping& mapping)
+        : NumberSpace(1, NumberStep::Wide, 0.1), mapping_(mapping) {}
 
     const PhotonImportance* importance = nullptr;
     const UserPaths* user_paths = nullptr;

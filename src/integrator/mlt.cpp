@@ -38,7 +38,7 @@ protected:
                              .c = pilot.b};
         PathMutations mutations;
         if (!user_paths_.empty()) {
-            mutations.user_paths.emplace(UserPaths::load(scene, user_paths_));
+            target.user = {UserPaths::load(scene, user_paths_), user_ratio_ / (1 + user_ratio_)};
             mutations.weights[PathMutations::UserPath] =
                 user_ratio_ * mutations.weights[PathMutations::Bidirectional];
         }
@@ -57,10 +57,11 @@ IntegratorEntry mlt_entry() {
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     params.push_back({"user_paths", ParamKind::String, "",
                       "JSON file of important light sub-paths, which `etendue paths` makes and "
-                      "checks; proposals near them are mixed with bidirectional mutations."});
+                      "checks; large steps and the start-up follow them, and proposals near them are mixed with "
+                      "bidirectional mutations."});
     params.push_back({"user_ratio", ParamKind::Float, "1",
-                      "Number of proposals near user paths for each bidirectional mutation, 0.01 "
-                      "to 100."});
+                      "Number of proposals near user paths for each bidirectional mutation, and of "
+                      "large steps that follow them for each other one, 0.01 to 100."});
     return {{"integrator", "mlt",
              "Metropolis light transport on paths: mutations replace a part of a path, or move it "
              "slightly. Unbiased.",

@@ -60,11 +60,11 @@ IntegratorEntry mps_entry() {
     params.push_back(
         {"user_paths", ParamKind::String, "",
          "JSON file of important light sub-paths, which `etendue paths` makes and "
-         "checks; a part of the independent light paths (with target=path, of the proposals) "
+         "checks; a part of the independent light paths (with target=path, of the proposals, too) "
          "follows them."});
     params.push_back({"user_share", ParamKind::Float, "0.5",
                       "Fraction of the independent light paths that follow user paths, in [0.01, "
-                      "0.99]; with target=path, of proposals near user paths among these and "
+                      "0.99]; with target=path, also of proposals near user paths among these and "
                       "bidirectional mutations."});
     params.push_back(
         {"least_share", ParamKind::Float, "0.25",

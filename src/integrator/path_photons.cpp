@@ -19,6 +19,7 @@
 #include <cmath>
 
 #include "math/hash.h"
+#include "math/statistics.h"
 #include "mcmc/path_space.h"
 
 namespace etendue {
@@ -205,16 +206,6 @@ private:
     std::unordered_map<uint64_t, double> reciprocals_;
 };
 
-/// Median of values with weights; 0 if there are none.
-double median(std::vector<std::array<double, 2>> values) {
-    std::sort(values.begin(), values.end());
-    double sum = 0, below = 0;
-    for (const auto& [value, weight] : values) sum += weight;
-    for (const auto& [value, weight] : values)
-        if ((below += weight) >= sum / 2) return value;
-    return 0;
-}
-
 class PathPhotons final : public PhotonStates {
 public:
     PathPhotons(const PassContext& context, const PhotonMapping& mapping,
@@ -228,7 +219,7 @@ public:
             mutations_.weights[kind] = 1;
         mutations_.weights[PathMutations::PhotonMap] = 2;
         if (user_paths) {
-            mutations_.user_paths = *user_paths;
+            user_ = {*user_paths, user_share};
             mutations_.weights[PathMutations::UserPath] =
                 user_share / (1 - user_share) * mutations_.weights[PathMutations::Bidirectional];
         }
@@ -258,7 +249,8 @@ private:
             return sum / x.large_step_density();
         };
         space_.emplace(PathTarget{measure_, importance,
-                                  LengthChoice(kShortest, measure_.longest, pilot), *techniques_},
+                                  LengthChoice(kShortest, measure_.longest, pilot), *techniques_,
+                                  user_},
                        mutations_, TechniqueCounts{});
     }
 
@@ -289,11 +281,12 @@ private:
             }
             for (double& share : sample.shares) share /= sum;
         });
-        std::array<std::vector<std::array<double, 2>>, 2> responses;
+        std::array<std::vector<WeightedValue>, 2> responses;
         for (const Sample& s : samples)
             for (const auto& [d, weight] : s.deposits)
                 responses[d.is_caustic].push_back({d.h, weight});
-        rule_.h0 = {median(std::move(responses[0])), median(std::move(responses[1]))};
+        rule_.h0 = {weighted_median(std::move(responses[0])),
+                    weighted_median(std::move(responses[1]))};
         Pilot pilot{.map = TargetMap(context.scene.film()), .by_technique = {}};
         for (const Sample& sample : samples)
             for (const auto& [d, weight] : sample.deposits)
@@ -306,6 +299,7 @@ private:
     PathMeasure measure_;
     PathPhotonRule rule_;
     PathMutations mutations_;
+    UserSteps user_;
     std::optional<TechniqueChoice> techniques_;
     std::optional<PathSpace> space_;
 };

@@ -6,8 +6,6 @@
 
 #include "integrator/pssmlt.h"
 
-#include <algorithm>
-
 #include "integrator/markov.h"
 
 namespace etendue {
@@ -20,6 +18,7 @@ public:
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
+        use_roulette(pilot);
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(pilot.precise_samples, options_),
                              .c = pilot.b};
@@ -32,9 +31,7 @@ protected:
 }  // namespace
 
 IntegratorEntry pssmlt_entry() {
-    std::vector<ParamInfo> params = depth_params();
-    for (ParamInfo& p : params)
-        if (p.name == std::string("rr_depth")) p.fallback = "10";
+    std::vector<ParamInfo> params = MarkovIntegrator::sub_path_params();
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     return {{"integrator", "pssmlt",
              "Metropolis light transport in the primary sample space of bidirectional path "

@@ -255,6 +255,7 @@ protected:
     /// Everything here is a function of the seed, so that a resumed rendering computes the same.
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         constexpr int kRounds = 3;
+        use_roulette(pilot);
         gathered_ = light_.count(pass.scene, paths_.depth(), kMaps * LightMap::kVertexBytes);
         const float size = pass.scene.bounds().is_empty() ? 1 : pass.scene.bounds().radius();
         const float largest = kGatherConstants.largest_radius * size;
@@ -318,9 +319,7 @@ private:
 }  // namespace
 
 IntegratorEntry upg_pssmlt_entry() {
-    std::vector<ParamInfo> params = depth_params();
-    for (ParamInfo& p : params)
-        if (p.name == std::string("rr_depth")) p.fallback = "10";
+    std::vector<ParamInfo> params = MarkovIntegrator::sub_path_params();
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     params.push_back(
         {"light_paths", ParamKind::Int, "0",

@@ -16,6 +16,16 @@ using StudentsT = boost::math::students_t_distribution<double, NoThrow>;
 
 }  // namespace
 
+double weighted_median(std::vector<WeightedValue> values) {
+    std::sort(values.begin(), values.end(),
+              [](const auto& a, const auto& b) { return a.value < b.value; });
+    double sum = 0, below = 0;
+    for (const WeightedValue& v : values) sum += v.weight;
+    for (const WeightedValue& v : values)
+        if ((below += v.weight) >= sum / 2) return v.value;
+    return 0;
+}
+
 double student_tail(double t, double dof) {
     return 2 * cdf(complement(StudentsT(dof), t));
 }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 namespace etendue {
 
@@ -35,6 +36,12 @@ private:
     int64_t count_ = 0;
     double mean_ = 0, sum2_ = 0;
 };
+
+struct WeightedValue {
+    double value, weight;
+};
+/// The smallest value at which the values up to it have half of the total weight; 0 if there are none.
+double weighted_median(std::vector<WeightedValue> values);
 
 /// Probability that |T| exceeds t for Student's distribution with `dof` degrees of freedom.
 double student_tail(double t, double dof);

@@ -16,9 +16,28 @@ namespace etendue {
 class NumberTable {
 public:
     void clear() { ++epoch_; }
+    struct Number {
+        uint32_t bits = 0, epoch = 0;
+    };
     /// The number at this address, or nullptr if it has not been read.
-    const uint32_t* find(Stream stream, uint64_t vertex, uint32_t slot) const;
-    void set(Stream stream, uint64_t vertex, uint32_t slot, uint32_t bits);
+    const uint32_t* find(Stream stream, uint64_t vertex, uint32_t slot) const {
+        const Place p = place(stream, vertex, slot);
+        const std::vector<Number>& table = tables_[p.table];
+        return p.index < table.size() && table[p.index].epoch == epoch_ ? &table[p.index].bits
+                                                                        : nullptr;
+    }
+    /// The place of the number at this address.
+    Number& at(Stream stream, uint64_t vertex, uint32_t slot) {
+        const Place p = place(stream, vertex, slot);
+        std::vector<Number>& table = tables_[p.table];
+        if (p.index >= table.size()) table.resize((p.index / kSlots + 4) * kSlots);
+        return table[p.index];
+    }
+    bool has(const Number& number) const { return number.epoch == epoch_; }
+    void set(Number& number, uint32_t bits) { number = {bits, epoch_}; }
+    void set(Stream stream, uint64_t vertex, uint32_t slot, uint32_t bits) {
+        set(at(stream, vertex, slot), bits);
+    }
     void save(LearnedState& to) const {
         to.put(epoch_);
         for (const auto& table : tables_) to.put(table);
@@ -30,26 +49,41 @@ public:
 
 private:
     static constexpr uint32_t kSlots = 8;  ///< Largest number of slots of a vertex.
-    struct Number {
-        uint32_t bits = 0, epoch = 0;
-    };
+    /// Joins to the lens are numbered from here on in Stream::Connection.
+    static constexpr uint64_t kLensVertex = 0x8000;
     struct Place {
         size_t table, index;
     };
-    static Place place(Stream stream, uint64_t vertex, uint32_t slot);
+    static Place place(Stream stream, uint64_t vertex, uint32_t slot) {
+        if (slot >= kSlots) throw_too_many();
+        const bool at_lens = stream == Stream::Connection && vertex >= kLensVertex;
+        const size_t v = size_t(at_lens ? vertex - kLensVertex : vertex);
+        const size_t table = stream == Stream::Eye          ? 0
+                             : stream == Stream::Light      ? 1
+                             : stream == Stream::Connection ? (at_lens ? 3 : 2)
+                             : stream == Stream::Selection  ? 4
+                                                            : 5;
+        return {table, v * kSlots + slot};
+    }
+    [[noreturn]] static void throw_too_many();
 
-    std::array<std::vector<Number>, 5> tables_;  ///< By stream; they never shrink.
+    std::array<std::vector<Number>, 6> tables_;  ///< By stream; they never shrink.
     uint32_t epoch_ = 1;
 };
 
 /// Where the numbers of a state come from.
 enum class NumberStep : uint8_t {
     Fresh,  ///< All numbers are drawn anew.
-    Small,  ///< Each changes by ±2^-13 … 2^-5, with a uniform exponent, except those of Stream::Selection.
+    /// Each changes by ±2^-16 … 2^-6, those of the film point by ±2^-10 … 2^-6, with about uniform exponents. Those of
+    /// Stream::Selection are kept.
+    Small,
+    Wide,   ///< The same with ±2^-13 … 2^-5 for all numbers.
     Block,  ///< The numbers of each vertex are drawn anew with probability kBlockProbability, and otherwise kept.
     Same,   ///< All numbers are kept.
 };
 
+/// All numbers of Stream::Roulette are one coordinate, rotated by a hash of the address: there are too many joins for a
+/// coordinate each.
 class NumberSource final : public PrimarySource {
 public:
     static constexpr double kBlockProbability = 0.2;
@@ -62,6 +96,8 @@ public:
     uint32_t bits(Stream stream, uint64_t vertex, uint32_t slot) override;
 
 private:
+    uint32_t draw(Stream stream, uint64_t vertex, uint32_t slot) const;
+
     NumberStep step_;
     uint64_t key_;
     const NumberTable* present_;

@@ -34,7 +34,8 @@ public:
     /// Appends a vertex by a given event.
     bool step_light(const BsdfSample& s);
     bool step_eye(const BsdfSample& s);
-    /// The last vertices so far.
+    /// The vertices so far of the side of the light, and the last ones of both sides.
+    int light_vertices() const { return work_.y.size(); }
     const Vertex& light_end() const { return work_.y[work_.y.size() - 1]; }
     const Vertex& eye_end() const { return work_.z[work_.z.size() - 1]; }
 

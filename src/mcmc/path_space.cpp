@@ -20,9 +20,9 @@ PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, Techniqu
         std::make_unique<EyeChain>(EyeChain::Kind::MultiChain, measure);
     mutations_[PathMutations::LensSubpath] = std::make_unique<LensSubpathMutation>();
     mutations_[PathMutations::PhotonMap] = std::make_unique<PhotonMapMutation>();
-    if (options_.user_paths)
+    if (target_.user.paths)
         mutations_[PathMutations::UserPath] =
-            std::make_unique<UserPathMutation>(measure, *options_.user_paths);
+            std::make_unique<UserPathMutation>(*target_.user.paths);
 }
 
 void PathSpace::draw(int, uint64_t key, const ChainContext& c, ChainState& state) const {
@@ -30,14 +30,31 @@ void PathSpace::draw(int, uint64_t key, const ChainContext& c, ChainState& state
     Sampler sampler(SamplerKind::Independent, key);
     sampler.start(0, 0);
     sampler.seek(Stream::Selection, 0);
-    const int k = target_.lengths.choose(sampler.next_1d_fine());
-    const int s = target_.techniques.choose(k, sampler.next_1d_fine());
+    const double u_length = sampler.next_1d_fine(), u_technique = sampler.next_1d_fine();
+    const bool follows_user = target_.user.paths && sampler.next_1d_fine() < target_.user.share;
     const MutationContext context{target_.measure, c, sampler};
     PathBuilder builder = context.builder(nullptr, -1, 0);
     y.set_black();
+    if (follows_user) {
+        y.edges = 0;
+        if (draw_user_path(builder, sampler) && builder.finish(y)) y.finish();
+        return;
+    }
+    const int k = target_.lengths.choose(u_length);
+    const int s = target_.techniques.choose(k, u_technique);
     y.edges = k;
     if (builder.sample_light(s, s == k + 1) && builder.sample_eye(k + 1 - s) && builder.finish(y))
         y.finish();
+}
+
+bool PathSpace::draw_user_path(PathBuilder& builder, Sampler& sampler) const {
+    if (!builder.follow(*target_.user.paths)) return false;
+    const int s = builder.light_vertices(), longest = target_.measure.longest;
+    int t = std::max(1, target_.measure.shortest + 1 - s);
+    sampler.seek(Stream::Selection, 1);
+    for (double u = sampler.next_1d_fine(); u < UserSteps::kLonger && s + t <= longest + 1; ++t)
+        u /= UserSteps::kLonger;
+    return s + t <= longest + 1 && builder.sample_eye(t);
 }
 
 std::array<double, PathMutations::kCount> PathSpace::choices(const PathState& x) const {

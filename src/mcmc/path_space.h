@@ -7,6 +7,7 @@
 namespace etendue {
 
 /// Mutations in path space, and their weights: one of those that can change a path is chosen in proportion.
+/// That of UserPath must be 0 if the target has no user paths.
 struct PathMutations {
     enum Kind : int {
         Bidirectional,
@@ -21,8 +22,7 @@ struct PathMutations {
     static constexpr std::array<const char*, kCount> kNames{
         "bidirectional", "lens",      "caustic",   "multi_chain",
         "lens_subpath",  "user_path", "photon_map"};
-    std::array<double, kCount> weights{1, 4, 2, 4, 1, 0, 0};
-    std::optional<UserPaths> user_paths{};  ///< Required if their weight is not 0.
+    std::array<double, kCount> weights{1, 4, 4, 4, 0.5, 0, 0};
 };
 
 class PathSpace final : public StateSpace {
@@ -44,6 +44,7 @@ public:
 
 private:
     using Kind = PathMutations::Kind;
+    bool draw_user_path(PathBuilder& builder, Sampler& sampler) const;
     /// Probability of each mutation at x.
     std::array<double, PathMutations::kCount> choices(const PathState& x) const;
     double Q(Kind kind, const PathState& x, const PathState& y, const MutationWay& way) const;

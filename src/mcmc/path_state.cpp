@@ -177,13 +177,49 @@ bool PathState::trace_edge(int i, RenderStats& stats) {
 }
 
 double PathState::density(int s) const {
-    const int n = size(), k = n - 1;
+    const int n = size();
     if (s == 0 ? emitter().is_delta() : s < n && !is_connected_at(s - 1)) return 0;
     double p = 1;
     for (int i = 0; i < s; ++i)
         p *= i > 0 ? ray_density_from_light(i) : s == 1 ? x_[0].next_event : x_[0].light;
+    return p * eye_density(s);
+}
+
+double PathState::eye_density(int s) const {
+    const int k = last();
+    double p = 1;
     for (int i = s; i <= k; ++i) p *= i == k ? x_[size_t(i)].eye : ray_density_from_eye(i);
     return p;
+}
+
+double PathState::density(const UserPaths& paths, int s) const {
+    if (s < 2) return 0;
+    std::vector<const Vertex*> light;
+    double p = 1;
+    for (int i = 0; i < s; ++i) {
+        const PathVertex& x = x_[size_t(i)];
+        light.push_back(&x.v);
+        p *= measure_.unit_area;
+        if (i > 0) p *= double(x_[size_t(i) - 1].transmittance * x.opacity);
+    }
+    return p * paths.density(light);
+}
+
+double PathState::independent_path_density() const {
+    const int k = last();
+    double T = 0;
+    for (int s = 0; s <= k + 1; ++s)
+        if (const double p = target_.techniques.pmf(k, s); p > 0) T += p * density(s);
+    T *= target_.lengths.pmf(k);
+    const UserSteps& user = target_.user;
+    if (!user.paths) return T;
+    double T_user = 0;
+    for (int s = 2; s <= std::min(k, user.paths->longest()); ++s) {
+        if (!is_connected_at(s - 1)) continue;
+        if (const double p = density(*user.paths, s); p > 0)
+            T_user += p * UserSteps::pmf(s, k + 1 - s, measure_.shortest) * eye_density(s);
+    }
+    return (1 - user.share) * T + user.share * T_user;
 }
 
 PathProduct PathState::contribution() const {
@@ -215,13 +251,9 @@ void PathState::set_black() {
 }
 
 void PathState::finish() {
-    const int k = last();
     set_black();
-    edges = k;
-    double T = 0;
-    for (int s = 0; s <= k + 1; ++s)
-        if (const double p = target_.techniques.pmf(k, s); p > 0) T += p * density(s);
-    large_step_density_ = T *= target_.lengths.pmf(k);
+    edges = last();
+    const double T = large_step_density_ = independent_path_density();
     if (!(T > 0)) return;
     const PathProduct f = contribution();
     const Rgb value(float(f[0] / T), float(f[1] / T), float(f[2] / T));

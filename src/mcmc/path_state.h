@@ -6,11 +6,15 @@
 // the direction toward the eye given the direction toward the light, and keep the geometry term of the edge behind the
 // event. Areas are in units of PathMeasure::unit_area, so that products over long paths neither overflow nor underflow.
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
+#include <optional>
 
 #include "mcmc/state.h"
 #include "mcmc/target_map.h"
 #include "mcmc/technique_choice.h"
+#include "mcmc/user_paths.h"
 
 namespace etendue {
 
@@ -31,12 +35,29 @@ using PathImportance = std::function<double(const PathState& x, Rgb value)>;
 /// Luminance times W.
 PathImportance weighted_luminance(TargetMap map);
 
-/// The terms of the target of a path, and the probabilities with which large steps choose length and technique.
+/// Large steps that follow user paths: a part `share` of all. A light sub-path close to one of the paths is joined to an eye
+/// sub-path, each vertex of which after the first is sampled with probability `kLonger`.
+struct UserSteps {
+    static constexpr double kLonger = 0.5;
+
+    std::optional<UserPaths> paths{};
+    double share = 0;
+
+    /// Probability of an eye sub-path of t vertices beside s light vertices; paths of fewer than `shortest` edges are not
+    /// made.
+    static double pmf(int s, int t, int shortest) {
+        const int more = t - std::max(1, shortest + 1 - s);
+        return more < 0 ? 0.0 : (1 - kLonger) * std::pow(kLonger, more);
+    }
+};
+
+/// The terms of the target of a path, and the choices of large steps.
 struct PathTarget {
     PathMeasure measure;
     PathImportance importance;
     LengthChoice lengths;
     TechniqueChoice techniques;
+    UserSteps user{};
 };
 
 /// A product over the vertices of a path, by colour. Long paths exceed the range of float.
@@ -98,6 +119,8 @@ public:
     void set_black();
     /// Density with which the technique C(s, k+1-s) samples the path.
     double density(int s) const;
+    /// Density per unit_area with which `paths` sample x_0 … x_{s-1}.
+    double density(const UserPaths& paths, int s) const;
     /// Density of x_i per unit_area as a ray from x_{i-1} or from x_{i+1} samples it: it passes the masks before it, and
     /// meets its surface.
     double ray_density_from_light(int i) const {
@@ -120,6 +143,10 @@ public:
     void load(LearnedState& from) override;
 
 private:
+    /// Density of the path as a large step.
+    double independent_path_density() const;
+    /// Density with which an eye sub-path samples x_s … x_k.
+    double eye_density(int s) const;
     double geometry(int from, int to) const;
     double arrival(int i) const;
     void scatter(int i);

@@ -69,6 +69,7 @@ void Pilot::save(LearnedState& to) const {
     to.put(relative_variance);
     to.put(direct_variance);
     to.put(chain_variance);
+    to.put(typical);
     to.put(samples);
     to.put(precise_samples);
     to.put(uint64_t(by_technique.size()));
@@ -85,6 +86,7 @@ void Pilot::load(LearnedState& from) {
     from.get(relative_variance);
     from.get(direct_variance);
     from.get(chain_variance);
+    from.get(typical);
     from.get(samples);
     from.get(precise_samples);
     uint64_t techniques = 0;
@@ -130,6 +132,7 @@ Pilot run_pilot(const PassContext& pass, const PrimarySample& sample, const Prim
 
         Moments target, direct_variance, chain_variance;
         pilot.by_technique.clear();
+        std::vector<WeightedValue> targets;
         for (const PilotSample& of : drawn) {
             double sum = 0, noise = 0;
             for (const PilotSplat& s : of.splats) {
@@ -139,10 +142,12 @@ Pilot run_pilot(const PassContext& pass, const PrimarySample& sample, const Prim
                 pilot.by_technique[{s.edges, s.s}] += value / double(drawn.size());
             }
             target.add(sum);
+            targets.push_back({sum, sum});
             chain_variance.add(noise);
             direct_variance.add(sqr(weighted(of.direct, all) - weighted(of.other_direct, all)) / 2);
         }
         pilot.samples = drawn.size();
+        pilot.typical = weighted_median(std::move(targets));
         pilot.b = target.mean();
         pilot.relative_variance = pilot.b > 0 ? target.variance() / sqr(pilot.b) : 0;
         pilot.direct_variance = direct_variance.mean();

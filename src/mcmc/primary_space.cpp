@@ -55,8 +55,8 @@ void NumberSpace::draw(int chain_class, uint64_t key, const ChainContext& c, Cha
 
 Proposal NumberSpace::propose(int chain_class, const ChainState& x, uint64_t key,
                               const ChainContext& c, ChainState& y) const {
-    const Mutation mutation = to_unit_double(mix64(key)) < kBlockShare ? Block : Small;
-    NumberSource source(mutation == Block ? NumberStep::Block : NumberStep::Small, key,
+    const Mutation mutation = to_unit_double(mix64(key)) < blocks_ ? Block : Small;
+    NumberSource source(mutation == Block ? NumberStep::Block : small_, key,
                         &static_cast<const NumberState&>(x).numbers,
                         &static_cast<NumberState&>(y).numbers);
     evaluate(chain_class, source, c, y);

@@ -54,7 +54,9 @@ public:
     enum Mutation { Small, Block };
     static constexpr std::array<const char*, 2> kMutations{"small", "block"};
 
-    explicit NumberSpace(int classes) : classes_(classes) {}
+    /// A part `blocks` of the mutations are block steps; the others are of the kind `small`.
+    explicit NumberSpace(int classes, NumberStep small = NumberStep::Small, double blocks = 0.05)
+        : classes_(classes), small_(small), blocks_(blocks) {}
 
     int classes() const override { return classes_; }
     std::span<const char* const> mutations() const override { return kMutations; }
@@ -68,9 +70,9 @@ protected:
                           ChainState& y) const = 0;
 
 private:
-    static constexpr double kBlockShare = 0.1;  ///< Fraction of the mutations that are block steps.
-
     int classes_;
+    NumberStep small_;
+    double blocks_;
 };
 
 class PrimarySpace : public NumberSpace {

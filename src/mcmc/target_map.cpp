@@ -21,7 +21,7 @@ TargetMap::TargetMap(const FilmGeometry& geometry, uint64_t samples)
     : geometry_(geometry), samples_(samples), tile_(tile_width(geometry, samples)),
       columns_((geometry.crop_width + tile_ - 1) / tile_),
       rows_((geometry.crop_height + tile_ - 1) / tile_), sums_(size_t(columns_) * size_t(rows_)),
-      luminance_(sums_.size()) {}
+      W_(sums_.size(), 1.0) {}
 
 void TargetMap::learn() {
     const auto pixels = [&](int tile, int size) { return std::min(tile_, size - tile * tile_); };
@@ -35,6 +35,8 @@ void TargetMap::learn() {
             mean[i] = sums_[i] / (double(samples_) * area);
             total += sums_[i];
         }
+    const double average = total / (double(samples_) * double(geometry_.pixel_count()));
+    const double floor2 = average > 0 ? 0.01 * sqr(average) : 1.0;
     // Smoothed by 1 2 1 in both directions, since a tile may have had few samples. The mean of square roots follows the
     // darker tiles: too large an L leaves a tile with few steps, too small an L only wastes some.
     for (int y = 0; y < rows_; ++y)
@@ -46,10 +48,9 @@ void TargetMap::learn() {
                     sum += w * std::sqrt(mean[size_t(v) * size_t(columns_) + size_t(u)]);
                     weights += w;
                 }
-            luminance_[size_t(y) * size_t(columns_) + size_t(x)] = sqr(sum / weights);
+            const double L = sqr(sum / weights);
+            W_[size_t(y) * size_t(columns_) + size_t(x)] = 1 / std::sqrt(L * L + floor2);
         }
-    const double average = total / (double(samples_) * double(geometry_.pixel_count()));
-    floor2_ = average > 0 ? 0.01 * sqr(average) : 1.0;
 }
 
 double TargetMap::operator()(Vec2 film) const {
@@ -63,11 +64,10 @@ double TargetMap::operator()(Vec2 film) const {
     const int right = std::min(left + 1, columns_ - 1), bottom = std::min(top + 1, rows_ - 1);
     const double u = double(x) - left, v = double(y) - top;
     const auto at = [&](int column, int row) {
-        return luminance_[size_t(row) * size_t(columns_) + size_t(column)];
+        return W_[size_t(row) * size_t(columns_) + size_t(column)];
     };
-    const double L = (1 - v) * ((1 - u) * at(left, top) + u * at(right, top)) +
-                     v * ((1 - u) * at(left, bottom) + u * at(right, bottom));
-    return 1 / std::sqrt(L * L + floor2_);
+    return (1 - v) * ((1 - u) * at(left, top) + u * at(right, top)) +
+           v * ((1 - u) * at(left, bottom) + u * at(right, bottom));
 }
 
 }  // namespace etendue

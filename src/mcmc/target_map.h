@@ -19,7 +19,7 @@ public:
     explicit TargetMap(const FilmGeometry& geometry = {}, uint64_t samples = 0);
     /// Adds the luminance that a sample of the whole film contributes at a film point, in pixels.
     void add(Vec2 film, double luminance) { sums_[tile_at(film)] += luminance; }
-    /// Sets L from the sums.
+    /// Sets W from the sums.
     void learn();
 
     double operator()(Vec2 film) const;
@@ -29,16 +29,14 @@ public:
         to.put(tile_);
         to.put(columns_);
         to.put(rows_);
-        to.put(luminance_);
-        to.put(floor2_);
+        to.put(W_);
     }
     void load(LearnedState& from) {
         from.get(geometry_);
         from.get(tile_);
         from.get(columns_);
         from.get(rows_);
-        from.get(luminance_);
-        from.get(floor2_);
+        from.get(W_);
     }
 
 private:
@@ -51,8 +49,8 @@ private:
     uint64_t samples_;
     int tile_;  ///< Width and height of a tile in pixels.
     int columns_, rows_;
-    std::vector<double> sums_, luminance_;  ///< By tile.
-    double floor2_ = 1;                     ///< 0.01 L̄²
+    std::vector<double> sums_;  ///< By tile.
+    std::vector<double> W_;     ///< At the centres of tiles.
 };
 
 }  // namespace etendue

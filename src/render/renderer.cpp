@@ -1,6 +1,7 @@
 #include "render/renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <stdexcept>
 #include <utility>
@@ -95,9 +96,16 @@ private:
 class FilmSplats final : public SplatSink {
 public:
     explicit FilmSplats(const Receivers& to) : to_(to) {}
+    ~FilmSplats() override { flush(); }
+    FilmSplats(const FilmSplats&) = delete;
+    FilmSplats& operator=(const FilmSplats&) = delete;
 
     void add(Vec2 film, Rgb value) override {
-        if (to_.shown.contains_all()) to_.film.add_splat(film, value);
+        if (!to_.shown.contains_all()) return;
+        // Splats wait until the memory of their pixels has been fetched.
+        if (waiting_ == queue_.size()) flush();
+        to_.film.prefetch_splat(film);
+        queue_[waiting_++] = {film, value};
     }
     void tell(const Join& join, Rgb contribution, float factor) override {
         if (!to_.shown.contains(join.technique) || !is_finite(contribution)) return;
@@ -125,8 +133,18 @@ private:
                            to_.observer->observe(join, contribution, share * h, pixel, to_.work);
                        });
     }
+    void flush() {
+        for (size_t i = 0; i < waiting_; ++i) to_.film.add_splat(queue_[i].film, queue_[i].value);
+        waiting_ = 0;
+    }
 
+    struct Splat {
+        Vec2 film;
+        Rgb value;
+    };
     Receivers to_;
+    std::array<Splat, 16> queue_;
+    size_t waiting_ = 0;
 };
 
 }  // namespace

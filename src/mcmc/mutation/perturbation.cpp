@@ -10,7 +10,7 @@ float LogRange::sample(float u) const {
 }
 
 LogRange film_range(const PathMeasure& measure) {
-    constexpr float kSmallest = 1, kShare = 0.02f;
+    constexpr float kSmallest = 1, kShare = 0.005f;
     return {kSmallest, std::max(std::sqrt(kShare * measure.film.area() / kPi), 2 * kSmallest)};
 }
 

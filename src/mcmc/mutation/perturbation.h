@@ -12,7 +12,7 @@ struct LogRange {
     bool contains(float r) const { return r >= low && r <= high; }
 };
 
-/// Distances in pixels by which a film point moves [Veach 1997, §11.4.2]: from 1 to √(0.02 A/π), with the film's area A.
+/// Distances in pixels by which a film point moves [Veach 1997, §11.4.2]: from 1 to √(0.005 A/π), with the film's area A.
 /// Veach has 0.1 and 0.05; but most moves of less than a pixel only repeat what the pixel has, and long ones are rejected.
 LogRange film_range(const PathMeasure& measure);
 

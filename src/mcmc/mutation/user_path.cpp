@@ -18,15 +18,7 @@ bool UserPathMutation::propose(const PathState& x, const MutationContext& c, Pat
 }
 
 double UserPathMutation::Q(const PathState& x, const PathState& y, const MutationWay& way) const {
-    if (!is_way(x, way)) return 0;
-    std::vector<const Vertex*> light;
-    double factor = 1;
-    for (int i = 0; i < way.m_y; ++i) {
-        light.push_back(&y[i].v);
-        factor *= measure_.unit_area;
-        if (i > 0) factor *= double(y[i - 1].transmittance * y[i].opacity);
-    }
-    return light.size() < 2 ? 0.0 : factor * paths_.density(light);
+    return is_way(x, way) ? y.density(paths_, way.m_y) : 0.0;
 }
 
 }  // namespace etendue

@@ -11,8 +11,7 @@ namespace etendue {
 
 class UserPathMutation final : public PathMutation {
 public:
-    UserPathMutation(const PathMeasure& measure, const UserPaths& paths)
-        : measure_(measure), paths_(paths) {}
+    explicit UserPathMutation(const UserPaths& paths) : paths_(paths) {}
 
     bool suits(const PathState& x) const override { return kept(x) > 0; }
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
@@ -27,7 +26,6 @@ private:
     /// x_m … x_k are kept.
     static int kept(const PathState& x);
 
-    const PathMeasure& measure_;
     const UserPaths& paths_;
 };
 

@@ -1,5 +1,7 @@
 #include "mcmc/numbers.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -30,15 +32,57 @@ TEST(Numbers, SmallStepsAreSymmetricOnTheTorus) {
         Moments sign, octave;
         for_each_step(NumberStep::Small, Stream::Eye, bits, [&](uint32_t moved) {
             const auto distance = double(int32_t(moved - bits)) * 0x1p-32;
-            EXPECT_GE(std::fabs(distance), 0.999 * 0x1p-13);
-            EXPECT_LE(std::fabs(distance), 0x1p-5);
+            EXPECT_GE(std::fabs(distance), 0x1p-16);
+            EXPECT_LT(std::fabs(distance), 0x1p-6);
             sign.add(distance > 0 ? 1 : -1);
-            octave.add(std::log2(std::fabs(distance)));
+            octave.add(std::floor(std::log2(std::fabs(distance))));
         });
         EXPECT_LT(std::fabs(sign.mean()), 4 * std::sqrt(sign.squared_error()));
-        EXPECT_NEAR(octave.mean(), -9, 4 * std::sqrt(octave.squared_error()));
-        EXPECT_NEAR(octave.variance(), 64.0 / 12, 0.3);
+        EXPECT_NEAR(octave.mean(), -11.5, 4 * std::sqrt(octave.squared_error()));
+        EXPECT_NEAR(octave.variance(), 99.0 / 12, 0.3);
     }
+}
+
+TEST(Numbers, WideStepsAreWider) {
+    Moments octave;
+    for_each_step(NumberStep::Wide, Stream::Light, 77, [&](uint32_t moved) {
+        const auto distance = std::fabs(double(int32_t(moved - 77u)) * 0x1p-32);
+        EXPECT_GE(distance, 0x1p-13);
+        EXPECT_LT(distance, 0x1p-5);
+        octave.add(std::floor(std::log2(distance)));
+    });
+    EXPECT_NEAR(octave.mean(), -9.5, 4 * std::sqrt(octave.squared_error()));
+}
+
+TEST(Numbers, FilmPointsMoveFarther) {
+    NumberTable present, next;
+    for (uint32_t slot = 0; slot < 3; ++slot) present.set(Stream::Eye, 0, slot, 0x12345678);
+    std::array<double, 3> least{1, 1, 1};
+    for (uint64_t key = 0; key < kCount; ++key) {
+        NumberSource source(NumberStep::Small, hash_combine(4, key), &present, &next);
+        for (uint32_t slot = 0; slot < 3; ++slot) {
+            const uint32_t moved = source.bits(Stream::Eye, 0, slot);
+            least[slot] = std::min(
+                least[slot], std::fabs(double(int32_t(moved - 0x12345678)) * 0x1p-32));
+        }
+    }
+    EXPECT_GE(least[0], 0x1p-10);
+    EXPECT_GE(least[1], 0x1p-10);
+    EXPECT_LT(least[2], 0x1p-15);  // The lens point.
+}
+
+TEST(Numbers, RouletteOfAllJoinsIsOneCoordinate) {
+    NumberTable present, next;
+    NumberSource first(NumberStep::Fresh, 1, nullptr, &present);
+    const uint32_t a = first.bits(Stream::Roulette, join_number(2, 3), 0),
+                   b = first.bits(Stream::Roulette, join_number(4, 2), 0);
+    EXPECT_NE(a, b);
+    // A small step moves both by the same small distance.
+    NumberSource small(NumberStep::Small, 5, &present, &next);
+    const uint32_t moved = small.bits(Stream::Roulette, join_number(4, 2), 0) - b;
+    EXPECT_EQ(small.bits(Stream::Roulette, join_number(2, 3), 0) - a, moved);
+    EXPECT_LT(std::abs(double(int32_t(moved))) * 0x1p-32, 0x1p-6);
+    EXPECT_NE(moved, 0u);
 }
 
 TEST(Numbers, ChoicesStayInSmallSteps) {
@@ -63,7 +107,7 @@ TEST(Numbers, BlocksAreDrawnAsAWhole) {
 }
 
 TEST(Numbers, ThoseThatWereNotReadAreDrawnAfresh) {
-    for (const NumberStep step : {NumberStep::Small, NumberStep::Block}) {
+    for (const NumberStep step : {NumberStep::Small, NumberStep::Wide, NumberStep::Block}) {
         NumberTable present, next;
         // It held a number, of a state before the present one.
         present.set(Stream::Eye, 1, 0, 42);

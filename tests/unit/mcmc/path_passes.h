@@ -19,7 +19,8 @@ public:
         return {scene_, reached_region(scene_.film(), scene_.filter()), kShortest, kLongest};
     }
     /// With uniform choices of length and technique, and W = 1.
-    std::unique_ptr<PathSpace> space(const PathMutations& mutations) const {
+    std::unique_ptr<PathSpace> space(const PathMutations& mutations,
+                                     const UserSteps& user = {}) const {
         const bool hits_lens = scene_.sensor().has_finite_lens();
         bool hits = false;
         for (const auto& e : scene_.emitters()) hits |= !e->is_delta();
@@ -30,7 +31,7 @@ public:
         return std::make_unique<PathSpace>(
             PathTarget{measure(), weighted_luminance(pilot.map),
                        LengthChoice(kShortest, kLongest, pilot),
-                       TechniqueChoice(kShortest, 8, hits, hits_lens, pilot)},
+                       TechniqueChoice(kShortest, 8, hits, hits_lens, pilot), user},
             mutations, counts);
     }
     PassContext pass() const {

@@ -42,6 +42,16 @@ std::vector<Case> cases() {
 class Paths : public ::testing::TestWithParam<Case> {
 protected:
     Paths() : passes(build(GetParam().xml)) {}
+    /// From the lamp to a wall, in the scenes that have a lamp there.
+    std::optional<UserPaths> user_paths() const {
+        const CheckedPath checked =
+            check_user_path(passes.scene(), {.name = {},
+                                             .points = {{0.1f, 0.98f, 0.15f}, {-1, 0, 0.3f}},
+                                             .cones = {8},
+                                             .radius = 0.1f});
+        if (!checked.path) return {};
+        return UserPaths(passes.scene(), {*checked.path});
+    }
     PathPasses passes;
 };
 
@@ -137,6 +147,52 @@ TEST_P(Paths, AreToldAsJoins) {
     }
 }
 
+bool has_no_edge_below(const PathState& x, double limit) {
+    for (int i = 1; i < x.last(); ++i)
+        if (!x[i - 1].v.is_infinite && double(length(x[i].v.p - x[i - 1].v.p)) < limit) return false;
+    return true;
+}
+
+/// Independent states that follow user paths have another density T, but the same integrals of f: I/T, times any function
+/// of the path, has the same mean.
+TEST_P(Paths, LargeStepsThatFollowUserPathsHaveTheirDensity) {
+    const std::optional<UserPaths> given = user_paths();
+    if (!given) GTEST_SKIP() << "the scene has no lamp of its own";
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    // All paths, those that begin like the user path, and the lengths of these.
+    constexpr size_t kFunctions = 3;
+    std::array<std::array<Moments, kFunctions>, 2> means;
+    std::array<double, 2> found{};  // Part of the states that begin like the user path.
+    for (size_t i = 0; i < 2; ++i) {
+        const auto space = passes.space({}, i == 0 ? UserSteps{} : UserSteps{given, 0.6});
+        const auto x = space->make_state();
+        const uint64_t states = i == 0 ? 2'000'000 : 200'000;
+        for (uint64_t n = 0; n < states; ++n) {
+            space->draw(0, hash_combine(7 + i, n), c, *x);
+            std::array<double, kFunctions> value{};
+            // The value of paths with arbitrarily short edges has no finite variance.
+            const auto& path = static_cast<const PathState&>(*x);
+            if (x->target > 0 && has_no_edge_below(path, 0.4)) {
+                const double I = x->importance();
+                value[0] = I;
+                if (path.density(*given, 2) > 0) {
+                    value[1] = I, value[2] = I * path.last();
+                    found[i] += 1 / double(states);
+                }
+            }
+            for (size_t f = 0; f < kFunctions; ++f) means[i][f].add(value[f]);
+        }
+    }
+    for (size_t f = 0; f < kFunctions; ++f)
+        EXPECT_GT(welch_p(means[0][f], means[1][f], 0), sidak(1e-3, kFunctions))
+            << "function " << f << ": " << means[0][f].mean() << " ± "
+            << std::sqrt(means[0][f].squared_error()) << ", " << means[1][f].mean() << " ± "
+            << std::sqrt(means[1][f].squared_error());
+    EXPECT_GT(found[0], 2e-5);
+    EXPECT_GT(found[1], 10 * found[0]);
+}
+
 /// Logarithm of a cosine or of 1/d², zero where there is none.
 double log_of(double v) {
     return v > 0 ? std::log(v) : 0.0;
@@ -186,18 +242,14 @@ TEST_P(Paths, MutationsKeepDetailedBalance) {
         PathMutations alone;
         alone.weights.fill(0);
         alone.weights[size_t(kind)] = 1;
+        UserSteps user;
         if (kind == PathMutations::UserPath) {
             // Together with bidirectional mutations, whose density theirs is mixed with.
-            const CheckedPath checked =
-                check_user_path(passes.scene(), {.name = {},
-                                                 .points = {{0.1f, 0.98f, 0.15f}, {-1, 0, 0.3f}},
-                                                 .cones = {8},
-                                                 .radius = 0.1f});
-            if (!checked.path) continue;
-            alone.user_paths = UserPaths(passes.scene(), {*checked.path});
+            if (!(user.paths = user_paths())) continue;
+            user.share = 0.3;
             alone.weights[PathMutations::Bidirectional] = 1;
         }
-        const auto space = passes.space(alone);
+        const auto space = passes.space(alone, user);
         const auto x = space->make_state(), y = space->make_state();
         std::vector<Moments> change;
         uint64_t moves = 0;
