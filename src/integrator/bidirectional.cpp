@@ -8,7 +8,7 @@
 namespace etendue {
 
 std::vector<ParamInfo> Bidirectional::params() {
-    std::vector<ParamInfo> params = depth_params();
+    std::vector<ParamInfo> params = sub_path_params();
     params.push_back(
         {"roulette", ParamKind::Float, "0.15",
          "Threshold of the Russian roulette before shadow rays, in [0, 1], as a fraction of the "

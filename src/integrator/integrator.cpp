@@ -186,14 +186,18 @@ DepthOptions DepthOptions::from(const IntegratorParams& params) {
     return depth;
 }
 
-std::vector<ParamInfo> depth_params() {
+std::vector<ParamInfo> depth_params(const char* rr_depth) {
     return {
         {"max_depth", ParamKind::Int, "-1",
          "Number of edges of the longest paths, at least 1 (1: only directly visible light); -1: "
          "no limit."},
-        {"rr_depth", ParamKind::Int, "5",
+        {"rr_depth", ParamKind::Int, rr_depth,
          "Index, at least 1, of the first vertex of a sub-path at which Russian roulette is "
          "applied; the lens or emitter has index 0."}};
+}
+
+std::vector<ParamInfo> sub_path_params() {
+    return depth_params("2");
 }
 
 }  // namespace etendue

@@ -140,6 +140,9 @@ struct DepthOptions {
     }
     static constexpr int kUnlimited = 1 << 20;
 };
-std::vector<ParamInfo> depth_params();
+std::vector<ParamInfo> depth_params(const char* rr_depth = "5");
+/// The same for methods that join two sub-paths. The number of joins is the product of their lengths, and most of those of
+/// long ones contribute little: Russian roulette begins at the second scattering.
+std::vector<ParamInfo> sub_path_params();
 
 }  // namespace etendue

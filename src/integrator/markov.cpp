@@ -33,13 +33,6 @@ std::vector<ParamInfo> MarkovIntegrator::params() {
          "has had a pass."}};
 }
 
-std::vector<ParamInfo> MarkovIntegrator::sub_path_params() {
-    std::vector<ParamInfo> params = depth_params();
-    for (ParamInfo& p : params)
-        if (p.name == std::string("rr_depth")) p.fallback = "3";
-    return params;
-}
-
 MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions& depth,
                                    StepWorth worth)
     : options_{.groups = p.integer("groups", 2, 1024),

@@ -23,9 +23,6 @@ public:
 
     /// The parameters of chains.
     static std::vector<ParamInfo> params();
-    /// The parameters of sub-paths with Russian roulette. A mutation evaluates all joins of two sub-paths, and most of
-    /// those of long ones contribute little: walks end earlier than usual.
-    static std::vector<ParamInfo> sub_path_params();
 
     void trace(const PassContext& pass) final;
     /// Chains can be made only when the scene is known; until then the loaded data are kept unchanged.

@@ -31,7 +31,7 @@ protected:
 }  // namespace
 
 IntegratorEntry pssmlt_entry() {
-    std::vector<ParamInfo> params = MarkovIntegrator::sub_path_params();
+    std::vector<ParamInfo> params = sub_path_params();
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     return {{"integrator", "pssmlt",
              "Metropolis light transport in the primary sample space of bidirectional path "

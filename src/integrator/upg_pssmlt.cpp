@@ -319,7 +319,7 @@ private:
 }  // namespace
 
 IntegratorEntry upg_pssmlt_entry() {
-    std::vector<ParamInfo> params = MarkovIntegrator::sub_path_params();
+    std::vector<ParamInfo> params = sub_path_params();
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     params.push_back(
         {"light_paths", ParamKind::Int, "0",
