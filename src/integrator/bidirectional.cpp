@@ -157,9 +157,9 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
     Rgb contribution = j.contribution;
     const bool is_splat = j.technique.t <= 1;
     if (is_splat) c.film.prefetch_splat(j.film);
-    const float q = join_survival(
-        luminance(contribution) * j.mis_weight * scale,
-        c.is_of_whole_film ? film_threshold(j.film) : threshold(c, is_splat ? &j.film : nullptr));
+    const float q = join_survival(luminance(contribution) * j.mis_weight * scale,
+                                  c.is_of_whole_film ? film_threshold(j.film)
+                                                     : threshold(c, is_splat ? &j.film : nullptr));
     if (q < 1) {
         c.sampler.seek(Stream::Roulette, number);
         if (!(c.sampler.next_1d_unstructured() < double(q))) {

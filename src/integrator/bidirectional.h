@@ -138,8 +138,8 @@ private:
     Guiding guiding_;
     int shortest_ = 1;  ///< Length of the shortest paths, in edges.
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
-    bool is_optimised_;              ///< Whether thresholds_ replaces roulette_.
-    std::vector<float> thresholds_;  ///< By pixel; empty until they are learned.
+    bool is_optimised_;                          ///< Whether thresholds_ replaces roulette_.
+    std::vector<float> thresholds_;              ///< By pixel; empty until they are learned.
     std::function<float(Vec2)> film_threshold_;  ///< Empty: no roulette.
 };
 

@@ -55,10 +55,11 @@ private:
 IntegratorEntry mlt_entry() {
     std::vector<ParamInfo> params{depth_params()[0]};
     for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
-    params.push_back({"user_paths", ParamKind::String, "",
-                      "JSON file of important light sub-paths, which `etendue paths` makes and "
-                      "checks; large steps and the start-up follow them, and proposals near them are mixed with "
-                      "bidirectional mutations."});
+    params.push_back(
+        {"user_paths", ParamKind::String, "",
+         "JSON file of important light sub-paths, which `etendue paths` makes and "
+         "checks; large steps and the start-up follow them, and proposals near them are mixed with "
+         "bidirectional mutations."});
     params.push_back({"user_ratio", ParamKind::Float, "1",
                       "Number of proposals near user paths for each bidirectional mutation, and of "
                       "large steps that follow them for each other one, 0.01 to 100."});

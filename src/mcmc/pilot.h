@@ -16,7 +16,7 @@ struct Pilot {
     /// Variances of a pixel with the weights W of the whole image, direct light included: their means over the pixels.
     double direct_variance = 0;  ///< Of one sample of direct light, given the film point.
     double chain_variance = 0;   ///< Of one independent state of density I/b per pixel.
-    double typical = 0;  ///< Median of the target over the states of a chain.
+    double typical = 0;          ///< Median of the target over the states of a chain.
     uint64_t samples = 0;
     uint64_t precise_samples = 0;  ///< Those that sufficed for b; the others improve the map.
     /// Mean of the target by length and number of light vertices.

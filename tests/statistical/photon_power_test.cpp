@@ -37,7 +37,8 @@ public:
                                                                   .mutations = kPaths,
                                                                   .chains = chains,
                                                                   .precision = 0.05,
-                                                                  .user_paths = user_paths});
+                                                                  .user_paths = user_paths,
+                                                                  .user_share = 0.25});
     }
 
     void trace(const PassContext& pass) override {
@@ -131,9 +132,9 @@ TEST_P(PhotonPower, IsThatOfTracedPhotons) {
         std::ofstream(user_paths) << kUserPaths;
     }
     const auto traced = totals(scene, {}, 256),
-               // Chains of full paths find few caustics here.
+               // Chains of full paths find few caustics here, and user paths lead elsewhere.
         sampled = totals(scene, GetParam().target,
-                         GetParam().target == PhotonTarget::Path ? 360 : 100, user_paths);
+                         GetParam().target == PhotonTarget::Path ? 540 : 160, user_paths);
     const double level = sidak(1e-4, int(traced.size()));
     for (size_t i = 0; i < traced.size(); ++i) {
         const bool is_caustic = i >= traced.size() / 2;

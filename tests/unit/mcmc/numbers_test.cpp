@@ -62,8 +62,8 @@ TEST(Numbers, FilmPointsMoveFarther) {
         NumberSource source(NumberStep::Small, hash_combine(4, key), &present, &next);
         for (uint32_t slot = 0; slot < 3; ++slot) {
             const uint32_t moved = source.bits(Stream::Eye, 0, slot);
-            least[slot] = std::min(
-                least[slot], std::fabs(double(int32_t(moved - 0x12345678)) * 0x1p-32));
+            least[slot] =
+                std::min(least[slot], std::fabs(double(int32_t(moved - 0x12345678)) * 0x1p-32));
         }
     }
     EXPECT_GE(least[0], 0x1p-10);

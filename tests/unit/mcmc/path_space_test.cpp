@@ -149,7 +149,8 @@ TEST_P(Paths, AreToldAsJoins) {
 
 bool has_no_edge_below(const PathState& x, double limit) {
     for (int i = 1; i < x.last(); ++i)
-        if (!x[i - 1].v.is_infinite && double(length(x[i].v.p - x[i - 1].v.p)) < limit) return false;
+        if (!x[i - 1].v.is_infinite && double(length(x[i].v.p - x[i - 1].v.p)) < limit)
+            return false;
     return true;
 }
 

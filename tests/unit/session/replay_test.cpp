@@ -222,7 +222,7 @@ TEST_P(LastReplayOf, SumsToTheLastPass) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, LastReplayOf,
-                         ::testing::Values("vcm:roulette=0", "upg:roulette=0,radius=0.3",
+                         ::testing::Values("vcm:roulette=0,radius=0.3", "upg:roulette=0,radius=0.3",
                                            "upg+bdpt:roulette=0,radius=0.3", "pcbpt:roulette=0",
                                            "bdpt:connections=cache,roulette=0", "path:guide=on",
                                            "sppm:radius=0.3"));
