@@ -1,6 +1,8 @@
 #pragma once
 // Common parts of the bidirectional integrators: both walks, and the Russian roulette before shadow rays.
 
+#include <functional>
+
 #include "integrator/guiding.h"
 #include "reuse/light_vertex_cache.h"
 

@@ -396,6 +396,12 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
     if (!(e.pdf_y0 > 0)) return false;
     start_light_path(walk, emitter, e, sampler, y);
     if (y.size() != 2) return false;
+    // Rounding puts a few vertices outside of the cones, where density() is zero: such paths end there. With the density
+    // of the other ways to sample them alone, their weights would be far too large.
+    if (!(start_density(path, y[0]) > 0) || !(step_density(path, 0, y[0], y[1]) > 0)) {
+        y.clear();
+        return false;
+    }
     for (size_t j = 1; j + 1 < points.size(); ++j) {
         const Vertex& v = y[int(j)];
         std::optional<BsdfSample> s;
@@ -414,6 +420,10 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
                                .eta = f.eta};
         }
         if (!s || !append<TransportMode::Importance>(walk, sampler, *s, y)) return false;
+        if (!(step_density(path, int(j), y[int(j)], y[int(j) + 1]) > 0)) {
+            y.truncate(int(j) + 1);
+            return false;
+        }
     }
     return true;
 }
