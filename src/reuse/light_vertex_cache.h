@@ -58,7 +58,11 @@ public:
     /// Restores the whole path `index`.
     void restore(const Scene& scene, uint64_t index, SubPath& y) const;
     /// Prefetches `vertex`, or the head of its path.
-    void prefetch(uint32_t vertex) const { __builtin_prefetch(&vertices_[vertex]); }
+    void prefetch(uint32_t vertex) const {
+        __builtin_prefetch(&vertices_[vertex]);
+        __builtin_prefetch(&places_[vertex]);
+        if (is_guided_) __builtin_prefetch(&guides_[vertex]);
+    }
     void prefetch_head(uint32_t vertex) const {
         __builtin_prefetch(&heads_[vertices_[vertex].path]);
     }

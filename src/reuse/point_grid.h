@@ -58,7 +58,9 @@ public:
             for (int i = 0; i < count; ++i) {
                 const uint32_t bucket = begin[i];
                 begin[i] = begins_[bucket], end[i] = begins_[bucket + 1];
-                if (begin[i] < end[i]) __builtin_prefetch(&blocks_[begin[i] / kBlock]);
+                if (begin[i] == end[i]) continue;
+                __builtin_prefetch(&blocks_[begin[i] / kBlock]);
+                __builtin_prefetch(&entries_[begin[i]]);
             }
             for (int i = 0; i < count; ++i)
                 for_each_in(begin[i], end[i], p, radius2, [&](const Entry& e) {
