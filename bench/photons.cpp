@@ -121,8 +121,8 @@ public:
                 ++work.stats.pairs;
                 return {};
             };
-            grid_.for_each_near(z[t - 1].p, radius_, only_count,
-                                [](const GatherCandidate&, Chosen) {});
+            grid_.for_each_in({z[t - 1].p, radius_}, only_count,
+                              [](const GatherCandidate&, Chosen) {});
         }
     }
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {

@@ -13,19 +13,20 @@ namespace {
 struct Place {
     Vec3 p, ng;
     ArrivalSide side;
-    int index;  ///< i of the vertex.
+    int index;       ///< i of the vertex.
+    bool sees_lens;  ///< See Vertex; of eye vertices.
 };
 
 void append_connectible(const SubPath& path, std::vector<Place>& to) {
     for (int i = 1; i < path.size(); ++i)
         if (const Vertex& v = path[i]; v.is_connectible && v.kind == Vertex::Kind::Surface)
-            to.push_back({v.p, v.ng, arrival_side(v), i});
+            to.push_back({v.p, v.ng, arrival_side(v), i, v.sees_lens});
 }
 
 /// Of the walks of a block, in order.
 struct Block {
     std::vector<Place> light, eye;
-    uint64_t pairs = 0;
+    std::array<uint64_t, 2> pairs{};
 };
 
 }  // namespace
@@ -64,15 +65,16 @@ PairPilot run_pair_pilot(const PassContext& pass, const Bidirectional& paths,
             grid.for_each_near(z.p, radius, [&](const PointGrid::Entry& e) {
                 const Place& y = light[e.index];
                 if (counts.gathers(y.index + z.index) > 0 && near.contains(y.p, y.side))
-                    ++blocks[b].pairs;
+                    ++blocks[b].pairs[z.sees_lens];
             });
         }
     });
-    uint64_t pairs = 0;
-    for (const Block& b : blocks) pairs += b.pairs;
+    std::array<double, 2> pairs{};
+    for (const Block& b : blocks)
+        for (size_t i = 0; i < 2; ++i) pairs[i] += double(b.pairs[i]);
     const double multiple = double(pass.light_paths) / double(walks);
-    return {grid.counts(), multiple,
-            multiple * double(pairs) / (double(walks) * sqr(double(radius)))};
+    for (double& n : pairs) n *= multiple / (double(walks) * sqr(double(radius)));
+    return {grid.counts(), multiple, pairs};
 }
 
 }  // namespace etendue

@@ -10,8 +10,8 @@ namespace etendue {
 struct PairPilot {
     CellCounts vertices;  ///< Connectible vertices of the light walks.
     double multiple;      ///< Number of light paths in a pass, divided by that of these walks.
-    /// Mean number of gathers of an eye path in a pass, divided by the square of their radius; 0 if none was found.
-    double pairs_per_radius2;
+    /// Mean numbers of gathers of an eye path in a pass, by Vertex::sees_lens, divided by the square of their radius.
+    std::array<double, 2> pairs_per_radius2;
 };
 
 /// Walks like those of the pass, with its counts, but with random numbers that no pass uses: a quarter of its light paths

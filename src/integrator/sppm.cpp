@@ -74,8 +74,8 @@ private:
             if (y.s + t - 2 > max_depth) return {};
             return Chosen{};
         };
-        grid_.for_each_near(
-            work.z[t - 1].p, radius_, choose, [&](const GatherCandidate& y, Chosen) {
+        grid_.for_each_in(
+            {work.z[t - 1].p, radius_}, choose, [&](const GatherCandidate& y, Chosen) {
                 const Photon photon = cache_.photon(y.vertex);
                 if (!is_diffuse &&
                     !(photon.emitter->is_delta() && cache_.came_by_delta_events(y.vertex)))

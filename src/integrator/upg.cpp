@@ -55,7 +55,7 @@ public:
         learned_.roulette.learn(learned_.gathers);
         if (pass.index == 0) return;  // see start()
         learned_.radius.learn(pass.film, pass.so_far, learned_.gathers);
-        density_ = PairDensity(cells(), learned_.radius.value(), kGatherConstants.correlation);
+        density_ = PairDensity(cells(), learned_.radius.of(false), kGatherConstants.correlation);
     }
     void save(LearnedState& to) const override {
         paths_.save(to);
@@ -83,7 +83,8 @@ public:
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
                                  cache_, &density_);
         cache_.assemble();
-        grid_.build(cache_, learned_.radius.value());
+        inner_grid_.build(cache_, learned_.radius.of(false));
+        if (has_two_grids()) seen_grid_.build(cache_, learned_.radius.of(true));
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
@@ -91,7 +92,8 @@ public:
         const GatherSearch search{c,
                                   n,
                                   cache_,
-                                  grid_,
+                                  has_two_grids() ? seen_grid_ : inner_grid_,
+                                  inner_grid_,
                                   density_,
                                   learned_.roulette,
                                   paths_.max_depth(),
@@ -110,7 +112,8 @@ public:
         TechniqueCounts n;
         if (connects_) n = Bidirectional::counts(scene, light_paths);
         n.gather = float(light_paths) * (connects_ ? learned_.weight_scale.value() : 1.0f);
-        n.pairs = {.disc = kPi * sqr(learned_.radius.value()),
+        n.pairs = {.disc = kPi * sqr(learned_.radius.of(true)),
+                   .inner_disc = kPi * sqr(learned_.radius.of(false)),
                    .min_edges = 3,
                    .short_rate = short_rate_,
                    .rule = rule_,
@@ -124,16 +127,18 @@ public:
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
         std::vector<std::pair<std::string, double>> figures{
-            {"radius", learned_.radius.value()},
+            {"radius", learned_.radius.of(true)},
+            {"inner_radius", learned_.radius.of(false)},
             {"weight_scale", connects_ ? learned_.weight_scale.value() : 1}};
         paths_.guiding().add_figures(figures);
         return figures;
     }
 
 private:
+    bool has_two_grids() const { return learned_.radius.of(true) != learned_.radius.of(false); }
     /// Number of light vertices by cell, in the previous pass.
     CellCounts cells() const {
-        return grid_.points().is_empty() ? loaded_ : grid_.points().counts();
+        return inner_grid_.points().is_empty() ? loaded_ : inner_grid_.points().counts();
     }
 
     /// Adds the join U(s,t) of a pair: one of its vertices is dropped, and the other is joined to the predecessor of
@@ -151,40 +156,47 @@ private:
         PairEvent event = pair.event(work.pair, work.z);
         event.bound = bound_;
         c.sampler.seek(Stream::Auxiliary, pair.number);
+        const uint64_t trials = work.stats.trials;
         const double r =
             reciprocal_probability(c.scene, event, c.sampler, work.scratch, work.stats);
         if (connects_) {
             const double seen =
                 double(luminance(*value)) / double(luminance(join->contribution) * pair.survival);
-            observe(c, *join, search.scale(), r, seen, work);
+            observe(c, pair, *join, work.stats.trials - trials, r, seen, search, work);
         }
         c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.rate));
     }
 
-    /// Records a visible pair for later passes. `scale`: the value that a unit of contribution adds to the pixel. `seen`:
-    /// the transmittance of the join, divided by its survival probability in Russian roulette.
-    void observe(const SampleContext& c, const Join& join, float scale, double r, double seen,
-                 Workspace& work) const {
+    /// Records a visible pair for later passes. `seen`: the transmittance of the join, divided by its survival probability
+    /// in Russian roulette.
+    void observe(const SampleContext& c, const GatherPair& pair, const Join& join, uint64_t trials,
+                 double r, double seen, const GatherSearch& search, Workspace& work) const {
+        GatherSums& sums = GatherSums::of(work);
+        const bool sees_lens = work.z[pair.technique.t - 1].sees_lens;
+        const double x = double(pair.unlimited_survival);
+        if (sees_lens) GatherRadius::observe_trials(trials, x, sums);
         const float pixel = c.film.expected_luminance(work.z.film);
         if (!(pixel > 0)) return;
         const double weight_scale = double(learned_.weight_scale.value());
         const GatherMoment moment = GatherMoment::of(
-            double(luminance(join.contribution) * scale / pixel), double(join.mis_weight),
+            double(luminance(join.contribution) * search.scale() / pixel), double(join.mis_weight),
             weight_scale, double(join.pair_probability), r, seen);
-        GatherRadius::observe(moment, weight_scale, GatherSums::of(work));
-        GatherWeightScale::observe(moment, GatherSums::of(work));
+        if (sees_lens) GatherRadius::observe(moment, x, weight_scale, sums);
+        GatherWeightScale::observe(moment, sums);
     }
 
     /// Chooses the radius and the density of the first pass.
     void start(const PassContext& pass) {
         const PairPilot pilot = run_pair_pilot(pass, paths_, counts(pass.scene, pass.light_paths));
-        learned_.radius.start(given_radius_, pass.scene.bounds().radius(), pilot.pairs_per_radius2);
-        density_ = PairDensity(pilot.vertices, learned_.radius.value(),
+        learned_.radius.start(given_radius_, connects_, pass.scene.bounds().radius(),
+                              pilot.pairs_per_radius2);
+        density_ = PairDensity(pilot.vertices, learned_.radius.of(false),
                                kGatherConstants.correlation, pilot.multiple);
     }
 
-    static constexpr uint64_t kVertexBytes =
-        LightVertexCache::kVertexBytes + LightVertexGrid::kVertexBytes;
+    static constexpr uint64_t kVertexBytes = LightVertexCache::kVertexBytes +
+                                             LightVertexGrid::kVertexBytes +
+                                             LightVertexGrid::kBuiltVertexBytes;
 
     Bidirectional paths_;
     float given_radius_;
@@ -207,7 +219,8 @@ private:
 
     // Of the pass.
     LightVertexCache cache_;
-    LightVertexGrid grid_;
+    LightVertexGrid inner_grid_;
+    LightVertexGrid seen_grid_;  ///< Unused where both radii are equal.
 };
 
 std::vector<ParamInfo> upg_params() {
@@ -216,7 +229,8 @@ std::vector<ParamInfo> upg_params() {
         {"radius", ParamKind::Float, "0",
          "Largest distance between the vertices of a pair, in scene units; 0: such that an "
          "eye path finds about eight pairs. upg+bdpt then chooses it from earlier "
-         "passes, for the least product of variance and time."});
+         "passes, for the least product of variance and time, and has a smaller one for vertices "
+         "that the lens does not see directly, by mirrors, or by clear glass."});
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     params.push_back(

@@ -52,9 +52,17 @@ struct Gathering {
 
     /// `c` must have the number of light paths of the map.
     GatherSearch search(const SampleContext& c, const LightMap& map, Workspace& work) const {
-        return {c,       counts,   map.cache,         map.grid,
-                density, roulette, paths.max_depth(), kGatherConstants.flatness,
-                0,       work};
+        return {c,
+                counts,
+                map.cache,
+                map.grid,
+                map.grid,
+                density,
+                roulette,
+                paths.max_depth(),
+                kGatherConstants.flatness,
+                0,
+                work};
     }
     /// Calls use(t) for each eye vertex z_{t-1} that may belong to a pair.
     template <class Use>
@@ -238,6 +246,7 @@ public:
         TechniqueCounts n = MarkovIntegrator::counts(scene, light_paths);
         n.gather = float(gathered_ > 0 ? gathered_ : scene.film().pixel_count());
         n.pairs = {.disc = kPi * sqr(radius_),
+                   .inner_disc = kPi * sqr(radius_),
                    .min_edges = kShortest,
                    .short_rate = 1,
                    .rule = PairRule::Gloss,

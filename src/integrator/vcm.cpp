@@ -95,7 +95,7 @@ public:
         if (merges_) {
             (is_exact_ ? n.gather : n.merge) = float(light_paths);
             n.pairs.disc = kPi * sqr(radius_);
-            n.pairs.inner_disc = n.pairs.disc * sqr(kInnerRadius);
+            n.pairs.inner_disc = is_exact_ ? n.pairs.disc : n.pairs.disc * sqr(kInnerRadius);
             n.pairs.clamps = false;
             n.pairs.first_merge = first_merge();
         }
@@ -136,7 +136,7 @@ private:
             return Chosen{};
         };
         const float radius = z.sees_lens ? radius_ : kInnerRadius * radius_;
-        grid_.for_each_near(z.p, reach() * radius, choose, [&](const GatherCandidate& y, Chosen) {
+        grid_.for_each_in({z.p, reach() * radius}, choose, [&](const GatherCandidate& y, Chosen) {
             cache_.restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair, false);
             const auto join = join_merge(work.pair, y.s, work.z, t, n);
             if (!join) return;
@@ -149,9 +149,12 @@ private:
     /// Adds U(s,t), with the approximation q π d² p̃ of p_c. q is the survival probability of the Russian roulette
     /// before the dropped vertex [Qin et al. 2015, eq. 7].
     void gather(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
-        const GatherSearch search{
-            c,   n, cache_, grid_, density_, roulette_, paths_.max_depth(), 1, paths_.threshold(c),
-            work};
+        const GatherSearch search{c,         n,
+                                  cache_,    grid_,
+                                  grid_,     density_,
+                                  roulette_, paths_.max_depth(),
+                                  1,         paths_.threshold(c),
+                                  work};
         search.for_each_pair(t, [&](const GatherPair& pair) {
             const auto& [strategy, s, t_, drops_eye] = pair.technique;
             const auto join = join_gather(c.scene, work.pair, s, work.z, t_, drops_eye, n);

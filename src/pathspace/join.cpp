@@ -190,9 +190,10 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     const auto edge = connect(scene, y, drops_eye ? s : s - 1, z, drops_eye ? t - 1 : t, counts);
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
-    const double probability = counts.pairs.probability(drops_eye ? edge->rev_a : edge->rev_b);
     const Vertex& x_m = drops_eye ? y[s - 1] : z[t - 1];
-    const bool sees_lens = drops_eye ? t == 2 : x_m.sees_lens;
+    const bool sees_lens = z[t - 1].sees_lens;
+    const double probability =
+        counts.pairs.probability(drops_eye ? edge->rev_a : edge->rev_b, sees_lens);
     const double count = counts.weighed_gathers(x_m.pair_level, sees_lens, s + t - 2);
     Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * probability, y, a, z, b);
     join.pair_probability = float(probability);
@@ -227,7 +228,7 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
             (squares_at<Side::Eye>(z, t - 2, z[t - 2].is_delta, 0, 0, edges, counts) +
              b.weight_sum);
     const double np = counts.merge_area(a.pair_level, b.sees_lens) * double(b.pdf_fwd);
-    const float disc = b.sees_lens ? counts.pairs.disc : counts.pairs.inner_disc;
+    const float disc = counts.pairs.disc_of(b.sees_lens);
     return Join{.technique = {Strategy::Merge, s, t},
                 .emitter = y[0].emitter,
                 .contribution = density_estimate(a.beta, a.wo, f, b, disc),

@@ -71,9 +71,9 @@ inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, 
     const uint8_t outward = gloss(v[i - 1], v[i - 1].is_delta);
     const uint8_t before = eye ? inward : outward, after = eye ? outward : inward;
     double sum = 0;
-    if (drops(n.pairs.rule, eye, before, after)) sum += sqr(n.pairs.probability(fwd));
+    if (drops(n.pairs.rule, eye, before, after)) sum += sqr(n.pairs.probability(fwd, sees_lens));
     if (rev > 0 && drops(n.pairs.rule, !eye, before, after))
-        sum += sqr(n.pairs.probability(rev) * (fwd / rev));
+        sum += sqr(n.pairs.probability(rev, sees_lens) * (fwd / rev));
     return sum > 0 ? sum * sqr(n.weighed_gathers(v[i].pair_level, sees_lens, edges)) : 0;
 }
 

@@ -45,7 +45,7 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     if (!drops(counts.pairs.rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
     const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
     return counts.weighed_gathers(pair_level[m], sees_lens[m], k) * others * kept *
-           counts.pairs.probability(dropped);
+           counts.pairs.probability(dropped, sees_lens[m]);
 }
 
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {

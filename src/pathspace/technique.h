@@ -75,19 +75,20 @@ struct PathSelection {
 
 /// Pairs of light and eye vertices near each other.
 struct PairModel {
-    float disc = 0;  ///< π d², the area of the disc in which partners are searched.
-    float inner_disc =
-        0;              ///< The same for merges of eye vertices that do not see the lens (Vertex).
-    int min_edges = 2;  ///< Length, in edges, of the shortest paths made from pairs.
+    /// π d², the area of the disc in which the partners of an eye vertex that sees the lens (Vertex) are searched.
+    float disc = 0;
+    float inner_disc = 0;  ///< The same for other eye vertices.
+    int min_edges = 2;     ///< Length, in edges, of the shortest paths made from pairs.
     /// Least m of an x_m where vertices are merged. 2: next events make all direct light, with less noise.
     int first_merge = 1;
     float short_rate = 1;  ///< Share of gathers made for paths of three edges.
     PairRule rule = PairRule::Gloss;
     bool clamps = true;  ///< Whether weights clamp probabilities to 1 [Qin et al. 2015, eq. 24].
 
+    float disc_of(bool sees_lens) const { return sees_lens ? disc : inner_disc; }
     /// Approximate probability of finding a pair whose dropped vertex has the area density `pdf` [ibid., eq. 24].
-    double probability(double pdf) const {
-        const double p = double(disc) * pdf;
+    double probability(double pdf, bool sees_lens) const {
+        const double p = double(disc_of(sees_lens)) * pdf;
         return clamps && p > 1 ? 1 : p;
     }
 

@@ -1,6 +1,7 @@
 #pragma once
 // The search for the pairs of an eye vertex, and the Russian roulette that ends most of them [Qin et al. 2015].
 
+#include "math/systematic.h"
 #include "pathspace/sample_context.h"
 #include "reuse/gather_roulette.h"
 #include "reuse/light_vertex_grid.h"
@@ -16,6 +17,7 @@ struct GatherPair {
     uint64_t number;     ///< Address of its random numbers.
     float estimate;      ///< Estimated contribution of its join to the pixel, for GatherRoulette.
     float survival;      ///< Probability of surviving all roulette so far.
+    float unlimited_survival;  ///< The same without the limit of 1.
     float rate;  ///< `survival` times the share of gathers that are made (PairModel::short_rate).
 
     /// The event from which the dropped vertex was sampled, on the walks y and z.
@@ -30,8 +32,9 @@ struct GatherSearch {
     const SampleContext& c;
     const TechniqueCounts& n;
     const LightVertexCache& cache;
-    const LightVertexGrid& grid;
-    const PairDensity& density;
+    /// For eye vertices that see the lens (Vertex), and for others. Their radii are those of `n`.
+    const LightVertexGrid &seen_grid, &inner_grid;
+    const PairDensity& density;  ///< For the radius of `inner_grid`.
     const GatherRoulette& roulette;
     int max_depth;    ///< Edges of the longest path.
     float flatness;   ///< Half the height of a neighbourhood over its radius.
@@ -43,21 +46,35 @@ struct GatherSearch {
     void for_each_pair(int t, const Use& use) const {
         const float reflected = reflected_flux(t);
         const Vertex& z = work.z[t - 1];
+        const LightVertexGrid& grid = grid_of(z);
         // Roulette for the whole search: most pairs of some vertices contribute little. The number of pairs found has
         // the second moment n (n+1), where n is its mean, and a search costs n+1 times as much as one that finds none.
-        const float partners = std::max(1.0f, density.partners(z.pair_level));
+        const float partners = std::max(1.0f, density.partners(z.pair_level) *
+                                                  sqr(grid.radius() / inner_grid.radius()));
         const float search_survival = join_survival(
             roulette.of_search(t) * reflected * grid.mean_flux() * std::sqrt(partners), threshold);
         if (!survives(search_survival, pair_number(0, t, kSearch))) return;
         const Vertex& last = work.z[t - 2];
         const uint8_t after = gloss(last, last.is_delta);
-        const Neighbourhood near_eye = near(z, arrival_side(z));
+        const Neighbourhood near_eye = near(z, arrival_side(z), grid.radius());
 
         struct Choice {
-            float estimate, survival, rate;
+            float estimate, survival, unlimited_survival, rate;
             bool drops_eye, drops_light;
         };
+        GatherSums& sums = GatherSums::of(work);
+        uint64_t& candidates = z.sees_lens ? sums.candidates : sums.inner_candidates;
+        std::optional<SystematicSampling> selection;
+        const auto is_selected = [&](float q) {
+            if (!(q < 1)) return true;
+            if (!selection) {
+                c.sampler.seek(Stream::Roulette, pair_number(0, t, kLook));
+                selection.emplace(c.sampler.next_1d_unstructured());
+            }
+            return selection->selects(double(q));
+        };
         const auto choose = [&](const GatherCandidate& y) -> std::optional<Choice> {
+            ++candidates;
             const int edges = y.s + t - 2;
             if (edges > max_depth || !(n.gathers(edges) > 0)) return {};
             Choice choice;
@@ -67,35 +84,37 @@ struct GatherSearch {
                 drops(n.pairs.rule, false, y.gloss_before, after) && near_eye.contains(y.p, y.side);
             if (!choice.drops_eye && !choice.drops_light) return {};
             ++work.stats.pairs;
-            GatherSums::of(work).expected_pairs +=
+            sums.expected_pairs[z.sees_lens] +=
                 uint64_t(std::lround(256 / std::max(search_survival, 1e-6f)));
             choice.estimate = reflected * y.flux;
             const float share = n.gathers(edges) / n.gather;
-            choice.rate =
-                std::min(share * join_survival(roulette.of(y.s, t) * choice.estimate, threshold),
-                         search_survival);
+            const float worth = roulette.of(y.s, t) * choice.estimate;
+            choice.unlimited_survival = threshold > 0 ? worth / threshold : kInf;
+            choice.rate = std::min(share * join_survival(worth, threshold), search_survival);
             choice.survival = choice.rate / share;
-            if (!survives(choice.rate / search_survival, pair_number(y.vertex, t, kLook)))
-                return {};
+            if (!is_selected(choice.rate / search_survival)) return {};
             return choice;
         };
-        grid.for_each_near(
-            z.p, grid.radius(), choose, [&](const GatherCandidate& y, const Choice& choice) {
-                for (const bool eye : {true, false}) {
-                    if (!(eye ? choice.drops_eye : choice.drops_light)) continue;
-                    cache.restore_first(c.scene, y.vertex, eye ? y.s : y.s - 1, work.is_observed,
-                                        work.pair);
-                    const Neighbourhood kept = eye ? near(work.pair[y.s - 1], y.side) : near_eye;
-                    if (eye && !kept.contains(near_eye.p, near_eye.side)) continue;
-                    use(GatherPair{.technique = {Strategy::Gather, y.s, t, eye},
-                                   .kept = kept,
-                                   .number =
-                                       pair_number(y.vertex, t, eye ? kDropsEye : kDropsLight),
-                                   .estimate = choice.estimate,
-                                   .survival = choice.survival,
-                                   .rate = choice.rate});
-                }
-            });
+        // The neighbourhood of z_{t-1}, or else the ball that holds all those that contain it.
+        FlatBall region{z.p, grid.radius()};
+        if (after >= kDeltaGloss) region.n = z.ng, region.half_height = near_eye.half_height;
+        grid.for_each_in(region, choose, [&](const GatherCandidate& y, const Choice& choice) {
+            for (const bool eye : {true, false}) {
+                if (!(eye ? choice.drops_eye : choice.drops_light)) continue;
+                cache.restore_first(c.scene, y.vertex, eye ? y.s : y.s - 1, work.is_observed,
+                                    work.pair);
+                const Neighbourhood kept =
+                    eye ? near(work.pair[y.s - 1], y.side, grid.radius()) : near_eye;
+                if (eye && !kept.contains(near_eye.p, near_eye.side)) continue;
+                use(GatherPair{.technique = {Strategy::Gather, y.s, t, eye},
+                               .kept = kept,
+                               .number = pair_number(y.vertex, t, eye ? kDropsEye : kDropsLight),
+                               .estimate = choice.estimate,
+                               .survival = choice.survival,
+                               .unlimited_survival = choice.unlimited_survival,
+                               .rate = choice.rate});
+            }
+        });
     }
 
     /// Factor from the contribution of a gather to the pixel's value, without r and roulette.
@@ -112,6 +131,9 @@ struct GatherSearch {
     }
 
 private:
+    const LightVertexGrid& grid_of(const Vertex& z) const {
+        return z.sees_lens ? seen_grid : inner_grid;
+    }
     enum Use : uint64_t { kDropsEye, kDropsLight, kLook, kSearch };
     /// Distinct for distinct arguments with t < 2^22, and from join_number().
     static uint64_t pair_number(uint32_t vertex, int t, Use use) {
@@ -122,8 +144,8 @@ private:
         c.sampler.seek(Stream::Roulette, number);
         return c.sampler.next_1d_unstructured() < double(q);
     }
-    Neighbourhood near(const Vertex& kept, ArrivalSide side) const {
-        return {kept.p, kept.ng, side, grid.radius(), flatness * grid.radius()};
+    Neighbourhood near(const Vertex& kept, ArrivalSide side, float radius) const {
+        return {kept.p, kept.ng, side, radius, flatness * radius};
     }
 
     /// Estimated contribution to the pixel of a pair at z_{t-1} per unit of flux, before the light path is looked up:
@@ -132,9 +154,11 @@ private:
         const Vertex& z = work.z[t - 1];
         const float roughness = 1 - float(z.gloss) / kSharpestGloss;
         const float highlight = std::max(1.0f, 0.25f / sqr(roughness));
-        const float clamped = std::max(1.0f, n.pairs.disc * z.pdf_fwd);
+        const float disc = n.pairs.disc_of(z.sees_lens);
+        // Next to the lens and to delta events, only the light vertex is dropped.
+        const float clamped = z.sees_lens ? 1 : std::max(1.0f, disc * z.pdf_fwd);
         return highlight * clamped * luminance(z.beta) * std::fabs(work.z.film_weight) *
-               c.splat_scale / (kPi * n.pairs.disc);
+               c.splat_scale / (kPi * disc);
     }
 };
 

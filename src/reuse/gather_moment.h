@@ -34,11 +34,12 @@ struct GatherMoment {
     /// Whether no other technique makes the path.
     bool is_alone() const { return odds == INFINITY; }
 
-    /// The moment with `count` times the number of gathers, which count `weight_scale` times in the weights.
-    double with(double count, double weight_scale) const {
-        if (is_alone()) return scale * r / count;
+    /// The moment with `count` times the number of gathers, which count `weight_scale` times in the weights. `roulette`:
+    /// factor by which Russian roulette enlarges the part of the gathers.
+    double with(double count, double weight_scale, double roulette = 1) const {
+        if (is_alone()) return scale * roulette * r / count;
         const double w = 1 / (1 + 1 / (odds * sqr(count * weight_scale)));
-        return scale * (sqr(w) * r / count + sqr(1 - w) / others);
+        return scale * (sqr(w) * roulette * r / count + sqr(1 - w) / others);
     }
 
     /// Fixed point for sums, which then do not depend on the order. The largest moment is that of a pair that adds a

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "film/film.h"
 #include "reuse/gather_constants.h"
@@ -9,14 +11,9 @@
 namespace etendue {
 namespace {
 
-/// Variance of one sample of a pixel, relative to its squared luminance.
-struct RelativeVariance {
-    double
-        mean;  ///< Over the pixels, without the noisiest ones, whose variance a few passes cannot tell.
-    double
-        part_of_square;  ///< Variance divided by the mean of squares: its mean, weighted by variance.
-};
-RelativeVariance relative_variance(const Film& film) {
+/// Mean variance of one sample of a pixel, relative to its squared luminance, without the noisiest pixels, whose variance
+/// a few passes cannot tell.
+double relative_variance(const Film& film) {
     constexpr double kKept = 0.99;
     const std::vector<Rgb> variance = film.variance();
     std::vector<double> relative(variance.size());
@@ -27,52 +24,99 @@ RelativeVariance relative_variance(const Film& film) {
     }
     const auto end = relative.begin() + std::ptrdiff_t(kKept * double(relative.size()));
     std::nth_element(relative.begin(), end, relative.end());
-    double sum = 0, part = 0;
-    for (auto v = relative.begin(); v != end; ++v) sum += *v, part += *v * *v / (1 + *v);
-    return {sum / double(relative.size()), sum > 0 ? part / sum : 0};
+    return std::accumulate(relative.begin(), end, 0.0) / double(relative.size());
 }
 
 }  // namespace
 
-void GatherRadius::start(float given, float scene_radius, double pairs_per_radius2) {
+void GatherRadius::start(float given, bool has_inner, float scene_radius,
+                         const std::array<double, 2>& pairs_per_radius2) {
+    const GatherConstants& k = kGatherConstants;
     is_given_ = given > 0;
+    has_inner_ = has_inner;
     scene_radius_ = scene_radius;
-    radius_ = kGatherConstants.largest_first_radius * scene_radius;
-    if (pairs_per_radius2 > 0)
-        radius_ = std::min(radius_, float(std::sqrt(kGatherConstants.pairs / pairs_per_radius2)));
-    if (is_given_) radius_ = given;
+    const auto radius_of = [&](double wanted, double per_radius2) {
+        const float largest = k.largest_first_radius * scene_radius;
+        return per_radius2 > 0 ? std::min(largest, float(std::sqrt(wanted / per_radius2)))
+                               : largest;
+    };
+    if (is_given_)
+        radii_.fill(given);
+    else if (has_inner)
+        radii_ = {radius_of(k.inner_pairs, pairs_per_radius2[0]),
+                  radius_of(k.pairs, pairs_per_radius2[1])};
+    else
+        radii_.fill(radius_of(k.pairs, pairs_per_radius2[0] + pairs_per_radius2[1]));
 }
 
-double GatherRadius::factor_of_pairs(double gain, double time) {
-    const double a = -std::log(std::clamp(1 - gain, 1 / kMore, 1.0)) / std::log(kMore);
-    return std::clamp(std::sqrt(a * (1 - time) / ((1 - a) * time)), 1 / kMore, kMore);
+void GatherRadius::grow(float& radius, double pairs, double wanted, float largest) const {
+    const double factor = std::clamp(std::sqrt(wanted / pairs), 0.25, 4.0);
+    radius = std::min(largest * scene_radius_, radius * float(factor));
+}
+
+double best_factor_of_pairs(double variance, double time,
+                            const std::array<double, kRadiusChanges>& moments,
+                            const std::array<double, kRadiusChanges>& times) {
+    constexpr size_t kPresent = kRadiusChanges / 2;
+    // Both are estimates; something always remains.
+    constexpr double kLeast = 0.05;
+    const double other_variance = std::max(variance - moments[kPresent], kLeast * variance),
+                 other_time = std::max(time - times[kPresent], kLeast * time);
+    // Between the candidates, moments and times are powers of m.
+    constexpr size_t kSteps = 4;
+    double best = 1, least = (other_variance + moments[kPresent]) * (other_time + times[kPresent]);
+    for (size_t i = 0; i <= (kRadiusChanges - 1) * kSteps; ++i) {
+        const size_t k = std::min(i / kSteps, kRadiusChanges - 2);
+        const double u = double(i - k * kSteps) / kSteps;
+        const auto between = [&](double a, double b) {
+            return a > 0 && b > 0 ? std::pow(a, 1 - u) * std::pow(b, u) : (1 - u) * a + u * b;
+        };
+        const double product = (other_variance + between(moments[k], moments[k + 1])) *
+                               (other_time + between(times[k], times[k + 1]));
+        if (product < least) {
+            least = product;
+            best = between(GatherRadius::factor_of_pairs(k), GatherRadius::factor_of_pairs(k + 1));
+        }
+    }
+    return best;
 }
 
 void GatherRadius::learn(const Film& film, const RenderStats& so_far, const GatherTotals& totals) {
     if (is_given_) return;
     const GatherConstants& k = kGatherConstants;
-    const Sums now{.eye_paths = double(so_far.eye_paths),
-                   .pairs = totals.expected_pairs,
-                   .gather_time =
-                       k.pair_time * double(so_far.pairs) + k.trial_time * double(so_far.trials),
-                   .other_time = double(so_far.rays() - so_far.trial_rays - so_far.visible_pairs),
-                   .gain = (totals.moment - totals.moment_of_more) / GatherMoment::kUnit};
-    const Sums since = now - before_;
-    before_ = now;
+    const GatherTotals before = std::exchange(before_, totals);
+    const double eye_paths_before = std::exchange(eye_paths_before_, double(so_far.eye_paths)),
+                 eye_paths = eye_paths_before_ - eye_paths_before;
+    const auto pairs = [&](bool sees_lens) {
+        return (totals.expected_pairs[sees_lens] - before.expected_pairs[sees_lens] + 1) /
+               eye_paths;
+    };
+    if (!has_inner_) {
+        grow(radii_[0], pairs(false) + pairs(true), k.pairs, k.largest_first_radius);
+        radii_[1] = radii_[0];
+        return;
+    }
 
-    const double pairs = (since.pairs + 1) / since.eye_paths;
+    const double now = double(so_far.rays() - so_far.trial_rays - so_far.visible_pairs) +
+                       k.candidate_time * (totals.candidates + totals.inner_candidates) +
+                       k.trial_time * double(so_far.trials);
+    const double time = now - std::exchange(time_before_, now);
+    const double variance = eye_paths * relative_variance(film);
+    std::array<double, kRadiusChanges> moments, times;
+    for (size_t i = 0; i < kRadiusChanges; ++i) {
+        moments[i] = totals.moments[i] - before.moments[i];
+        times[i] = k.candidate_time * (totals.candidates - before.candidates) * factor_of_pairs(i) +
+                   k.trial_time * (totals.trials[i] - before.trials[i]);
+    }
     double wanted = k.pairs;
     float largest = k.largest_first_radius;
-    const RelativeVariance variance = relative_variance(film);
-    if (totals.moment > 0 && variance.mean > 0) {
-        const double change = factor_of_pairs(
-            variance.part_of_square * since.gain / (since.eye_paths * variance.mean),
-            since.gather_time / (since.gather_time + since.other_time));
-        wanted = std::clamp(pairs * change, k.pairs / k.pairs_range, k.pairs * k.pairs_range);
+    if (moments[0] > 0 && variance > 0) {
+        const double change = best_factor_of_pairs(variance, time, moments, times);
+        wanted = std::clamp(pairs(true) * change, k.pairs / k.pairs_range, k.pairs * k.pairs_range);
         largest = k.largest_radius;
     }
-    const double factor = std::clamp(std::sqrt(wanted / pairs), 0.25, 4.0);
-    radius_ = std::min(largest * scene_radius_, radius_ * float(factor));
+    grow(radii_[1], pairs(true), wanted, largest);
+    grow(radii_[0], pairs(false), k.inner_pairs * std::min(1.0, wanted / k.pairs), largest);
 }
 
 }  // namespace etendue

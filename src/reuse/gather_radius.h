@@ -3,55 +3,80 @@
 
 #include "film/film.h"
 #include "pathspace/render_stats.h"
+#include "reuse/gather_constants.h"
 #include "reuse/gather_moment.h"
 #include "reuse/gather_sums.h"
 
 namespace etendue {
 
-/// A smaller radius makes gathers cheaper, a larger one makes them less noisy. With m times the number of pairs, variance
-/// and time of a sample are taken to be
-///     V m^-a   and   T (1 - δ + δ m),
-/// where δ is the part of the time that gathers take. Their product is least for m = a (1 - δ) / ((1 - a) δ). The exponent
-/// a is that of V(4) = V - κ (M(1) - M(4)), where M(m) is the second moment of the paths that gathers can make
-/// (GatherMoment), and κ is the part of second moments that is variance. The number of pairs changes by √m only, since a
-/// is smaller for more pairs. All of this is estimated from earlier
-/// passes, so that the image remains unbiased. Time is counted in rays, so that it depends neither on the machine nor on
-/// the number of threads.
+/// A smaller radius makes gathers cheaper, a larger one makes them less noisy. Eye vertices that see the lens
+/// (Vertex::sees_lens) have one radius, and others have a smaller one. Pairs of the former share an eye path without any
+/// random choice, so that each of them helps; pairs of the latter share a random eye path.
+///
+/// The smaller radius is that of a number of pairs for an eye path, fewer where the others bring little. The other is that of the least product of variance and
+/// time. With m times the number of pairs, variance and time of a sample are taken to be
+///     V - M(1) + M(m)   and   T - t(1) + t(m).
+/// M is the second moment of the paths that these gathers can make (GatherMoment): the number of pairs has a Poisson
+/// distribution, for which this is the variance. t is the time of the search, which is proportional to m, and of the
+/// trials for pairs that roulette leaves. A pair survives with the probability min(1, x/m), so that pairs with x < m cost
+/// the same for any m. Their moment is then the same as well if they survive independently; systematic sampling leaves
+/// only a part of it. All of this is estimated from earlier passes, so that the image remains unbiased. Time is counted
+/// in rays, so that it depends neither on the machine nor on the number of threads.
 class GatherRadius {
 public:
-    /// `given`: the radius, or 0 if it is to be chosen. `scene_radius`: that of the scene's bounds. `pairs_per_radius2`:
-    /// number of pairs that an eye path finds, divided by the square of the radius; 0 if unknown.
-    void start(float given, float scene_radius, double pairs_per_radius2);
-    /// Chooses the radius of the next passes, unless it was given; where no pair was observed, for GatherConstants::pairs.
+    /// `given`: both radii, or 0 if they are to be chosen. `has_inner`: whether there are two; otherwise the one radius is
+    /// that of GatherConstants::pairs pairs for an eye path. `scene_radius`: that of the scene's bounds.
+    /// `pairs_per_radius2`: numbers of pairs that an eye path finds, by Vertex::sees_lens, divided by the square of the
+    /// radius.
+    void start(float given, bool has_inner, float scene_radius,
+               const std::array<double, 2>& pairs_per_radius2);
+    /// Chooses the radii of the next passes, unless one was given.
     void learn(const Film& film, const RenderStats& so_far, const GatherTotals& totals);
-    float value() const { return radius_; }
-    /// √m, where kMore times the number of pairs reduces the variance by the part `gain`. `time`: δ.
-    static double factor_of_pairs(double gain, double time);
+    /// Of eye vertices of one kind.
+    float of(bool sees_lens) const { return radii_[sees_lens]; }
 
-    /// Records a visible pair. `weight_scale`: GatherWeightScale::value().
-    static void observe(const GatherMoment& pair, double weight_scale, GatherSums& sums) {
+    /// m of the candidate `change`.
+    static constexpr double factor_of_pairs(size_t change) {
+        constexpr double kFactors[kRadiusChanges] = {1 / 16.0, 1 / 4.0, 1, 4, 16};
+        return kFactors[change];
+    }
+    /// Records a visible pair of an eye vertex that sees the lens. `x`: its survival probability in roulette without the
+    /// limit of 1; `weight_scale`: GatherWeightScale::value().
+    static void observe(const GatherMoment& pair, double x, double weight_scale, GatherSums& sums) {
         // A pair that adds ten times the pixel's luminance. V leaves rare ones out, too.
         constexpr double kMost = 100;
-        sums.moment += GatherMoment::fixed(std::min(pair.with(1, weight_scale), kMost));
-        sums.moment_of_more += GatherMoment::fixed(std::min(pair.with(kMore, weight_scale), kMost));
+        for (size_t k = 0; k < kRadiusChanges; ++k) {
+            const double m = factor_of_pairs(k),
+                         roulette = 1 + kGatherConstants.roulette_noise * std::max(0.0, m / x - 1);
+            sums.moments[k] +=
+                GatherMoment::fixed(std::min(pair.with(m, weight_scale, roulette), kMost));
+        }
+    }
+    /// Records the trials for such a pair.
+    static void observe_trials(uint64_t trials, double x, GatherSums& sums) {
+        constexpr double kLeast = 1e-3, kMost = 1 << 20;
+        const double most = std::max(x, kLeast),
+                     of_pairs = 256 * std::min(double(trials), kMost) / std::min(most, 1.0);
+        for (size_t k = 0; k < kRadiusChanges; ++k)
+            sums.trials[k] += uint64_t(of_pairs * std::min(factor_of_pairs(k), most));
     }
 
 private:
-    static constexpr double kMore = 4;
+    /// Changes a radius, so that an eye path finds `wanted` pairs, not `pairs`.
+    void grow(float& radius, double pairs, double wanted, float largest) const;
 
-    /// Sums over passes. `gain`: of M(1) - M(kMore).
-    struct Sums {
-        double eye_paths = 0, pairs = 0, gather_time = 0, other_time = 0, gain = 0;
-
-        Sums operator-(const Sums& o) const {
-            return {eye_paths - o.eye_paths, pairs - o.pairs, gather_time - o.gather_time,
-                    other_time - o.other_time, gain - o.gain};
-        }
-    };
-
-    float radius_ = 0, scene_radius_ = 0;
-    bool is_given_ = false;
-    Sums before_;  ///< Of all passes, when the radius was chosen.
+    float scene_radius_ = 0;
+    std::array<float, 2> radii_{};
+    bool is_given_ = false, has_inner_ = false;
+    /// Of all passes, when the radii were chosen.
+    double eye_paths_before_ = 0, time_before_ = 0;
+    GatherTotals before_;
 };
+
+/// The m for which the product of variance and time is least. `variance`, `time`: V and T, each for the same unit as the
+/// sums of the gathers, `moments` and `times`, which belong to the candidates of GatherRadius::factor_of_pairs().
+double best_factor_of_pairs(double variance, double time,
+                            const std::array<double, kRadiusChanges>& moments,
+                            const std::array<double, kRadiusChanges>& times);
 
 }  // namespace etendue

@@ -6,11 +6,14 @@
 #include <span>
 
 #include "pathspace/sample_context.h"
+#include "reuse/gather_moment.h"
 
 namespace etendue {
 
 /// Number of candidates for the scale c of GatherWeightScale.
 inline constexpr size_t kWeightScales = 6;
+/// Number of candidates for the change of a radius, see GatherRadius.
+inline constexpr size_t kRadiusChanges = 5;
 /// GatherRoulette does not distinguish sub-paths of more vertices than this.
 inline constexpr size_t kGatherLengths = 8;
 
@@ -18,38 +21,45 @@ inline constexpr size_t kGatherLengths = 8;
 struct GatherSums final : PassSums {
     /// GatherMoment::fixed() by candidates of GatherWeightScale.
     std::array<uint64_t, kWeightScales> weight_moments{};
-    /// The same with the number of gathers, and with GatherRadius::kMore times that number.
-    uint64_t moment = 0, moment_of_more = 0;
+    /// Of gathers at eye vertices that see the lens (Vertex): GatherMoment::fixed(), and trials in units of 1/256, by the
+    /// factor of the number of pairs.
+    std::array<uint64_t, kRadiusChanges> moments{}, trials{};
+    uint64_t candidates = 0, inner_candidates = 0;  ///< Light vertices that searches looked at.
+    /// Pairs that would have been found if roulette had ended no search, in units of 1/256; by Vertex::sees_lens.
+    std::array<uint64_t, 2> expected_pairs{};
     struct Joins {
         uint64_t count = 0, squares = 0;
     };
     std::array<Joins, kGatherLengths * kGatherLengths> joins{};
-    /// Pairs that would have been found if roulette had ended no search, in units of 1/256.
-    uint64_t expected_pairs = 0;
 
     static GatherSums& of(Workspace& work) { return static_cast<GatherSums&>(*work.sums); }
 
     void add(const GatherSums& o) {
         for (size_t i = 0; i < kWeightScales; ++i) weight_moments[i] += o.weight_moments[i];
-        moment += o.moment;
-        moment_of_more += o.moment_of_more;
+        for (size_t i = 0; i < kRadiusChanges; ++i) {
+            moments[i] += o.moments[i];
+            trials[i] += o.trials[i];
+        }
+        candidates += o.candidates;
+        inner_candidates += o.inner_candidates;
+        for (size_t i = 0; i < 2; ++i) expected_pairs[i] += o.expected_pairs[i];
         for (size_t i = 0; i < joins.size(); ++i) {
             joins[i].count += o.joins[i].count;
             joins[i].squares += o.joins[i].squares;
         }
-        expected_pairs += o.expected_pairs;
     }
 };
 
 /// Sums over all finished passes.
 struct GatherTotals {
     std::array<double, kWeightScales> weight_moments{};
-    double moment = 0, moment_of_more = 0;
+    std::array<double, kRadiusChanges> moments{}, trials{};
+    double candidates = 0, inner_candidates = 0;
+    std::array<double, 2> expected_pairs{};
     struct Joins {
         double count = 0, squares = 0;
     };
     std::array<Joins, kGatherLengths * kGatherLengths> joins{};
-    double expected_pairs = 0;
 
     /// Adds a pass. Sums of its workers are added as integers first, so that the order of workers does not matter.
     void add(std::span<const std::unique_ptr<PassSums>> workers) {
@@ -57,13 +67,17 @@ struct GatherTotals {
         for (const auto& w : workers) pass.add(static_cast<const GatherSums&>(*w));
         for (size_t i = 0; i < kWeightScales; ++i)
             weight_moments[i] += double(pass.weight_moments[i]);
-        moment += double(pass.moment);
-        moment_of_more += double(pass.moment_of_more);
+        for (size_t i = 0; i < kRadiusChanges; ++i) {
+            moments[i] += double(pass.moments[i]) / GatherMoment::kUnit;
+            trials[i] += double(pass.trials[i]) / 256;
+        }
+        candidates += double(pass.candidates);
+        inner_candidates += double(pass.inner_candidates);
+        for (size_t i = 0; i < 2; ++i) expected_pairs[i] += double(pass.expected_pairs[i]) / 256;
         for (size_t i = 0; i < joins.size(); ++i) {
             joins[i].count += double(pass.joins[i].count);
             joins[i].squares += double(pass.joins[i].squares);
         }
-        expected_pairs += double(pass.expected_pairs) / 256;
     }
 };
 

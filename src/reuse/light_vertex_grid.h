@@ -27,6 +27,9 @@ public:
     /// buckets with two numbers each and a level of PairDensity.
     static constexpr uint64_t kVertexBytes =
         2 * sizeof(PointGrid::Entry) + sizeof(Vec3) + 10 * sizeof(uint32_t);
+    /// The same afterwards.
+    static constexpr uint64_t kBuiltVertexBytes =
+        sizeof(PointGrid::Entry) + sizeof(Vec3) + 4 * sizeof(uint32_t);
 
     /// Of the vertices y_i, i ≥ first ≥ 1, for searches up to `radius`. The cache must outlive the grid, and not change
     /// before the next build().
@@ -37,10 +40,10 @@ public:
     float mean_flux() const { return mean_flux_; }
     const PointGrid& points() const { return grid_; }
 
-    /// Calls use(candidate, choice) for the light vertices within `radius` of `p` for which
+    /// Calls use(candidate, choice) for the light vertices in `region`, see PointGrid::for_each_in(), for which
     /// `choose(candidate) -> std::optional<Choice>` returns a choice.
     template <class Choose, class Use>
-    void for_each_near(Vec3 p, float radius, const Choose& choose, const Use& use) const {
+    void for_each_in(const FlatBall& region, const Choose& choose, const Use& use) const {
         constexpr int kBatch = 32;
         using Choice = typename decltype(choose(GatherCandidate{}))::value_type;
         struct Found {
@@ -54,7 +57,7 @@ public:
             for (size_t i = 0; i < count; ++i) use(batch[i].candidate, batch[i].choice);
             count = 0;
         };
-        grid_.for_each_near(p, radius, [&](const PointGrid::Entry& e) {
+        grid_.for_each_in(region, [&](const PointGrid::Entry& e) {
             Found& found = batch[count];
             found.candidate = {.p = e.p,
                                .vertex = e.index,

@@ -27,6 +27,14 @@ struct CellCounts {
     }
 };
 
+/// The part of a ball within `half_height` of the plane through its centre with normal `n`.
+struct FlatBall {
+    Vec3 p;
+    float radius;
+    Vec3 n{};
+    float half_height = kInf;
+};
+
 class PointGrid {
 public:
     /// A point, the caller's index for it, and data that the caller needs without a look-up.
@@ -47,8 +55,12 @@ public:
     /// Calls use(entry) for every point nearer to `p` than `radius`.
     template <class Use>
     void for_each_near(Vec3 p, float radius, const Use& use) const {
+        for_each_in(FlatBall{p, radius}, use);
+    }
+    /// Calls use(entry) for every point in `region`, and maybe for others within a thousandth of its height from it.
+    template <class Use>
+    void for_each_in(const FlatBall& region, const Use& use) const {
         if (entries_.empty()) return;
-        const float radius2 = radius * radius;
         // Several buckets are looked up together, because memory latency dominates the time.
         constexpr int kBatch = 8;
         CellHash::Cell cells[kBatch];
@@ -63,13 +75,13 @@ public:
                 __builtin_prefetch(&entries_[begin[i]]);
             }
             for (int i = 0; i < count; ++i)
-                for_each_in(begin[i], end[i], p, radius2, [&](const Entry& e) {
+                for_each_in(begin[i], end[i], region, [&](const Entry& e) {
                     // Other cells may share the bucket.
                     if (cells_.cell_of(e.p) == cells[i]) use(e);
                 });
             count = 0;
         };
-        cells_.for_each_near(p, radius, [&](const CellHash::Cell& cell) {
+        cells_.for_each_near(region.p, region.radius, [&](const CellHash::Cell& cell) {
             cells[count] = cell;
             begin[count] = cells_.bucket_of(cell);
             __builtin_prefetch(&begins_[begin[count]]);
@@ -93,15 +105,19 @@ private:
         Lanes x, y, z;
     };
 
-    /// Calls use(entry) for the entries from `begin` to `end` that are nearer to `p` than the root of `radius2`.
+    /// The same for the entries from `begin` to `end`.
     template <class Use>
-    void for_each_in(uint32_t begin, uint32_t end, Vec3 p, float radius2, const Use& use) const {
+    void for_each_in(uint32_t begin, uint32_t end, const FlatBall& region, const Use& use) const {
+        const auto& [p, radius, n, half_height] = region;
+        const float radius2 = radius * radius, height = 1.001f * half_height;
         for (uint32_t first = begin; first < end;) {
             const uint32_t of_block = first / kBlock * kBlock;
             const uint32_t last = std::min(end, of_block + kBlock);
             const Block& b = blocks_[of_block / kBlock];
             const Lanes x = b.x - p.x, y = b.y - p.y, z = b.z - p.z;
-            const Bits bits = (x * x + y * y + z * z < radius2) & Bits{1, 2, 4, 8, 16, 32, 64, 128};
+            const Lanes along = x * n.x + y * n.y + z * n.z;
+            const Bits bits = (x * x + y * y + z * z < radius2) & (along <= height) &
+                              (along >= -height) & Bits{1, 2, 4, 8, 16, 32, 64, 128};
             uint32_t near = 0;
             for (uint32_t i = 0; i < kBlock; ++i) near |= uint32_t(bits[i]);
             near &= (1u << (last - of_block)) - (1u << (first - of_block));

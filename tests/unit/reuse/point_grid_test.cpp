@@ -1,6 +1,7 @@
 #include "reuse/point_grid.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -41,6 +42,30 @@ TEST(PointGrid, AgreesWithALoop) {
             }
         EXPECT_EQ(found_in_all > 500, count == 5000);
     }
+}
+
+/// Those on the border of the slab may be found as well.
+TEST(PointGrid, FindsTheFlatPartOfABall) {
+    PointGrid grid;
+    const auto entries = points(5000, 1);
+    grid.build(entries, kRadius);
+    size_t found_in_all = 0;
+    for (const auto& query : points(300, 2)) {
+        const Vec3 n = normalize(query.p + Vec3{0.1f, -0.2f, 0.3f});
+        const FlatBall region{query.p, kRadius, n, 0.3f * kRadius};
+        const auto is_inside = [&](Vec3 p, float height) {
+            return length2(p - query.p) < sqr(kRadius) && std::fabs(dot(p - query.p, n)) <= height;
+        };
+        size_t found = 0, expected = 0;
+        grid.for_each_in(region, [&](const PointGrid::Entry& e) {
+            EXPECT_TRUE(is_inside(e.p, 1.002f * region.half_height));
+            found += is_inside(e.p, region.half_height);
+        });
+        for (const auto& e : entries) expected += is_inside(e.p, region.half_height);
+        EXPECT_EQ(found, expected);
+        found_in_all += found;
+    }
+    EXPECT_GT(found_in_all, 200u);
 }
 
 TEST(PointGrid, TestsFewDistantPoints) {
