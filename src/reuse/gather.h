@@ -17,7 +17,8 @@ struct GatherPair {
     uint64_t number;     ///< Address of its random numbers.
     float estimate;      ///< Estimated contribution of its join to the pixel, for GatherRoulette.
     float survival;      ///< Probability of surviving all roulette so far.
-    float unlimited_survival;  ///< The same without the limit of 1.
+    /// Ratio of its estimated worth to the threshold of roulette; a pair above 1 always survives.
+    float unlimited_survival;
     float rate;  ///< `survival` times the share of gathers that are made (PairModel::short_rate).
 
     /// The event from which the dropped vertex was sampled, on the walks y and z.
@@ -54,8 +55,7 @@ struct GatherSearch {
         const float search_survival = join_survival(
             roulette.of_search(t) * reflected * grid.mean_flux() * std::sqrt(partners), threshold);
         if (!survives(search_survival, pair_number(0, t, kSearch))) return;
-        const Vertex& last = work.z[t - 2];
-        const uint8_t after = gloss(last, last.is_delta);
+        const uint8_t after = gloss_after(t);
         const Neighbourhood near_eye = near(z, arrival_side(z), grid.radius());
 
         struct Choice {
@@ -97,7 +97,7 @@ struct GatherSearch {
         };
         // The neighbourhood of z_{t-1}, or else the ball that holds all those that contain it.
         FlatBall region{z.p, grid.radius()};
-        if (after >= kDeltaGloss) region.n = z.ng, region.half_height = near_eye.half_height;
+        if (keeps_eye(t)) region.n = z.ng, region.half_height = near_eye.half_height;
         grid.for_each_in(region, choose, [&](const GatherCandidate& y, const Choice& choice) {
             for (const bool eye : {true, false}) {
                 if (!(eye ? choice.drops_eye : choice.drops_light)) continue;
@@ -131,6 +131,10 @@ struct GatherSearch {
     }
 
 private:
+    /// Gloss of the vertex from which z_{t-1} was sampled.
+    uint8_t gloss_after(int t) const { return gloss(work.z[t - 2], work.z[t - 2].is_delta); }
+    /// Whether the pairs of z_{t-1} can only drop the light vertex: next to the lens and to delta events, see drops().
+    bool keeps_eye(int t) const { return gloss_after(t) >= kDeltaGloss; }
     const LightVertexGrid& grid_of(const Vertex& z) const {
         return z.sees_lens ? seen_grid : inner_grid;
     }
@@ -155,8 +159,7 @@ private:
         const float roughness = 1 - float(z.gloss) / kSharpestGloss;
         const float highlight = std::max(1.0f, 0.25f / sqr(roughness));
         const float disc = n.pairs.disc_of(z.sees_lens);
-        // Next to the lens and to delta events, only the light vertex is dropped.
-        const float clamped = z.sees_lens ? 1 : std::max(1.0f, disc * z.pdf_fwd);
+        const float clamped = keeps_eye(t) ? 1 : std::max(1.0f, disc * z.pdf_fwd);
         return highlight * clamped * luminance(z.beta) * std::fabs(work.z.film_weight) *
                c.splat_scale / (kPi * disc);
     }

@@ -11,15 +11,16 @@ struct GatherConstants {
     /// Default radius of the first passes: the number of pairs that an eye path should find, and the upper limit relative
     /// to the radius of the scene's bounds.
     double pairs = 8;
-    /// Number of pairs that an eye path should find at vertices that do not see the lens (Vertex). Of 0.5, 4 and 16, the
-    /// value 4 has the smallest errors on yard-ring and two-rooms, 0.5 on staircase2 and 16 on veach-ajar.
+    /// Number of pairs that an eye path should find at vertices that do not see the lens (Vertex). Of 4 and 16,
+    /// 4 has the smaller error on yard-ring, two-rooms and staircase2, and 16 on veach-ajar.
     double inner_pairs = 4;
     float largest_first_radius = 0.02f;
     /// The same limit for later passes, and the largest factor between their number of pairs and that of the first ones.
     float largest_radius = 0.06f;
     double pairs_range = 16;
     /// Time of a light vertex in a search, and of a trial with its share of joins and rays, divided by that of a ray with
-    /// its share of walks and joins. The latter was fitted to 35 renderings of seven scenes.
+    /// its share of walks and joins. The former is from passes on yard-ring, the latter was fitted to 35 renderings of seven
+    /// scenes.
     double candidate_time = 0.15, trial_time = 3.6;
     /// ρ of PairDensity. It is far below 1, because competing techniques also share most of the eye path. Of 0.05, 0.2,
     /// 0.5 and 1, the value 0.2 has the smallest errors on veach-ajar, staircase2, veach-bidir and living-room.

@@ -13,8 +13,9 @@ namespace etendue {
 /// (Vertex::sees_lens) have one radius, and others have a smaller one. Pairs of the former share an eye path without any
 /// random choice, so that each of them helps; pairs of the latter share a random eye path.
 ///
-/// The smaller radius is that of a number of pairs for an eye path, fewer where the others bring little. The other is that of the least product of variance and
-/// time. With m times the number of pairs, variance and time of a sample are taken to be
+/// The smaller radius is such that an eye path finds GatherConstants::inner_pairs pairs, and fewer where pairs bring
+/// little. The larger one is that of the least product of variance and time. With m times the number of pairs, variance
+/// and time of a sample are taken to be
 ///     V - M(1) + M(m)   and   T - t(1) + t(m).
 /// M is the second moment of the paths that these gathers can make (GatherMoment): the number of pairs has a Poisson
 /// distribution, for which this is the variance. t is the time of the search, which is proportional to m, and of the
@@ -32,13 +33,13 @@ public:
                const std::array<double, 2>& pairs_per_radius2);
     /// Chooses the radii of the next passes, unless one was given.
     void learn(const Film& film, const RenderStats& so_far, const GatherTotals& totals);
-    /// Of eye vertices of one kind.
+    /// The radius of eye vertices that see the lens, or of others.
     float of(bool sees_lens) const { return radii_[sees_lens]; }
 
-    /// m of the candidate `change`.
-    static constexpr double factor_of_pairs(size_t change) {
+    /// m of a candidate, in [0, kRadiusChanges).
+    static constexpr double factor_of_pairs(size_t candidate) {
         constexpr double kFactors[kRadiusChanges] = {1 / 16.0, 1 / 4.0, 1, 4, 16};
-        return kFactors[change];
+        return kFactors[candidate];
     }
     /// Records a visible pair of an eye vertex that sees the lens. `x`: its survival probability in roulette without the
     /// limit of 1; `weight_scale`: GatherWeightScale::value().
