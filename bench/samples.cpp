@@ -1,6 +1,6 @@
 // Samples per second, and the error after a given time, alternating with measurements of bare Embree. `normalised`
 // results are those expected on the machine where other renderers were measured, assuming the same ratio to Embree
-// there. Two threads, as for the other renderers.
+// there. Methods that learn run for as long as it takes to do the same work. Two threads, as for the other renderers.
 
 #include "image/image_io.h"
 #include "image/metrics.h"
@@ -18,23 +18,33 @@ struct Case {
     struct Aim {
         std::string integrator;
         std::optional<double> samples_per_second, rel_mse;
+        /// Whether the error is not inverse to the time, since passes learn from earlier ones, or since chains start anew.
+        bool learns = false;
     };
     std::vector<Aim> integrators = {{"path", {}, {}}, {"bdpt", {}, {}}, {"light", {}, {}}};
 };
 
-/// Aims: `path` 1.5 times and `bdpt` twice the samples of the best peer, `bdpt` at half the best
-/// peer's error.
+/// Aims: `path` 1.5 times and `bdpt` twice the samples of the best peer; `bdpt` and each kind of chain at half the error
+/// of the best peer of its kind, and `upg+bdpt` at half the error of the best one of all.
 std::vector<Case> cases() {
     return {{.file = shared_scene("yard-cornell-mts06", "yard-cornell"),
              .error_seconds = 30,
              .integrators = {{"path", 1.5 * 1.31e6, {}},
                              {"bdpt", 2 * 0.318e6, 0.0043},
-                             {"light", {}, {}}}},
+                             {"light", {}, {}},
+                             {"pssmlt", {}, 0.0145 / 2, true},
+                             {"mmlt", {}, 0.0161 / 2, true},
+                             {"mlt", {}, 0.0102 / 2, true}}},
             {.file = shared_scene("yard-ring-mts06", "yard-ring"),
              .error_seconds = 60,
              .integrators = {{"path", 1.5 * 0.75e6, {}},
                              {"bdpt", 2 * 0.154e6, 0.19},
-                             {"light", {}, {}}}},
+                             {"light", {}, {}},
+                             {"upg+bdpt", {}, {}, true},
+                             {"upg+bdpt:guide=on", {}, 0.035 / 2, true},
+                             {"pssmlt", {}, 0.128 / 2, true},
+                             {"mmlt", {}, 0.088 / 2, true},
+                             {"mlt", {}, 0.035 / 2, true}}},
             {.file = own_scene("cornell")}};
 }
 
@@ -64,6 +74,20 @@ void measure_samples(const Report& report, const Options& options, const Yardsti
         {{"passes", passes}, {"rays_per_sample", double(stats.rays()) / rendered.front().samples}});
 }
 
+/// Errors of images of the case's scene, in comparison with its two references.
+class Comparison {
+public:
+    explicit Comparison(const Case& c)
+        : reference_(read_rgb(c.file.sibling("ref1.pfm").string()).pixels),
+          reference2_(read_rgb(c.file.sibling("ref2.pfm").string()).pixels) {}
+    ImageErrors errors(const std::vector<Rgb>& image) const {
+        return image_errors(image, reference_, {.reference2 = reference2_, .ignore_above = 3});
+    }
+
+private:
+    std::vector<Rgb> reference_, reference2_;
+};
+
 /// Errors of independent runs that take `error_seconds` together, each scaled to that time (the
 /// error of an unbiased estimate is inverse to its length); and that of the mean of their images,
 /// which has no such assumption.
@@ -71,15 +95,11 @@ void measure_error(const Report& report, const Options& options, const Yardstick
                    const Scene& scene, const Case& c, const Case::Aim& aim) {
     const std::string name = "error " + aim.integrator + " " + c.file.name;
     if (!report.wants(name)) return;
-    const auto ref1 = read_rgb(c.file.sibling("ref1.pfm").string()).pixels;
-    const auto ref2 = read_rgb(c.file.sibling("ref2.pfm").string()).pixels;
-    const auto errors = [&](const std::vector<Rgb>& image) {
-        return image_errors(image, ref1, {.reference2 = ref2, .ignore_above = 3});
-    };
+    const Comparison comparison(c);
     const IntegratorSpec integrator = integrator_for(scene, aim.integrator);
     const double length = options.quick ? options.seconds : c.error_seconds / options.repeats;
     uint64_t seed = 0;
-    std::vector<Rgb> sum(ref1.size());
+    std::vector<Rgb> sum(scene.film().pixel_count());
     double samples = 0, seconds = 0;
     struct Run {
         double rel_mse, trimmed, rel_mse_1_spp;
@@ -95,14 +115,14 @@ void measure_error(const Report& report, const Options& options, const Yardstick
                 samples += r.samples;
                 seconds += r.seconds;
             }
-            const ImageErrors e = errors(r.image);
+            const ImageErrors e = comparison.errors(r.image);
             const double scale = r.seconds / c.error_seconds;
             return Run{e.rel_mse * scale, e.rel_mse_trimmed * scale,
-                       e.rel_mse * r.samples / double(ref1.size())};
+                       e.rel_mse * r.samples / double(sum.size())};
         },
         [&] { return yardstick.rays_per_second(kPeerThreads, options.seconds); });
     for (Rgb& value : sum) value *= float(1 / samples);
-    const ImageErrors all = errors(sum);
+    const ImageErrors all = comparison.errors(sum);
     report.add(
         name,
         {{"rel_mse", "1", false, each(runs, [](const Run& r) { return r.rel_mse; })},
@@ -117,6 +137,34 @@ void measure_error(const Report& report, const Options& options, const Yardstick
          {"not_finite", all.not_finite}});
 }
 
+/// Errors of runs as long as it takes to do the work of `error_seconds` on the machine where other renderers were measured.
+void measure_learning_error(const Report& report, const Options& options,
+                            const Yardstick& yardstick, const Scene& scene, const Case& c,
+                            const Case::Aim& aim) {
+    const std::string name = "error " + aim.integrator + " " + c.file.name;
+    if (!report.wants(name)) return;
+    const Comparison comparison(c);
+    const IntegratorSpec integrator = integrator_for(scene, aim.integrator);
+    std::vector<double> rel_mse, trimmed, seconds, mean_ratio;
+    for (int run = 0; run < options.repeats; ++run) {
+        const double rays = yardstick.rays_per_second(kPeerThreads, options.seconds);
+        const double length = options.quick ? options.seconds : c.error_seconds * kPeerRays / rays;
+        const Rendering r = render(scene, integrator, kPeerThreads,
+                                   {.passes = {}, .seconds = length}, uint64_t(run));
+        const ImageErrors e = comparison.errors(r.image);
+        rel_mse.push_back(e.rel_mse);
+        trimmed.push_back(e.rel_mse_trimmed);
+        seconds.push_back(r.seconds);
+        mean_ratio.push_back(e.mean_ratio);
+    }
+    report.add(name,
+               {{"normalised_rel_mse", "1", false, rel_mse, aim.rel_mse},
+                {"normalised_rel_mse_trimmed", "1", false, trimmed},
+                {"seconds", "s", false, seconds},
+                {"mean_ratio", "1", false, mean_ratio}},
+               {{"seconds", c.error_seconds}});
+}
+
 }  // namespace
 }  // namespace etendue::bench
 
@@ -129,6 +177,10 @@ int main(int argc, char** argv) {
         const auto scene = load_or_skip(report, c.file);
         if (!scene) continue;
         for (const Case::Aim& aim : c.integrators) {
+            if (aim.learns) {
+                measure_learning_error(report, options, yardstick, *scene, c, aim);
+                continue;
+            }
             measure_samples(report, options, yardstick, *scene, c.file.name, aim);
             if (c.error_seconds > 0) measure_error(report, options, yardstick, *scene, c, aim);
         }

@@ -104,7 +104,7 @@ std::optional<Scene> load_or_skip(const Report& report, const SceneFile& file,
 }
 
 IntegratorSpec integrator_for(const Scene& scene, const std::string& name) {
-    IntegratorSpec spec{name, {}};
+    IntegratorSpec spec = IntegratorSpec::parse(name);
     for (const auto& [parameter, value] : scene.defaults().integrator_params)
         spec.params.emplace(parameter, value);
     return spec;

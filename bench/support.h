@@ -97,7 +97,7 @@ SceneFile own_scene(const std::string& name);
 std::optional<Scene> load_or_skip(const Report& report, const SceneFile& file,
                                   std::optional<std::pair<int, int>> resolution = {});
 
-/// The integrator with the scene file's own parameters, such as the longest path.
+/// The integrator NAME or NAME:PARAMETER=VALUE,…, with the scene file's own parameters, such as the longest path.
 IntegratorSpec integrator_for(const Scene& scene, const std::string& name);
 
 struct Rendering {
