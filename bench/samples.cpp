@@ -18,7 +18,7 @@ struct Case {
     struct Aim {
         std::string integrator;
         std::optional<double> samples_per_second, rel_mse;
-        /// Whether the error is not inverse to the time, since passes learn from earlier ones, or since chains start anew.
+        /// Whether the error is not inverse to the time, since passes learn from earlier ones, or chains have a start-up.
         bool learns = false;
     };
     std::vector<Aim> integrators = {{"path", {}, {}}, {"bdpt", {}, {}}, {"light", {}, {}}};

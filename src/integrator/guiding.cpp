@@ -251,15 +251,14 @@ Guiding::Guiding(const IntegratorParams& p) {
     has_roulette_ = p.flag("guide_roulette");
 }
 
-bool Guiding::gains_little(GuidedWalks walks, float share) const {
+bool Guiding::gains_little(GuidedWalks walks) const {
     // In nats; these tell the scenes of docs/guiding.md apart. Guided eye walks take paths away from techniques that need
     // no guide, so they must gain more than emission, without which most light paths may be lost. What light walks gain
     // says little about methods that have both walks.
     constexpr float kLeastEyeGain = 1.0f, kLeastLightGain = 0.4f;
-    const float least_eye = share * kLeastEyeGain, least_light = share * kLeastLightGain;
-    const bool eye = guide_->surfaces.gain(TransportMode::Radiance) >= least_eye,
-               light = guide_->surfaces.gain(TransportMode::Importance) >= least_light,
-               emission = guide_->emission_gain >= least_light;
+    const bool eye = guide_->surfaces.gain(TransportMode::Radiance) >= kLeastEyeGain,
+               light = guide_->surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
+               emission = guide_->emission_gain >= kLeastLightGain;
     switch (walks) {
     case GuidedWalks::Eye:
     case GuidedWalks::BothWithPairs: return !eye;
@@ -293,16 +292,14 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
                                                       std::move(pmf), at_infinity, kKappa, seed));
     } else if (pass.index == 0) {
         const uint64_t first = std::max(kFewestWalks, std::min(pass.pixels, kMostWalks) >> kRounds);
-        for (int round = 0; round < kRounds && !is_given_up_; ++round) {
-            const bool is_last = round == kRounds - 1;
-            guide_ = trained(pass, depth, walks, first << round,
-                             hash_combine(seed, uint64_t(round)), has_roulette_ && is_last);
-            // Gains increase with the number of walks. A guide that has a quarter of the bound after a fifth of all
-            // walks may still reach it.
-            is_given_up_ =
-                mode_ == Mode::Auto && round > 0 && gains_little(walks, is_last ? 1.0f : 0.25f);
+        for (int round = 0; round < kRounds; ++round)
+            guide_ =
+                trained(pass, depth, walks, first << round, hash_combine(seed, uint64_t(round)),
+                        has_roulette_ && round == kRounds - 1);
+        if (mode_ == Mode::Auto && gains_little(walks)) {
+            is_given_up_ = true;
+            guide_ = nullptr;
         }
-        if (is_given_up_) guide_ = nullptr;
     } else {
         constexpr uint64_t kFewest = 16 * kFewestWalks;
         guide_ = trained(pass, depth, walks, std::clamp(pass.pixels, kFewest, kMostWalks), seed,

@@ -26,9 +26,8 @@ public:
     void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks);
     /// What guides walks until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
-    /// Whether the guide gains so little that `auto` does without it: less than the bounds times `share`. There must be a
-    /// guide.
-    bool gains_little(GuidedWalks walks, float share = 1) const;
+    /// Whether the guide gains so little that `auto` does without it. There must be a guide.
+    bool gains_little(GuidedWalks walks) const;
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);
