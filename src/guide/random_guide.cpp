@@ -7,7 +7,9 @@ namespace etendue {
 
 Guide random_guide(Vec3 center, float radius, std::vector<double> emission,
                    const std::vector<uint32_t>& at_infinity, float kappa, uint64_t seed) {
-    constexpr float kShare = 0.5f;
+    // The squares of a walk's weights grow by 1/(1 − share) at each vertex where the guide has little of the density. Most
+    // walks would have infinite variance with a half.
+    constexpr float kShare = 0.25f;
     auto u = [seed, n = uint64_t(0)]() mutable {
         return to_unit_float(uint32_t(hash_combine(seed, n++)));
     };

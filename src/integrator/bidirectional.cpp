@@ -173,14 +173,15 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
     return contribution * Tr;
 }
 
-void Bidirectional::add(const SampleContext& c, const std::optional<Join>& j, Workspace& work,
-                        float factor, uint32_t draw) const {
-    if (!j || j->technique.vertices() - 1 < shortest_) return;
+std::optional<Rgb> Bidirectional::add(const SampleContext& c, const std::optional<Join>& j,
+                                      Workspace& work, float factor, uint32_t draw) const {
+    if (!j || j->technique.vertices() - 1 < shortest_) return {};
     const float splat_scale = c.is_of_whole_film ? 1.0f : c.splat_scale,
                 scale = j->technique.t <= 1 ? splat_scale : std::fabs(work.z.film_weight);
     const uint64_t number = join_number(j->technique.s, j->technique.t, draw);
-    if (const auto value = test(c, *j, scale * factor, number, work))
-        c.sink.add(*j, *value * factor);
+    const auto value = test(c, *j, scale * factor, number, work);
+    if (value) c.sink.add(*j, *value * factor);
+    return value;
 }
 
 }  // namespace etendue

@@ -5,6 +5,7 @@
 
 #include "integrator/guiding.h"
 #include "reuse/light_vertex_cache.h"
+#include "reuse/next_event_count.h"
 
 namespace etendue {
 
@@ -83,20 +84,42 @@ public:
 
     /// Adds all techniques of one sample of bidirectional path tracing.
     void add_sample(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
-    /// Traces the eye sub-path and adds C(0,t) and C(1,t). `join(t)` adds all other joins of z_{t-1}.
-    template <class JoinMore>
+    /// Traces the eye sub-path and adds C(0,t) and C(1,t). `join(t)` adds all other joins of z_{t-1}, and
+    /// `observe(t, draws)` is told about its next events.
+    template <class JoinMore, class Observe>
     void add_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                      const LearnedPlaces* learned, const JoinMore& join) const {
+                      const LearnedPlaces* learned, const JoinMore& join,
+                      const Observe& observe) const {
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
         trace_eye_path(c, counts, work, learned);
         const SubPath& z = work.z;
         for (int t = 2; t <= z.size(); ++t) {
             add_hits(c, counts, t, work);
             if (!is_joinable(z, t)) continue;
-            if (counts.next_event > 0)
-                add(c, join_next_event(c.scene, z, t, c.sampler, counts), work);
+            if (counts.next_event > 0) add_next_events(c, counts, t, work, observe);
             join(t);
         }
+    }
+    template <class JoinMore>
+    void add_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
+                      const LearnedPlaces* learned, const JoinMore& join) const {
+        add_eye_path(c, counts, work, learned, join, [](int, std::span<const NextEventDraw>) {});
+    }
+    /// Adds C(1,t).
+    template <class Observe>
+    void add_next_events(const SampleContext& c, const TechniqueCounts& counts, int t,
+                         Workspace& work, const Observe& observe) const {
+        std::array<NextEventDraw, kMostNextEvents> draws{};
+        const uint32_t n = work.z[t - 1].sees_lens ? uint32_t(counts.repeated_next_event) : 1;
+        for (uint32_t i = 0; i < n; ++i) {
+            const auto join = join_next_event(c.scene, work.z, t, c.sampler, counts, i);
+            const auto value = add(c, join, work, 1 / float(n), i);
+            if (!join) continue;
+            draws[i] = {.contribution = luminance(join->contribution), .weight = join->mis_weight};
+            if (value && draws[i].contribution > 0)
+                draws[i].seen = luminance(*value) / draws[i].contribution;
+        }
+        observe(t, std::span<const NextEventDraw>(draws.data(), n));
     }
     /// Adds C(s,t), s ≥ 2, with the light sub-path work.y.
     void add_connections(const SampleContext& c, const TechniqueCounts& counts, int t,
@@ -116,10 +139,10 @@ public:
             for_each_hit(c.scene, work.z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution * factor); });
     }
-    /// Adds the join, times `factor`, if it exists and passes test(). If z_{t-1} has several joins of the same
-    /// technique, `draw` (from 1 on) distinguishes them.
-    void add(const SampleContext& c, const std::optional<Join>& join, Workspace& work,
-             float factor = 1, uint32_t draw = 0) const;
+    /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several
+    /// joins of the same technique, `draw` distinguishes them.
+    std::optional<Rgb> add(const SampleContext& c, const std::optional<Join>& join, Workspace& work,
+                           float factor = 1, uint32_t draw = 0) const;
     /// The contribution of a join after Russian roulette and the shadow ray; empty if either of them ends it. A unit of
     /// contribution adds `scale` to its pixel. `number` distinguishes the joins of one sample.
     std::optional<Rgb> test(const SampleContext& c, const Join& join, float scale, uint64_t number,

@@ -55,6 +55,7 @@ public:
         learned_.roulette.learn(learned_.gathers);
         if (pass.index == 0) return;  // see start()
         learned_.radius.learn(pass.film, pass.so_far, learned_.gathers);
+        if (connects_) learned_.next_events.learn(learned_.radius.observed(), learned_.gathers);
         density_ = PairDensity(cells(), learned_.radius.of(false), kGatherConstants.correlation);
     }
     void save(LearnedState& to) const override {
@@ -101,16 +102,26 @@ public:
                                   paths_.threshold(c),
                                   work};
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
-        paths_.add_eye_path(c, n, work, &density_, [&](int t) {    // C(0,t), C(1,t)
+        const auto join = [&](int t) {
             if (connects_) paths_.add_connections(c, n, t, work);  // C(s,t)
             search.for_each_pair(
                 t, [&](const GatherPair& pair) { gather(c, n, search, pair, work); });  // U(s,t)
-        });
+        };
+        const auto observe_next_events = [&](int t, std::span<const NextEventDraw> draws) {
+            const float pixel = c.film.expected_luminance(c.pixel);
+            if (work.z[t - 1].sees_lens && pixel > 0)
+                NextEventCount::observe(draws, double(std::fabs(work.z.film_weight) / pixel),
+                                        GatherSums::of(work));
+        };
+        paths_.add_eye_path(c, n, work, &density_, join, observe_next_events);  // C(0,t), C(1,t)
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n;
-        if (connects_) n = Bidirectional::counts(scene, light_paths);
+        if (connects_) {
+            n = Bidirectional::counts(scene, light_paths);
+            n.repeated_next_event = float(learned_.next_events.value());
+        }
         n.gather = float(light_paths) * (connects_ ? learned_.weight_scale.value() : 1.0f);
         n.pairs = {.disc = kPi * sqr(learned_.radius.of(true)),
                    .inner_disc = kPi * sqr(learned_.radius.of(false)),
@@ -130,6 +141,7 @@ public:
             {"radius", learned_.radius.of(true)},
             {"inner_radius", learned_.radius.of(false)},
             {"weight_scale", connects_ ? learned_.weight_scale.value() : 1}};
+        if (connects_) figures.push_back({"next_events", learned_.next_events.value()});
         paths_.guiding().add_figures(figures);
         return figures;
     }
@@ -212,6 +224,7 @@ private:
         GatherRadius radius;
         GatherTotals gathers;
         GatherWeightScale weight_scale;
+        NextEventCount next_events;
         GatherRoulette roulette;
     } learned_;
     PairDensity density_;

@@ -1,5 +1,7 @@
 #include "pathspace/join.h"
 
+#include "math/rotated.h"
+
 namespace etendue {
 Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b) {
     // If the two differ although no surface lies between them (an inconsistent scene), the choice does not depend on
@@ -33,9 +35,9 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     const double p_L = double(emission_pmf(counts.guide, emitter)) *
                        origin_pdf(counts.guide, emitter, v.p, e.pdf_y0) / v.pdf_fwd;
     double others = 0;
-    if (last >= 2 && !z[last - 1].is_delta)
-        others += sqr(double(counts.reaching(z[last - 1].sees_lens))) *
-                  (sqr(counts.next_event * p_NE) + sqr(counts.connect_emission * p_L));
+    if (const Vertex& prev = z[last - 1]; last >= 2 && !prev.is_delta)
+        others += sqr(counts.next_events(prev.sees_lens) * p_NE) +
+                  sqr(counts.connect_emission * counts.reaching(prev.sees_lens) * p_L);
     if (counts.uses_light_paths()) {
         const double rev_prev =
             v.is_infinite
@@ -56,15 +58,15 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
 }
 
 std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,
-                                    const TechniqueCounts& counts) {
+                                    const TechniqueCounts& counts, uint32_t draw) {
     const int last = t - 1;
     const Vertex& v = z[last];
     if (!v.is_connectible || !scene.has_emitters()) return {};
     sampler.seek(Stream::Connection, uint32_t(last));
     const Emitter& emitter =
-        scene.sample_emitter(sampler.next_1d_fine_if(scene.has_emitter_choice()));
+        scene.sample_emitter(rotated(sampler.next_1d_fine_if(scene.has_emitter_choice()), draw));
     DirectSample d;
-    if (!emitter.sample_direct(v.p, sampler.next_2d_fine(), d)) return {};
+    if (!emitter.sample_direct(v.p, rotated(sampler.next_2d_fine(), draw), d)) return {};
     const BsdfEval f = v.eval(d.wi, TransportMode::Radiance);
     if (f.f.is_zero()) return {};
 
@@ -99,8 +101,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .emitter = &emitter,
                 .contribution = C,
-                .mis_weight =
-                    power_heuristic(counts.next_event * counts.reaching(v.sees_lens), others),
+                .mis_weight = power_heuristic(counts.next_events(v.sees_lens), others),
                 .film = z.film,
                 .a = v.p,
                 .ng_a = v.ng,
@@ -136,9 +137,10 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     if (fb.f.is_zero()) return {};
     const BsdfEval fa = a.eval(edge.w, TransportMode::Importance);
     if (fa.f.is_zero()) return {};
-    const double squares =
-        s == 1 ? emission_squares(double(next_event_ratio(a, edge.w, counts.guide)), counts)
-               : sqr(double(counts.connect));
+    const double squares = s == 1
+                               ? emission_squares(double(next_event_ratio(a, edge.w, counts.guide)),
+                                                  b.sees_lens, counts)
+                               : sqr(double(counts.connect * counts.reaching(b.sees_lens)));
     edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
     if (scene.has_media()) edge.contribution *= edge_attenuation(scene, a, b, edge.w);
 
@@ -146,7 +148,7 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     edge.rev_b = double(fa.pdf) * abs_dot(b.ng, edge.w) * inv_dist2;
     if (a.is_infinite) edge.rev_a = fb.pdf;
     edge.total =
-        squares * sqr(double(counts.reaching(b.sees_lens))) +
+        squares +
         outward_sum<Side::Light>(
             y, s - 1, false,
             {edge.rev_a, s >= 2 ? fa.pdf_rev * a.to_predecessor : 0.0f, gloss(b, false), s + t - 1},

@@ -37,9 +37,10 @@ float visibility(const Scene& scene, const Join& join, RenderStats& stats);
 /// C(0,t): z_{t-1} lies on `emitter`.
 std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
                              const TechniqueCounts& counts);
-/// C(1,t): a point on an emitter sampled for z_{t-1}.
+/// C(1,t): a point on an emitter sampled for z_{t-1}. The points with the numbers `draw` = 0, 1, 2 … are stratified, and
+/// each of them alone has the density of the technique.
 std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,
-                                    const TechniqueCounts& counts);
+                                    const TechniqueCounts& counts, uint32_t draw = 0);
 /// C(s,t), t ≥ 2; for s = 1, y_0 comes from emission sampling (Strategy::Connect, not NextEvent).
 std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
                                  int t, const TechniqueCounts& counts);

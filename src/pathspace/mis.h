@@ -27,9 +27,10 @@ inline uint8_t gloss(const Vertex& v, bool is_delta) {
     return is_delta ? kDeltaGloss : v.gloss;
 }
 
-/// Σ c² of the techniques C(1,t), relative to p_L(y_0).
-inline double emission_squares(double next_event_ratio, const TechniqueCounts& n) {
-    return sqr(n.next_event * next_event_ratio) + sqr(double(n.connect_emission));
+/// Σ c² of the techniques C(1,t), relative to p_L(y_0); `sees_lens`: of z_{t-1}.
+inline double emission_squares(double next_event_ratio, bool sees_lens, const TechniqueCounts& n) {
+    return sqr(n.next_events(sees_lens) * next_event_ratio) +
+           sqr(double(n.connect_emission * n.reaching(sees_lens)));
 }
 
 /// Σ c_i² of a sub-path over the techniques split between v[i-1] and v[i]: their samples, times the ratio of their own
@@ -43,7 +44,7 @@ inline double split_squares(const SubPath& v, int i, bool delta, uint8_t inward,
         // The eye sub-path ends at v[i].
         const double reaching = sqr(double(n.reaching(inward == kLensGloss)));
         if (i == 0) return v[0].emitter->is_delta() ? 0.0 : reaching * sqr(double(n.hit));
-        if (i == 1) return reaching * emission_squares(v[1].next_event_ratio, n);
+        if (i == 1) return emission_squares(v[1].next_event_ratio, inward == kLensGloss, n);
         return v[i - 1].is_delta ? 0.0 : reaching * sqr(double(n.connect));
     } else {
         if (i == 0) return sqr(double(n.hit_lens));

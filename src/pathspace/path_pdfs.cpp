@@ -32,6 +32,7 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     const int k = vertices() - 1, m = q.s - 1;
     const double n = counts.of(q);
     if (!(n > 0)) return 0;
+    if (q.strategy == Strategy::NextEvent) return counts.next_events(sees_lens[1]) * density(q);
     if (!is_pair(q.strategy))
         return n * density(q) * (q.t >= 2 ? counts.reaching(sees_lens[size_t(q.s)]) : 1);
     if (m < 1 || m >= k || k < counts.pairs.min_edges || is_delta[m]) return 0;

@@ -109,6 +109,9 @@ uint8_t pair_level_of_share(double share);
 struct TechniqueCounts {
     float hit = 0, next_event = 0, connect = 0, splat = 0, hit_lens = 0;
     float connect_emission = 0;  ///< C(1,t) with y_0 of light paths, Strategy::Connect.
+    /// Next events at an eye vertex that sees the lens (Vertex), for each of `next_event` at another vertex. The vertex
+    /// is not a random choice, so that they count as that many samples.
+    float repeated_next_event = 1;
     float merge = 0,
           gather = 0;  ///< For each inner vertex of the path; at least one of the two is 0.
     PairModel pairs{};
@@ -140,6 +143,10 @@ struct TechniqueCounts {
     }
     /// Number of eye sub-paths, of one sample, that reach a vertex.
     float reaching(bool sees_lens) const { return sees_lens ? 1 : continued; }
+    /// Number of next events of one sample that are made for a vertex.
+    float next_events(bool sees_lens) const {
+        return next_event * (sees_lens ? repeated_next_event : continued);
+    }
     float of(const Technique& q) const {
         switch (q.strategy) {
         case Strategy::Hit: return hit;

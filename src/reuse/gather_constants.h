@@ -22,6 +22,8 @@ struct GatherConstants {
     /// its share of walks and joins. The former is from passes on yard-ring, the latter was fitted to 35 renderings of seven
     /// scenes.
     double candidate_time = 0.15, trial_time = 3.6;
+    /// Time of one more next event at a vertex, in the same unit: 0.6 on yard-ring, 0.9 on living-room.
+    double next_event_time = 0.7;
     /// ρ of PairDensity. It is far below 1, because competing techniques also share most of the eye path. Of 0.05, 0.2,
     /// 0.5 and 1, the value 0.2 has the smallest errors on veach-ajar, staircase2, veach-bidir and living-room.
     double correlation = 0.2;

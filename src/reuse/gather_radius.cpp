@@ -82,11 +82,17 @@ double best_factor_of_pairs(double variance, double time,
 }
 
 void GatherRadius::learn(const Film& film, const RenderStats& so_far, const GatherTotals& totals) {
-    if (is_given_) return;
     const GatherConstants& k = kGatherConstants;
     const GatherTotals before = std::exchange(before_, totals);
     const double eye_paths_before = std::exchange(eye_paths_before_, double(so_far.eye_paths)),
                  eye_paths = eye_paths_before_ - eye_paths_before;
+    const double now = double(so_far.rays() - so_far.trial_rays - so_far.visible_pairs) +
+                       k.candidate_time * (totals.candidates + totals.inner_candidates) +
+                       k.trial_time * double(so_far.trials);
+    observed_ = {.variance = eye_paths * relative_variance(film),
+                 .time = now - std::exchange(time_before_, now)};
+    if (is_given_) return;
+
     const auto pairs = [&](bool sees_lens) {
         return (totals.expected_pairs[sees_lens] - before.expected_pairs[sees_lens] + 1) /
                eye_paths;
@@ -97,11 +103,6 @@ void GatherRadius::learn(const Film& film, const RenderStats& so_far, const Gath
         return;
     }
 
-    const double now = double(so_far.rays() - so_far.trial_rays - so_far.visible_pairs) +
-                       k.candidate_time * (totals.candidates + totals.inner_candidates) +
-                       k.trial_time * double(so_far.trials);
-    const double time = now - std::exchange(time_before_, now);
-    const double variance = eye_paths * relative_variance(film);
     std::array<double, kRadiusChanges> moments, times;
     for (size_t i = 0; i < kRadiusChanges; ++i) {
         moments[i] = totals.moments[i] - before.moments[i];
@@ -110,8 +111,9 @@ void GatherRadius::learn(const Film& film, const RenderStats& so_far, const Gath
     }
     double wanted = k.pairs;
     float largest = k.largest_first_radius;
-    if (moments[0] > 0 && variance > 0) {
-        const double change = best_factor_of_pairs(variance, time, moments, times);
+    if (moments[0] > 0 && observed_.variance > 0) {
+        const double change =
+            best_factor_of_pairs(observed_.variance, observed_.time, moments, times);
         wanted = std::clamp(pairs(true) * change, k.pairs / k.pairs_range, k.pairs * k.pairs_range);
         largest = k.largest_radius;
     }

@@ -9,6 +9,11 @@
 
 namespace etendue {
 
+/// Variance and time of all samples of some passes. Variance: relative to the pixels' squared luminance; time: in rays.
+struct Efficiency {
+    double variance = 0, time = 0;
+};
+
 /// A smaller radius makes gathers cheaper, a larger one makes them less noisy. Eye vertices that see the lens
 /// (Vertex::sees_lens) have one radius, and others have a smaller one. Pairs of the former share an eye path without any
 /// random choice, so that each of them helps; pairs of the latter share a random eye path.
@@ -35,6 +40,8 @@ public:
     void learn(const Film& film, const RenderStats& so_far, const GatherTotals& totals);
     /// The radius of eye vertices that see the lens, or of others.
     float of(bool sees_lens) const { return radii_[sees_lens]; }
+    /// Of the passes that learn() saw last.
+    const Efficiency& observed() const { return observed_; }
 
     /// m of a candidate, in [0, kRadiusChanges).
     static constexpr double factor_of_pairs(size_t candidate) {
@@ -72,6 +79,7 @@ private:
     /// Of all passes, when the radii were chosen.
     double eye_paths_before_ = 0, time_before_ = 0;
     GatherTotals before_;
+    Efficiency observed_;
 };
 
 /// The m for which the product of variance and time is least. `variance`, `time`: V and T, each for the same unit as the

@@ -14,6 +14,8 @@ namespace etendue {
 inline constexpr size_t kWeightScales = 6;
 /// Number of candidates for the change of a radius, see GatherRadius.
 inline constexpr size_t kRadiusChanges = 5;
+/// Number of candidates for NextEventCount, and the largest.
+inline constexpr size_t kNextEventCounts = 4, kMostNextEvents = 8;
 /// GatherRoulette does not distinguish sub-paths of more vertices than this.
 inline constexpr size_t kGatherLengths = 8;
 
@@ -27,6 +29,9 @@ struct GatherSums final : PassSums {
     uint64_t candidates = 0, inner_candidates = 0;  ///< Light vertices that searches looked at.
     /// Pairs that would have been found if roulette had ended no search, in units of 1/256; by Vertex::sees_lens.
     std::array<uint64_t, 2> expected_pairs{};
+    /// Of next events at eye vertices that see the lens: GatherMoment::fixed() by candidates of NextEventCount.
+    std::array<uint64_t, kNextEventCounts> next_event_moments{};
+    uint64_t next_events = 0;
     struct Joins {
         uint64_t count = 0, squares = 0;
     };
@@ -43,6 +48,9 @@ struct GatherSums final : PassSums {
         candidates += o.candidates;
         inner_candidates += o.inner_candidates;
         for (size_t i = 0; i < 2; ++i) expected_pairs[i] += o.expected_pairs[i];
+        for (size_t i = 0; i < kNextEventCounts; ++i)
+            next_event_moments[i] += o.next_event_moments[i];
+        next_events += o.next_events;
         for (size_t i = 0; i < joins.size(); ++i) {
             joins[i].count += o.joins[i].count;
             joins[i].squares += o.joins[i].squares;
@@ -56,6 +64,8 @@ struct GatherTotals {
     std::array<double, kRadiusChanges> moments{}, trials{};
     double candidates = 0, inner_candidates = 0;
     std::array<double, 2> expected_pairs{};
+    std::array<double, kNextEventCounts> next_event_moments{};
+    double next_events = 0;
     struct Joins {
         double count = 0, squares = 0;
     };
@@ -74,6 +84,9 @@ struct GatherTotals {
         candidates += double(pass.candidates);
         inner_candidates += double(pass.inner_candidates);
         for (size_t i = 0; i < 2; ++i) expected_pairs[i] += double(pass.expected_pairs[i]) / 256;
+        for (size_t i = 0; i < kNextEventCounts; ++i)
+            next_event_moments[i] += double(pass.next_event_moments[i]) / GatherMoment::kUnit;
+        next_events += double(pass.next_events);
         for (size_t i = 0; i < joins.size(); ++i) {
             joins[i].count += double(pass.joins[i].count);
             joins[i].squares += double(pass.joins[i].squares);

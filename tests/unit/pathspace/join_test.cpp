@@ -88,6 +88,7 @@ protected:
         if (extra() == Extra::Stored) {
             counts.connect = 5;
             counts.connect_emission = 3;
+            counts.repeated_next_event = 4;
         } else if (extra() != Extra::None) {
             const bool merges = extra() == Extra::Merges || extra() == Extra::GuidedMerges;
             (merges ? counts.merge : counts.gather) = N;
@@ -96,6 +97,7 @@ protected:
             counts.pairs.inner_disc = 0.1f;
             counts.pairs.min_edges = merges ? 2 : 3;
             if (merges) counts.continued = 0.5f;
+            counts.repeated_next_event = merges ? 3 : 2;
             if (extra() == Extra::GuidedMerges) counts.pairs.first_merge = 2;
             if (extra() == Extra::Variants) {
                 counts.pairs.rule = PairRule::Both;

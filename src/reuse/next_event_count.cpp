@@ -1,0 +1,82 @@
+#include "reuse/next_event_count.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "reuse/gather_constants.h"
+
+namespace etendue {
+namespace {
+
+constexpr std::array<uint32_t, kNextEventCounts> kCandidates{1, 2, 4, 8};
+static_assert(kCandidates.back() == kMostNextEvents);
+
+/// With more next events, their weight grows.
+double weight_of(const NextEventDraw& d, double factor) {
+    const double odds = double(d.weight) / (1 - double(d.weight));
+    return std::isfinite(odds) ? 1 - 1 / (1 + odds * sqr(factor)) : 1;
+}
+
+/// The part of the variance that belongs to the paths of these next events, with `count` of them instead.
+double moment(std::span<const NextEventDraw> draws, double scale, uint32_t count) {
+    const double n = double(draws.size()), factor = count / n;
+    double sum = 0, squares = 0, others = 0;
+    for (const NextEventDraw& d : draws) {
+        const double w = weight_of(d, factor), value = double(d.contribution) * scale,
+                     x = w * value * double(d.seen);
+        sum += x;
+        squares += sqr(x);
+        // f/(n_S p_S) = f/(n p) √odds
+        if (d.weight < 1)
+            others += sqr((1 - w) * value / n) * double(d.seen) *
+                      std::sqrt(double(d.weight) / (1 - double(d.weight)));
+    }
+    return std::max(0.0, (squares - sqr(sum) / n) / (n - 1)) / std::pow(count, 1.5) + others;
+}
+
+}  // namespace
+
+void NextEventCount::learn(const Efficiency& observed, const GatherTotals& totals) {
+    const GatherTotals before = std::exchange(before_, totals);
+    const double draws = totals.next_events - before.next_events;
+    // One next event tells nothing about the variance of two. If one was best, it remains so.
+    if (value_ == 1 || !(draws > 0 && observed.variance > 0)) return;
+    std::array<double, kNextEventCounts> moments;
+    for (size_t i = 0; i < kNextEventCounts; ++i)
+        moments[i] = totals.next_event_moments[i] - before.next_event_moments[i];
+    const double time_of_one = kGatherConstants.next_event_time * draws / value_;
+    value_ = best_next_event_count(observed, value_, moments, time_of_one);
+}
+
+uint32_t best_next_event_count(const Efficiency& observed, uint32_t present,
+                               const std::array<double, kNextEventCounts>& moments,
+                               double time_of_one) {
+    // Both are estimates; something always remains.
+    constexpr double kLeast = 0.05;
+    const auto index =
+        size_t(std::find(kCandidates.begin(), kCandidates.end(), present) - kCandidates.begin());
+    const double other_variance =
+                     std::max(observed.variance - moments[index], kLeast * observed.variance),
+                 other_time =
+                     std::max(observed.time - time_of_one * present, kLeast * observed.time);
+    const auto product = [&](size_t i) {
+        return (other_variance + moments[i]) * (other_time + time_of_one * kCandidates[i]);
+    };
+    size_t best = index;
+    for (size_t i = 0; i < kNextEventCounts; ++i)
+        if (product(i) < product(best)) best = i;
+    return kCandidates[best];
+}
+
+void NextEventCount::observe(std::span<const NextEventDraw> draws, double scale, GatherSums& sums) {
+    // Next events that add ten times the pixel's luminance. V leaves rare ones out, too.
+    constexpr double kMost = 100;
+    sums.next_events += draws.size();
+    if (draws.size() < 2) return;
+    for (size_t i = 0; i < kNextEventCounts; ++i)
+        sums.next_event_moments[i] +=
+            GatherMoment::fixed(std::min(moment(draws, scale, kCandidates[i]), kMost));
+}
+
+}  // namespace etendue
