@@ -10,7 +10,7 @@
 namespace etendue {
 
 /// Variance and time of all samples of some passes. Variance: relative to the pixels' squared luminance; time: in rays.
-struct Efficiency {
+struct VarianceAndTime {
     double variance = 0, time = 0;
 };
 
@@ -41,7 +41,7 @@ public:
     /// The radius of eye vertices that see the lens, or of others.
     float of(bool sees_lens) const { return radii_[sees_lens]; }
     /// Of the passes that learn() saw last.
-    const Efficiency& observed() const { return observed_; }
+    const VarianceAndTime& observed() const { return observed_; }
 
     /// m of a candidate, in [0, kRadiusChanges).
     static constexpr double factor_of_pairs(size_t candidate) {
@@ -79,7 +79,7 @@ private:
     /// Of all passes, when the radii were chosen.
     double eye_paths_before_ = 0, time_before_ = 0;
     GatherTotals before_;
-    Efficiency observed_;
+    VarianceAndTime observed_;
 };
 
 /// The m for which the product of variance and time is least. `variance`, `time`: V and T, each for the same unit as the

@@ -37,7 +37,7 @@ double moment(std::span<const NextEventDraw> draws, double scale, uint32_t count
 
 }  // namespace
 
-void NextEventCount::learn(const Efficiency& observed, const GatherTotals& totals) {
+void NextEventCount::learn(const VarianceAndTime& observed, const GatherTotals& totals) {
     const GatherTotals before = std::exchange(before_, totals);
     const double draws = totals.next_events - before.next_events;
     // One next event tells nothing about the variance of two. If one was best, it remains so.
@@ -49,7 +49,7 @@ void NextEventCount::learn(const Efficiency& observed, const GatherTotals& total
     value_ = best_next_event_count(observed, value_, moments, time_of_one);
 }
 
-uint32_t best_next_event_count(const Efficiency& observed, uint32_t present,
+uint32_t best_next_event_count(const VarianceAndTime& observed, uint32_t present,
                                const std::array<double, kNextEventCounts>& moments,
                                double time_of_one) {
     // Both are estimates; something always remains.
@@ -63,9 +63,10 @@ uint32_t best_next_event_count(const Efficiency& observed, uint32_t present,
     const auto product = [&](size_t i) {
         return (other_variance + moments[i]) * (other_time + time_of_one * kCandidates[i]);
     };
+    // The estimates of the first passes are too noisy for more than one step.
     size_t best = index;
-    for (size_t i = 0; i < kNextEventCounts; ++i)
-        if (product(i) < product(best)) best = i;
+    for (const size_t i : {index - 1, index + 1})
+        if (i < kNextEventCounts && product(i) < product(best)) best = i;
     return kCandidates[best];
 }
 

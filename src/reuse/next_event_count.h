@@ -30,7 +30,7 @@ struct NextEventDraw {
 class NextEventCount {
 public:
     /// Chooses N for the next passes. `observed`: of the passes since the last call.
-    void learn(const Efficiency& observed, const GatherTotals& totals);
+    void learn(const VarianceAndTime& observed, const GatherTotals& totals);
     /// N.
     uint32_t value() const { return value_; }
 
@@ -43,9 +43,9 @@ private:
     GatherTotals before_;
 };
 
-/// The candidate for N with the least product. `moments`: sums of M of the candidates; `present`: N of the observed
+/// The candidate for N with the least product, among `present`, the next smaller and the next larger one. `moments`: sums of M of the candidates; `present`: N of the observed
 /// passes; `time_of_one`: time of their next events, divided by N.
-uint32_t best_next_event_count(const Efficiency& observed, uint32_t present,
+uint32_t best_next_event_count(const VarianceAndTime& observed, uint32_t present,
                                const std::array<double, kNextEventCounts>& moments,
                                double time_of_one);
 

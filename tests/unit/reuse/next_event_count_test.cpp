@@ -68,9 +68,9 @@ TEST(NextEventCount, HasTheLeastProductOfVarianceAndTime) {
             for (const uint32_t present : {2u, 4u, 8u}) {
                 Moments moments;
                 for (size_t i = 0; i < kNextEventCounts; ++i) moments[i] = b / double(1u << i);
-                const Efficiency observed{1 - b + b / present, 1 - time + time * present};
+                const VarianceAndTime observed{1 - b + b / present, 1 - time + time * present};
                 const uint32_t chosen = best_next_event_count(observed, present, moments, time);
-                for (const uint32_t other : {1u, 2u, 4u, 8u})
+                for (const uint32_t other : {present / 2, present, std::min(2 * present, 8u)})
                     EXPECT_LE(product(chosen), product(other) * (1 + 1e-9))
                         << "b " << b << ", time " << time << ", present " << present;
             }
