@@ -9,6 +9,11 @@
 
 namespace etendue {
 
+/// The weight of a technique with `factor` times its samples, from its `odds` w / (1 - w) with one times.
+inline double weight_of_odds(double odds, double factor) {
+    return 1 / (1 + 1 / (odds * sqr(factor)));
+}
+
 /// Part of the second moment of a pixel's estimate, relative to its squared luminance, that belongs to the paths near the
 /// one of a visible pair,
 ///     ∫ w² f² / (n p p_c) + (1 - w)² f² / (n_S p_S),
@@ -38,7 +43,7 @@ struct GatherMoment {
     /// factor by which Russian roulette enlarges the part of the gathers.
     double with(double count, double weight_scale, double roulette = 1) const {
         if (is_alone()) return scale * roulette * r / count;
-        const double w = 1 / (1 + 1 / (odds * sqr(count * weight_scale)));
+        const double w = weight_of_odds(odds, count * weight_scale);
         return scale * (sqr(w) * roulette * r / count + sqr(1 - w) / others);
     }
 

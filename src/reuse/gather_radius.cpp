@@ -58,21 +58,20 @@ double best_factor_of_pairs(double variance, double time,
                             const std::array<double, kRadiusChanges>& moments,
                             const std::array<double, kRadiusChanges>& times) {
     constexpr size_t kPresent = kRadiusChanges / 2;
-    // Both are estimates; something always remains.
-    constexpr double kLeast = 0.05;
-    const double other_variance = std::max(variance - moments[kPresent], kLeast * variance),
-                 other_time = std::max(time - times[kPresent], kLeast * time);
+    const VarianceAndTime others =
+        VarianceAndTime{variance, time}.without(moments[kPresent], times[kPresent]);
     // Between the candidates, moments and times are powers of m.
     constexpr size_t kSteps = 4;
-    double best = 1, least = (other_variance + moments[kPresent]) * (other_time + times[kPresent]);
+    double best = 1,
+           least = (others.variance + moments[kPresent]) * (others.time + times[kPresent]);
     for (size_t i = 0; i <= (kRadiusChanges - 1) * kSteps; ++i) {
         const size_t k = std::min(i / kSteps, kRadiusChanges - 2);
         const double u = double(i - k * kSteps) / kSteps;
         const auto between = [&](double a, double b) {
             return a > 0 && b > 0 ? std::pow(a, 1 - u) * std::pow(b, u) : (1 - u) * a + u * b;
         };
-        const double product = (other_variance + between(moments[k], moments[k + 1])) *
-                               (other_time + between(times[k], times[k + 1]));
+        const double product = (others.variance + between(moments[k], moments[k + 1])) *
+                               (others.time + between(times[k], times[k + 1]));
         if (product < least) {
             least = product;
             best = between(GatherRadius::factor_of_pairs(k), GatherRadius::factor_of_pairs(k + 1));

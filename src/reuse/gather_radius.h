@@ -1,6 +1,8 @@
 #pragma once
 // The largest distance between the vertices of a pair, learned from earlier passes.
 
+#include <algorithm>
+
 #include "film/film.h"
 #include "pathspace/render_stats.h"
 #include "reuse/gather_constants.h"
@@ -12,6 +14,13 @@ namespace etendue {
 /// Variance and time of all samples of some passes. Variance: relative to the pixels' squared luminance; time: in rays.
 struct VarianceAndTime {
     double variance = 0, time = 0;
+
+    /// What remains without a part of both. All are estimates, and something always remains.
+    VarianceAndTime without(double part_of_variance, double part_of_time) const {
+        constexpr double kLeast = 0.05;
+        return {std::max(variance - part_of_variance, kLeast * variance),
+                std::max(time - part_of_time, kLeast * time)};
+    }
 };
 
 /// A smaller radius makes gathers cheaper, a larger one makes them less noisy. Eye vertices that see the lens

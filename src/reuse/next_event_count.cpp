@@ -12,25 +12,18 @@ namespace {
 constexpr std::array<uint32_t, kNextEventCounts> kCandidates{1, 2, 4, 8};
 static_assert(kCandidates.back() == kMostNextEvents);
 
-/// With more next events, their weight grows.
-double weight_of(const NextEventDraw& d, double factor) {
-    const double odds = double(d.weight) / (1 - double(d.weight));
-    return std::isfinite(odds) ? 1 - 1 / (1 + odds * sqr(factor)) : 1;
-}
-
 /// The part of the variance that belongs to the paths of these next events, with `count` of them instead.
 double moment(std::span<const NextEventDraw> draws, double scale, uint32_t count) {
     const double n = double(draws.size()), factor = count / n;
     double sum = 0, squares = 0, others = 0;
     for (const NextEventDraw& d : draws) {
-        const double w = weight_of(d, factor), value = double(d.contribution) * scale,
+        const double odds = double(d.weight) / (1 - double(d.weight)),
+                     w = weight_of_odds(odds, factor), value = double(d.contribution) * scale,
                      x = w * value * double(d.seen);
         sum += x;
         squares += sqr(x);
         // f/(n_S p_S) = f/(n p) √odds
-        if (d.weight < 1)
-            others += sqr((1 - w) * value / n) * double(d.seen) *
-                      std::sqrt(double(d.weight) / (1 - double(d.weight)));
+        if (w < 1) others += sqr((1 - w) * value / n) * double(d.seen) * std::sqrt(odds);
     }
     return std::max(0.0, (squares - sqr(sum) / n) / (n - 1)) / std::pow(count, 1.5) + others;
 }
@@ -52,16 +45,11 @@ void NextEventCount::learn(const VarianceAndTime& observed, const GatherTotals& 
 uint32_t best_next_event_count(const VarianceAndTime& observed, uint32_t present,
                                const std::array<double, kNextEventCounts>& moments,
                                double time_of_one) {
-    // Both are estimates; something always remains.
-    constexpr double kLeast = 0.05;
     const auto index =
         size_t(std::find(kCandidates.begin(), kCandidates.end(), present) - kCandidates.begin());
-    const double other_variance =
-                     std::max(observed.variance - moments[index], kLeast * observed.variance),
-                 other_time =
-                     std::max(observed.time - time_of_one * present, kLeast * observed.time);
+    const VarianceAndTime others = observed.without(moments[index], time_of_one * present);
     const auto product = [&](size_t i) {
-        return (other_variance + moments[i]) * (other_time + time_of_one * kCandidates[i]);
+        return (others.variance + moments[i]) * (others.time + time_of_one * kCandidates[i]);
     };
     // The estimates of the first passes are too noisy for more than one step.
     size_t best = index;
