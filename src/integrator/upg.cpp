@@ -120,6 +120,7 @@ public:
         TechniqueCounts n;
         if (connects_) {
             n = Bidirectional::counts(scene, light_paths);
+            n.connect = kGatherConstants.connections;
             n.repeated_next_event = float(learned_.next_events.value());
         }
         n.gather = float(light_paths) * (connects_ ? learned_.weight_scale.value() : 1.0f);
