@@ -43,8 +43,8 @@ private:
     GatherTotals before_;
 };
 
-/// The candidate for N with the least product, among `present`, the next smaller and the next larger one. `moments`: sums of M of the candidates; `present`: N of the observed
-/// passes; `time_of_one`: time of their next events, divided by N.
+/// The candidate for N with the least product, among `present`, the next smaller and the next larger one. `moments`: sums
+/// of M of the candidates; `present`: N of the observed passes; `time_of_one`: time of their next events, divided by N.
 uint32_t best_next_event_count(const VarianceAndTime& observed, uint32_t present,
                                const std::array<double, kNextEventCounts>& moments,
                                double time_of_one);
