@@ -96,7 +96,10 @@ protected:
             counts.pairs.disc = 0.3f;
             counts.pairs.inner_disc = 0.1f;
             counts.pairs.min_edges = merges ? 2 : 3;
-            if (merges) counts.continued = 0.5f;
+            if (merges)
+                counts.continued = 0.5f;
+            else
+                counts.connect = 0.25f;
             counts.repeated_next_event = merges ? 3 : 2;
             if (extra() == Extra::GuidedMerges) counts.pairs.first_merge = 2;
             if (extra() == Extra::Variants) {
