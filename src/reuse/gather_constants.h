@@ -25,9 +25,9 @@ struct GatherConstants {
     /// Time of one more next event at a vertex, in the same unit: 0.6 on yard-ring, 0.9 on living-room.
     double next_event_time = 0.7;
     /// Count of connections in the weights of methods that gather. A pixel has one connection for each pair of lengths,
-    /// with the light path of its own, and pairs come from many. Of 1, 0.5, 0.25 and 0.1 with the same samples, smaller
-    /// values have less variance on yard-ring, staircase2, veach-ajar and two-rooms (up to 13 %), and slightly more on
-    /// veach-bidir and lantern (up to 7 %).
+    /// with its own light path, whereas pairs come from many light paths. Of 1, 0.5, 0.25 and 0.1 with the same samples,
+    /// smaller values have less variance on yard-ring, staircase2, veach-ajar and two-rooms (up to 13 %), and slightly
+    /// more on veach-bidir and lantern (up to 7 %).
     float connections = 0.25f;
     /// ρ of PairDensity. It is far below 1, because competing techniques also share most of the eye path. Of 0.05, 0.2,
     /// 0.5 and 1, the value 0.2 has the smallest errors on veach-ajar, staircase2, veach-bidir and living-room.
