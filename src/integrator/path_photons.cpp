@@ -214,8 +214,9 @@ public:
         : measure_(measure), rule_(mapping, measure_) {
         // Mutations of the eye's side have small weights, because they store few new photons.
         mutations_.weights[PathMutations::Bidirectional] = 3;
-        for (const auto kind : {PathMutations::Lens, PathMutations::Caustic,
-                                PathMutations::MultiChain, PathMutations::LensSubpath})
+        for (const auto kind :
+             {PathMutations::Lens, PathMutations::Caustic, PathMutations::MultiChain,
+              PathMutations::GlossyLens, PathMutations::GlossyCaustic, PathMutations::LensSubpath})
             mutations_.weights[kind] = 1;
         mutations_.weights[PathMutations::PhotonMap] = 2;
         if (user_paths) {

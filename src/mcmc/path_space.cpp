@@ -15,9 +15,14 @@ PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, Techniqu
     using EyeChain = EyeChainMutation;
     mutations_[PathMutations::Bidirectional] = std::make_unique<BidirectionalMutation>(measure);
     mutations_[PathMutations::Lens] = std::make_unique<EyeChain>(EyeChain::Kind::Lens, measure);
-    mutations_[PathMutations::Caustic] = std::make_unique<CausticMutation>(measure);
+    mutations_[PathMutations::Caustic] =
+        std::make_unique<CausticMutation>(Followed::Delta, measure);
     mutations_[PathMutations::MultiChain] =
         std::make_unique<EyeChain>(EyeChain::Kind::MultiChain, measure);
+    mutations_[PathMutations::GlossyLens] =
+        std::make_unique<EyeChain>(EyeChain::Kind::Glossy, measure);
+    mutations_[PathMutations::GlossyCaustic] =
+        std::make_unique<CausticMutation>(Followed::Glossy, measure);
     mutations_[PathMutations::LensSubpath] = std::make_unique<LensSubpathMutation>();
     mutations_[PathMutations::PhotonMap] = std::make_unique<PhotonMapMutation>();
     if (target_.user.paths)

@@ -5,13 +5,23 @@
 
 namespace etendue {
 
-CausticMutation::CausticMutation(const PathMeasure& measure)
-    : measure_(measure), film_(film_range(measure)) {}
+CausticMutation::CausticMutation(Followed events, const PathMeasure& measure)
+    : events_(events), measure_(measure), film_(film_range(measure)) {}
 
-int CausticMutation::first(const PathState& x) {
+int CausticMutation::first(const PathState& x) const {
     int i = x.last() - 2;
-    while (i > 0 && x[i].v.is_delta) --i;
+    while (i > 0 && is_followed(x, i, events_)) --i;
     return i;
+}
+
+bool CausticMutation::suits(const PathState& x) const {
+    const int k = x.last();
+    if (x[k - 1].v.is_delta) return false;
+    if (events_ == Followed::Delta) return true;
+    const int l = first(x);
+    for (int i = l + 1; i < k - 1; ++i)
+        if (!x[i].v.is_delta) return true;
+    return false;
 }
 
 LogRange CausticMutation::range(const PathState& x, int first) const {
@@ -65,7 +75,7 @@ bool CausticMutation::propose(const PathState& x, const MutationContext& c, Path
         if (!builder.start_light(emitter, e)) return false;
     }
     for (int i = l + 1; i < k - 1; ++i) {
-        const auto s = follow(builder.light_end(), x[i].v, TransportMode::Importance);
+        const auto s = follow(builder.light_end(), x, i, TransportMode::Importance);
         if (!s || !builder.step_light(*s)) return false;
     }
     return builder.finish(y);
@@ -74,8 +84,12 @@ bool CausticMutation::propose(const PathState& x, const MutationContext& c, Path
 double CausticMutation::Q(const PathState& x, const PathState& y, const MutationWay& way) const {
     // The logarithm of the angle is uniform over ranges of equal length in both directions, but the ranges differ.
     if (!range(x, way.l).contains(way.angle)) return 0;
+    if (first(y) != way.l) return 0;
+    for (int i = way.l + 1; i < y.last() - 1; ++i)
+        if (!is_same_event(x, y, i, events_)) return 0;
     double p = y.geometry_from_light(way.l + 1);
-    for (int i = way.l + 2; i < y.last(); ++i) p *= y[i].light / double(y[i - 1].light_pmf);
+    for (int i = way.l + 1; i < y.last() - 1; ++i)
+        p *= followed_density(y, i, TransportMode::Importance);
     return p;
 }
 

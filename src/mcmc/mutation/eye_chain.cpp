@@ -1,5 +1,6 @@
 #include "mcmc/mutation/eye_chain.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace etendue {
@@ -12,13 +13,22 @@ constexpr LogRange kTurns{1e-4f * kDegree, 0.1f * kDegree};
 }  // namespace
 
 EyeChainMutation::EyeChainMutation(Kind kind, const PathMeasure& measure)
-    : is_multi_(kind == Kind::MultiChain), range_(film_range(measure)) {}
+    : kind_(kind), events_(kind == Kind::Glossy ? Followed::Glossy : Followed::Delta),
+      range_(film_range(measure)) {}
 
-EyeChainMutation::Chains EyeChainMutation::chains(const PathState& x) {
-    Chains c{x.last() - 1, 0};
+EyeChainMutation::Chains EyeChainMutation::chains(const PathState& x) const {
+    Chains c{x.last() - 1, 0, false};
     while (true) {
-        while (c.end > 0 && x[c.end].v.is_delta) --c.end;
-        if (c.end == 0 || !x[c.end - 1].v.is_delta) return c;
+        for (; c.end > 0 && is_followed(x, c.end, events_); --c.end) {
+            // A glossy reflection of the emitter is connected to it, since few such rays would hit it.
+            if (c.end == 1 && !x[c.end].v.is_delta) return c;
+            c.is_glossy |= !x[c.end].v.is_delta;
+        }
+        if (c.end == 0) return c;
+        // Beyond the first glossy reflection, others need not be followed.
+        const bool goes_on = x[c.end - 1].v.is_delta ||
+                             (!c.is_glossy && c.end > 1 && is_followed(x, c.end - 1, events_));
+        if (!goes_on) return c;
         ++c.turns;
         --c.end;
     }
@@ -26,8 +36,8 @@ EyeChainMutation::Chains EyeChainMutation::chains(const PathState& x) {
 
 bool EyeChainMutation::suits(const PathState& x) const {
     const Chains c = chains(x);
-    const bool can_hit_end = c.end > 0 || !x.emitter().is_delta();
-    return can_hit_end && (c.turns > 0) == is_multi_;
+    if (c.end == 0 && x.emitter().is_delta()) return false;
+    return kind_ == Kind::Glossy ? c.is_glossy : (c.turns > 0) == (kind_ == Kind::MultiChain);
 }
 
 bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, PathState& y,
@@ -44,8 +54,8 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
         const Vertex& like = x[i].v;
         const Vertex& at = builder.eye_end();
         std::optional<BsdfSample> s;
-        if (like.is_delta) {
-            s = follow(at, like, TransportMode::Radiance);
+        if (is_followed(x, i, events_)) {
+            s = follow(at, x, i, TransportMode::Radiance);
         } else if (at.is_connectible) {
             c.sampler.seek(Stream::Selection, 2 + uint64_t(i));
             const float angle = kTurns.sample(c.sampler.next_1d());
@@ -59,13 +69,18 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
     return builder.finish(y);
 }
 
-double EyeChainMutation::Q(const PathState&, const PathState& y, const MutationWay& way) const {
+double EyeChainMutation::Q(const PathState& x, const PathState& y, const MutationWay& way) const {
     if (way.l < 0 && y.emitter().is_delta()) return 0;  // The chain cannot hit it.
-    // Film points and turned directions have the same density in both directions.
     const int k = y.last();
+    // On the way back, the same events must be followed.
+    if (chains(y).end != way.l + 1) return 0;
+    for (int i = k - 1; i > std::max(way.l, 0); --i)
+        if (!is_same_event(x, y, i, events_)) return 0;
+    // Film points, turned directions and half vectors have the same density in both directions.
     double p = y[k - 1].eye;
-    for (int i = k - 2; i > way.l; --i)
-        p *= y[i + 1].v.is_delta ? y[i].eye / double(y[i + 1].eye_pmf) : y.geometry_from_eye(i);
+    for (int i = k - 1; i > way.l + 1; --i)
+        p *= is_followed(y, i, events_) ? followed_density(y, i, TransportMode::Radiance)
+                                        : y.geometry_from_eye(i - 1);
     return p;
 }
 

@@ -10,8 +10,9 @@ namespace etendue {
 class EyeChainMutation final : public PathMutation {
 public:
     enum class Kind {
-        Lens,       ///< At most one chain of delta events.
-        MultiChain  ///< More than one.
+        Lens,        ///< At most one chain of delta events.
+        MultiChain,  ///< More than one.
+        Glossy       ///< With glossy reflections, which are followed as delta events are.
     };
     EyeChainMutation(Kind kind, const PathMeasure& measure);
 
@@ -22,12 +23,14 @@ public:
 
 private:
     struct Chains {
-        int end;    ///< x_end … x_{k-1} are replaced.
-        int turns;  ///< Vertices among them whose direction is turned.
+        int end;         ///< x_end … x_{k-1} are replaced.
+        int turns;       ///< Vertices among them whose direction is turned.
+        bool is_glossy;  ///< Whether glossy reflections are among them.
     };
-    static Chains chains(const PathState& x);
+    Chains chains(const PathState& x) const;
 
-    bool is_multi_;
+    Kind kind_;
+    Followed events_;
     LogRange range_;
 };
 

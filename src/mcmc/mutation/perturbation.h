@@ -19,7 +19,20 @@ LogRange film_range(const PathMeasure& measure);
 /// `axis` turned by `angle` (radians) toward the azimuth 2π u.
 Vec3 turned(Vec3 axis, float angle, float u);
 
-/// The delta event at `at` that has the same kind as the one at `like`; empty if there is none.
-std::optional<BsdfSample> follow(const Vertex& at, const Vertex& like, TransportMode mode);
+/// Events that a perturbation repeats at the new place of a vertex.
+enum class Followed {
+    Delta,
+    Glossy  ///< Delta events and glossy reflections: these keep their half vector [Kaplanyan et al. 2014].
+};
+
+/// Whether the event at x_i is one of these.
+bool is_followed(const PathState& x, int i, Followed events);
+/// Whether the same event, or none, is followed at x_i and y_i.
+bool is_same_event(const PathState& x, const PathState& y, int i, Followed events);
+/// Repeats the followed event of x_i at `at`; empty if there is none.
+std::optional<BsdfSample> follow(const Vertex& at, const PathState& x, int i, TransportMode mode);
+/// Density of x_{i-1} (Radiance) or x_{i+1} (Importance) after the followed event at x_i, if half vectors have density 1 per
+/// steradian.
+double followed_density(const PathState& x, int i, TransportMode mode);
 
 }  // namespace etendue

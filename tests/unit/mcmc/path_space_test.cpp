@@ -26,6 +26,12 @@ std::vector<Case> cases() {
     const std::string sky = room() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
                             sphere("0.1,0.2,-0.1", "0.3", kGlass) + kConstant;
     const std::string lens_scene = mixed_room(lens_camera(kPixels));
+    // Two balls and a floor of rough metal: paths over several glossy reflections.
+    const std::string kFloor =
+        rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-0.95\"/>", kRoughMetal);
+    const std::string glossy = front_camera(kPixels) + room() + area_lamp() + kFloor +
+                               sphere("-0.4,-0.4,0.1", "0.45", kRoughMetal) +
+                               sphere("0.5,-0.5,0.2", "0.4", kRoughMetal);
     return {
         {"mixed", mixed_room(front_camera(kPixels))},
         {"thinlens", lens_scene},
@@ -36,7 +42,8 @@ std::vector<Case> cases() {
                         "value=\"0,0.7,0.5\"/></emitter>"},
         {"sun", front_camera(kPixels) + room() + sphere("0.1,0.2,-0.1", "0.4", kGlass) +
                     "<emitter type=\"directional\"><vector name=\"direction\" "
-                    "value=\"0.2,-0.4,-1\"/></emitter>"}};
+                    "value=\"0.2,-0.4,-1\"/></emitter>"},
+        {"glossy", glossy}};
 }
 
 class Paths : public ::testing::TestWithParam<Case> {
@@ -205,6 +212,9 @@ std::vector<double> features(const PathState& x) {
     const auto edge = [&](int from, int to) {
         return log_of(double(to_area(1, x[from].v, x[to].v)));
     };
+    const auto between = [&](int i) {
+        return double(dot(direction(x[i].v, x[i - 1].v), direction(x[i].v, x[i + 1].v)));
+    };
     const auto cosine = [&](int at, int to) {
         return x[at].v.has_cosine ? log_of(double(abs_dot(x[at].v.ng, direction(x[at].v, x[to].v))))
                                   : 0.0;
@@ -229,7 +239,11 @@ std::vector<double> features(const PathState& x) {
             edge(1, 0),
             edge(1, 2),
             cosine(1, 0),
-            cosine(0, 1)};
+            cosine(0, 1),
+            between(k - 1),
+            between(1),
+            double(x[k - 2].v.gloss),
+            double(x[1].v.gloss)};
 }
 
 /// Each mutation alone: from independent states x, whose density is T, the flow min(T(x) Q(x→y), T(y) Q(y→x)) is the same
@@ -238,7 +252,6 @@ std::vector<double> features(const PathState& x) {
 TEST_P(Paths, MutationsKeepDetailedBalance) {
     const WholeFilm whole(passes.pass());
     const ChainContext c{whole.sample, passes.work()};
-    constexpr uint64_t kSamples = 60000;
     for (int kind = 0; kind < PathMutations::kCount; ++kind) {
         PathMutations alone;
         alone.weights.fill(0);
@@ -253,8 +266,12 @@ TEST_P(Paths, MutationsKeepDetailedBalance) {
         const auto space = passes.space(alone, user);
         const auto x = space->make_state(), y = space->make_state();
         std::vector<Moments> change;
+        const bool is_glossy =
+            (kind == PathMutations::GlossyLens || kind == PathMutations::GlossyCaustic) &&
+            GetParam().name == std::string("glossy");
+        const uint64_t samples = is_glossy ? 400000 : 60000;
         uint64_t moves = 0;
-        for (uint64_t i = 0; i < kSamples; ++i) {
+        for (uint64_t i = 0; i < samples; ++i) {
             space->draw(0, hash_combine(5, i), c, *x);
             if (!(x->target > 0)) continue;
             const Proposal p = space->propose(0, *x, hash_combine(6, i), c, *y);
@@ -265,6 +282,9 @@ TEST_P(Paths, MutationsKeepDetailedBalance) {
                        after = features(static_cast<const PathState&>(*y));
             change.resize(before.size());
             for (size_t f = 0; f < change.size(); ++f) change[f].add(rate * (after[f] - before[f]));
+        }
+        if (is_glossy) {
+            EXPECT_GT(moves, 5000);
         }
         if (moves < 200) continue;
         const double level = sidak(1e-3, change.size());
