@@ -62,8 +62,8 @@ bool PathSpace::draw_user_path(PathBuilder& builder, Sampler& sampler) const {
     return s + t <= longest + 1 && builder.sample_eye(t);
 }
 
-std::array<double, PathMutations::kCount> PathSpace::choices(const PathState& x) const {
-    std::array<double, PathMutations::kCount> p{};
+PathSpace::Choices PathSpace::choices(const PathState& x) const {
+    Choices p{};
     double sum = 0;
     for (size_t i = 0; i < p.size(); ++i)
         if (options_.weights[i] > 0 && mutations_[i]->suits(x)) sum += p[i] = options_.weights[i];
@@ -72,11 +72,10 @@ std::array<double, PathMutations::kCount> PathSpace::choices(const PathState& x)
     return p;
 }
 
-double PathSpace::Q(Kind kind, const PathState& x, const PathState& y,
+double PathSpace::Q(Kind kind, const Choices& at_x, const PathState& x, const PathState& y,
                     const MutationWay& way) const {
-    const auto p = choices(x);
     const auto density = [&](Kind of) {
-        return p[of] > 0 ? p[of] * mutations_[of]->Q(x, y, way) : 0.0;
+        return at_x[of] > 0 ? at_x[of] * mutations_[of]->Q(x, y, way) : 0.0;
     };
     const bool is_either =
         (kind == PathMutations::Bidirectional || kind == PathMutations::UserPath) &&
@@ -93,7 +92,7 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
     sampler.start(0, 0);
     sampler.seek(Stream::Selection, 0);
     double u = double(sampler.next_1d());
-    const auto p = choices(x);
+    const Choices p = choices(x);
     int chosen = 0;
     for (size_t i = 0; i < p.size(); u -= p[i], ++i) {
         if (p[i] > 0) chosen = int(i);
@@ -110,7 +109,7 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
     }
     y.finish();
     if (!(y.target > 0)) return proposal;
-    const double there = Q(kind, x, y, way), back = Q(kind, y, x, way.back());
+    const double there = Q(kind, p, x, y, way), back = Q(kind, choices(y), y, x, way.back());
     // Targets are relative to the densities of large steps, Q is not.
     proposal.Q_ratio =
         there > 0 ? back * y.large_step_density() / (there * x.large_step_density()) : 0.0;

@@ -47,9 +47,12 @@ public:
 private:
     using Kind = PathMutations::Kind;
     bool draw_user_path(PathBuilder& builder, Sampler& sampler) const;
-    /// Probability of each mutation at x.
-    std::array<double, PathMutations::kCount> choices(const PathState& x) const;
-    double Q(Kind kind, const PathState& x, const PathState& y, const MutationWay& way) const;
+    /// Probability of each mutation at a state.
+    using Choices = std::array<double, PathMutations::kCount>;
+    Choices choices(const PathState& x) const;
+    /// `at_x` is choices(x).
+    double Q(Kind kind, const Choices& at_x, const PathState& x, const PathState& y,
+             const MutationWay& way) const;
 
     PathTarget target_;
     PathMutations options_;
