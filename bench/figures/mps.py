@@ -4,26 +4,23 @@ import numpy as np
 
 from equal_time import LARGE, compare_large
 from output import Figure, panels
-from runs import FIRST_SEED
+from runs import FIRST_SEED, ROOT
 
 # ------------------------------------------------------------------------------ figure 3: user paths
 
-USER_PATHS = 10
 USER_PATH_RUNS = 8
-CONE = 5  # degrees, as in the paper's scene of rooms
-MUTATIONS = ("bidirectional", "caustic", "large", "lens", "lens_subpath", "multi_chain", "user_path")
+MUTATIONS = ("bidirectional", "caustic", "glossy_caustic", "glossy_lens", "large", "lens", "lens_subpath", "multi_chain",
+             "user_path")
 
 
 def user_paths(runs, seconds):
-    """Fig. 3: mlt with ten user paths through a doorway, and without: acceptance, and mutations for the same variance."""
-    scene = "two-rooms"
-    size = LARGE[scene]
-    file = runs.pick_paths(scene, USER_PATHS, length=3, size=size, pixel=(100, 133), cone=CONE)
-    methods = {"without": "mlt", "with": f"mlt:user_paths={file}"}
-    spp = runs.spp_within(scene, methods.values(), seconds / len(methods) / USER_PATH_RUNS, size=size)
+    """Fig. 3: mlt with ten user paths through a shutter, and without: acceptance, and mutations for the same variance."""
+    scene = "shutter"
+    methods = {"without": "mlt:mutations=4", "with": f"mlt:mutations=4,user_paths={ROOT / 'scenes/shutter-paths.json'}"}
+    spp = runs.spp_within(scene, methods.values(), seconds / len(methods) / USER_PATH_RUNS)
     results = {}
     for name, method in methods.items():
-        rendered = [runs.render(scene, method, spp=spp, seed=FIRST_SEED + i, size=size)
+        rendered = [runs.render(scene, method, spp=spp, seed=FIRST_SEED + i)
                     for i in range(USER_PATH_RUNS)]
         images = np.array([image for _, image in rendered])
         results[name] = {

@@ -24,6 +24,7 @@ SCENES = {
     "keyhole": ("scenes/keyhole.xml", (160, 120)),
     "lantern": ("scenes/lantern.xml", (160, 120)),
     "mirror-box": ("scenes/mirror-box.xml", (160, 120)),
+    "shutter": ("scenes/shutter.xml", (160, 120)),
     "two-rooms": ("scenes/two-rooms.xml", (160, 120)),
     "living-room": ("living-room-mts06/scene.xml", (160, 90)),
 }
@@ -107,17 +108,6 @@ class Runs:
         arguments += ["--report", report, "--seed", FIRST_SEED, "--threads", self.threads]
         self._call(*arguments, "--quiet")
         return _comparison(json.loads((report / "report.json").read_text()), scene)
-
-    def pick_paths(self, scene, count, *, length, pixel, size, cone):
-        """A file of that many light sub-paths of full paths to a pixel, with the cone's half-angle in degrees."""
-        file = self.folder / "paths.json"
-        self._call("paths", scene_file(scene), "--pick", count, "--length", length, "--pixel",
-                   ",".join(map(str, pixel)), "--resolution", "{}x{}".format(*size), "-o", file)
-        paths = json.loads(file.read_text())
-        for path in paths:
-            path["cone"] = cone
-        file.write_text(json.dumps(paths))
-        return file
 
     def _call(self, *arguments):
         done = subprocess.run([self.program, *map(str, arguments)], capture_output=True, text=True)
