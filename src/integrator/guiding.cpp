@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <map>
 
 #include "guide/random_guide.h"
@@ -9,6 +10,8 @@
 
 namespace etendue {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 /// Walks of a block, which are recorded in order by one thread.
 constexpr uint64_t kBlock = 256;
@@ -273,9 +276,10 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     constexpr uint64_t kFewestWalks = 1024;
     // A pass that was dropped and is traced again is trained for once.
     if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > pass.index) return;
-    const bool is_power_of_4 =
-        std::has_single_bit(pass.index) && std::countr_zero(pass.index) % 2 == 0;
-    if (!pass.scene.has_emitters() || (pass.index > 0 && !is_power_of_4)) return;
+    const bool is_refit = pass.index > 1 && std::has_single_bit(pass.index) &&
+                          std::countr_zero(pass.index) % 3 == 0;  // 8, 64, 512 …
+    if (!pass.scene.has_emitters() || (pass.index > 0 && !is_refit)) return;
+    const auto begin = Clock::now();
     const uint64_t seed = hash_combine(pass.seed, 0x67756964ull + pass.index);
     // Walks that end early would teach less.
     if (guide_) guide_->has_roulette = false;
@@ -307,6 +311,7 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     }
     if (guide_) guide_->has_roulette = has_roulette_;
     trained_passes_ = pass.index + 1;
+    seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOptions& depth,
@@ -376,6 +381,7 @@ void Guiding::load(LearnedState& from) {
 void Guiding::add_figures(std::vector<std::pair<std::string, double>>& figures) const {
     if (mode_ == Mode::Off) return;
     figures.push_back({"guided", guide_ ? 1 : 0});
+    figures.push_back({"guide_seconds", seconds_});
     if (!guide_) return;
     figures.push_back({"guide_cells", double(guide_->surfaces.cells().size())});
     figures.push_back({"guide_gain_eye", double(guide_->surfaces.gain(TransportMode::Radiance))});

@@ -20,7 +20,7 @@ public:
 
     /// False with `guide=off`: then no walk is ever guided.
     bool is_on() const { return mode_ != Mode::Off; }
-    /// Trains before pass 0 and refits before passes 1, 4, 16, 64 …, from walks of its own: light walks show eye walks
+    /// Trains before pass 0 and refits before passes 8, 64, 512 …, from walks of its own: light walks show eye walks
     /// where radiance comes from, and eye walks show light walks where importance does. Each round is guided by the one
     /// before. For Integrator::trace(), before it traces anything.
     void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks);
@@ -46,6 +46,7 @@ private:
     std::unique_ptr<Guide> guide_;
     uint32_t trained_passes_ = 0;  ///< That train() was called for.
     bool is_given_up_ = false;     ///< By Mode::Auto.
+    double seconds_ = 0;           ///< Spent in train() by this process.
 };
 
 }  // namespace etendue
