@@ -188,8 +188,10 @@ protected:
                  {"path:", "bdpt:", "upg+bdpt:radius=0.12,", "pcbpt:record_fraction=0.02,"}) {
                 // Alone, eye paths that a bad guide misleads would need too many samples.
                 if (method == "path:" && guide.starts_with("guide=random")) continue;
-                // Roulette by the throughput ends walks early that a bad guide has misled.
-                const uint64_t more = guide == "guide=random,guide_roulette=false" ? 2 : 1;
+                // Footprints of few photons are noisy. Roulette by the throughput ends walks early that a bad guide has
+                // misled.
+                const uint64_t more =
+                    guide == "guide=hp02" || guide == "guide=random,guide_roulette=false" ? 2 : 1;
                 const TileOptions plan{more * factor * c.passes, 4, 2};
                 expect_same_image(render_tiles(scene, method + guide, plan), path,
                                   (method == "path:" ? 3 : 2) * resolution, method + guide);
