@@ -154,12 +154,17 @@ void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCo
 
 std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, float scale,
                                        uint64_t number, Workspace& work) const {
-    Rgb contribution = j.contribution;
     const bool is_splat = j.technique.t <= 1;
     if (is_splat) c.film.prefetch_splat(j.film);
-    const float q = join_survival(luminance(contribution) * j.mis_weight * scale,
+    const float q = join_survival(luminance(j.contribution) * j.mis_weight * scale,
                                   c.is_of_whole_film ? film_threshold(j.film)
                                                      : threshold(c, is_splat ? &j.film : nullptr));
+    return test_with_survival(c, j, q, number, work);
+}
+
+std::optional<Rgb> Bidirectional::test_with_survival(const SampleContext& c, const Join& j, float q,
+                                                     uint64_t number, Workspace& work) {
+    Rgb contribution = j.contribution;
     if (q < 1) {
         c.sampler.seek(Stream::Roulette, number);
         if (!(c.sampler.next_1d_unstructured() < double(q))) {

@@ -1,12 +1,11 @@
 // Unbiased photon gathering in Markov chains [Qin et al. 2015, §5]: pssmlt, with states that also gather from stored light
 // paths.
 //
-// A state consists of the numbers of an eye and a light sub-path, as in pssmlt. Its target is the sum of the joins of the
-// two and of the gathers of its eye sub-path from a light map that is traced once, before the chains start. For the target,
-// gathers use no shadow rays, and the reciprocal probability of the disc instead of trials. A constant is added wherever
-// there may be a pair, so that the target is positive there. For the image, gathers use shadow rays and trials, and another
-// map, which every pass traces anew. Given the state, these have the correct mean for any target. If the target depended on
-// the map of the pass, each map would need its own target and its own b.
+// A state consists of the numbers of an eye and a light sub-path, as in pssmlt. Its eye sub-path also gathers from the light
+// paths of the pass. The contributions of gathers are random given the state, since they need Bernoulli trials. The target
+// is a fixed function of the state instead: the sum of the joins of the two sub-paths, and of the gathers without shadow
+// rays and with the reciprocal probability of the disc. It depends on the light paths, so that the chains of each pass start
+// anew: the mean over a pass is unbiased for any number of mutations after a start-up (chain_groups.h).
 
 #include "integrator/upg_pssmlt.h"
 
@@ -26,11 +25,16 @@
 namespace etendue {
 namespace {
 
-/// Fraction of b that is added to the target of every state that may form pairs.
-constexpr double kFloor = 0.05;
+/// Pairs per eye path for which the radius is chosen.
+constexpr double kPairs = 2;
+/// Weights count a light path as this part of a sample. Joins that the target contains contribute exactly in proportion to
+/// it, whereas gathers add the noise of trials and of the light paths.
+constexpr float kSample = 0.1f;
+/// Russian roulette tests pairs below this part of the target of their state.
+constexpr double kSmall = 0.3;
 
 /// Purposes of random numbers of light paths.
-enum Purpose : uint64_t { kRadius, kFrozen, kFresh, kTrials };
+enum Purpose : uint64_t { kRadius, kDensity, kPass };
 
 /// Light paths to gather from.
 struct LightMap {
@@ -72,13 +76,6 @@ struct Gathering {
     }
     void trace_eye_path(const SampleContext& c, Workspace& work) const {
         paths.trace_eye_path(c, counts, work, &density);
-    }
-    /// The same with the numbers of a state.
-    void repeat_eye_path(const NumberState& state, const ChainContext& c,
-                         ContributionSink& sink) const {
-        NumberSource numbers(NumberStep::Same, 0, &state.numbers, nullptr);
-        Sampler sampler(numbers);
-        trace_eye_path(c.sample.with(sampler, sink), c.work);
     }
     /// Joins of bidirectional path tracing.
     void add_sample(const SampleContext& c, Workspace& work) const {
@@ -135,101 +132,109 @@ double mean_pairs(const PassContext& pass, const Gathering& gathering, const Lig
     return double(sum) / double(kPaths);
 }
 
+struct GatherState final : NumberState {
+    double joined = 0;  ///< Part of the target that the joins of the two sub-paths have.
+    uint64_t trials =
+        0;  ///< Key of the random numbers of its gathers, which the target does not depend on.
+
+    void save(LearnedState& to) const override {
+        NumberState::save(to);
+        to.put(joined);
+        to.put(trials);
+    }
+    void load(LearnedState& from) override {
+        NumberState::load(from);
+        from.get(joined);
+        from.get(trials);
+    }
+};
+
 class GatherSpace final : public PrimarySpace {
 public:
-    GatherSpace(const Gathering& gathering, const LightMap& frozen, const TargetMap& map,
-                double floor)
+    GatherSpace(const Gathering& gathering, const LightMap& light, const TargetMap& map)
         : PrimarySpace(
               1,
               [&gathering](int, const SampleContext& c, Workspace& work) {
                   gathering.add_sample(c, work);
               },
               map),
-          gathering_(gathering), frozen_(frozen), floor_(floor) {}
+          gathering_(gathering), light_(light) {}
+
+    std::unique_ptr<ChainState> make_state() const override {
+        return std::make_unique<GatherState>();
+    }
+    void copy(const ChainState& from, ChainState& to) const override {
+        static_cast<GatherState&>(to) = static_cast<const GatherState&>(from);
+    }
+    void repeat(int chain_class, const ChainState& x, const ChainContext& c,
+                ContributionSink& sink) const override {
+        PrimarySpace::repeat(chain_class, x, c, sink);
+        gather(static_cast<const GatherState&>(x), c,
+               [&](const Join& join, Rgb contribution) { sink.add(join, contribution); });
+    }
 
 protected:
     void evaluate(int chain_class, NumberSource& source, const ChainContext& c,
-                  ChainState& y) const override {
-        PrimarySpace::evaluate(chain_class, source, c, y);
-        const SampleContext of_map = c.sample.with_light_paths(gathering_.light_paths);
-        const GatherSearch search = gathering_.search(of_map, frozen_, c.work);
-        const double W = c.work.z.size() > 0 ? map()(c.work.z.film) : 0.0;
-        bool has_place = false;
-        gathering_.for_each_place(c.work, [&](int t) {
-            has_place = true;
-            search.for_each_pair(t, [&](const GatherPair& pair) {
-                const auto& [strategy, s, t_eye, drops_eye] = pair.technique;
-                const auto join = join_gather(c.sample.scene, c.work.pair, s, c.work.z, t_eye,
-                                              drops_eye, gathering_.counts);
-                if (!join) return;
-                const double value = double(luminance(join->contribution)) *
-                                     double(join->mis_weight) * double(search.scale()) /
-                                     double(join->pair_probability);
-                if (std::isfinite(value)) y.target += W * value;
-            });
+                  ChainState& state) const override {
+        PrimarySpace::evaluate(chain_class, source, c, state);
+        auto& y = static_cast<GatherState&>(state);
+        y.joined = y.target;
+        y.trials = source.key();
+        const SubPath& z = c.work.z;
+        Splat gathered{z.film, {}};
+        y.target += gather(y, c, [&](const Join& join, Rgb contribution) {
+            const Rgb value = contribution * (join.mis_weight * z.film_weight);
+            if (is_finite(value))
+                gathered.value += value;
+            else
+                ++c.work.stats.rejected;
         });
-        if (has_place) y.target += floor_;
+        if (luminance(gathered.value) > 0) y.splats.push_back(gathered);
         if (y.edges == 0 && y.target > 0) y.edges = MarkovIntegrator::kShortest;
     }
 
 private:
-    const Gathering& gathering_;
-    const LightMap& frozen_;
-    double floor_;
-};
-
-/// Adds the states of a chain to the film, with their gathers from the map of the pass.
-class GatheringStates final : public StateSink {
-public:
-    GatheringStates(const StateSpace& space, const Gathering& gathering, const LightMap& fresh,
-                    uint64_t key, const ChainContext& c, SplatSink& film)
-        : space_(space), gathering_(gathering), fresh_(fresh), key_(key), c_(c), film_(film) {}
-
-    void add(const ChainState& state, double factor) override {
-        space_.contribute(0, state, factor, c_, film_);
-        Workspace& work = c_.work;
-        NoSink none;
-        gathering_.repeat_eye_path(static_cast<const NumberState&>(state), c_, none);
-        Sampler trials(SamplerKind::Independent, hash_combine(key_, states_++));
+    /// Gathers of the eye sub-path c.work.z of `state`. Calls add(join, contribution) for visible pairs. Returns the part of
+    /// the target that the pairs have.
+    template <class Add>
+    double gather(const GatherState& state, const ChainContext& chain, const Add& add) const {
+        Workspace& work = chain.work;
+        Sampler trials(SamplerKind::Independent, state.trials);
         trials.start(0, 0);
         const SampleContext c =
-            c_.sample.with(trials, none).with_light_paths(gathering_.light_paths);
-        const GatherSearch search = gathering_.search(c, fresh_, work);
+            chain.sample.with(trials, chain.sample.sink).with_light_paths(gathering_.light_paths);
+        const GatherSearch search = gathering_.search(c, light_, work);
+        const double W = work.z.size() > 0 ? map()(work.z.film) : 0.0;
+        double sum = 0;
         gathering_.for_each_place(work, [&](int t) {
-            search.for_each_pair(t, [&](const GatherPair& pair) { add(c, pair, factor, trials); });
+            search.for_each_pair(t, [&](const GatherPair& pair) {
+                const auto& [strategy, s, t_eye, drops_eye] = pair.technique;
+                const auto join =
+                    join_gather(c.scene, work.pair, s, work.z, t_eye, drops_eye, gathering_.counts);
+                if (!join) return;
+                const double part = W * double(luminance(join->contribution)) *
+                                    double(join->mis_weight) * double(search.scale()) /
+                                    double(join->pair_probability);
+                if (!std::isfinite(part)) return;
+                sum += part;
+                // Contributions that are small beside the target need not be precise.
+                const auto value = Bidirectional::test_with_survival(
+                    c, *join, float(part / (kSmall * (state.joined + sum))), pair.number, work);
+                if (!value) return;
+                ++work.stats.visible_pairs;
+                PairEvent event = pair.event(work.pair, work.z);
+                event.bound = TrialBound::Slab;
+                trials.seek(Stream::Auxiliary, pair.number);
+                const double r =
+                    reciprocal_probability(c.scene, event, trials, work.scratch, work.stats);
+                add(*join, *value * (float(r) * c.splat_scale));
+            });
         });
+        return sum;
     }
 
-private:
-    void add(const SampleContext& c, const GatherPair& pair, double factor, Sampler& trials) {
-        Workspace& work = c_.work;
-        const auto& [strategy, s, t, drops_eye] = pair.technique;
-        const auto join =
-            join_gather(c.scene, work.pair, s, work.z, t, drops_eye, gathering_.counts);
-        if (!join) return;
-        const float Tr = visibility(c.scene, *join, work.stats);
-        if (!(Tr > 0)) return;
-        ++work.stats.visible_pairs;
-        PairEvent event = pair.event(work.pair, work.z);
-        event.bound = TrialBound::Slab;
-        trials.seek(Stream::Auxiliary, pair.number);
-        const double r = reciprocal_probability(c.scene, event, trials, work.scratch, work.stats);
-        const Rgb contribution = join->contribution * (Tr * float(r) * c.splat_scale);
-        const Rgb value = contribution * (join->mis_weight * work.z.film_weight * float(factor));
-        if (!is_finite(value)) {
-            ++work.stats.rejected;
-            return;
-        }
-        if (work.is_observed) film_.tell(*join, contribution, float(factor) * work.z.film_weight);
-        film_.add(work.z.film, value);
-    }
-
-    const StateSpace& space_;
     const Gathering& gathering_;
-    const LightMap& fresh_;
-    uint64_t key_, states_ = 0;
-    ChainContext c_;
-    SplatSink& film_;
+    const LightMap& light_;
 };
 
 class UpgPssmltIntegrator final : public MarkovIntegrator {
@@ -237,6 +242,7 @@ public:
     explicit UpgPssmltIntegrator(const IntegratorParams& p)
         : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 10, .cost = 6}), light_(p),
           given_radius_(p.number("radius")) {
+        options_.restarts = true;
         if (!(given_radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));
@@ -244,7 +250,7 @@ public:
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n = MarkovIntegrator::counts(scene, light_paths);
-        n.gather = float(gathered_ > 0 ? gathered_ : scene.film().pixel_count());
+        n.gather = kSample * float(gathered_ > 0 ? gathered_ : scene.film().pixel_count());
         n.pairs = {.disc = kPi * sqr(radius_),
                    .inner_disc = kPi * sqr(radius_),
                    .min_edges = kShortest,
@@ -265,64 +271,55 @@ protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         constexpr int kRounds = 3;
         use_roulette(pilot);
-        gathered_ = light_.count(pass.scene, paths_.depth(), kMaps * LightMap::kVertexBytes);
+        gathered_ = light_.count(pass.scene, paths_.depth(), LightMap::kVertexBytes);
         const float size = pass.scene.bounds().is_empty() ? 1 : pass.scene.bounds().radius();
         const float largest = kGatherConstants.largest_radius * size;
         radius_ = given_radius_ > 0 ? given_radius_
                                     : std::min(largest, size / std::sqrt(float(gathered_)));
         for (int round = 0; round < kRounds; ++round) {
             gathering_.emplace(gathering(pass.scene));
-            gathering_->trace(pass, key(pass, kRadius, uint64_t(round)), frozen_, radius_);
+            gathering_->trace(pass, key(pass, kRadius, uint64_t(round)), map_, radius_);
             if (given_radius_ > 0) break;
-            const double pairs = mean_pairs(pass, *gathering_, frozen_,
-                                            key(pass, kRadius, kRounds + uint64_t(round)));
+            const double pairs =
+                mean_pairs(pass, *gathering_, map_, key(pass, kRadius, kRounds + uint64_t(round)));
             radius_ = std::min(
                 largest,
-                radius_ * float(std::clamp(std::sqrt(kGatherConstants.pairs / (pairs + 1e-3)), 0.25,
-                                           4.0)));
+                radius_ * float(std::clamp(std::sqrt(kPairs / (pairs + 1e-3)), 0.25, 4.0)));
         }
-        const PairDensity density(frozen_.grid.points().counts(), radius_,
+        const PairDensity density(map_.grid.points().counts(), radius_,
                                   kGatherConstants.correlation);
         gathering_.emplace(gathering(pass.scene));
         gathering_->density = density;
-        gathering_->trace(pass, key(pass, kFrozen, 0), frozen_, radius_);
+        gathering_->trace(pass, key(pass, kDensity, 0), map_, radius_);
 
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(pilot.precise_samples, options_),
                              .c = pilot.b};
-        return {std::make_unique<GatherSpace>(*gathering_, frozen_, pilot.map, kFloor * pilot.b),
-                {plan}};
+        return {std::make_unique<GatherSpace>(*gathering_, map_, pilot.map), {plan}};
     }
 
     void advance(const PassContext& pass, const StateSpace& space, ChainGroups& groups) override {
-        gathering_->trace(pass, key(pass, kFresh, pass.index), fresh_, radius_);
-        const uint64_t trials = key(pass, kTrials, pass.index);
-        groups.advance(pass, [&](uint64_t chain, int, const ChainContext& c, SplatSink& film) {
-            return std::make_unique<GatheringStates>(space, *gathering_, fresh_,
-                                                     hash_combine(trials, chain), c, film);
-        });
+        gathering_->trace(pass, key(pass, kPass, pass.index), map_, radius_);
+        MarkovIntegrator::advance(pass, space, groups);
     }
 
 private:
-    static constexpr uint64_t kMaps = 2;
-
     Gathering gathering(const Scene& scene) const {
         return {.paths = paths_,
                 .light_paths = gathered_,
-                .max_bytes = light_.memory / kMaps,
+                .max_bytes = light_.memory,
                 .counts = counts(scene, 0)};
     }
-
-    LightPathOptions light_;
-    uint64_t gathered_ = 0;  ///< Light paths of a map.
     static uint64_t key(const PassContext& pass, Purpose purpose, uint64_t number) {
         return hash_combine(hash_combine(hash_combine(pass.seed, 0x75706763), purpose), number);
     }
 
+    LightPathOptions light_;
+    uint64_t gathered_ = 0;  ///< Light paths of a map.
     float given_radius_;
     float radius_ = 0;
     std::optional<Gathering> gathering_;
-    LightMap frozen_, fresh_;
+    LightMap map_;  ///< Of the pass.
 };
 
 }  // namespace
@@ -334,9 +331,8 @@ IntegratorEntry upg_pssmlt_entry() {
         {"light_paths", ParamKind::Int, "0",
          "Number of light paths in a pass to gather from. 0: one for each pixel, or as "
          "many as fit into `memory`."});
-    params.push_back({"memory", ParamKind::Int, "6144",
-                      "Largest memory for light vertices, in MiB; those to gather from in a pass "
-                      "and those that the chains know take half of it each."});
+    params.push_back(
+        {"memory", ParamKind::Int, "6144", "Largest memory for light vertices, in MiB."});
     params.push_back({"radius", ParamKind::Float, "0",
                       "Largest distance between the vertices of a pair, in scene units; 0: chosen "
                       "so that an eye path finds about eight pairs."});

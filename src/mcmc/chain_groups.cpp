@@ -104,9 +104,10 @@ void ChainGroups::advance(const PassContext& pass) {
 
 void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
     const size_t g = pass.index % groups_.size();
-    const uint64_t key = hash_combine(hash_combine(pass.seed, 0x636861696e), g);
+    const uint64_t key = hash_combine(hash_combine(pass.seed, 0x636861696e),
+                                      options_.restarts ? pass.index : uint64_t(g));
     working_group_ = g;
-    if (groups_[g].chains.empty()) {
+    if (options_.restarts || groups_[g].chains.empty()) {
         start(pass, key, working_);
     } else {
         for (size_t i = 0; i < working_.chains.size(); ++i)
@@ -167,10 +168,11 @@ void ChainGroups::commit() {
 
 void ChainGroups::save(LearnedState& to) const {
     for (const Group& g : groups_) {
-        to.put(uint64_t(g.chains.size()));
+        const size_t kept = options_.restarts ? 0 : g.chains.size();
+        to.put(uint64_t(kept));
         to.put(g.normalisation);
         to.put(g.steps);
-        for (const Chain& chain : g.chains) chain.save(to);
+        for (size_t i = 0; i < kept; ++i) g.chains[i].save(to);
     }
 }
 

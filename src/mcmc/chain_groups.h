@@ -8,6 +8,9 @@
 // g is scaled by b_g plus the mean of b'_h - b_h over all other groups h, where b'_h is the mean over the pool of h and all
 // large steps of its earlier passes. This mean has the expectation 0 and is independent of g. Averaged over all groups, the
 // scale is the mean of b'.
+//
+// If each pass has a target of its own, with random parameters (ChainOptions::restarts), its group starts anew in each pass.
+// The estimates of b above then have the same expectation over these parameters for all groups.
 
 #include <functional>
 
@@ -20,6 +23,8 @@ struct ChainOptions {
     int chains = 256;  ///< Number in a group, for all classes together.
     double p_large = 0.3;
     double mutations = 1;  ///< Steps per pixel and pass, for all chains of a group together.
+    /// Whether each pass starts its group anew, because its target differs from that of earlier passes.
+    bool restarts = false;
 };
 
 /// Parameters of a class that are fixed before its chains start.

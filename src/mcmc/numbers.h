@@ -94,6 +94,7 @@ public:
         if (next_) next_->clear();
     }
     uint32_t bits(Stream stream, uint64_t vertex, uint32_t slot) override;
+    uint64_t key() const { return key_; }
 
 private:
     uint32_t draw(Stream stream, uint64_t vertex, uint32_t slot) const;

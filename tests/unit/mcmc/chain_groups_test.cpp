@@ -73,6 +73,44 @@ TEST(ChainGroups, BlackPoolsMakeLargeSteps) {
     expect_exact(run_toy({{.groups = 4, .chains = 2, .p_large = 0.5}, 2, 8, 16, 8000}), 0.02);
 }
 
+/// A quarter of the cells, which ones by chance, are bright in a pass, and the others are black.
+TEST(ChainGroups, RestartsAllowAnotherTargetInEachPass) {
+    ToyPasses toy;
+    uint64_t bright = 0;  // two bits for each cell, 0 if it is bright
+    class DimSink final : public ContributionSink {
+    public:
+        DimSink(ContributionSink& to, uint64_t bright) : to_(to), bright_(bright) {}
+        void add(const Join& join, Rgb contribution) override {
+            if ((bright_ >> 2 * uint64_t(join.film.x) & 3) == 0) to_.add(join, contribution * 4.0f);
+        }
+
+    private:
+        ContributionSink& to_;
+        uint64_t bright_;
+    };
+    const PrimarySpace space(
+        1,
+        [&](int chain_class, const SampleContext& c, Workspace& work) {
+            DimSink sink(c.sink, bright);
+            toy_sample(chain_class, c.with(c.sampler, sink), work);
+        },
+        TargetMap(toy.geometry()));
+    std::array<Moments, kCells> means;
+    constexpr uint32_t kPasses = 8;
+    for (uint64_t run = 0; run < 4000; ++run) {
+        ChainGroups groups(space, {.groups = 2, .chains = 4, .p_large = 0.1, .restarts = true},
+                           {{.chains = 4, .pool = 64, .c = toy_b()}});
+        CellSums sums;
+        for (uint32_t i = 0; i < kPasses; ++i) {
+            bright = mix64(hash_combine(run, i));
+            groups.advance(toy.pass(i, hash_combine(22, run), 256, sums));
+            groups.commit();
+        }
+        for (size_t k = 0; k < kCells; ++k) means[k].add(sums.sums[k] / kPasses);
+    }
+    expect_exact(means, 0.015);
+}
+
 /// Later passes know b better than the pools, from each other.
 TEST(ChainGroups, NormalisationImproves) {
     ToyPasses toy;
