@@ -335,7 +335,7 @@ IntegratorEntry upg_pssmlt_entry() {
         {"memory", ParamKind::Int, "6144", "Largest memory for light vertices, in MiB."});
     params.push_back({"radius", ParamKind::Float, "0",
                       "Largest distance between the vertices of a pair, in scene units; 0: chosen "
-                      "so that an eye path finds about eight pairs."});
+                      "so that an eye path finds about two pairs."});
     return {{"integrator", "upg+pssmlt",
              "Unbiased photon gathering combined with Markov chains in the primary sample space "
              "of bidirectional path tracing. Unbiased.",
