@@ -1,4 +1,4 @@
-// Samples per second, and the error after a given time, alternating with measurements of bare Embree. `normalised`
+// Samples and mutations per second, and the error after a given time, alternating with measurements of bare Embree. `normalised`
 // results are those expected on the machine where other renderers were measured, assuming the same ratio to Embree
 // there. Methods that learn run for as long as it takes to do the same work. Two threads, as for the other renderers.
 
@@ -72,6 +72,42 @@ void measure_samples(const Report& report, const Options& options, const Yardsti
                }),
           aim.samples_per_second}},
         {{"passes", passes}, {"rays_per_sample", double(stats.rays()) / rendered.front().samples}});
+}
+
+/// Mutations per second, relative to samples of `bdpt`. The start-up and direct light take as long with few mutations as with
+/// many, and cancel.
+void measure_mutations(const Report& report, const Options& options, const Scene& scene,
+                       const std::string& scene_name, const std::string& method) {
+    const std::string name = "mutations " + method + " " + scene_name;
+    if (!report.wants(name)) return;
+    constexpr int kFew = 1, kMany = 9;  // per pixel
+    const auto pass = [&](int mutations) {
+        const IntegratorSpec chains =
+            integrator_for(scene, method + ":mutations=" + std::to_string(mutations));
+        return render(scene, chains, kPeerThreads, {.passes = 1, .seconds = {}});
+    };
+    double rays = 0;
+    const IntegratorSpec bdpt = integrator_for(scene, "bdpt");
+    const uint64_t passes =
+        std::max(passes_for(scene, bdpt, kPeerThreads, options.seconds), uint64_t{8});
+    const auto [mutations, samples] = alternate(
+        options.repeats,
+        [&] {
+            const Rendering few = pass(kFew), many = pass(kMany);
+            const double count = (kMany - kFew) * few.samples;
+            rays = double(many.stats.rays() - few.stats.rays()) / count;
+            return count / (many.seconds - few.seconds);
+        },
+        [&] {
+            return render(scene, bdpt, kPeerThreads, {.passes = passes, .seconds = {}})
+                .samples_per_second();
+        });
+    report.add(name,
+               {{"mutations_per_second", "mutations/s", true, mutations},
+                {"bdpt_samples_per_second", "samples/s", true, samples},
+                {"mutations_per_bdpt_sample", "1", true,
+                 each(mutations, samples, [](double a, double b) { return a / b; }), 1.0}},
+               {{"rays_per_mutation", rays}});
 }
 
 /// Errors of images of the case's scene, in comparison with its two references.
@@ -176,6 +212,9 @@ int main(int argc, char** argv) {
     for (const Case& c : cases()) {
         const auto scene = load_or_skip(report, c.file);
         if (!scene) continue;
+        if (c.error_seconds > 0)
+            for (const char* method : {"pssmlt", "mmlt", "mlt"})
+                measure_mutations(report, options, *scene, c.file.name, method);
         for (const Case::Aim& aim : c.integrators) {
             if (aim.learns) {
                 measure_learning_error(report, options, yardstick, *scene, c, aim);

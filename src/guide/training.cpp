@@ -161,11 +161,10 @@ Share best_share(const std::vector<Densities>& samples) {
 
 }  // namespace
 
-GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number) {
+GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number,
+                   float least_gain) {
     constexpr int kSteps = 8;
     constexpr double kSamplesPerLobe = 6;
-    // In nats: guided directions take up to twice the time, and spread light paths that other techniques rely on.
-    constexpr double kLeastGain = 0.6;
     GuideFit fit;
     double mean = 0;
     for (const GuideSample* s : samples) mean += double(s->weight) / double(samples.size());
@@ -204,7 +203,7 @@ GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uin
     for (size_t c = 0; c < by_class.size(); ++c) {
         Share s = best_share(by_class[c]);
         if (!(s.weight > 0)) s = of_all;
-        if (!(s.gain >= kLeastGain)) s.share = s.gain = 0;
+        if (!(s.gain >= double(least_gain))) s.share = s.gain = 0;
         fit.share[c] = float(s.share);
         weight += s.weight, gain += s.weight * s.gain;
     }

@@ -81,13 +81,16 @@ struct GuideFit {
 
 /// Fits lobes by expectation maximisation with a prior [Ruppert et al. 2020], and the shares with the BSDF as one more
 /// component. Every fourth sample is kept for the shares, so that lobes that fit to noise have none. A function of the
-/// samples' order; `number` seeds its choices.
-GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number);
+/// samples' order; `number` seeds its choices. Shares that gain less than `least_gain`, in nats, are 0.
+GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number,
+                   float least_gain);
 
-/// What the cells of a guide learn.
-enum class GuideLearning {
-    Mixtures,   ///< fit_guide(), for both modes.
-    Footprints  ///< footprint_guide(), for eye walks alone.
+/// How the cells of a guide learn.
+struct GuideLearning {
+    /// footprint_guide() for eye walks alone, instead of fit_guide().
+    bool has_footprints = false;
+    /// That of fit_guide(), by TransportMode. Guided directions take up to twice the time.
+    std::array<float, 2> least_gain{0.6f, 0.6f};
 };
 
 /// Footprints of photons [Hey & Purgathofer 2002]: at most GuideMixture::kMostLobes samples, chosen in proportion to

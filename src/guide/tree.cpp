@@ -96,8 +96,8 @@ struct GuideTree::Builder {
             const auto chosen = of_mode(l.ranges[m], m);
             if (chosen.empty()) continue;
             const uint64_t number = hash_combine(seed, 2 * leaf + m);
-            if (learning == GuideLearning::Mixtures)
-                fits[m] = fit_guide(chosen, cell.center, number);
+            if (!learning.has_footprints)
+                fits[m] = fit_guide(chosen, cell.center, number, learning.least_gain[m]);
             else if (m == size_t(TransportMode::Radiance))
                 fits[m] = footprint_guide(chosen, number);
             cell.fields[m] = {fits[m].mixture, fits[m].share};
@@ -106,7 +106,7 @@ struct GuideTree::Builder {
 };
 
 GuideTree::GuideTree(const std::vector<GuideSample>& samples, uint64_t seed,
-                     GuideLearning learning) {
+                     const GuideLearning& learning) {
     if (samples.empty()) return;
     Builder builder{*this, samples, learning};
     builder.order.resize(samples.size());

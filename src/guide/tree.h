@@ -54,7 +54,7 @@ public:
     GuideTree() = default;
     /// Fits the cells in parallel; a function of the samples and their order. `seed` seeds its choices.
     GuideTree(const std::vector<GuideSample>& samples, uint64_t seed,
-              GuideLearning learning = GuideLearning::Mixtures);
+              const GuideLearning& learning = {});
     /// One cell for all places.
     explicit GuideTree(const GuideCell& cell) : nodes_(1), cells_{cell} {}
 

@@ -175,6 +175,14 @@ TechniqueCounts joins_of(GuidedWalks walks, uint64_t light_paths) {
     return {.hit = 1, .next_event = 1, .connect = 1, .splat = N};
 }
 
+/// Where both walks are joined, guided directions take paths away from techniques that need no guide, and must gain more.
+GuideLearning learning_of(GuidedWalks walks, bool has_footprints) {
+    GuideLearning learning{.has_footprints = has_footprints};
+    if (walks == GuidedWalks::Both || walks == GuidedWalks::BothWithPairs)
+        learning.least_gain = {1.2f, 1.2f};
+    return learning;
+}
+
 template <class T>
 void append(std::vector<T>& to, const std::vector<T>& more) {
     to.insert(to.end(), more.begin(), more.end());
@@ -219,7 +227,8 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
     guide.emission = GuideTree(finite, seed);
     double gain = sum_of_weights(finite) * double(guide.emission.gain(TransportMode::Importance));
     for (const auto& [emitter, samples] : at_infinity) {
-        const GuideFit fit = fit_guide(thinned(samples), {}, hash_combine(seed, emitter));
+        const GuideFit fit = fit_guide(thinned(samples), {}, hash_combine(seed, emitter),
+                                       GuideLearning{}.least_gain[1]);
         gain += sum_of_weights(samples) * double(fit.gain);
         guide.add_at_infinity({emitter, fit});
     }
@@ -351,14 +360,14 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
         all.light_contribution += b.light_contribution;
     }
     auto guide = std::make_unique<Guide>();
-    const bool has_footprints = mode_ == Mode::Footprints;
-    guide->surfaces = GuideTree(
-        all.samples, seed, has_footprints ? GuideLearning::Footprints : GuideLearning::Mixtures);
+    const GuideLearning learning = learning_of(guided, mode_ == Mode::Footprints);
+    guide->surfaces = GuideTree(all.samples, seed, learning);
     if (guide->surfaces.is_empty()) return guide;
     guide->surfaces.set_importance(all.importons);
     guide->surfaces.set_contributions(all.contributions);
     guide->light_contribution = float(all.light_contribution / double(walks));
-    if (!has_footprints) learn_emission(pass.scene, all.emission, hash_combine(seed, 1), *guide);
+    if (!learning.has_footprints)
+        learn_emission(pass.scene, all.emission, hash_combine(seed, 1), *guide);
     return guide;
 }
 

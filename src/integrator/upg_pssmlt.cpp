@@ -34,7 +34,7 @@ constexpr float kSample = 0.1f;
 constexpr double kSmall = 0.3;
 
 /// Purposes of random numbers of light paths.
-enum Purpose : uint64_t { kRadius, kDensity, kPass };
+enum Purpose : uint64_t { kRadius, kPass };
 
 /// Light paths to gather from.
 struct LightMap {
@@ -134,8 +134,8 @@ double mean_pairs(const PassContext& pass, const Gathering& gathering, const Lig
 
 struct GatherState final : NumberState {
     double joined = 0;  ///< Part of the target that the joins of the two sub-paths have.
-    uint64_t trials =
-        0;  ///< Key of the random numbers of its gathers, which the target does not depend on.
+    /// Key of the random numbers of its gathers, on which the target does not depend.
+    uint64_t trials = 0;
 
     void save(LearnedState& to) const override {
         NumberState::save(to);
@@ -290,7 +290,6 @@ protected:
                                   kGatherConstants.correlation);
         gathering_.emplace(gathering(pass.scene));
         gathering_->density = density;
-        gathering_->trace(pass, key(pass, kDensity, 0), map_, radius_);
 
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(pilot.precise_samples, options_),

@@ -175,7 +175,7 @@ TEST(GuideTree, IsTheSameForAnyNumberOfThreads) {
 /// Footprints of photons: eye walks alone, with one share.
 TEST(GuideTree, FootprintsGuideEyeWalksAlone) {
     const std::vector<GuideSample> samples = samples_under_lamp(20000);
-    const GuideTree tree(samples, 1, GuideLearning::Footprints);
+    const GuideTree tree(samples, 1, {.has_footprints = true});
     EXPECT_GT(tree.cells().size(), 4u);
     for (const GuideCell& cell : tree.cells()) {
         const GuideMixture& eye = cell.field(kEye).mixture;
