@@ -27,8 +27,7 @@ GuideView guide_view(const Vertex& v, const GuideCell& cell, Vec3 from) {
     return {cell.center - v.p, normal};
 }
 
-WalkContribution expected_contribution(const Vertex& v, const Guide& guide, TransportMode mode) {
-    const GuideCell& cell = v.guide ? *v.guide : guide.surfaces.cell(v.p);
+WalkContribution expected_contribution(const Vertex& v, const GuideCell& cell, TransportMode mode) {
     return cell.field(mode).contribution[GuideCell::octant(facing_normal(v))];
 }
 

@@ -158,7 +158,7 @@ float guided_pdf(const Vertex& v, const GuideCell& cell, Vec3 from, Vec3 w, Tran
 /// The share of guided directions at `v` for walks in `mode`.
 float guide_share(const Vertex& v, const GuideCell& cell, TransportMode mode);
 /// What walks in `mode` that reach `v` as this one did contribute on average.
-WalkContribution expected_contribution(const Vertex& v, const Guide& guide, TransportMode mode);
+WalkContribution expected_contribution(const Vertex& v, const GuideCell& cell, TransportMode mode);
 /// Normal of a surface on the side from which the walk came.
 inline Vec3 facing_normal(const Vertex& v) {
     return dot(v.ng, v.wo) < 0 ? -v.ng : v.ng;
@@ -200,6 +200,7 @@ struct SubPath {
     float gain = 1;  ///< Product of BsdfSample::gain.
     /// Expected contribution of an eye sub-path at its first connectible vertex; 0 where unknown or not yet reached.
     float expected = 0;
+    const GuideCell* cell = nullptr;  ///< That holds the last vertex; nullptr without a guide.
 
     SubPath() = default;
     /// Copies would read BSDFs from the arena of the original.
@@ -234,6 +235,7 @@ struct SubPath {
         arena.reset();
         eta2 = gain = 1;
         expected = 0;
+        cell = nullptr;
         flight.pdf_sa = 0;
     }
 

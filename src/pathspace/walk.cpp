@@ -26,9 +26,8 @@ std::optional<float> adjoint_survival(const WalkContext& walk, SubPath& path) {
     constexpr float kLeast = 0.1f;  // where the estimate may be far too small
     const Guide* guide = walk.counts.guide;
     const Vertex& v = path[path.size() - 1];
-    if (!guide || !guide->has_roulette || guide->surfaces.is_empty() || !v.is_connectible)
-        return {};
-    const WalkContribution expected = expected_contribution(v, *guide, mode);
+    if (!path.cell || !guide->has_roulette || !v.is_connectible) return {};
+    const WalkContribution expected = expected_contribution(v, *path.cell, mode);
     if (!(expected.beyond >= 0)) return {};
     const float beta = luminance(v.beta);
     float reference = guide->light_contribution;
@@ -91,8 +90,10 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, Tra
     Vertex& v = path.append();
     v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
     v.medium = passage.medium;
-    if (const Guide* guide = walk.counts.guide; guide && !guide->surfaces.is_empty())
-        v.set_guide(guide->surfaces.cell(v.p), mode, walk.counts.uses_light_paths());
+    if (const Guide* guide = walk.counts.guide; guide && !guide->surfaces.is_empty()) {
+        path.cell = &guide->surfaces.cell(v.p);
+        v.set_guide(*path.cell, mode, walk.counts.uses_light_paths());
+    }
     v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
     v.beta = beta;
     // hit.t is the distance from the offset origin of the ray; densities need the distance between the vertices.

@@ -42,13 +42,14 @@ struct LearnedRoulette : ::testing::Test {
                 trace_eye_path(walk, film, index % kPixels, sampler, path);
             else
                 trace_light_path(walk, sampler, path);
+            const auto expected = [&](int i) {
+                return expected_contribution(path[i], guide.surfaces.cell(path[i].p), mode);
+            };
             for (int i = 2; i + 1 < path.size(); ++i) {
-                const WalkContribution at = expected_contribution(path[i], guide, mode);
+                const WalkContribution at = expected(i);
                 if (!(at.beyond >= 0)) continue;
-                const float whole =
-                    mode == kEye
-                        ? luminance(path[1].beta) * expected_contribution(path[1], guide, mode).here
-                        : guide.light_contribution;
+                const float whole = mode == kEye ? luminance(path[1].beta) * expected(1).here
+                                                 : guide.light_contribution;
                 ++all.vertices;
                 all.survival += double(path[i].survival.value());
                 all.weak += luminance(path[i].beta) * at.beyond < 0.1f * whole;
