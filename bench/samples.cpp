@@ -1,5 +1,5 @@
-// Samples and mutations per second, and the error after a given time, alternating with measurements of bare Embree. `normalised`
-// results are those expected on the machine where other renderers were measured, assuming the same ratio to Embree
+// Samples and mutations per second, and the error after a given time, alternating with measurements of bare Embree.
+// `normalised` results are those expected on the machine where other renderers were measured, assuming the same ratio to Embree
 // there. Methods that learn run for as long as it takes to do the same work. Two threads, as for the other renderers.
 
 #include "image/image_io.h"

@@ -85,12 +85,15 @@ struct GuideFit {
 GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number,
                    float least_gain);
 
+/// Least gain, in nats, for which directions are guided: they take up to twice the time.
+inline constexpr float kLeastGuideGain = 0.6f;
+
 /// How the cells of a guide learn.
 struct GuideLearning {
     /// footprint_guide() for eye walks alone, instead of fit_guide().
     bool has_footprints = false;
-    /// That of fit_guide(), by TransportMode. Guided directions take up to twice the time.
-    std::array<float, 2> least_gain{0.6f, 0.6f};
+    /// Argument of fit_guide(), by TransportMode.
+    std::array<float, 2> least_gain{kLeastGuideGain, kLeastGuideGain};
 };
 
 /// Footprints of photons [Hey & Purgathofer 2002]: at most GuideMixture::kMostLobes samples, chosen in proportion to

@@ -147,7 +147,7 @@ public:
     /// contribution adds `scale` to its pixel. `number` distinguishes the joins of one sample.
     std::optional<Rgb> test(const SampleContext& c, const Join& join, float scale, uint64_t number,
                             Workspace& work) const;
-    /// The same with the survival probability q, which is limited to 1.
+    /// The same for a join that survives roulette with probability min(1, q).
     static std::optional<Rgb> test_with_survival(const SampleContext& c, const Join& join, float q,
                                                  uint64_t number, Workspace& work);
 

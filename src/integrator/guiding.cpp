@@ -227,8 +227,8 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
     guide.emission = GuideTree(finite, seed);
     double gain = sum_of_weights(finite) * double(guide.emission.gain(TransportMode::Importance));
     for (const auto& [emitter, samples] : at_infinity) {
-        const GuideFit fit = fit_guide(thinned(samples), {}, hash_combine(seed, emitter),
-                                       GuideLearning{}.least_gain[1]);
+        const GuideFit fit =
+            fit_guide(thinned(samples), {}, hash_combine(seed, emitter), kLeastGuideGain);
         gain += sum_of_weights(samples) * double(fit.gain);
         guide.add_at_infinity({emitter, fit});
     }
