@@ -16,6 +16,7 @@ public:
     };
 
     GuideTree surfaces;
+    bool uses_surfaces = true;  ///< Whether walks are guided by `surfaces`.
     GuideTree emission;  ///< Of the directions from y_0, as TransportMode::Importance and class 0.
     /// Whether walks use adjoint-driven Russian roulette [Vorba & Křivánek 2016], by GuideCell::Field::contribution.
     bool has_roulette = false;
@@ -23,6 +24,9 @@ public:
     float light_contribution = 0;
     float emission_gain =
         0;  ///< Mean gain of all light paths by the directions from y_0, or of y_0 at infinity.
+
+    /// Whether walks have directions, densities and roulette of a cell at each surface.
+    bool guides_surfaces() const { return uses_surfaces && !surfaces.is_empty(); }
 
     /// Guides an emitter at infinity, unless its share is 0.
     void add_at_infinity(const AtInfinity& learned) {
@@ -54,6 +58,7 @@ public:
     template <class State>
     void save(State& to) const {
         surfaces.save(to);
+        to.put(uses_surfaces);
         emission.save(to);
         to.put(has_roulette);
         to.put(light_contribution);
@@ -64,6 +69,7 @@ public:
     template <class State>
     void load(State& from) {
         surfaces.load(from);
+        from.get(uses_surfaces);
         emission.load(from);
         from.get(has_roulette);
         from.get(light_contribution);

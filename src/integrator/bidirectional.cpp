@@ -24,7 +24,7 @@ std::vector<ParamInfo> Bidirectional::params() {
 
 Bidirectional::Bidirectional(const IntegratorParams& p, Guiding guiding)
     : depth_(DepthOptions::from(p)), guiding_(std::move(guiding)), roulette_(p.number("roulette")),
-      is_optimised_(p.flag("eorr")) {
+      is_optimised_(p.flag("eorr") && roulette_ > 0) {
     if (!(roulette_ >= 0 && roulette_ <= 1))
         throw std::runtime_error(fmt::format("{}: roulette must lie in [0, 1]", p.integrator()));
 }
@@ -111,6 +111,9 @@ void Bidirectional::learn(const LearnContext& pass) {
     if (!is_optimised_ || pass.film.passes() < 2) return;
     // The variance of one pass, averaged over a window, because few passes give a poor estimate for a single pixel.
     constexpr int kReach = 3;
+    // With a survival probability q = C/δ, the expected number of rays of a join is q, and its variance increases by
+    // C²(1/q - 1). The product of the number of rays T and the variance V of a sample is minimal for δ² = V/T
+    // [Veach 1997, §10.4.2].
     const FilmGeometry& g = pass.film.geometry();
     const std::vector<Rgb> variance = pass.film.variance();
     thresholds_.resize(variance.size());
@@ -132,15 +135,12 @@ void Bidirectional::learn(const LearnContext& pass) {
         }
 }
 
-float Bidirectional::threshold(const SampleContext& c, const Vec2* splat) const {
-    if (!is_optimised_ || roulette_ == 0)
-        return roulette_ *
-               (splat ? c.film.expected_luminance(*splat) : c.film.expected_luminance(c.pixel));
-    // With a survival probability q = C/δ, the expected number of rays of a join is q, and its variance increases by
-    // C²(1/q - 1). The product of the number of rays T and the variance V of a sample is minimal for δ² = V/T
-    // [Veach 1997, §10.4.2].
-    if (thresholds_.empty()) return 0;
-    return thresholds_[splat ? c.film.geometry().pixel_at(*splat) : c.pixel];
+float Bidirectional::threshold(const SampleContext& c, const Vec2* film) const {
+    if (!thresholds_.empty())
+        return thresholds_[film ? c.film.geometry().pixel_at(*film) : c.pixel];
+    if (is_optimised_ || roulette_ == 0) return 0;
+    return roulette_ *
+           (film ? c.film.expected_luminance(*film) : c.film.expected_luminance(c.pixel));
 }
 
 void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCounts& counts,
@@ -157,8 +157,7 @@ std::optional<Rgb> Bidirectional::test(const SampleContext& c, const Join& j, fl
     const bool is_splat = j.technique.t <= 1;
     if (is_splat) c.film.prefetch_splat(j.film);
     const float q = join_survival(luminance(j.contribution) * j.mis_weight * scale,
-                                  c.is_of_whole_film ? film_threshold(j.film)
-                                                     : threshold(c, is_splat ? &j.film : nullptr));
+                                  threshold(c, is_splat || c.is_of_whole_film ? &j.film : nullptr));
     return test_with_survival(c, j, q, number, work);
 }
 

@@ -1,8 +1,6 @@
 #pragma once
 // Common parts of the bidirectional integrators: both walks, and the Russian roulette before shadow rays.
 
-#include <functional>
-
 #include "integrator/guiding.h"
 #include "reuse/light_vertex_cache.h"
 #include "reuse/next_event_count.h"
@@ -18,11 +16,8 @@ public:
     Bidirectional(const DepthOptions& depth, int shortest)
         : depth_(depth), shortest_(shortest), roulette_(0), is_optimised_(false) {}
 
-    /// Russian roulette of joins for samples of the whole film, which must not depend on the film: `threshold` is that
-    /// of join_survival() at a film point, for contributions of a sample to the whole film.
-    void set_roulette(std::function<float(Vec2 film)> threshold) {
-        film_threshold_ = std::move(threshold);
-    }
+    /// Sets the thresholds of join_survival() by pixel. A sample of the whole film may contribute to any of them.
+    void set_roulette(std::vector<float> thresholds) { thresholds_ = std::move(thresholds); }
 
     /// Sample counts of bidirectional path tracing, without merges and gathers.
     static TechniqueCounts counts(const Scene& scene, uint64_t light_paths) {
@@ -157,18 +152,15 @@ public:
     float threshold(const SampleContext& c) const { return threshold(c, nullptr); }
 
 private:
-    /// Threshold of join_survival() for contributions at the film point `splat`, or to the own pixel if it is nullptr.
-    float threshold(const SampleContext& c, const Vec2* splat) const;
-    /// The same for a sample of the whole film.
-    float film_threshold(Vec2 film) const { return film_threshold_ ? film_threshold_(film) : 0; }
+    /// Threshold of join_survival() for contributions at a film point, or to the own pixel if `film` is nullptr.
+    float threshold(const SampleContext& c, const Vec2* film) const;
 
     DepthOptions depth_;
     Guiding guiding_;
     int shortest_ = 1;  ///< Length of the shortest paths, in edges.
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
-    bool is_optimised_;                          ///< Whether thresholds_ replaces roulette_.
-    std::vector<float> thresholds_;              ///< By pixel; empty until they are learned.
-    std::function<float(Vec2)> film_threshold_;  ///< Empty: no roulette.
+    bool is_optimised_;              ///< Efficiency-optimised roulette, which sets thresholds_.
+    std::vector<float> thresholds_;  ///< By pixel, instead of roulette_; empty until they are set.
 };
 
 }  // namespace etendue

@@ -280,11 +280,21 @@ bool Guiding::gains_little(GuidedWalks walks) const {
     return true;
 }
 
+bool Guiding::gains_nothing(GuidedWalks walks) const {
+    // Adjoint-driven roulette keeps more vertices, and a method that joins both walks joins each of them.
+    constexpr float kLeastGain = 0.2f;
+    const bool joins_both = walks == GuidedWalks::Both || walks == GuidedWalks::BothWithPairs;
+    return joins_both && mode_ != Mode::Footprints &&
+           std::max({guide_->surfaces.gain(TransportMode::Radiance),
+                     guide_->surfaces.gain(TransportMode::Importance), guide_->emission_gain}) <
+               kLeastGain;
+}
+
 void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks) {
     constexpr int kRounds = 4;
     constexpr uint64_t kFewestWalks = 1024;
     // A pass that was dropped and is traced again is trained for once.
-    if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > pass.index) return;
+    if (mode_ == Mode::Off || is_settled_ || trained_passes_ > pass.index) return;
     const bool is_refit = pass.index > 1 && std::has_single_bit(pass.index) &&
                           std::countr_zero(pass.index) % 3 == 0;  // 8, 64, 512 …
     if (!pass.scene.has_emitters() || (pass.index > 0 && !is_refit)) return;
@@ -309,10 +319,10 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
             guide_ =
                 trained(pass, depth, walks, first << round, hash_combine(seed, uint64_t(round)),
                         has_roulette_ && round == kRounds - 1);
-        if (mode_ == Mode::Auto && gains_little(walks)) {
-            is_given_up_ = true;
-            guide_ = nullptr;
-        }
+        guide_->uses_surfaces = !gains_nothing(walks);
+        const bool is_given_up = mode_ == Mode::Auto && gains_little(walks);
+        is_settled_ = is_given_up || !guide_->uses_surfaces;
+        if (is_given_up) guide_ = nullptr;
     } else {
         constexpr uint64_t kFewest = 16 * kFewestWalks;
         guide_ = trained(pass, depth, walks, std::clamp(pass.pixels, kFewest, kMostWalks), seed,
@@ -373,14 +383,14 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
 
 void Guiding::save(LearnedState& to) const {
     to.put(trained_passes_);
-    to.put(is_given_up_);
+    to.put(is_settled_);
     to.put(guide_ != nullptr);
     if (guide_) guide_->save(to);
 }
 
 void Guiding::load(LearnedState& from) {
     from.get(trained_passes_);
-    from.get(is_given_up_);
+    from.get(is_settled_);
     bool has_guide = false;
     from.get(has_guide);
     guide_ = has_guide ? std::make_unique<Guide>() : nullptr;
@@ -392,6 +402,7 @@ void Guiding::add_figures(std::vector<std::pair<std::string, double>>& figures) 
     figures.push_back({"guided", guide_ ? 1 : 0});
     figures.push_back({"guide_seconds", seconds_});
     if (!guide_) return;
+    figures.push_back({"guided_surfaces", guide_->guides_surfaces() ? 1 : 0});
     figures.push_back({"guide_cells", double(guide_->surfaces.cells().size())});
     figures.push_back({"guide_gain_eye", double(guide_->surfaces.gain(TransportMode::Radiance))});
     figures.push_back(

@@ -28,6 +28,8 @@ public:
     const Guide* guide() const { return guide_.get(); }
     /// Whether the guide gains so little that `auto` does without it. There must be a guide.
     bool gains_little(GuidedWalks walks) const;
+    /// Whether walks are better off without a guide at surfaces. There must be a guide.
+    bool gains_nothing(GuidedWalks walks) const;
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);
@@ -45,7 +47,7 @@ private:
     bool has_roulette_ = false;  ///< The option; see Guide::has_roulette.
     std::unique_ptr<Guide> guide_;
     uint32_t trained_passes_ = 0;  ///< That train() was called for.
-    bool is_given_up_ = false;     ///< By Mode::Auto.
+    bool is_settled_ = false;      ///< Whether no later pass is trained for.
     double seconds_ = 0;           ///< Spent in train() by this process.
 };
 

@@ -65,11 +65,12 @@ PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
         [&paths, n](int, const SampleContext& c, Workspace& work) { paths.add_sample(c, n, work); };
 }
 
-void MarkovIntegrator::use_roulette(const Pilot& pilot) {
+void MarkovIntegrator::use_roulette(const FilmGeometry& film, const Pilot& pilot) {
     constexpr double kSmall = 0.1;  // Part of the target of a state.
-    paths_.set_roulette([threshold = kSmall * pilot.typical, map = pilot.map](Vec2 film) {
-        return float(threshold / map(film));
-    });
+    std::vector<float> thresholds(film.pixel_count());
+    for (uint64_t i = 0; i < thresholds.size(); ++i)
+        thresholds[i] = float(kSmall * pilot.typical / pilot.map(film.pixel_center(i)));
+    paths_.set_roulette(std::move(thresholds));
 }
 
 void MarkovIntegrator::trace(const PassContext& pass) {

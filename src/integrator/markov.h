@@ -69,7 +69,7 @@ protected:
     }
 
     /// From now on, paths_ tests joins that have a small part of the target of a state with a probability in proportion.
-    void use_roulette(const Pilot& pilot);
+    void use_roulette(const FilmGeometry& film, const Pilot& pilot);
 
     /// A sample of all techniques of `bdpt`, with the walks of `paths`.
     PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;

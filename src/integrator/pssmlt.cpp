@@ -18,7 +18,7 @@ public:
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
-        use_roulette(pilot);
+        use_roulette(pass.scene.film(), pilot);
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(pilot.precise_samples, options_),
                              .c = pilot.b};

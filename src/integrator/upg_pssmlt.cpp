@@ -270,7 +270,7 @@ protected:
     /// Everything here is a function of the seed, so that a resumed rendering computes the same.
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         constexpr int kRounds = 3;
-        use_roulette(pilot);
+        use_roulette(pass.scene.film(), pilot);
         gathered_ = light_.count(pass.scene, paths_.depth(), LightMap::kVertexBytes);
         const float size = pass.scene.bounds().is_empty() ? 1 : pass.scene.bounds().radius();
         const float largest = kGatherConstants.largest_radius * size;

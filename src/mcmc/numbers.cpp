@@ -27,11 +27,12 @@ void NumberTable::throw_too_many() {
     throw std::logic_error("Markov chain: too many numbers at a vertex");
 }
 
-uint32_t NumberSource::draw(Stream stream, uint64_t vertex, uint32_t slot) const {
+inline uint32_t NumberSource::draw(Stream stream, uint64_t vertex, uint32_t slot,
+                                   NumberTable::Place place) const {
     const uint64_t random = hash_address(key_, stream, vertex, slot);
     const auto fresh = uint32_t(random >> 32);
     if (step_ == NumberStep::Fresh) return fresh;
-    const uint32_t* old = present_->find(stream, vertex, slot);
+    const uint32_t* old = present_->find(place);
     if (!old) return fresh;
     if (stream != Stream::Selection) {
         if (step_ == NumberStep::Small)
@@ -49,9 +50,10 @@ uint32_t NumberSource::draw(Stream stream, uint64_t vertex, uint32_t slot) const
 uint32_t NumberSource::bits(Stream stream, uint64_t vertex, uint32_t slot) {
     if (stream == Stream::Roulette && (vertex != 0 || slot != 0))
         return bits(Stream::Roulette, 0, 0) + uint32_t(hash_address(0, stream, vertex, slot) >> 32);
-    if (!next_) return draw(stream, vertex, slot);
-    NumberTable::Number& number = next_->at(stream, vertex, slot);
-    if (!next_->has(number)) next_->set(number, draw(stream, vertex, slot));
+    const NumberTable::Place place = NumberTable::place(stream, vertex, slot);
+    if (!next_) return draw(stream, vertex, slot, place);
+    NumberTable::Number& number = next_->at(place);
+    if (!next_->has(number)) next_->set(number, draw(stream, vertex, slot, place));
     return number.bits;
 }
 

@@ -19,25 +19,30 @@ public:
     struct Number {
         uint32_t bits = 0, epoch = 0;
     };
-    /// The number at this address, or nullptr if it has not been read.
-    const uint32_t* find(Stream stream, uint64_t vertex, uint32_t slot) const {
-        const Place p = place(stream, vertex, slot);
+    /// Where the number at an address is, in any table.
+    struct Place {
+        size_t table, index;
+    };
+    static Place place(Stream stream, uint64_t vertex, uint32_t slot) {
+        if (slot >= kSlots) throw_too_many();
+        const bool at_lens = stream == Stream::Connection && vertex >= kLensVertex;
+        const size_t v = size_t(at_lens ? vertex - kLensVertex : vertex);
+        return {at_lens ? kStreams : size_t(stream), v * kSlots + slot};
+    }
+    /// The number at this place, or nullptr if it has not been read.
+    const uint32_t* find(Place p) const {
         const std::vector<Number>& table = tables_[p.table];
         return p.index < table.size() && table[p.index].epoch == epoch_ ? &table[p.index].bits
                                                                         : nullptr;
     }
-    /// The place of the number at this address.
-    Number& at(Stream stream, uint64_t vertex, uint32_t slot) {
-        const Place p = place(stream, vertex, slot);
+    Number& at(Place p) {
         std::vector<Number>& table = tables_[p.table];
         if (p.index >= table.size()) table.resize((p.index / kSlots + 4) * kSlots);
         return table[p.index];
     }
     bool has(const Number& number) const { return number.epoch == epoch_; }
     void set(Number& number, uint32_t bits) { number = {bits, epoch_}; }
-    void set(Stream stream, uint64_t vertex, uint32_t slot, uint32_t bits) {
-        set(at(stream, vertex, slot), bits);
-    }
+    void set(Place p, uint32_t bits) { set(at(p), bits); }
     void save(LearnedState& to) const {
         to.put(epoch_);
         for (const auto& table : tables_) to.put(table);
@@ -49,25 +54,13 @@ public:
 
 private:
     static constexpr uint32_t kSlots = 8;  ///< Largest number of slots of a vertex.
+    static constexpr size_t kStreams = size_t(Stream::Selection) + 1;
     /// Joins to the lens are numbered from here on in Stream::Connection.
     static constexpr uint64_t kLensVertex = 0x8000;
-    struct Place {
-        size_t table, index;
-    };
-    static Place place(Stream stream, uint64_t vertex, uint32_t slot) {
-        if (slot >= kSlots) throw_too_many();
-        const bool at_lens = stream == Stream::Connection && vertex >= kLensVertex;
-        const size_t v = size_t(at_lens ? vertex - kLensVertex : vertex);
-        const size_t table = stream == Stream::Eye          ? 0
-                             : stream == Stream::Light      ? 1
-                             : stream == Stream::Connection ? (at_lens ? 3 : 2)
-                             : stream == Stream::Selection  ? 4
-                                                            : 5;
-        return {table, v * kSlots + slot};
-    }
     [[noreturn]] static void throw_too_many();
 
-    std::array<std::vector<Number>, 6> tables_;  ///< By stream; they never shrink.
+    /// By stream, and those of joins to the lens; they never shrink.
+    std::array<std::vector<Number>, kStreams + 1> tables_;
     uint32_t epoch_ = 1;
 };
 
@@ -97,7 +90,7 @@ public:
     uint64_t key() const { return key_; }
 
 private:
-    uint32_t draw(Stream stream, uint64_t vertex, uint32_t slot) const;
+    uint32_t draw(Stream stream, uint64_t vertex, uint32_t slot, NumberTable::Place place) const;
 
     NumberStep step_;
     uint64_t key_;

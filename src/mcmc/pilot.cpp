@@ -46,7 +46,8 @@ PilotSample draw(const PassContext& pass, const PrimarySample& sample, const Pri
     const uint64_t direct_key = hash_combine(key, kDirect);
     NumberTable film_point;
     for (uint32_t slot : {0u, 1u})
-        film_point.set(Stream::Eye, 0, slot, uint32_t(hash_combine(direct_key, slot) >> 32));
+        film_point.set(NumberTable::place(Stream::Eye, 0, slot),
+                       uint32_t(hash_combine(direct_key, slot) >> 32));
     for (PilotSplats* to : {&out.direct, &out.other_direct}) {
         const uint64_t k = hash_combine(direct_key, to == &out.direct ? 2 : 3);
         NumberSource others(NumberStep::Same, k, &film_point, &numbers);

@@ -21,16 +21,18 @@ void SplatCollector::add(const Join& join, Rgb contribution) {
     const double y = double(luminance(value));
     if (!(y > 0) || !region_.contains(join.film)) return;
     if (observer) observer(join, y);
-    const double part = map_ ? y * (*map_)(join.film) : y;
+    // All joins of the eye path have one film point, and come one after the other.
+    std::vector<Splat>& splats = state_.splats;
+    const bool is_same = is_eye && !splats.empty() && splats.back().film.x == join.film.x &&
+                         splats.back().film.y == join.film.y;
+    if (map_ && !is_same) W_ = (*map_)(join.film);
+    const double part = y * W_;
     state_.target += part;
     if (part > largest_) {
         largest_ = part;
         state_.edges = join.technique.vertices() - 1;
     }
-    // All joins of the eye path have one film point, and come one after the other.
-    std::vector<Splat>& splats = state_.splats;
-    if (is_eye && !splats.empty() && splats.back().film.x == join.film.x &&
-        splats.back().film.y == join.film.y)
+    if (is_same)
         splats.back().value += value;
     else
         splats.push_back({join.film, value});

@@ -28,6 +28,7 @@ private:
     ChainState& state_;
     Workspace& work_;
     double largest_ = 0;
+    double W_ = 1;  ///< At the film point of the last join.
 };
 
 /// Evaluates `sample` with the numbers of `source`; contributions go to `sink`.

@@ -21,7 +21,7 @@ TargetMap::TargetMap(const FilmGeometry& geometry, uint64_t samples)
     : geometry_(geometry), samples_(samples), tile_(tile_width(geometry, samples)),
       columns_((geometry.crop_width + tile_ - 1) / tile_),
       rows_((geometry.crop_height + tile_ - 1) / tile_), sums_(size_t(columns_) * size_t(rows_)),
-      W_(sums_.size(), 1.0) {}
+      W_(size_t(columns_ + 1) * size_t(rows_ + 1), 1.0f) {}
 
 void TargetMap::learn() {
     const auto pixels = [&](int tile, int size) { return std::min(tile_, size - tile * tile_); };
@@ -49,25 +49,27 @@ void TargetMap::learn() {
                     weights += w;
                 }
             const double L = sqr(sum / weights);
-            W_[size_t(y) * size_t(columns_) + size_t(x)] = 1 / std::sqrt(L * L + floor2);
+            const auto W = float(1 / std::sqrt(L * L + floor2));
+            for (const int v : {y, y + 1 == rows_ ? rows_ : y})
+                for (const int u : {x, x + 1 == columns_ ? columns_ : x})
+                    W_[size_t(v) * size_t(columns_ + 1) + size_t(u)] = W;
         }
 }
 
 double TargetMap::operator()(Vec2 film) const {
     // Between the centres of tiles.
-    const auto clamp = [&](float v, int count) {
-        return std::min(std::max(v / float(tile_) - 0.5f, 0.0f), float(count - 1));
+    const float tiles = 1 / float(tile_);
+    const auto centre = [tiles](float v, int count) {
+        return std::min(std::max(v * tiles - 0.5f, 0.0f), float(count - 1));
     };
-    const float x = clamp(film.x - float(geometry_.crop_x), columns_),
-                y = clamp(film.y - float(geometry_.crop_y), rows_);
+    const float x = centre(film.x - float(geometry_.crop_x), columns_),
+                y = centre(film.y - float(geometry_.crop_y), rows_);
     const int left = int(x), top = int(y);
-    const int right = std::min(left + 1, columns_ - 1), bottom = std::min(top + 1, rows_ - 1);
-    const double u = double(x) - left, v = double(y) - top;
-    const auto at = [&](int column, int row) {
-        return W_[size_t(row) * size_t(columns_) + size_t(column)];
-    };
-    return (1 - v) * ((1 - u) * at(left, top) + u * at(right, top)) +
-           v * ((1 - u) * at(left, bottom) + u * at(right, bottom));
+    const float u = x - float(left), v = y - float(top);
+    const float* upper = &W_[size_t(top) * size_t(columns_ + 1) + size_t(left)];
+    const float* lower = upper + columns_ + 1;
+    return double((1 - v) * ((1 - u) * upper[0] + u * upper[1]) +
+                  v * ((1 - u) * lower[0] + u * lower[1]));
 }
 
 }  // namespace etendue

@@ -50,7 +50,8 @@ private:
     int tile_;  ///< Width and height of a tile in pixels.
     int columns_, rows_;
     std::vector<double> sums_;  ///< By tile.
-    std::vector<double> W_;     ///< At the centres of tiles.
+    /// At the centres of tiles. The last row and column are there twice, so that each centre has one to its right and below.
+    std::vector<float> W_;
 };
 
 }  // namespace etendue

@@ -153,7 +153,7 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
             f = e.f;
             pdf_light = e.pdf;
             pdf_eye = x[i]->bsdf.eval(to_eye, to_light, TransportMode::Radiance).pdf;
-            if (guide && !guide->surfaces.is_empty()) {
+            if (guide && guide->guides_surfaces()) {
                 const GuideCell& cell = guide->surfaces.cell(x[i]->p);
                 pdf_light =
                     guided_pdf(*x[i], cell, to_light, to_eye, TransportMode::Importance, pdf_light);

@@ -90,7 +90,7 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, Tra
     Vertex& v = path.append();
     v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
     v.medium = passage.medium;
-    if (const Guide* guide = walk.counts.guide; guide && !guide->surfaces.is_empty()) {
+    if (const Guide* guide = walk.counts.guide; guide && guide->guides_surfaces()) {
         path.cell = &guide->surfaces.cell(v.p);
         v.set_guide(*path.cell, mode, walk.counts.uses_light_paths());
     }

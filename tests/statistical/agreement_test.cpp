@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "render/learned_guide.h"
 #include "render_tiles.h"
 #include "test_scenes.h"
 
@@ -113,6 +114,7 @@ std::vector<AgreementCase> cases() {
         {"roughplastic", front + room() + area_lamp() + sphere("0,-0.4,0", "0.5", kRoughPlastic),
          true},
         {"smooth_mesh", front + room() + area_lamp() + smooth_mesh(diffuse("0.8,0.6,0.4")), true},
+        {"lantern", lantern_room(front), false, 768},
         {"smooth_glass", front + room() + area_lamp() + smooth_mesh(kRoughGlass), true},
     };
 }
@@ -223,6 +225,20 @@ TEST_P(LongAgreement, WithPathTracing) {
     expect_agreement(16, 16);
 }
 
+/// Otherwise, GuidedAgreement would compare unguided walks.
+TEST(LearnedGuide, IsUsedInTheLantern) {
+    const Scene scene = build(lantern_room(front_camera(kSize)));
+    const LearnedGuide learned(scene, IntegratorSpec::parse("bdpt:guide=on"), 1, 2);
+    EXPECT_TRUE(learned.guide().guides_surfaces());
+    EXPECT_GT(LearnedGuide::mean_shares(learned.shares())[0], 0.2);
+}
+
+TEST(LearnedGuide, IsNotUsedAtSurfacesOfARoom) {
+    const Scene scene = build(front_camera(kSize) + room() + area_lamp());
+    const LearnedGuide learned(scene, IntegratorSpec::parse("bdpt:guide=on"), 1, 2);
+    EXPECT_FALSE(learned.guide().guides_surfaces());
+}
+
 TEST_P(GuidedAgreement, WithPathTracing) {
     expect_guided_agreement(1);
 }
@@ -243,9 +259,10 @@ const auto kName = [](const ::testing::TestParamInfo<AgreementCase>& p) {
 };
 INSTANTIATE_TEST_SUITE_P(Quick, Agreement, ::testing::ValuesIn(cases()), kName);
 INSTANTIATE_TEST_SUITE_P(Long, LongAgreement, ::testing::ValuesIn(cases()), kName);
-INSTANTIATE_TEST_SUITE_P(
-    Quick, GuidedAgreement,
-    ::testing::ValuesIn(cases({"rough", "constant_on_diffuse", "several", "gloss"})), kName);
+INSTANTIATE_TEST_SUITE_P(Quick, GuidedAgreement,
+                         ::testing::ValuesIn(cases({"rough", "constant_on_diffuse", "several",
+                                                    "gloss", "lantern"})),
+                         kName);
 INSTANTIATE_TEST_SUITE_P(Long, LongGuidedAgreement, ::testing::ValuesIn(cases()), kName);
 
 }  // namespace

@@ -19,7 +19,7 @@ template <class Use>
 void for_each_step(NumberStep step, Stream stream, uint32_t bits, const Use& use) {
     NumberTable present, next;
     present.clear();
-    present.set(stream, 3, 1, bits);
+    present.set(NumberTable::place(stream, 3, 1), bits);
     for (uint64_t key = 0; key < kCount; ++key) {
         NumberSource source(step, hash_combine(7, key), &present, &next);
         use(source.bits(stream, 3, 1));
@@ -56,7 +56,8 @@ TEST(Numbers, WideStepsAreWider) {
 
 TEST(Numbers, FilmPointsMoveFarther) {
     NumberTable present, next;
-    for (uint32_t slot = 0; slot < 3; ++slot) present.set(Stream::Eye, 0, slot, 0x12345678);
+    for (uint32_t slot = 0; slot < 3; ++slot)
+        present.set(NumberTable::place(Stream::Eye, 0, slot), 0x12345678);
     std::array<double, 3> least{1, 1, 1};
     for (uint64_t key = 0; key < kCount; ++key) {
         NumberSource source(NumberStep::Small, hash_combine(4, key), &present, &next);
@@ -92,7 +93,8 @@ TEST(Numbers, ChoicesStayInSmallSteps) {
 
 TEST(Numbers, BlocksAreDrawnAsAWhole) {
     NumberTable present, next;
-    for (uint32_t slot = 0; slot < 4; ++slot) present.set(Stream::Light, 2, slot, slot);
+    for (uint32_t slot = 0; slot < 4; ++slot)
+        present.set(NumberTable::place(Stream::Light, 2, slot), slot);
     Moments drawn;
     for (uint64_t key = 0; key < kCount; ++key) {
         NumberSource source(NumberStep::Block, hash_combine(9, key), &present, &next);
@@ -110,7 +112,7 @@ TEST(Numbers, ThoseThatWereNotReadAreDrawnAfresh) {
     for (const NumberStep step : {NumberStep::Small, NumberStep::Wide, NumberStep::Block}) {
         NumberTable present, next;
         // It held a number, of a state before the present one.
-        present.set(Stream::Eye, 1, 0, 42);
+        present.set(NumberTable::place(Stream::Eye, 1, 0), 42);
         present.clear();
         Moments u;
         for (uint64_t key = 0; key < kCount; ++key) {
