@@ -109,11 +109,11 @@ void Bidirectional::add_technique(const SampleContext& c, const TechniqueCounts&
 
 void Bidirectional::learn(const LearnContext& pass) {
     if (!is_optimised_ || pass.film.passes() < 2) return;
-    // The variance of one pass, averaged over a window, because few passes give a poor estimate for a single pixel.
-    constexpr int kReach = 3;
     // With a survival probability q = C/δ, the expected number of rays of a join is q, and its variance increases by
     // C²(1/q - 1). The product of the number of rays T and the variance V of a sample is minimal for δ² = V/T
     // [Veach 1997, §10.4.2].
+    // The variance of one pass, averaged over a window, because few passes give a poor estimate for a single pixel.
+    constexpr int kReach = 3;
     const FilmGeometry& g = pass.film.geometry();
     const std::vector<Rgb> variance = pass.film.variance();
     thresholds_.resize(variance.size());

@@ -283,8 +283,9 @@ bool Guiding::gains_little(GuidedWalks walks) const {
 bool Guiding::gains_nothing(GuidedWalks walks) const {
     // Adjoint-driven roulette keeps more vertices, and a method that joins both walks joins each of them.
     constexpr float kLeastGain = 0.2f;
-    const bool joins_both = walks == GuidedWalks::Both || walks == GuidedWalks::BothWithPairs;
-    return joins_both && mode_ != Mode::Footprints &&
+    const bool joins_both = walks == GuidedWalks::Both || walks == GuidedWalks::BothWithPairs,
+               has_gains = mode_ == Mode::On || mode_ == Mode::Auto;
+    return joins_both && has_gains &&
            std::max({guide_->surfaces.gain(TransportMode::Radiance),
                      guide_->surfaces.gain(TransportMode::Importance), guide_->emission_gain}) <
                kLeastGain;
@@ -294,7 +295,7 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     constexpr int kRounds = 4;
     constexpr uint64_t kFewestWalks = 1024;
     // A pass that was dropped and is traced again is trained for once.
-    if (mode_ == Mode::Off || is_settled_ || trained_passes_ > pass.index) return;
+    if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > pass.index) return;
     const bool is_refit = pass.index > 1 && std::has_single_bit(pass.index) &&
                           std::countr_zero(pass.index) % 3 == 0;  // 8, 64, 512 …
     if (!pass.scene.has_emitters() || (pass.index > 0 && !is_refit)) return;
@@ -319,16 +320,19 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
             guide_ =
                 trained(pass, depth, walks, first << round, hash_combine(seed, uint64_t(round)),
                         has_roulette_ && round == kRounds - 1);
-        guide_->uses_surfaces = !gains_nothing(walks);
-        const bool is_given_up = mode_ == Mode::Auto && gains_little(walks);
-        is_settled_ = is_given_up || !guide_->uses_surfaces;
-        if (is_given_up) guide_ = nullptr;
+        if (mode_ == Mode::Auto && gains_little(walks)) {
+            is_given_up_ = true;
+            guide_ = nullptr;
+        }
     } else {
         constexpr uint64_t kFewest = 16 * kFewestWalks;
         guide_ = trained(pass, depth, walks, std::clamp(pass.pixels, kFewest, kMostWalks), seed,
                          has_roulette_);
     }
-    if (guide_) guide_->has_roulette = has_roulette_;
+    if (guide_) {
+        guide_->has_roulette = has_roulette_;
+        guide_->uses_surfaces = !gains_nothing(walks);
+    }
     trained_passes_ = pass.index + 1;
     seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
@@ -383,14 +387,14 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
 
 void Guiding::save(LearnedState& to) const {
     to.put(trained_passes_);
-    to.put(is_settled_);
+    to.put(is_given_up_);
     to.put(guide_ != nullptr);
     if (guide_) guide_->save(to);
 }
 
 void Guiding::load(LearnedState& from) {
     from.get(trained_passes_);
-    from.get(is_settled_);
+    from.get(is_given_up_);
     bool has_guide = false;
     from.get(has_guide);
     guide_ = has_guide ? std::make_unique<Guide>() : nullptr;

@@ -47,7 +47,7 @@ private:
     bool has_roulette_ = false;  ///< The option; see Guide::has_roulette.
     std::unique_ptr<Guide> guide_;
     uint32_t trained_passes_ = 0;  ///< That train() was called for.
-    bool is_settled_ = false;      ///< Whether no later pass is trained for.
+    bool is_given_up_ = false;     ///< By Mode::Auto.
     double seconds_ = 0;           ///< Spent in train() by this process.
 };
 
