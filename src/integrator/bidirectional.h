@@ -16,7 +16,7 @@ public:
     Bidirectional(const DepthOptions& depth, int shortest)
         : depth_(depth), shortest_(shortest), roulette_(0), is_optimised_(false) {}
 
-    /// Sets the thresholds of join_survival() by pixel. A sample of the whole film may contribute to any of them.
+    /// Sets the thresholds of join_survival() by pixel, also for samples of the whole film, for which they must be fixed.
     void set_roulette(std::vector<float> thresholds) { thresholds_ = std::move(thresholds); }
 
     /// Sample counts of bidirectional path tracing, without merges and gathers.

@@ -28,8 +28,6 @@ public:
     const Guide* guide() const { return guide_.get(); }
     /// Whether the guide gains so little that `auto` does without it. There must be a guide.
     bool gains_little(GuidedWalks walks) const;
-    /// Whether walks are better off without a guide at surfaces. There must be a guide.
-    bool gains_nothing(GuidedWalks walks) const;
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);
@@ -42,6 +40,9 @@ private:
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
                                    GuidedWalks guided, uint64_t walks, uint64_t seed,
                                    bool for_roulette) const;
+
+    /// Whether walks are better off without a guide at surfaces. There must be a guide.
+    bool gains_nothing(GuidedWalks walks) const;
 
     Mode mode_ = Mode::Off;
     bool has_roulette_ = false;  ///< The option; see Guide::has_roulette.
