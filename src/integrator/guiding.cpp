@@ -15,10 +15,7 @@ using Clock = std::chrono::steady_clock;
 
 /// Walks of a block, which are recorded in order by one thread.
 constexpr uint64_t kBlock = 256;
-/// Samples of a round and of a walk, which limit its number of walks.
-constexpr uint64_t kMostSamples = uint64_t(1) << 21;
 constexpr int kMostVertices = 10;
-constexpr uint64_t kMostWalks = kMostSamples / (2 * kMostVertices);
 
 /// The start of a light walk, and its vertices with smooth lobes.
 struct EmissionRecord {
@@ -243,14 +240,18 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
 }  // namespace
 
 std::vector<ParamInfo> Guiding::params() {
-    return {{"guide", ParamKind::String, "off",
-             "Learned directions for the walks: off, on, or auto (on, unless the training shows "
-             "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
-             "alone, by footprints of photons [Hey & Purgathofer 2002]. random is a useless guide "
-             "for tests."},
-            {"guide_roulette", ParamKind::Bool, "true",
-             "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
-             "walks had from the same place on. Has no effect if `guide` is off."}};
+    return {
+        {"guide", ParamKind::String, "off",
+         "Learned directions for the walks: off, on, or auto (on, unless the training shows "
+         "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
+         "alone, by footprints of photons [Hey & Purgathofer 2002]. random is a useless guide "
+         "for tests."},
+        {"guide_walks", ParamKind::Int, "100000",
+         "Number of light walks, and of eye walks, that train the guide before the first pass. A "
+         "refit traces as many, after 8, 64, 512 … times as many samples of pixels."},
+        {"guide_roulette", ParamKind::Bool, "true",
+         "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
+         "walks had from the same place on. Has no effect if `guide` is off."}};
 }
 
 Guiding::Guiding(const IntegratorParams& p) {
@@ -260,6 +261,7 @@ Guiding::Guiding(const IntegratorParams& p) {
                                                   {"hp02", Mode::Footprints},
                                                   {"random", Mode::Random}}};
     mode_ = p.choice("guide", kModes);
+    walks_ = uint64_t(p.integer("guide_walks", 256, 1 << 20));
     has_roulette_ = p.flag("guide_roulette");
 }
 
@@ -292,13 +294,16 @@ bool Guiding::gains_nothing(GuidedWalks walks) const {
 }
 
 void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks) {
-    constexpr int kRounds = 4;
-    constexpr uint64_t kFewestWalks = 1024;
+    constexpr int kRounds = 4;  // Each has twice the walks of the last.
+    constexpr uint64_t kFirstPart = (1 << kRounds) - 1;
     // A pass that was dropped and is traced again is trained for once.
     if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > pass.index) return;
-    const bool is_refit = pass.index > 1 && std::has_single_bit(pass.index) &&
-                          std::countr_zero(pass.index) % 3 == 0;  // 8, 64, 512 …
-    if (!pass.scene.has_emitters() || (pass.index > 0 && !is_refit)) return;
+    // Logarithm to base 8, rounded down, of the samples of pixels before a pass over the walks.
+    const auto refits = [&](uint64_t index) {
+        return (std::bit_width(index * pass.pixels / walks_) - 1) / 3;
+    };
+    const bool is_due = pass.index == 0 || refits(pass.index) > refits(pass.index - 1);
+    if (!pass.scene.has_emitters() || !is_due) return;
     const auto begin = Clock::now();
     const uint64_t seed = hash_combine(pass.seed, 0x67756964ull + pass.index);
     // Walks that end early would teach less.
@@ -315,19 +320,16 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
         guide_ = std::make_unique<Guide>(random_guide(bounds.center(), bounds.radius(),
                                                       std::move(pmf), at_infinity, kKappa, seed));
     } else if (pass.index == 0) {
-        const uint64_t first = std::max(kFewestWalks, std::min(pass.pixels, kMostWalks) >> kRounds);
         for (int round = 0; round < kRounds; ++round)
             guide_ =
-                trained(pass, depth, walks, first << round, hash_combine(seed, uint64_t(round)),
-                        has_roulette_ && round == kRounds - 1);
+                trained(pass, depth, walks, (walks_ / kFirstPart) << round,
+                        hash_combine(seed, uint64_t(round)), has_roulette_ && round == kRounds - 1);
         if (mode_ == Mode::Auto && gains_little(walks)) {
             is_given_up_ = true;
             guide_ = nullptr;
         }
     } else {
-        constexpr uint64_t kFewest = 16 * kFewestWalks;
-        guide_ = trained(pass, depth, walks, std::clamp(pass.pixels, kFewest, kMostWalks), seed,
-                         has_roulette_);
+        guide_ = trained(pass, depth, walks, walks_, seed, has_roulette_);
     }
     if (guide_) {
         guide_->has_roulette = has_roulette_;

@@ -20,9 +20,9 @@ public:
 
     /// False with `guide=off`: then no walk is ever guided.
     bool is_on() const { return mode_ != Mode::Off; }
-    /// Trains before pass 0 and refits before passes 8, 64, 512 …, from walks of its own: light walks show eye walks
-    /// where radiance comes from, and eye walks show light walks where importance does. Each round is guided by the one
-    /// before. For Integrator::trace(), before it traces anything.
+    /// Trains before pass 0 and refits after 8, 64, 512 … times as many samples of pixels as walks, from walks of its own:
+    /// light walks show eye walks where radiance comes from, and eye walks show light walks where importance does. Each
+    /// round is guided by the one before. For Integrator::trace(), before it traces anything.
     void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks);
     /// What guides walks until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
@@ -45,6 +45,7 @@ private:
     bool gains_nothing(GuidedWalks walks) const;
 
     Mode mode_ = Mode::Off;
+    uint64_t walks_ = 0;         ///< Of each kind, in training.
     bool has_roulette_ = false;  ///< The option; see Guide::has_roulette.
     std::unique_ptr<Guide> guide_;
     uint32_t trained_passes_ = 0;  ///< That train() was called for.

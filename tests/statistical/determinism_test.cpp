@@ -39,8 +39,8 @@ Rendering render(const Scene& scene, const std::string& integrator, SamplerKind 
     settings.sampler = sampler;
     settings.seed = seed;
     settings.threads = threads;
-    // Guides are fitted again before pass 8.
-    settings.spp = is_guided(integrator) ? 9 : 3;
+    // Guides of 8000 walks are fitted again before pass 40, after as many samples as eight times these walks.
+    settings.spp = is_guided(integrator) ? 41 : 3;
     Renderer renderer(scene, settings);
     const std::atomic<bool> interrupted{false};
     EXPECT_EQ(renderer.run([](const Progress&) {}, interrupted), StopReason::Samples);
@@ -77,17 +77,16 @@ TEST_P(Determinism, OfThreadsAndSeeds) {
 
 INSTANTIATE_TEST_SUITE_P(
     Integrators, Determinism,
-    ::testing::Combine(::testing::Values("path", "light", "bdpt", "bdpt:eorr=true",
-                                         "bdpt:connections=cache", "pcbpt", "vcm", "vcm:exact=true",
-                                         "upg+bdpt", "path:guide=on,guide_roulette=false",
-                                         "bdpt:guide=hp02", "upg+bdpt:guide=on", "sppm",
-                                         "ppm:eye_paths=2", "pm:light_paths=2000",
-                                         "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
-                                         "pssmlt:groups=2,chains=24", "mmlt:groups=2,chains=48",
-                                         "mlt:groups=2,chains=48", "upg+pssmlt:groups=2,chains=24",
-                                         "mps:mutations=2000,precision=0.2",
-                                         "mps:target=path,mutations=1000,precision=0.2"),
-                       ::testing::ValuesIn(kSamplers)),
+    ::testing::Combine(
+        ::testing::Values(
+            "path", "light", "bdpt", "bdpt:eorr=true", "bdpt:connections=cache", "pcbpt", "vcm",
+            "vcm:exact=true", "upg+bdpt", "path:guide=on,guide_roulette=false,guide_walks=8000",
+            "bdpt:guide=hp02,guide_walks=8000", "upg+bdpt:guide=on,guide_walks=8000", "sppm",
+            "ppm:eye_paths=2", "pm:light_paths=2000",
+            "pm:light_paths=2000,cache_error=0.3,cache_rays=32", "pssmlt:groups=2,chains=24",
+            "mmlt:groups=2,chains=48", "mlt:groups=2,chains=48", "upg+pssmlt:groups=2,chains=24",
+            "mps:mutations=2000,precision=0.2", "mps:target=path,mutations=1000,precision=0.2"),
+        ::testing::ValuesIn(kSamplers)),
     [](const auto& p) {
         std::string name = std::get<0>(p.param);
         for (char& c : name)
