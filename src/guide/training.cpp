@@ -136,10 +136,9 @@ struct Share {
 struct Densities {
     double unguided, guided, weight;
 };
-Share best_share(const std::vector<Densities>& samples) {
+Share best_share(const std::vector<Densities>& samples, const GuideLearning& learning) {
     constexpr size_t kFewest = 16;
     constexpr int kSteps = 10;
-    constexpr double kMostShare = 0.9;
     Share best;
     if (samples.size() < kFewest) return best;
     for (const Densities& s : samples) best.weight += s.weight;
@@ -152,17 +151,18 @@ Share best_share(const std::vector<Densities>& samples) {
             sum += s.weight * a * s.guided / ((1 - a) * s.unguided + a * s.guided);
         a = (sum + 0.5 * prior) / (best.weight + prior);
     }
-    best.share = std::min(a, kMostShare);
+    best.share = std::min(a, double(learning.most_share));
     for (const Densities& s : samples)
         best.gain += s.weight * std::log((1 - best.share) + best.share * s.guided / s.unguided);
     best.gain /= best.weight;
+    if (!(best.gain >= double(learning.least_gain))) best.share = best.gain = 0;
     return best;
 }
 
 }  // namespace
 
 GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number,
-                   float least_gain) {
+                   const GuideLearning& learning) {
     constexpr int kSteps = 8;
     constexpr double kSamplesPerLobe = 6;
     GuideFit fit;
@@ -198,12 +198,11 @@ GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uin
         by_class[s.gloss_class].push_back(d);
         all.push_back(d);
     }
-    const Share of_all = best_share(all);
+    const Share of_all = best_share(all, learning);
     double weight = 0, gain = 0;
     for (size_t c = 0; c < by_class.size(); ++c) {
-        Share s = best_share(by_class[c]);
+        Share s = best_share(by_class[c], learning);
         if (!(s.weight > 0)) s = of_all;
-        if (!(s.gain >= double(least_gain))) s.share = s.gain = 0;
         fit.share[c] = float(s.share);
         weight += s.weight, gain += s.weight * s.gain;
     }

@@ -79,22 +79,20 @@ struct GuideFit {
         0;  ///< Mean of log(guided pdf / unguided pdf) over the light, in nats, at these shares.
 };
 
-/// Fits lobes by expectation maximisation with a prior [Ruppert et al. 2020], and the shares with the BSDF as one more
-/// component. Every fourth sample is kept for the shares, so that lobes that fit to noise have none. A function of the
-/// samples' order; `number` seeds its choices. Shares that gain less than `least_gain`, in nats, are 0.
-GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number,
-                   float least_gain);
-
-/// Least gain, in nats, for which directions are guided: they take up to twice the time.
-inline constexpr float kLeastGuideGain = 0.6f;
-
 /// How the cells of a guide learn.
 struct GuideLearning {
     /// footprint_guide() for eye walks alone, instead of fit_guide().
     bool has_footprints = false;
-    /// Argument of fit_guide(), by TransportMode.
-    std::array<float, 2> least_gain{kLeastGuideGain, kLeastGuideGain};
+    /// Shares that gain less, in nats, are 0: guided directions take up to twice the time.
+    float least_gain = 0.6f;
+    float most_share = 0.9f;
 };
+
+/// Fits lobes by expectation maximisation with a prior [Ruppert et al. 2020], and the shares with the BSDF as one more
+/// component. Every fourth sample is kept for the shares, so that lobes that fit to noise have none. A function of the
+/// samples' order; `number` seeds its choices.
+GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number,
+                   const GuideLearning& learning);
 
 /// Footprints of photons [Hey & Purgathofer 2002]: at most GuideMixture::kMostLobes samples, chosen in proportion to
 /// their weights, are lobes of one width, without parallax. The share is ½ everywhere, and the gain is not estimated.

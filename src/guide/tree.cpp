@@ -22,12 +22,6 @@ struct Range {
     size_t size() const { return end - begin; }
 };
 
-/// Area of a rectangle as large as the box's largest side: a rough guess of the surface in it.
-float surface_in(const Bounds3& box) {
-    const Vec3 d = box.hi - box.lo;
-    return std::max({d.x * d.y, d.y * d.z, d.z * d.x});
-}
-
 }  // namespace
 
 struct GuideTree::Builder {
@@ -91,13 +85,12 @@ struct GuideTree::Builder {
         const Leaf& l = leaves[leaf];
         GuideCell& cell = tree.cells_[leaf];
         cell.center = l.box.center();
-        cell.surface = surface_in(l.box);
         for (size_t m = 0; m < 2; ++m) {
             const auto chosen = of_mode(l.ranges[m], m);
             if (chosen.empty()) continue;
             const uint64_t number = hash_combine(seed, 2 * leaf + m);
             if (!learning.has_footprints)
-                fits[m] = fit_guide(chosen, cell.center, number, learning.least_gain[m]);
+                fits[m] = fit_guide(chosen, cell.center, number, learning);
             else if (m == size_t(TransportMode::Radiance))
                 fits[m] = footprint_guide(chosen, number);
             cell.fields[m] = {fits[m].mixture, fits[m].share};
@@ -179,16 +172,6 @@ void GuideTree::set_contributions(const std::vector<ContributionRecord>& records
                 c.beyond =
                     float((s.beyond + prior * all[m].beyond / all[m].beta) / (s.beta + prior));
             }
-}
-
-void GuideTree::set_importance(const std::vector<PlacedWeight>& weights) {
-    std::vector<std::array<double, 8>> sums(cells_.size());
-    for (const PlacedWeight& w : weights)
-        sums[index(w.p)][GuideCell::octant(w.n)] += double(w.weight);
-    for (size_t i = 0; i < cells_.size(); ++i)
-        for (size_t k = 0; k < sums[i].size(); ++k)
-            cells_[i].importance[k] =
-                cells_[i].surface > 0 ? float(sums[i][k] / double(cells_[i].surface)) : 0.0f;
 }
 
 }  // namespace etendue

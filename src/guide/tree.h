@@ -4,15 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "guide/placed_density.h"
 #include "guide/training.h"
 
 namespace etendue {
-
-/// A weight at a place on a surface.
-struct PlacedWeight {
-    Vec3 p, n;  ///< n: normal on the side that is meant.
-    float weight;
-};
 
 /// What walks contribute to the image from a place on, on average and per unit of their throughput; negative where
 /// unknown.
@@ -26,7 +21,7 @@ struct ContributionRecord {
     Vec3 p;
     float beta = 0;                ///< Throughput.
     float here = 0, beyond = 0;    ///< As WalkContribution, times the throughput.
-    uint8_t mode = 0, octant = 0;  ///< TransportMode of the walk; GuideCell::octant().
+    uint8_t mode = 0, octant = 0;  ///< TransportMode of the walk; octant().
 };
 
 /// The learned directions of a cell. The fields are indexed by the TransportMode of the walks that they guide.
@@ -38,14 +33,8 @@ struct GuideCell {
         std::array<WalkContribution, 8> contribution{};
     };
     Vec3 center;
-    float surface = 0;  ///< Rough area of the surfaces in it.
-    /// Per area, by octant of the normal, which tells the sides of a wall apart; see GuideTree::set_importance().
-    std::array<float, 8> importance{};
     std::array<Field, 2> fields;
 
-    static size_t octant(Vec3 n) {
-        return size_t(n.x < 0) | size_t(n.y < 0) << 1 | size_t(n.z < 0) << 2;
-    }
     const Field& field(TransportMode mode) const { return fields[size_t(mode)]; }
 };
 
@@ -57,9 +46,6 @@ public:
               const GuideLearning& learning = {});
     /// One cell for all places.
     explicit GuideTree(const GuideCell& cell) : nodes_(1), cells_{cell} {}
-
-    /// Sums of the weights in each cell over its surface.
-    void set_importance(const std::vector<PlacedWeight>& weights);
 
     /// Means of the records in each cell, octant and mode; unknown where there are few records.
     void set_contributions(const std::vector<ContributionRecord>& records);

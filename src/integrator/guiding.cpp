@@ -155,8 +155,7 @@ void record_contributions(const SubPath& path, TransportMode mode, int max_verti
         if (!v.is_connectible || v.kind != Vertex::Kind::Surface) continue;
         const auto vertices = size_t(i + 1);
         records.push_back({v.p, luminance(v.beta), sums[vertices] - hits[vertices],
-                           sums[vertices + 1], uint8_t(mode),
-                           uint8_t(GuideCell::octant(facing_normal(v)))});
+                           sums[vertices + 1], uint8_t(mode), uint8_t(octant(facing_normal(v)))});
     }
 }
 
@@ -172,11 +171,24 @@ TechniqueCounts joins_of(GuidedWalks walks, uint64_t light_paths) {
     return {.hit = 1, .next_event = 1, .connect = 1, .splat = N};
 }
 
-/// Where both walks are joined, guided directions take paths away from techniques that need no guide, and must gain more.
-GuideLearning learning_of(GuidedWalks walks, bool has_footprints) {
+/// Whether a method joins eye walks to light walks.
+bool joins_both(GuidedWalks walks) {
+    return walks == GuidedWalks::Both || walks == GuidedWalks::BothWithPairs;
+}
+
+/// Where both walks are joined, guided directions take paths away from techniques that need no guide, and must gain more than
+/// eye walks alone, for which little makes up for the time.
+GuideLearning learning_at_surfaces(GuidedWalks walks, bool has_footprints) {
     GuideLearning learning{.has_footprints = has_footprints};
-    if (walks == GuidedWalks::Both || walks == GuidedWalks::BothWithPairs)
-        learning.least_gain = {1.2f, 1.2f};
+    if (walks == GuidedWalks::Eye) learning.least_gain = 0.3f;
+    if (joins_both(walks)) learning.least_gain = 1.2f;
+    return learning;
+}
+
+/// Pairs find the useful ones among all light paths of a pass, which must not be alike.
+GuideLearning learning_of_emission(GuidedWalks walks) {
+    GuideLearning learning;
+    if (walks == GuidedWalks::BothWithPairs) learning.most_share = 0.5f;
     return learning;
 }
 
@@ -201,7 +213,8 @@ double sum_of_weights(const std::vector<GuideSample>& samples) {
 }
 
 /// Emission is learned by what walks bring to the places that the lens sees: an estimate of their splats.
-void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& records, uint64_t seed,
+void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& records,
+                    const PlacedDensity& importance, const GuideLearning& learning, uint64_t seed,
                     Guide& guide) {
     constexpr double kByPower = 0.3;
     std::vector<GuideSample> finite;
@@ -210,8 +223,7 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
     double sum = 0;
     for (const EmissionRecord& r : records) {
         GuideSample s = r.sample;
-        for (const PlacedWeight& v : r.reached)
-            s.weight += v.weight * guide.surfaces.cell(v.p).importance[GuideCell::octant(v.n)];
+        for (const PlacedWeight& v : r.reached) s.weight += v.weight * float(importance(v.p, v.n));
         if (!(s.weight > 0)) continue;
         by_emitter[r.emitter->index] += double(s.weight);
         sum += double(s.weight);
@@ -221,11 +233,10 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
             at_infinity[r.emitter->index].push_back(s);
     }
     if (!(sum > 0)) return;
-    guide.emission = GuideTree(finite, seed);
+    guide.emission = GuideTree(finite, seed, learning);
     double gain = sum_of_weights(finite) * double(guide.emission.gain(TransportMode::Importance));
     for (const auto& [emitter, samples] : at_infinity) {
-        const GuideFit fit =
-            fit_guide(thinned(samples), {}, hash_combine(seed, emitter), kLeastGuideGain);
+        const GuideFit fit = fit_guide(thinned(samples), {}, hash_combine(seed, emitter), learning);
         gain += sum_of_weights(samples) * double(fit.gain);
         guide.add_at_infinity({emitter, fit});
     }
@@ -274,10 +285,10 @@ bool Guiding::gains_little(GuidedWalks walks) const {
                light = guide_->surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
                emission = guide_->emission_gain >= kLeastLightGain;
     switch (walks) {
-    case GuidedWalks::Eye:
-    case GuidedWalks::BothWithPairs: return !eye;
+    case GuidedWalks::Eye: return !eye;
     case GuidedWalks::Light: return !light && !emission;
-    case GuidedWalks::Both: return !eye && !emission;
+    case GuidedWalks::Both:
+    case GuidedWalks::BothWithPairs: return !eye && !emission;
     }
     return true;
 }
@@ -285,9 +296,8 @@ bool Guiding::gains_little(GuidedWalks walks) const {
 bool Guiding::gains_nothing(GuidedWalks walks) const {
     // Adjoint-driven roulette keeps more vertices, and a method that joins both walks joins each of them.
     constexpr float kLeastGain = 0.2f;
-    const bool joins_both = walks == GuidedWalks::Both || walks == GuidedWalks::BothWithPairs,
-               has_gains = mode_ == Mode::On || mode_ == Mode::Auto;
-    return joins_both && has_gains &&
+    const bool has_gains = mode_ == Mode::On || mode_ == Mode::Auto;
+    return joins_both(walks) && has_gains &&
            std::max({guide_->surfaces.gain(TransportMode::Radiance),
                      guide_->surfaces.gain(TransportMode::Importance), guide_->emission_gain}) <
                kLeastGain;
@@ -376,14 +386,14 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
         all.light_contribution += b.light_contribution;
     }
     auto guide = std::make_unique<Guide>();
-    const GuideLearning learning = learning_of(guided, mode_ == Mode::Footprints);
-    guide->surfaces = GuideTree(all.samples, seed, learning);
+    guide->surfaces =
+        GuideTree(all.samples, seed, learning_at_surfaces(guided, mode_ == Mode::Footprints));
     if (guide->surfaces.is_empty()) return guide;
-    guide->surfaces.set_importance(all.importons);
     guide->surfaces.set_contributions(all.contributions);
     guide->light_contribution = float(all.light_contribution / double(walks));
-    if (!learning.has_footprints)
-        learn_emission(pass.scene, all.emission, hash_combine(seed, 1), *guide);
+    if (mode_ != Mode::Footprints)
+        learn_emission(pass.scene, all.emission, PlacedDensity(std::move(all.importons)),
+                       learning_of_emission(guided), hash_combine(seed, 1), *guide);
     return guide;
 }
 

@@ -8,8 +8,7 @@
 
 namespace etendue {
 
-/// Walks that a method guides, by which `auto` decides. Where each eye path finds pairs among all light paths of a pass,
-/// it has found those that get out of a lamp already: the guide must gain for eye walks.
+/// Walks that a method guides.
 enum class GuidedWalks { Eye, Light, Both, BothWithPairs };
 
 class Guiding {

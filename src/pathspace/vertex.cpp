@@ -28,7 +28,7 @@ GuideView guide_view(const Vertex& v, const GuideCell& cell, Vec3 from) {
 }
 
 WalkContribution expected_contribution(const Vertex& v, const GuideCell& cell, TransportMode mode) {
-    return cell.field(mode).contribution[GuideCell::octant(facing_normal(v))];
+    return cell.field(mode).contribution[octant(facing_normal(v))];
 }
 
 void Vertex::set_guide(const GuideCell& cell, TransportMode mode, bool both) {

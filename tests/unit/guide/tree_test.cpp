@@ -77,7 +77,7 @@ std::vector<ContributionRecord> contributions(int count) {
         r.beyond = r.beta * at.x * (is_above ? 1.0f : 0.1f) * (is_eye ? 1.0f : 5.0f);
         r.here = 2 * r.beyond;
         r.mode = uint8_t(is_eye ? kEye : kLight);
-        r.octant = uint8_t(GuideCell::octant({0, 0, is_above ? 1.0f : -1.0f}));
+        r.octant = uint8_t(octant({0, 0, is_above ? 1.0f : -1.0f}));
         records.push_back(r);
     }
     return records;

@@ -1,0 +1,55 @@
+// The density of weights on surfaces.
+
+#include "guide/placed_density.h"
+
+#include <gtest/gtest.h>
+
+#include "math/hash.h"
+
+namespace etendue::test {
+namespace {
+
+/// Weights of 0.01 each at random places of a square with sides of 2 at z = 0: a hundred per area.
+std::vector<PlacedWeight> square(Vec3 n) {
+    std::vector<PlacedWeight> weights;
+    for (uint32_t i = 0; i < 40'000; ++i) {
+        const auto u = [&](uint32_t k) {
+            return 2 * to_unit_float(uint32_t(hash_combine(i, k))) - 1;
+        };
+        weights.push_back({{u(0), u(1), 0}, n, 0.01f});
+    }
+    return weights;
+}
+
+TEST(PlacedDensity, IsTheSumOfWeightsOverTheArea) {
+    const PlacedDensity density(square({0, 0, 1}));
+    double mean = 0;
+    constexpr int kSteps = 40;
+    for (int i = 0; i < kSteps; ++i)
+        for (int k = 0; k < kSteps; ++k)
+            mean +=
+                density({2 * (float(i) + 0.5f) / kSteps - 1, 2 * (float(k) + 0.5f) / kSteps - 1, 0},
+                        {0, 0, 1});
+    // It is 0 between the boxes.
+    EXPECT_NEAR(mean / (kSteps * kSteps), 100, 10);
+}
+
+TEST(PlacedDensity, TellsTheSidesOfAWallApart) {
+    const PlacedDensity density(square({0, 0, 1}));
+    EXPECT_EQ(density({0.1f, 0.2f, 0}, {0, 0, -1}), 0);
+}
+
+TEST(PlacedDensity, IsZeroAwayFromTheWeights) {
+    const PlacedDensity density(square({0, 0, 1}));
+    EXPECT_EQ(density({1.1f, 0.2f, 0}, {0, 0, 1}), 0);
+    EXPECT_EQ(density({0.1f, 0.2f, 0.1f}, {0, 0, 1}), 0);
+    EXPECT_EQ(PlacedDensity({})({0, 0, 0}, {0, 0, 1}), 0);
+}
+
+TEST(PlacedDensity, TakesCoincidentWeights) {
+    const PlacedDensity density(std::vector<PlacedWeight>(1000, {{1, 2, 3}, {0, 0, 1}, 1}));
+    EXPECT_EQ(density({0, 2, 3}, {0, 0, 1}), 0);
+}
+
+}  // namespace
+}  // namespace etendue::test
