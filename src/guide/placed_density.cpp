@@ -5,9 +5,7 @@
 namespace etendue {
 
 PlacedDensity::PlacedDensity(std::vector<PlacedWeight> weights) {
-    if (weights.empty()) return;
-    nodes_.resize(1);
-    split(0, weights.data(), weights.data() + weights.size());
+    if (!weights.empty()) split(KdSplits::kRoot, weights.data(), weights.data() + weights.size());
 }
 
 void PlacedDensity::split(uint32_t node, PlacedWeight* begin, PlacedWeight* end) {
@@ -21,11 +19,9 @@ void PlacedDensity::split(uint32_t node, PlacedWeight* begin, PlacedWeight* end)
         std::nth_element(begin, middle, end, [&](const PlacedWeight& a, const PlacedWeight& b) {
             return a.p[axis] < b.p[axis];
         });
-        const auto child = uint32_t(nodes_.size());
-        nodes_.resize(child + 2);
-        nodes_[node] = {middle->p[axis], uint32_t(axis) & 3, child & 0x3fffffffu};
-        split(child, begin, middle);
-        split(child + 1, middle, end);
+        const uint32_t below = splits_.divide(node, axis, middle->p[axis]);
+        split(below, begin, middle);
+        split(below + 1, middle, end);
         return;
     }
     // A surface ends a little beyond its outermost places.
@@ -39,15 +35,13 @@ void PlacedDensity::split(uint32_t node, PlacedWeight* begin, PlacedWeight* end)
     if (area > 0)
         for (const PlacedWeight* w = begin; w != end; ++w)
             box.density[octant(w->n)] += double(w->weight) / area;
-    nodes_[node] = {0, 3, uint32_t(boxes_.size()) & 0x3fffffffu};
+    splits_.set_leaf(node, boxes_.size());
     boxes_.push_back(box);
 }
 
 double PlacedDensity::operator()(Vec3 p, Vec3 n) const {
-    if (nodes_.empty()) return 0;
-    uint32_t i = 0;
-    while (nodes_[i].axis < 3) i = nodes_[i].child + (p[int(nodes_[i].axis)] >= nodes_[i].split);
-    const Box& box = boxes_[nodes_[i].child];
+    if (boxes_.empty()) return 0;
+    const Box& box = boxes_[splits_.leaf(p)];
     for (int axis = 0; axis < 3; ++axis)
         if (!(p[axis] >= box.bounds.lo[axis] && p[axis] <= box.bounds.hi[axis])) return 0;
     return box.density[octant(n)];

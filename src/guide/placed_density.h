@@ -2,9 +2,9 @@
 // Density of weights on surfaces.
 
 #include <array>
-#include <cstdint>
 #include <vector>
 
+#include "guide/kd_splits.h"
 #include "math/bounds.h"
 
 namespace etendue {
@@ -29,18 +29,13 @@ public:
     double operator()(Vec3 p, Vec3 n) const;
 
 private:
-    struct Node {
-        float split = 0;
-        uint32_t axis : 2 = 3;    ///< 3: a leaf.
-        uint32_t child : 30 = 0;  ///< The first of two nodes, or the box.
-    };
     struct Box {
         Bounds3 bounds;
         std::array<double, 8> density{};  ///< By octant.
     };
     void split(uint32_t node, PlacedWeight* begin, PlacedWeight* end);
 
-    std::vector<Node> nodes_;
+    KdSplits splits_;  ///< Its leaves are boxes.
     std::vector<Box> boxes_;
 };
 

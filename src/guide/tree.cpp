@@ -58,14 +58,12 @@ struct GuideTree::Builder {
                 std::stable_partition(begin + ptrdiff_t(range.begin), begin + ptrdiff_t(range.end),
                                       [&](uint32_t i) { return samples[i].p[axis] < at; }) -
                 begin);
-            const auto child = uint32_t(tree.nodes_.size());
-            tree.nodes_.resize(child + 2);
-            tree.nodes_[node] = {at, uint32_t(axis) & 3, child & 0x3fffffffu};
-            split(child, {range.begin, middle}, ranges);
-            split(child + 1, {middle, range.end}, ranges);
+            const uint32_t below = tree.splits_.divide(node, axis, at);
+            split(below, {range.begin, middle}, ranges);
+            split(below + 1, {middle, range.end}, ranges);
             return;
         }
-        tree.nodes_[node] = {0, 3, uint32_t(leaves.size()) & 0x3fffffffu};
+        tree.splits_.set_leaf(node, leaves.size());
         leaves.push_back({box, ranges});
     }
 
@@ -104,9 +102,8 @@ GuideTree::GuideTree(const std::vector<GuideSample>& samples, uint64_t seed,
     Builder builder{*this, samples, learning};
     builder.order.resize(samples.size());
     for (size_t i = 0; i < samples.size(); ++i) builder.order[i] = uint32_t(i);
-    nodes_.resize(1);
     const Range all{0, samples.size()};
-    builder.split(0, all, {all, all});
+    builder.split(KdSplits::kRoot, all, {all, all});
     cells_.resize(builder.leaves.size());
     std::vector<std::array<GuideFit, 2>> fits(cells_.size());
     tbb::parallel_for(size_t(0), cells_.size(),
@@ -116,7 +113,7 @@ GuideTree::GuideTree(const std::vector<GuideSample>& samples, uint64_t seed,
     std::vector<std::array<double, 2>> light(cells_.size());
     std::array<size_t, 2> count{};
     for (const GuideSample& s : samples)
-        light[index(s.p)][s.mode] += double(s.weight), ++count[s.mode];
+        light[splits_.leaf(s.p)][s.mode] += double(s.weight), ++count[s.mode];
     const bool has_both = count[0] > 0 && count[1] > 0;
     for (size_t m = 0; m < 2; ++m) {
         double gain = 0, sum = 0;
@@ -149,12 +146,12 @@ void GuideTree::set_contributions(const std::vector<ContributionRecord>& records
     std::vector<ByOctant> cells(cells_.size());
     std::array<Sums, 2> all;
     for (const ContributionRecord& r : records) {
-        cells[index(r.p)][r.mode][r.octant].add(r);
+        cells[splits_.leaf(r.p)][r.mode][r.octant].add(r);
         all[r.mode].add(r);
     }
     std::vector<std::array<std::array<double, 8>, 2>> clamped(cells_.size());
     for (const ContributionRecord& r : records) {
-        const size_t cell = index(r.p);
+        const size_t cell = splits_.leaf(r.p);
         const Sums& s = cells[cell][r.mode][r.octant];
         clamped[cell][r.mode][r.octant] +=
             std::min(double(r.here), kLargestHere * double(r.beta) * s.here / s.beta);

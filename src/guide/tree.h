@@ -45,50 +45,38 @@ public:
     GuideTree(const std::vector<GuideSample>& samples, uint64_t seed,
               const GuideLearning& learning = {});
     /// One cell for all places.
-    explicit GuideTree(const GuideCell& cell) : nodes_(1), cells_{cell} {}
+    explicit GuideTree(const GuideCell& cell) : cells_{cell} {}
 
     /// Means of the records in each cell, octant and mode; unknown where there are few records.
     void set_contributions(const std::vector<ContributionRecord>& records);
 
     bool is_empty() const { return cells_.empty(); }
     /// The cell that holds `p`. Not where the tree is empty.
-    const GuideCell& cell(Vec3 p) const { return cells_[index(p)]; }
+    const GuideCell& cell(Vec3 p) const { return cells_[splits_.leaf(p)]; }
     const std::vector<GuideCell>& cells() const { return cells_; }
     /// Mean of GuideFit::gain for walks of a mode, weighted by the product of radiance and importance in the cells.
     float gain(TransportMode mode) const { return gain_[size_t(mode)]; }
     size_t memory_bytes() const {
-        return nodes_.capacity() * sizeof(Node) + cells_.capacity() * sizeof(GuideCell);
+        return splits_.memory_bytes() + cells_.capacity() * sizeof(GuideCell);
     }
 
     template <class State>
     void save(State& to) const {
-        to.put(nodes_);
+        splits_.save(to);
         to.put(cells_);
         to.put(gain_);
     }
     template <class State>
     void load(State& from) {
-        from.get(nodes_);
+        splits_.load(from);
         from.get(cells_);
         from.get(gain_);
     }
 
 private:
-    struct Node {
-        float split = 0;
-        uint32_t axis : 2 = 3;    ///< 3: a leaf.
-        uint32_t child : 30 = 0;  ///< The first of two nodes, or the cell.
-    };
     struct Builder;
-    /// Of the cell that holds `p`.
-    size_t index(Vec3 p) const {
-        uint32_t i = 0;
-        while (nodes_[i].axis < 3)
-            i = nodes_[i].child + (p[int(nodes_[i].axis)] >= nodes_[i].split);
-        return nodes_[i].child;
-    }
 
-    std::vector<Node> nodes_;
+    KdSplits splits_;  ///< Its leaves are cells.
     std::vector<GuideCell> cells_;
     std::array<float, 2> gain_{};
 };
