@@ -185,10 +185,12 @@ GuideLearning learning_at_surfaces(GuidedWalks walks, bool has_footprints) {
     return learning;
 }
 
-/// Pairs find the useful ones among all light paths of a pass, which must not be alike.
+/// Light paths are learned by their splats, but other techniques need other ones. Pairs find the useful ones among all light
+/// paths of a pass, which must not be alike.
 GuideLearning learning_of_emission(GuidedWalks walks) {
     GuideLearning learning;
-    if (walks == GuidedWalks::BothWithPairs) learning.most_share = 0.5f;
+    if (walks == GuidedWalks::Both) learning.most_share = 0.7f;
+    if (walks == GuidedWalks::BothWithPairs) learning.most_share = 0.3f;
     return learning;
 }
 
