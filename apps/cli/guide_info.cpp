@@ -145,9 +145,7 @@ json GuideInfo::run(const Scene& scene) const {
     const Image image = learned.shares();
     if (!shares.empty()) write_image(shares, image);
     const auto mean = LearnedGuide::mean_shares(image);
-    json kept = json::array(), choices = json::array();
-    for (const auto& [method, is_kept] : learned.kept_by_auto())
-        if (is_kept) kept.push_back(method);
+    json choices = json::array();
     for (const auto& c : learned.emitter_choices(5))
         choices.push_back({{"emitter", c.name}, {"guided", c.guided}, {"by_power", c.by_power}});
     json j{{"method", learned.method()},
@@ -158,7 +156,7 @@ json GuideInfo::run(const Scene& scene) const {
            {"gain_emission", guide.emission_gain},
            {"share_eye", mean[0]},
            {"share_light", mean[1]},
-           {"kept_by_auto", kept},
+           {"kept_by_auto", learned.is_kept_by_auto()},
            {"emitter_choices", choices}};
     if (!place.is_null()) j["place"] = place;
     return j;
@@ -179,10 +177,8 @@ std::string guide_text(const json& j) {
             fmt::format("    \"{}\" emits a share of {:.3f} of the light paths, by power {:.3f}\n",
                         c["emitter"].get<std::string>(), c["guided"].get<double>(),
                         c["by_power"].get<double>());
-    const auto kept = j["kept_by_auto"].get<std::vector<std::string>>();
-    text += fmt::format("    guide=auto  {}\n",
-                        kept.empty() ? "guides no method here"
-                                     : fmt::format("guides {}", fmt::join(kept, ", ")));
+    text += fmt::format("    guide=auto  {} it\n",
+                        j["kept_by_auto"].get<bool>() ? "keeps" : "does without");
     return j.contains("place") ? text + place_text(j["place"]) : text;
 }
 

@@ -282,8 +282,9 @@ bool Guiding::gains_little(GuidedWalks walks) const {
     // In nats; these tell the scenes of docs/guiding.md apart. Guided eye walks take paths away from techniques that need
     // no guide, so they must gain more than emission, without which most light paths may be lost. What light walks gain
     // says little about methods that have both walks.
-    constexpr float kLeastEyeGain = 1.0f, kLeastLightGain = 0.4f;
-    const bool eye = guide_->surfaces.gain(TransportMode::Radiance) >= kLeastEyeGain,
+    constexpr float kLeastEyeGain = 1.0f, kLeastGainAlone = 0.75f, kLeastLightGain = 0.4f;
+    const bool eye = guide_->surfaces.gain(TransportMode::Radiance) >=
+                     (walks == GuidedWalks::Eye ? kLeastGainAlone : kLeastEyeGain),
                light = guide_->surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
                emission = guide_->emission_gain >= kLeastLightGain;
     switch (walks) {
@@ -310,12 +311,15 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     constexpr uint64_t kFirstPart = (1 << kRounds) - 1;
     // A pass that was dropped and is traced again is trained for once.
     if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > pass.index) return;
+    if (!pass.scene.has_emitters()) return;
     // Logarithm to base 8, rounded down, of the samples of pixels before a pass over the walks.
     const auto refits = [&](uint64_t index) {
         return (std::bit_width(index * pass.pixels / walks_) - 1) / 3;
     };
-    const bool is_due = pass.index == 0 || refits(pass.index) > refits(pass.index - 1);
-    if (!pass.scene.has_emitters() || !is_due) return;
+    // As many walks would not gain more where a guide gains nothing.
+    const bool is_due =
+        pass.index == 0 || (guide_->uses_surfaces && refits(pass.index) > refits(pass.index - 1));
+    if (!is_due) return;
     const auto begin = Clock::now();
     const uint64_t seed = hash_combine(pass.seed, 0x67756964ull + pass.index);
     // Walks that end early would teach less.

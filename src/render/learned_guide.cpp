@@ -22,20 +22,25 @@ constexpr std::array<Choice<GuidedWalks>, 7> kMethods{{{"path", GuidedWalks::Eye
                                                        {"upg+bdpt", GuidedWalks::BothWithPairs},
                                                        {"pcbpt", GuidedWalks::Both}}};
 
-IntegratorParams guided_params(IntegratorSpec& spec) {
-    const IntegratorEntry& entry = integrator_entry(spec.name);
+GuidedWalks guided_walks(const std::string& method) {
     std::vector<std::string> names;
-    for (const auto& m : kMethods) names.push_back(m.name);
-    if (std::find(names.begin(), names.end(), spec.name) == names.end())
-        throw std::runtime_error(
-            fmt::format("integrator \"{}\" has no guide; choose one that has (-i): {}", spec.name,
-                        fmt::join(names, ", ")));
+    for (const auto& m : kMethods) {
+        if (method == m.name) return m.value;
+        names.push_back(m.name);
+    }
+    throw std::runtime_error(
+        fmt::format("integrator \"{}\" has no guide; choose one that has (-i): {}", method,
+                    fmt::join(names, ", ")));
+}
+
+IntegratorParams guided_params(IntegratorSpec& spec) {
     std::string& guide = spec.params["guide"];
     if (guide != "random" && guide != "hp02") guide = "on";
-    return {spec, entry.info};
+    return {spec, integrator_entry(spec.name).info};
 }
 
 Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threads) {
+    const GuidedWalks walks = guided_walks(spec.name);
     const IntegratorParams params = guided_params(spec);
     Guiding guiding(params);
     const DepthOptions depth = DepthOptions::from(params);
@@ -59,7 +64,7 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
                        .chunks = {},
                        .for_each_other_path = for_each,
                        .for_each_chain = {}},
-                      depth, GuidedWalks::Both);
+                      depth, walks);
     });
     if (!guiding.guide() || guiding.guide()->surfaces.is_empty())
         throw std::runtime_error(
@@ -136,10 +141,8 @@ LearnedGuide::LearnedGuide(const Scene& scene, IntegratorSpec spec, uint64_t see
     : scene_(scene), method_(spec.name), seed_(seed), threads_(threads),
       guiding_(train(scene, spec, seed, threads)) {}
 
-std::vector<std::pair<std::string, bool>> LearnedGuide::kept_by_auto() const {
-    std::vector<std::pair<std::string, bool>> kept;
-    for (const auto& m : kMethods) kept.emplace_back(m.name, !guiding_.gains_little(m.value));
-    return kept;
+bool LearnedGuide::is_kept_by_auto() const {
+    return !guiding_.gains_little(guided_walks(method_));
 }
 
 std::vector<LearnedGuide::EmitterChoice> LearnedGuide::emitter_choices(size_t most) const {

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "image/image.h"
@@ -50,8 +49,8 @@ public:
 
     const Guide& guide() const { return *guiding_.guide(); }
     const std::string& method() const { return method_; }
-    /// All methods that have a guide, and whether guide=auto would keep it.
-    std::vector<std::pair<std::string, bool>> kept_by_auto() const;
+    /// Whether guide=auto would keep the guide of the method.
+    bool is_kept_by_auto() const;
 
     /// An emitter that light paths choose with another probability than next events do.
     struct EmitterChoice {
