@@ -8,7 +8,7 @@
 
 namespace etendue {
 
-/// Walks that a method guides.
+/// Walks that a method guides. With pairs, each eye path meets the light paths of all pixels.
 enum class GuidedWalks { Eye, Light, Both, BothWithPairs };
 
 class Guiding {
