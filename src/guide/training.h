@@ -85,7 +85,7 @@ struct GuideLearning {
     bool has_footprints = false;
     /// Shares that gain less, in nats, are 0: guided directions take up to twice the time.
     float least_gain = 0.6f;
-    float most_share = 0.9f;
+    float most_share = 0.9f;  ///< Of guided directions.
 };
 
 /// Fits lobes by expectation maximisation with a prior [Ruppert et al. 2020], and the shares with the BSDF as one more

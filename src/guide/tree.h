@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "guide/kd_splits.h"
 #include "guide/placed_density.h"
 #include "guide/training.h"
 
