@@ -10,7 +10,7 @@ find_package(Imath REQUIRED)
 find_package(Boost REQUIRED)  # Boost.Math, header only
 find_path(XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
 
-if(ETENDUE_PYTHON)
+if(ETENDUE_PYTHON OR ETENDUE_TESTS OR ETENDUE_FUZZ)
     find_package(OpenEXR REQUIRED)
     find_package(PNG REQUIRED)
     find_package(JPEG REQUIRED)

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "system/available_memory.h"
 #include "image/atomic_file.h"
 #include "image/image_io.h"
 #include "interrupt.h"
@@ -108,6 +109,7 @@ void check_writable(const std::string& path) {
 }
 
 void RenderCommand::check_options() const {
+    check_limits({.spp = spp, .seconds = {}, .error = {}});
     check_image_extension(output);
     const auto folder = std::filesystem::path(output).parent_path();
     if (!folder.empty() && std::filesystem::exists(folder) &&
@@ -168,6 +170,9 @@ void RenderCommand::run() const {
                        (1 << 20));
     const std::unique_ptr<Renderer> owned = make_renderer(s, settings);
     Renderer& renderer = *owned;
+    for (const std::string& w :
+         memory_warnings(s, settings.integrator, renderer.light_paths(), available_memory()))
+        fmt::print(stderr, "warning: {}\n", w);
     check_outputs();
 
     const Interrupts interrupts = catch_interrupts(grace);

@@ -397,6 +397,8 @@ void set(SceneDescription& scene, const std::string& path, nb::handle value) {
 }
 
 std::vector<std::string> paths(const SceneDescription& scene) {
+    // Groups of shapes within others multiply the paths that lead to what they contain.
+    constexpr size_t kMostPaths = 1'000'000;
     std::vector<std::string> all;
     const std::function<void(int, const std::string&, int)> visit =
         [&](int index, const std::string& prefix, int depth) {
@@ -405,6 +407,8 @@ std::vector<std::string> paths(const SceneDescription& scene) {
                     all.push_back(prefix + p.name);
             for (const Named& c : children_of(scene, index)) {
                 all.push_back(prefix + c.key);
+                if (all.size() > kMostPaths)
+                    throw nb::value_error("the description has more than 1000000 paths");
                 if (depth < kDeepestNesting) visit(c.object, prefix + c.key + ".", depth + 1);
             }
         };

@@ -1,7 +1,9 @@
 #include "description/mesh_data.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 namespace etendue {
@@ -65,6 +67,33 @@ void drop_degenerate(MeshData& mesh) {
         mesh.triangles, [&](const auto& t) { return !EdgeProduct(mesh, t).is_valid(); }));
 }
 
+/// Removes the vertices of no triangle; the others keep their order.
+void drop_unused(MeshData& mesh) {
+    std::vector<bool> is_used(mesh.positions.size());
+    for (const MeshData::Triangle& t : mesh.triangles)
+        for (const uint32_t v : t) is_used[v] = true;
+    const auto used = size_t(std::count(is_used.begin(), is_used.end(), true));
+    if (used == is_used.size()) return;
+    std::vector<uint32_t> place(is_used.size());
+    uint32_t next = 0;
+    for (size_t i = 0; i < is_used.size(); ++i)
+        if (is_used[i]) place[i] = next++;
+    const auto keep_used = [&](auto& values) {
+        if (values.empty()) return;
+        std::remove_reference_t<decltype(values)> kept;
+        kept.reserve(used);
+        for (size_t i = 0; i < values.size(); ++i)
+            if (is_used[i]) kept.push_back(values[i]);
+        values = std::move(kept);
+    };
+    keep_used(mesh.positions);
+    keep_used(mesh.normals);
+    keep_used(mesh.uvs);
+    keep_used(mesh.colors);
+    for (MeshData::Triangle& t : mesh.triangles)
+        for (uint32_t& v : t) v = place[v];
+}
+
 void repair_normals(MeshData& mesh) {
     std::vector<uint32_t> missing;
     for (uint32_t i = 0; i < mesh.normals.size(); ++i) {
@@ -83,6 +112,12 @@ void repair_normals(MeshData& mesh) {
 }
 
 }  // namespace
+
+size_t memory_bytes(const MeshData& mesh) {
+    const auto bytes = [](const auto& values) { return values.size() * sizeof(values[0]); };
+    return bytes(mesh.positions) + bytes(mesh.normals) + bytes(mesh.uvs) + bytes(mesh.colors) +
+           bytes(mesh.triangles);
+}
 
 void compute_vertex_normals(MeshData& mesh) {
     mesh.normals.assign(mesh.positions.size(), Vec3{});
@@ -113,6 +148,7 @@ void finish_mesh(MeshData& mesh, const MeshOptions& options, const SourceLocatio
     if (mesh.triangles.empty())
         throw SceneError(where, mesh.dropped_degenerate ? "all triangles of the mesh have zero area"
                                                         : "the mesh has no triangles");
+    drop_unused(mesh);
     if (mesh.face_normals) mesh.normals.clear();
     repair_normals(mesh);
     if (options.flip_tex_coords)

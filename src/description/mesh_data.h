@@ -25,6 +25,9 @@ struct MeshData {
     uint32_t replaced_normals = 0;    ///< Normals that were zero or not finite in the file.
 };
 
+/// Memory of the arrays.
+size_t memory_bytes(const MeshData& mesh);
+
 /// How the numbers of a mesh file are interpreted. Mitsuba flips texture coordinates by default for .obj, but not for
 /// .ply and .serialized.
 struct MeshOptions {
@@ -32,7 +35,7 @@ struct MeshOptions {
 };
 
 /// Last step of every mesh reader: checks that indices are in range and that positions and texture coordinates are
-/// finite, removes triangles of zero area, normalises normals (those that are zero or not finite are computed from the
+/// finite, removes triangles of zero area and vertices of no triangle, normalises normals (those that are zero or not finite are computed from the
 /// faces), and applies the options. Throws SceneError where a check fails or no triangle is left.
 void finish_mesh(MeshData& mesh, const MeshOptions& options, const SourceLocation& where);
 

@@ -147,6 +147,13 @@ Rgb Params::rgb(std::string_view name, Rgb fallback, float lo) const {
 Transform Params::transform(std::string_view name) const {
     const Transform* t = get<Transform>(name, "transform");
     if (t && !t->is_invertible()) fail(name, fmt::format("transform \"{}\" is singular", name));
+    if (t)
+        for (const auto& row : t->matrix())
+            for (const double v : row)
+                if (!std::isfinite(float(v)))
+                    fail(name, fmt::format("transform \"{}\" has the entry {}, which is out of "
+                                           "range for single precision",
+                                           name, v));
     return t ? *t : Transform();
 }
 

@@ -31,6 +31,12 @@ public:
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;
 
+    /// Memory of a film, by pixel. `groups`: see set_groups().
+    static uint64_t bytes_per_pixel(bool has_splats, int groups) {
+        return sizeof(Moments) + sizeof(Rgb) + (2 + uint64_t(groups)) * sizeof(float) +
+               (has_splats ? 3 * sizeof(int64_t) : 0);
+    }
+
     const FilmGeometry& geometry() const { return geometry_; }
     const ReconstructionFilter& filter() const { return filter_; }
 

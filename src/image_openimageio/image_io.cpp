@@ -15,6 +15,7 @@
 
 #include "color/srgb.h"
 #include "image/image_codecs.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 namespace {
@@ -54,6 +55,10 @@ std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path) {
         fail_read(path,
                   fmt::format("its header claims {} x {} pixels, too many for the file's size",
                               spec.width, spec.height));
+    if (const auto free = available_memory(); free && bytes > *free)
+        fail_read(path,
+                  fmt::format("its {} x {} pixels need {} of memory, but only {} are free",
+                              spec.width, spec.height, format_bytes(bytes), format_bytes(*free)));
     return input;
 }
 

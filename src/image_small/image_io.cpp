@@ -4,6 +4,8 @@
 #include "image/image_io.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <csetjmp>
 #include <cstdio>
@@ -12,6 +14,7 @@
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <system_error>
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfDoubleAttribute.h>
@@ -28,6 +31,7 @@
 
 #include "color/srgb.h"
 #include "image/image_codecs.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 namespace {
@@ -41,12 +45,17 @@ namespace fs = std::filesystem;
 /// No codec compresses better than this. A header with a larger size is damaged, and would exhaust the memory.
 void check_size(const std::string& path, uint64_t width, uint64_t height, uint64_t pixel_bytes) {
     constexpr uint64_t kBestRatio = 4096, kAlwaysFine = 256u << 20;
+    constexpr uint64_t kLargestSide = 1 << 20;
     if (width < 1 || height < 1) fail_read(path, "it has no pixels");
     const uint64_t bytes = width * height * pixel_bytes;
-    if (bytes > kAlwaysFine && bytes / kBestRatio > fs::file_size(path))
+    if (width > kLargestSide || height > kLargestSide || pixel_bytes > kLargestSide ||
+        (bytes > kAlwaysFine && bytes / kBestRatio > fs::file_size(path)))
         fail_read(path,
                   fmt::format("its header claims {} x {} pixels, too many for the file's size",
                               width, height));
+    if (const auto free = available_memory(); free && bytes > *free)
+        fail_read(path, fmt::format("its {} x {} pixels need {} of memory, but only {} are free",
+                                    width, height, format_bytes(bytes), format_bytes(*free)));
 }
 
 /// What a file holds, before any conversion of colours.
@@ -116,10 +125,11 @@ Contents read_exr(const std::string& path, bool as_floats) {
             fail_read(path, "its channels differ in resolution");
     }
     PixelBuffer& p = c.pixels;
-    p.width = window.max.x - window.min.x + 1;
-    p.height = window.max.y - window.min.y + 1;
+    const int64_t width = int64_t(window.max.x) - window.min.x + 1,
+                  height = int64_t(window.max.y) - window.min.y + 1;
+    check_size(path, uint64_t(width), uint64_t(height), c.channels.size() * 4);
+    p.width = int(width), p.height = int(height);
     p.channels = int(c.channels.size());
-    check_size(path, uint64_t(p.width), uint64_t(p.height), c.channels.size() * 4);
     const auto alpha = std::find(c.channels.begin(), c.channels.end(), "A");
     if (alpha != c.channels.end()) p.alpha_channel = int(alpha - c.channels.begin());
     if (is_half)
@@ -458,9 +468,19 @@ Contents read_pfm(const std::string& path) {
     const std::string kind = bytes.word();
     if (kind != "PF" && kind != "Pf") fail_read(path, "it does not begin with \"PF\" or \"Pf\"");
     const int channels = kind == "PF" ? 3 : 1;
-    const int width = std::atoi(bytes.word().c_str()), height = std::atoi(bytes.word().c_str());
-    const double scale = std::atof(bytes.word().c_str());
-    if (width < 1 || height < 1 || scale == 0) fail_read(path, "its header is invalid");
+    const auto number = [&]<class T>(T value) {
+        std::string text = bytes.word();
+        if (text.starts_with('+')) text.erase(0, 1);
+        const char* end = text.data() + text.size();
+        if (const auto [stop, error] = std::from_chars(text.data(), end, value);
+            error != std::errc() || stop != end)
+            fail_read(path, fmt::format("\"{}\" in its header is no number", text.substr(0, 40)));
+        return value;
+    };
+    const int width = number(0), height = number(0);
+    const double scale = number(0.0);
+    if (width < 1 || height < 1 || !std::isfinite(scale) || scale == 0)
+        fail_read(path, "its header is invalid");
     check_size(path, uint64_t(width), uint64_t(height), 4 * size_t(channels));
     const size_t row = size_t(width) * size_t(channels);
     if (bytes.left() < row * size_t(height) * 4) fail_read(path, "the file ends too early");
@@ -486,7 +506,10 @@ Contents read_contents(const std::string& path, bool as_floats) {
     if (!fs::exists(status)) fail_read(path, "there is no such file");
     if (!fs::is_regular_file(status)) fail_read(path, "it is not a regular file");
     char start[8] = {};
-    std::ifstream(path, std::ios::binary).read(start, sizeof start);
+    errno = 0;
+    std::ifstream in(path, std::ios::binary);
+    if (!in) fail_read(path, std::generic_category().message(errno));
+    in.read(start, sizeof start);
     const std::string_view magic(start, sizeof start);
     try {
         if (magic.starts_with("\x76\x2f\x31\x01")) return read_exr(path, as_floats);

@@ -183,6 +183,12 @@ DepthOptions DepthOptions::from(const IntegratorParams& params) {
     DepthOptions depth = without_roulette(params);
     depth.rr_depth = params.integer("rr_depth");
     if (depth.rr_depth < 1) throw std::runtime_error("rr_depth must be at least 1");
+    constexpr int kLatestRoulette = RenderDefaults::kLatestRoulette;
+    if (depth.rr_depth > kLatestRoulette && depth.max_depth > kLatestRoulette)
+        throw std::runtime_error(fmt::format(
+            "rr_depth is {}, but must be at most {}, unless max_depth is: paths in a closed room "
+            "would not end",
+            depth.rr_depth, kLatestRoulette));
     return depth;
 }
 

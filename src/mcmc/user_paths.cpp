@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "description/json_text.h"
+#include "description/source_location.h"
 #include "math/warp.h"
 
 namespace etendue {
@@ -25,7 +27,7 @@ float positive_number(const json& value, const std::string& file, const std::str
     if (!(v > 0 && v <= double(most)))
         refuse(file, fmt::format("{} must be a number above 0{}, but is {}", what,
                                  std::isfinite(most) ? fmt::format(", at most {}", most) : "",
-                                 value.dump()));
+                                 excerpt(value)));
     return float(v);
 }
 
@@ -45,8 +47,12 @@ GivenPath parse_path(const json& from, const std::string& file, size_t index) {
                                       p[1].is_number() && p[2].is_number();
                 if (!is_point)
                     refuse(file, fmt::format("{}: point {} must be [x, y, z], but is {}", where,
-                                             path.points.size() + 1, p.dump()));
-                path.points.push_back({p[0].get<float>(), p[1].get<float>(), p[2].get<float>()});
+                                             path.points.size() + 1, excerpt(p)));
+                const Vec3 point{p[0].get<float>(), p[1].get<float>(), p[2].get<float>()};
+                if (!is_finite(point))
+                    refuse(file, fmt::format("{}: point {} is {}, which is beyond single precision",
+                                             where, path.points.size() + 1, excerpt(p)));
+                path.points.push_back(point);
             }
         } else if (key == "cone") {
             const std::string what = where + ": \"cone\" (degrees)";
@@ -78,14 +84,11 @@ GivenPath parse_path(const json& from, const std::string& file, size_t index) {
 std::vector<GivenPath> parse_user_paths(const std::string& text, const std::string& file) {
     json document;
     try {
-        document = json::parse(text);
-    } catch (const json::parse_error& e) {
-        const auto line =
-            1 + std::count(text.begin(), text.begin() + long(std::min(e.byte, text.size())), '\n');
-        throw std::runtime_error(
-            fmt::format("{}:{}: not valid JSON: expected a list of paths, like "
-                        "[{{\"points\": [[0, 1, 0], [0, 0, 0]]}}]",
-                        file, line));
+        document = parse_json(text, file);
+    } catch (const SceneError& e) {
+        throw SceneError(e.where(),
+                         e.message() + "; expected a list of paths, like [{\"points\": [[0, 1, 0], "
+                                       "[0, 0, 0]]}]");
     }
     if (!document.is_array()) refuse(file, "must be a list of paths, [{\"points\": …}, …]");
     std::vector<GivenPath> paths;

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "description/scene_description.h"
+#include "readers/gzip.h"
 
 namespace etendue {
 
@@ -36,6 +37,14 @@ std::string read_file_bytes(const std::string& path) {
     return bytes;
 }
 
+std::string_view plain_text(std::string_view text, const std::string& file) {
+    constexpr std::string_view kUtf8 = "\xef\xbb\xbf", kUtf16[] = {"\xff\xfe", "\xfe\xff"};
+    for (const std::string_view mark : kUtf16)
+        if (text.starts_with(mark))
+            throw SceneError({file, 1}, "the file is in UTF-16; save it as UTF-8");
+    return text.starts_with(kUtf8) ? text.substr(kUtf8.size()) : text;
+}
+
 std::string directory_of(const std::string& file) {
     const auto directory = std::filesystem::path(file).parent_path();
     return directory.empty() ? std::string(".") : directory.string();
@@ -54,7 +63,7 @@ ReadOptions with_disk(ReadOptions options) {
 std::string read_scene_bytes(const std::string& file, const ReadOptions& options) {
     auto bytes = options.read_file(file);
     if (!bytes) throw SceneError({file, 0}, "cannot read the scene file");
-    return *std::move(bytes);
+    return is_gzip(*bytes) ? unpack_gzip(*bytes, file) : *std::move(bytes);
 }
 
 }  // namespace etendue

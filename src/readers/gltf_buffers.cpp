@@ -145,6 +145,7 @@ const std::string& GltfBuffers::buffer(size_t index) {
         bytes = std::string(chunk_);
     else
         b.fail("has neither a uri nor a binary chunk");
+    if (!watch_.add(bytes->size())) b.fail("needs more memory than is free");
     if (bytes->size() < length)
         b.fail(fmt::format("should have {} bytes, but has {}", length, bytes->size()));
     return *bytes;
@@ -172,11 +173,13 @@ GltfBuffers::Layout GltfBuffers::read_layout(const JsonValue& a) const {
 }
 
 template <class Store>
-void GltfBuffers::read(const JsonValue& a, const Layout& layout, const Store& store) {
+void GltfBuffers::read(const JsonValue& a, const Layout& layout, Range range, const Store& store) {
     const size_t element = layout.element_bytes();
     const auto read_element = [&](const char* at, size_t index) {
+        if (index < range.first || index >= range.end) return;
         for (size_t c = 0; c < layout.components; ++c)
-            store(index * layout.components + c, layout.value(at + c * layout.component->bytes));
+            store((index - range.first) * layout.components + c,
+                  layout.value(at + c * layout.component->bytes));
     };
     if (const auto in = a["bufferView"].index(views_.size())) {
         const std::string_view bytes = view(*in);
@@ -186,7 +189,8 @@ void GltfBuffers::read(const JsonValue& a, const Layout& layout, const Store& st
         if (layout.count > 0 && (offset > bytes.size() || bytes.size() - offset < element ||
                                  (bytes.size() - offset - element) / stride < layout.count - 1))
             a.fail(fmt::format("needs more than the {} bytes of its bufferView", bytes.size()));
-        for (size_t i = 0; i < layout.count; ++i) read_element(&bytes[offset + i * stride], i);
+        for (size_t i = range.first; i < std::min(layout.count, range.end); ++i)
+            read_element(&bytes[offset + i * stride], i);
     }
     const JsonValue sparse = a["sparse"];
     if (!sparse) return;
@@ -212,10 +216,24 @@ void GltfBuffers::read(const JsonValue& a, const Layout& layout, const Store& st
     }
 }
 
-GltfBuffers::Values GltfBuffers::floats(const JsonValue& accessor_index, std::string_view types) {
+const JsonValue& GltfBuffers::accessor(const JsonValue& accessor_index) const {
     const auto index = accessor_index.index(accessors_.size());
     if (!index) accessor_index.fail("is missing");
-    const JsonValue& a = accessors_[*index];
+    return accessors_[*index];
+}
+
+size_t GltfBuffers::count(const JsonValue& accessor_index) const {
+    return read_layout(accessor(accessor_index)).count;
+}
+
+void GltfBuffers::require_bytes(const JsonValue& accessor_index) const {
+    const JsonValue& a = accessor(accessor_index);
+    if (!a["bufferView"]) a.fail("has no bufferView");
+}
+
+GltfBuffers::Values GltfBuffers::floats(const JsonValue& accessor_index, std::string_view types,
+                                        Range range) {
+    const JsonValue& a = accessor(accessor_index);
     const Layout layout = read_layout(a);
     if (types.find(a["type"].text("")) == types.npos)
         a["type"].fail(fmt::format("is {}, but {} needs {}", a["type"].text(""),
@@ -226,16 +244,15 @@ GltfBuffers::Values GltfBuffers::floats(const JsonValue& accessor_index, std::st
         a.fail(fmt::format("has no bufferView, but {} elements", layout.count));
     if (const auto in = a["bufferView"].index(views_.size()); in && layout.count > view(*in).size())
         a.fail(fmt::format("needs more than the {} bytes of its bufferView", view(*in).size()));
-    Values v{layout.count, layout.components, {}};
-    v.numbers.resize(layout.count * layout.components);
-    read(a, layout, [&](size_t i, double x) { v.numbers[i] = float(x); });
+    range.end = std::min(range.end, layout.count);
+    Values v{range.end - std::min(range.first, range.end), layout.components, {}};
+    v.numbers.resize(v.count * layout.components);
+    read(a, layout, range, [&](size_t i, double x) { v.numbers[i] = float(x); });
     return v;
 }
 
 std::vector<uint32_t> GltfBuffers::indices(const JsonValue& accessor_index) {
-    const auto index = accessor_index.index(accessors_.size());
-    if (!index) accessor_index.fail("is missing");
-    const JsonValue& a = accessors_[*index];
+    const JsonValue& a = accessor(accessor_index);
     const Layout layout = read_layout(a);
     if (layout.components != 1 || layout.component->largest == 0 || layout.component->code % 2 == 0)
         a.fail("indices must be unsigned integers");
@@ -244,7 +261,7 @@ std::vector<uint32_t> GltfBuffers::indices(const JsonValue& accessor_index) {
     if (layout.count > view(*in).size())
         a.fail(fmt::format("needs more than the {} bytes of its bufferView", view(*in).size()));
     std::vector<uint32_t> values(layout.count);
-    read(a, layout, [&](size_t i, double x) { values[i] = uint32_t(x); });
+    read(a, layout, {}, [&](size_t i, double x) { values[i] = uint32_t(x); });
     return values;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "readers/gltf_json.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 
@@ -18,6 +19,7 @@ public:
     /// `chunk` is the binary chunk of a .glb file. `root` must outlive the object.
     GltfBuffers(const JsonValue& root, std::string_view chunk, LoadFile load);
 
+    size_t view_count() const { return views_.size(); }
     /// The bytes of a bufferView.
     std::string_view view(size_t index);
     /// The bytes that a URI stands for: data in base64, or a file.
@@ -28,8 +30,19 @@ public:
         size_t count = 0, components = 0;
         std::vector<float> numbers;  ///< count × components; normalised integers are fractions.
     };
-    /// `types`: those allowed, e.g. "VEC3 VEC4".
-    Values floats(const JsonValue& accessor_index, std::string_view types);
+    /// Some of the values of an accessor.
+    struct Range {
+        size_t first = 0, end = size_t(-1);
+    };
+    /// `types`: those allowed, e.g. "VEC3 VEC4". Only the values of `range` are read.
+    Values floats(const JsonValue& accessor_index, std::string_view types, Range range);
+    Values floats(const JsonValue& accessor_index, std::string_view types) {
+        return floats(accessor_index, types, {});
+    }
+    /// Number of elements of an accessor.
+    size_t count(const JsonValue& accessor_index) const;
+    /// Fails where the accessor names no bytes, and its values would be zero.
+    void require_bytes(const JsonValue& accessor_index) const;
     /// Values of unsigned integers.
     std::vector<uint32_t> indices(const JsonValue& accessor_index);
 
@@ -37,13 +50,15 @@ private:
     struct Layout;
     Layout read_layout(const JsonValue& accessor) const;
     template <class Store>
-    void read(const JsonValue& accessor, const Layout& layout, const Store& store);
+    void read(const JsonValue& accessor, const Layout& layout, Range range, const Store& store);
+    const JsonValue& accessor(const JsonValue& accessor_index) const;
     const std::string& buffer(size_t index);
 
     std::vector<JsonValue> buffers_, views_, accessors_;
     std::string_view chunk_;
     LoadFile load_;
     std::vector<std::optional<std::string>> loaded_;
+    MemoryWatch watch_;  ///< Over buffers, many of which may name the same file.
 };
 
 }  // namespace etendue

@@ -281,8 +281,9 @@ int GltfReader::bitmap(const JsonValue& info, bool raw, const char* channel) {
         const auto [at, is_new] =
             loaded_images_.try_emplace(*source, int64_t(scene_.images.size()));
         if (is_new) {
-            const auto view = image["bufferView"].index(root_["bufferViews"].elements().size());
+            const auto view = image["bufferView"].index(buffers_.view_count());
             if (!view && uri.empty()) image.fail("has neither a uri nor a bufferView");
+            watch(view ? buffers_.view(*view).size() : uri.size(), image);
             scene_.images.push_back(
                 {fmt::format("{}{}", file_.str(), image.path()),
                  view ? std::string(buffers_.view(*view)) : buffers_.uri(image["uri"])});

@@ -108,36 +108,37 @@ std::optional<GltfReader::Primitive> GltfReader::read_primitive(const JsonValue&
 
     MeshData mesh;
     mesh.name = name;
-    mesh.positions = triples(buffers_.floats(attributes["POSITION"], "VEC3"));
-    const size_t count = mesh.positions.size();
-    const auto check = [&](const JsonValue& attribute, size_t found) {
-        if (found != count)
-            attribute.fail(
-                fmt::format("has {} elements, but there are {} positions", found, count));
-    };
-    if (const JsonValue normals = attributes["NORMAL"]) {
-        mesh.normals = triples(buffers_.floats(normals, "VEC3"));
-        check(normals, mesh.normals.size());
-    }
-    if (const JsonValue uvs = attributes[fmt::format("TEXCOORD_{}", m.uv_set)]) {
-        const GltfBuffers::Values v = buffers_.floats(uvs, "VEC2");
-        check(uvs, v.count);
-        for (size_t i = 0; i < v.count; ++i)
-            mesh.uvs.push_back({v.numbers[2 * i], v.numbers[2 * i + 1]});
-    }
-    if (const JsonValue colors = attributes["COLOR_0"]) {
-        mesh.colors = triples(buffers_.floats(colors, "VEC3 VEC4"));
-        check(colors, mesh.colors.size());
-    }
+    const size_t count = buffers_.count(attributes["POSITION"]);
     std::vector<uint32_t> vertices;
+    // Many primitives may share the values of all their vertices: only those of its own are read for each.
+    GltfBuffers::Range used{0, count};
     if (primitive["indices"]) {
         vertices = buffers_.indices(primitive["indices"]);
         for (const uint32_t v : vertices)
             if (v >= count)
                 primitive["indices"].fail(fmt::format("has the index {} of {} vertices", v, count));
-    } else {
-        for (size_t i = 0; i < count; ++i) vertices.push_back(uint32_t(i));
+        const auto [lo, hi] = std::minmax_element(vertices.begin(), vertices.end());
+        if (lo != vertices.end()) used = {*lo, size_t(*hi) + 1};
+        for (uint32_t& v : vertices) v -= uint32_t(used.first);
     }
+    const auto read = [&](const JsonValue& attribute, const char* types) {
+        if (const size_t found = buffers_.count(attribute); found != count)
+            attribute.fail(
+                fmt::format("has {} elements, but there are {} positions", found, count));
+        return buffers_.floats(attribute, types, used);
+    };
+    mesh.positions = triples(read(attributes["POSITION"], "VEC3"));
+    if (const JsonValue normals = attributes["NORMAL"])
+        mesh.normals = triples(read(normals, "VEC3"));
+    if (const JsonValue uvs = attributes[fmt::format("TEXCOORD_{}", m.uv_set)]) {
+        const GltfBuffers::Values v = read(uvs, "VEC2");
+        for (size_t i = 0; i < v.count; ++i)
+            mesh.uvs.push_back({v.numbers[2 * i], v.numbers[2 * i + 1]});
+    }
+    if (const JsonValue colors = attributes["COLOR_0"])
+        mesh.colors = triples(read(colors, "VEC3 VEC4"));
+    if (!primitive["indices"])
+        for (size_t i = 0; i < count; ++i) vertices.push_back(uint32_t(i));
     mesh.triangles = triangles(vertices, mode);
     try {
         finish_mesh(mesh, {}, primitive.where());
@@ -149,6 +150,7 @@ std::optional<GltfReader::Primitive> GltfReader::read_primitive(const JsonValue&
         primitive.fail(e.message());
     }
     for (const Vec3 p : mesh.positions) made.bounds.extend(p);
+    watch(memory_bytes(mesh), primitive);
     scene_.meshes.push_back(std::move(mesh));
     return made;
 }

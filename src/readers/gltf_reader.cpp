@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "description/json_text.h"
 #include "readers/file_bytes.h"
 #include "readers/gltf.h"
 #include "readers/object_graph.h"
@@ -105,6 +106,10 @@ void GltfReader::reject(const JsonValue& where, const std::string& message) {
     warn(fmt::format("{}: {}; left out", where.path(), message));
 }
 
+void GltfReader::watch(size_t bytes, const JsonValue& where) {
+    if (!watch_.add(bytes)) where.fail("the scene needs more memory than is free");
+}
+
 SceneDescription GltfReader::read() {
     const std::string version = root_["asset"]["version"].text("");
     if (version.rfind("2.", 0) != 0)
@@ -181,8 +186,12 @@ void GltfReader::read_node(const JsonValue& node, const Transform& to_world) {
         if (!to_world.is_invertible()) {
             warn(fmt::format("{}: a mesh without extent is left out", node.path()));
         } else {
-            for (const Transform& t : gpu_instances(node))
-                if (t.is_invertible()) placements_.push_back({*mesh, to_world * t});
+            for (const Transform& t : gpu_instances(node)) {
+                if (!t.is_invertible()) continue;
+                placements_.push_back({*mesh, to_world * t});
+                // An instance, its transform and its place in the scene follow.
+                watch(sizeof(Placement) + 2 * sizeof(SceneObject) + sizeof(Transform), node);
+            }
         }
     }
     if (const auto camera = node["camera"].index(cameras_.size())) {
@@ -207,9 +216,15 @@ std::vector<Transform> GltfReader::gpu_instances(const JsonValue& node) {
     size_t count = 0;
     for (int i = 0; i < 3; ++i)
         if (names[i]) {
+            buffers_.require_bytes(names[i]);
             values[i] = buffers_.floats(names[i], types[i]);
             count = std::max(count, values[i].count);
         }
+    // Nodes may share their accessors, so this is not limited by the size of the file.
+    constexpr size_t kMostInstances = 1 << 22;
+    if ((instances_ += count) > kMostInstances)
+        node.fail(fmt::format("EXT_mesh_gpu_instancing places more than {} meshes in the scene",
+                              kMostInstances));
     std::vector<Transform> instances(count);
     const auto get = [&](int which, size_t i, std::vector<double> fallback) {
         const GltfBuffers::Values& v = values[which];
@@ -352,7 +367,7 @@ Container open_container(std::string_view bytes, const std::string& file) {
         const std::string_view contents = bytes.substr(at + 8, length);
         if (type == kJson && found.json.empty()) found.json = contents;
         if (type == kBinary && found.chunk.empty()) found.chunk = contents;
-        at += 8 + length;
+        at += 8 + size_t(length);
     }
     if (found.json.empty()) fail("the file has no JSON chunk");
     return found;
@@ -368,18 +383,7 @@ SceneDescription read_gltf(const std::string& file, const ReadOptions& options) 
 SceneDescription parse_gltf(std::string_view bytes, const std::string& file,
                             const ReadOptions& options) {
     const Container parts = open_container(bytes, file);
-    nlohmann::json document;
-    try {
-        document = nlohmann::json::parse(parts.json);
-    } catch (const nlohmann::json::parse_error& e) {
-        const auto line =
-            std::count(parts.json.begin(),
-                       parts.json.begin() + ptrdiff_t(std::min(e.byte, parts.json.size())), '\n') +
-            1;
-        throw SceneError({file, int(line)}, "malformed JSON");
-    } catch (const nlohmann::json::out_of_range&) {
-        throw SceneError({file, 0}, "malformed JSON: a number is too large");
-    }
+    const nlohmann::json document = parse_json(parts.json, file);
     return GltfReader(file, options, document, parts.chunk).read();
 }
 

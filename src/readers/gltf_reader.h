@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "system/available_memory.h"
 #include "description/scene_description.h"
 #include "math/bounds.h"
 #include "readers/gltf_buffers.h"
@@ -79,6 +80,8 @@ private:
     void set(int object, const char* name, ParamValue value);
     void add_child(int parent, const char* name, int object);
     void warn(const std::string& message);
+    /// Fails where so many bytes more do not fit into the memory.
+    void watch(size_t bytes, const JsonValue& where);
     /// An error, or a warning under `lenient`.
     void reject(const JsonValue& where, const std::string& message);
 
@@ -96,6 +99,8 @@ private:
     std::map<size_t, int64_t> loaded_images_;  ///< Index into SceneDescription::images.
     std::optional<size_t> uv_set_;             ///< Of the material that is being read.
     Bounds3 bounds_;
+    MemoryWatch watch_;
+    size_t instances_ = 0;  ///< Of EXT_mesh_gpu_instancing.
     bool has_light_ = false, has_camera_ = false;
 };
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <limits>
 
+#include <fmt/format.h>
 #include <zlib.h>
 
+#include "system/available_memory.h"
 #include "description/source_location.h"
 
 namespace etendue {
@@ -14,20 +16,29 @@ bool is_gzip(std::string_view bytes) {
 }
 
 std::string unpack_gzip(std::string_view bytes, const std::string& file) {
-    constexpr size_t kMost = size_t(1) << 34;  // keeps hostile files from exhausting the memory
+    // Texts of scenes take a tenth to a hundredth; a file of a few megabytes must not exhaust the memory.
+    constexpr size_t kAlways = size_t(256) << 20, kMostRatio = 200;
+    const size_t most = std::max(kAlways, kMostRatio * bytes.size());
     constexpr size_t kStep = size_t(1) << 20;
     constexpr size_t kMostInput = std::numeric_limits<uInt>::max();
-    const auto fail = [&](const char* why) {
-        throw SceneError({file, 0}, std::string("cannot unpack the gzip data: ") + why);
+    const auto fail = [&](const std::string& why) {
+        throw SceneError({file, 0}, "cannot unpack the gzip data: " + why);
     };
     z_stream stream{};
     constexpr int kGzipWindow = 15 + 16;
     if (inflateInit2(&stream, kGzipWindow) != Z_OK) fail("out of memory");
     std::string out;
+    MemoryWatch watch;
+    bool is_too_large = false;
     size_t read = 0, written = 0;
     int status = Z_OK;
     while (status == Z_OK) {
-        if (written == out.size()) out.resize(out.size() + std::max(kStep, out.size() / 2));
+        if (written == out.size()) {
+            const size_t more = std::min(std::max(kStep, out.size() / 2), most + 1 - out.size());
+            is_too_large = written > most || !watch.add(out.size() + more);
+            if (is_too_large) break;
+            out.resize(out.size() + more);
+        }
         const size_t in = std::min(bytes.size() - read, kMostInput);
         const size_t room = std::min(out.size() - written, kMostInput);
         stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data() + read));
@@ -40,10 +51,11 @@ std::string unpack_gzip(std::string_view bytes, const std::string& file) {
         // Another member may follow the end of one.
         if (status == Z_STREAM_END && read < bytes.size() && is_gzip(bytes.substr(read)))
             status = inflateReset(&stream);
-        if (written > kMost) break;
     }
     inflateEnd(&stream);
-    if (written > kMost) fail("there are more than 16 GiB of them");
+    if (is_too_large && written > most)
+        fail(fmt::format("they are more than {} times as large as the file", kMostRatio));
+    if (is_too_large) fail("there is too little memory");
     if (status != Z_STREAM_END) fail("they are damaged or cut short");
     out.resize(written);
     return out;

@@ -101,6 +101,7 @@ void MitsubaReader::check_leaf(const pugi::xml_node& node) const {
 void MitsubaReader::read_document(std::string_view text, const std::string& file, Scope& scope,
                                   const Element* include) {
     Source source(file, text, source_ && source_->old_dialect);
+    plain_text(text, file);  // refuses UTF-16; the parser knows the mark of UTF-8
     if (const size_t zero = text.find('\0'); zero != text.npos)
         throw SceneError({file, source.line(ptrdiff_t(zero))},
                          "a zero byte: this is not an XML file");

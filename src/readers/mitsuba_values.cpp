@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "color/srgb.h"
+#include "readers/file_bytes.h"
 
 namespace etendue {
 namespace {
@@ -163,6 +164,7 @@ SpectrumSamples parse_spectrum_list(std::string_view text, const SourceLocation&
 SpectrumSamples parse_spectrum_file(std::string_view text, const std::string& file) {
     SpectrumSamples samples;
     SourceLocation where{file, 0};
+    text = plain_text(text, file);
     while (!text.empty()) {
         ++where.line;
         const size_t end = std::min(text.find('\n'), text.size());

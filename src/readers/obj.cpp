@@ -174,7 +174,7 @@ private:
 }  // namespace
 
 MeshData parse_obj(std::string_view text, const std::string& name, const MeshOptions& options) {
-    MeshData mesh = ObjParser(text, name).parse();
+    MeshData mesh = ObjParser(plain_text(text, name), name).parse();
     mesh.name = name;
     finish_mesh(mesh, options, {name, 0});
     return mesh;

@@ -35,6 +35,32 @@ std::string label(const SceneObject& object) {
                                  listed > kMostListed ? " > ..." : "", path));
 }
 
+/// Groups of shapes are made once; everything else is visited once for each path that leads to it.
+bool is_made_once(const SceneObject& object) {
+    return object.type == "shapegroup";
+}
+
+/// Objects that name another one several times, again and again, take exponential time to visit. `order`: parents
+/// before their children.
+void check_size(const SceneDescription& scene, const std::vector<int>& order) {
+    constexpr uint64_t kMostVisits = 100'000;
+    const uint64_t most = kMostVisits + scene.objects.size();
+    std::vector<uint64_t> visits(scene.objects.size(), 1);  // of an object and what it contains
+    for (size_t i = order.size(); i-- > 0;) {
+        const SceneObject& object = scene.objects[size_t(order[i])];
+        uint64_t& sum = visits[size_t(order[i])];
+        for (const auto& child : object.children)
+            sum += is_made_once(scene.objects[size_t(child.object)]) ? 1
+                                                                     : visits[size_t(child.object)];
+        if (sum > most)
+            throw SceneError(
+                object.where,
+                fmt::format("{} contains more than {} objects, since those in it name the same "
+                            "ones several times: name each once",
+                            label(object), most));
+    }
+}
+
 }  // namespace
 
 void check_object_graph(const SceneDescription& scene, int deepest) {
@@ -46,10 +72,11 @@ void check_object_graph(const SceneDescription& scene, int deepest) {
     for (int i = 0; i < n; ++i)
         if (parents_left[i] == 0) ready.push_back(i);
     std::vector<bool> unsorted(n, true);
-    int sorted = 0;
-    for (; !ready.empty(); ++sorted) {
+    std::vector<int> order;
+    while (!ready.empty()) {
         const int at = ready.back();
         ready.pop_back();
+        order.push_back(at);
         unsorted[at] = false;
         if (depth[at] > deepest)
             throw SceneError(scene.objects[at].where,
@@ -59,7 +86,8 @@ void check_object_graph(const SceneDescription& scene, int deepest) {
             if (--parents_left[child.object] == 0) ready.push_back(child.object);
         }
     }
-    if (sorted < n) fail_cycle(scene, unsorted);
+    if (int(order.size()) < n) fail_cycle(scene, unsorted);
+    check_size(scene, order);
 }
 
 }  // namespace etendue

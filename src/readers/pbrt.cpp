@@ -5,16 +5,13 @@
 #include <fmt/format.h>
 
 #include "readers/file_bytes.h"
-#include "readers/gzip.h"
 #include "readers/pbrt_reader.h"
 
 namespace etendue {
 
 SceneDescription read_pbrt(const std::string& file, const ReadOptions& options) {
     const ReadOptions all = with_disk(options);
-    std::string text = read_scene_bytes(file, all);
-    if (is_gzip(text)) text = unpack_gzip(text, file);
-    return parse_pbrt(text, file, all);
+    return parse_pbrt(read_scene_bytes(file, all), file, all);
 }
 
 SceneDescription parse_pbrt(std::string_view text, const std::string& file,

@@ -116,6 +116,9 @@ std::vector<PbrtValue> read_pbrt_values(PbrtTokenizer& in) {
         if (values.empty()) values.reserve(4);
         PbrtValue& value = values.emplace_back();
         read_declaration(in, value);
+        if (values.size() > kMostPbrtValues)
+            throw SceneError(value.where,
+                             fmt::format("more than {} parameters stand here", kMostPbrtValues));
         if (in.skip('[')) {
             while (!in.skip(']')) {
                 if (!in.peek())

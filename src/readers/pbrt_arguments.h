@@ -41,6 +41,9 @@ struct PbrtValue {
     size_t size() const { return numbers.size() + integers.size() + strings.size(); }
 };
 
+/// No directive has more parameters than this.
+constexpr size_t kMostPbrtValues = 1000;
+
 /// Reads the parameters up to the next directive.
 std::vector<PbrtValue> read_pbrt_values(PbrtTokenizer& in);
 

@@ -7,8 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "readers/file_bytes.h"
 #include "readers/gzip.h"
 #include "readers/mitsuba_values.h"
+#include "readers/object_graph.h"
 
 namespace etendue {
 namespace {
@@ -125,7 +127,7 @@ SceneDescription PbrtReader::read(std::string_view text) {
 void PbrtReader::read_file(std::string_view text, const std::string& file) {
     const FileName& name = file_names_.emplace_back(file);
     open_files_.push_back(std::filesystem::path(file).lexically_normal().string());
-    PbrtTokenizer in(text, name);
+    PbrtTokenizer in(plain_text(text, file), name);
     while (const char c = in.peek()) {
         if (c == '"')
             in.fail(fmt::format("expected a directive, found the string {}", quote(in.string())));
@@ -180,7 +182,7 @@ PbrtArguments PbrtReader::arguments(PbrtTokenizer& in, const char* kind, const c
     std::string name = unescape(in.string());
     PbrtArguments args(kind, std::move(name), where, read_pbrt_values(in));
     if (const auto it = scene_.state.defaults.find(defaults); it != scene_.state.defaults.end())
-        args.add_defaults(it->second);
+        args.add_defaults(*it->second);
     return args;
 }
 
@@ -326,8 +328,12 @@ void PbrtReader::attribute(PbrtTokenizer& in) {
         throw SceneError(where, fmt::format("unknown target of Attribute {}{}", quote(target),
                                             hint(target, known)));
     PbrtArguments merged("Attribute", target, where, read_pbrt_values(in));
-    merged.add_defaults(scene_.state.defaults[target]);
-    scene_.state.defaults[target] = merged.values();
+    std::shared_ptr<const std::vector<PbrtValue>>& defaults = scene_.state.defaults[target];
+    if (defaults) merged.add_defaults(*defaults);
+    if (merged.values().size() > kMostPbrtValues)
+        throw SceneError(where, fmt::format("Attribute {} has more than {} parameters",
+                                            quote(target), kMostPbrtValues));
+    defaults = std::make_shared<const std::vector<PbrtValue>>(merged.values());
 }
 
 void PbrtReader::reverse_orientation(PbrtTokenizer&) {
@@ -347,8 +353,8 @@ void PbrtReader::color_space(PbrtTokenizer& in) {
 
 void PbrtReader::medium_interface(PbrtTokenizer& in) {
     const PbrtPlace where = in.where();
-    scene_.state.inside = unescape(in.string());
-    scene_.state.outside = in.peek() == '"' ? unescape(in.string()) : scene_.state.inside;
+    scene_.state.inside = PbrtName(unescape(in.string()));
+    scene_.state.outside = in.peek() == '"' ? PbrtName(unescape(in.string())) : scene_.state.inside;
     if (!in_world_ && !scene_.state.outside.empty())
         scene_.reject(where, "a medium around the camera is not supported");
 }
@@ -395,7 +401,7 @@ int PbrtReader::make_material(PbrtArguments& args) {
 void PbrtReader::material(PbrtTokenizer& in) {
     PbrtArguments args = arguments(in, "Material", "material");
     scene_.state.material = make_material(args);
-    scene_.state.named_material.clear();
+    scene_.state.named_material = {};
 }
 
 void PbrtReader::make_named_material(PbrtTokenizer& in) {
@@ -407,12 +413,13 @@ void PbrtReader::make_named_material(PbrtTokenizer& in) {
 
 void PbrtReader::named_material(PbrtTokenizer& in) {
     scene_.state.material_where = in.where();
-    scene_.state.named_material = unescape(in.string());
+    const std::string name = unescape(in.string());
+    scene_.state.named_material = name;
     // pbrt-v4 may define the material later.
     if (scene_.is_v3())
         scene_.current_material();
-    else if (!scene_.named_materials.contains(scene_.state.named_material))
-        not_yet_made_.emplace_back(scene_.state.named_material, scene_.state.material_where);
+    else if (!scene_.named_materials.contains(name))
+        not_yet_made_.emplace_back(name, scene_.state.material_where);
 }
 
 // ---- Lights and shapes
@@ -435,7 +442,7 @@ void PbrtReader::area_light_source(PbrtTokenizer& in) {
                [&](const SourceLocation& where, const std::string& what, const std::string& more) {
                    scene_.reject(where, what, more);
                });
-    scene_.state.area_light = std::move(args);
+    scene_.state.area_light = std::make_shared<const PbrtArguments>(std::move(args));
 }
 
 void PbrtReader::shape(PbrtTokenizer& in) {
@@ -516,7 +523,7 @@ void PbrtReader::world_begin(PbrtTokenizer& in) {
     in_world_ = true;
     scene_.state.ctm = Transform();
     coordinate_systems_["world"] = scene_.state.ctm;
-    scene_.state.inside = scene_.state.outside = "";
+    scene_.state.inside = scene_.state.outside = {};
     (void)in;
 }
 
@@ -564,6 +571,8 @@ void PbrtReader::finish(const SourceLocation& end) {
         throw SceneError(stack_.back().where,
                          fmt::format("{} is never closed", stack_.back().what));
     for (const auto& [name, where] : not_yet_made_) scene_.named_material(name, where);
+    constexpr int kDeepestObjects = 64;
+    check_object_graph(scene_.description, kDeepestObjects);
 }
 
 }  // namespace etendue

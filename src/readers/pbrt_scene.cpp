@@ -144,7 +144,7 @@ int PbrtScene::named_material(const std::string& name, const SourceLocation& whe
 
 int PbrtScene::current_material() {
     if (!state.named_material.empty())
-        return named_material(state.named_material, state.material_where);
+        return named_material(state.named_material.str(), state.material_where);
     if (state.material >= 0) return state.material;
     if (default_material_ < 0) {
         const int diffuse = add("bsdf", "diffuse", {});
@@ -180,9 +180,9 @@ void PbrtScene::place_shape(int shape, const PbrtArguments& args) {
         const std::vector<PbrtEntry>& entries = pbrt_area_lights();
         add_child(shape, "", entries[0].make(*this, *state.area_light));
     }
-    if (state.inside != state.outside)
-        for (const auto& [name, medium] :
-             {std::pair("interior", state.inside), std::pair("exterior", state.outside)}) {
+    if (state.inside.str() != state.outside.str())
+        for (const auto& [name, medium] : {std::pair("interior", state.inside.str()),
+                                           std::pair("exterior", state.outside.str())}) {
             if (medium.empty()) continue;
             const auto it = media.find(medium);
             if (it == media.end())

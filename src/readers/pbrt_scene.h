@@ -2,27 +2,32 @@
 // What the directives of a pbrt file build: the description, the graphics state, the names given so far.
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "system/available_memory.h"
 #include "readers/pbrt_arguments.h"
 #include "readers/read_options.h"
 
 namespace etendue {
 
-/// What AttributeBegin saves and AttributeEnd restores.
+/// A name whose copies share the text.
+using PbrtName = FileName;
+
+/// What AttributeBegin saves and AttributeEnd restores. Copies share what can be large, since files nest deeply.
 struct PbrtState {
     Transform ctm;
     bool reverse_orientation = false;
-    int material = -1;           ///< Object, -1 for the default one.
-    std::string named_material;  ///< Instead, where it is not empty.
+    int material = -1;        ///< Object, -1 for the default one.
+    PbrtName named_material;  ///< Instead, where it is not empty.
     PbrtPlace material_where;
-    std::optional<PbrtArguments> area_light;
-    std::string inside, outside;  ///< Media.
+    std::shared_ptr<const PbrtArguments> area_light;
+    PbrtName inside, outside;  ///< Media.
     /// pbrt-v4's Attribute: parameters that hold for every shape, light, ... that follows.
-    std::map<std::string, std::vector<PbrtValue>> defaults;
+    std::map<std::string, std::shared_ptr<const std::vector<PbrtValue>>> defaults;
 };
 
 class PbrtScene {
@@ -69,6 +74,7 @@ public:
     void place_shape(int shape, const PbrtArguments& args);
 
     SceneDescription description;
+    MemoryWatch watch;  ///< Over what a short text makes much of.
     const ReadOptions& options;
     PbrtVersion version = PbrtVersion::V4;
     PbrtState state;

@@ -34,6 +34,8 @@ void set_mesh_orientation(PbrtScene& scene, int shape) {
 /// A mesh that the description holds.
 int add_mesh(PbrtScene& scene, const PbrtArguments& args, MeshData mesh) {
     finish_mesh(mesh, {}, args.where());
+    if (!scene.watch.add(memory_bytes(mesh)))
+        args.fail("the meshes of the scene need more memory than is free");
     const int shape = add_shape(scene, args, "mesh");
     scene.set(shape, "mesh", int64_t(scene.description.meshes.size()));
     scene.description.meshes.push_back(std::move(mesh));

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <span>
+#include <tuple>
+
+#include <fmt/format.h>
 
 namespace etendue {
 namespace {
@@ -112,73 +115,108 @@ MeshData tessellate(const Revolution& surface) {
 
 namespace {
 
-using Edge = std::pair<uint32_t, uint32_t>;
-Edge edge(uint32_t a, uint32_t b) {
-    return {std::min(a, b), std::max(a, b)};
-}
-
-/// The vertices around each vertex, and those along the border where it is on one.
-struct Neighbours {
-    std::vector<std::vector<uint32_t>> all;
-    std::vector<std::vector<uint32_t>> border;
-    std::map<Edge, std::vector<uint32_t>>
-        opposite;  ///< Of each edge: the third corners of its triangles.
-
-    explicit Neighbours(const MeshData& mesh)
-        : all(mesh.positions.size()), border(mesh.positions.size()) {
-        for (const auto& t : mesh.triangles)
-            for (size_t i = 0; i < 3; ++i)
-                opposite[edge(t[i], t[(i + 1) % 3])].push_back(t[(i + 2) % 3]);
-        for (const auto& [e, corners] : opposite) {
-            all[e.first].push_back(e.second);
-            all[e.second].push_back(e.first);
-            if (corners.size() != 2) {
-                border[e.first].push_back(e.second);
-                border[e.second].push_back(e.first);
-            }
-        }
-    }
+/// A side of a triangle. Corner i of the triangle and the next one are its ends.
+struct Side {
+    uint32_t a, b;    ///< Ends; a < b, unless they are the same vertex.
+    uint32_t corner;  ///< Three times the triangle, plus i.
 };
 
+/// The sides of all triangles, those of the same edge next to each other.
+std::vector<Side> sorted_sides(const MeshData& mesh) {
+    std::vector<Side> sides;
+    sides.reserve(3 * mesh.triangles.size());
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
+        for (uint32_t i = 0; i < 3; ++i) {
+            const uint32_t a = mesh.triangles[t][i], b = mesh.triangles[t][(i + 1) % 3];
+            sides.push_back({std::min(a, b), std::max(a, b), 3 * t + i});
+        }
+    std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) {
+        return std::tie(x.a, x.b, x.corner) < std::tie(y.a, y.b, y.corner);
+    });
+    return sides;
+}
+
+/// Calls use(sides of an edge) for each edge.
+template <class Use>
+void for_each_edge(const std::vector<Side>& sides, const Use& use) {
+    for (size_t begin = 0, end; begin < sides.size(); begin = end) {
+        for (end = begin + 1; end < sides.size(); ++end)
+            if (sides[end].a != sides[begin].a || sides[end].b != sides[begin].b) break;
+        use(std::span(sides).subspan(begin, end - begin));
+    }
+}
+
+/// The vertices around a vertex: their number and the sum of their positions.
+struct Ring {
+    uint32_t count = 0;
+    Vec3 sum;
+
+    void add(Vec3 p) {
+        ++count;
+        sum += p;
+    }
+};
+struct Rings {
+    Ring all;
+    Ring border;  ///< Those along the border, where the vertex is on one.
+};
+
+std::vector<Rings> rings_of(const MeshData& mesh, const std::vector<Side>& sides) {
+    std::vector<Rings> rings(mesh.positions.size());
+    for_each_edge(sides, [&](std::span<const Side> edge) {
+        const auto [a, b, corner] = edge.front();
+        rings[a].all.add(mesh.positions[b]);
+        rings[b].all.add(mesh.positions[a]);
+        if (edge.size() == 2) return;
+        rings[a].border.add(mesh.positions[b]);
+        rings[b].border.add(mesh.positions[a]);
+    });
+    return rings;
+}
+
 /// New place of a vertex: (1 − n w) of the old one and w of each neighbour, on a border of those along it.
-Vec3 weighted(const MeshData& mesh, const Neighbours& near, uint32_t v, bool limit) {
-    const Vec3 p = mesh.positions[v];
-    const bool on_border = !near.border[v].empty();
-    const std::vector<uint32_t>& ring = on_border ? near.border[v] : near.all[v];
-    if (ring.empty() || (on_border && ring.size() != 2))
+Vec3 weighted(Vec3 p, const Rings& rings, bool limit) {
+    const bool on_border = rings.border.count > 0;
+    const Ring& ring = on_border ? rings.border : rings.all;
+    if (ring.count == 0 || (on_border && ring.count != 2))
         return p;  // corners of several sheets stay
-    const auto n = float(ring.size());
+    const auto n = float(ring.count);
     float w;
     if (on_border) {
         w = limit ? 0.2f : 0.125f;
     } else {
-        const float beta = ring.size() == 3 ? 3.0f / 16 : 3 / (8 * n);
+        const float beta = ring.count == 3 ? 3.0f / 16 : 3 / (8 * n);
         w = limit ? 1 / (n + 3 / (8 * beta)) : beta;
     }
-    Vec3 sum = p * (1 - n * w);
-    for (const uint32_t i : ring) sum += mesh.positions[i] * w;
-    return sum;
+    return p * (1 - n * w) + ring.sum * w;
 }
 
 MeshData subdivide_once(const MeshData& mesh) {
-    const Neighbours near(mesh);
+    const std::vector<Side> sides = sorted_sides(mesh);
     MeshData out;
     out.name = mesh.name;
-    for (uint32_t v = 0; v < mesh.positions.size(); ++v)
-        out.positions.push_back(weighted(mesh, near, v, false));
-    std::map<Edge, uint32_t> middle;
-    for (const auto& [e, corners] : near.opposite) {
-        middle[e] = uint32_t(out.positions.size());
-        const Vec3 ends = mesh.positions[e.first] + mesh.positions[e.second];
-        out.positions.push_back(
-            corners.size() == 2
-                ? ends * (3 / 8.0f) +
-                      (mesh.positions[corners[0]] + mesh.positions[corners[1]]) * (1 / 8.0f)
-                : ends * 0.5f);
+    out.positions.reserve(mesh.positions.size() + sides.size() / 2);
+    {
+        const std::vector<Rings> rings = rings_of(mesh, sides);
+        for (size_t v = 0; v < mesh.positions.size(); ++v)
+            out.positions.push_back(weighted(mesh.positions[v], rings[v], false));
     }
-    for (const auto& t : mesh.triangles) {
-        const uint32_t a = middle[edge(t[0], t[1])], b = middle[edge(t[1], t[2])],
-                       c = middle[edge(t[2], t[0])];
+    std::vector<uint32_t> middle(sides.size());  // By side; the new vertex upon it.
+    const auto opposite = [&](const Side& s) {
+        return mesh.positions[mesh.triangles[s.corner / 3][(s.corner % 3 + 2) % 3]];
+    };
+    for_each_edge(sides, [&](std::span<const Side> edge) {
+        for (const Side& s : edge) middle[s.corner] = uint32_t(out.positions.size());
+        const Vec3 ends = mesh.positions[edge[0].a] + mesh.positions[edge[0].b];
+        out.positions.push_back(edge.size() == 2
+                                    ? ends * (3 / 8.0f) +
+                                          (opposite(edge[0]) + opposite(edge[1])) * (1 / 8.0f)
+                                    : ends * 0.5f);
+    });
+    out.triangles.reserve(4 * mesh.triangles.size());
+    for (size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const MeshData::Triangle& t = mesh.triangles[i];
+        const uint32_t a = middle[3 * i], b = middle[3 * i + 1], c = middle[3 * i + 2];
         out.triangles.push_back({t[0], a, c});
         out.triangles.push_back({a, t[1], b});
         out.triangles.push_back({c, b, t[2]});
@@ -190,14 +228,15 @@ MeshData subdivide_once(const MeshData& mesh) {
 }  // namespace
 
 MeshData loop_subdivide(MeshData mesh, int levels, const SourceLocation& where) {
-    constexpr size_t kMostTriangles = size_t(1) << 28;
-    if ((mesh.triangles.size() << (2 * levels)) > kMostTriangles)
-        throw SceneError(where, "the subdivision would make more than 2^28 triangles");
+    constexpr size_t kMostTriangles = size_t(1) << 24;
+    if (mesh.triangles.size() > kMostTriangles >> (2 * levels))
+        throw SceneError(where, fmt::format("{} subdivisions of {} triangles would make more than "
+                                            "2^24: use fewer levels",
+                                            levels, mesh.triangles.size()));
     for (int i = 0; i < levels; ++i) mesh = subdivide_once(mesh);
-    const Neighbours near(mesh);
-    std::vector<Vec3> limit(mesh.positions.size());
-    for (uint32_t v = 0; v < limit.size(); ++v) limit[v] = weighted(mesh, near, v, true);
-    mesh.positions = std::move(limit);
+    const std::vector<Rings> rings = rings_of(mesh, sorted_sides(mesh));
+    for (size_t v = 0; v < mesh.positions.size(); ++v)
+        mesh.positions[v] = weighted(mesh.positions[v], rings[v], true);
     compute_vertex_normals(mesh);
     return mesh;
 }

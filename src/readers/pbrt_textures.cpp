@@ -39,6 +39,8 @@ void bind(PbrtScene& scene, int texture, const char* to, const PbrtArguments& ar
 }
 
 int make_constant(PbrtScene& scene, const PbrtArguments& args) {
+    // The name of a texture stands for it, so that "constant" objects have a number or a colour.
+    if (const int t = scene.texture(args, "value", is_float(args)); t >= 0) return t;
     const int texture = scene.add("texture", "constant", args.where());
     bind(scene, texture, "value", args, "value", 1);
     return texture;

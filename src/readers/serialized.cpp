@@ -9,6 +9,9 @@
 #include <iterator>
 #include <limits>
 
+#include <fmt/format.h>
+
+#include "system/available_memory.h"
 #include "readers/file_bytes.h"
 
 namespace etendue {
@@ -69,6 +72,7 @@ public:
     auto read_array(uint64_t count, Convert convert) {
         constexpr uint64_t kPiece = 1 << 16;
         std::vector<decltype(convert(Stored{}))> items;
+        items.reserve(std::min(count, 16 * kPiece));
         std::vector<Stored> piece;
         while (items.size() < count) {
             piece.resize(std::min(kPiece, count - items.size()));
@@ -86,16 +90,17 @@ private:
 class SerializedMesh {
 public:
     SerializedMesh(std::string_view compressed, uint16_t version, const SourceLocation& where)
-        : in_(compressed, where), version_(version), where_(where) {}
+        : in_(compressed, where), compressed_bytes_(compressed.size()), version_(version),
+          where_(where) {}
 
     MeshData parse() {
         flags_ = in_.read<uint32_t>();
         if (((flags_ & kSinglePrecision) != 0) == ((flags_ & kDoublePrecision) != 0))
             throw SceneError(where_, "the flags must name either single or double precision");
         MeshData mesh;
-        if (version_ == kVersion)
-            for (char c = in_.read<char>(); c != 0; c = in_.read<char>()) mesh.name += c;
+        if (version_ == kVersion) mesh.name = read_name();
         const uint64_t vertices = count("vertices"), triangles = count("triangles");
+        check_size(vertices, triangles);
         mesh.positions = points<Vec3>(vertices);
         if (flags_ & kHasNormals) mesh.normals = points<Vec3>(vertices);
         if (flags_ & kHasTexcoords) mesh.uvs = points<Vec2>(vertices);
@@ -107,6 +112,33 @@ public:
     }
 
 private:
+    std::string read_name() {
+        constexpr size_t kLongest = 1 << 16;
+        std::string name;
+        for (char c = in_.read<char>(); c != 0; c = in_.read<char>()) {
+            if (name.size() == kLongest)
+                throw SceneError(where_, "the name of the mesh has no end");
+            name += c;
+        }
+        return name;
+    }
+    /// Refuses counts of which a small file could hold nothing but zeros.
+    void check_size(uint64_t vertices, uint64_t triangles) const {
+        constexpr uint64_t kAlways = uint64_t(256) << 20, kMostRatio = 64;
+        const uint64_t number = flags_ & kSinglePrecision ? sizeof(float) : sizeof(double);
+        const uint64_t numbers = 3 + (flags_ & kHasNormals ? 3 : 0) +
+                                 (flags_ & kHasTexcoords ? 2 : 0) + (flags_ & kHasColors ? 3 : 0);
+        const uint64_t bytes = vertices * numbers * number + triangles * sizeof(MeshData::Triangle);
+        if (bytes > std::max(kAlways, kMostRatio * compressed_bytes_))
+            throw SceneError(where_,
+                             fmt::format("the mesh has {} vertices and {} triangles, which is more "
+                                         "than {} bytes of the file can hold",
+                                         vertices, triangles, compressed_bytes_));
+        if (const auto free = available_memory(); free && bytes > *free)
+            throw SceneError(where_,
+                             fmt::format("the mesh needs {} of memory, but only {} are free",
+                                         format_bytes(bytes), format_bytes(*free)));
+    }
     uint64_t count(const char* what) {
         const auto n = in_.read<uint64_t>();
         if (n > std::numeric_limits<uint32_t>::max())
@@ -128,6 +160,7 @@ private:
     }
 
     InflateStream in_;
+    uint64_t compressed_bytes_;
     uint16_t version_;
     uint32_t flags_ = 0;
     SourceLocation where_;

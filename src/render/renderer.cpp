@@ -13,6 +13,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "system/available_memory.h"
+
 namespace etendue {
 namespace {
 
@@ -149,6 +151,14 @@ private:
 
 }  // namespace
 
+void check_limits(const RenderLimits& limits) {
+    if (limits.spp && *limits.spp > kMostPasses)
+        throw std::runtime_error(fmt::format(
+            "{} samples per pixel are too many: there are random numbers for 2^32; render with "
+            "several seeds instead, and average the images",
+            *limits.spp));
+}
+
 const char* to_string(StopReason reason) {
     switch (reason) {
     case StopReason::Samples: return "samples";
@@ -192,6 +202,20 @@ std::unique_ptr<tbb::global_control> allow_threads(int threads) {
 /// Exception that ends a pass which is to be discarded.
 struct PassDropped {};
 
+/// The film's geometry, if there is memory for its film and for the image that is written.
+const FilmGeometry& fitting_film(const Scene& scene, const RenderSettings& settings,
+                                 const Integrator& integrator, uint64_t light_paths) {
+    const FilmGeometry& g = scene.film();
+    uint64_t bytes =
+        g.pixel_count() * Film::bytes_per_pixel(light_paths > 0, integrator.error_groups()) +
+        g.pixel_count() * sizeof(Rgb);
+    if (settings.technique_depth > 0)
+        bytes += TechniqueImages::memory_bytes(g.pixel_count(), settings.technique_depth);
+    require_memory(bytes, fmt::format("an image of {} x {} pixels", g.crop_width, g.crop_height),
+                   "; render it in crops (--crop)");
+    return g;
+}
+
 }  // namespace
 
 struct Renderer::Workers {
@@ -225,9 +249,11 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings)
 Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
                    std::unique_ptr<Integrator> integrator)
     : scene_(scene), settings_(settings), integrator_(std::move(integrator)),
-      film_(scene.film(), scene.filter(), typical_radiance(scene)),
+      light_paths_(integrator_->light_paths(scene)),
+      film_(fitting_film(scene, settings, *integrator_, light_paths_), scene.filter(),
+            typical_radiance(scene)),
       workers_(std::make_unique<Workers>(settings.threads)) {
-    light_paths_ = integrator_->light_paths(scene);
+    check_limits(settings);
     if (integrator_->error_groups() > 0) film_.set_groups(integrator_->error_groups());
     if (settings.technique_depth > 0)
         techniques_ = std::make_unique<TechniqueImages>(
@@ -296,12 +322,12 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
     // Calls use(context, work, sink) for the samples 0 … count-1 of the pass.
     const auto for_each_sample = [&](uint64_t count, const auto& use) {
         tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
-            go_on();
             Workspace& work = workspace();
             Sampler sampler(settings_.sampler, seed);
             FilmSink sink({film_, techniques_.get(), settings_, splat_scale, work});
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
             for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
+                go_on();
                 sampler.start(place.pass, pixel);
                 work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
                 use(SampleContext{scene_, film_, pixel, chunk, light_paths, splat_scale, sampler,
@@ -366,7 +392,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
 std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
                                             const ErrorEstimate& error) const {
     if (film_.passes() == 0) return {};
-    if (limits.spp && film_.passes() >= *limits.spp) return StopReason::Samples;
+    if (film_.passes() >= limits.spp.value_or(kMostPasses)) return StopReason::Samples;
     // A pass is begun only if at least half of it is expected to fit.
     if (limits.seconds && seconds_ + 0.5 * seconds_ / double(film_.passes()) > *limits.seconds)
         return StopReason::Time;
@@ -381,6 +407,7 @@ StopReason Renderer::run(const RenderLimits& limits,
     using Clock = std::chrono::steady_clock;
     const auto begin = Clock::now();
     const double before = seconds_;
+    check_limits(limits);
     if (const auto reason = reached(limits, film_.error())) return *reason;
     while (true) {
         try {

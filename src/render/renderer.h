@@ -21,6 +21,11 @@ struct RenderLimits {
     std::optional<double> error;  ///< Relative RMS error of the image, see ErrorEstimate.
 };
 
+/// Random numbers are addressed by the index of the pass, which has 32 bits.
+constexpr uint64_t kMostPasses = uint64_t(1) << 32;
+/// Throws std::runtime_error if a limit is beyond what can be rendered.
+void check_limits(const RenderLimits& limits);
+
 struct RenderSettings : RenderLimits {
     IntegratorSpec integrator{"path", {}};
     SamplerKind sampler = SamplerKind::Independent;
@@ -78,6 +83,7 @@ public:
     bool sample_again(uint64_t pixel, Workspace& work, ContributionSink& sink) const;
 
     const Film& film() const { return film_; }
+    uint64_t light_paths() const { return light_paths_; }  ///< Number of light paths in a pass.
     const Integrator& integrator() const { return *integrator_; }
     const RenderStats& stats() const { return stats_; }  ///< Statistics of the finished passes.
     double seconds() const { return seconds_; }          ///< Time of the finished passes in run().

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <map>
 
 #include <fmt/format.h>
@@ -155,8 +156,10 @@ private:
         const Params p = plugins_.params(index);
         SceneShape s;
         auto made = plugins_.attempt(index, [&] {
-            return preload_.take_shape(*entry, p,
-                                       [&](const std::string& m) { plugins_.warn(p.where(), m); });
+            auto shape = preload_.take_shape(
+                *entry, p, [&](const std::string& m) { plugins_.warn(p.where(), m); });
+            check_extent(shape->bounds(), p.where());
+            return shape;
         });
         if (!made) return {};
         scene_.owned_shapes_.push_back(std::move(made));
@@ -192,6 +195,16 @@ private:
         else
             s.emitter = models_.make_emitters(emitters[0].object, s.shape);
         return s;
+    }
+
+    /// The squares of distances must be numbers of single precision.
+    static void check_extent(const Bounds3& b, const SourceLocation& where) {
+        constexpr float kFarthest = 1e18f;
+        for (const Vec3 corner : {b.lo, b.hi})
+            for (const float x : {corner.x, corner.y, corner.z})
+                if (!(std::fabs(x) <= kFarthest))
+                    throw SceneError(
+                        where, fmt::format("shapes must lie within ±1e18, but one reaches {}", x));
     }
 
     void add_shape(int index) {
@@ -232,14 +245,27 @@ private:
                                 : ""));
             return {};
         }
-        std::vector<Instance> shown = make_group(groups[0].object);
+        const std::vector<Instance>& group = make_group(groups[0].object);
+        count_copies(group.size(), p.where());
+        std::vector<Instance> shown = group;
         const Transform to_world = plugins_.attempt(index, [&] { return p.transform("to_world"); });
         for (Instance& i : shown) i.to_world = to_world * i.to_world;
         return shown;
     }
 
+    /// Groups within groups multiply, so that a short file could fill any memory. Instances of groups that hold shapes
+    /// only are not limited.
+    void count_copies(size_t parts, const SourceLocation& where) {
+        constexpr size_t kMostCopies = 1 << 22;
+        if (parts > 1) copies_ += parts;
+        if (copies_ > kMostCopies)
+            throw SceneError(where, fmt::format("nested groups amount to more than {} instances: "
+                                                "put their shapes into fewer groups",
+                                                kMostCopies));
+    }
+
     /// The shapes of a group, and the instances nested in it.
-    std::vector<Instance> make_group(int index) {
+    const std::vector<Instance>& make_group(int index) {
         if (const auto it = group_of_.find(index); it != group_of_.end()) return it->second;
         std::vector<SceneShape> members;
         std::vector<Instance> parts;
@@ -250,11 +276,6 @@ private:
         }
         if (parts.empty())
             plugins_.problem(plugins_.object(index).where, "the shapegroup has no shapes");
-        constexpr size_t kMostInstances = 50'000'000;
-        if (parts.size() > kMostInstances)
-            throw SceneError(
-                plugins_.object(index).where,
-                fmt::format("nested groups amount to more than {} instances", kMostInstances));
         return group_of_[index] = std::move(parts);
     }
 
@@ -262,6 +283,8 @@ private:
         for (const auto& c : plugins_.params(index).children("shape")) {
             const std::string& type = plugins_.object(c.object).type;
             if (type == "shapegroup" || type == "instance") {
+                if (type == "shapegroup")
+                    count_copies(make_group(c.object).size(), plugins_.object(c.object).where);
                 const auto nested =
                     type == "instance" ? instances_of(c.object) : make_group(c.object);
                 parts.insert(parts.end(), nested.begin(), nested.end());
@@ -298,6 +321,7 @@ private:
                                         corner & 4 ? b.hi.z : b.lo.z}));
             }
         }
+        if (!scene_.bounds_.is_empty()) check_extent(scene_.bounds_, {description_.file, 0});
         plugins_.guarded(0, [&] { a.commit(); });
     }
 
@@ -369,10 +393,21 @@ private:
                           fmt::format("integrator \"{}\" is not supported; {} is rendered", type,
                                       alias->integrator));
         strict_normals_ = p.flag("strict_normals", false);
-        for (const char* name : {"max_depth", "rr_depth"})
-            if (p.has(name))
-                scene_.defaults_.integrator_params.emplace_back(
-                    name, fmt::format("{}", p.integer(name, 0, -1, 1 << 20)));
+        constexpr int64_t kLatest = RenderDefaults::kLatestRoulette;
+        for (const char* name : {"max_depth", "rr_depth"}) {
+            if (!p.has(name)) continue;
+            int64_t depth = p.integer(name, 0, -1, INT32_MAX);
+            const int64_t longest = p.integer("max_depth", -1, -1, INT32_MAX);
+            if (name == std::string_view("rr_depth") && depth > kLatest &&
+                (longest < 0 || longest > kLatest)) {
+                plugins_.warn(p.where(name),
+                              fmt::format("rr_depth is {}; {} is used, so that paths "
+                                          "in closed rooms end",
+                                          depth, kLatest));
+                depth = kLatest;
+            }
+            scene_.defaults_.integrator_params.emplace_back(name, fmt::format("{}", depth));
+        }
         if (alias->max_depth >= 0)
             scene_.defaults_.integrator_params.emplace_back("max_depth",
                                                             fmt::format("{}", alias->max_depth));
@@ -468,6 +503,7 @@ private:
     Preload preload_;
     Scene scene_;
     std::map<int, std::vector<Instance>> group_of_;
+    size_t copies_ = 0;           ///< Of what groups within groups contain.
     std::vector<bool> is_child_;  ///< Whether another object refers to an object.
     std::vector<View> views_;
     bool strict_normals_ = false;

@@ -43,6 +43,11 @@ Preload::Made Preload::make(const ShapeEntry& entry, const Params& params) {
     Made made;
     try {
         made.shape = entry.make(params, [&](const std::string& m) { made.warnings.push_back(m); });
+        const std::lock_guard lock(mutex_);
+        if (!watch_.add(made.shape->memory_bytes())) {
+            made.shape.reset();
+            params.fail("the shapes of the scene need more memory than is free");
+        }
     } catch (const std::exception&) {
         made.error = std::current_exception();
     }

@@ -4,11 +4,13 @@
 #include <exception>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "scene/shape_registry.h"
+#include "system/available_memory.h"
 #include "texture/texture_cache.h"
 
 namespace etendue {
@@ -30,8 +32,10 @@ private:
         std::vector<std::string> warnings;
         std::exception_ptr error;
     };
-    static Made make(const ShapeEntry& entry, const Params& params);
+    Made make(const ShapeEntry& entry, const Params& params);
 
+    std::mutex mutex_;
+    MemoryWatch watch_;  ///< Over all shapes: many may name the same file.
     std::vector<std::optional<Made>> shapes_;  ///< By object.
 };
 

@@ -52,6 +52,9 @@ struct SurfaceHit {
 
 /// Settings of the scene file for integrator and sampler; the command line overrides them.
 struct RenderDefaults {
+    /// Largest rr_depth of paths that are longer: in closed rooms nothing but roulette ends walks.
+    static constexpr int kLatestRoulette = 1000;
+
     std::string integrator;  ///< Empty where the file names none.
     std::vector<std::pair<std::string, std::string>> integrator_params;  ///< max_depth, rr_depth.
     int spp = 0;                                                         ///< 0: not given.

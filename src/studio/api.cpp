@@ -303,7 +303,7 @@ Reply Api::put_paths(const Request& request) {
     const std::string name = request.query("file").value_or("paths.json");
     if (!is_file_name(name)) throw ApiError(422, "this is no name of a file");
     if (!name.ends_with(".json")) throw ApiError(422, "the name must end with .json");
-    const json list = json::parse(request.body, nullptr, false);
+    const json list = parse_body(request.body);
     const std::string text = etendue::to_json(paths_of(list, name));
     const std::string current = etendue::to_json(parse_user_paths(paths_text(name), name));
     if (request.if_match != hash_of(current))

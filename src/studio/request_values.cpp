@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "description/json_text.h"
+#include "description/source_location.h"
 #include "studio/reply_json.h"
 
 namespace etendue {
@@ -35,8 +37,16 @@ Vec3 to_vec(const json& value, const char* name) {
     return v;
 }
 
+json parse_body(const std::string& text) {
+    try {
+        return parse_json(text, "body");
+    } catch (const SceneError& e) {
+        throw ApiError(400, e.what());
+    }
+}
+
 json parse_object(const std::string& text) {
-    json body = json::parse(text, nullptr, false);
+    json body = parse_body(text);
     if (!body.is_object()) throw ApiError(400, "the body must be a JSON object");
     return body;
 }

@@ -23,6 +23,7 @@ struct ApiError : std::runtime_error {
     int status;
 };
 
+nlohmann::json parse_body(const std::string& text);
 nlohmann::json parse_object(const std::string& text);
 /// A finite vector; `name` is for messages.
 Vec3 to_vec(const nlohmann::json& value, const char* name);

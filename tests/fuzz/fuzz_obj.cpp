@@ -1,11 +1,20 @@
 // Any bytes as an .obj file: the result must be a mesh or a SceneError.
 
+#include "fuzz_target.h"
 #include "readers/obj.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+namespace etendue::fuzz {
+namespace {
+
+void run(std::string_view bytes) {
     try {
-        etendue::parse_obj({reinterpret_cast<const char*>(data), size}, "fuzz.obj");
-    } catch (const etendue::SceneError&) {
+        parse_obj(bytes, "fuzz.obj");
+    } catch (const SceneError&) {
     }
-    return 0;
 }
+
+const Register
+    kRegister({.name = "obj", .run = run, .extension = ".obj", .folders = {"tests/scenes"}});
+
+}  // namespace
+}  // namespace etendue::fuzz

@@ -131,7 +131,7 @@ TEST_F(PathsTest, BadFilesAreRefused) {
     };
     expect(folder.path() / "none.json", "none.json: cannot be read");
     write(paths, "[\n{\"points\": [[0, 1, 0], [0.1, -1, 0.3]}\n]");
-    expect(paths, "paths.json:2: not valid JSON");
+    expect(paths, "paths.json:2: malformed JSON");
     write(paths, "[]");
     expect(paths, "paths.json: has no paths");
     write(paths, "[{\"points\": [[0, 1, 0]]}]");

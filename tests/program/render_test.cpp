@@ -92,6 +92,14 @@ TEST_F(RenderTest, RefusesCropsAndSizesThatCannotBe) {
     }
 }
 
+TEST_F(RenderTest, RefusesMoreSamplesThanThereAreRandomNumbers) {
+    const ProgramResult r = run({"--spp", "4294967297"});
+    EXPECT_EQ(r.status, 1);
+    EXPECT_NE(r.errors.find("4294967297 samples per pixel are too many"), std::string::npos)
+        << r.errors;
+    EXPECT_TRUE(has_earlier_image());
+}
+
 /// A memory limit that pass 0 meets, but a later pass exceeds.
 TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
     const auto vcm = [&](int light_paths, int spp, int seed) {

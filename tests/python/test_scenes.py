@@ -183,3 +183,22 @@ def test_errors_of_files_are_those_of_the_program(tmp_path: Path, program: str) 
 
 def test_defines(scenes: Path) -> None:
     assert et.load(scenes / "demo.xml", {"width": 20, "height": 10}).build().width == 20
+
+
+def test_objects_that_double_are_refused() -> None:
+    textures: dict[str, object] = {"type": "scene", "t0": {"type": "checkerboard"}}
+    for i in range(1, 61):
+        before = {"type": "ref", "id": f"t{i - 1}"}
+        textures[f"t{i}"] = {"type": "checkerboard", "color0": before, "color1": before}
+    with pytest.raises(et.SceneError, match="contains more than .* objects"):
+        et.load_dict(textures)
+
+
+def test_paths_are_limited() -> None:
+    # Groups within groups are made once, but many paths lead to the innermost.
+    groups: dict[str, object] = {"type": "scene", "g0": {"type": "shapegroup", "ball": {"type": "sphere"}}}
+    for i in range(1, 26):
+        before = {"type": "instance", "shape": {"type": "ref", "id": f"g{i - 1}"}}
+        groups[f"g{i}"] = {"type": "shapegroup", "a": before, "b": dict(before)}
+    with pytest.raises(ValueError, match="more than 1000000 paths"):
+        et.load_dict(groups).paths()

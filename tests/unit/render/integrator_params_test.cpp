@@ -24,5 +24,16 @@ TEST(IntegratorParams, NumbersAreFinite) {
     EXPECT_EQ(error_of("vcm:radius=0.1"), "no error");
 }
 
+TEST(IntegratorParams, RouletteMustEndWalks) {
+    for (const char* name : {"path", "light", "bdpt", "upg", "pcbpt"}) {
+        const std::string spec = std::string(name) + ":rr_depth=1000000";
+        EXPECT_EQ(error_of(spec),
+                  "rr_depth is 1000000, but must be at most 1000, unless max_depth is: paths in a "
+                  "closed room would not end");
+        EXPECT_EQ(error_of(spec + ",max_depth=1000"), "no error");
+        EXPECT_EQ(error_of(std::string(name) + ":rr_depth=1000"), "no error");
+    }
+}
+
 }  // namespace
 }  // namespace etendue

@@ -92,5 +92,74 @@ TEST(SceneBuilder, UnknownTextureIsReplacedByTheDefault) {
     EXPECT_EQ(scene.shapes().at(0).material->mean_albedo(), Rgb(0.5f));
 }
 
+TEST(SceneBuilder, RefusesGroupsThatMultiply) {
+    // Each group has the one before it twice: 2^25 instances.
+    std::string groups = "<shape type=\"shapegroup\" id=\"g0\"><shape type=\"sphere\"/></shape>\n";
+    for (int i = 1; i <= 25; ++i) {
+        const std::string nested =
+            "<shape type=\"instance\"><ref id=\"g" + std::to_string(i - 1) + "\"/></shape>";
+        groups += "<shape type=\"shapegroup\" id=\"g" + std::to_string(i) + "\">" + nested +
+                  nested + "</shape>\n";
+    }
+    const std::string error = error_of([&] {
+        build(front_camera(4) + groups + "<shape type=\"instance\"><ref id=\"g25\"/></shape>");
+    });
+    EXPECT_NE(error.find("nested groups amount to more than 4194304 instances"), std::string::npos)
+        << error;
+}
+
+TEST(SceneBuilder, CountsInstancesInGroupsOnlyWhereTheyMultiply) {
+    // Few shapes, used by many instances of the file itself.
+    std::string scene = "<shape type=\"shapegroup\" id=\"g\"><shape type=\"sphere\"/></shape>"
+                        "<shape type=\"shapegroup\" id=\"h\">";
+    for (int i = 0; i < 10; ++i) scene += "<shape type=\"instance\"><ref id=\"g\"/></shape>";
+    scene += "</shape>";
+    for (int i = 0; i < 10; ++i) scene += "<shape type=\"instance\"><ref id=\"h\"/></shape>";
+    EXPECT_EQ(build(front_camera(4) + scene).statistics().instances, 100u);
+}
+
+TEST(SceneBuilder, RouletteOfFilesBeginsInTime) {
+    const auto scene = [](const std::string& params) {
+        return build(front_camera(4) + room() + "<integrator type=\"path\">" + params +
+                     "</integrator>");
+    };
+    const Scene late = scene("<integer name=\"rr_depth\" value=\"1000000\"/>");
+    ASSERT_EQ(late.warnings().size(), 2u);  // the other: there is no light
+    EXPECT_NE(late.warnings()[0].find("rr_depth is 1000000; 1000 is used"), std::string::npos)
+        << late.warnings()[0];
+    const auto expected = std::vector<std::pair<std::string, std::string>>{{"rr_depth", "1000"}};
+    EXPECT_EQ(late.defaults().integrator_params, expected);
+    const Scene never = scene("<integer name=\"max_depth\" value=\"6\"/>"
+                              "<integer name=\"rr_depth\" value=\"1000000\"/>");
+    EXPECT_EQ(never.warnings().size(), 1u);
+}
+
+TEST(SceneBuilder, RefusesWhatSinglePrecisionCannotHold) {
+    const auto scaled = [](const std::string& shape, const std::string& transform) {
+        return "<shape type=\"" + shape + "\"><transform name=\"to_world\">" + transform +
+               "</transform></shape>";
+    };
+    const std::string far = "shapes must lie within ±1e18", entry = "out of range for single";
+    for (const auto& [body, message] : std::vector<std::pair<std::string, std::string>>{
+             {scaled("sphere", "<scale value=\"1e19\"/>"), far},
+             {scaled("rectangle", "<scale value=\"1e20\"/>"), far},
+             {scaled("cube", "<translate x=\"-2e18\"/>"), far},
+             {scaled("disk", "<scale value=\"1e30\"/>"), far},
+             {scaled("cylinder", "<translate z=\"1e30\"/>"), far},
+             {scaled("cube", "<translate x=\"1e200\"/>"), entry},
+             {"<shape type=\"shapegroup\" id=\"g\"><shape type=\"sphere\"/></shape>"
+              "<shape type=\"instance\"><ref id=\"g\"/><transform name=\"to_world\"><scale "
+              "value=\"1e25\"/></transform></shape>",
+              far},
+             {"<sensor type=\"perspective\"><transform name=\"to_world\"><translate "
+              "x=\"1e60\"/></transform></sensor>",
+              entry}}) {
+        const bool has_camera = body.find("sensor") != std::string::npos;
+        const std::string error =
+            error_of([&, &xml = body] { build((has_camera ? "" : front_camera(4)) + room() + xml); });
+        EXPECT_NE(error.find(message), std::string::npos) << error << "\nexpected: " << message;
+    }
+}
+
 }  // namespace
 }  // namespace etendue::test

@@ -1,0 +1,80 @@
+// Any bytes as an image: pixels or a std::runtime_error. The small implementation of image_io.h is used; with OpenImageIO
+// little but its own code would be tested.
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include <jpeglib.h>
+
+#include "fuzz_target.h"
+#include "image/image_io.h"
+
+namespace etendue::fuzz {
+namespace {
+
+void run(std::string_view bytes) {
+    for (const bool raw : {false, true}) {
+        try {
+            const PixelBuffer p = decode_pixels(std::string(bytes), "fuzz", raw);
+            const size_t values = size_t(p.width) * size_t(p.height) * size_t(p.channels);
+            require(p.width > 0 && p.height > 0 && p.channels > 0);
+            std::visit([&](const auto& data) { require(data.size() == values); }, p.data);
+        } catch (const std::runtime_error&) {
+        }
+    }
+}
+
+std::string jpeg() {
+    jpeg_compress_struct c;
+    jpeg_error_mgr errors;
+    c.err = jpeg_std_error(&errors);
+    jpeg_create_compress(&c);
+    unsigned char* bytes = nullptr;
+    unsigned long size = 0;
+    jpeg_mem_dest(&c, &bytes, &size);
+    c.image_width = c.image_height = 16;
+    c.input_components = 3;
+    c.in_color_space = JCS_RGB;
+    jpeg_set_defaults(&c);
+    jpeg_start_compress(&c, TRUE);
+    for (int y = 0; y < 16; ++y) {
+        unsigned char row[48];
+        for (int i = 0; i < 48; ++i) row[i] = static_cast<unsigned char>(i * y);
+        JSAMPROW at = row;
+        jpeg_write_scanlines(&c, &at, 1);
+    }
+    jpeg_finish_compress(&c);
+    const std::string file(reinterpret_cast<const char*>(bytes), size);
+    jpeg_destroy_compress(&c);
+    std::free(bytes);
+    return file;
+}
+
+/// An image in each format that can be written.
+std::vector<std::string> seeds() {
+    Image image;
+    image.width = 16, image.height = 5;
+    image.channels = {"R", "G", "B"};
+    for (int i = 0; i < 16 * 5 * 3; ++i) image.data.push_back(float(i) * 0.01f);
+    const std::filesystem::path folder =
+        std::filesystem::temp_directory_path() / ("fuzz-image-" + std::to_string(getpid()));
+    std::vector<std::string> files = {jpeg()};
+    for (const char* extension : {".exr", ".pfm", ".hdr", ".png"}) {
+        const std::string name = (folder / ("image" + std::string(extension))).string();
+        write_image(name, image);
+        std::ifstream in(name, std::ios::binary);
+        files.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+    }
+    std::filesystem::remove_all(folder);
+    return files;
+}
+
+const Register kRegister({.name = "image", .run = run, .seeds = seeds, .mutations = 1500});
+
+}  // namespace
+}  // namespace etendue::fuzz

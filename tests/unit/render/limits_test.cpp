@@ -1,0 +1,118 @@
+// Limits of a rendering: numbers of passes, memory, and how soon a pass can be dropped.
+
+#include <chrono>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "limited_memory.h"
+#include "render/renderer.h"
+#include "render/warnings.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+template <class F>
+std::string error_of(F&& f) {
+    try {
+        f();
+    } catch (const std::exception& e) {
+        return e.what();
+    }
+    return "no error";
+}
+
+Scene small_scene(int width = 8) {
+    BuildOptions options;
+    options.resolution = {width, width};
+    return build_scene(parse_mitsuba_xml("<scene version=\"3.0.0\">" + front_camera(8) + room() +
+                                             area_lamp() + "</scene>",
+                                         "test.xml"),
+                       options);
+}
+
+TEST(RenderLimits, PassesHaveRandomNumbersOfTheirOwn) {
+    const Scene scene = small_scene();
+    RenderSettings settings;
+    settings.spp = (uint64_t(1) << 32) + 1;
+    const std::string error = error_of([&] { Renderer(scene, settings); });
+    EXPECT_NE(error.find("4294967297 samples per pixel are too many"), std::string::npos) << error;
+    settings.spp = uint64_t(1) << 32;
+    Renderer renderer(scene, settings);
+    const std::atomic<bool> interrupted{false};
+    EXPECT_NE(error_of([&] {
+                  renderer.run(
+                      {.spp = uint64_t(1) << 40, .seconds = {}, .error = {}},
+                      [](const Progress&) {}, interrupted);
+              }).find("too many"),
+              std::string::npos);
+}
+
+TEST(RenderLimits, ImagesMustFitIntoTheMemory) {
+    if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers need the address space";
+    const Scene scene = small_scene(16384);
+    RenderSettings settings;
+    settings.threads = 1;
+    const std::string verdict =
+        in_limited_memory(uint64_t(2) << 30, [&] { Renderer(scene, settings); });
+    // 16384² pixels of 48 + 12 + 8 + 12 bytes.
+    EXPECT_TRUE(
+        verdict.starts_with("an image of 16384 x 16384 pixels needs 20 GiB of memory, but only "))
+        << verdict;
+    EXPECT_TRUE(verdict.ends_with(" GiB are free; render it in crops (--crop)")) << verdict;
+}
+
+TEST(RenderLimits, LightPathsThatMayNotFitAreNamedBefore) {
+    const Scene scene = small_scene(2048);
+    const auto warned = [&](const char* text, uint64_t light_paths, uint64_t available) {
+        return memory_warnings(scene, IntegratorSpec::parse(text), light_paths, available);
+    };
+    constexpr uint64_t kGiB = uint64_t(1) << 30;
+    EXPECT_TRUE(warned("upg", 1 << 22, 8 * kGiB).empty());
+    EXPECT_TRUE(warned("upg:memory=1000", 1 << 22, kGiB).empty());
+    EXPECT_TRUE(warned("path", 0, 1).empty());
+    for (const char* name : {"upg", "vcm", "sppm", "pcbpt", "pm"}) {
+        const auto all = warned(name, 1 << 22, 2 * kGiB);
+        ASSERT_EQ(all.size(), 1u) << name;
+        EXPECT_EQ(all[0], std::string(name) +
+                              " may need up to 6.0 GiB for its light paths, but only 2.0 GiB of "
+                              "memory are free; memory=1536 limits it, and there are fewer light "
+                              "paths then");
+    }
+}
+
+/// A closed room whose walls reflect all light: only roulette ends its paths.
+Scene white_room() {
+    return build(sensor("0,0,3", "0,0,0", 64) +
+                 "<shape type=\"sphere\"><float name=\"radius\" value=\"10\"/><boolean "
+                 "name=\"flip_normals\" value=\"true\"/>" +
+                 diffuse("1,1,1") + "</shape>" + area_lamp("1,1,1"));
+}
+
+TEST(RenderLimits, PassesOfLongPathsAreDroppedAtOnce) {
+    const Scene scene = white_room();
+    for (const char* method :
+         {"path:rr_depth=1000", "bdpt:rr_depth=100,max_depth=1000000", "mlt"}) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse(method);
+        settings.threads = 2;
+        settings.spp = 1000000;
+        Renderer renderer(scene, settings);
+        std::atomic<bool> stop{false}, drop{false};
+        using Clock = std::chrono::steady_clock;
+        Clock::time_point dropped;
+        std::thread user([&] {
+            std::this_thread::sleep_for(std::chrono::milliseconds(100));
+            stop = drop = true;
+            dropped = Clock::now();
+        });
+        renderer.run([](const Progress&) {}, stop, drop);
+        const double seconds = std::chrono::duration<double>(Clock::now() - dropped).count();
+        user.join();
+        EXPECT_LT(seconds, 1) << method;
+    }
+}
+
+}  // namespace
+}  // namespace etendue::test
