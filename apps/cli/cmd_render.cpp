@@ -13,7 +13,6 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
-#include "system/available_memory.h"
 #include "image/atomic_file.h"
 #include "image/image_io.h"
 #include "interrupt.h"
@@ -25,6 +24,7 @@
 #include "render/renderer.h"
 #include "render/warnings.h"
 #include "scene_options.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 namespace {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -11,6 +9,7 @@
 #include "description/json_text.h"
 #include "description/source_location.h"
 #include "math/warp.h"
+#include "readers/file_bytes.h"
 
 namespace etendue {
 namespace {
@@ -97,9 +96,7 @@ std::vector<GivenPath> parse_user_paths(const std::string& text, const std::stri
 }
 
 std::vector<GivenPath> read_user_paths(const std::string& file) {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) refuse(file, "cannot be read");
-    return parse_user_paths({std::istreambuf_iterator<char>(in), {}}, file);
+    return parse_user_paths(read_file_bytes(file), file);
 }
 
 std::string to_json(std::span<const GivenPath> paths) {

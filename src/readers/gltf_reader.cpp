@@ -143,6 +143,7 @@ void GltfReader::check_extensions() {
 // ---- Nodes
 
 void GltfReader::read_scene() {
+    check_gpu_instances();
     const std::vector<JsonValue> scenes = root_["scenes"].elements();
     std::vector<size_t> roots;
     if (scenes.empty()) {
@@ -205,6 +206,23 @@ void GltfReader::read_node(const JsonValue& node, const Transform& to_world) {
         add_light(lights_[*light], to_world);
 }
 
+/// Nodes may share their accessors, so the size of the file does not limit what they place.
+void GltfReader::check_gpu_instances() const {
+    constexpr size_t kMost = 1 << 22;
+    size_t sum = 0;
+    for (const JsonValue& node : nodes_) {
+        const JsonValue attributes = node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
+        size_t count = 0;
+        for (const char* name : {"TRANSLATION", "ROTATION", "SCALE"})
+            if (const JsonValue accessor = attributes[name])
+                count = std::max(count, buffers_.count(accessor));
+        if (count > kMost - sum)
+            node.fail(fmt::format("EXT_mesh_gpu_instancing places more than {} meshes in the scene",
+                                  kMost));
+        sum += count;
+    }
+}
+
 /// The transforms of EXT_mesh_gpu_instancing; the identity where the node has none.
 std::vector<Transform> GltfReader::gpu_instances(const JsonValue& node) {
     const JsonValue attributes = node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
@@ -220,11 +238,6 @@ std::vector<Transform> GltfReader::gpu_instances(const JsonValue& node) {
             values[i] = buffers_.floats(names[i], types[i]);
             count = std::max(count, values[i].count);
         }
-    // Nodes may share their accessors, so this is not limited by the size of the file.
-    constexpr size_t kMostInstances = 1 << 22;
-    if ((instances_ += count) > kMostInstances)
-        node.fail(fmt::format("EXT_mesh_gpu_instancing places more than {} meshes in the scene",
-                              kMostInstances));
     std::vector<Transform> instances(count);
     const auto get = [&](int which, size_t i, std::vector<double> fallback) {
         const GltfBuffers::Values& v = values[which];

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "system/available_memory.h"
 #include "description/scene_description.h"
 #include "math/bounds.h"
 #include "readers/gltf_buffers.h"
 #include "readers/gltf_json.h"
 #include "readers/read_options.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 
@@ -47,6 +47,7 @@ private:
     void check_extensions();
     void read_scene();
     void read_node(const JsonValue& node, const Transform& to_world);
+    void check_gpu_instances() const;
     std::vector<Transform> gpu_instances(const JsonValue& node);
     void add_camera(const JsonValue& camera, const Transform& to_world);
     void add_default_camera();
@@ -100,7 +101,6 @@ private:
     std::optional<size_t> uv_set_;             ///< Of the material that is being read.
     Bounds3 bounds_;
     MemoryWatch watch_;
-    size_t instances_ = 0;  ///< Of EXT_mesh_gpu_instancing.
     bool has_light_ = false, has_camera_ = false;
 };
 

@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include "system/available_memory.h"
 #include "description/source_location.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 

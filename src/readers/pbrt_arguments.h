@@ -42,7 +42,7 @@ struct PbrtValue {
 };
 
 /// No directive has more parameters than this.
-constexpr size_t kMostPbrtValues = 1000;
+constexpr size_t kMostPbrtValues = 256;
 
 /// Reads the parameters up to the next directive.
 std::vector<PbrtValue> read_pbrt_values(PbrtTokenizer& in);

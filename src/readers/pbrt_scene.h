@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include "system/available_memory.h"
 #include "readers/pbrt_arguments.h"
 #include "readers/read_options.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 

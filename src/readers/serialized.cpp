@@ -11,8 +11,8 @@
 
 #include <fmt/format.h>
 
-#include "system/available_memory.h"
 #include "readers/file_bytes.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 namespace {

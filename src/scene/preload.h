@@ -35,7 +35,7 @@ private:
     Made make(const ShapeEntry& entry, const Params& params);
 
     std::mutex mutex_;
-    MemoryWatch watch_;  ///< Over all shapes: many may name the same file.
+    MemoryWatch watch_;                        ///< Over all shapes: many may name the same file.
     std::vector<std::optional<Made>> shapes_;  ///< By object.
 };
 

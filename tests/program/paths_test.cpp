@@ -129,9 +129,14 @@ TEST_F(PathsTest, BadFilesAreRefused) {
             EXPECT_FALSE(fs::exists(image));
         }
     };
-    expect(folder.path() / "none.json", "none.json: cannot be read");
+    expect(folder.path() / "none.json", "none.json: cannot read: No such file or directory");
     write(paths, "[\n{\"points\": [[0, 1, 0], [0.1, -1, 0.3]}\n]");
     expect(paths, "paths.json:2: malformed JSON");
+    expect(folder.path(), "cannot read: Is a directory");
+    write(paths, "[{\"points\":" + std::string(100000, '[') + "]");
+    expect(paths, "paths.json:1: values are nested more than 64 deep");
+    write(paths, "[{\"points\": [[1e999, 0, 0], [0, 0, 0]]}]");
+    expect(paths, "paths.json:1: malformed JSON: the number 1e999 is too large");
     write(paths, "[]");
     expect(paths, "paths.json: has no paths");
     write(paths, "[{\"points\": [[0, 1, 0]]}]");

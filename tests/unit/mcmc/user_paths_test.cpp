@@ -74,6 +74,11 @@ TEST(UserPaths, BadFilesAreRefused) {
     EXPECT_NE(message("[{\"points\": [[0,0,0]]}]").find("at least two points"), std::string::npos);
     EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0]]}]").find("point 2 must be [x, y, z]"),
               std::string::npos);
+    EXPECT_NE(message("[{\"points\": [[0,0,0],[1e300,0,0]]}]")
+                  .find("point 2 is [1e+300,0,0], which is beyond"),
+              std::string::npos);
+    EXPECT_NE(message("[{\"points\":" + std::string(1000, '[')).find("nested more than 64 deep"),
+              std::string::npos);
     EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"cones\": 1}]").find("\"cones\""),
               std::string::npos);
     EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"cone\": -1}]").find("above 0"),

@@ -155,8 +155,8 @@ TEST(SceneBuilder, RefusesWhatSinglePrecisionCannotHold) {
               "x=\"1e60\"/></transform></sensor>",
               entry}}) {
         const bool has_camera = body.find("sensor") != std::string::npos;
-        const std::string error =
-            error_of([&, &xml = body] { build((has_camera ? "" : front_camera(4)) + room() + xml); });
+        const std::string error = error_of(
+            [&, &xml = body] { build((has_camera ? "" : front_camera(4)) + room() + xml); });
         EXPECT_NE(error.find(message), std::string::npos) << error << "\nexpected: " << message;
     }
 }
