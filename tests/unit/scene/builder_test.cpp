@@ -115,7 +115,7 @@ TEST(SceneBuilder, CountsInstancesInGroupsOnlyWhereTheyMultiply) {
     for (int i = 0; i < 10; ++i) scene += "<shape type=\"instance\"><ref id=\"g\"/></shape>";
     scene += "</shape>";
     for (int i = 0; i < 10; ++i) scene += "<shape type=\"instance\"><ref id=\"h\"/></shape>";
-    EXPECT_EQ(build(front_camera(4) + scene).statistics().instances, 100u);
+    EXPECT_EQ(build(front_camera(4) + room() + scene).statistics().instances, 100u);
 }
 
 TEST(SceneBuilder, RouletteOfFilesBeginsInTime) {
