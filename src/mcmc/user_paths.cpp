@@ -22,12 +22,13 @@ using nlohmann::json;
 
 float positive_number(const json& value, const std::string& file, const std::string& what,
                       float most) {
-    const double v = value.is_number() ? value.get<double>() : 0.0;
-    if (!(v > 0 && v <= double(most)))
+    // As a float: numbers may be too small or too large for one.
+    const float v = value.is_number() ? value.get<float>() : 0.0f;
+    if (!(v > 0 && v <= most && std::isfinite(v)))
         refuse(file, fmt::format("{} must be a number above 0{}, but is {}", what,
                                  std::isfinite(most) ? fmt::format(", at most {}", most) : "",
                                  excerpt(value)));
-    return float(v);
+    return v;
 }
 
 GivenPath parse_path(const json& from, const std::string& file, size_t index) {

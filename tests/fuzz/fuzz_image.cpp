@@ -74,7 +74,7 @@ std::vector<std::string> seeds() {
     return files;
 }
 
-const Register kRegister({.name = "image", .run = run, .seeds = seeds, .mutations = 1500});
+const Register kRegister({.name = "image", .run = run, .seeds = seeds, .mutations = 500});
 
 }  // namespace
 }  // namespace etendue::fuzz

@@ -16,6 +16,12 @@
 #include "mutate.h"
 
 namespace etendue::fuzz {
+
+/// For messages of failed tests.
+static void PrintTo(const Target& target, std::ostream* out) {
+    *out << target.name;
+}
+
 namespace {
 
 namespace fs = std::filesystem;

@@ -83,6 +83,12 @@ TEST(UserPaths, BadFilesAreRefused) {
               std::string::npos);
     EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"cone\": -1}]").find("above 0"),
               std::string::npos);
+    for (const char* radius : {"1e300", "1e-300", "0", "-1", "\"wide\""})
+        EXPECT_NE(
+            message("[{\"points\": [[0,0,0],[1,0,0]], \"radius\": " + std::string(radius) + "}]")
+                .find("\"radius\" must be a number above 0"),
+            std::string::npos)
+            << radius;
     EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"cone\": [1,2]}]").find("2 angles for 1"),
               std::string::npos);
 }
