@@ -41,31 +41,48 @@ public:
 
 private:
     // The unit square of distribution_ has the columns of cells along x and the height + 1 rows along y. The first and
-    // the last row have half the height of the others in the image.
+    // the last row have half the height of the others in the image. Value and density of a sample are those of the
+    // sampled point, not of the rounded direction, which may lie in the next cell.
     Sample sample_arrival(FinePoint u) const override {
         const auto s = distribution_.sample(u);
         Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};
-        const Vec3 d = to_direction(uv);
-        return {d, radiance(d), pdf_direction(d)};
+        if (uv.x >= 1) uv.x -= 1;
+        float sp, cp, ct, sin_theta;
+        sincosf(2 * kPi * uv.x, &sp, &cp);
+        sincosf(kPi * uv.y, &sin_theta, &ct);
+        return {normalize(to_world_.vector({sp * sin_theta, ct, -cp * sin_theta})), radiance(uv),
+                density(s.pdf, {uv, sin_theta})};
+    }
+    float pdf_direction(Vec3 d) const override { return pdf(to_place(d)); }
+    Rgb radiance(Vec3 d) const override { return radiance(to_place(d).uv); }
+    Arrival arrival(Vec3 d) const override {
+        const Place at = to_place(d);
+        return {radiance(at.uv), pdf(at)};
     }
 
-    float pdf_direction(Vec3 d) const override {
-        const Vec2 uv = to_uv(d);
-        const float sin_theta = std::sin(kPi * uv.y);
-        if (!(sin_theta > 0)) return 0;
-        float x = uv.x - 0.5f / float(width_);
+    /// A point of the image, with the sine of its polar angle.
+    struct Place {
+        Vec2 uv;
+        float sin_theta;
+    };
+    float pdf(const Place& at) const {
+        float x = at.uv.x - 0.5f / float(width_);
         if (x < 0) x += 1;
-        return distribution_.pdf({x, to_cell_v(uv.y)}) * cell_v_derivative(uv.y) /
-               (2 * kPi * kPi * sin_theta);
+        return density(distribution_.pdf({x, to_cell_v(at.uv.y)}), at);
+    }
+    /// The density in solid angle, from the density in the unit square of distribution_.
+    float density(float in_square, const Place& at) const {
+        if (!(at.sin_theta > 0)) return 0;
+        return in_square * cell_v_derivative(at.uv.y) / (2 * kPi * kPi * at.sin_theta);
     }
 
-    Rgb radiance(Vec3 d) const override {
-        const Vec2 uv = to_uv(d);
+    Rgb radiance(Vec2 uv) const {
         const float x = uv.x * float(width_) - 0.5f, y = uv.y * float(height_) - 0.5f;
         const int x0 = int(std::floor(x)), y0 = int(std::floor(y));
         const float fx = x - float(x0), fy = y - float(y0);
-        return lerp(fy, lerp(fx, texel(x0, y0), texel(x0 + 1, y0)),
-                    lerp(fx, texel(x0, y0 + 1), texel(x0 + 1, y0 + 1)));
+        const size_t left = size_t(wrap(x0)), right = size_t(wrap(x0 + 1));
+        const Rgb *above = row(y0), *below = row(y0 + 1);
+        return lerp(fy, lerp(fx, above[left], above[right]), lerp(fx, below[left], below[right]));
     }
 
     /// From image coordinate v to the y of distribution_, in [0, 1); piecewise linear.
@@ -92,25 +109,22 @@ private:
         return y < 0.5f || y >= float(height_) - 0.5f ? 2 * slope : slope;
     }
 
-    Vec2 to_uv(Vec3 d) const {
+    Place to_place(Vec3 d) const {
         const Vec3 w = normalize(to_local_.vector(d));
         float u = std::atan2(w.x, -w.z) / (2 * kPi);
         if (u < 0) u += 1;
-        return {std::min(u, kOneMinusEpsilon),
-                std::min(std::acos(clamp(w.y, -1, 1)) / kPi, kOneMinusEpsilon)};
-    }
-    Vec3 to_direction(Vec2 uv) const {
-        float sp, cp, st, ct;
-        sincosf(2 * kPi * uv.x, &sp, &cp);
-        sincosf(kPi * uv.y, &st, &ct);
-        return normalize(to_world_.vector({sp * st, ct, -cp * st}));
+        const float sin_theta = std::sqrt(sqr(w.x) + sqr(w.z));
+        // Near the poles acos(w.y) would be far less exact.
+        const float v = std::atan2(sin_theta, w.y) / kPi;
+        return {{std::min(u, kOneMinusEpsilon), std::min(v, kOneMinusEpsilon)}, sin_theta};
     }
 
-    Rgb texel(int x, int y) const {
-        x %= width_;
-        if (x < 0) x += width_;
-        return pixels_[size_t(std::clamp(y, 0, height_ - 1)) * width_ + x];
+    /// The image repeats along x, beyond its edges by at most its width.
+    int wrap(int x) const { return x < 0 ? x + width_ : x >= width_ ? x - width_ : x; }
+    const Rgb* row(int y) const {
+        return &pixels_[size_t(std::clamp(y, 0, height_ - 1)) * size_t(width_)];
     }
+    Rgb texel(int x, int y) const { return row(y)[wrap(x)]; }
 
     int width_, height_;
     std::vector<Rgb> pixels_;

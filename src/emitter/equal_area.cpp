@@ -28,16 +28,21 @@ public:
     }
 
 private:
+    // As in environment.cpp, a sample has the value and density of the sampled point.
     Sample sample_arrival(FinePoint u) const override {
         const auto s = distribution_.sample(u);
-        const Vec3 d = normalize(to_world_.vector(equal_area_direction(s.uv)));
-        return {d, radiance(d), pdf_direction(d)};
+        return {normalize(to_world_.vector(equal_area_direction(s.uv))), radiance(s.uv),
+                s.pdf * kUniformSpherePdf};
     }
-    float pdf_direction(Vec3 d) const override {
-        return distribution_.pdf(square(d)) * kUniformSpherePdf;
-    }
-    Rgb radiance(Vec3 d) const override {
+    float pdf_direction(Vec3 d) const override { return pdf(square(d)); }
+    Rgb radiance(Vec3 d) const override { return radiance(square(d)); }
+    Arrival arrival(Vec3 d) const override {
         const Vec2 uv = square(d);
+        return {radiance(uv), pdf(uv)};
+    }
+
+    float pdf(Vec2 uv) const { return distribution_.pdf(uv) * kUniformSpherePdf; }
+    Rgb radiance(Vec2 uv) const {
         const int x = std::min(int(uv.x * float(size_)), size_ - 1),
                   y = std::min(int(uv.y * float(size_)), size_ - 1);
         return pixels_[size_t(y) * size_t(size_) + size_t(x)];

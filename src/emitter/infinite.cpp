@@ -10,7 +10,8 @@ EmissionSample InfiniteEmitter::sample_emission(FinePoint u_y0, Vec2 u_d) const 
 }
 
 EmissionSample InfiniteEmitter::sample_emission_from(Vec3 d, Vec2 u_d) const {
-    return emission({d, radiance(d), pdf_direction(d)}, u_d);
+    const Arrival a = arrival(d);
+    return emission({d, a.L, a.pdf}, u_d);
 }
 
 EmissionSample InfiniteEmitter::emission(const Sample& s, Vec2 u_d) const {
@@ -22,7 +23,6 @@ EmissionSample InfiniteEmitter::emission(const Sample& s, Vec2 u_d) const {
 
 bool InfiniteEmitter::sample_direct(Vec3, FinePoint u, DirectSample& out) const {
     const Sample s = sample_arrival(u);
-    // Due to rounding, the direction may lie in a cell of the environment with density zero.
     if (s.L.is_zero() || !(s.pdf > 0)) return false;
     out = {s.d, -s.d, s.d, kInf, s.L, s.pdf, s.pdf, pdf_disk_, {}, 0};
     return true;
@@ -30,8 +30,8 @@ bool InfiniteEmitter::sample_direct(Vec3, FinePoint u, DirectSample& out) const 
 
 EmitterHit InfiniteEmitter::eval_infinite(Vec3 d) const {
     if (is_delta()) return {};
-    const float pdf = pdf_direction(d);
-    return {radiance(d), pdf, pdf, pdf_disk_};
+    const Arrival a = arrival(d);
+    return {a.L, a.pdf, a.pdf, pdf_disk_};
 }
 
 Emitter::Emission InfiniteEmitter::eval_emission(Vec3, Vec2, Vec3 w) const {

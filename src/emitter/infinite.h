@@ -26,11 +26,17 @@ protected:
         Rgb L;
         float pdf;
     };
+    struct Arrival {
+        Rgb L;
+        float pdf;
+    };
     EmissionSample emission(const Sample& from, Vec2 u_d) const;
     virtual Sample sample_arrival(FinePoint u) const = 0;
     virtual Rgb radiance(Vec3 d) const = 0;
     virtual float pdf_direction(Vec3 d) const = 0;
     float scene_radius() const { return radius_; }
+    /// radiance() and pdf_direction() together.
+    virtual Arrival arrival(Vec3 d) const { return {radiance(d), pdf_direction(d)}; }
     /// Density on the bounding disc, 1/(πR²).
     float pdf_disk() const { return pdf_disk_; }
 

@@ -68,50 +68,91 @@ float point_in_cell(int i, float f, int n) {
     return std::min(x, kOneMinusEpsilon);
 }
 
+double sum_of(std::span<const float> values) {
+    double sum = 0;
+    for (const float v : values) sum += double(v);
+    return sum;
+}
+
 }  // namespace
 
+PiecewiseConstant1D::Steps::Steps(int cells, size_t rows)
+    : cells(cells), guides((cells + kCellsPerGuide - 1) / kCellsPerGuide) {
+    lower.reserve(rows * size_t(cells));
+    guide.reserve(rows * size_t(guides));
+}
+
+void PiecewiseConstant1D::Steps::add(std::span<const float> values, double sum) {
+    const size_t first = lower.size();
+    // Whether a cell has a probability above zero; where no value is, all have the same.
+    const auto counts = [&](int i) { return sum > 0 ? values[size_t(i)] > 0 : true; };
+    uint32_t left = 0;
+    for (int i = 0; i < cells; ++i) left += counts(i);
+    double before = 0;
+    uint32_t edge = 0;
+    for (int i = 0; i < cells; ++i) {
+        lower.push_back(edge);
+        if (!counts(i)) continue;
+        before += sum > 0 ? double(values[size_t(i)]) / sum : 1.0 / cells;
+        // At least one step for this cell and for each of those that follow.
+        --left;
+        const auto rounded = uint32_t(std::min(before, 1.0) * kOne + 0.5);
+        edge = left > 0 ? std::clamp(rounded, edge + 1, kOne - left) : kOne;
+    }
+    const uint32_t* row = &lower[first];
+    int cell = 0;
+    for (int g = 0; g < guides; ++g) {
+        const auto at = uint32_t(uint64_t(kOne) * uint64_t(g) / uint64_t(guides));
+        while (upper(row, cell) <= at) ++cell;
+        guide.push_back(uint32_t(cell));
+    }
+}
+
+PiecewiseConstant1D::Sample PiecewiseConstant1D::Steps::sample(double u, size_t r) const {
+    const uint32_t* row = &lower[r * size_t(cells)];
+    const double scaled = u * kOne;
+    const uint32_t at = uint32_t(scaled);
+    const auto g = size_t(uint64_t(at) * uint64_t(guides) >> 31);
+    int cell = int(guide[r * size_t(guides) + g]);
+    while (upper(row, cell) <= at) ++cell;
+    const uint32_t begin = row[cell], width = upper(row, cell) - begin;
+    const float f = std::min(float((scaled - begin) / width), kOneMinusEpsilon);
+    return {point_in_cell(cell, f, cells), float(width) * (float(cells) / float(kOne)), cell};
+}
+
+float PiecewiseConstant1D::Steps::pdf(float x, size_t r) const {
+    const uint32_t* row = &lower[r * size_t(cells)];
+    const int cell = cell_of(x, cells);
+    return float(upper(row, cell) - row[cell]) * (float(cells) / float(kOne));
+}
+
 PiecewiseConstant1D::PiecewiseConstant1D(std::span<const float> values)
-    : values_(values.begin(), values.end()), cdf_(values.size() + 1) {
-    const double n = double(values_.size());
-    std::vector<double> sum(values_.size() + 1, 0.0);
-    for (size_t i = 0; i < values_.size(); ++i) sum[i + 1] = sum[i] + values_[i] / n;
-    integral_ = sum.back();
-    for (size_t i = 0; i < sum.size(); ++i)
-        cdf_[i] = integral_ > 0 ? sum[i] / integral_ : double(i) / n;
-    cdf_.back() = 1;
-    for (float& v : values_) v = integral_ > 0 ? float(v / integral_) : 1.0f;
+    : steps_(int(values.size()), 1) {
+    const double sum = sum_of(values);
+    integral_ = sum / double(values.size());
+    steps_.add(values, sum);
 }
 
-PiecewiseConstant1D::Sample PiecewiseConstant1D::sample(double u) const {
-    // First cell whose upper bound exceeds u; cells of zero width cannot be chosen.
-    const auto it = std::upper_bound(cdf_.begin() + 1, cdf_.end() - 1, u);
-    const int i = int(it - cdf_.begin()) - 1;
-    const double width = cdf_[i + 1] - cdf_[i];
-    const float f = width > 0 ? std::min(float((u - cdf_[i]) / width), kOneMinusEpsilon) : 0.5f;
-    return {point_in_cell(i, f, size()), values_[i], i};
-}
-
-float PiecewiseConstant1D::pdf(float x) const {
-    return values_[cell_of(x, size())];
-}
-
-PiecewiseConstant2D::PiecewiseConstant2D(std::span<const float> values, int width, int height) {
+PiecewiseConstant2D::PiecewiseConstant2D(std::span<const float> values, int width, int height)
+    : rows_(width, size_t(height)) {
     std::vector<float> sums;
     for (int y = 0; y < height; ++y) {
-        rows_.emplace_back(values.subspan(size_t(y) * width, width));
-        sums.push_back(float(rows_.back().integral()));
+        const auto row = values.subspan(size_t(y) * size_t(width), size_t(width));
+        const double sum = sum_of(row);
+        rows_.add(row, sum);
+        sums.push_back(float(sum / width));
     }
     marginal_ = PiecewiseConstant1D(sums);
 }
 
 PiecewiseConstant2D::Sample PiecewiseConstant2D::sample(FinePoint u) const {
     const auto y = marginal_.sample(u.y);
-    const auto x = rows_[y.cell].sample(u.x);
+    const auto x = rows_.sample(u.x, size_t(y.cell));
     return {{x.x, y.x}, x.pdf * y.pdf};
 }
 
 float PiecewiseConstant2D::pdf(Vec2 uv) const {
-    return rows_[cell_of(uv.y, int(rows_.size()))].pdf(uv.x) * marginal_.pdf(uv.y);
+    return rows_.pdf(uv.x, size_t(cell_of(uv.y, marginal_.size()))) * marginal_.pdf(uv.y);
 }
 
 }  // namespace etendue

@@ -45,7 +45,10 @@ private:
     double total_ = 0;
 };
 
-/// Piecewise-constant density on [0, 1), proportional to `values` (not negative); uniform where all are zero.
+/// Piecewise-constant density on [0, 1), proportional to `values` (not negative); uniform where all are zero. Sampling
+/// inverts the distribution function, so it is monotone: what is stratified or changes little stays so. It takes
+/// constant time on average and touches two or three cache lines [Chen & Asau 1974]. Probabilities are multiples of
+/// 2^-31, and pdf() is the density of exactly what is sampled. It is above zero wherever a value is.
 class PiecewiseConstant1D {
 public:
     PiecewiseConstant1D() = default;
@@ -55,18 +58,41 @@ public:
         float x, pdf;
         int cell;
     };
-    Sample sample(double u) const;
-    float pdf(float x) const;
+    Sample sample(double u) const { return steps_.sample(u, 0); }
+    float pdf(float x) const { return steps_.pdf(x, 0); }
     double integral() const { return integral_; }
-    int size() const { return int(values_.size()); }
+    int size() const { return steps_.cells; }
 
 private:
-    std::vector<float> values_;
-    std::vector<double> cdf_;
+    friend class PiecewiseConstant2D;
+    /// Distribution functions of the rows of an image, each with its cells and its guide.
+    struct Steps {
+        static constexpr uint32_t kOne = 1u << 31;
+        static constexpr int kCellsPerGuide = 4;
+
+        int cells = 0, guides = 0;
+        std::vector<uint32_t>
+            lower;  ///< By row and cell: the distribution function at its lower edge, times kOne.
+        std::vector<uint32_t> guide;  ///< By row and part of kOne: the cell at its lower edge.
+
+        Steps() = default;
+        Steps(int cells, size_t rows);
+        /// Appends a row.
+        void add(std::span<const float> values, double sum);
+        uint32_t upper(const uint32_t* row, int cell) const {
+            return cell + 1 < cells ? row[cell + 1] : kOne;
+        }
+        Sample sample(double u, size_t row) const;
+        float pdf(float x, size_t row) const;
+        size_t memory_bytes() const {
+            return lower.capacity() * sizeof(lower[0]) + guide.capacity() * sizeof(guide[0]);
+        }
+    };
+    Steps steps_;
     double integral_ = 0;
 };
 
-/// Piecewise-constant density on [0, 1)²; `values` are those of `width` × `height` cells, row by row.
+/// Piecewise-constant density on [0, 1)²; `values` are those of `width` × `height` cells, row by row. See above.
 class PiecewiseConstant2D {
 public:
     PiecewiseConstant2D() = default;
@@ -78,9 +104,10 @@ public:
     Sample sample(FinePoint u) const;
     float pdf(Vec2 uv) const;
     double integral() const { return marginal_.integral(); }
+    size_t memory_bytes() const { return rows_.memory_bytes() + marginal_.steps_.memory_bytes(); }
 
 private:
-    std::vector<PiecewiseConstant1D> rows_;
+    PiecewiseConstant1D::Steps rows_;
     PiecewiseConstant1D marginal_;
 };
 
