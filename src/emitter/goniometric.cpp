@@ -22,6 +22,10 @@ public:
         DirectSample s;
         return directions_->sample_direct({}, {u.x, u.y}, s) ? s.wi : Vec3{0, 0, 1};
     }
+    Emission eval_emission(Vec3, Vec2, Vec3 w) const override {
+        const EmitterHit hit = directions_->eval_infinite(w);
+        return {hit.Le, hit.pdf};
+    }
     float max_pdf_d() const override { return kInf; }
     double power() const override { return directions_->power() / double(kPi); }  // ∫ I dω
 

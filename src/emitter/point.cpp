@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "description/view.h"
+#include "emitter/plane.h"
 #include "math/frame.h"
 
 namespace etendue {
@@ -14,46 +16,115 @@ namespace {
 /// other, x²(3 − 2x) (pbrt-v4), x⁴ (pbrt-v3) or x² (glTF).
 enum class Falloff { Angle, Smooth, Quartic, Quadratic };
 
-class SpotEmitter final : public PointEmitter {
+/// Share of a spot light's intensity by direction.
+class Beam {
 public:
-    SpotEmitter(Vec3 p, Vec3 axis, Rgb intensity, float cutoff_degrees, float beam_degrees,
-                Falloff falloff)
-        : PointEmitter(p, intensity), falloff_(falloff), frame_(Frame::from_normal(axis)),
-          cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
+    Beam(float cutoff_degrees, float beam_degrees, Falloff falloff)
+        : falloff_(falloff), cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
           cos_cutoff_(std::cos(cutoff_)), cos_beam_(std::cos(beam_)) {}
 
-    Vec3 sample_direction(Vec3, Vec2 u) const override {
-        return frame_.to_world(sample_uniform_cone(u, cos_cutoff_));
+    float share(float cos_theta) const {
+        if (cos_theta <= cos_cutoff_) return 0;
+        if (cos_theta >= cos_beam_) return 1;
+        const float x = (cos_theta - cos_cutoff_) / (cos_beam_ - cos_cutoff_);
+        switch (falloff_) {
+        case Falloff::Smooth: return sqr(x) * (3 - 2 * x);
+        case Falloff::Quadratic: return sqr(x);
+        case Falloff::Quartic: return sqr(sqr(x));
+        default: return (cutoff_ - std::acos(cos_theta)) / (cutoff_ - beam_);
+        }
     }
-    float max_pdf_d() const override { return pdf_uniform_cone(cos_cutoff_); }
-    double power() const override {
-        const double share = falloff_ == Falloff::Quartic     ? 0.2
-                             : falloff_ == Falloff::Quadratic ? 1.0 / 3
-                                                              : 0.5;  // of the ring, on average
-        return 2 * double(kPi) * luminance(intensity_) *
-               ((1 - double(cos_beam_)) + share * (double(cos_beam_) - cos_cutoff_));
+    /// Integral of share() over all directions.
+    double integral() const {
+        const double mean = falloff_ == Falloff::Quartic     ? 0.2
+                            : falloff_ == Falloff::Quadratic ? 1.0 / 3
+                                                             : 0.5;  // of the ring
+        return 2 * double(kPi) *
+               ((1 - double(cos_beam_)) + mean * (double(cos_beam_) - double(cos_cutoff_)));
+    }
+    float cos_cutoff() const { return cos_cutoff_; }
+    float tan_cutoff() const { return std::tan(cutoff_); }
+
+private:
+    Falloff falloff_;
+    float cutoff_, beam_, cos_cutoff_, cos_beam_;
+};
+
+class SpotEmitter final : public PointEmitter {
+public:
+    SpotEmitter(Vec3 p, Vec3 axis, Rgb intensity, const Beam& beam)
+        : PointEmitter(p, intensity), frame_(Frame::from_normal(axis)), beam_(beam) {}
+
+    Vec3 sample_direction(Vec3, Vec2 u) const override {
+        return frame_.to_world(sample_uniform_cone(u, beam_.cos_cutoff()));
+    }
+    float max_pdf_d() const override { return pdf_uniform_cone(beam_.cos_cutoff()); }
+    double power() const override { return luminance(intensity_) * beam_.integral(); }
+
+private:
+    Rgb intensity(Vec3 d) const override { return intensity_ * beam_.share(dot(d, frame_.n)); }
+    float pdf_direction(Vec3 d) const override {
+        return dot(d, frame_.n) > beam_.cos_cutoff() ? pdf_uniform_cone(beam_.cos_cutoff()) : 0.0f;
+    }
+
+    Frame frame_;
+    Beam beam_;
+};
+
+/// Cells of a density that resolves a texture, but not much more than its beam or image needs.
+void density_cells(const TextureRef& texture, int& width, int& height) {
+    constexpr int kLeast = 32, kMost = 2048;
+    texture.resolution(width, height);
+    width = std::clamp(width, kLeast, kMost);
+    height = std::clamp(height, kLeast, kMost);
+}
+
+/// A spot light with a texture over the square around its cone, u along x and v along y.
+class TexturedSpotEmitter final : public PlaneEmitter {
+public:
+    TexturedSpotEmitter(const Transform& to_world, Rgb intensity, const Beam& beam,
+                        TextureRef texture)
+        : PlaneEmitter(to_world, {double(beam.tan_cutoff()), double(beam.tan_cutoff())}),
+          peak_(intensity), beam_(beam), texture_(texture) {
+        int width, height;
+        density_cells(texture, width, height);
+        sample_powers(width, height);
     }
 
 private:
-    Rgb intensity(Vec3 d) const override {
-        const float c = dot(d, frame_.n);
-        if (c <= cos_cutoff_) return Rgb();
-        if (c >= cos_beam_) return intensity_;
-        const float x = (c - cos_cutoff_) / (cos_beam_ - cos_cutoff_);
-        switch (falloff_) {
-        case Falloff::Smooth: return intensity_ * (sqr(x) * (3 - 2 * x));
-        case Falloff::Quadratic: return intensity_ * sqr(x);
-        case Falloff::Quartic: return intensity_ * sqr(sqr(x));
-        default: return intensity_ * ((cutoff_ - std::acos(c)) / (cutoff_ - beam_));
-        }
-    }
-    float pdf_direction(Vec3 d) const override {
-        return dot(d, frame_.n) > cos_cutoff_ ? pdf_uniform_cone(cos_cutoff_) : 0.0f;
+    Rgb intensity_at(Vec2 uv, float cos_theta) const override {
+        const float share = beam_.share(cos_theta);
+        return share > 0 ? peak_ * texture_.eval(TexturePoint(uv)) * share : Rgb();
     }
 
-    Falloff falloff_;
-    Frame frame_;
-    float cutoff_, beam_, cos_cutoff_, cos_beam_;
+    Rgb peak_;
+    Beam beam_;
+    TextureRef texture_;
+};
+
+/// The counterpart of a perspective camera: the irradiance on the plane z = 1 is π times a texture.
+class ProjectorEmitter final : public PlaneEmitter {
+public:
+    ProjectorEmitter(const Transform& to_world, Rectangle rectangle, TextureRef irradiance,
+                     float scale)
+        : PlaneEmitter(to_world, rectangle), irradiance_(irradiance), scale_(scale) {
+        int width, height;
+        density_cells(irradiance, width, height);
+        sample_powers(width, height);
+    }
+    /// That of a camera whose image has the width over height `aspect`; x is to the left, y up, v down.
+    static Rectangle rectangle(double half_width, double aspect) {
+        return {-half_width, -half_width / aspect};
+    }
+
+private:
+    Rgb intensity_at(Vec2 uv, float cos_theta) const override {
+        return irradiance_.eval(TexturePoint(uv)) *
+               (scale_ * kPi / (cos_theta * cos_theta * cos_theta));
+    }
+
+    TextureRef irradiance_;
+    float scale_;
 };
 
 }  // namespace
@@ -100,9 +171,12 @@ EmitterEntry spot_entry() {
                "Decrease from beam_width to cutoff_angle: angle (linear in the angle), or a "
                "function of x, the cosine scaled to [0, 1]: smooth (x² (3 - 2x), pbrt-v4), "
                "quartic (x⁴, pbrt-v3) or quadratic (x², glTF)."},
+              {"texture", ParamKind::Texture, "1",
+               "Factor of the intensity over the square that the cone touches on a plane across "
+               "the beam, u along x and v along y."},
               {"to_world", ParamKind::Transform, "identity",
                "Its origin is the light's position, and its +z axis is that of the beam."}}},
-            [](const Params& p, EmitterContext&) {
+            [](const Params& p, EmitterContext& c) {
                 const Transform t = p.transform("to_world");
                 const float cutoff = p.number("cutoff_angle", 20, 0.01f, 179.9f);
                 const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
@@ -110,11 +184,58 @@ EmitterEntry spot_entry() {
                     p.fail("beam_width", fmt::format("\"beam_width\" is {}, but must not exceed "
                                                      "\"cutoff_angle\", which is {}",
                                                      beam, cutoff));
-                return one_emitter(std::make_unique<SpotEmitter>(
-                    t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})), p.rgb("intensity", Rgb(1)),
+                const Rgb intensity = p.rgb("intensity", Rgb(1));
+                const Beam shape(
                     cutoff, beam,
-                    Falloff(p.choice("falloff", {"angle", "smooth", "quartic", "quadratic"}, 0))));
+                    Falloff(p.choice("falloff", {"angle", "smooth", "quartic", "quadratic"}, 0)));
+                const TextureRef texture = c.texture(p, "texture", Rgb(1));
+                if (texture.is_constant())
+                    return one_emitter(std::make_unique<SpotEmitter>(
+                        t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})),
+                        intensity * texture.mean(), shape));
+                constexpr float kWidest = 89;
+                if (cutoff > kWidest)
+                    p.fail("texture", fmt::format("a spot light with a texture needs a "
+                                                  "\"cutoff_angle\" of at most {}, but it is {}",
+                                                  kWidest, cutoff));
+                return one_emitter(std::make_unique<TexturedSpotEmitter>(
+                    similarity(p, "to_world"), intensity, shape, texture));
             }};
+}
+
+namespace {
+
+std::vector<ParamInfo> projector_params() {
+    std::vector<ParamInfo> all = {
+        {"irradiance", ParamKind::Texture, "1",
+         "Texture of the image plane at the distance 1; the irradiance there, in W/m², is π times "
+         "its value. Its upper edge is that of +y, its left edge that of +x."},
+        {"scale", ParamKind::Float, "1", "Factor on the irradiance."},
+        {"to_world", ParamKind::Transform, "identity",
+         "Similarity: its origin is the position, and its +z axis the middle of the image."}};
+    const std::vector<ParamInfo> view = view_params("that of the texture");
+    all.insert(all.end(), view.begin(), view.end());
+    return all;
+}
+
+}  // namespace
+
+EmitterEntry projector_entry() {
+    return {
+        {"emitter", "projector",
+         "Counterpart of a perspective camera: projects a texture along +z; importance-sampled.",
+         projector_params()},
+        [](const Params& p, EmitterContext& c) {
+            const TextureRef irradiance = c.texture(p, "irradiance", Rgb(1));
+            int width, height;
+            irradiance.resolution(width, height);
+            const double aspect = p.has("aspect") ? double(p.number("aspect", 1, 1e-6f, 1e6f))
+                                                  : double(width) / height;
+            return one_emitter(std::make_unique<ProjectorEmitter>(
+                similarity(p, "to_world"),
+                ProjectorEmitter::rectangle(view_half_width(p, aspect), aspect), irradiance,
+                p.number("scale", 1, 0)));
+        }};
 }
 
 }  // namespace etendue

@@ -60,9 +60,18 @@ std::unique_ptr<Emitter> scaled_to_power(const Params& params, RgbImage image, c
 /// A parameter that maps the directions of an image without distortion: rotation, mirror, uniform scale and translation.
 Transform similarity(const Params& params, const char* name);
 
+/// The image of a `projection` in W/sr, with its half extents on the plane at the distance 1.
+struct ProjectionLight {
+    float fov;
+    RgbImage image{};
+    double half_width = 0, half_height = 0;
+};
+ProjectionLight read_projection(const Params& params);
+
 EmitterEntry point_entry();
 EmitterEntry spot_entry();
 EmitterEntry goniometric_entry();
 EmitterEntry projection_entry();
+EmitterEntry projector_entry();
 
 }  // namespace etendue

@@ -6,9 +6,9 @@ namespace etendue {
 
 const std::vector<EmitterEntry>& emitter_registry() {
     static const std::vector<EmitterEntry> entries = {
-        area_entry(),       point_entry(),       spot_entry(),     goniometric_entry(),
-        projection_entry(), directional_entry(), constant_entry(), envmap_entry(),
-        sky_entry(),        sun_entry(),         sunsky_entry()};
+        area_entry(),       point_entry(),     spot_entry(),        goniometric_entry(),
+        projection_entry(), projector_entry(), directional_entry(), constant_entry(),
+        envmap_entry(),     sky_entry(),       sun_entry(),         sunsky_entry()};
     return entries;
 }
 

@@ -13,6 +13,7 @@
 #include "bsdf/ior.h"
 #include "color/metals.h"
 #include "emitter/environment.h"
+#include "emitter/point.h"
 #include "emitter/sky_model.h"
 #include "scene/mitsuba_manual.h"
 #include "scene/model_builder.h"
@@ -335,7 +336,8 @@ private:
             if (p && !std::get<bool>(p->value)) remove(o, "two_sided");
         }
         if (o.type == "envmap") replace_environment(index);
-        if (o.type == "goniometric" || o.type == "projection") {
+        if (o.type == "projection") replace_projection(index);
+        if (o.type == "goniometric") {
             // The same intensity in all directions.
             Rgb mean(1);
             if (!o.find("power"))
@@ -355,6 +357,44 @@ private:
             for (int i = 0; i < 3; ++i) sum[i] += double(c[i]);
         const double n = double(image.pixels.size());
         return {float(sum[0] / n), float(sum[1] / n), float(sum[2] / n)};
+    }
+
+    /// Mitsuba's projector has a factor 1 / cos³ θ that the projection lacks. It varies within pixels, so these are
+    /// divided.
+    void replace_projection(int index) {
+        SceneObject& o = object(index);
+        const ProjectionLight light = read_projection({original_, index});
+        const RgbImage& image = light.image;
+        const int parts = (kBakedSize + std::min(image.width, image.height) - 1) /
+                          std::min(image.width, image.height);
+        const int width = parts * image.width, height = parts * image.height;
+        std::vector<Rgb> pixels;
+        pixels.reserve(size_t(width) * size_t(height));
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const double px = light.half_width * ((2.0 * x + 1) / width - 1),
+                             py = light.half_height * ((2.0 * y + 1) / height - 1),
+                             cos_theta = 1 / std::sqrt(1 + px * px + py * py);
+                pixels.push_back(
+                    image.pixels[size_t(y / parts) * size_t(image.width) + size_t(x / parts)] *
+                    float(cos_theta * cos_theta * cos_theta / double(kPi)));
+            }
+        const Param* to_world = o.find("to_world");
+        // Cameras have +x on the left.
+        const Transform mirrored =
+            (to_world ? *to_world->as<Transform>() : Transform()) * Transform::scale({-1, 1, 1});
+        o.type = "projector";
+        o.params.clear();
+        set(o, "to_world", mirrored);
+        set(o, "fov", double(light.fov));
+        set(o, "fov_axis", std::string("smaller"));
+        SceneObject bitmap{"texture", "bitmap", "", o.where, {}, {}};
+        set(bitmap, "filter_type", std::string("nearest"));
+        set(bitmap, "raw", true);
+        set_image(bitmap, pfm(width, height, pixels));
+        const SourceLocation where = o.where;
+        const int texture = add(std::move(bitmap));  // which moves all objects
+        object(index).children.push_back({"irradiance", texture, where});
     }
 
     void replace_environment(int index) {

@@ -7,12 +7,9 @@
 
 #include "sensor/perspective.h"
 
-#include <charconv>
 #include <cmath>
-#include <string_view>
 
-#include <fmt/format.h>
-
+#include "description/view.h"
 #include "math/warp.h"
 
 namespace etendue {
@@ -153,35 +150,7 @@ Transform rigid(const Params& params) {
 void set_field_of_view(const Params& params, PerspectiveCamera& camera) {
     const double aspect = params.has("aspect") ? double(params.number("aspect", 1, 1e-6f, 1e6f))
                                                : double(camera.film.width) / camera.film.height;
-    double half_width;
-    const std::string focal = params.text("focal_length", "");
-    if (!params.has("fov")) {
-        // The diagonal is that of 35 mm film (43.27 mm) for any aspect ratio.
-        const std::string text = focal.empty() ? "50mm" : focal;
-        double mm = 0;
-        const char* const text_end = text.data() + text.size();
-        const auto [end, error] = std::from_chars(text.data(), text_end, mm);
-        const std::string_view unit(end, size_t(text_end - end));
-        if (error != std::errc() || (unit != "mm" && unit != "") || !(mm > 0) || !std::isfinite(mm))
-            params.fail(
-                "focal_length",
-                fmt::format("parameter \"focal_length\" is \"{}\", but must be a length in mm, "
-                            "like \"50mm\"",
-                            focal));
-        const double half_diagonal = std::hypot(36.0, 24.0) / 2 / mm;
-        half_width = half_diagonal * aspect / std::hypot(aspect, 1.0);
-    } else {
-        if (!focal.empty())
-            params.fail("focal_length", "give either \"fov\" or \"focal_length\", not both");
-        const double tangent = std::tan(params.number("fov", 0, 1e-3f, 179.9f) * double(kPi) / 360);
-        switch (params.choice("fov_axis", {"x", "y", "diagonal", "smaller", "larger"}, 0)) {
-        case 0: half_width = tangent; break;
-        case 1: half_width = tangent * aspect; break;
-        case 2: half_width = tangent * aspect / std::hypot(aspect, 1.0); break;
-        case 3: half_width = aspect > 1 ? tangent * aspect : tangent; break;
-        default: half_width = aspect > 1 ? tangent : tangent * aspect; break;
-        }
-    }
+    const double half_width = view_half_width(params, aspect);
     camera.half_width = float(half_width);
     camera.half_height = float(half_width / aspect);
 }
@@ -206,22 +175,18 @@ std::unique_ptr<Sensor> make(const Params& params, const SensorContext& context,
 std::vector<ParamInfo> shared_params(std::vector<ParamInfo> more) {
     std::vector<ParamInfo> all = {
         {"to_world", ParamKind::Transform, "identity",
-         "Camera-to-world transform; the camera looks along +z, with +x to the left and +y up."},
-        {"fov", ParamKind::Float, "", "Field of view in degrees along fov_axis."},
-        {"fov_axis", ParamKind::String, "x", "Axis of fov: x, y, diagonal, smaller or larger."},
-        {"aspect", ParamKind::Float, "that of the film",
-         "Width over height of the view; pixels are not square if it differs from the film's."},
-        {"focal_length", ParamKind::String, "50mm",
-         "Focal length for a 35 mm film, instead of fov."},
-        {"principal_point_offset_x", ParamKind::Float, "0",
-         "Shift of the image centre, as a fraction of the width."},
-        {"principal_point_offset_y", ParamKind::Float, "0",
-         "Shift of the image centre, as a fraction of the height."},
-        {"near_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
-        {"far_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
-        {"shutter_open", ParamKind::Float, "0", "Accepted; nothing moves."},
-        {"shutter_close", ParamKind::Float, "0", "Accepted; nothing moves."},
-    };
+         "Camera-to-world transform; the camera looks along +z, with +x to the left and +y up."}};
+    const std::vector<ParamInfo> view = view_params("that of the film");
+    all.insert(all.end(), view.begin(), view.end());
+    more.insert(more.begin(),
+                {{"principal_point_offset_x", ParamKind::Float, "0",
+                  "Shift of the image centre, as a fraction of the width."},
+                 {"principal_point_offset_y", ParamKind::Float, "0",
+                  "Shift of the image centre, as a fraction of the height."},
+                 {"near_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
+                 {"far_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
+                 {"shutter_open", ParamKind::Float, "0", "Accepted; nothing moves."},
+                 {"shutter_close", ParamKind::Float, "0", "Accepted; nothing moves."}});
     all.insert(all.end(), more.begin(), more.end());
     return all;
 }

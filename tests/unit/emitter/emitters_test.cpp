@@ -175,7 +175,9 @@ protected:
             ASSERT_EQ(e.Le_cos, s.Le);
             // Next event from a point in this direction.
             DirectSample direct;
-            ASSERT_TRUE(light.sample_direct(s.p + s.d * 4, {}, direct));
+            // Some directions of textures are sampled in vain.
+            ASSERT_EQ(light.sample_direct(s.p + s.d * 4, {}, direct), !s.Le.is_zero());
+            if (s.Le.is_zero()) continue;
             ASSERT_NEAR(direct.dist, 4, 1e-4);
             EXPECT_EQ(direct.pdf, 1);
         }
@@ -274,6 +276,112 @@ TEST_F(ImageLights, RefuseWhatTheyCannotDo) {
     EXPECT_THROW(
         make(projection_entry(), 2, 1, pixels, {{"to_world", Transform::scale({1, 2, 1}), {}}}),
         SceneError);
+}
+
+// ---- Points with a texture
+
+/// Black on the left, (u, v, 1) on the right.
+class RightHalf final : public Texture {
+public:
+    Rgb eval(const TexturePoint& at) const override {
+        return at.uv.x < 0.5f ? Rgb(0) : Rgb(at.uv.x, at.uv.y, 1);
+    }
+    Rgb mean() const override { return {0.375f, 0.25f, 0.5f}; }
+    void resolution(int& width, int& height) const override { width = 40, height = 20; }
+};
+
+class TextureLights : public ImageLights {
+protected:
+    class Context final : public EmitterContext {
+    public:
+        TextureRef texture(const Params&, std::string_view, Rgb fallback, float) override {
+            return is_constant ? TextureRef(fallback) : TextureRef(&texture_);
+        }
+        const Shape* shape() const override { return nullptr; }
+        bool is_constant = false;
+
+    private:
+        RightHalf texture_;
+    };
+
+    std::unique_ptr<Emitter> make(const EmitterEntry& entry, std::vector<Param> params) {
+        scene_.objects = {{"emitter", entry.info.name, "", {}, std::move(params), {}}};
+        return std::move(entry.make({scene_, 0}, context_).front());
+    }
+    Context context_;
+};
+
+// Irradiance π times the texture on the plane z = 1; like the image of a camera, with +x on the left.
+TEST_F(TextureLights, ProjectorLightsAPlaneByItsTexture) {
+    const auto light = make(projector_entry(), {{"fov", 90.0, {}}, {"scale", 2.0, {}}});
+    for (const Vec2 at : {Vec2{0.1f, 0.2f}, {-0.6f, 0.4f}, {-0.9f, -0.45f}, {0.9f, -0.3f}}) {
+        // u from the left edge x = 1, v from the upper edge y = 1/2.
+        const Rgb texture = RightHalf().eval({(1 - at.x) / 2, (0.5f - at.y)});
+        const Vec3 d{at.x, at.y, 1};
+        const float cosine = 1 / length(d);
+        const Rgb irradiance = along(*light, d).Le_cos * (cosine * sqr(cosine));
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(irradiance[c], 2 * M_PI * texture[c], 1e-4);
+    }
+    for (const Vec3 d : {Vec3{1.1f, 0, 1}, {0, 0.6f, 1}, {0, 0, -1}, {1, 0, 0}})
+        EXPECT_EQ(along(*light, d).pdf_d, 0);
+    EXPECT_NEAR(light->power() / (2 * M_PI * 2 * luminance({0.375f, 0.25f, 0.5f})), 1, 0.01);
+}
+
+TEST_F(TextureLights, ProjectorIsSampledByItsTexture) {
+    const auto light =
+        make(projector_entry(),
+             {{"fov", 100.0, {}}, {"to_world", Transform::rotate({1, 2, 3}, 50), {}}});
+    expect_consistent(*light, 24);
+    // Without a texture, the image is square, and all of it has the same irradiance.
+    context_.is_constant = true;
+    const auto constant = make(projector_entry(), {{"fov", 60.0, {}}});
+    expect_consistent(*constant, 24);
+    EXPECT_NEAR(constant->power(), M_PI * 4 / 3, 1e-3);
+}
+
+TEST_F(TextureLights, SpotHasTheTextureAcrossItsBeam) {
+    const std::vector<Param> params = {
+        {"intensity", Rgb(2), {}}, {"cutoff_angle", 45.0, {}}, {"beam_width", 30.0, {}}};
+    const auto light = make(spot_entry(), params);
+    // The square around the cone is [-1, 1]² at the distance 1.
+    for (const Vec2 at : {Vec2{0.3f, -0.2f}, {0.1f, 0.5f}, {0.6f, -0.5f}, {-0.4f, 0}}) {
+        const Rgb texture = RightHalf().eval({(1 + at.x) / 2, (1 + at.y) / 2});
+        const Vec3 d{at.x, at.y, 1};
+        const double angle = std::acos(1 / double(length(d))) * 180 / M_PI,
+                     share = std::min((45 - angle) / 15, 1.0);
+        const Rgb intensity = along(*light, d).Le_cos;
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(intensity[c], 2 * share * texture[c], 1e-4);
+    }
+    EXPECT_EQ(along(*light, {0.9f, 0.9f, 1}).Le_cos, Rgb(0));  // in the corner of the square
+    expect_consistent(*light, 24);
+    // A constant is a factor, and keeps the density of the cone.
+    context_.is_constant = true;
+    EXPECT_EQ(along(*make(spot_entry(), params), {0, 0, 1}).Le_cos, Rgb(2));
+}
+
+TEST_F(TextureLights, RefuseWhatTheyCannotDo) {
+    EXPECT_THROW(make(spot_entry(), {{"cutoff_angle", 120.0, {}}}), SceneError);
+    EXPECT_THROW(make(spot_entry(), {{"to_world", Transform::scale({1, 2, 1}), {}}}), SceneError);
+    EXPECT_THROW(
+        make(projector_entry(), {{"fov", 50.0, {}}, {"focal_length", std::string("30mm"), {}}}),
+        SceneError);
+}
+
+// All points at which the texture is looked at to measure the power may be dark.
+TEST(AreaEmitter, CanBeChosenThoughItsTextureIsNearlyBlack) {
+    class Needle final : public Texture {
+    public:
+        Rgb eval(const TexturePoint& at) const override {
+            return at.uv.x > 0.4871f && at.uv.x < 0.4873f ? Rgb(1e3f) : Rgb(0);
+        }
+        Rgb mean() const override { return Rgb(0.2f); }
+    } needle;
+    TriangleMesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.triangles = {{0, 1, 2}};
+    mesh.compute_face_normals();
+    const auto emitter = make_area_emitter(mesh, TextureRef(&needle), false, 0);
+    EXPECT_GT(emitter->power(), 0);
 }
 
 }  // namespace

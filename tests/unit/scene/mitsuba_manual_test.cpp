@@ -82,9 +82,9 @@ TEST(MitsubaManual, RefusalsGiveTheReason) {
                        "<shape type=\"sphere\"><bsdf type=\"measured\"/></shape>")
                   .find("bsdf \"measured\" is not supported: measured materials"),
               std::string::npos);
-    EXPECT_NE(error_of(front_camera(4) + "<emitter type=\"spot\"><texture type=\"bitmap\" "
-                                         "name=\"texture\"/></emitter>")
-                  .find("parameter \"texture\" of emitter \"spot\" is not supported"),
+    EXPECT_NE(error_of(front_camera(4) + "<emitter type=\"envmap\"><texture type=\"bitmap\" "
+                                         "name=\"bitmap\"/></emitter>")
+                  .find("parameter \"bitmap\" of emitter \"envmap\" is not supported"),
               std::string::npos);
 }
 
@@ -139,8 +139,8 @@ TEST(MitsubaScenes, LenientLeavesOutWhatItCannotRender) {
                                  "<shape type=\"instance\"><ref id=\"g\"/></shape>"
                                  "<shape type=\"sphere\"><bsdf type=\"hk\"/></shape>"  // 5
                                  "<shape type=\"sphere\"><medium type=\"heterogeneous\" "
-                                 "name=\"interior\"/></shape>"     // 6
-                                 "<emitter type=\"projector\"/>",  // 7
+                                 "name=\"interior\"/></shape>"           // 6
+                                 "<emitter type=\"directionalarea\"/>",  // 7
                              true);
     EXPECT_EQ(scene.shapes().size(), 3u);
     ASSERT_FALSE(scene.warnings().empty());
