@@ -278,7 +278,7 @@ void add_path_space(const Report& report, const Options& options, const WalkInpu
     });
     add(report, options, "scene transmittance", [&](size_t i) {
         const Vertex &a = in.y[i % WalkInputs::kPairs][2], &b = in.z[i * 7 % WalkInputs::kPairs][2];
-        return in.scene.transmittance(a.p, a.ng, b.p, b.ng);
+        return in.scene.transmittance(a.ray_end(), b.ray_end());
     });
     add(report, options, "join next_event",
         [&, sampler = Sampler(SamplerKind::Independent, 10)](size_t i) mutable {

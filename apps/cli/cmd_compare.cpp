@@ -150,6 +150,7 @@ void CompareCommand::run() const {
     for (size_t i = 0; i < scenes.size() && !interrupted.load(); ++i) {
         SceneOptions options = reading;
         options.file = scenes[i];
+        options.threads = threads;
         const SceneDescription description = read_scene(options);
         const Scene scene = build_scene(description, options);
         for (const std::string& w : scene.warnings()) fmt::print(stderr, "warning: {}\n", w);

@@ -160,7 +160,9 @@ void RenderCommand::write_outputs(const Renderer& renderer, const Scene& s,
 
 void RenderCommand::run() const {
     check_options();
-    const Scene s = load_scene(scene);
+    SceneOptions loading = scene;
+    loading.threads = threads;
+    const Scene s = load_scene(loading);
     for (const std::string& w : s.warnings()) fmt::print(stderr, "warning: {}\n", w);
     const RenderSettings settings = settings_for(s);
     if (settings.technique_depth > 0 && !quiet)

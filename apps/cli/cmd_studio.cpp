@@ -87,7 +87,9 @@ void StudioCommand::run() const {
     const Interrupts interrupts = catch_interrupts(grace);
     // Declared so that what calls others is destroyed before these.
     Server server(listen, port);
-    Session session([this] { return load_scene(scene); }, threads);
+    SceneOptions loading = scene;
+    loading.threads = threads;
+    Session session([loading] { return load_scene(loading); }, threads);
     if (listen != "127.0.0.1" && listen != "::1")
         fmt::print(stderr, "warning: {} can be reached from other machines, without encryption\n",
                    listen);

@@ -245,7 +245,9 @@ void VerifyCommand::run() {
     for (const std::string& m : methods) specs.push_back(IntegratorSpec::parse(m));
     for (const IntegratorSpec& s : specs) make_integrator(s);
 
-    const Scene s = load_scene(scene);
+    SceneOptions loading = scene;
+    loading.threads = options.threads;
+    const Scene s = load_scene(loading);
     for (const std::string& w : s.warnings()) fmt::print(stderr, "warning: {}\n", w);
     std::optional<ReferenceImage> image;
     if (!reference.empty()) image = read_reference_image(reference, s);

@@ -77,6 +77,7 @@ Scene build_scene(const SceneDescription& description, const SceneOptions& optio
     build.lenient = options.lenient;
     build.sensor = options.sensor;
     build.accelerator.is_watertight = options.watertight;
+    build.threads = options.threads;
     if (!options.resolution.empty()) {
         const auto v = parse_integers(options.resolution, 'x', 2, "--resolution", "WxH");
         if (v[0] < 1 || v[1] < 1 || v[0] > 65536 || v[1] > 65536)

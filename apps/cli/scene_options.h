@@ -19,6 +19,7 @@ struct SceneOptions {
     bool lenient = false;
     bool watertight = false;
     std::string resolution, crop, sensor;
+    int threads = 0;  ///< Of BuildOptions; set by commands that have --threads.
 
     void add_to(CLI::App& command);
     /// All of these options except the scene file.

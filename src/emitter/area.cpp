@@ -17,30 +17,35 @@ public:
         : shape_(shape), radiance_(radiance), two_sided_(two_sided) {
         const size_t n = shape.primitive_count();
         std::vector<double> weights(n), areas(n);
-        double flux = 0;
+        double flux = 0, floor = 0;
+        constexpr double kFloor = 0.05;
+        // Many points of few primitives, which have larger parts of the texture.
+        const int grid = std::clamp(int(std::sqrt(4096.0 / double(n))), 4, 32);
         const double mean = luminance(radiance.mean());
         for (uint32_t i = 0; i < n; ++i) {
             areas[i] = shape.primitive_area(i);
             double L = mean;
             if (!radiance.is_constant()) {
-                // Mean over a few points of the primitive. A share of the overall mean is added below, so that a
+                // Mean over points of the primitive. A share of the overall mean is added below, so that a
                 // primitive that is dark at all these points can still be chosen.
-                constexpr int kGrid = 4;
                 double sum = 0;
-                for (int k = 0; k < kGrid * kGrid; ++k)
-                    sum +=
-                        luminance(radiance.eval(shape
-                                                    .sample(i, {(float(k % kGrid) + 0.5f) / kGrid,
-                                                                (float(k / kGrid) + 0.5f) / kGrid})
-                                                    .uv));
-                L = sum / (kGrid * kGrid);
+                for (int k = 0; k < grid * grid; ++k)
+                    sum += luminance(
+                        radiance.eval(shape
+                                          .sample(i, {(float(k % grid) + 0.5f) / float(grid),
+                                                      (float(k / grid) + 0.5f) / float(grid)})
+                                          .uv));
+                L = sum / (grid * grid);
                 flux += areas[i] * L;
-                L += 0.05 * mean;
+                L += kFloor * mean;
             } else {
                 flux += areas[i] * L;
             }
             weights[i] = areas[i] * L;
+            floor += areas[i] * kFloor * mean;
         }
+        // So that the emitter itself can be chosen, even if all of its points were dark.
+        flux = std::max(flux, floor);
         power_ = double(kPi) * flux * (two_sided ? 2 : 1);
         choice_ = AliasTable(weights);
         pdf_.resize(n);
@@ -71,7 +76,8 @@ public:
         const float cos = emitted_cos(s.ng, -wi);
         if (!(cos > 0)) return false;
         const float pdf = pdf_[s.prim];
-        out = {s.p, s.ng, wi, dist, radiance(s.uv), pdf, pdf, pdf_direction(cos), s.uv, s.prim};
+        out = {s.p,  s.ng,   wi,     dist, radiance(s.uv), pdf, pdf, pdf_direction(cos),
+               s.uv, s.prim, s.slack};
         return true;
     }
 
@@ -94,6 +100,7 @@ public:
     }
     double power() const override { return power_; }
     bool is_area() const override { return true; }
+    float slack(uint32_t prim) const override { return shape_.slack(prim); }
     float max_pdf_d() const override { return pdf_direction(1); }
     bool emits_by_cosine() const override { return !two_sided_; }
 

@@ -41,6 +41,7 @@ struct DirectSample {
     float pdf_d;   ///< Density of the direction to the scene point for sample_emission().
     Vec2 uv;
     uint32_t prim = 0;
+    float slack = 0;  ///< As Emitter::slack().
 };
 
 /// Radiance and densities where an eye path hits the emitter.
@@ -95,13 +96,16 @@ public:
     virtual bool is_delta() const { return false; }
     /// Whether it has a surface, so that |cos θ| at y_0 is part of G.
     virtual bool is_area() const { return false; }
+    /// SurfaceGeometry::slack of the points of its surface.
+    virtual float slack(uint32_t /*prim*/) const { return 0; }
     virtual void set_scene_bounds(Vec3 /*center*/, float /*radius*/) {}
 
     /// Probability that the scene chooses this emitter, for emission and for next event estimation.
     float selection_pmf = 0;
     uint32_t index = 0;  ///< Among the emitters of the scene.
-    /// MediumId of the medium in which its light starts; negative for none.
+    /// MediumId of the medium in which its light starts, see Scene::medium_at().
     int16_t medium = -1;
+    int16_t medium_behind = -1;  ///< The same where it starts at the back of a boundary.
 };
 
 /// Services of the scene builder for the construction of emitters.

@@ -1,7 +1,11 @@
 #include "geometry/accelerator.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <bit>
+#include <fstream>
 #include <stdexcept>
 #include <string>
 
@@ -50,8 +54,9 @@ void intersect_callback(const RTCIntersectFunctionNArguments* args) {
                             hit))
         return;
     rayhit->ray.tfar = float(hit.t);
-    rayhit->hit.u = hit.u;
-    rayhit->hit.v = hit.v;
+    rayhit->hit.Ng_x = hit.local.x;
+    rayhit->hit.Ng_y = hit.local.y;
+    rayhit->hit.Ng_z = hit.local.z;
     rayhit->hit.geomID = args->geomID;
     rayhit->hit.primID = args->primID;
     rayhit->hit.instID[0] = args->context->instID[0];
@@ -65,16 +70,49 @@ void occluded_callback(const RTCOccludedFunctionNArguments* args) {
         ray->tfar = -kInf;
 }
 
+/// What Embree allocates, and how much it may.
+struct MemoryBudget {
+    std::atomic<int64_t> bytes{0};
+    int64_t most = 0;
+};
+
+/// False refuses an allocation.
 bool memory_callback(void* user, ssize_t bytes, bool) {
-    static_cast<std::atomic<int64_t>*>(user)->fetch_add(bytes, std::memory_order_relaxed);
-    return true;
+    auto& budget = *static_cast<MemoryBudget*>(user);
+    const int64_t before = budget.bytes.fetch_add(bytes, std::memory_order_relaxed);
+    if (bytes <= 0 || before + bytes <= budget.most) return true;
+    budget.bytes.fetch_sub(bytes, std::memory_order_relaxed);
+    return false;
 }
+
+/// Without the instruction set, Embree would choose that of the machine, and images of different machines would differ
+/// in their last bits. The files would be .embree3 in the working directory and in the home directory.
+#if defined(__AVX2__)
+constexpr const char* kDevice = "isa=avx2,ignore_config_files=1";
+#elif defined(__x86_64__)
+constexpr const char* kDevice = "isa=sse4.2,ignore_config_files=1";
+#else
+constexpr const char* kDevice = "ignore_config_files=1";
+#endif
 
 }  // namespace
 
+size_t memory_of_machine() {
+    size_t bytes = size_t(sysconf(_SC_PHYS_PAGES)) * size_t(sysconf(_SC_PAGESIZE));
+    // Of a container; "max" where there is no limit.
+    if (std::ifstream file("/sys/fs/cgroup/memory.max"); file) {
+        size_t most = 0;
+        if (file >> most) bytes = std::min(bytes, most);
+    }
+    rlimit limit;
+    if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
+        bytes = std::min(bytes, size_t(limit.rlim_cur));
+    return bytes;
+}
+
 struct Accelerator::Impl {
     AcceleratorOptions options;
-    std::atomic<int64_t> bytes{0};
+    MemoryBudget memory;
     RTCDevice device = nullptr;
     RTCScene top = nullptr;
     std::vector<RTCScene> groups;
@@ -87,11 +125,13 @@ struct Accelerator::Impl {
     std::vector<uint32_t> shape_of_geom;
     std::vector<Instance> instances;
     uint32_t shape_count = 0;
+    std::vector<const AnalyticShape*> analytic;  ///< By shape; nullptr for meshes.
 
     explicit Impl(const AcceleratorOptions& o) : options(o) {
-        device = rtcNewDevice(nullptr);
+        memory.most = int64_t(std::min(options.most_bytes, size_t(INT64_MAX)));
+        device = rtcNewDevice(kDevice);
         if (!device) throw std::runtime_error("Embree: cannot create a device");
-        rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &bytes);
+        rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &memory);
         top = new_scene();
     }
     ~Impl() {
@@ -103,9 +143,12 @@ struct Accelerator::Impl {
     void check() const {
         const RTCError error = rtcGetDeviceError(device);
         if (error == RTC_ERROR_NONE) return;
-        throw std::runtime_error(error == RTC_ERROR_OUT_OF_MEMORY
-                                     ? "Embree: not enough memory for the ray-tracing hierarchy"
-                                     : "Embree: error " + std::to_string(int(error)));
+        throw std::runtime_error(
+            error == RTC_ERROR_OUT_OF_MEMORY
+                ? "Embree: the ray-tracing hierarchy needs more than " +
+                      std::to_string(memory.most >> 20) +
+                      " MiB, the memory of this machine; use instances or coarser meshes"
+                : "Embree: error " + std::to_string(int(error)));
     }
 
     RTCScene new_scene() const {
@@ -155,13 +198,17 @@ Accelerator& Accelerator::operator=(Accelerator&&) noexcept = default;
 uint32_t Accelerator::add_shape(const Shape& shape) {
     const uint32_t id = impl_->attach(impl_->top, shape);
     impl_->shape_of_geom.resize(id + 1);
+    impl_->analytic.push_back(dynamic_cast<const AnalyticShape*>(&shape));
     return impl_->shape_of_geom[id] = impl_->shape_count++;
 }
 
 uint32_t Accelerator::add_group(const std::vector<const Shape*>& shapes) {
     RTCScene scene = impl_->new_scene();
     impl_->groups.push_back(scene);
-    for (const Shape* s : shapes) impl_->attach(scene, *s);  // geometry ids count from 0
+    for (const Shape* s : shapes) {
+        impl_->attach(scene, *s);  // geometry ids count from 0
+        impl_->analytic.push_back(dynamic_cast<const AnalyticShape*>(s));
+    }
     const uint32_t first = impl_->shape_count;
     impl_->shape_count += uint32_t(shapes.size());
     impl_->group_shapes.emplace_back(first, impl_->shape_count);
@@ -216,6 +263,10 @@ bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
         out.instance = impl_->shape_of_geom[rh.hit.instID[0]];
         out.shape = impl_->instances[out.instance].shapes.first + rh.hit.geomID;
     }
+    if (const AnalyticShape* shape = impl_->analytic[out.shape]) {
+        const Vec2 uv = shape->parameters({rh.hit.Ng_x, rh.hit.Ng_y, rh.hit.Ng_z});
+        out.u = uv.x, out.v = uv.y;
+    }
     return true;
 }
 
@@ -245,7 +296,7 @@ const Transform& Accelerator::instance_transform(uint32_t instance) const {
 }
 
 size_t Accelerator::memory_bytes() const {
-    return size_t(std::max<int64_t>(0, impl_->bytes.load()));
+    return size_t(std::max<int64_t>(0, impl_->memory.bytes.load()));
 }
 
 }  // namespace etendue

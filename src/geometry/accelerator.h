@@ -25,10 +25,15 @@ struct RayHit : SurfaceLocation {
     float t;
 };
 
+/// Physical memory, or what the process may use of it if that is less.
+size_t memory_of_machine();
+
 struct AcceleratorOptions {
     /// Lets no ray pass between adjacent triangles. Otherwise about one ray in millions does, where it meets an edge to
     /// within rounding, and rays are 10 to 20 % faster.
     bool is_watertight = false;
+    /// What the hierarchy may take, with copies of the meshes.
+    size_t most_bytes = memory_of_machine();
 };
 
 /// Shapes are added, then committed once; queries are thread-safe after that.

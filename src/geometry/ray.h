@@ -13,15 +13,25 @@ struct Ray {
     float tmax = kInf;
 };
 
+/// An end of a ray: a point of a surface, or a free point, whose normal is zero.
+struct RayEnd {
+    Vec3 p;
+    Vec3 ng{};        ///< Unit geometric normal.
+    float slack = 0;  ///< As SurfaceGeometry::slack.
+};
+
 /// Moves a ray's origin off its surface, along the geometric normal to the side of `d`, by a distance that exceeds the
 /// rounding error of hit points [after Wächter & Binder 2019]. The error of points near 0 is that of points with a
 /// coordinate `least`, since it depends on where the ray came from. Scenes of the given size far from the origin need
-/// smaller offsets, just beyond the rounding of the coordinates.
-inline Vec3 offset_origin(Vec3 p, Vec3 ng, Vec3 d, float least, float size) {
+/// smaller offsets, just beyond the rounding of the coordinates. Where surfaces are larger than their distance from the
+/// origin, the error is that of their intersection, the slack.
+inline Vec3 offset_origin(const RayEnd& from, Vec3 d, float least, float size) {
     constexpr float kRelative = 0x1p-16f, kRounding = 0x1p-21f;
+    const Vec3 p = from.p;
     const float scale = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), least});
-    const float offset = std::max(std::min(scale, size) * kRelative, scale * kRounding);
-    return p + ng * std::copysign(offset, dot(ng, d));
+    const float offset =
+        std::max({std::min(scale, size) * kRelative, scale * kRounding, from.slack});
+    return p + from.ng * std::copysign(offset, dot(from.ng, d));
 }
 
 }  // namespace etendue

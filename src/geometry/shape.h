@@ -12,7 +12,8 @@
 
 namespace etendue {
 
-/// A point on a shape with the differential geometry that shading needs. World space.
+/// A point on a shape with the differential geometry that shading needs. World space. The coordinates of p are rounded
+/// once, so its distance from the surface is that of the rounding, however large the shape is.
 struct SurfaceGeometry {
     Vec3 p;
     Vec3 ng;          ///< Unit geometric normal, on the same side as ns.
@@ -20,6 +21,9 @@ struct SurfaceGeometry {
     Vec3 dpdu, dpdv;  ///< Zero unless requested.
     Vec2 uv;
     Vec3 color{1, 1, 1};  ///< Interpolated vertex colour; white where the shape has none.
+    /// Bound of the distance from p, along the normal, at which a ray from p may meet the same primitive again because
+    /// of the rounding in its intersection. The rounding of p is not part of it.
+    float slack = 0;
 };
 
 /// A point drawn from a shape's surface.
@@ -27,6 +31,7 @@ struct ShapeSample {
     Vec3 p, ng, ns;
     Vec2 uv;
     uint32_t prim;
+    float slack = 0;  ///< As SurfaceGeometry::slack.
 };
 
 class Shape {
@@ -38,6 +43,8 @@ public:
     virtual double primitive_area(uint32_t) const { return area(); }
     /// Geometry at parameters (u, v) of primitive `prim`, as in RayHit; dpdu and dpdv only if `tangents`.
     virtual SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const = 0;
+    /// SurfaceGeometry::slack of the points of a primitive.
+    virtual float slack(uint32_t) const { return 0; }
     /// Uniform in area on primitive `prim`.
     virtual ShapeSample sample(uint32_t prim, Vec2 u) const = 0;
     virtual size_t memory_bytes() const { return sizeof(*this); }
@@ -61,20 +68,24 @@ public:
     double primitive_area(uint32_t prim) const override;
     /// (u, v) are the barycentric coordinates of the second and third vertex.
     SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const override;
+    float slack(uint32_t prim) const override;
     ShapeSample sample(uint32_t prim, Vec2 u) const override;
     size_t memory_bytes() const override;
 };
 
-/// A shape that Embree intersects through a callback.
+/// A shape that Embree intersects through a callback, in double: its slack is zero.
 class AnalyticShape : public Shape {
 public:
     /// An intersection at o + t·d; t is double, since `o` may be far away.
     struct Hit {
         double t;
-        float u, v;
+        Vec3
+            local;  ///< The point in the shape's own coordinates, from which parameters() are computed.
     };
     /// The nearest intersection with t in (tmin, tmax); false where there is none.
     virtual bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const = 0;
+    /// The parameters (u, v) of a hit. Candidates that are not the nearest hit, and shadow rays, do not need them.
+    virtual Vec2 parameters(Vec3 local) const = 0;
 };
 
 /// Sphere with (u, v) = (azimuth about +z over 2π, polar angle over π).
@@ -90,10 +101,12 @@ public:
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
+    Vec2 parameters(Vec3 local) const override;
 
 private:
     SurfaceGeometry at(Vec3 local_unit) const;
-    Transform orientation_;  ///< Rotation alone; moves the parametrisation, not the surface.
+    Transform orientation_,
+        to_local_;  ///< Rotation alone; moves the parametrisation, not the surface.
     Vec3 center_;
     float radius_;
     bool flip_;
@@ -109,6 +122,7 @@ public:
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
+    Vec2 parameters(Vec3 local) const override;
 
 private:
     Transform to_world_, to_local_;
@@ -127,6 +141,7 @@ public:
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
+    Vec2 parameters(Vec3 local) const override;
 
 private:
     Transform to_world_, to_local_;

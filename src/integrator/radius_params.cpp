@@ -22,7 +22,7 @@ float pixel_radius(const Scene& scene) {
                              (float(row) + 0.5f) * (float(film.height) / kRays)};
             const SensorRay ray = scene.sensor().sample_ray(point, {0.5f, 0.5f});
             SurfaceHit hit;
-            Passage passage{kVacuum};
+            Passage passage{scene.sensor_medium()};
             if (!scene.intersect({ray.p, ray.d, kInf}, 0.5f, hit, passage)) continue;
             const float to_area = abs_dot(hit.geometry.ng, ray.d) /
                                   (scene.sensor().is_orthographic() ? 1.0f : sqr(hit.t));

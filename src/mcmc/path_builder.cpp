@@ -193,7 +193,7 @@ bool PathBuilder::append_emitter_point(const Vertex& from, PathState& y) {
     v.is_infinite = emitter.is_infinite();
     v.has_cosine = emitter.is_area();
     v.is_connectible = true;
-    v.medium = MediumId(emitter.medium);
+    v.medium = v.is_infinite ? kVacuum : scene.medium_at(emitter, v.ray_end());
     y.append(v);
     return true;
 }
@@ -215,7 +215,7 @@ bool PathBuilder::append_hit_emitter(const Vertex& hit, PathState& y) {
     v.has_cosine = emitter->is_area();
     v.is_connectible = true;
     v.is_delta = false;
-    v.medium = MediumId(emitter->medium);
+    v.medium = v.is_infinite ? kVacuum : measure_.scene.medium_at(*emitter, v.ray_end());
     y.append(v);
     return true;
 }

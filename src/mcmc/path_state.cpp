@@ -12,11 +12,6 @@ double inverse_square(const Vertex& a, const Vertex& b) {
     return a.is_infinite || b.is_infinite ? 1.0 : 1.0 / double(length2(b.p - a.p));
 }
 
-/// The normal of a vertex as shadow rays take it: none where it has no surface.
-Vec3 surface_normal(const Vertex& v) {
-    return v.kind != Vertex::Kind::Sensor && v.has_cosine ? v.ng : Vec3{};
-}
-
 }  // namespace
 
 PathImportance weighted_luminance(TargetMap map) {
@@ -149,10 +144,9 @@ bool PathState::evaluate(int first, int last) {
         if (i + 1 < k)
             attenuation = edge_attenuation(scene, a, b, w);
         else if (a.is_infinite)
-            attenuation = scene.attenuation_to_infinity(kVacuum, b.p, {}, a.p);
+            attenuation = scene.attenuation_to_infinity(scene.sensor_medium(), {b.p}, a.p);
         else
-            attenuation =
-                scene.attenuation(a.medium_toward(w), a.p, surface_normal(a), lens_point(), {});
+            attenuation = scene.attenuation(a.medium_toward(w), a.ray_end(), {lens_point()});
     }
     return true;
 }
@@ -167,11 +161,11 @@ Vec3 PathState::lens_point() const {
 bool PathState::trace_edge(int i, RenderStats& stats) {
     const Scene& scene = measure_.scene;
     const Vertex &a = x_[size_t(i)].v, &b = x_[size_t(i) + 1].v;
-    const Vec3 at = i + 1 == last() ? lens_point() : b.p, normal = surface_normal(b);
+    const RayEnd end = i + 1 == last() ? RayEnd{lens_point()} : b.ray_end();
     ++stats.shadow_rays;
     float& Tr = x_[size_t(i)].transmittance;
-    Tr = a.is_infinite ? scene.transmittance_to_infinity(at, normal, a.p)
-                       : scene.transmittance(at, normal, a.p, surface_normal(a));
+    Tr = a.is_infinite ? scene.transmittance_to_infinity(end, a.p)
+                       : scene.transmittance(end, a.ray_end());
     stats.visible += Tr > 0;
     return Tr > 0;
 }
@@ -289,7 +283,7 @@ void PathState::tell(const TechniqueCounts& counts, Workspace& work, Contributio
                   .needs_test = false};
         if (s > 0 && s < n) {
             const Vertex &a = x_[size_t(s) - 1].v, &b = x_[size_t(s)].v;
-            join.a = b.p, join.b = a.p, join.to_infinity = a.is_infinite;
+            join.a = {b.p}, join.b = {a.p}, join.to_infinity = a.is_infinite;
         }
         sink.add(join, join.contribution);
     }

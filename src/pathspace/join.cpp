@@ -8,15 +8,15 @@ Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 
     // the order of the vertices.
     const MediumId at_a = a.medium_toward(a_to_b), at_b = b.medium_toward(-a_to_b);
     const MediumId medium = scene.has_open_boundaries() ? at_b : std::min(at_a, at_b);
-    if (a.is_infinite) return scene.attenuation_to_infinity(medium, b.p, b.ng, a.p);
-    return scene.attenuation(medium, b.p, b.ng, a.p, a.has_cosine ? a.ng : Vec3{});
+    if (a.is_infinite) return scene.attenuation_to_infinity(medium, b.ray_end(), a.p);
+    return scene.attenuation(medium, b.ray_end(), a.ray_end());
 }
 
 float visibility(const Scene& scene, const Join& join, RenderStats& stats) {
     if (!join.needs_test) return 1;
     ++stats.shadow_rays;
-    const float Tr = join.to_infinity ? scene.transmittance_to_infinity(join.a, join.ng_a, join.b)
-                                      : scene.transmittance(join.a, join.ng_a, join.b, join.ng_b);
+    const float Tr = join.to_infinity ? scene.transmittance_to_infinity(join.a, join.b.p)
+                                      : scene.transmittance(join.a, join.b);
     stats.visible += Tr > 0;
     return Tr;
 }
@@ -76,11 +76,11 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     const float to_x0 = emitter.is_area() ? abs_dot(d.ng, d.wi) * inv_dist2 : inv_dist2;
     const float p_NE = emitter.selection_pmf * d.pdf;
     Rgb C = v.beta * f.f * d.Le * (to_x0 / p_NE);
-    const Vec3 ng_b = emitter.is_area() ? d.ng : Vec3{};
+    const RayEnd x0 = emitter.is_area() ? RayEnd{d.p, d.ng, d.slack} : RayEnd{d.p};
     if (scene.has_media()) {
         const MediumId medium = v.medium_toward(d.wi);
-        C *= infinite ? scene.attenuation_to_infinity(medium, v.p, v.ng, d.wi)
-                      : scene.attenuation(medium, v.p, v.ng, d.p, ng_b);
+        C *= infinite ? scene.attenuation_to_infinity(medium, v.ray_end(), d.wi)
+                      : scene.attenuation(medium, v.ray_end(), x0);
     }
 
     double others = emitter.is_delta()
@@ -103,10 +103,8 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                 .contribution = C,
                 .mis_weight = power_heuristic(counts.next_events(v.sees_lens), others),
                 .film = z.film,
-                .a = v.p,
-                .ng_a = v.ng,
-                .b = d.p,
-                .ng_b = ng_b,
+                .a = v.ray_end(),
+                .b = x0,
                 .to_infinity = infinite};
 }
 
@@ -167,10 +165,8 @@ Join joined(const Edge& edge, const Technique& technique, double np, const SubPa
             .contribution = edge.contribution,
             .mis_weight = float(sqr(np) / edge.total),
             .film = z.film,
-            .a = b.p,
-            .ng_a = b.ng,
-            .b = a.p,
-            .ng_b = a.has_cosine ? a.ng : Vec3{},
+            .a = b.ray_end(),
+            .b = a.ray_end(),
             .to_infinity = a.is_infinite};
 }
 
@@ -281,10 +277,9 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
     const BsdfEval f = a.eval(w, TransportMode::Importance);
     if (f.f.is_zero()) return {};
     Rgb C = a.beta * f.f * (lens->We_cos / lens->pdf_pos * inv_dist2);
-    const Vec3 ng_a = a.has_cosine ? a.ng : Vec3{};
     if (scene.has_media())
-        C *= a.is_infinite ? scene.attenuation_to_infinity(kVacuum, lens->p, {}, a.p)
-                           : scene.attenuation(a.medium_toward(w), a.p, ng_a, lens->p, {});
+        C *= a.is_infinite ? scene.attenuation_to_infinity(scene.sensor_medium(), {lens->p}, a.p)
+                           : scene.attenuation(a.medium_toward(w), a.ray_end(), {lens->p});
 
     const double rev_last =
         a.is_infinite ? lens->pdf_dir
@@ -300,10 +295,8 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
                 .contribution = C,
                 .mis_weight = power_heuristic(count, others),
                 .film = lens->film,
-                .a = lens->p,
-                .ng_a = Vec3{},
-                .b = a.p,
-                .ng_b = ng_a,
+                .a = {lens->p},
+                .b = a.ray_end(),
                 .to_infinity = a.is_infinite};
 }
 
@@ -318,7 +311,7 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
     const float dist2 = a.is_infinite ? 1.0f : length2(lens->p - origin);
     const float cos_lens = abs_dot(lens->ng, flight.d);
     const Rgb C = flight.beta * (lens->We_cos / cos_lens) *
-                  scene.attenuation(flight.medium, origin, {}, lens->p, {});
+                  scene.attenuation(flight.medium, {origin}, {lens->p});
 
     const double p_fwd = double(flight.pdf_sa) * double(cos_lens / dist2);
     const double p_lens = lens->pdf_pos / p_fwd;
@@ -333,8 +326,8 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
                 .contribution = C,
                 .mis_weight = power_heuristic(counts.hit_lens, others),
                 .film = lens->film,
-                .a = origin,
-                .b = lens->p,
+                .a = {origin},
+                .b = {lens->p},
                 .to_infinity = a.is_infinite,
                 .needs_test = false};
 }

@@ -15,8 +15,8 @@ struct Join {
     Rgb contribution;  ///< C_{s,t} without visibility; for one light path where t ≤ 1 (the film divides by N_L).
     float mis_weight;
     Vec2 film{};  ///< Film point; that of the eye sub-path unless t ≤ 1.
-    /// The edge added by the join; b is a direction where `to_infinity`. A hit adds no edge.
-    Vec3 a{}, ng_a{}, b{}, ng_b{};
+    /// The edge added by the join; b.p is a direction where `to_infinity`. A hit adds no edge.
+    RayEnd a{}, b{};
     bool to_infinity = false;
     /// Of a gather: the disc's approximation π d² p of p_c, clamped as in the weights [Qin et al. 2015, eq. 7 and 24].
     float pair_probability = 1;

@@ -75,8 +75,8 @@ Vertex emitter_end(const Join& join, const Vertex& next) {
     Vertex x0;
     x0.kind = Vertex::Kind::Emitter;
     x0.emitter = join.emitter;
-    x0.p = join.b;
-    x0.ng = join.ng_b;
+    x0.p = join.b.p;
+    x0.ng = join.b.ng;
     x0.is_infinite = join.to_infinity;
     x0.has_cosine = join.emitter->is_area();
     if (!x0.has_cosine) x0.ng = x0.is_infinite ? -x0.p : normalize(next.p - x0.p);
@@ -89,7 +89,7 @@ Vertex lens_end(const Scene& scene, const Join& join) {
     lens.is_infinite = scene.sensor().is_orthographic();
     const SensorRay ray = scene.sensor().sample_ray(join.film, {0.5f, 0.5f});
     lens.ng = ray.ng;
-    lens.p = lens.is_infinite ? -ray.ng : join.a;
+    lens.p = lens.is_infinite ? -ray.ng : join.a.p;
     lens.pdf_fwd = ray.pdf_pos;
     return lens;
 }

@@ -72,6 +72,7 @@ struct Vertex {
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or of the surface.
     SurfaceLocation location;          ///< On a surface; for y_0 only `prim` is set.
     Vec2 uv;
+    float slack = 0;  ///< Of a surface vertex, see SurfaceGeometry.
     const GuideCell* guide =
         nullptr;  ///< Learned directions here; nullptr if the walk is not guided.
     float guide_rev =
@@ -89,6 +90,7 @@ struct Vertex {
         emitter = on.emitter;
         location = at;
         uv = g.uv;
+        slack = g.slack;
         on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo, g.color}, arena, bsdf);
         is_connectible = bsdf.has_smooth();
         gloss = gloss_of_roughness(bsdf.roughness());
@@ -135,8 +137,19 @@ struct Vertex {
         return emitter->emits_by_cosine() ? std::optional(ng) : std::nullopt;
     }
 
+    /// This point as the end of a ray; not at infinity.
+    RayEnd ray_end() const {
+        if (kind == Kind::Surface) return {p, ng, slack};
+        if (kind != Kind::Emitter || !has_cosine) return {p};
+        return {p, ng, emitter->slack(location.prim)};
+    }
+
     /// Medium on the edge that leaves along `w`.
     MediumId medium_toward(Vec3 w) const {
+        if (kind == Kind::Emitter) {
+            const bool is_behind = emitter->medium_behind != emitter->medium && dot(ng, w) < 0;
+            return is_behind ? MediumId(emitter->medium_behind) : medium;
+        }
         if (!shape || !shape->is_interface) return medium;
         return shape->medium_toward(ng, w);
     }

@@ -166,7 +166,7 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const 
     const Ray start{ray.p, ray.d, kInf};
     Rgb beta(1);
     const Met met = append_surface(walk, sampler, z, TransportMode::Radiance, start, beta,
-                                   ray.pdf_dir, kVacuum);
+                                   ray.pdf_dir, walk.scene.sensor_medium());
     if (met == Met::Nothing && !walk.scene.infinite_emitters().empty())
         append_escape(walk.scene, z, ray.d, beta, ray.pdf_dir);
 }
@@ -210,7 +210,7 @@ Vertex& append_emitter(const WalkContext& walk, const Emitter& emitter, const Em
     y0.uv = e.uv;
     y0.location.prim = e.prim;
     y0.is_connectible = true;
-    y0.medium = MediumId(emitter.medium);
+    y0.medium = y0.is_infinite ? kVacuum : walk.scene.medium_at(emitter, y0.ray_end());
     y0.gloss = gloss_of_emitter(emitter.is_area());
     y0.pdf_fwd = emission_pmf(walk.counts.guide, emitter) * e.pdf_y0;
     y0.beta = Rgb(1 / y0.pdf_fwd);
@@ -222,11 +222,11 @@ Vertex& append_emitter(const WalkContext& walk, const Emitter& emitter, const Em
 void leave_emitter(const WalkContext& walk, const EmissionSample& e, Sampler& sampler, SubPath& y) {
     const Vertex& y0 = y[0];
     if (!(e.pdf_d > 0)) return;
-    const Vec3 origin = y0.has_cosine ? walk.scene.offset_origin(e.p, e.ng, e.d) : e.p;
+    const Vec3 origin = y0.has_cosine ? walk.scene.offset_origin(y0.ray_end(), e.d) : e.p;
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
     Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
     if (append_surface(walk, sampler, y, TransportMode::Importance, {origin, e.d, kInf}, beta,
-                       e.pdf_d, y0.medium) == Met::Surface)
+                       e.pdf_d, y0.medium_toward(e.d)) == Met::Surface)
         y[1].next_event_ratio = next_event_ratio(y[0], e.d, walk.counts.guide);
 }
 
@@ -303,7 +303,7 @@ bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubP
 
     Rgb beta = v.beta * s.weight * (1 / v.survival.value());
     const MediumId medium = v.medium_toward(s.wi);
-    const Ray ray{walk.scene.offset_origin(v.p, v.ng, s.wi), s.wi, kInf};
+    const Ray ray{walk.scene.offset_origin(v.ray_end(), s.wi), s.wi, kInf};
     const Met met = append_surface(walk, sampler, path, mode, ray, beta, s.pdf, medium);
     if (met == Met::Surface) return true;
     if (!eye || met == Met::SurfaceEdgeOn || walk.scene.infinite_emitters().empty()) return false;

@@ -106,7 +106,7 @@ size_t LightVertexCache::memory_bytes() const {
            guides_.capacity() * sizeof(LightVertexGuide);
 }
 
-void LightVertexCache::restore_head(uint64_t index, SubPath& y) const {
+void LightVertexCache::restore_head(const Scene& scene, uint64_t index, SubPath& y) const {
     const Head& head = heads_[index];
     Vertex& y0 = y.append();
     y0.kind = Vertex::Kind::Emitter;
@@ -118,7 +118,7 @@ void LightVertexCache::restore_head(uint64_t index, SubPath& y) const {
     y0.uv = head.uv;
     y0.location.prim = head.prim;
     y0.is_connectible = true;
-    y0.medium = MediumId(head.emitter->medium);
+    y0.medium = y0.is_infinite ? kVacuum : scene.medium_at(*head.emitter, y0.ray_end());
     y0.gloss = gloss_of_emitter(head.emitter->is_area());
     y0.pdf_fwd = head.pdf_fwd;
     y0.beta = head.beta;
@@ -166,7 +166,7 @@ void LightVertexCache::restore(const Scene& scene, uint64_t index, SubPath& y) c
     y.clear();
     const Head& head = heads_[index];
     if (!head.emitter) return;
-    restore_head(index, y);
+    restore_head(scene, index, y);
     for (uint32_t vertex = head.begin; vertex < head.end; ++vertex) {
         y.append();
         restore_vertex(scene, vertex, true, y, y.size() - 1);
@@ -186,7 +186,7 @@ void LightVertexCache::restore_first(const Scene& scene, uint32_t vertex, int si
     const uint32_t begin = heads_[path].begin;
     const int last = size - 1;
     y.clear();
-    restore_head(path, y);
+    restore_head(scene, path, y);
     for (int i = 1; i < size; ++i) {
         y.append();
         // The direction at a vertex needs the position of its predecessor.

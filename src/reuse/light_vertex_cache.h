@@ -107,7 +107,7 @@ private:
         std::vector<LightVertexGuide> guides;  ///< Empty without a guide.
     };
 
-    void restore_head(uint64_t index, SubPath& y) const;
+    void restore_head(const Scene& scene, uint64_t index, SubPath& y) const;
     void restore_vertex(const Scene& scene, uint32_t vertex, bool bsdf, SubPath& y, int i) const;
 
     std::vector<Chunk> chunks_;

@@ -6,6 +6,7 @@
 #include <map>
 
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include "description/resolve_file.h"
 #include "film/filter.h"
@@ -30,6 +31,9 @@ public:
         for (const SceneObject& object : description_.objects)
             for (const auto& c : object.children) is_child_[size_t(c.object)] = true;
         for (int root : description_.roots) add_root(root);
+        for (const View& v : views_)
+            for (const auto& c : plugins_.params(v.sensor).children("medium"))
+                models_.make_medium(c.object);
         take_models();
         if (scene_.shapes_.empty() && scene_.emitters_.empty())
             throw SceneError({description_.file, 0}, "the scene has no shapes and no emitters");
@@ -334,26 +338,66 @@ private:
         scene_.least_offset_ =
             std::ldexp(1.0f, std::clamp(std::ilogb(bounds.radius()), -120, 0) - 6);
         const float radius = std::max(bounds.radius(), 1e-6f);
-        // Area emitters emit into the exterior medium.
-        std::map<const Emitter*, MediumId> media;
-        for (const SceneShape& s : scene_.shapes_)
-            if (s.emitter && s.is_interface) media[s.emitter] = s.exterior;
         std::vector<double> powers;
         for (auto& e : scene_.emitters_) {
             e->index = uint32_t(powers.size());
-            if (const auto it = media.find(e.get()); it != media.end()) e->medium = it->second;
             // The margin keeps bounding discs outside all objects.
             e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);
             powers.push_back(e->power());
             if (e->is_infinite() && !e->is_delta()) scene_.infinite_.push_back(e.get());
             scene_.has_delta_emitters_ |= e->is_delta();
         }
+        if (scene_.has_media()) find_media();
         scene_.selection_ = AliasTable(powers);
         for (size_t i = 0; i < powers.size() && !scene_.selection_.empty(); ++i)
             scene_.emitters_[i]->selection_pmf = scene_.selection_.pmf(uint32_t(i));
         if (scene_.selection_.empty())
             scene_.warnings_.push_back(
                 "no emitter of the scene has any power: the image will be black");
+    }
+
+    /// The media in which emitters and the sensor lie.
+    void find_media() {
+        std::map<const Emitter*, const SceneShape*> boundaries;
+        for (const SceneShape& s : scene_.shapes_)
+            if (s.emitter && s.is_interface) boundaries[s.emitter] = &s;
+        for (auto& e : scene_.emitters_) {
+            if (const auto it = boundaries.find(e.get()); it != boundaries.end()) {
+                e->medium = it->second->exterior;
+                e->medium_behind = it->second->interior;
+            } else if (!e->is_infinite()) {
+                e->medium = e->medium_behind = medium_of(*e);
+            }
+        }
+        if (!scene_.sensor_->is_orthographic()) {
+            const FilmGeometry& film = scene_.film_;
+            const Vec2 center{float(film.width) / 2, float(film.height) / 2};
+            scene_.sensor_medium_ =
+                scene_.medium_around({scene_.sensor_->sample_ray(center, {0.5f, 0.5f}).p});
+        }
+        if (sensor_medium_ && *sensor_medium_ != scene_.sensor_medium_)
+            plugins_.problem(where_of_sensor_medium_,
+                             "the medium around the sensor is not the one that the surfaces around "
+                             "it have on their side",
+                             "the one of the surfaces instead");
+    }
+
+    /// The medium at points all over an emitter.
+    MediumId medium_of(const Emitter& emitter) const {
+        const auto medium_at = [&](FinePoint u) {
+            const EmissionSample e = emitter.sample_emission(u, {0.5f, 0.5f});
+            return scene_.medium_around(emitter.is_area() ? RayEnd{e.p, e.ng, emitter.slack(e.prim)}
+                                                          : RayEnd{e.p});
+        };
+        const MediumId medium = medium_at({0.5, 0.5});
+        if (!emitter.is_area()) return medium;
+        // A lattice, since the first number also chooses the primitive.
+        constexpr int kPoints = 64, kGenerator = 39;
+        for (int i = 0; i < kPoints; ++i)
+            if (medium_at({stratum(i, kPoints, 0.5),
+                           stratum(i * kGenerator % kPoints, kPoints, 0.5)}) != medium)
+                return kSeveralMedia;
+        return medium;
     }
 
     /// A scene file's integrator is no more than a suggestion, so what is wrong with it is noted for the case that the
@@ -448,9 +492,10 @@ private:
             if (plugins_.find(c.object, sampler_registry()))
                 scene_.defaults_.spp =
                     int(plugins_.params(c.object).integer("sample_count", 4, 1, 1 << 30));
-        if (!p.children("medium").empty())
-            plugins_.problem(p.children("medium")[0].where,
-                             "a medium around the sensor is not supported", "vacuum instead");
+        if (const auto media = p.children("medium"); !media.empty()) {
+            sensor_medium_ = models_.make_medium(media[0].object);
+            where_of_sensor_medium_ = media[0].where;
+        }
         scene_.film_ = film;
         scene_.sensor_ = plugins_.guarded(index, [&] {
             return entry->make(p, {film, scene_.filter_.radius(), scene_.bounds_.radius(),
@@ -506,6 +551,8 @@ private:
     size_t copies_ = 0;           ///< Of what groups within groups contain.
     std::vector<bool> is_child_;  ///< Whether another object refers to an object.
     std::vector<View> views_;
+    std::optional<MediumId> sensor_medium_;  ///< As the file gives it.
+    SourceLocation where_of_sensor_medium_;
     bool strict_normals_ = false;
     std::vector<SceneShape> top_;
     std::vector<std::vector<SceneShape>> groups_;
@@ -513,7 +560,9 @@ private:
 };
 
 Scene build_scene(const SceneDescription& description, const BuildOptions& options) {
-    return SceneBuilder(description, options).build();
+    const auto build = [&] { return SceneBuilder(description, options).build(); };
+    // Embree, too, uses the threads of the arena that calls it.
+    return options.threads > 0 ? tbb::task_arena(options.threads).execute(build) : build();
 }
 
 std::vector<PluginInfo> scene_plugins() {

@@ -16,6 +16,8 @@ struct BuildOptions {
     std::optional<std::array<int, 4>> crop;  ///< x, y, width, height
     std::string sensor;                      ///< Number (from 0) or id; empty: the first.
     AcceleratorOptions accelerator;
+    /// Threads that read files and build the hierarchy of rays; 0: those of the caller's arena.
+    int threads = 0;
 };
 
 /// Throws SceneError where the description is invalid.

@@ -1,6 +1,8 @@
 #include "scene/scene.h"
 
+#include <array>
 #include <new>
+#include <span>
 
 #include "math/frame.h"
 #include "texture/texture_cache.h"
@@ -8,14 +10,46 @@
 namespace etendue {
 namespace {
 
+/// Largest magnitude among the terms of the coordinates of `t`.point(p).
+float largest_term(const Transform& t, Vec3 p) {
+    double most = 0;
+    for (int i = 0; i < 3; ++i) {
+        const auto& row = t.matrix()[size_t(i)];
+        most = std::max({most, std::fabs(row[0] * p.x), std::fabs(row[1] * p.y),
+                         std::fabs(row[2] * p.z), std::fabs(row[3])});
+    }
+    return float(most);
+}
+
 /// Transforms the geometry of an instance's shape to world space.
 void transform_geometry(const Transform& t, SurfaceGeometry& g) {
     const float side = t.determinant3() < 0 ? -1.0f : 1.0f;
     g.p = t.point(g.p);
-    g.ng = normalize(t.normal(g.ng)) * side;
+    const Vec3 ng = t.normal(g.ng);
+    const float to_world = 1 / length(ng);  // of distances along the normal
+    // Embree transforms rays in float, with terms that may be larger than the coordinates.
+    constexpr float kErrors = 0x1p-21f;
+    g.slack = (g.slack + kErrors * largest_term(t.inverse(), g.p)) * to_world;
+    g.ng = ng * (to_world * side);
     g.ns = normalize(t.normal(g.ns)) * side;
     g.dpdu = t.vector(g.dpdu);
     g.dpdv = t.vector(g.dpdv);
+}
+
+/// The first one in the order of MediumId where several are equally common.
+MediumId commonest(std::span<MediumId> media) {
+    MediumId best = kVacuum;
+    ptrdiff_t times = 0;
+    std::sort(media.begin(), media.end());
+    for (auto it = media.begin(), next = it; it != media.end(); it = next) {
+        next = std::upper_bound(it, media.end(), *it);
+        if (next - it > times) times = next - it, best = *it;
+    }
+    return best;
+}
+
+RayEnd ray_end(const SurfaceGeometry& g) {
+    return {g.p, g.ng, g.slack};
 }
 
 /// The medium beyond a surface that a ray along `d` passes.
@@ -60,7 +94,7 @@ Ray Scene::for_each_surface(Ray ray, const Passes& passes) const {
         fill_hit(raw, hit);
         hit.t = hit.t * length_d + skipped;
         if (!passes(hit)) return ray;
-        const Vec3 p = hit.geometry.p, o = offset_origin(p, hit.geometry.ng, ray.d);
+        const Vec3 p = hit.geometry.p, o = offset_origin(ray_end(hit.geometry), ray.d);
         skipped = dot(o - p, ray.d) / length_d;
         ray.tmax -= dot(o - ray.o, ray.d) / sqr(length_d);
         ray.o = o;
@@ -127,36 +161,67 @@ Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
 }
 
 /// A shadow ray from `a` to `b` with parameters in [0, 1]; both ends are moved off their surfaces.
-Ray Scene::segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const {
-    const Vec3 d = b - a;
-    const Vec3 from = offset_origin(a, ng_a, d);
+Ray Scene::segment(const RayEnd& a, const RayEnd& b) const {
+    const Vec3 d = b.p - a.p;
+    const Vec3 from = offset_origin(a, d);
     // Bound for the rounding error of the distance at which the ray meets the far surface.
     constexpr float kRoundings = 8 * 0x1p-24f;
     const float error = kRoundings * length(d);
-    const Vec3 to = offset_origin(b, ng_b, -d) + ng_b * std::copysign(error, -dot(ng_b, d));
+    const Vec3 to = offset_origin(b, -d) + b.ng * std::copysign(error, -dot(b.ng, d));
     return {from, to - from, 1};
 }
 
-float Scene::transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const {
-    const Ray ray = segment(a, ng_a, b, ng_b);
+float Scene::transmittance(const RayEnd& a, const RayEnd& b) const {
+    const Ray ray = segment(a, b);
     if (!has_masks_) return accelerator_.occluded(ray) ? 0.0f : 1.0f;
     return masked_transmittance(ray);
 }
 
-float Scene::transmittance_to_infinity(Vec3 a, Vec3 ng_a, Vec3 d) const {
-    const Ray ray{offset_origin(a, ng_a, d), d, kInf};
+float Scene::transmittance_to_infinity(const RayEnd& a, Vec3 d) const {
+    const Ray ray{offset_origin(a, d), d, kInf};
     if (!has_masks_) return accelerator_.occluded(ray) ? 0.0f : 1.0f;
     return masked_transmittance(ray);
 }
 
-Rgb Scene::attenuation(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const {
-    return has_open_boundaries_ ? attenuation(medium, segment(a, ng_a, b, ng_b))
-                                : attenuation(medium, length(b - a));
+Rgb Scene::attenuation(MediumId medium, const RayEnd& a, const RayEnd& b) const {
+    return has_open_boundaries_ ? attenuation(medium, segment(a, b))
+                                : attenuation(medium, length(b.p - a.p));
 }
 
-Rgb Scene::attenuation_to_infinity(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 d) const {
-    return has_open_boundaries_ ? attenuation(medium, Ray{offset_origin(a, ng_a, d), d, kInf})
+Rgb Scene::attenuation_to_infinity(MediumId medium, const RayEnd& a, Vec3 d) const {
+    return has_open_boundaries_ ? attenuation(medium, Ray{offset_origin(a, d), d, kInf})
                                 : attenuation(medium, kInf);
+}
+
+MediumId Scene::medium_around(const RayEnd& at) const {
+    if (media_.empty()) return kVacuum;
+    // Boundaries need not be closed, such as the surface of a lake. So several directions vote; those that end at an
+    // opaque surface have no vote, unless all of them do.
+    constexpr int kDirections = 9;
+    constexpr float kGoldenAngle = 2.399963f;
+    std::array<MediumId, kDirections> votes;
+    auto end = votes.begin();
+    for (const bool through_opaque : {false, true}) {
+        for (int i = 0; i < kDirections; ++i) {
+            // A spiral over the sphere, whose directions lie in no plane of symmetry.
+            const float z = 1 - (2 * float(i) + 1) / kDirections, sine = safe_sqrt(1 - sqr(z)),
+                        phi = kGoldenAngle * float(i) + 0.1f;
+            Vec3 d{sine * std::cos(phi), sine * std::sin(phi), z};
+            if (dot(d, at.ng) < 0) d = -d;
+            MediumId medium = kVacuum;
+            bool votes_here = true;
+            for_each_surface({offset_origin(at, d), d, kInf}, [&](const SurfaceHit& hit) {
+                if (hit.shape->is_interface) {
+                    medium = hit.shape->medium_toward(hit.geometry.ng, -d);
+                    return false;
+                }
+                return votes_here = through_opaque || !hit.shape->material->is_opaque();
+            });
+            if (votes_here) *end++ = medium;
+        }
+        if (end != votes.begin()) break;
+    }
+    return commonest(std::span(votes.begin(), end));
 }
 
 }  // namespace etendue

@@ -20,6 +20,8 @@ namespace etendue {
 /// Index of a medium; kVacuum where nothing absorbs.
 using MediumId = int16_t;
 inline constexpr MediumId kVacuum = -1;
+/// Emitter::medium of an emitter that lies in more than one.
+inline constexpr MediumId kSeveralMedia = -2;
 
 struct SceneShape {
     const Shape* shape = nullptr;
@@ -79,14 +81,13 @@ public:
     SurfaceGeometry surface(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
     const Accelerator& accelerator() const { return accelerator_; }
-    /// The origin of a ray of direction `d` from a surface point `p` with normal `ng`, see etendue::offset_origin().
-    Vec3 offset_origin(Vec3 p, Vec3 ng, Vec3 d) const {
-        return etendue::offset_origin(p, ng, d, least_offset_, size_);
+    /// The origin of a ray of direction `d` from a surface point, see etendue::offset_origin().
+    Vec3 offset_origin(const RayEnd& from, Vec3 d) const {
+        return etendue::offset_origin(from, d, least_offset_, size_);
     }
-    /// Transmittance of masks along the open segment from `a` to `b`, which lie on surfaces with normals `ng_a` and
-    /// `ng_b`; 0 where an opaque surface is in between.
-    float transmittance(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
-    float transmittance_to_infinity(Vec3 a, Vec3 ng_a, Vec3 d) const;
+    /// Transmittance of masks along the open segment from `a` to `b`; 0 where an opaque surface is in between.
+    float transmittance(const RayEnd& a, const RayEnd& b) const;
+    float transmittance_to_infinity(const RayEnd& a, Vec3 d) const;
 
     /// Attenuation over `distance`, which may be infinite, in a medium.
     Rgb attenuation(MediumId medium, float distance) const {
@@ -95,8 +96,17 @@ public:
     }
     /// Attenuation by the media along the segment of transmittance(), which starts in `medium`; undefined where
     /// transmittance() is 0.
-    Rgb attenuation(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
-    Rgb attenuation_to_infinity(MediumId medium, Vec3 a, Vec3 ng_a, Vec3 d) const;
+    Rgb attenuation(MediumId medium, const RayEnd& a, const RayEnd& b) const;
+    Rgb attenuation_to_infinity(MediumId medium, const RayEnd& a, Vec3 d) const;
+    /// The medium at a point, on the front of the surface if it lies on one: the one that the nearest boundaries around
+    /// it have on its side.
+    MediumId medium_around(const RayEnd& at) const;
+    /// The medium in which light of a finite emitter starts at a point of it.
+    MediumId medium_at(const Emitter& emitter, const RayEnd& at) const {
+        return emitter.medium != kSeveralMedia ? MediumId(emitter.medium) : medium_around(at);
+    }
+    /// The medium at the lens.
+    MediumId sensor_medium() const { return sensor_medium_; }
     /// Whether rays can pass from one medium into another without a vertex, through masked surfaces.
     bool has_open_boundaries() const { return has_open_boundaries_; }
 
@@ -138,7 +148,7 @@ public:
 private:
     friend class SceneBuilder;
     void fill_hit(const RayHit& raw, SurfaceHit& hit) const;
-    Ray segment(Vec3 a, Vec3 ng_a, Vec3 b, Vec3 ng_b) const;
+    Ray segment(const RayEnd& a, const RayEnd& b) const;
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;
     /// Calls `passes(hit)` for the surfaces along a ray in order, until it returns false or there are no more; returns
@@ -168,6 +178,7 @@ private:
     bool has_masks_ = false;
     bool has_open_boundaries_ = false;
     bool has_delta_emitters_ = false;
+    MediumId sensor_medium_ = kVacuum;
     std::vector<std::string> warnings_;
     Statistics statistics_;
 };

@@ -20,6 +20,7 @@ RayPoint describe(const Scene& scene, const SurfaceHit& hit, Vec3 toward_origin,
     const SceneShape& shape = *hit.shape;
     RayPoint point{.p = hit.geometry.p,
                    .ng = hit.geometry.ng,
+                   .slack = hit.geometry.slack,
                    .shape = shape.name.empty() ? fmt::format("shape {}", hit.location.shape)
                                                : shape.name,
                    .emits = shape.emitter != nullptr,
@@ -55,7 +56,7 @@ std::vector<RayPoint> trace(const Scene& scene, Vec3 o, Vec3 d, int most, Transp
         d = std::max_element(at.events.begin(), at.events.end(), [](const auto& a, const auto& b) {
                 return a.weight < b.weight;
             })->direction;
-        o = scene.offset_origin(at.p, at.ng, d);
+        o = scene.offset_origin({at.p, at.ng, at.slack}, d);
     }
     return points;
 }
@@ -158,7 +159,7 @@ private:
             events_.push_back(event->number);
             // The next surface is found where it is expected.
             d = i == last_ ? event->direction : wanted;
-            o = scene_.offset_origin(point->p, point->ng, d);
+            o = scene_.offset_origin({point->p, point->ng, point->slack}, d);
         }
         const Vec3 last = normalize(given_[last_ + 1] - given_[last_]);
         plane_ = Frame::from_normal(last);
@@ -177,7 +178,7 @@ private:
             arrival.points.push_back(point->p);
             p = point->p;
             d = event->direction;
-            o = scene_.offset_origin(p, point->ng, d);
+            o = scene_.offset_origin({p, point->ng, point->slack}, d);
         }
         const Vec3 end = given_[last_ + 1];
         const float along = dot(d, plane_.n);

@@ -14,6 +14,7 @@ namespace etendue {
 /// A surface point on a light ray.
 struct RayPoint {
     Vec3 p, ng;
+    float slack = 0;    ///< As SurfaceGeometry::slack.
     std::string shape;  ///< Name or number of the shape.
     bool emits = false;
     bool is_specular =

@@ -60,13 +60,13 @@ private:
         if (is_pair(join.technique.strategy)) --(join.technique.drops_eye ? t : s);
         std::vector<ReplayedPath::Point> list;
         if (join.technique.strategy == Strategy::NextEvent)
-            list.push_back({join.b, 'L', join.to_infinity});
+            list.push_back({join.b.p, 'L', join.to_infinity});
         else
             for (int i = 0; i < std::min(s, y.size()); ++i)
                 list.push_back(
                     point(y[i], i == s - 1 && join.technique.strategy != Strategy::Merge));
         if (t == 1)
-            list.push_back({join.a, 'E', false});
+            list.push_back({join.a.p, 'E', false});
         else
             for (int i = std::min(t, work_.z.size()) - 1; i >= 0; --i)
                 list.push_back(point(work_.z[i], i == t - 1));

@@ -20,12 +20,12 @@ float shortest_edge(const Scene& scene, const Join& join, const SubPath& y, cons
     const Technique& q = join.technique;
     // Numbers of vertices taken from the walks: the lens of C(s,0) is not one of them, and a gather drops one.
     int light = q.t == 0 ? q.s - 1 : q.s, eye = q.t;
-    if (q.strategy == Strategy::Gather) --(length2(join.a - z[eye - 2].p) == 0 ? eye : light);
+    if (q.strategy == Strategy::Gather) --(length2(join.a.p - z[eye - 2].p) == 0 ? eye : light);
     float shortest = std::min(shortest_edge(y, light), shortest_edge(z, eye));
     const bool to_lens_at_infinity = q.t <= 1 && scene.sensor().is_orthographic();
     const bool has_edge = q.strategy != Strategy::Hit && q.strategy != Strategy::Merge;
     if (has_edge && !join.to_infinity && !to_lens_at_infinity)
-        shortest = std::min(shortest, length(join.b - join.a));
+        shortest = std::min(shortest, length(join.b.p - join.a.p));
     return shortest;
 }
 

@@ -82,7 +82,7 @@ private:
         const Vec3 n = p.side.normal();
         const auto lens = scene_.sensor().sample_connection(p.p, false, {});
         return lens && reached_region(scene_.film(), scene_.filter()).contains(lens->film) &&
-               scene_.transmittance(p.p, n, lens->p, {}) > 0;
+               scene_.transmittance({p.p, n}, {lens->p}) > 0;
     }
 
     const Scene& scene_;

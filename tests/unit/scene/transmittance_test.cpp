@@ -21,10 +21,10 @@ TEST(Transmittance, AWallHidesWhatLiesCloseBehindIt) {
     const Scene scene = build(front_camera(1) + kSky + wall(0) + wall(0.001f));
     const Vec3 far{0.3f, 0.2f, 1000}, behind{1.2f, -0.7f, 0}, before{1.2f, -0.7f, 0.001f};
     const Vec3 n{0, 0, 1};
-    EXPECT_EQ(scene.transmittance(far, -n, behind, n), 0);
-    EXPECT_EQ(scene.transmittance(behind, n, far, -n), 0);
-    EXPECT_EQ(scene.transmittance(far, -n, before, n), 1);
-    EXPECT_EQ(scene.transmittance(before, n, far, -n), 1);
+    EXPECT_EQ(scene.transmittance({far, -n}, {behind, n}), 0);
+    EXPECT_EQ(scene.transmittance({behind, n}, {far, -n}), 0);
+    EXPECT_EQ(scene.transmittance({far, -n}, {before, n}), 1);
+    EXPECT_EQ(scene.transmittance({before, n}, {far, -n}), 1);
 }
 
 // No point of a surface is hidden by its own surface, from near or far, head on or grazing.
@@ -51,13 +51,141 @@ TEST(Transmittance, ASurfaceDoesNotHideItself) {
                     const Vec3 w = Frame::from_normal(g.ng).to_world(
                         {sine * std::cos(phi), sine * std::sin(phi), cosine});
                     const Vec3 from = g.p + w * distance;
-                    hidden += scene.transmittance(from, {}, g.p, g.ng) == 0;
-                    hidden += scene.transmittance(g.p, g.ng, from, {}) == 0;
+                    hidden += scene.transmittance({from}, {g.p, g.ng, g.slack}) == 0;
+                    hidden += scene.transmittance({g.p, g.ng, g.slack}, {from}) == 0;
                     total += 2;
                 }
             }
             EXPECT_EQ(hidden, 0) << "of " << total << " at " << distance << ", size " << size;
         }
+}
+
+/// A large shape whose surface passes near the origin.
+struct LargeShape {
+    const char* name;
+    std::string xml;
+};
+
+std::string shape(const std::string& type, const std::string& transform,
+                  const std::string& more = "") {
+    return fmt::format("<shape type=\"{}\"><transform name=\"to_world\">{}</transform>{}</shape>",
+                       type, transform, more);
+}
+
+/// An instance of a shape that lies far from the origin of its group.
+std::string instance(const std::string& inside, const std::string& transform) {
+    return "<shape type=\"shapegroup\" id=\"group\">" + inside + "</shape>" +
+           shape("instance", transform, "<ref id=\"group\"/>");
+}
+
+const std::string kTurned =
+    "<rotate x=\"1\" y=\"0.3\" angle=\"23\"/><rotate y=\"1\" z=\"0.4\" angle=\"71\"/>";
+
+const LargeShape kLargeShapes[] = {
+    {"ground of radius 1000",
+     "<shape type=\"sphere\"><point name=\"center\" value=\"0,-1000,0\"/><float name=\"radius\" "
+     "value=\"1000\"/></shape>"},
+    {"wall of radius 1e5",
+     "<shape type=\"sphere\"><point name=\"center\" value=\"100001,40.8,81.6\"/><float "
+     "name=\"radius\" value=\"100000\"/></shape>"},
+    {"sphere around the scene", shape("sphere", "<scale value=\"20000\"/><translate y=\"20000\"/>",
+                                      "<boolean name=\"flip_normals\" value=\"true\"/>")},
+    {"disk", shape("disk", "<scale value=\"5000\"/>" + kTurned)},
+    {"cylinder",
+     shape("cylinder", "<translate y=\"-1\" z=\"-0.5\"/><scale value=\"3000\"/>" + kTurned)},
+    {"rectangle", shape("rectangle", "<scale value=\"1000\"/>" + kTurned)},
+    {"large rectangle", shape("rectangle", "<scale value=\"100000\"/>" + kTurned)},
+    {"box", shape("cube", "<translate z=\"-1\"/><scale value=\"2000\"/>" + kTurned)},
+    {"instance of a rectangle",
+     instance(shape("rectangle", kTurned + "<translate x=\"3000\" y=\"2000\" z=\"-700\"/>"),
+              "<translate x=\"-3000\" y=\"-2000\" z=\"700\"/>")},
+    {"instance of a sphere",
+     instance("<shape type=\"sphere\"><point name=\"center\" value=\"0,-10,0\"/><float "
+              "name=\"radius\" value=\"10\"/></shape>",
+              "<scale value=\"300\"/>" + kTurned)},
+};
+
+/// A point on the last shape of the scene, and near the origin on large ones.
+SurfaceHit point_near_origin(const Scene& scene, etendue::testing::Random& random) {
+    SurfaceHit hit;
+    for (;;) {
+        // From a sphere about the origin through it.
+        const Vec3 d = normalize(random.in_cube()), o = normalize(random.in_cube()) * 5;
+        if (scene.intersect({o, d, kInf}, 0.5f, hit) && length(hit.geometry.p) < 10) return hit;
+    }
+}
+
+// Of walks, shadow rays, rays of light from the surface, and of their other ends.
+TEST(Transmittance, LargeSurfacesDoNotHideThemselves) {
+    etendue::testing::Random random(8);
+    for (const LargeShape& large : kLargeShapes) {
+        // A small object, whose size determines offsets of rays near the origin.
+        const Scene scene = build(front_camera(1) + kSky + large.xml);
+        int met_again = 0, hidden = 0, total = 0;
+        float reach = 0;
+        for (int i = 0; i < 20000; ++i) {
+            const SurfaceHit at = point_near_origin(scene, random);
+            const SurfaceGeometry& g = at.geometry;
+            const float cosine = std::pow(10.0f, -1.5f * random.next_1d()),
+                        phi = 2 * kPi * random.next_1d(), sine = safe_sqrt(1 - sqr(cosine));
+            const Vec3 n = i % 2 ? g.ng : -g.ng,
+                       w = Frame::from_normal(n).to_world(
+                           {sine * std::cos(phi), sine * std::sin(phi), cosine});
+            const RayEnd end{g.p, g.ng, g.slack};
+            SurfaceHit next;
+            if (scene.intersect({scene.offset_origin(end, w), w, kInf}, 0.5f, next) &&
+                next.t < 0.5f) {
+                ++met_again;
+                reach = std::max(reach, next.t * cosine);
+            }
+            const Vec3 from = g.p + w * std::pow(10.0f, 1 - 2 * random.next_1d());
+            hidden += scene.transmittance(end, {from}) == 0;
+            hidden += scene.transmittance({from}, end) == 0;
+            ++total;
+        }
+        EXPECT_EQ(met_again, 0) << large.name << ", up to " << reach << " from the surface, of "
+                                << total;
+        EXPECT_EQ(hidden, 0) << large.name << ", of " << 2 * total;
+    }
+}
+
+// The offsets on large surfaces are small enough for walls of a few thousandths of their size.
+TEST(Transmittance, LargeThinWallsBlock) {
+    etendue::testing::Random random(9);
+    const struct {
+        std::string xml;
+        float thickness;
+    } walls[] = {
+        {shape("cube", "<scale x=\"1000\" y=\"1000\" z=\"0.02\"/>" + kTurned), 0.04f},
+        {shape("rectangle", "<scale value=\"1000\"/>" + kTurned) +
+             shape("rectangle", "<scale value=\"1000\"/><translate z=\"0.01\"/>" + kTurned),
+         0.01f},
+        {shape("sphere", "<scale value=\"1000\"/><translate y=\"-1000\"/>") +
+             shape("sphere", "<scale value=\"999.999\"/><translate y=\"-1000\"/>"),
+         0.001f},
+    };
+    for (const auto& wall : walls) {
+        const Scene scene = build(front_camera(1) + kSky + wall.xml);
+        int leaks = 0;
+        for (int i = 0; i < 5000; ++i) {
+            const SurfaceHit at = point_near_origin(scene, random);
+            const SurfaceGeometry& g = at.geometry;
+            const RayEnd end{g.p, g.ng, g.slack};
+            // Through the other surface of the wall, on the side where it is.
+            for (const float side : {-1.0f, 1.0f}) {
+                SurfaceHit other;
+                const Vec3 n = g.ng * side;
+                if (!scene.intersect({g.p + n * (0.3f * wall.thickness), n, kInf}, 0.5f, other) ||
+                    other.t > wall.thickness)
+                    continue;
+                const Vec3 beyond = g.p + n * 3;
+                leaks += scene.transmittance(end, {beyond}) != 0;
+                leaks += scene.transmittance({beyond}, end) != 0;
+                leaks += scene.transmittance_to_infinity(end, n) != 0;
+            }
+        }
+        EXPECT_EQ(leaks, 0) << wall.thickness;
+    }
 }
 
 }  // namespace

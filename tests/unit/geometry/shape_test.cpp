@@ -1,0 +1,157 @@
+#include "geometry/shape.h"
+
+#include <cmath>
+#include <memory>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "geometry/accelerator.h"
+#include "random.h"
+
+namespace etendue {
+namespace {
+
+constexpr double kUlp = 0x1p-24;  // half the distance of numbers between 1 and 2, relative to 1
+
+/// Σ |n_i p_i| 2^-24: what rounding each coordinate of p once moves it along n, at most.
+double rounding(const Vec3& p, const double n[3]) {
+    return kUlp * (std::fabs(n[0] * p.x) + std::fabs(n[1] * p.y) + std::fabs(n[2] * p.z));
+}
+
+/// A radius and a centre so that the surface passes near the origin, as the ground of a scene does.
+constexpr float kRadii[] = {0.3f, 40, 1e3f, 1e5f, 6.4e6f};
+
+// However large the sphere is, its points are off by no more than the rounding of their coordinates.
+TEST(Sphere, PointsLieOnTheSurface) {
+    testing::Random random(1);
+    for (const float radius : kRadii) {
+        const Vec3 center = Vec3{0.36f, -0.8f, 0.48f} * radius;
+        const Sphere sphere(center, radius, false);
+        double worst = 0;
+        for (int i = 0; i < 2000; ++i) {
+            const Vec2 u = random.next_2d();
+            const Vec3 p = i % 2 ? sphere.surface(0, u.x, u.y, false).p : sphere.sample(0, u).p;
+            const double n[3] = {(double(p.x) - center.x) / radius,
+                                 (double(p.y) - center.y) / radius,
+                                 (double(p.z) - center.z) / radius};
+            const double off =
+                radius * std::fabs(std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) - 1);
+            worst = std::max(worst, off / (rounding(p, n) + 1e-12 * radius));
+        }
+        EXPECT_LE(worst, 1.01) << "radius " << radius;
+    }
+}
+
+TEST(Cylinder, PointsLieOnTheSurface) {
+    testing::Random random(2);
+    for (const float radius : kRadii) {
+        const Transform to_world = Transform::translate({0, -radius, 0}) *
+                                   Transform::scale({radius, radius, 2 * radius}) *
+                                   Transform::translate({0, 0, -0.5f});
+        const Cylinder cylinder(to_world, false);
+        double worst = 0;
+        for (int i = 0; i < 2000; ++i) {
+            const Vec2 u = random.next_2d();
+            const Vec3 p = i % 2 ? cylinder.surface(0, u.x, u.y, false).p : cylinder.sample(0, u).p;
+            const double x = double(p.x) / radius, y = (double(p.y) + radius) / radius;
+            const double n[3] = {x, y, 0}, off = radius * std::fabs(std::hypot(x, y) - 1);
+            worst = std::max(worst, off / (rounding(p, n) + 1e-12 * radius));
+        }
+        EXPECT_LE(worst, 1.01) << "radius " << radius;
+    }
+}
+
+TEST(TriangleMesh, PointsLieOnTheSurface) {
+    testing::Random random(3);
+    for (const float size : kRadii)
+        for (int turn = 0; turn < 20; ++turn) {
+            TriangleMesh mesh;
+            for (int i = 0; i < 3; ++i) mesh.positions.push_back(random.in_cube() * size);
+            mesh.triangles = {{0, 1, 2}};
+            mesh.compute_face_normals();
+            const Vec3 a = mesh.positions[0], b = mesh.positions[1], c = mesh.positions[2];
+            const double e[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z},
+                         f[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
+            double n[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
+                           e[0] * f[1] - e[1] * f[0]};
+            const double size_n = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+            for (double& x : n) x /= size_n;
+            double worst = 0;
+            for (int i = 0; i < 200; ++i) {
+                const Vec3 p = mesh.sample(0, random.next_2d()).p;
+                const double off =
+                    std::fabs((double(p.x) - a.x) * n[0] + (double(p.y) - a.y) * n[1] +
+                              (double(p.z) - a.z) * n[2]);
+                worst = std::max(worst, off / (rounding(p, n) + 1e-12 * double(size)));
+            }
+            EXPECT_LE(worst, 1.01) << "size " << size;
+        }
+}
+
+// Hits are found again from their parameters.
+TEST(AnalyticShapes, ParametersOfHits) {
+    testing::Random random(4);
+    const Transform to_world = Transform::translate({1, -2, 3}) *
+                               Transform::rotate({3, 1, -2}, 70) * Transform::scale({2, 2, 2});
+    const std::unique_ptr<AnalyticShape> shapes[] = {std::make_unique<Sphere>(to_world, false),
+                                                     std::make_unique<Disk>(to_world, false),
+                                                     std::make_unique<Cylinder>(to_world, true)};
+    for (const auto& shape : shapes)
+        for (const bool in_group : {false, true}) {
+            Accelerator accelerator;
+            if (in_group)
+                accelerator.add_instance(accelerator.add_group({shape.get()}),
+                                         Transform::translate({0.5f, 0, 0}));
+            else
+                accelerator.add_shape(*shape);
+            accelerator.commit();
+            int hits = 0;
+            for (int i = 0; i < 1000; ++i) {
+                const Vec3 o{8 * random.next_1d() - 4, 8 * random.next_1d() - 6, 9};
+                const Vec3 to = shape->sample(0, random.next_2d()).p;
+                const Ray ray{o, normalize(to - o), kInf};
+                RayHit hit;
+                if (!accelerator.intersect(ray, hit)) continue;
+                ++hits;
+                EXPECT_TRUE(accelerator.occluded(ray));
+                Vec3 p = shape->surface(0, hit.u, hit.v, false).p;
+                if (in_group) p.x += 0.5f;
+                EXPECT_LT(length(p - (ray.o + ray.d * hit.t)), 2e-5f);
+            }
+            EXPECT_GT(hits, in_group ? 300 : 900);
+        }
+}
+
+// The hierarchy may not take more memory than it is given, and says so.
+TEST(Accelerator, MemoryIsBounded) {
+    TriangleMesh mesh;
+    for (int i = 0; i < 300; ++i)
+        for (int j = 0; j < 300; ++j) mesh.positions.push_back({float(i), float(j), float(i % 7)});
+    for (uint32_t i = 0; i + 1 < 300; ++i)
+        for (uint32_t j = 0; j + 1 < 300; ++j) {
+            mesh.triangles.push_back({i * 300 + j, i * 300 + j + 1, i * 300 + j + 300});
+            mesh.triangles.push_back({i * 300 + j + 1, i * 300 + j + 301, i * 300 + j + 300});
+        }
+    mesh.compute_face_normals();
+    const auto make = [&](size_t most) {
+        Accelerator accelerator({.most_bytes = most});
+        accelerator.add_shape(mesh);
+        accelerator.commit();
+        return accelerator.memory_bytes();
+    };
+    const size_t needed = make(memory_of_machine());
+    EXPECT_GT(needed, size_t(1) << 20);
+    // Neither a copy of the mesh nor the hierarchy may exceed the bound.
+    for (const size_t most : {size_t(1) << 16, needed / 2}) {
+        try {
+            make(most);
+            ADD_FAILURE() << "no error with " << most << " bytes";
+        } catch (const std::runtime_error& e) {
+            EXPECT_NE(std::string(e.what()).find("memory"), std::string::npos) << e.what();
+        }
+    }
+}
+
+}  // namespace
+}  // namespace etendue
