@@ -1,11 +1,15 @@
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <future>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -25,6 +29,7 @@ namespace {
 struct StudioCommand {
     SceneOptions scene;
     std::string integrator, sampler, output = ".", listen = "127.0.0.1", reference;
+    std::vector<std::string> hosts;
     int port = 0, threads = 0;
     unsigned grace = 20;
     bool idle = false;
@@ -32,9 +37,21 @@ struct StudioCommand {
     void run() const;
 
 private:
+    ApiOptions api_options() const;
+    void print_urls(const Server& server, const std::string& token) const;
     void start_first_run(Session& session) const;
+    void watch(Session& session, const Api& api, const std::atomic<bool>& stop) const;
     void save_all(Session& session) const;
 };
+
+/// Without an exception where nobody reads it, or the disk is full: no image is lost for a message.
+template <class... Args>
+void tell(fmt::format_string<Args...> format, Args&&... args) noexcept {
+    try {
+        fmt::print(stderr, format, std::forward<Args>(args)...);
+    } catch (const std::exception&) {
+    }
+}
 
 /// A name in the folder that no file has yet.
 std::string free_name(const std::string& folder, const std::string& stem) {
@@ -51,21 +68,93 @@ void StudioCommand::start_first_run(Session& session) const {
     try {
         session.start(request);
     } catch (const std::exception& e) {
-        fmt::print(stderr, "warning: nothing is rendered yet: {}\n", e.what());
+        tell("warning: nothing is rendered yet: {}\n", e.what());
     }
 }
 
+Saved save_and_wait(Session& session, int run, const std::string& file) {
+    std::promise<Saved> answer;
+    session.save(run, file, false, [&](const Saved& saved) { answer.set_value(saved); });
+    return answer.get_future().get();
+}
+
+/// Saves the image of every run, those first that need not wait for the pass in flight. What cannot be saved in the output
+/// folder is saved in that for temporary files. Throws only after all were tried.
 void StudioCommand::save_all(Session& session) const {
-    session.settle();
     const std::string stem = std::filesystem::path(scene.file).stem().string();
-    for (const RunStatus& s : session.runs()) {
-        if (s.passes == 0) continue;
-        const std::string file = free_name(output, stem);
-        std::promise<std::string> saved;
-        session.save(s.id, file, [&](const std::string& error) { saved.set_value(error); });
-        if (const std::string error = saved.get_future().get(); !error.empty())
-            throw std::runtime_error(fmt::format("{}: {}", file, error));
-        fmt::print(stderr, "{}: run {}, {}, {} spp\n", file, s.id, s.integrator, s.passes);
+    std::error_code ignored;
+    const std::string other = std::filesystem::temp_directory_path(ignored).string();
+    std::string errors;
+    std::vector<RunStatus> runs = session.runs();
+    std::stable_partition(runs.begin(), runs.end(),
+                          [](const RunStatus& s) { return s.state != RunState::Stopping; });
+    for (const RunStatus& s : runs) {
+        // A run in its first pass may end it.
+        if (s.passes == 0 && s.state != RunState::Stopping) continue;
+        for (const std::string& folder : {output, other}) {
+            const std::string file = free_name(folder, stem);
+            const Saved saved = save_and_wait(session, s.id, file);
+            if (saved.error.empty()) {
+                tell("{}: run {}, {}, {} spp\n", file, s.id, s.integrator, saved.passes);
+                break;
+            }
+            if (session.status(s.id).passes == 0) break;
+            tell("{}: {}\n", file, saved.error);
+            if (folder == output)
+                errors +=
+                    fmt::format("{}run {}: {}", errors.empty() ? "" : "; ", s.id, saved.error);
+        }
+    }
+    if (!errors.empty()) throw std::runtime_error(errors);
+}
+
+ApiOptions StudioCommand::api_options() const {
+    ApiOptions options;
+    options.token = make_token();
+    options.scene_file = scene.file;
+    options.output_folder = output;
+    if (!reference.empty()) options.reference = read_rgb(reference);
+    for (const std::string& host : hosts) {
+        if (!is_host_name(host))
+            throw std::runtime_error(fmt::format(
+                "--host: \"{}\" is no host name: only letters, digits, '-' and '.' are allowed",
+                host));
+        options.hosts.push_back(lower_case(host));
+    }
+    // Where it is a name, the page is asked for by it.
+    options.hosts.push_back(lower_case(listen));
+    return options;
+}
+
+void StudioCommand::print_urls(const Server& server, const std::string& token) const {
+    std::vector<std::string> urls;
+    for (const std::string& host : hosts) urls.push_back(server.url(host));
+    for (std::string& url : server.urls()) urls.push_back(std::move(url));
+    for (const std::string& url : urls) fmt::print("{}/#token={}\n", url, token);
+    std::fflush(stdout);
+    if (!server.is_local())
+        tell("warning: {} can be reached from other machines, without encryption\n", listen);
+}
+
+/// Until `stop`: starts the first run, and tells what becomes of the scene.
+void StudioCommand::watch(Session& session, const Api& api, const std::atomic<bool>& stop) const {
+    bool is_started = idle;
+    uint64_t version = 0;
+    std::string reported;
+    while (!stop) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        if (session.scene_version() != version) {
+            version = session.scene_version();
+            for (const std::string& w : session.scene()->warnings()) tell("warning: {}\n", w);
+            if (const std::string problem = api.reference_problem(); !problem.empty())
+                tell("warning: {}\n", problem);
+            if (!is_started) start_first_run(session);
+            is_started = true;
+        }
+        if (const std::string e = session.load_error(); e != reported) {
+            if (!e.empty()) tell("{}\n", e);
+            reported = e;
+        }
     }
 }
 
@@ -78,11 +167,7 @@ void StudioCommand::run() const {
         throw std::runtime_error(fmt::format("{}: no such file", scene.file));
     parse_sampler(sampler);
     if (!integrator.empty()) make_integrator(IntegratorSpec::parse(integrator));
-    ApiOptions options;
-    options.token = make_token();
-    options.scene_file = scene.file;
-    options.output_folder = output;
-    if (!reference.empty()) options.reference = read_rgb(reference);
+    const ApiOptions options = api_options();
 
     const Interrupts interrupts = catch_interrupts(grace);
     // Declared so that what calls others is destroyed before these.
@@ -90,45 +175,29 @@ void StudioCommand::run() const {
     SceneOptions loading = scene;
     loading.threads = threads;
     Session session([loading] { return load_scene(loading); }, threads);
-    if (listen != "127.0.0.1" && listen != "::1")
-        fmt::print(stderr, "warning: {} can be reached from other machines, without encryption\n",
-                   listen);
     Api api(session, options);
-    server.start(api);
-    fmt::print("{}/#token={}\n", server.url(), options.token);
-    std::fflush(stdout);
+    const Server::Serving serving = server.start(api);
+    print_urls(server, options.token);
 
-    bool is_started = idle;
-    std::string reported;
-    while (!interrupts.stop) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        if (!is_started && session.scene()) {
-            for (const std::string& w : session.scene()->warnings())
-                fmt::print(stderr, "warning: {}\n", w);
-            start_first_run(session);
-            is_started = true;
-        }
-        if (const std::string e = session.load_error(); e != reported) {
-            if (!e.empty()) fmt::print(stderr, "{}\n", e);
-            reported = e;
-        }
-    }
-    session.stop_all(false);
-    std::promise<void> finished;
-    std::thread dropper([&, done = finished.get_future()] {
-        while (done.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready)
+    watch(session, api, interrupts.stop);
+    session.close(false);
+    // A second signal, or the end of the time of grace, discards the pass in flight.
+    std::atomic<bool> is_saved{false};
+    std::thread dropper([&] {
+        while (!is_saved) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
             if (interrupts.drop) session.stop_all(true);
+        }
     });
+    std::exception_ptr failure;
     try {
         save_all(session);
     } catch (...) {
-        finished.set_value();
-        dropper.join();
-        throw;
+        failure = std::current_exception();
     }
-    finished.set_value();
+    is_saved = true;
     dropper.join();
-    server.stop();
+    if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace
@@ -155,9 +224,14 @@ void add_studio_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(0, 65535));
     c.add_option("--listen", command->listen,
-                 "Address to listen at; an address other than 127.0.0.1 can be reached from other "
-                 "machines, without encryption (consider ssh -L instead)")
+                 "Address or host name to listen at, 0.0.0.0 or :: for all; one other than "
+                 "127.0.0.1 can be reached from other machines, without encryption (consider ssh "
+                 "-L instead)")
         ->capture_default_str();
+    c.add_option("--host", command->hosts,
+                 "Host name by which the page may be opened, beside addresses and localhost; "
+                 "repeatable")
+        ->allow_extra_args(false);
     c.add_option("--grace", command->grace,
                  "Seconds that the current pass may continue after Ctrl-C or SIGTERM")
         ->capture_default_str()

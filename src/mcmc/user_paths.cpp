@@ -52,6 +52,12 @@ GivenPath parse_path(const json& from, const std::string& file, size_t index) {
                 if (!is_finite(point))
                     refuse(file, fmt::format("{}: point {} is {}, which is beyond single precision",
                                              where, path.points.size() + 1, excerpt(p)));
+                for (int axis = 0; axis < 3; ++axis)
+                    if (!(std::abs(point[axis]) <= GivenPath::kFarthest))
+                        refuse(file, fmt::format("{}: point {} is {}, but coordinates must not "
+                                                 "exceed {:g}",
+                                                 where, path.points.size() + 1, excerpt(p),
+                                                 GivenPath::kFarthest));
                 path.points.push_back(point);
             }
         } else if (key == "cone") {

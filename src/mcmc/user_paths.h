@@ -18,6 +18,8 @@ namespace etendue {
 /// A path as it is written in a file.
 struct GivenPath {
     static constexpr float kCone = 1;  ///< Half-angle, degrees.
+    /// The largest coordinate. Embree ends the program at rays whose numbers exceed 1.8e18, or are not finite.
+    static constexpr float kFarthest = 1e15f;
 
     std::string name;          ///< May be empty.
     std::vector<Vec3> points;  ///< World space, from the emitter on.

@@ -10,9 +10,10 @@
 namespace etendue {
 
 nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
-                       const std::string& stopped_by, const PassLog& log) {
+                       const std::string& stopped_by, const PassLog& log,
+                       const ErrorEstimate* error) {
     const RenderStats& s = r.stats();
-    const ErrorEstimate e = r.film().error();
+    const ErrorEstimate e = error ? *error : r.film().error();
     const Film::MeanEstimate mean = r.film().mean_luminance();
     nlohmann::json j{
         {"scene", scene.file()},
@@ -59,10 +60,7 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
     return j;
 }
 
-Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
-                        const std::vector<std::string>& aovs, const nlohmann::json& report) {
-    Image image =
-        rgb_image(scene.film().crop_width, scene.film().crop_height, renderer.film().image());
+void add_attributes(const nlohmann::json& report, Image& image) {
     for (const auto& [key, value] : report.items())
         if (value.is_string())
             image.attributes["etendue." + key] = value.get<std::string>();
@@ -71,6 +69,13 @@ Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t s
         else if (value.is_number())
             image.attributes["etendue." + key] = value.get<double>();
     image.attributes["etendue.version"] = std::string(ETENDUE_VERSION);
+}
+
+Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
+                        const std::vector<std::string>& aovs, const nlohmann::json& report) {
+    Image image =
+        rgb_image(scene.film().crop_width, scene.film().crop_height, renderer.film().image());
+    add_attributes(report, image);
     for (const AovImage& a : render_aovs(scene, aovs, kAovSamples, seed, threads))
         add_rgb_layer(image, image.width, image.height, a.name, a.pixels);
     if (std::find(aovs.begin(), aovs.end(), "variance") != aovs.end())

@@ -28,10 +28,14 @@ private:
     uint64_t pairs_before_ = 0;
 };
 
-/// Statistics of a rendering by name. `stopped_by`: a StopReason, or "failure".
+/// Statistics of a rendering by name. `stopped_by`: a StopReason, or "failure". `error`: that of the film, where it is
+/// known already; it takes a while with groups.
 nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
-                       const std::string& stopped_by, const PassLog& log);
+                       const std::string& stopped_by, const PassLog& log,
+                       const ErrorEstimate* error = nullptr);
 
+/// Sets the texts and numbers of a report as metadata, with the version of the program.
+void add_attributes(const nlohmann::json& report, Image& image);
 /// The image, the layers of aov_registry() that `aovs` names, and the texts and numbers of `report` as metadata.
 Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
                         const std::vector<std::string>& aovs, const nlohmann::json& report);

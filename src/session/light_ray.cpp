@@ -39,7 +39,9 @@ RayPoint describe(const Scene& scene, const SurfaceHit& hit, Vec3 toward_origin,
     return point;
 }
 
+/// No point also for a ray that is not one, as from a point toward itself.
 std::optional<RayPoint> next_point(const Scene& scene, Vec3 o, Vec3 d, TransportMode mode) {
+    if (!is_finite(o) || !is_finite(d)) return {};
     SurfaceHit hit;
     if (!scene.intersect({o, d, kInf}, 0.5f, hit)) return {};
     return describe(scene, hit, -d, mode);

@@ -93,6 +93,11 @@ bool has_roulette_of_joins(const IntegratorSpec& spec) {
                        [](const ParamInfo& p) { return p.name == std::string_view("roulette"); });
 }
 
+void check_pixel(const FilmGeometry& geometry, uint64_t pixel) {
+    if (pixel >= geometry.pixel_count())
+        throw std::runtime_error("the pixel is not within the image of the run");
+}
+
 void sort_by_luminance(Replay& replay) {
     std::sort(replay.paths.begin(), replay.paths.end(),
               [](const ReplayedPath& a, const ReplayedPath& b) {
@@ -113,6 +118,7 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
         throw std::runtime_error(
             fmt::format("paths of {} cannot be traced again without the rest of their pass",
                         request.integrator.name));
+    check_pixel(scene.film(), request.pixel);
     IntegratorSpec spec = request.integrator;
     if (has_roulette_of_joins(spec)) spec.params["roulette"] = "0";
     const std::unique_ptr<Integrator> integrator = make_integrator(spec);
@@ -148,6 +154,8 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
 }
 
 Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths) {
+    check_pixel(renderer.film().geometry(), pixel);
+    if (renderer.film().passes() == 0) throw std::runtime_error("no pass is finished yet");
     Replay result;
     Workspace work;
     PathRecorder recorder(renderer.film(), pixel, most_paths, work, result);

@@ -2,46 +2,65 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <span>
 #include <unordered_map>
+#include <utility>
 
 #include "pathspace/vertex.h"
 
 namespace etendue {
 namespace {
 
+using Triangle = std::array<uint32_t, 3>;
+
 struct Mesh {
     std::vector<Vec3> positions;
-    std::vector<uint32_t> triangles;
+    std::vector<Triangle> triangles;
 };
 
-/// All other shapes have parameters (u, v) in [0, 1]².
-Mesh grid_of(const Shape& shape) {
-    constexpr int kColumns = 48, kRows = 24;
+struct GridSize {
+    int columns, rows;
+    size_t triangles() const { return size_t(2) * size_t(columns) * size_t(rows); }
+};
+
+/// All other shapes than meshes have parameters (u, v) in [0, 1]².
+Mesh grid_of(const Shape& shape, GridSize size) {
     Mesh mesh;
-    for (int row = 0; row <= kRows; ++row)
-        for (int column = 0; column <= kColumns; ++column)
-            mesh.positions.push_back(
-                shape.surface(0, float(column) / kColumns, float(row) / kRows, false).p);
-    for (int row = 0; row < kRows; ++row)
-        for (int column = 0; column < kColumns; ++column) {
-            const auto a = uint32_t(row * (kColumns + 1) + column), b = a + 1, c = a + kColumns + 1,
-                       d = c + 1;
-            mesh.triangles.insert(mesh.triangles.end(), {a, b, d, a, d, c});
+    for (int row = 0; row <= size.rows; ++row)
+        for (int column = 0; column <= size.columns; ++column)
+            mesh.positions.push_back(shape
+                                         .surface(0, float(column) / float(size.columns),
+                                                  float(row) / float(size.rows), false)
+                                         .p);
+    for (int row = 0; row < size.rows; ++row)
+        for (int column = 0; column < size.columns; ++column) {
+            const auto a = uint32_t(row * (size.columns + 1) + column), b = a + 1,
+                       c = a + uint32_t(size.columns) + 1, d = c + 1;
+            mesh.triangles.insert(mesh.triangles.end(), {Triangle{a, b, d}, Triangle{a, d, c}});
         }
     return mesh;
 }
 
-Mesh mesh_of(const Shape& shape) {
-    const auto* triangles = dynamic_cast<const TriangleMesh*>(&shape);
-    if (!triangles) return grid_of(shape);
-    Mesh mesh{triangles->positions, {}};
-    for (const auto& t : triangles->triangles)
-        mesh.triangles.insert(mesh.triangles.end(), t.begin(), t.end());
-    return mesh;
-}
+/// A shape's triangles: those of its mesh, as long as they need not be simplified.
+struct Part {
+    const TriangleMesh* given = nullptr;
+    Mesh own;
+    std::vector<Triangle> coarse;  ///< Empty: the same as in the mesh.
+    Bounds3 bounds;                ///< Of what cells are measured by.
+    float size = 0;                ///< Of the shape, in world space for one place.
+
+    std::span<const Vec3> positions() const { return given ? given->positions : own.positions; }
+    std::span<const Triangle> triangles() const { return given ? given->triangles : own.triangles; }
+    size_t coarsest_count() const { return coarse.empty() ? triangles().size() : coarse.size(); }
+    void replace(Mesh mesh) {
+        given = nullptr;
+        own = std::move(mesh);
+    }
+};
 
 /// Index of the vertex that stands for each vertex if all in a cell of a grid are merged.
-std::vector<uint32_t> merged_vertices(const std::vector<Vec3>& positions, Vec3 origin, float cell) {
+std::vector<uint32_t> merged_vertices(std::span<const Vec3> positions, Vec3 origin, float cell) {
     std::unordered_map<uint64_t, uint32_t> cells;
     std::vector<uint32_t> merged(positions.size());
     for (size_t i = 0; i < positions.size(); ++i) {
@@ -55,30 +74,31 @@ std::vector<uint32_t> merged_vertices(const std::vector<Vec3>& positions, Vec3 o
 }
 
 /// The triangles of a mesh whose vertices are merged, without those that collapse.
-std::vector<uint32_t> merged_triangles(const Mesh& mesh, Vec3 origin, float cell) {
-    const std::vector<uint32_t> merged = merged_vertices(mesh.positions, origin, cell);
-    std::vector<uint32_t> out;
-    for (size_t i = 0; i + 2 < mesh.triangles.size(); i += 3) {
-        const uint32_t a = merged[mesh.triangles[i]], b = merged[mesh.triangles[i + 1]],
-                       c = merged[mesh.triangles[i + 2]];
-        if (a != b && b != c && c != a) out.insert(out.end(), {a, b, c});
+std::vector<Triangle> merged_triangles(const Part& part, int cells) {
+    const std::vector<uint32_t> merged =
+        merged_vertices(part.positions(), part.bounds.lo, 2 * part.bounds.radius() / float(cells));
+    std::vector<Triangle> out;
+    for (const Triangle& t : part.triangles()) {
+        const uint32_t a = merged[t[0]], b = merged[t[1]], c = merged[t[2]];
+        if (a != b && b != c && c != a) out.push_back({a, b, c});
     }
     return out;
 }
 
 /// The mesh with these of its triangles, and only the vertices that they use.
-Mesh part_of(const Mesh& mesh, std::vector<uint32_t> triangles) {
+Mesh part_of(std::span<const Vec3> positions, std::vector<Triangle> triangles) {
     constexpr uint32_t kUnused = ~0u;
     Mesh out;
-    std::vector<uint32_t> index(mesh.positions.size(), kUnused);
-    for (uint32_t& vertex : triangles) {
-        uint32_t& to = index[vertex];
-        if (to == kUnused) {
-            to = uint32_t(out.positions.size());
-            out.positions.push_back(mesh.positions[vertex]);
+    std::vector<uint32_t> index(positions.size(), kUnused);
+    for (Triangle& t : triangles)
+        for (uint32_t& vertex : t) {
+            uint32_t& to = index[vertex];
+            if (to == kUnused) {
+                to = uint32_t(out.positions.size());
+                out.positions.push_back(positions[vertex]);
+            }
+            vertex = to;
         }
-        vertex = to;
-    }
     out.triangles = std::move(triangles);
     return out;
 }
@@ -122,13 +142,16 @@ Places places_of(const Scene& scene) {
             for (uint32_t shape = first; shape < end; ++shape) use(i, shape);
         }
     };
+    size_t all = 0;
     for_each([&](uint32_t, uint32_t shape) {
+        ++all;
         ++instances[shape];
         places.first_of_groups = std::min(places.first_of_groups, size_t(shape));
     });
     for_each([&](uint32_t i, uint32_t shape) {
         // Every n-th, such that few enough are left.
-        const size_t step = (instances[shape] + kMostPlaces - 1) / kMostPlaces;
+        const size_t step = std::max((instances[shape] + kMostPlaces - 1) / kMostPlaces,
+                                     (all + kMostPlacesInAll - 1) / kMostPlacesInAll);
         if (seen[shape]++ % step == 0)
             places.of[shape].push_back(to_place(accelerator.instance_transform(i)));
     });
@@ -142,65 +165,91 @@ Places places_of(const Scene& scene) {
 std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles) {
     const Places placed = places_of(scene);
     const auto& places = placed.of;
-    struct Part {
-        Mesh mesh;
-        std::vector<uint32_t> coarse;  ///< Empty: the same as in the mesh.
-        Bounds3 bounds;                ///< Of what cells are measured by.
-        const std::vector<uint32_t>& coarsest() const {
-            return coarse.empty() ? mesh.triangles : coarse;
-        }
-    };
-    std::vector<Part> parts;
-    for (const SceneShape& shape : scene.shapes()) {
-        const bool is_in_world = parts.size() < placed.first_of_groups;
-        parts.push_back(
-            {mesh_of(*shape.shape), {}, is_in_world ? scene.bounds() : shape.shape->bounds()});
+    std::vector<Part> parts(scene.shapes().size());
+    size_t curved = 0;
+    for (size_t i = 0; i < parts.size(); ++i) {
+        const Shape& shape = *scene.shapes()[i].shape;
+        parts[i].given = dynamic_cast<const TriangleMesh*>(&shape);
+        parts[i].bounds = i < placed.first_of_groups ? scene.bounds() : shape.bounds();
+        parts[i].size = shape.bounds().radius();
+        curved += parts[i].given ? 0 : 1;
     }
+    // Half of the triangles are for spheres and the like, so many that they are round where there are few of them.
+    GridSize grid{48, 24};
+    constexpr int kFewestRows = 4;
+    while (grid.rows > kFewestRows && curved * grid.triangles() > most_triangles / 2)
+        grid = {grid.columns / 2, grid.rows / 2};
+    for (size_t i = 0; i < parts.size(); ++i)
+        if (!parts[i].given && !places[i].empty())
+            parts[i].own = grid_of(*scene.shapes()[i].shape, grid);
+
     const auto has_too_many = [&](size_t most) {
         size_t triangles = 0, drawn = 0;
         for (size_t i = 0; i < parts.size(); ++i) {
-            const size_t n = parts[i].coarsest().size() / 3;
+            const size_t n = parts[i].coarsest_count();
             triangles += n;
             drawn += n * places[i].size();
         }
         return triangles > most || drawn > 4 * most;
     };
-    // Coarser from step to step.
+    // Coarser from step to step; small meshes only where that is not enough.
     constexpr int kFinest = 1024, kCoarsest = 16, kCoarseFraction = 16;
-    constexpr size_t kSmall = 3 * 2400;
-    const auto merge = [&](int cells, const auto& use) {
+    constexpr size_t kSmall = 2400, kSmallest = 12;
+    const auto merge = [&](size_t larger_than, int cells, const auto& use) {
         for (Part& part : parts)
-            if (part.mesh.triangles.size() > kSmall)
-                use(part, merged_triangles(part.mesh, part.bounds.lo,
-                                           2 * part.bounds.radius() / float(cells)));
+            if (part.triangles().size() > larger_than) use(part, merged_triangles(part, cells));
+    };
+    const auto simplify = [](Part& part, std::vector<Triangle> triangles) {
+        part.replace(part_of(part.positions(), std::move(triangles)));
     };
     int cells = kFinest;
     for (; has_too_many(most_triangles) && cells >= kCoarsest; cells /= 2)
-        merge(cells, [](Part& part, std::vector<uint32_t> triangles) {
-            part.mesh = part_of(part.mesh, std::move(triangles));
-        });
+        merge(kSmall, cells, simplify);
+    for (const int coarse : {256, 64, kCoarsest})
+        if (has_too_many(most_triangles)) merge(kSmallest, coarse, simplify);
+    // What is still too much is left out, from the smallest shape on.
+    std::vector<size_t> by_size(parts.size());
+    std::iota(by_size.begin(), by_size.end(), size_t(0));
+    std::stable_sort(by_size.begin(), by_size.end(),
+                     [&](size_t a, size_t b) { return parts[a].size > parts[b].size; });
+    size_t triangles = 0, drawn_triangles = 0;
+    for (const size_t i : by_size) {
+        const size_t n = parts[i].coarsest_count();
+        if (triangles + n > most_triangles ||
+            drawn_triangles + n * places[i].size() > 4 * most_triangles) {
+            parts[i].replace({});
+            continue;
+        }
+        triangles += n;
+        drawn_triangles += n * places[i].size();
+    }
     for (; has_too_many(most_triangles / kCoarseFraction) && cells >= kCoarsest; cells /= 2)
-        merge(cells, [](Part& part, std::vector<uint32_t> triangles) {
-            part.coarse = std::move(triangles);
-        });
+        merge(kSmall, cells,
+              [](Part& part, std::vector<Triangle> coarse) { part.coarse = std::move(coarse); });
+
+    const auto append = [](std::vector<uint32_t>& to, std::span<const Triangle> from) {
+        to.reserve(3 * from.size());
+        for (const Triangle& t : from) to.insert(to.end(), t.begin(), t.end());
+    };
     std::vector<DrawnShape> drawn;
     for (size_t i = 0; i < parts.size(); ++i) {
-        const Mesh& mesh = parts[i].mesh;
-        if (mesh.triangles.empty() || places[i].empty()) continue;
+        const Part& part = parts[i];
+        if (part.triangles().empty() || places[i].empty()) continue;
         DrawnShape& to = drawn.emplace_back();
         to.shape = uint32_t(i);
         to.name = scene.shapes()[i].name;
         to.places = places[i];
         describe(scene, to);
-        for (const Vec3 p : mesh.positions) to.bounds.extend(p);
-        for (const Vec3 p : mesh.positions)
+        for (const Vec3 p : part.positions()) to.bounds.extend(p);
+        to.positions.reserve(3 * part.positions().size());
+        for (const Vec3 p : part.positions())
             for (int axis = 0; axis < 3; ++axis) {
                 const float extent = to.bounds.hi[axis] - to.bounds.lo[axis];
                 const float at = extent > 0 ? (p[axis] - to.bounds.lo[axis]) / extent : 0.0f;
                 to.positions.push_back(uint16_t(std::lround(at * 65535)));
             }
-        to.triangles = mesh.triangles;
-        to.coarse_triangles = parts[i].coarse;
+        append(to.triangles, part.triangles());
+        append(to.coarse_triangles, part.coarse);
     }
     return drawn;
 }

@@ -26,11 +26,12 @@ struct DrawnShape {
     std::vector<Place> places;  ///< Maps to world space, one for each time that the shape is drawn.
 };
 
-/// Limit of the instances that are drawn of one shape.
-inline constexpr size_t kMostPlaces = 20'000;
+/// Limits of the instances that are drawn of one shape, and of all.
+inline constexpr size_t kMostPlaces = 20'000, kMostPlacesInAll = 200'000;
 
 /// All shapes, those with many triangles simplified until there are at most `most_triangles` in all, and four times as
-/// many with instances. Of a shape with more than kMostPlaces instances, some are left out.
+/// many with instances. Where there are more shapes than that, the smallest are left out, and some of more instances than
+/// the limits.
 std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles);
 
 }  // namespace etendue

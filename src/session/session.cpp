@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <tbb/task_arena.h>
 
-#include "image/image_io.h"
 #include "render/defaults.h"
+#include "render/render_report.h"
 
 namespace etendue {
 namespace {
@@ -70,29 +70,36 @@ struct Session::Run {
     SharedSlot<const TechniqueSnapshot> techniques;
     SharedSlot<const SeedSeries> series{std::make_shared<const SeedSeries>()};
     std::atomic<bool> is_wanted{true}, wants_techniques{false};
-
-    bool has_seeds() const { return status.seeds > 1; }
+    std::shared_ptr<const Scene> scene;  ///< Constant from the start on.
 
     // Of the session's thread.
-    std::shared_ptr<const Scene> scene;
+    bool has_seeds() const { return status.seeds > 1; }
+    uint64_t passes() const {
+        return seeds.passes() + (renderer && !is_counted ? renderer->film().passes() : 0);
+    }
+
     RenderSettings settings;
-    std::unique_ptr<Integrator> integrator;  ///< Until the renderer is made.
+    std::unique_ptr<Integrator> integrator;  ///< Until the first renderer is made.
     std::unique_ptr<Renderer> renderer;
-    PassLog log;
+    bool is_counted = false;  ///< Whether the renderer's image is among `seeds`.
+    SeedMean seeds;
+    int shown_seeds = 0;       ///< Of them, those in the last snapshot.
+    double pass_seconds = 0;   ///< Of the last pass.
+    double shown_seconds = 0;  ///< Processor time of the last snapshot.
     SnapshotPool pool;
-    std::vector<Rgb> sum_of_seeds;
-    uint64_t passes_of_seeds = 0;
     uint64_t last_turn = 0;
 };
 
 Session::Session(Load load, int threads) : load_(std::move(load)), threads_(threads) {
     thread_ = std::thread([this] { work(); });
+    loader_ = std::thread([this] { load_scenes(); });
 }
 
 Session::~Session() {
-    stop_all(true);
+    close(true);
     post([this] { is_ended_ = true; });
     thread_.join();
+    loader_.join();
 }
 
 void Session::post(std::function<void()> command) {
@@ -104,10 +111,63 @@ void Session::post(std::function<void()> command) {
     wake_.notify_all();
 }
 
+void Session::post(const std::shared_ptr<Run>& run, std::function<void(Run&)> work) {
+    post([this, run, work = std::move(work)] { guard(*run, [&] { work(*run); }); });
+}
+
+template <class Work>
+void Session::guard(Run& run, const Work& work) noexcept {
+    try {
+        work();
+    } catch (const std::bad_alloc&) {
+        finish_turn(run, RunState::Failed, "not enough memory");
+    } catch (const std::exception& e) {
+        finish_turn(run, RunState::Failed, e.what());
+    } catch (...) {
+        finish_turn(run, RunState::Failed, "unknown failure");
+    }
+}
+
+// -- The thread that loads.
+
+void Session::load_scenes() {
+    while (true) {
+        {
+            std::unique_lock lock(mutex_);
+            wake_.wait(lock, [&] { return must_load_ || is_closed_; });
+            if (is_closed_) return;
+            must_load_ = false;
+        }
+        load_scene();
+    }
+}
+
+void Session::load_scene() {
+    std::string error;
+    try {
+        auto scene = std::make_shared<const Scene>(load_());
+        const std::lock_guard lock(mutex_);
+        load_error_.clear();
+        for (const auto& run : runs_) request_stop(run);
+        scene_.store(std::move(scene));
+        ++scene_version_;
+    } catch (const std::bad_alloc&) {
+        error = "not enough memory";
+    } catch (const std::exception& e) {
+        error = e.what();
+    } catch (...) {
+        error = "the scene cannot be loaded";
+    }
+    if (!error.empty()) {
+        const std::lock_guard lock(mutex_);
+        load_error_.swap(error);
+    }
+    changed();
+}
+
 // -- The session's thread.
 
 void Session::work() {
-    load_scene();
     while (true) {
         execute_commands();
         if (is_ended_) return;
@@ -124,30 +184,6 @@ void Session::work() {
     }
 }
 
-void Session::load_scene() {
-    std::string error;
-    try {
-        auto scene = std::make_shared<const Scene>(load_());
-        const std::lock_guard lock(mutex_);
-        load_error_.clear();
-        for (const auto& run : runs_) {
-            run->status.is_of_this_scene = false;
-            request_stop(run);
-        }
-        scene_.store(std::move(scene));
-        ++scene_version_;
-    } catch (const std::bad_alloc&) {
-        error = "not enough memory";
-    } catch (const std::exception& e) {
-        error = e.what();
-    }
-    if (!error.empty()) {
-        const std::lock_guard lock(mutex_);
-        load_error_ = error;
-    }
-    changed();
-}
-
 void Session::execute_commands() {
     while (true) {
         std::function<void()> command;
@@ -157,7 +193,11 @@ void Session::execute_commands() {
             command = std::move(commands_.front());
             commands_.pop_front();
         }
-        command();
+        try {
+            command();
+        } catch (...) {
+            // The work of runs is guarded. What is left are answers, such as one for which there is no memory.
+        }
         changed();
     }
 }
@@ -170,20 +210,28 @@ std::shared_ptr<Session::Run> Session::next_run() const {
     return next;
 }
 
+void Session::make_renderer(Run& run) {
+    run.renderer.reset();
+    run.is_counted = false;
+    run.settings.seed = run.status.seed + uint64_t(run.seeds.count());
+    std::unique_ptr<Integrator> integrator = std::move(run.integrator);
+    if (!integrator) integrator = make_integrator(run.settings.integrator);
+    run.renderer = std::make_unique<Renderer>(*run.scene, run.settings, std::move(integrator));
+}
+
 void Session::take_turn(Run& run) {
     run.last_turn = ++turns_;
     const auto begin = Clock::now();
-    try {
-        if (run.integrator) {
-            run.renderer.reset();
-            run.renderer =
-                std::make_unique<Renderer>(*run.scene, run.settings, std::move(run.integrator));
-            run.log = {};
-        }
+    guard(run, [&] {
+        if (!run.renderer || run.is_counted) make_renderer(run);
         const StopReason reason = run.renderer->run(
             run.settings,
             [&](const Progress& progress) {
-                after_pass(run, progress);
+                try {
+                    after_pass(run, progress);
+                } catch (const std::exception&) {
+                    // The pass is made, though some of its figures may be missing.
+                }
                 const std::chrono::duration<double> elapsed = Clock::now() - begin;
                 if (elapsed.count() > kTurn) turn_over_ = true;
             },
@@ -191,130 +239,153 @@ void Session::take_turn(Run& run) {
         const bool is_rendering =
             reason == StopReason::Interrupted || (run.has_seeds() && finish_seed(run));
         finish_turn(run, is_rendering ? RunState::Rendering : RunState::Finished);
-    } catch (const std::bad_alloc&) {
-        finish_turn(run, RunState::Failed, "not enough memory");
-    } catch (const std::exception& e) {
-        finish_turn(run, RunState::Failed, e.what());
-    }
+    });
 }
 
 bool Session::finish_seed(Run& run) {
     const Renderer& renderer = *run.renderer;
     const std::vector<Rgb> image = renderer.film().image();
     SeedSeries::Image luminances;
-    run.sum_of_seeds.resize(image.size());
-    for (size_t i = 0; i < image.size(); ++i) {
-        luminances.push_back(luminance(image[i]));
-        run.sum_of_seeds[i] += image[i];
-    }
-    run.passes_of_seeds += renderer.film().passes();
+    luminances.reserve(image.size());
+    for (const Rgb c : image) luminances.push_back(luminance(c));
     auto series = std::make_shared<SeedSeries>(*run.series.load());
     series->add(std::move(luminances), renderer.seconds(), renderer.integrator().figures());
-
-    const std::shared_ptr<Snapshot> snapshot = run.pool.take();
+    auto figures = series->figures;
     const auto count = int(series->luminance.size());
-    *snapshot = {.run = run.status.id,
-                 .passes = run.passes_of_seeds,
-                 .width = run.scene->film().crop_width,
-                 .height = run.scene->film().crop_height,
-                 .mean = run.sum_of_seeds,
-                 .variance = std::vector<Rgb>(image.size())};
-    for (Rgb& c : snapshot->mean) c *= 1 / float(count);
-    run.snapshot.store(snapshot);
-
-    const std::lock_guard lock(mutex_);
-    RunStatus& s = run.status;
-    s.finished_seeds = count;
-    s.snapshot_passes = run.passes_of_seeds;
-    s.figures = series->figures;
+    run.seeds.add(image, renderer.film().passes());
+    // Nothing fails from here on, so that an image is neither lost nor counted twice.
+    run.is_counted = true;
     run.series.store(std::move(series));
-    if (count >= s.seeds) return false;
-    ++run.settings.seed;
-    run.integrator = make_integrator(run.settings.integrator);
-    return true;
-}
-
-void Session::finish_turn(Run& run, RunState state, const std::string& message) {
-    // The last image of a run is shown whatever the budget, since no other follows.
-    if (state != RunState::Rendering && run.renderer && run.renderer->film().passes() > 0)
-        show(run);
+    bool is_last = false;
     {
         const std::lock_guard lock(mutex_);
-        turn_of_ = 0;
+        RunStatus& s = run.status;
+        s.finished_seeds = count;
+        s.figures.swap(figures);
+        is_last = count >= s.seeds;
+    }
+    if (!is_last) show(run);  // The last one is shown at the end of the turn.
+    return !is_last;
+}
+
+void Session::finish_turn(Run& run, RunState state, const char* message) noexcept {
+    // The last image of a run is shown whatever the budget, since no other follows.
+    if (state != RunState::Rendering) show(run);
+    std::string text;
+    try {
+        text = message;
+    } catch (const std::bad_alloc&) {
+        text = "no memory";  // short enough to need none
+    }
+    {
+        const std::lock_guard lock(mutex_);
+        if (turn_of_ == run.status.id) turn_of_ = 0;
         if (state != RunState::Rendering) run.status.state = state;
-        run.status.message = message;
+        run.status.message.swap(text);
     }
     changed();
 }
 
 void Session::request_stop(const std::shared_ptr<Run>& run) {
     if (run->status.state != RunState::Rendering) return;
-    run->status.state = RunState::Stopping;
     commands_.push_back([this, run] { finish_stop(*run); });
+    run->status.state = RunState::Stopping;
     changed();
     turn_over_ = true;
     wake_.notify_all();
 }
 
 void Session::finish_stop(Run& run) {
-    std::string message;
-    try {
-        if (run.renderer && run.renderer->film().passes() > 0) show(run);
-    } catch (const std::bad_alloc&) {
-        message = "not enough memory";
-    }
+    show(run);
     const std::lock_guard lock(mutex_);
     if (run.status.state != RunState::Stopping) return;
-    run.status.state = message.empty() ? RunState::Stopped : RunState::Failed;
-    run.status.message = message;
+    run.status.state = RunState::Stopped;
+    run.status.message.clear();
 }
 
 void Session::after_pass(Run& run, const Progress& p) {
-    run.log.add(p.seconds, run.renderer->stats().pairs);
     bool shows = false;
     {
         const std::lock_guard lock(mutex_);
         RunStatus& s = run.status;
-        s.passes = run.passes_of_seeds + p.passes;
-        s.seconds = run.series.load()->total_seconds() + p.seconds;
+        s.passes = run.passes();
+        const double earlier = run.series.load()->total_seconds();
+        run.pass_seconds = earlier + p.seconds - s.seconds;
+        s.seconds = earlier + p.seconds;
         s.rays_per_second = p.rays_per_second;
         s.fraction = p.fraction;
-        // What follows belongs to one seed.
+        shows = (run.is_wanted || run.wants_techniques) && budget_.allows(Clock::now());
         if (run.has_seeds()) {
             if (s.fraction) *s.fraction = (s.finished_seeds + *s.fraction) / s.seeds;
-            return changed();
+        } else {
+            s.error = p.error;
+            s.figures = run.renderer->integrator().figures();
+            constexpr double kSpacing = 1.05;
+            if (p.error.valid &&
+                (s.history.empty() || p.seconds > kSpacing * s.history.back().seconds))
+                s.history.push_back({p.passes, p.seconds, p.error});
         }
-        s.error = p.error;
-        s.figures = run.renderer->integrator().figures();
-        constexpr double kSpacing = 1.05;
-        if (p.error.valid && (s.history.empty() || p.seconds > kSpacing * s.history.back().seconds))
-            s.history.push_back({p.passes, p.seconds, p.error});
-        shows = (run.is_wanted || run.wants_techniques) && budget_.allows(Clock::now());
     }
-    // The first picture does not wait.
-    if (shows || p.passes == 1) show(run);
+    // The first picture does not wait. Long passes are shown unasked, so that saving need not wait for the next one.
+    constexpr double kLong = 0.5;
+    const bool is_long =
+        run.pass_seconds > kLong && run.shown_seconds < SnapshotBudget::kShare * run.pass_seconds;
+    if (shows || is_long || run.passes() == 1) show(run);
     changed();
 }
 
-void Session::show(Run& run) {
-    if (run.has_seeds()) return;
-    const double before = process_cpu_seconds();
-    tbb::task_arena arena(threads_ > 0 ? threads_ : tbb::task_arena::automatic);
-    run.is_wanted = false;
-    const uint64_t passes = run.renderer->film().passes();
-    if (const auto last = run.snapshot.load(); !last || last->passes != passes) {
-        const std::shared_ptr<Snapshot> snapshot = run.pool.take();
-        snapshot->run = run.status.id;
-        const bool has_groups = run.renderer->integrator().error_groups() > 0;
-        arena.execute([&] { fill_snapshot(run.renderer->film(), has_groups, *snapshot); });
-        run.snapshot.store(snapshot);
+void Session::fill(Run& run, Snapshot& snapshot) {
+    const Film* film = run.renderer && !run.is_counted ? &run.renderer->film() : nullptr;
+    snapshot.run = run.status.id;
+    snapshot.width = run.scene->film().crop_width;
+    snapshot.height = run.scene->film().crop_height;
+    if (run.seeds.count() > 0)
+        run.seeds.fill(film, snapshot);
+    else
+        fill_snapshot(*film, run.renderer->integrator().error_groups() > 0, snapshot);
+    snapshot.report = nullptr;
+    if (!run.renderer) return;
+    // Lists, such as the times of passes, are not stored in images.
+    auto report = std::make_shared<nlohmann::json>(
+        to_json(*run.renderer, *run.scene, run.settings, "studio", {}, &run.status.error));
+    if (run.has_seeds()) {
+        (*report)["spp"] = snapshot.passes;
+        (*report)["seed"] = run.status.seed;
+        (*report)["seeds"] = run.seeds.count() + (film ? 1 : 0);
     }
-    if (run.renderer->techniques() && run.wants_techniques.exchange(false))
-        run.techniques.store(std::make_shared<const TechniqueSnapshot>(
-            TechniqueSnapshot{passes, run.renderer->techniques()->images()}));
+    snapshot.report = std::move(report);
+}
+
+void Session::show(Run& run) noexcept {
+    const uint64_t passes = run.passes();
+    if (passes == 0) return;
+    const double before = process_cpu_seconds();
+    run.is_wanted = false;
+    try {
+        tbb::task_arena arena(threads_ > 0 ? threads_ : tbb::task_arena::automatic);
+        if (const auto last = run.snapshot.load();
+            !last || last->passes != passes || run.shown_seeds != run.seeds.count()) {
+            const std::shared_ptr<Snapshot> snapshot = run.pool.take();
+            arena.execute([&] { fill(run, *snapshot); });
+            run.snapshot.store(snapshot);
+            run.shown_seeds = run.seeds.count();
+        }
+        {
+            const std::lock_guard lock(mutex_);
+            run.status.snapshot_passes = passes;
+        }
+        if (!run.has_seeds() && run.renderer && run.renderer->techniques() &&
+            run.wants_techniques.exchange(false)) {
+            const FilmGeometry& g = run.scene->film();
+            run.techniques.store(std::make_shared<const TechniqueSnapshot>(TechniqueSnapshot{
+                passes, g.crop_width, g.crop_height, run.renderer->techniques()->images()}));
+        }
+    } catch (const std::exception&) {
+        // No memory: the earlier picture stays, and the run goes on.
+    }
+    run.shown_seconds = process_cpu_seconds() - before;
     const std::lock_guard lock(mutex_);
-    run.status.snapshot_passes = passes;
-    budget_.taken(Clock::now(), process_cpu_seconds() - before);
+    budget_.taken(Clock::now(), run.shown_seconds);
 }
 
 // -- From any thread.
@@ -325,7 +396,11 @@ std::string Session::load_error() const {
 }
 
 void Session::reload() {
-    post([this] { load_scene(); });
+    {
+        const std::lock_guard lock(mutex_);
+        must_load_ = true;
+    }
+    wake_.notify_all();
 }
 
 std::shared_ptr<Session::Run> Session::find(int id) const {
@@ -360,9 +435,15 @@ int Session::start(const RunRequest& request) {
     s.interval = interval_kind(*run->integrator, settings.sampler, request.seeds);
     {
         const std::lock_guard lock(mutex_);
-        s.id = ++last_id_;
-        runs_.push_back(run);
+        if (is_closed_) throw std::runtime_error("the program is about to end");
+        // Otherwise another scene was loaded in the meantime.
+        if (scene_.load() == scene) {
+            s.id = last_id_ + 1;
+            runs_.push_back(run);
+            ++last_id_;
+        }
     }
+    if (s.id == 0) return start(request);
     post([] {});
     return s.id;
 }
@@ -391,26 +472,26 @@ void Session::discard(int id) {
 void Session::resume(int id, const RenderLimits& limits) {
     const std::shared_ptr<Run> run = [&] {
         const std::lock_guard lock(mutex_);
+        if (is_closed_) throw std::runtime_error("the program is about to end");
         return find(id);
     }();
-    post([this, run, limits] {
-        // A run with several seeds continues with more of them.
-        if (run->has_seeds()) {
-            const std::lock_guard lock(mutex_);
-            RunStatus& s = run->status;
-            if (s.state == RunState::Finished) {
-                s.seeds *= 2;
-                ++run->settings.seed;
-                run->integrator = make_integrator(run->settings.integrator);
-            }
-            if (s.state != RunState::Failed) s.state = RunState::Rendering;
-            return;
-        }
-        if (limits.spp || limits.seconds || limits.error)
-            static_cast<RenderLimits&>(run->settings) = limits;
+    post(run, [this, limits](Run& r) {
         const std::lock_guard lock(mutex_);
-        run->status.limits = run->settings;
-        if (run->status.state != RunState::Failed) run->status.state = RunState::Rendering;
+        if (is_closed_) return;
+        RunStatus& s = r.status;
+        // What failed in its first pass begins anew.
+        if (s.state == RunState::Failed && r.renderer && r.renderer->film().passes() == 0)
+            r.renderer.reset();
+        if (r.has_seeds()) {
+            // A run with several seeds continues with more of them.
+            if (s.state == RunState::Finished) s.seeds *= 2;
+        } else {
+            if (limits.spp || limits.seconds || limits.error)
+                static_cast<RenderLimits&>(r.settings) = limits;
+            s.limits = r.settings;
+        }
+        s.message.clear();
+        s.state = RunState::Rendering;
     });
 }
 
@@ -422,23 +503,37 @@ void Session::remove(int id) {
     });
 }
 
-void Session::save(int id, const std::string& file, std::function<void(std::string)> done) {
-    const std::shared_ptr<Run> run = [&] {
-        const std::lock_guard lock(mutex_);
-        return find(id);
-    }();
-    post([this, run, file, done = std::move(done)] {
-        if (!run->renderer || run->renderer->film().passes() == 0)
-            return done("no pass is finished yet");
+void Session::write(const std::shared_ptr<const Snapshot>& snapshot, const std::string& file,
+                    bool replaces, const std::function<void(const Saved&)>& done) {
+    const bool is_taken = writer_.post([snapshot, file, replaces, done] {
         try {
-            const nlohmann::json report =
-                to_json(*run->renderer, *run->scene, run->settings, "studio", run->log);
-            write_image(file, image_with_layers(*run->renderer, *run->scene, run->settings.seed,
-                                                threads_, {}, report));
-            done({});
+            etendue::save(*snapshot, file, replaces);
+        } catch (const std::bad_alloc&) {
+            return done({"not enough memory", 0});
         } catch (const std::exception& e) {
-            done(e.what());
+            return done({e.what(), 0});
         }
+        done({{}, snapshot->passes});
+    });
+    if (!is_taken) done({"too many images wait to be saved; try again", 0});
+}
+
+void Session::save(int id, const std::string& file, bool replaces,
+                   std::function<void(const Saved&)> done) {
+    std::shared_ptr<Run> run;
+    std::shared_ptr<const Snapshot> latest;
+    {
+        const std::lock_guard lock(mutex_);
+        run = find(id);
+        latest = run->snapshot.load();
+        if (latest && latest->passes != run->status.passes) latest = nullptr;
+    }
+    if (latest) return write(latest, file, replaces, done);
+    post([this, run, file, replaces, done = std::move(done)] {
+        show(*run);
+        // Without memory for a newer image an earlier one is better than none.
+        if (const auto shown = run->snapshot.load()) return write(shown, file, replaces, done);
+        done({run->passes() == 0 ? "no pass is finished yet" : "not enough memory", 0});
     });
 }
 
@@ -448,46 +543,69 @@ void Session::stop_all(bool drop) {
     if (drop && turn_of_ != 0) drop_ = true;
 }
 
+void Session::close(bool drop) {
+    {
+        const std::lock_guard lock(mutex_);
+        is_closed_ = true;
+    }
+    wake_.notify_all();
+    stop_all(drop);
+}
+
 void Session::settle() {
     std::promise<void> reached;
     post([&] { reached.set_value(); });
     reached.get_future().wait();
 }
 
+RunStatus Session::status_of(const Run& run) const {
+    RunStatus status = run.status;
+    status.is_of_this_scene = run.scene == scene_.load();
+    return status;
+}
+
 RunStatus Session::status(int id) const {
     const std::lock_guard lock(mutex_);
-    return find(id)->status;
+    return status_of(*find(id));
 }
 
 std::vector<RunStatus> Session::runs() const {
     const std::lock_guard lock(mutex_);
     std::vector<RunStatus> all;
-    for (const auto& run : runs_) all.push_back(run->status);
+    for (const auto& run : runs_) all.push_back(status_of(*run));
     return all;
+}
+
+std::shared_ptr<const Scene> Session::scene_of(int id) const {
+    const std::lock_guard lock(mutex_);
+    return find(id)->scene;
+}
+
+void Session::show_if_idle(const std::shared_ptr<Run>& run) {
+    const RunState state = run->status.state;
+    if (run->status.passes == 0 || state == RunState::Rendering || state == RunState::Stopping)
+        return;
+    commands_.push_back([this, run] { show(*run); });
+    turn_over_ = true;
+    wake_.notify_all();
 }
 
 std::shared_ptr<const Snapshot> Session::snapshot(int id) {
     const std::lock_guard lock(mutex_);
     const std::shared_ptr<Run> run = find(id);
     run->is_wanted = true;
-    return run->snapshot.load();
+    const auto shown = run->snapshot.load();
+    if (!shown || shown->passes != run->status.passes) show_if_idle(run);
+    return shown;
 }
 
 std::shared_ptr<const TechniqueSnapshot> Session::techniques(int id) {
-    std::shared_ptr<Run> run;
-    bool is_idle = false;
-    {
-        const std::lock_guard lock(mutex_);
-        run = find(id);
-        run->wants_techniques = true;
-        is_idle = run->status.state != RunState::Rendering;
-    }
+    const std::lock_guard lock(mutex_);
+    const std::shared_ptr<Run> run = find(id);
+    if (run->status.technique_depth == 0) return nullptr;
+    run->wants_techniques = true;
     const auto shown = run->techniques.load();
-    // No pass will follow that would show them.
-    if (is_idle && (!shown || shown->passes != run->status.passes))
-        post([this, run] {
-            if (run->renderer && run->renderer->film().passes() > 0) show(*run);
-        });
+    if (!shown || shown->passes != run->status.passes) show_if_idle(run);
     return shown;
 }
 
@@ -503,12 +621,16 @@ void Session::replay_last(int id, uint64_t pixel, size_t most_paths,
         return find(id);
     }();
     post([run, pixel, most_paths, done = std::move(done)] {
-        if (!run->renderer) return done({}, "no pass is finished yet");
+        Replay replay;
         try {
-            done(etendue::replay_last(*run->renderer, pixel, most_paths), {});
+            if (!run->renderer) throw std::runtime_error("no pass is finished yet");
+            replay = etendue::replay_last(*run->renderer, pixel, most_paths);
+        } catch (const std::bad_alloc&) {
+            return done({}, "not enough memory");
         } catch (const std::exception& e) {
-            done({}, e.what());
+            return done({}, e.what());
         }
+        done(replay, {});
     });
 }
 

@@ -12,12 +12,12 @@
 #include <thread>
 #include <vector>
 
-#include "render/render_report.h"
 #include "render/renderer.h"
 #include "session/replay.h"
 #include "session/seed_series.h"
 #include "session/shared_slot.h"
 #include "session/snapshot.h"
+#include "session/workers.h"
 
 namespace etendue {
 
@@ -29,8 +29,8 @@ struct RunRequest {
     uint64_t seed = 0;
     RenderLimits limits;      ///< Without any, the run ends when it is stopped.
     int technique_depth = 0;  ///< In edges; reduced until the images fit into kTechniqueBytes.
-    /// Number of renderings, with the seeds `seed`, `seed` + 1, …; the limits apply to each. The run then shows their
-    /// mean, and has a SeedSeries.
+    /// Number of renderings, with the seeds `seed`, `seed` + 1, …; the limits apply to each. The run then shows the mean
+    /// of all their passes, and has a SeedSeries.
     int seeds = 1;
 };
 
@@ -77,7 +77,14 @@ struct RunStatus {
 /// The technique images of a run after a number of passes.
 struct TechniqueSnapshot {
     uint64_t passes;
+    int width, height;
     std::vector<TechniqueImages::Entry> images;
+};
+
+/// What became of an image that was to be saved.
+struct Saved {
+    std::string error;    ///< Empty: it was saved.
+    uint64_t passes = 0;  ///< Of the image.
 };
 
 class Session {
@@ -85,9 +92,11 @@ public:
     using Load = std::function<Scene()>;
     static constexpr size_t kTechniqueBytes = size_t(512) << 20;
 
-    /// Loads the scene in the session's thread. `threads`: number of threads of each rendering; 0: one per core.
+    /// Loads the scene in a thread of its own, while runs of an earlier one go on. `threads`: number of threads of each
+    /// rendering; 0: one per core.
     Session(Load load, int threads);
-    ~Session();  ///< Discards the current pass.
+    /// Discards the current pass. Images that are to be saved are.
+    ~Session();
     Session(const Session&) = delete;
     Session& operator=(const Session&) = delete;
 
@@ -112,16 +121,22 @@ public:
     void resume(int run, const RenderLimits& limits);
     /// Removes the run and its image.
     void remove(int run);
-    /// Writes the image between two passes. Then calls `done` in the session's thread, with an error or an empty text.
-    void save(int run, const std::string& file, std::function<void(std::string)> done);
+    /// Saves the image of the latest pass, without waiting for the pass in flight where that image is shown already; see
+    /// etendue::save(). Then calls `done` once, in a thread of the session.
+    void save(int run, const std::string& file, bool replaces,
+              std::function<void(const Saved&)> done);
     /// Stops all runs; with `drop`, discards the current pass.
     void stop_all(bool drop);
+    /// The same, and from now on no run is started or continued.
+    void close(bool drop);
     /// Waits until the current pass and all commands so far are finished.
     void settle();
 
     /// Throws std::runtime_error for an unknown run, as do all functions that take one.
     RunStatus status(int run) const;
     std::vector<RunStatus> runs() const;
+    /// The scene that the run was started with.
+    std::shared_ptr<const Scene> scene_of(int run) const;
     /// A number that changes whenever the status of a run changes.
     uint64_t revision() const { return revision_.load(); }
 
@@ -140,20 +155,34 @@ public:
 private:
     struct Run;
     void work();
+    void load_scenes();
     void load_scene();
     void post(std::function<void()> command);
+    /// Posts a part of the work of a run.
+    void post(const std::shared_ptr<Run>& run, std::function<void(Run&)> work);
     void execute_commands();
+    /// Carries out a part of the work of a run. An exception ends the run, which keeps its passes.
+    template <class Work>
+    void guard(Run& run, const Work& work) noexcept;
+    RunStatus status_of(const Run& run) const;
     std::shared_ptr<Run> find(int run) const;
     std::shared_ptr<Run> next_run() const;
     void take_turn(Run& run);
+    void make_renderer(Run& run);
     void after_pass(Run& run, const Progress& progress);
-    /// Publishes a snapshot if one was requested and the budget allows it.
-    void show(Run& run);
-    void finish_turn(Run& run, RunState state, const std::string& message = {});
-    /// Keeps the image of a finished seed, and shows the mean of those so far. Returns whether another seed follows.
+    /// Publishes a snapshot, and the technique images if they were requested. Where there is no memory for them, the
+    /// earlier ones stay.
+    void show(Run& run) noexcept;
+    void fill(Run& run, Snapshot& snapshot);
+    void finish_turn(Run& run, RunState state, const char* message = "") noexcept;
+    /// Keeps the image of a finished seed. Returns whether another seed follows.
     bool finish_seed(Run& run);
     /// Shows the last image of a run that is to be stopped.
     void finish_stop(Run& run);
+    /// Has an image shown that no pass to come would show. Needs the mutex.
+    void show_if_idle(const std::shared_ptr<Run>& run);
+    void write(const std::shared_ptr<const Snapshot>& snapshot, const std::string& file,
+               bool replaces, const std::function<void(const Saved&)>& done);
     /// Marks a run as stopping, and lets the session's thread do the rest. Needs the mutex.
     void request_stop(const std::shared_ptr<Run>& run);
     /// The same for a run in any state: one that does not render is stopped after the commands that wait, since one of
@@ -174,13 +203,16 @@ private:
     std::vector<std::shared_ptr<Run>> runs_;
     SnapshotBudget budget_;
     int last_id_ = 0;
+    bool must_load_ = true;
+    bool is_closed_ = false;  ///< No run is started or continued.
     bool is_ended_ = false;
 
     std::atomic<bool> turn_over_{false};  ///< The current turn ends after its pass.
     std::atomic<bool> drop_{false};       ///< The current pass is to be discarded.
     int turn_of_ = 0;                     ///< Id of the run whose turn it is; 0: none.
     uint64_t turns_ = 0;
-    std::thread thread_;
+    Workers writer_{1, Workers::AtEnd::FinishAll};  ///< Of files. Outlives the threads.
+    std::thread thread_, loader_;
 };
 
 }  // namespace etendue

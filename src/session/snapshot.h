@@ -1,10 +1,16 @@
 #pragma once
 // Copies of a film between passes, for readers in other threads, and the time that they may take.
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <memory>
 #include <mutex>
+#include <span>
+#include <string>
 #include <vector>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "film/film.h"
 
@@ -17,7 +23,12 @@ struct Snapshot {
     int width = 0, height = 0;
     std::vector<Rgb> mean;
     std::vector<Rgb> variance;  ///< Of the mean; zero with fewer than two passes.
+    std::shared_ptr<const nlohmann::json> report;  ///< For the file that the image is saved in.
 };
+
+/// Saves the image with its report. Throws std::runtime_error; also where a file has the name, unless it is to be
+/// replaced. Only regular files are.
+void save(const Snapshot& snapshot, const std::string& file, bool replaces);
 
 /// Half-width of the 95 % confidence interval of a mean of `passes` ≥ 2 passes, whose variance was estimated from their
 /// spread.
@@ -32,13 +43,28 @@ public:
 private:
     struct Shelf {
         std::mutex mutex;
-        std::vector<std::unique_ptr<Snapshot>> free;
+        std::array<std::unique_ptr<Snapshot>, 2> free;
     };
     std::shared_ptr<Shelf> shelf_ = std::make_shared<Shelf>();
 };
 
 /// Copies the film's mean and variance. `has_groups`: see Film::set_groups(). Must not run during Film::end_pass().
 void fill_snapshot(const Film& film, bool has_groups, Snapshot& to);
+
+/// The images of renderings that are finished, each with another seed.
+class SeedMean {
+public:
+    void add(std::span<const Rgb> image, uint64_t passes);
+    int count() const { return count_; }
+    uint64_t passes() const { return passes_; }
+    /// Mean and variance of these images, and of `film`, which is one more that is not finished; nullptr: none.
+    void fill(const Film* film, Snapshot& to) const;
+
+private:
+    std::vector<Film::Moments> moments_;
+    uint64_t passes_ = 0;
+    int count_ = 0;
+};
 
 /// Keeps the processor time of snapshots, and of sending them, at or below 2 % of the time of a rendering.
 class SnapshotBudget {
@@ -49,7 +75,7 @@ public:
     bool allows(Clock::time_point now) const { return now >= next_; }
     /// Notes that a snapshot was finished at `now` and took `cpu_seconds`.
     void taken(Clock::time_point now, double cpu_seconds) {
-        next_ = now;
+        next_ = std::max(next_, now);
         spent(cpu_seconds);
     }
     /// Adds processor time, such as that of encoding and sending.

@@ -4,11 +4,20 @@
 
 namespace etendue {
 
-Workers::Workers() {
-    for (size_t i = 0; i < kThreads; ++i) threads_.emplace_back([this] { work(); });
+Workers::Workers(size_t threads, AtEnd at_end) : at_end_(at_end) {
+    try {
+        for (size_t i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+    } catch (...) {
+        end();
+        throw;
+    }
 }
 
 Workers::~Workers() {
+    end();
+}
+
+void Workers::end() {
     {
         const std::lock_guard lock(mutex_);
         is_ended_ = true;
@@ -33,11 +42,15 @@ void Workers::work() {
         {
             std::unique_lock lock(mutex_);
             wake_.wait(lock, [&] { return is_ended_ || !tasks_.empty(); });
-            if (is_ended_) return;
+            if (tasks_.empty() || (is_ended_ && at_end_ == AtEnd::ForgetWaiting)) return;
             task = std::move(tasks_.front());
             tasks_.pop_front();
         }
-        task();
+        try {
+            task();
+        } catch (...) {
+            // Such as a lack of memory for the answer, which then is missing.
+        }
     }
 }
 

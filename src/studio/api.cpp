@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
@@ -67,22 +68,28 @@ Api::Api(Session& session, ApiOptions options) : session_(session), options_(std
 
 // -- Requests.
 
-bool Api::is_events(const Request& request, std::optional<Reply>& refused) {
-    refused = refuse(request, options_.token);
-    return !refused && request.method == "GET" && request.path() == "/v1/events";
+Admission Api::admit(const Request& request) {
+    Admission a;
+    a.refusal = refuse(request, options_.token, options_.hosts);
+    a.has_token = !a.refusal && request.path().starts_with("/v1");
+    a.is_events = !a.refusal && request.method == "GET" && request.path() == "/v1/events";
+    return a;
 }
 
 void Api::handle(const Request& request, std::function<void(Reply)> done) try {
-    if (auto refused = refuse(request, options_.token)) return done(std::move(*refused));
+    if (auto refusal = admit(request).refusal) return done(std::move(*refusal));
     const std::string_view path = request.path();
     const bool is_get = request.method == "GET" || request.method == "HEAD";
     for (const PageFile& file : page_files())
         if (path == file.path) {
             if (!is_get) throw ApiError(405, "only GET is possible here");
-            return done({200, std::string(file.type), std::string(file.text), {}});
+            Reply reply;
+            reply.type = file.type;
+            reply.body = file.text;
+            return done(std::move(reply));
         }
     // Browsers ask for it unbidden, and complain where it is missing.
-    if (path == "/favicon.ico") return done({204, {}, {}, {}});
+    if (path == "/favicon.ico") return done(Reply::nothing());
     const auto needs = [&](bool holds) {
         if (!holds) throw ApiError(405, "this method is not possible here");
     };
@@ -98,8 +105,10 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
     }
     if (path == "/v1/geometry") {
         needs(is_get);
-        return later(done, [data = data()] {
-            return Reply{200, "application/octet-stream", data->geometry(), {}};
+        return later(workers_, done, [data = data()] {
+            Reply reply = Reply::binary({});
+            reply.shared_body = data->geometry();
+            return reply;
         });
     }
     if (path == "/v1/run")
@@ -110,21 +119,19 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
          {"/v1/ray", "/v1/paths/check", "/v1/paths/snap", "/v1/paths/pick", "/v1/replay"})
         if (path == known) return needs(request.method == "POST"), probe(request, done);
     throw ApiError(404, "there is nothing at this address");
-} catch (const ApiError& e) {
-    done(Reply::error(e.status, e.what()));
-} catch (const std::exception& e) {
-    done(Reply::error(422, e.what()));
+} catch (const std::exception&) {
+    done(Reply::current_exception());
 }
 
-void Api::later(const Done& done, std::function<Reply()> task) {
-    const bool is_taken = workers_.post([done, task = std::move(task)] {
+void Api::later(Workers& workers, const Done& done, std::function<Reply()> task) {
+    const bool is_taken = workers.post([done, task = std::move(task)] {
+        Reply reply;
         try {
-            done(task());
-        } catch (const ApiError& e) {
-            done(Reply::error(e.status, e.what()));
-        } catch (const std::exception& e) {
-            done(Reply::error(422, e.what()));
+            reply = task();
+        } catch (const std::exception&) {
+            reply = Reply::current_exception();
         }
+        done(std::move(reply));
     });
     if (!is_taken) throw ApiError(503, "too many requests wait; try again");
 }
@@ -165,8 +172,7 @@ std::string Api::event() {
     return dump({{"runs", runs},
                  {"scene_version", session_.scene_version()},
                  {"load_error", session_.load_error()},
-                 {"scene_changed", is_scene_changed_},
-                 {"paths", paths_versions_}});
+                 {"scene_changed", is_scene_changed_}});
 }
 
 Reply Api::state() {
@@ -176,7 +182,12 @@ Reply Api::state() {
            {"load_error", session_.load_error()},
            {"scene_changed", is_scene_changed_},
            {"has_reference", options_.reference.has_value()},
+           {"reference_problem", ""},
            {"scene", nullptr}};
+    if (const std::string problem = reference_problem(); !problem.empty()) {
+        j["has_reference"] = false;
+        j["reference_problem"] = problem;
+    }
     if (const auto scene = session_.scene()) {
         const FilmGeometry& g = scene->film();
         const bool is_empty = scene->bounds().is_empty();
@@ -273,45 +284,46 @@ void Api::save(const json& body, const Done& done) {
                                         "'_' and '-' are allowed, without a leading dot",
                                         name));
     check_image_extension(name);
-    session_.save(
-        int(integer(body, "run", 1, INT32_MAX)), options_.output_folder + "/" + name,
-        [done, name](const std::string& error) {
-            done(error.empty() ? Reply::json(dump({{"file", name}})) : Reply::error(422, error));
-        });
+    const bool replaces = boolean(body, "overwrite");
+    check_writable(options_.output_folder, name, replaces);
+    session_.save(int(integer(body, "run", 1, INT32_MAX)), options_.output_folder + "/" + name,
+                  replaces, [done, name](const Saved& saved) {
+                      done(saved.error.empty()
+                               ? Reply::json(dump({{"file", name}, {"passes", saved.passes}}))
+                               : Reply::error(422, saved.error));
+                  });
 }
 
 // -- User paths.
 
-std::string Api::paths_text(const std::string& name) const {
-    try {
-        return read_file_in(folders(), name);
-    } catch (const std::runtime_error&) {
-        if (!is_file_name(name)) throw;
-        return "[]";
-    }
+/// The paths of a file as the program reads them, as JSON; none where there is no such file.
+std::string Api::paths_in(const std::string& name) const {
+    const std::string text = read_file_in(folders(), name).value_or("[]");
+    return etendue::to_json(parse_user_paths(text, name));
 }
 
 Reply Api::get_paths(const Request& request) {
     const std::string name = request.query("file").value_or("paths.json");
-    const std::string text = paths_text(name);
-    // As the program reads them, so that errors are found here.
-    const std::string list = etendue::to_json(parse_user_paths(text, name));
-    return {200, "application/json", list, hash_of(list)};
+    Reply reply = Reply::json(paths_in(name));
+    reply.etag = hash_of(reply.body);
+    return reply;
 }
 
 Reply Api::put_paths(const Request& request) {
     const std::string name = request.query("file").value_or("paths.json");
     if (!is_file_name(name)) throw ApiError(422, "this is no name of a file");
     if (!name.ends_with(".json")) throw ApiError(422, "the name must end with .json");
-    const json list = parse_body(request.body);
-    const std::string text = etendue::to_json(paths_of(list, name));
-    const std::string current = etendue::to_json(parse_user_paths(paths_text(name), name));
-    if (request.if_match != hash_of(current))
-        return {409, "application/json", current, hash_of(current)};
-    write_file_atomically(options_.output_folder + "/" + name, text);
-    ++paths_versions_[name];
-    ++own_revision_;
-    return {200, "application/json", text, hash_of(text)};
+    Reply reply = Reply::json(etendue::to_json(paths_of(parse_body(request.body), name)));
+    check_writable(options_.output_folder, name, true);
+    if (std::string current = paths_in(name); request.if_match != hash_of(current)) {
+        reply.status = 409;
+        reply.body = std::move(current);
+    } else {
+        write_file_atomically(options_.output_folder + "/" + name, reply.body);
+        ++own_revision_;
+    }
+    reply.etag = hash_of(reply.body);
+    return reply;
 }
 
 // -- Rays, paths and replays, in the workers.
@@ -330,40 +342,46 @@ void Api::probe(const Request& request, const Done& done) {
         if (body.contains("x")) {
             const auto [x, y] = pixel();
             const Vec2 film = g.pixel_center(g.pixel_index(x, y));
-            return later(done, [=] {
+            return later(workers_, done, [=] {
                 return Reply::json(
                     dump({{"points", to_json(trace_eye(*scene, film, kMostPoints))}}));
             });
         }
         const Vec3 origin = to_vec(body.value("origin", json()), "origin"),
                    direction = to_vec(body.value("direction", json()), "direction");
-        if (!(length(direction) > 0)) throw ApiError(422, "\"direction\" must not be zero");
-        const bool follows = body.value("trace", json(false)) == json(true);
-        return later(done, [=] {
-            return Reply::json(
-                dump({{"points", to_json(trace_light(*scene, origin, normalize(direction),
-                                                     follows ? kMostPoints : 1))}}));
+        const float largest =
+            std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
+        if (!(largest > 0)) throw ApiError(422, "\"direction\" must not be zero");
+        // The square of a small number may be zero.
+        const Vec3 d =
+            normalize({direction.x / largest, direction.y / largest, direction.z / largest});
+        const bool follows = boolean(body, "trace");
+        return later(workers_, done, [=] {
+            return Reply::json(dump(
+                {{"points", to_json(trace_light(*scene, origin, d, follows ? kMostPoints : 1))}}));
         });
     }
     if (path == "/v1/paths/check") {
-        return later(done, [scene, given = paths_of(body.value("paths", json()), "paths")] {
-            json verdicts = json::array();
-            for (const GivenPath& one : given) {
-                const CheckedPath checked = check_user_path(*scene, one);
-                if (checked.path)
-                    verdicts.push_back({{"ok", true}});
-                else
-                    verdicts.push_back(
-                        {{"ok", false}, {"point", checked.point}, {"problem", checked.problem}});
-            }
-            return Reply::json(dump({{"verdicts", verdicts}}));
-        });
+        return later(workers_, done,
+                     [scene, given = paths_of(body.value("paths", json()), "paths")] {
+                         json verdicts = json::array();
+                         for (const GivenPath& one : given) {
+                             const CheckedPath checked = check_user_path(*scene, one);
+                             if (checked.path)
+                                 verdicts.push_back({{"ok", true}});
+                             else
+                                 verdicts.push_back({{"ok", false},
+                                                     {"point", checked.point},
+                                                     {"problem", checked.problem}});
+                         }
+                         return Reply::json(dump({{"verdicts", verdicts}}));
+                     });
     }
     if (path == "/v1/paths/snap") {
         json list = json::array({json{{"points", body.value("points", json())}}});
         std::vector<GivenPath> given = paths_of(list, "points");
         const auto index = size_t(integer(body, "index", 0, 31));
-        return later(done, [scene, given = std::move(given[0]), index] {
+        return later(workers_, done, [scene, given = std::move(given[0]), index] {
             const Snapped snapped = snap(*scene, given.points, index);
             json points = json::array();
             for (const Vec3 p : snapped.points) points.push_back(to_json(p));
@@ -380,7 +398,7 @@ void Api::probe(const Request& request, const Done& done) {
         pick.count = int(integer(body, "count", 1, 100, 8));
         pick.samples = 20000;
         pick.seed = uint64_t(integer(body, "seed", 0, INT64_MAX, 0));
-        return later(done, [scene, pick] {
+        return later(workers_, done, [scene, pick] {
             return Reply::json(etendue::to_json(pick_paths(*scene, pick)));
         });
     }
@@ -388,11 +406,11 @@ void Api::probe(const Request& request, const Done& done) {
 }
 
 void Api::replay_pixel(const json& body, const Done& done) {
-    const std::shared_ptr<const Scene> scene = this->scene();
-    const FilmGeometry& g = scene->film();
     const int run = int(integer(body, "run", 1, INT32_MAX));
     const RunStatus status = session_.status(run);
-    if (!status.is_of_this_scene)
+    const std::shared_ptr<const Scene> scene = session_.scene_of(run);
+    const FilmGeometry& g = scene->film();
+    if (scene != this->scene())
         throw ApiError(409, "the run belongs to an earlier version of the scene");
     const uint64_t pixel = g.pixel_index(int(integer(body, "x", 0, g.crop_width - 1)),
                                          int(integer(body, "y", 0, g.crop_height - 1)));
@@ -421,9 +439,10 @@ void Api::replay_pixel(const json& body, const Done& done) {
     request.pixel = pixel;
     request.first_pass = uint32_t(integer(body, "pass", 0, INT32_MAX, 0));
     request.passes = uint32_t(integer(body, "passes", 1, 100000, 16));
-    request.splats = body.value("splats", json(false)) == json(true);
+    request.splats = boolean(body, "splats");
     request.most_paths = most;
-    later(done, [scene, request] { return Reply::json(dump(to_json(replay(*scene, request)))); });
+    later(workers_, done,
+          [scene, request] { return Reply::json(dump(to_json(replay(*scene, request)))); });
 }
 
 }  // namespace etendue

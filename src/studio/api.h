@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -25,17 +24,21 @@ struct ApiOptions {
     std::string token;
     std::string scene_file;
     std::string output_folder;          ///< Where images and paths are saved.
-    std::optional<RgbImage> reference;  ///< Of the size of the image.
+    std::optional<RgbImage> reference;  ///< Shown while it has the size of the image.
+    std::vector<std::string>
+        hosts;  ///< By which the page may be asked for, beside localhost and addresses.
 };
 
 class Api final : public Handler {
 public:
     Api(Session& session, ApiOptions options);
 
+    Admission admit(const Request& request) override;
     void handle(const Request& request, std::function<void(Reply)> done) override;
-    bool is_events(const Request& request, std::optional<Reply>& refused) override;
     uint64_t revision() override;
     std::string event() override;
+    /// Why the reference cannot be shown; empty if it can, and without one.
+    std::string reference_problem() const;
 
 private:
     using Done = std::function<void(Reply)>;
@@ -53,13 +56,16 @@ private:
     void probe(const Request& request, const Done& done);
     void replay_pixel(const nlohmann::json& body, const Done& done);
     /// Calls `task`, which may throw, in a worker.
-    void later(const Done& done, std::function<Reply()> task);
+    static void later(Workers& workers, const Done& done, std::function<Reply()> task);
+    /// Sends an image that a worker makes.
+    template <class Make>
+    void send(const Done& done, const Make& make);
 
     RunRequest run_request(const nlohmann::json& body) const;
     std::shared_ptr<const Scene> scene() const;
     std::shared_ptr<SceneData> data();
     std::vector<std::string> folders() const;
-    std::string paths_text(const std::string& name) const;
+    std::string paths_in(const std::string& name) const;
     void look_at_scene_file();
 
     Session& session_;
@@ -71,11 +77,11 @@ private:
     std::string fingerprint_;  ///< Of the scene's file as it was loaded.
     bool is_scene_changed_ = false;
     uint64_t own_revision_ = 0;
-    std::map<std::string, uint64_t> paths_versions_;
 
     std::mutex data_mutex_;
     std::shared_ptr<SceneData> data_;
-    Workers workers_;  ///< The last member: its tasks end before the others are destroyed.
+    // The last members: their tasks end before the others are destroyed. Images do not wait for longer tasks.
+    Workers workers_{2}, image_workers_{1};
 };
 
 }  // namespace etendue

@@ -30,7 +30,55 @@ double thread_cpu_seconds() {
     return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
+/// An image of a run of a scene that was loaded before may have another size than the page expects.
+void check_size(int width, int height, const FilmGeometry& film) {
+    if (width != film.crop_width || height != film.crop_height)
+        throw ApiError(409, "the run belongs to a scene of another size");
+}
+
+/// The image of a view such as technique:connect-2-3.
+const std::vector<Rgb>& technique_image(const TechniqueSnapshot& shown, const std::string& view) {
+    const std::string key = view.substr(view.find(':') + 1);
+    for (const TechniqueImages::Entry& e : shown.images)
+        if (key_of(e.technique) == key)
+            return view.starts_with("technique:") ? e.weighted : e.unweighted;
+    throw ApiError(404, "there is no such technique");
+}
+
+/// The sum of the images of techniques whose paths have so many edges.
+std::vector<Rgb> length_image(const TechniqueSnapshot& shown, const std::string& view) {
+    const std::string number = view.substr(view.find(':') + 1);
+    int edges = -1;
+    std::from_chars(number.data(), number.data() + number.size(), edges);
+    std::vector<Rgb> sum(size_t(shown.width) * size_t(shown.height));
+    for (const TechniqueImages::Entry& e : shown.images)
+        if (e.technique.vertices() - 1 == edges)
+            for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
+    return sum;
+}
+
 }  // namespace
+
+template <class Make>
+void Api::send(const Done& done, const Make& make) {
+    later(image_workers_, done, [this, make] {
+        const double before = thread_cpu_seconds();
+        Reply reply = Reply::binary(make());
+        session_.spent(thread_cpu_seconds() - before);
+        return reply;
+    });
+}
+
+std::string Api::reference_problem() const {
+    const auto scene = session_.scene();
+    if (!options_.reference || !scene) return {};
+    const FilmGeometry& g = scene->film();
+    if (options_.reference->width == g.crop_width && options_.reference->height == g.crop_height)
+        return {};
+    return fmt::format("the reference has {} × {} pixels, but the image {} × {}",
+                       options_.reference->width, options_.reference->height, g.crop_width,
+                       g.crop_height);
+}
 
 void Api::image(const Request& request, const Done& done) {
     // The budget of snapshots includes all that this thread does, so what it did since the last image.
@@ -40,79 +88,67 @@ void Api::image(const Request& request, const Done& done) {
 
     const std::shared_ptr<SceneData> data = this->data();
     const FilmGeometry& g = data->scene()->film();
-    ImageHeader header;
-    header.width = g.crop_width, header.height = g.crop_height;
-    header.rect = {0, 0, g.crop_width, g.crop_height};
-    header.level = query_integer(request, "level", 0);
+    ImagePart part;
+    part.level = query_integer(request, "level", 0);
     if (const auto rect = request.query("rect")) {
-        ImageRect& r = header.rect;
+        ImageRect& r = part.rect.emplace();
         if (std::sscanf(rect->c_str(), "%9d,%9d,%9d,%9d", &r.x, &r.y, &r.width, &r.height) != 4)
             throw ApiError(400, "\"rect\" must be x,y,width,height");
+        check(r, g.crop_width, g.crop_height);
     }
-    check(header);
     const std::string view = request.query("view").value_or("image");
-    const auto reply = [&](std::string body) {
-        done({200, "application/octet-stream", std::move(body), {}});
-    };
     if (view == "first")
-        return later(done, [data] {
+        return send(done, [data] {
             const FirstPicture& p = data->first_picture();
-            ImageHeader small;
-            small.width = p.width, small.height = p.height;
-            small.rect = {0, 0, p.width, p.height};
-            return Reply{200, "application/octet-stream", encode_image(small, p.pixels), {}};
+            return encode_image({}, PixelRows<Rgb>(p.pixels, p.width, p.height));
         });
     if (view == "reference") {
         if (!options_.reference) throw ApiError(404, "there is no reference");
-        return reply(encode_image(header, options_.reference->pixels));
+        if (const std::string problem = reference_problem(); !problem.empty())
+            throw ApiError(409, problem);
+        return send(done, [this, part] {
+            const RgbImage& r = *options_.reference;
+            return encode_image(part, PixelRows<Rgb>(r.pixels, r.width, r.height));
+        });
     }
     for (const AovInfo& a : aov_registry())
         if (view == a.name && view != "variance")
-            return later(done, [data, header, view] {
-                return Reply{
-                    200, "application/octet-stream", encode_image(header, data->layer(view)), {}};
+            return later(workers_, done, [data, part, view] {
+                const FilmGeometry& film = data->scene()->film();
+                return Reply::binary(encode_image(
+                    part, PixelRows<Rgb>(data->layer(view), film.crop_width, film.crop_height)));
             });
 
     const int id = query_integer(request, "run", 0);
     const auto after = uint64_t(query_integer(request, "after", 0));
-    header.run = uint32_t(id);
-    const auto send = [&](uint64_t passes, int width, int height, const auto& pixels) {
-        header.passes = passes;
-        // A run of a scene that was loaded before may have another size.
-        if (width != header.width || height != header.height)
-            throw ApiError(409, "the run belongs to a scene of another size");
-        reply(encode_image(header, std::span(std::as_const(pixels))));
-    };
+    part.run = uint32_t(id);
     const bool is_length = view.starts_with("length:");
     if (is_length || view.starts_with("technique:") || view.starts_with("unweighted:")) {
         const auto shown = session_.techniques(id);
-        if (!shown || shown->passes <= after) return done({204, {}, {}, {}});
-        const std::string number = view.substr(view.find(':') + 1);
-        int index = -1;
-        std::from_chars(number.data(), number.data() + number.size(), index);
-        if (!is_length) {
-            if (index < 0 || size_t(index) >= shown->images.size())
-                throw ApiError(404, "there is no such technique");
-            const TechniqueImages::Entry& e = shown->images[size_t(index)];
-            return send(shown->passes, header.width, header.height,
-                        view[0] == 't' ? e.weighted : e.unweighted);
-        }
-        std::vector<Rgb> sum(g.pixel_count());
-        for (const TechniqueImages::Entry& e : shown->images)
-            if (e.technique.vertices() - 1 == index && e.weighted.size() == sum.size())
-                for (size_t i = 0; i < sum.size(); ++i) sum[i] += e.weighted[i];
-        return send(shown->passes, header.width, header.height, sum);
+        if (!shown || shown->passes <= after) return done(Reply::nothing());
+        check_size(shown->width, shown->height, g);
+        part.passes = shown->passes;
+        return send(done, [shown, part, view, is_length] {
+            const std::vector<Rgb> sum =
+                is_length ? length_image(*shown, view) : std::vector<Rgb>();
+            return encode_image(part,
+                                PixelRows<Rgb>(is_length ? sum : technique_image(*shown, view),
+                                               shown->width, shown->height));
+        });
     }
-    const auto snapshot = session_.snapshot(id);
-    if (!snapshot || snapshot->passes <= after) return done({204, {}, {}, {}});
-    if (view == "image")
-        return send(snapshot->passes, snapshot->width, snapshot->height, snapshot->mean);
-    if (view == "variance")
-        return send(snapshot->passes, snapshot->width, snapshot->height, snapshot->variance);
-    if (view == "error")
-        return send(snapshot->passes, snapshot->width, snapshot->height,
-                    relative_errors(*snapshot));
-    throw ApiError(404, fmt::format("there is no view \"{}\"", view));
+    if (view != "image" && view != "variance" && view != "error")
+        throw ApiError(404, fmt::format("there is no view \"{}\"", view));
+    const auto shown = session_.snapshot(id);
+    if (!shown || shown->passes <= after) return done(Reply::nothing());
+    check_size(shown->width, shown->height, g);
+    part.passes = shown->passes;
+    send(done, [shown, part, view] {
+        if (view == "error")
+            return encode_image(
+                part, PixelRows<float>(relative_errors(*shown), shown->width, shown->height));
+        return encode_image(part, PixelRows<Rgb>(view == "image" ? shown->mean : shown->variance,
+                                                 shown->width, shown->height));
+    });
 }
 
 Reply Api::pixel(const Request& request) {
@@ -121,12 +157,7 @@ Reply Api::pixel(const Request& request) {
               id = query_integer(request, "run", 0);
     const auto snapshot = session_.snapshot(id);
     if (!snapshot) return Reply::json(dump({{"run", id}, {"passes", 0}}));
-    check(ImageHeader{.run = 0,
-                      .passes = 0,
-                      .width = snapshot->width,
-                      .height = snapshot->height,
-                      .rect = {x, y, w, h},
-                      .level = 0});
+    check({x, y, w, h}, snapshot->width, snapshot->height);
     const RunStatus status = session_.status(id);
     const RectangleValues values = values_in(*snapshot, {x, y, w, h});
     json j{{"run", id},           {"passes", snapshot->passes},
@@ -169,7 +200,7 @@ void Api::difference(const Request& request, const Done& done) {
     const int width = other ? other->width : options_.reference->width;
     if (width != snapshot->width || reference.size() != snapshot->mean.size())
         throw ApiError(409, "the images differ in size");
-    later(done, [snapshot, other, reference] {
+    later(workers_, done, [snapshot, other, reference] {
         const ImageErrors errors = image_errors(snapshot->mean, reference);
         const FlipResult flip =
             hdr_flip(snapshot->mean, reference, snapshot->width, snapshot->height);
@@ -184,7 +215,7 @@ void Api::difference(const Request& request, const Done& done) {
 void Api::gain(const Request& request, const Done& done) {
     const auto without = session_.seed_series(query_integer(request, "without", 0)),
                with = session_.seed_series(query_integer(request, "with", 0));
-    later(done, [without, with] {
+    later(workers_, done, [without, with] {
         const SeedComparison c = compare(*without, *with);
         json j{{"without", to_json(c.a, *without)},
                {"with", to_json(c.b, *with)},
@@ -202,7 +233,7 @@ Reply Api::techniques(const Request& request) {
             json item = to_json(shown->images[i].technique);
             double sum = 0;
             for (const Rgb c : shown->images[i].weighted) sum += double(luminance(c));
-            item["index"] = i;
+            item["key"] = key_of(shown->images[i].technique);
             item["mean"] = sum / double(shown->images[i].weighted.size());
             list.push_back(std::move(item));
         }

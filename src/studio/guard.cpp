@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
 #include <stdexcept>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -36,10 +38,7 @@ std::string host_name(std::string_view host) {
     } else {
         name = name.substr(0, name.find(':'));
     }
-    std::string lower(name);
-    std::transform(lower.begin(), lower.end(), lower.begin(),
-                   [](unsigned char c) { return char(std::tolower(c)); });
-    return lower;
+    return lower_case(name);
 }
 
 /// A file descriptor that is closed with the object.
@@ -58,16 +57,25 @@ private:
     int fd_;
 };
 
-/// The opened file, or a closed one where the folder has no such regular file.
+[[noreturn]] void fail(const std::string& name, const std::string& why) {
+    throw std::runtime_error(fmt::format("{}: {}", name, why));
+}
+
+/// The opened file, or a closed one where the folder has nothing of that name.
 int open_in(const std::string& folder, const std::string& name) {
     const Descriptor directory(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (!directory.is_open()) return -1;
     const int fd =
         ::openat(directory.get(), name.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0) {
+        if (errno == ENOENT) return -1;
+        fail(name,
+             errno == ELOOP ? "links are not followed" : std::generic_category().message(errno));
+    }
     struct stat about {};
-    if (fd >= 0 && (::fstat(fd, &about) != 0 || !S_ISREG(about.st_mode))) {
+    if (::fstat(fd, &about) != 0 || !S_ISREG(about.st_mode)) {
         ::close(fd);
-        return -1;
+        fail(name, "is no regular file");
     }
     return fd;
 }
@@ -78,10 +86,6 @@ void check_name(const std::string& name) {
             fmt::format("\"{}\" is no name of a file: only letters, digits, '.', '_' and '-' are "
                         "allowed, without a leading dot",
                         name));
-}
-
-[[noreturn]] void fail_missing(const std::string& name) {
-    throw std::runtime_error(fmt::format("{}: there is no such file", name));
 }
 
 }  // namespace
@@ -95,9 +99,12 @@ std::string make_token() {
     return token;
 }
 
-std::optional<Reply> refuse(const Request& r, std::string_view token) {
+std::optional<Reply> refuse(const Request& r, std::string_view token,
+                            const std::vector<std::string>& hosts) {
     const std::string host = host_name(r.host);
-    if (host != "localhost" && (host.empty() || host != r.local_address))
+    const bool is_known = host == "localhost" || host == r.local_address ||
+                          std::find(hosts.begin(), hosts.end(), host) != hosts.end();
+    if (host.empty() || !is_known)
         return Reply::error(403, "the host of the request is not this server");
     if (!r.path().starts_with("/v1")) return {};
     if (!r.origin.empty() && r.origin != "http://" + r.host)
@@ -109,6 +116,21 @@ std::optional<Reply> refuse(const Request& r, std::string_view token) {
         !equal_in_constant_time(std::string_view(r.authorization).substr(kScheme.size()), token))
         return Reply::error(401, "the token is missing or wrong; open the printed address again");
     return {};
+}
+
+std::string lower_case(std::string_view text) {
+    std::string lower(text);
+    std::transform(lower.begin(), lower.end(), lower.begin(),
+                   [](unsigned char c) { return char(std::tolower(c)); });
+    return lower;
+}
+
+bool is_host_name(std::string_view name) {
+    constexpr size_t kLongest = 253;
+    return !name.empty() && name.size() <= kLongest &&
+           std::all_of(name.begin(), name.end(), [](unsigned char c) {
+               return c < 128 && (std::isalnum(c) || c == '-' || c == '.');
+           });
 }
 
 bool is_file_name(std::string_view name) {
@@ -124,10 +146,11 @@ std::string find_file_in(const std::vector<std::string>& folders, const std::str
     for (const std::string& folder : folders)
         if (const Descriptor file(open_in(folder, name)); file.is_open())
             return folder + "/" + name;
-    fail_missing(name);
+    fail(name, "there is no such file");
 }
 
-std::string read_file_in(const std::vector<std::string>& folders, const std::string& name) {
+std::optional<std::string> read_file_in(const std::vector<std::string>& folders,
+                                        const std::string& name) {
     check_name(name);
     for (const std::string& folder : folders) {
         const Descriptor file(open_in(folder, name));
@@ -136,16 +159,24 @@ std::string read_file_in(const std::vector<std::string>& folders, const std::str
         size_t size = 0;
         while (size < text.size()) {
             const ssize_t n = ::read(file.get(), text.data() + size, text.size() - size);
-            if (n < 0) throw std::runtime_error(fmt::format("{}: cannot be read", name));
+            if (n < 0) fail(name, std::generic_category().message(errno));
             if (n == 0) break;
             size += size_t(n);
         }
-        if (size > kMostBodyBytes)
-            throw std::runtime_error(fmt::format("{}: is larger than 1 MiB", name));
+        if (size > kMostBodyBytes) fail(name, "is larger than 1 MiB");
         text.resize(size);
         return text;
     }
-    fail_missing(name);
+    return {};
+}
+
+void check_writable(const std::string& folder, const std::string& name, bool replaces) {
+    check_name(name);
+    struct stat about {};
+    if (::lstat((folder + "/" + name).c_str(), &about) != 0) return;
+    if (!S_ISREG(about.st_mode))
+        throw ApiError(409, fmt::format("{} is no regular file; choose another name", name));
+    if (!replaces) throw ApiError(409, fmt::format("{} exists already", name));
 }
 
 }  // namespace etendue

@@ -1,5 +1,7 @@
 #include "studio/http.h"
 
+#include <new>
+
 #include <nlohmann/json.hpp>
 
 namespace etendue {
@@ -51,10 +53,21 @@ std::optional<std::string> Request::query(std::string_view name) const {
 Reply Reply::error(int status, std::string_view message) {
     // Messages may quote bytes of a request that are not UTF-8.
     const nlohmann::json body{{"error", message}};
-    return {status,
-            "application/json",
-            body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
-            {}};
+    Reply reply = json(body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    reply.status = status;
+    return reply;
+}
+
+Reply Reply::current_exception() {
+    try {
+        throw;
+    } catch (const ApiError& e) {
+        return error(e.status, e.what());
+    } catch (const std::bad_alloc&) {
+        return error(503, "not enough memory");
+    } catch (const std::exception& e) {
+        return error(422, e.what());
+    }
 }
 
 }  // namespace etendue

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -29,20 +30,52 @@ struct Reply {
     std::string type = "application/json";
     std::string body;
     std::string etag;  ///< Empty if there is none.
+    /// The body instead of `body`, where other replies have the same.
+    std::shared_ptr<const std::string> shared_body;
 
-    static Reply json(std::string text) { return {200, "application/json", std::move(text), {}}; }
+    static Reply json(std::string text) {
+        Reply reply;
+        reply.body = std::move(text);
+        return reply;
+    }
+    static Reply binary(std::string bytes) {
+        Reply reply = json(std::move(bytes));
+        reply.type = "application/octet-stream";
+        return reply;
+    }
+    static Reply nothing() {
+        Reply reply;
+        reply.status = 204;
+        return reply;
+    }
     /// {"error": message}
     static Reply error(int status, std::string_view message);
+    /// The error of the exception that is being handled.
+    static Reply current_exception();
+};
+
+/// A request that cannot be carried out.
+struct ApiError : std::runtime_error {
+    ApiError(int status, const std::string& message)
+        : std::runtime_error(message), status(status) {}
+    int status;
+};
+
+/// Who asks, and for what.
+struct Admission {
+    std::optional<Reply> refusal;  ///< If the request is rejected.
+    bool has_token = false;
+    bool is_events = false;  ///< The reply is a stream of events.
 };
 
 /// The interface between server and application. The server's thread calls all functions except `done`.
 class Handler {
 public:
     virtual ~Handler() = default;
-    /// Calls `done` once, from any thread.
+    virtual Admission admit(const Request& request) = 0;
+    /// Calls `done` once, from any thread. If `done` is never called, for which memory may be missing, the connection is
+    /// closed with its last copy.
     virtual void handle(const Request& request, std::function<void(Reply)> done) = 0;
-    /// Whether the reply to a request is a stream of events. If the request is rejected, sets `refused`.
-    virtual bool is_events(const Request& request, std::optional<Reply>& refused) = 0;
     /// Changes with the next event.
     virtual uint64_t revision() = 0;
     /// One line of JSON, without its end.

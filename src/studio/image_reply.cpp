@@ -21,31 +21,30 @@ void put(std::string& to, size_t at, uint32_t value) {
 }
 
 template <int channels, class Pixel>
-std::string encode(const ImageHeader& h, std::span<const Pixel> pixels) {
-    check(h);
+std::string encode(const ImagePart& part, const PixelRows<Pixel>& pixels) {
+    if (part.level < 0 || part.level > kMostLevel) throw std::runtime_error("level must be 0 to 8");
+    const ImageRect rect = part.rect.value_or(ImageRect{0, 0, pixels.width(), pixels.height()});
+    check(rect, pixels.width(), pixels.height());
     const auto value = [](const Pixel& p, int c) {
         if constexpr (channels == 1)
             return p;
         else
             return p[c];
     };
-    const int block = 1 << h.level;
-    const int columns = (h.rect.width + block - 1) / block,
-              rows = (h.rect.height + block - 1) / block;
+    const int block = 1 << part.level;
+    const int columns = (rect.width + block - 1) / block, rows = (rect.height + block - 1) / block;
     std::vector<float> values(size_t(columns) * size_t(rows) * channels);
     float largest = 0;
     for (int row = 0; row < rows; ++row)
         for (int column = 0; column < columns; ++column) {
-            const int x0 = column * block, x1 = std::min(x0 + block, h.rect.width);
-            const int y0 = row * block, y1 = std::min(y0 + block, h.rect.height);
+            const int x0 = column * block, x1 = std::min(x0 + block, rect.width);
+            const int y0 = row * block, y1 = std::min(y0 + block, rect.height);
             const float share = 1 / float((x1 - x0) * (y1 - y0));
             for (int c = 0; c < channels; ++c) {
                 float sum = 0;
                 for (int y = y0; y < y1; ++y)
                     for (int x = x0; x < x1; ++x)
-                        sum += value(
-                            pixels[size_t(h.rect.y + y) * size_t(h.width) + size_t(h.rect.x + x)],
-                            c);
+                        sum += value(pixels.at(rect.x + x, rect.y + y), c);
                 sum *= share;
                 values[(size_t(row) * size_t(columns) + size_t(column)) * channels + size_t(c)] =
                     sum;
@@ -53,21 +52,24 @@ std::string encode(const ImageHeader& h, std::span<const Pixel> pixels) {
             }
         }
     int scale = 0;
-    if (largest > kLargest) std::frexp(largest / kLargest, &scale);
+    // Small values have few digits as half floats, none below 6e-8; those of a variance are smaller than that.
+    if (largest > 0) std::frexp(largest / kLargest, &scale);
+    constexpr int kLeastScale = -120;  // 2^120 is a float
+    scale = std::max(scale, kLeastScale);
     std::string out(kHeaderBytes + 2 * values.size(), '\0');
     std::memcpy(out.data(), "ETND", 4);
     const uint32_t fields[] = {kVersion,
-                               h.run,
-                               uint32_t(h.passes),
-                               uint32_t(h.rect.x),
-                               uint32_t(h.rect.y),
-                               uint32_t(h.rect.width),
-                               uint32_t(h.rect.height),
-                               uint32_t(h.level),
+                               part.run,
+                               uint32_t(part.passes),
+                               uint32_t(rect.x),
+                               uint32_t(rect.y),
+                               uint32_t(rect.width),
+                               uint32_t(rect.height),
+                               uint32_t(part.level),
                                uint32_t(channels),
-                               uint32_t(scale),
-                               uint32_t(h.width),
-                               uint32_t(h.height),
+                               uint32_t(scale),  // of either sign
+                               uint32_t(pixels.width()),
+                               uint32_t(pixels.height()),
                                uint32_t(columns),
                                uint32_t(rows)};
     for (size_t i = 0; i < std::size(fields); ++i) put(out, 4 + 4 * i, fields[i]);
@@ -82,20 +84,18 @@ std::string encode(const ImageHeader& h, std::span<const Pixel> pixels) {
 
 }  // namespace
 
-void check(const ImageHeader& h) {
-    const ImageRect& r = h.rect;
-    if (h.level < 0 || h.level > kMostLevel) throw std::runtime_error("level must be 0 to 8");
+void check(const ImageRect& r, int width, int height) {
     // Without sums that could overflow.
-    if (r.x < 0 || r.y < 0 || r.width < 1 || r.height < 1 || r.x >= h.width || r.y >= h.height ||
-        r.width > h.width - r.x || r.height > h.height - r.y)
+    if (r.x < 0 || r.y < 0 || r.width < 1 || r.height < 1 || r.x >= width || r.y >= height ||
+        r.width > width - r.x || r.height > height - r.y)
         throw std::runtime_error("the rectangle is not within the image");
 }
 
-std::string encode_image(const ImageHeader& header, std::span<const Rgb> pixels) {
-    return encode<3>(header, pixels);
+std::string encode_image(const ImagePart& part, const PixelRows<Rgb>& pixels) {
+    return encode<3>(part, pixels);
 }
-std::string encode_image(const ImageHeader& header, std::span<const float> pixels) {
-    return encode<1>(header, pixels);
+std::string encode_image(const ImagePart& part, const PixelRows<float>& pixels) {
+    return encode<1>(part, pixels);
 }
 
 }  // namespace etendue

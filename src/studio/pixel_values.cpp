@@ -13,7 +13,11 @@ std::vector<float> relative_errors(const Snapshot& s) {
     for (const Rgb c : s.mean) mean += double(luminance(c)) / double(s.mean.size());
     for (size_t i = 0; i < errors.size(); ++i) {
         const float y = luminance(s.mean[i]), scale = std::max(std::abs(y), float(0.1 * mean));
-        errors[i] = scale > 0 ? std::sqrt(std::max(0.0f, luminance(s.variance[i]))) / scale : 0.0f;
+        const Rgb v = s.variance[i];
+        // Of the luminance if the errors of the channels are those of one factor, as the noise of paths mostly is; in no
+        // case is the luminance's larger.
+        const float error = luminance(Rgb(std::sqrt(v.r), std::sqrt(v.g), std::sqrt(v.b)));
+        errors[i] = scale > 0 ? error / scale : 0.0f;
     }
     return errors;
 }

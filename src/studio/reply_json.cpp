@@ -1,5 +1,9 @@
 #include "studio/reply_json.h"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+
 namespace etendue {
 namespace {
 
@@ -98,6 +102,12 @@ json to_json(const SeedComparison::Method& m, const SeedSeries& series) {
             {"mean", m.mean},
             {"mean_error", m.mean_error},
             {"mutations", mutations}};
+}
+
+std::string key_of(const Technique& q) {
+    std::string key = fmt::format("{}-{}-{}", name_of(q.strategy), q.s, q.t);
+    std::replace(key.begin(), key.end(), ' ', '-');
+    return key;
 }
 
 json to_json(const Technique& q) {

@@ -22,6 +22,8 @@ nlohmann::json to_json(Rgb c);
 nlohmann::json progress_of(const RunStatus& s);
 nlohmann::json to_json(const RunStatus& s);
 nlohmann::json to_json(const SeedComparison::Method& m, const SeedSeries& series);
+/// The name of a technique in requests: connect-2-3.
+std::string key_of(const Technique& q);
 nlohmann::json to_json(const Technique& q);
 nlohmann::json to_json(const std::vector<RayPoint>& points);
 nlohmann::json to_json(const Replay& r);

@@ -32,7 +32,9 @@ Vec3 to_vec(const json& value, const char* name) {
         if (!value[size_t(i)].is_number())
             throw ApiError(422, fmt::format("\"{}\" must be three numbers", name));
         v[i] = value[size_t(i)].get<float>();
-        if (!std::isfinite(v[i])) throw ApiError(422, fmt::format("\"{}\" must be finite", name));
+        if (!(std::abs(v[i]) <= GivenPath::kFarthest))
+            throw ApiError(422,
+                           fmt::format("\"{}\" must not exceed {:g}", name, GivenPath::kFarthest));
     }
     return v;
 }
@@ -62,6 +64,13 @@ int64_t integer(const json& body, const char* name, int64_t low, int64_t high,
     if (!is_integer || at->get<int64_t>() < low || at->get<int64_t>() > high)
         throw ApiError(422, fmt::format("\"{}\" must be an integer in [{}, {}]", name, low, high));
     return at->get<int64_t>();
+}
+
+bool boolean(const json& body, const char* name) {
+    const auto at = body.find(name);
+    if (at == body.end()) return false;
+    if (!at->is_boolean()) throw ApiError(422, fmt::format("\"{}\" must be true or false", name));
+    return at->get<bool>();
 }
 
 std::string text_of(const json& body, const char* name, const std::string& fallback) {

@@ -16,20 +16,14 @@
 
 namespace etendue {
 
-/// A request that cannot be carried out.
-struct ApiError : std::runtime_error {
-    ApiError(int status, const std::string& message)
-        : std::runtime_error(message), status(status) {}
-    int status;
-};
-
 nlohmann::json parse_body(const std::string& text);
 nlohmann::json parse_object(const std::string& text);
-/// A finite vector; `name` is for messages.
+/// A vector whose components are at most GivenPath::kFarthest; `name` is for messages.
 Vec3 to_vec(const nlohmann::json& value, const char* name);
 /// An integer of the body in [low, high]; throws where it is missing, unless there is a fallback.
 int64_t integer(const nlohmann::json& body, const char* name, int64_t low, int64_t high,
                 std::optional<int64_t> fallback = {});
+bool boolean(const nlohmann::json& body, const char* name);  ///< False where it is missing.
 /// A text of the body; `fallback` where it is missing.
 std::string text_of(const nlohmann::json& body, const char* name, const std::string& fallback = {});
 RenderLimits limits_of(const nlohmann::json& body);

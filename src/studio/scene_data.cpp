@@ -23,10 +23,11 @@ const std::vector<Rgb>& SceneData::layer(const std::string& name) {
     throw ApiError(404, "there is no such layer");
 }
 
-const std::string& SceneData::geometry() {
+std::shared_ptr<const std::string> SceneData::geometry() {
     std::call_once(geometry_, [&] {
         constexpr size_t kMostTriangles = 1'000'000;
-        geometry_bytes_ = encode(drawn_shapes(*scene_, kMostTriangles));
+        geometry_bytes_ =
+            std::make_shared<const std::string>(encode(drawn_shapes(*scene_, kMostTriangles)));
     });
     return geometry_bytes_;
 }

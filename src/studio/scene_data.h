@@ -20,14 +20,14 @@ public:
     /// The pixels of a layer of aov_registry(), except those that the passes of a rendering make.
     const std::vector<Rgb>& layer(const std::string& name);
     /// The shapes as encode() writes them.
-    const std::string& geometry();
+    std::shared_ptr<const std::string> geometry();
 
 private:
     std::shared_ptr<const Scene> scene_;
     std::once_flag first_, layers_, geometry_;
     FirstPicture first_picture_;
     std::vector<AovImage> aovs_;
-    std::string geometry_bytes_;
+    std::shared_ptr<const std::string> geometry_bytes_;
 };
 
 }  // namespace etendue

@@ -1,7 +1,12 @@
 #include "studio/server.h"
 
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
+
 #include <algorithm>
 #include <atomic>
+#include <deque>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -76,38 +81,45 @@ void set_common_fields(http::response<http::empty_body>& m) {
     m.set(http::field::cache_control, "no-store");
 }
 
-}  // namespace
+/// An address as a request may name it as its host: an IPv4 address also where it arrives at an IPv6 socket, and without
+/// the name of an interface.
+std::string text_of(net::ip::address address) {
+    if (address.is_v6()) {
+        net::ip::address_v6 v6 = address.to_v6();
+        if (v6.is_v4_mapped()) return net::ip::make_address_v4(net::ip::v4_mapped, v6).to_string();
+        v6.scope_id(0);
+        return v6.to_string();
+    }
+    return address.to_string();
+}
 
-struct Server::Impl {
-    // Connections, which `io` keeps alive, count themselves.
-    // Threads of the workers may be the last to drop a connection.
-    std::atomic<int> connections = 0, event_streams = 0;
+/// What the connections share. Threads of the workers may be the last to drop a connection.
+struct Shared {
     Handler* handler = nullptr;
-    std::string address;
-    net::io_context io{1};
-    tcp::acceptor acceptor{io};
-    std::thread thread;
-
-    void accept();
+    std::atomic<int> known = 0, event_streams = 0;
 };
-
-namespace {
 
 /// One connection: requests are answered one after the other.
 class Connection : public std::enable_shared_from_this<Connection> {
 public:
-    template <class Impl>
-    Connection(tcp::socket socket, Impl& server)
-        : stream_(std::move(socket)), timer_(stream_.get_executor()), handler_(*server.handler),
-          connections_(server.connections), event_streams_(server.event_streams) {
-        ++connections_;
+    Connection(tcp::socket socket, Shared& shared)
+        : stream_(std::move(socket)), timer_(stream_.get_executor()), handler_(*shared.handler),
+          shared_(shared) {
         error_code ignored;
         stream_.socket().set_option(tcp::no_delay(true), ignored);
-        local_address_ = stream_.socket().local_endpoint(ignored).address().to_string();
+        local_address_ = text_of(stream_.socket().local_endpoint(ignored).address());
     }
     ~Connection() {
-        --connections_;
-        if (is_event_stream_) --event_streams_;
+        if (is_known_) --shared_.known;
+        if (is_event_stream_) --shared_.event_streams;
+    }
+
+    bool is_known() const { return is_known_; }
+    /// At once, whatever it does.
+    void abort() {
+        error_code ignored;
+        timer_.cancel(ignored);
+        stream_.close();
     }
 
     void read() {
@@ -119,12 +131,12 @@ public:
             [self = shared_from_this()](const error_code& error, size_t) { self->on_read(error); });
     }
 
+private:
     void refuse(Reply reply) {
         keep_alive_ = false;
         write(std::move(reply));
     }
 
-private:
     void on_read(const error_code& error) {
         if (error == http::error::end_of_stream || error == beast::error::timeout) return close();
         if (error) {
@@ -137,13 +149,19 @@ private:
         is_head_ = parser_->get().method() == http::verb::head;
         Request request = request_of(*parser_);
         request.local_address = local_address_;
-        std::optional<Reply> refused;
-        if (handler_.is_events(request, refused)) {
-            if (event_streams_ < Server::kMostEventStreams) return stream_events();
-            refused = Reply::error(429, fmt::format("{} pages are open already; close one",
-                                                    Server::kMostEventStreams));
+        Admission admission = handler_.admit(request);
+        if (admission.refusal) return write(std::move(*admission.refusal));
+        if (admission.has_token && !is_known_) {
+            if (shared_.known >= Server::kMostConnections)
+                return refuse(Reply::error(503, "there are too many connections"));
+            ++shared_.known;
+            is_known_ = true;
         }
-        if (refused) return write(std::move(*refused));
+        if (admission.is_events) {
+            if (shared_.event_streams < Server::kMostEventStreams) return stream_events();
+            return write(Reply::error(429, fmt::format("{} pages are open already; close one",
+                                                       Server::kMostEventStreams)));
+        }
         stream_.expires_never();
         handler_.handle(
             request, [self = shared_from_this(), executor = stream_.get_executor()](Reply reply) {
@@ -154,7 +172,8 @@ private:
     }
 
     void write(Reply reply) {
-        body_ = std::move(reply.body);
+        body_ = reply.shared_body ? std::move(reply.shared_body)
+                                  : std::make_shared<const std::string>(std::move(reply.body));
         written_ = 0;
         header_ = {};
         header_.version(11);
@@ -164,7 +183,7 @@ private:
         if (!reply.etag.empty()) header_.set(http::field::etag, reply.etag);
         if (reply.status == 401) header_.set(http::field::www_authenticate, "Bearer");
         header_.keep_alive(keep_alive_);
-        if (reply.status != 204) header_.content_length(body_.size());
+        if (reply.status != 204) header_.content_length(body_->size());
         write_header([self = shared_from_this()] { self->write_body(); });
     }
 
@@ -182,13 +201,13 @@ private:
     /// In pieces, each with its own time limit.
     void write_body() {
         constexpr size_t kPiece = 256 << 10;
-        if (is_head_ || written_ == body_.size()) {
+        if (is_head_ || written_ == body_->size()) {
             if (keep_alive_) return read();
             return linger();
         }
-        const size_t size = std::min(kPiece, body_.size() - written_);
+        const size_t size = std::min(kPiece, body_->size() - written_);
         stream_.expires_after(kTimeout);
-        net::async_write(stream_, net::buffer(body_.data() + written_, size),
+        net::async_write(stream_, net::buffer(body_->data() + written_, size),
                          [self = shared_from_this(), size](const error_code& error, size_t) {
                              if (error) return;
                              self->written_ += size;
@@ -221,7 +240,7 @@ private:
 
     void stream_events() {
         is_event_stream_ = true;
-        ++event_streams_;
+        ++shared_.event_streams;
         header_ = {};
         header_.version(11);
         header_.result(http::status::ok);
@@ -242,13 +261,17 @@ private:
     }
     void send_event() {
         if (is_ended_) return;
-        const uint64_t revision = handler_.revision();
-        if (revision == seen_ && ++idle_ < kHeartbeat) return wait();
-        seen_ = revision;
-        idle_ = 0;
-        body_ = handler_.event() + "\n";
+        try {
+            const uint64_t revision = handler_.revision();
+            if (revision == seen_ && ++idle_ < kHeartbeat) return wait();
+            seen_ = revision;
+            idle_ = 0;
+            event_ = handler_.event() + "\n";
+        } catch (const std::exception&) {
+            return abort();  // watch_for_end() would keep a connection that is silent
+        }
         stream_.expires_after(kTimeout);
-        net::async_write(stream_, http::make_chunk(net::buffer(body_)),
+        net::async_write(stream_, http::make_chunk(net::buffer(event_)),
                          [self = shared_from_this()](const error_code& error, size_t) {
                              if (!error) return self->wait();
                              self->close();
@@ -265,16 +288,17 @@ private:
     beast::tcp_stream stream_;
     net::steady_timer timer_;
     Handler& handler_;
-    std::atomic<int>& connections_;
-    std::atomic<int>& event_streams_;
+    Shared& shared_;
     std::string local_address_;
     beast::flat_buffer buffer_{kMostHeaderBytes + kMostBodyBytes};
     std::optional<Parser> parser_;
     http::response<http::empty_body> header_;
     std::optional<http::response_serializer<http::empty_body>> serializer_;
-    std::string body_;
+    std::shared_ptr<const std::string> body_;
+    std::string event_;
     std::vector<char> scratch_;
     size_t written_ = 0, discarded_ = 0;
+    bool is_known_ = false;  ///< A request had the token.
     bool keep_alive_ = false, is_head_ = false, is_event_stream_ = false, is_ended_ = false;
     uint64_t seen_ = 0;
     int idle_ = 0;
@@ -282,29 +306,101 @@ private:
 
 }  // namespace
 
+struct Server::Impl {
+    Shared shared;  // Outlives the connections, which `io` keeps.
+    std::string address;
+    net::io_context io{1};
+    tcp::acceptor acceptor{io};
+    net::steady_timer pause{io};
+    bool is_accepting = false;
+    std::deque<std::weak_ptr<Connection>> strangers;  ///< From the oldest on.
+    std::thread thread;
+
+    void listen(int port);
+    void accept();
+    void accept_later();
+    void take(tcp::socket socket);
+    void run();
+    void end();
+};
+
+void Server::Impl::listen(int port) {
+    std::vector<tcp::endpoint> endpoints;
+    error_code error;
+    if (const auto given = net::ip::make_address(address, error); !error) {
+        endpoints.emplace_back(given, uint16_t(port));
+    } else {
+        tcp::resolver resolver(io);
+        for (const auto& found : resolver.resolve(address, std::to_string(port)))
+            endpoints.push_back(found.endpoint());
+    }
+    for (size_t i = 0; i < endpoints.size(); ++i) try {
+            if (acceptor.is_open()) acceptor.close();
+            acceptor.open(endpoints[i].protocol());
+            acceptor.set_option(net::socket_base::reuse_address(true));
+            acceptor.bind(endpoints[i]);
+            acceptor.listen();
+            return;
+        } catch (const boost::system::system_error&) {
+            if (i + 1 == endpoints.size()) throw;
+        }
+}
+
+void Server::Impl::take(tcp::socket socket) {
+    std::erase_if(strangers, [](const std::weak_ptr<Connection>& weak) {
+        const auto connection = weak.lock();
+        return !connection || connection->is_known();
+    });
+    if (strangers.size() >= kMostStrangers) {
+        if (const auto oldest = strangers.front().lock()) oldest->abort();
+        strangers.pop_front();
+    }
+    const auto connection = std::make_shared<Connection>(std::move(socket), shared);
+    strangers.push_back(connection);
+    connection->read();
+}
+
 void Server::Impl::accept() {
     acceptor.async_accept([this](const error_code& error, tcp::socket socket) {
+        is_accepting = false;
         if (error == net::error::operation_aborted) return;
-        if (!error) {
-            const bool is_full = connections >= kMostConnections;
-            const auto connection = std::make_shared<Connection>(std::move(socket), *this);
-            if (is_full)
-                connection->refuse(Reply::error(503, "there are too many connections"));
-            else
-                connection->read();
-        }
+        // Such as a lack of file descriptors, which lasts.
+        if (error && error != net::error::connection_aborted) return accept_later();
+        if (!error) take(std::move(socket));
         accept();
     });
+    is_accepting = true;
+}
+
+void Server::Impl::accept_later() {
+    is_accepting = true;
+    pause.expires_after(kEventInterval);
+    pause.async_wait([this](const error_code& error) {
+        is_accepting = false;
+        if (!error) accept();
+    });
+}
+
+void Server::Impl::run() {
+    while (true) try {
+            if (!is_accepting) accept();
+            io.run();
+            return;
+        } catch (const std::exception&) {
+            // Mostly a lack of memory. The connection whose turn it was is closed; the others go on.
+            std::this_thread::sleep_for(kEventInterval);
+        }
+}
+
+void Server::Impl::end() {
+    io.stop();
+    if (thread.joinable()) thread.join();
 }
 
 Server::Server(const std::string& address, int port) : impl_(std::make_unique<Impl>()) {
     impl_->address = address;
     try {
-        const tcp::endpoint endpoint(net::ip::make_address(address), uint16_t(port));
-        impl_->acceptor.open(endpoint.protocol());
-        impl_->acceptor.set_option(net::socket_base::reuse_address(true));
-        impl_->acceptor.bind(endpoint);
-        impl_->acceptor.listen();
+        impl_->listen(port);
     } catch (const boost::system::system_error& e) {
         throw std::runtime_error(
             fmt::format("cannot listen at {}, port {}: {}", address, port, e.code().message()));
@@ -312,29 +408,70 @@ Server::Server(const std::string& address, int port) : impl_(std::make_unique<Im
 }
 
 Server::~Server() {
-    stop();
+    impl_->end();
 }
 
 int Server::port() const {
     return impl_->acceptor.local_endpoint().port();
 }
 
-std::string Server::url() const {
+bool Server::is_local() const {
+    return impl_->acceptor.local_endpoint().address().is_loopback();
+}
+
+namespace {
+
+/// The addresses of the machine, without those that are valid in one link only; the loopback address last.
+std::vector<std::string> own_addresses(bool with_v6) {
+    std::vector<std::string> addresses, loopback;
+    ifaddrs* list = nullptr;
+    if (getifaddrs(&list) != 0) return {"127.0.0.1"};
+    for (const ifaddrs* i = list; i; i = i->ifa_next) {
+        if (!i->ifa_addr || !(i->ifa_flags & IFF_UP)) continue;
+        net::ip::address address;
+        if (i->ifa_addr->sa_family == AF_INET) {
+            const auto* v4 = reinterpret_cast<const sockaddr_in*>(i->ifa_addr);
+            address = net::ip::address_v4(ntohl(v4->sin_addr.s_addr));
+        } else if (i->ifa_addr->sa_family == AF_INET6 && with_v6) {
+            net::ip::address_v6::bytes_type bytes;
+            const auto* v6 = reinterpret_cast<const sockaddr_in6*>(i->ifa_addr);
+            std::copy_n(v6->sin6_addr.s6_addr, bytes.size(), bytes.begin());
+            address = net::ip::address_v6(bytes);
+            if (address.to_v6().is_link_local()) continue;
+        } else {
+            continue;
+        }
+        (address.is_loopback() ? loopback : addresses).push_back(text_of(address));
+    }
+    freeifaddrs(list);
+    addresses.insert(addresses.end(), loopback.begin(), loopback.end());
+    return addresses;
+}
+
+}  // namespace
+
+std::string Server::url(const std::string& host) const {
     // The brackets of IPv6 addresses keep their colons apart from that of the port.
-    const bool has_colons = impl_->address.find(':') != std::string::npos;
-    return "http://" + (has_colons ? "[" + impl_->address + "]" : impl_->address) + ":" +
-           std::to_string(port());
+    return host.find(':') != std::string::npos ? fmt::format("http://[{}]:{}", host, port())
+                                               : fmt::format("http://{}:{}", host, port());
 }
 
-void Server::start(Handler& handler) {
-    impl_->handler = &handler;
-    impl_->accept();
-    impl_->thread = std::thread([this] { impl_->io.run(); });
+std::vector<std::string> Server::urls() const {
+    const auto address = impl_->acceptor.local_endpoint().address();
+    std::vector<std::string> urls;
+    if (!address.is_unspecified()) return {url(impl_->address)};
+    for (const std::string& own : own_addresses(address.is_v6())) urls.push_back(url(own));
+    return urls;
 }
 
-void Server::stop() {
-    impl_->io.stop();
-    if (impl_->thread.joinable()) impl_->thread.join();
+Server::Serving Server::start(Handler& handler) {
+    impl_->shared.handler = &handler;
+    impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
+    return Serving(*this);
+}
+
+Server::Serving::~Serving() {
+    server_.impl_->end();
 }
 
 ParsedRequest parse_request(std::string_view bytes) {

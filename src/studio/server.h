@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "studio/http.h"
 
@@ -10,23 +11,44 @@ namespace etendue {
 
 class Server {
 public:
-    static constexpr int kMostConnections = 64, kMostEventStreams = 4;
+    /// Connections on which a request had the token; further ones are refused.
+    static constexpr int kMostConnections = 64;
+    /// Other connections. A further one takes the place of the oldest, so that nobody without the token keeps others out,
+    /// or takes all of the program's file descriptors.
+    static constexpr int kMostStrangers = 32;
+    static constexpr int kMostEventStreams = 4;
     static constexpr double kTimeout =
         10;  ///< Seconds without progress after which a connection is closed.
 
-    /// Listens at the address; port 0 means any free one. Throws std::runtime_error where that is impossible.
+    /// Listens at an address, or that of a host name; port 0 means any free one. Throws std::runtime_error where that is
+    /// impossible.
     Server(const std::string& address, int port);
     ~Server();
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;
 
     int port() const;
-    /// `http://address:port`
-    std::string url() const;
-    /// Serves from now on; `handler` must live until stop().
-    void start(Handler& handler);
-    /// Ends the thread. Replies that come later are lost.
-    void stop();
+    /// Whether only this machine can reach it.
+    bool is_local() const;
+    /// `http://host:port`
+    std::string url(const std::string& host) const;
+    /// The same with its address, or each address of the machine if it listens at all of them.
+    std::vector<std::string> urls() const;
+
+    /// The server serves while this exists. Replies that come later are lost.
+    class Serving {
+    public:
+        Serving(const Serving&) = delete;
+        Serving& operator=(const Serving&) = delete;
+        ~Serving();
+
+    private:
+        friend Server;
+        explicit Serving(Server& server) : server_(server) {}
+        Server& server_;
+    };
+    /// Once. `handler` must outlive the result.
+    [[nodiscard]] Serving start(Handler& handler);
 
 private:
     struct Impl;

@@ -55,6 +55,11 @@ public:
         return at != std::string::npos &&
                (std::stoull(status.substr(at + mark.size(), 16), nullptr, 16) >> (SIGINT - 1) & 1);
     }
+    /// Number of its file descriptors.
+    int open_files() const {
+        const std::filesystem::directory_iterator all("/proc/" + std::to_string(pid_) + "/fd");
+        return int(std::distance(begin(all), end(all)));
+    }
     /// Its output on standard error so far.
     std::string errors() const { return read_text(err_); }
 

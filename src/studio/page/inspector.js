@@ -54,7 +54,8 @@ export class Inspector {
         const request = ++this.request, {x, y, run} = this.pixel;
         this.of = run;
         this.message.className = '';
-        this.message.textContent = 'tracing …';
+        // Methods that share light paths answer between two passes.
+        this.message.textContent = 'tracing, or waiting for the end of the pass …';
         try {
             const r = await this.server.post('/v1/replay', {x, y, run, passes: Number(this.passes.value), splats: this.splats.checked});
             if (request !== this.request) return;

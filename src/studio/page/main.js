@@ -20,10 +20,12 @@ let state = null;
 const runs = new Map();
 /**
  * What the two places of the view show.
- * @typedef {{run: number, view: string, passes: number, isAsked: boolean, busy: boolean, again: boolean}} Shown
+ * @typedef {{run: number, view: string, passes: number, isAsked: boolean, busy: boolean, again: boolean, isRefused: boolean}} Shown
  */
 /** @type {[Shown, Shown | null]} */
-const shown = [{run: 0, view: 'image', passes: 0, isAsked: false, busy: false, again: false}, null];
+const shown = [{run: 0, view: 'image', passes: 0, isAsked: false, busy: false, again: false, isRefused: false}, null];
+/** The pictures that are drawn there, in words. They stay until those that are to be shown have come. */
+const drawn = ['', ''];
 /** @type {Space | null} */
 let space = null;
 /** @type {PathEditor | null} */
@@ -78,7 +80,7 @@ const kLabels = {image: '', error: 'relative standard error', first: 'first pict
 async function refresh(place) {
     const s = shown[place];
     if (s?.busy) s.again = true;
-    if (!s || s.busy || document.hidden || !view.hasGraphics || !state?.scene) return;
+    if (!s || s.busy || s.isRefused || document.hidden || !view.hasGraphics || !state?.scene) return;
     const isOfRun = s.run > 0 && (['image', 'error', 'variance'].includes(s.view) || s.view.includes(':'));
     if (!isOfRun && s.passes > 0) return;
     const run = runs.get(s.run);
@@ -91,20 +93,24 @@ async function refresh(place) {
         const isMade = isOfRun || s.view !== 'image';
         // Coarse first.
         let picture = s.passes === 0 && isMade && pixels > kCoarse ? await server.image({...query, level: 2}) : null;
-        if (picture && shown[place] === s) view.show(place, picture);
+        if (picture && shown[place] === s) draw(place, picture, textOf(s, picture.passes));
         picture = (isMade ? await server.image(query) : null) ?? picture;
         if (shown[place] !== s) return;
         s.isAsked = picture === null;
         if (picture) {
             s.passes = Math.max(1, picture.passes);
-            view.show(place, picture);
-            label();
+            draw(place, picture, textOf(s, picture.passes));
             if (isOfRun && place === 0) showPixel();
         } else if (s.passes === 0 && place === 0 && s.view === 'image' && !view.pictures[0]) {
             const first = await server.image({view: 'first'});
-            if (first && s.passes === 0 && shown[0] === s) view.show(0, first), label();
+            if (first && s.passes === 0 && shown[0] === s) draw(0, first, kLabels.first);
         }
     } catch (e) {
+        if (e instanceof Refusal && e.status === 409 && shown[place] === s) {
+            // An image of another size, as of a run of an earlier version of the scene.
+            s.isRefused = true;
+            draw(place, null, '');
+        }
         if (e instanceof Refusal && e.status !== 503) banner('image', e.message, 'Dismiss', () => banner('image', ''));
     } finally {
         s.busy = false;
@@ -121,23 +127,37 @@ async function refresh(place) {
  */
 const optionText = view => [...tools.view.options].find((/** @type {any} */ o) => o.value === view)?.textContent ?? view;
 
+/** @param {Shown} s @param {number} passes */
+function textOf(s, passes) {
+    if (s.view === 'reference') return 'reference';
+    return [s.run > 0 ? `run ${s.run}` : '', /** @type {any} */ (kLabels)[s.view] ?? optionText(s.view), s.run > 0 && passes > 0 ? `${passes} spp` : ''].filter(Boolean).join(', ');
+}
+
+/** @param {0 | 1} place @param {import('./server.js').Picture | null} picture @param {string} text */
+function draw(place, picture, text) {
+    view.show(place, picture);
+    drawn[place] = text;
+    label();
+}
+
 function label() {
-    const [a, b] = shown;
-    const text = (/** @type {Shown} */ s) => s.view === 'reference' ? 'reference'
-        : [s.run > 0 ? `run ${s.run}` : '', /** @type {any} */ (kLabels)[s.view] ?? optionText(s.view), s.run > 0 && s.passes > 0 ? `${s.passes} spp` : ''].filter(Boolean).join(', ');
-    const first = a.passes === 0 && view.pictures[0] ? kLabels.first : text(a);
-    at('label').textContent = b ? `${view.isFlipped ? 'right | left' : 'left | right'}: ${first} | ${text(b)}` : first;
+    const texts = shown.map((s, i) => !s ? '' : s.passes > 0 || s.isRefused || (i === 0 && drawn[0] === kLabels.first) ? drawn[i]
+        : [drawn[i], `${textOf(s, 0) || 'the image'} is awaited`].filter(Boolean).join('; '));
+    at('label').textContent = shown[1] ? `${view.isFlipped ? 'right | left' : 'left | right'}: ${texts[0]} | ${texts[1]}` : texts[0];
 }
 
 /** @param {0 | 1} place @param {number} run @param {string} what */
 function showIn(place, run, what) {
-    if (place === 0 || run > 0 || what === 'reference') shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false, again: false};
+    if (place === 0 || run > 0 || what === 'reference') shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false, again: false, isRefused: false};
     else shown[1] = null;
     tools.measured.textContent = '';
     tools.measure.disabled = !shown[1];
-    if (place === 1 && !shown[1]) view.show(1, null);
-    refresh(place).then(label);
+    if (place === 1 && !shown[1]) draw(1, null, '');
+    label();
+    refresh(place);
     updateRuns();
+    // Another run has other techniques.
+    if (place === 0 && tools.listed?.run !== run) updateViewOptions().catch(() => {});
 }
 
 let pixelRequest = 0;
@@ -187,9 +207,9 @@ async function measure() {
 
 function makeTools() {
     const number = (/** @type {any} */ properties) => element('input', {type: 'range', ...properties});
-    tools.exposure = number({id: 'exposure', min: -12, max: 12, step: 0.25, value: 0, oninput: () => setExposure(Number(tools.exposure.value))});
+    tools.exposure = number({id: 'exposure', min: -kMostStops, max: kMostStops, step: 0.25, value: 0, oninput: () => setExposure(Number(tools.exposure.value))});
     tools.exposureText = element('output', {textContent: '0'});
-    tools.view = element('select', {id: 'view-choice', onchange: () => showIn(0, shown[0].run || newest(), tools.view.value)});
+    tools.view = element('select', {id: 'view-choice', onfocus: () => updateViewOptions().catch(() => {}), onchange: () => showIn(0, shown[0].run || newest(), tools.view.value)});
     tools.mode = element('select', {id: 'mode', onchange: () => { view.mode = Number(tools.mode.value); view.redraw(); }},
         ['colours', 'false colours', 'difference'].map((t, i) => element('option', {value: i, textContent: t})));
     tools.against = element('select', {id: 'against', onchange: () => {
@@ -207,9 +227,12 @@ function makeTools() {
         tools.measure, tools.measured);
 }
 
+/** So many that scenes in any units can be seen. */
+const kMostStops = 24;
+
 /** @param {number} stops */
 function setExposure(stops) {
-    view.exposure = Math.min(Math.max(stops, -12), 12);
+    view.exposure = Math.min(Math.max(stops, -kMostStops), kMostStops);
     tools.exposure.value = view.exposure;
     tools.exposureText.textContent = String(view.exposure);
     view.redraw();
@@ -244,16 +267,19 @@ async function updateViewOptions() {
     /** @type {[string, string][]} */
     const options = [['image', 'image'], ['error', 'relative error'], ...state.layers.map((/** @type {any} */ l) => [l.name, l.name])];
     const run = runs.get(shown[0].run);
+    tools.listed = {run: shown[0].run, passes: run?.passes ?? 0};
     if (run?.techniques > 0 && run.passes > 0) {
         const {techniques} = await server.get(`/v1/techniques?run=${run.id}`);
         const lengths = [...new Set(techniques.map((/** @type {any} */ t) => t.edges))].sort((a, b) => a - b);
         for (const edges of lengths) options.push([`length:${edges}`, `paths of ${edges} edges`]);
         for (const t of techniques) {
             const text = `${t.strategy} s=${t.s} t=${t.t} (${t.edges} edges)`;
-            options.push([`technique:${t.index}`, `${text}, weighted`], [`unweighted:${t.index}`, `${text}, unweighted`]);
+            options.push([`technique:${t.key}`, `${text}, weighted`], [`unweighted:${t.key}`, `${text}, unweighted`]);
         }
+        if (tools.listed.run !== shown[0].run) return;
     }
     setOptions(tools.view, options, 'image');
+    if (shown[0].view !== tools.view.value) showIn(0, shown[0].run, tools.view.value);
 }
 
 // ---------------------------------------------------------------------------------------- runs
@@ -270,11 +296,24 @@ function updateRuns() {
     if (pane === 'image') drawPlot(at('plot'), all);
 }
 
+/** @param {number} run @param {string} name */
+async function save(run, name) {
+    const send = (/** @type {boolean} */ overwrite) => server.post('/v1/save', {run, file: name, overwrite});
+    const {file, passes} = await send(false).catch(e => {
+        if (e instanceof Refusal && e.status === 409 && confirm(`${e.message}. Replace it?`)) return send(true);
+        throw e;
+    });
+    const text = `${file}: ${passes} spp saved.`, kSeconds = 6;
+    banner('saved', text);
+    at('spoken').textContent = text;
+    setTimeout(() => banner('saved', ''), 1000 * kSeconds);
+}
+
 /** @param {string} action @param {number} run */
 function act(action, run) {
     if (action === 'save') {
         const name = prompt('Name of the file in the output folder (.exr, .pfm, .hdr or .png)', `run-${run}.exr`);
-        if (name) report(server.post('/v1/save', {run, file: name}));
+        if (name) report(save(run, name));
         return;
     }
     const r = runs.get(run);
@@ -297,12 +336,13 @@ async function start(request) {
 // ---------------------------------------------------------------------------------------- state
 
 async function update() {
-    const before = state?.scene_version ?? 0;
+    const before = state?.scene_version ?? 0, problemBefore = state?.reference_problem ?? '';
     state = await server.get('/v1/state');
     for (const r of state.runs) runs.set(r.id, r);
     for (const id of runs.keys()) if (!state.runs.some((/** @type {any} */ r) => r.id === id)) runs.delete(id);
     at('scene-name').textContent = state.scene ? `${state.scene_file}, ${state.scene.width} × ${state.scene.height}` : `${state.scene_file} is being loaded`;
     banner('load', state.load_error);
+    if (state.reference_problem !== problemBefore) banner('reference', state.reference_problem, 'Dismiss', () => banner('reference', ''));
     if (state.scene) view.setSize(state.scene.width, state.scene.height);
     if (!tools.form) {
         tools.form = new RunForm(at('run-form'), state.integrators, {start: async request => { await start(request); }});
@@ -343,7 +383,9 @@ async function onEvent(event) {
     banner('changed', event.scene_changed ? 'The scene changed on the disk.' : '', 'Load it again', () => report(server.post('/v1/run', {action: 'reload'})));
     if (shown[0].run === 0 && runs.size > 0) showIn(0, newest(), 'image');
     if (shown[0].run > 0 && !runs.has(shown[0].run) && runs.size > 0) showIn(0, newest(), 'image');
-    if (runs.get(shown[0].run)?.techniques > 0 && !tools.view.dataset.key?.includes('technique:')) await updateViewOptions();
+    // More techniques are found as the run goes on.
+    const run = runs.get(shown[0].run);
+    if (run?.techniques > 0 && run.passes > 0 && (!tools.view.dataset.key?.includes('technique:') || run.passes >= 2 * tools.listed.passes)) await updateViewOptions();
     updateRuns();
     editor?.onEvent();
     await Promise.all([refresh(0), refresh(1)]);

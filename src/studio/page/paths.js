@@ -14,6 +14,12 @@ import {coneOutline} from './space.js';
  * @typedef {{isRemembered: boolean}} Drag
  */
 
+/**
+ * Of the paths that are switched off.
+ * @param {string} file
+ */
+const offFile = file => file.replace(/\.json$/, '') + '-off.json';
+
 const kColors = [[1, 0.75, 0.3], [0.5, 0.8, 1], [0.6, 1, 0.6], [1, 0.6, 0.9], [1, 1, 0.5]];
 
 export class PathEditor {
@@ -27,6 +33,8 @@ export class PathEditor {
         this.tell = tell;
         this.file = 'paths.json';
         this.etags = {on: '', off: ''};
+        /** Whether the file of the paths that are switched off has some. */
+        this.hasOff = false;
         /** @type {Path[]} */
         this.paths = [];
         this.chosen = -1;
@@ -48,7 +56,7 @@ export class PathEditor {
         this.spp = element('input', {id: 'gain-spp', type: 'number', min: 1, value: 64});
         this.seeds = element('input', {id: 'gain-seeds', type: 'number', min: 3, max: 64, value: 8});
         const fileInput = element('input', {id: 'paths-file', value: this.file, size: 14});
-        fileInput.onchange = () => { this.file = fileInput.value; this.open(); };
+        fileInput.onchange = () => this.open(fileInput.value).then(() => { fileInput.value = this.file; });
         parent.append(
             element('div', {className: 'bar'}, [element('label', {}, ['file ', fileInput])]),
             element('div', {className: 'bar'}, [button('New path', 'N', () => this.begin()), button('Undo', 'Ctrl+Z', () => this.undo()), button('Redo', 'Ctrl+Y', () => this.redo()),
@@ -69,7 +77,7 @@ export class PathEditor {
             },
             release: () => { this.drag = null; },
         };
-        this.open();
+        this.open(this.file);
     }
 
     /**
@@ -85,9 +93,17 @@ export class PathEditor {
         return this.queue;
     }
 
-    open() {
+    /**
+     * Shows the paths of a file. Edits that wait belong to the one before it.
+     * @param {string} file
+     */
+    open(file) {
         return this.run(async () => {
-            const [on, off] = await Promise.all([this.server.paths(this.file), this.server.paths(this.offFile())]);
+            const [on, off] = await Promise.all([this.server.paths(file), this.server.paths(offFile(file))]);
+            // Undo would bring the paths of one file into another.
+            if (file !== this.file) this.done = [], this.undone = [];
+            this.file = file;
+            this.hasOff = off.list.length > 0;
             this.etags = {on: on.etag, off: off.etag};
             const read = (/** @type {any[]} */ list, /** @type {boolean} */ isOn) => list.map(p => ({name: '', cone: 1, ...p, on: isOn}));
             this.paths = [...read(on.list, true), ...read(off.list, false)];
@@ -96,8 +112,6 @@ export class PathEditor {
             await this.check();
         });
     }
-    offFile() { return this.file.replace(/\.json$/, '') + '-off.json'; }
-
     snapshot() { return JSON.stringify(this.paths.map(({verdict, ...p}) => p)); }
 
     /** Keeps the state before an edit for undo. */
@@ -148,7 +162,7 @@ export class PathEditor {
         try {
             this.etags.on = await this.server.putPaths(this.file, list(true), this.etags.on);
             if (list(false).length > 0 || this.hasOff) {
-                this.etags.off = await this.server.putPaths(this.offFile(), list(false), this.etags.off);
+                this.etags.off = await this.server.putPaths(offFile(this.file), list(false), this.etags.off);
                 this.hasOff = true;
             }
             this.status.textContent = `${list(true).length} paths saved in ${this.file}`;
@@ -156,7 +170,7 @@ export class PathEditor {
             if (!(e instanceof Refusal) || e.status !== 409) throw e;
             this.tell.fail('The paths were edited elsewhere; this is the newer list. Undo brings back yours.');
             this.done.push(this.snapshot());
-            this.open();
+            this.open(this.file);
         }
     }
 

@@ -23,8 +23,9 @@ export function decodePicture(bytes) {
     const v = new DataView(bytes);
     if (bytes.byteLength < 64 || v.getUint32(0, true) !== 0x444e5445) throw new Error('this is no image');
     if (v.getUint32(4, true) !== 1) throw new Error('the server speaks another version; reload the page');
+    // The scale may be negative.
     const [run, passes, x, y, rectWidth, rectHeight, level, channels, scale, width, height, columns, rows] =
-        Array.from({length: 13}, (_, i) => v.getUint32(8 + 4 * i, true));
+        Array.from({length: 13}, (_, i) => i === 8 ? v.getInt32(8 + 4 * i, true) : v.getUint32(8 + 4 * i, true));
     return {run, passes, x, y, rectWidth, rectHeight, level, channels, scale, width, height, columns, rows,
         halves: new Uint16Array(bytes, 64)};
 }

@@ -162,7 +162,7 @@ TEST(DrawnShapes, KeepTheirBoundsAndTheirLimit) {
     for (const DrawnShape& s : all) EXPECT_EQ(s.places.size(), 1u);
     size_t triangles = 0;
     for (const DrawnShape& s : drawn_shapes(scene, 500)) triangles += s.triangles.size() / 3;
-    EXPECT_LT(triangles, 2400u);
+    EXPECT_LE(triangles, 500u);
 }
 
 /// A wavy surface of 2 · edge² triangles in an OBJ file, which is gone when the scene is built.
@@ -221,6 +221,35 @@ TEST(DrawnShapes, HaveFewerTrianglesInMotion) {
     EXPECT_LE(triangles, 20'000u);
     // Others have too few triangles for a coarse level.
     for (const DrawnShape& s : drawn) EXPECT_TRUE(&s == &mesh || s.coarse_triangles.empty());
+}
+
+/// Many small shapes keep the limit together; the large ones stay.
+TEST(DrawnShapes, OfManySmallShapesKeepTheLimit) {
+    std::string spheres, cubes;
+    constexpr int kCount = 60;
+    for (int i = 0; i < kCount; ++i) {
+        const std::string x = std::to_string(0.03 * i - 0.9), r = std::to_string(0.01 + 1e-4 * i);
+        spheres += sphere(x + ",0,0", r, "");
+        cubes += "<shape type=\"cube\"><transform name=\"to_world\"><scale value=\"" + r +
+                 "\"/><translate x=\"" + x + "\"/></transform></shape>";
+    }
+    const auto triangles_of = [](const std::vector<DrawnShape>& drawn) {
+        size_t triangles = 0;
+        for (const DrawnShape& s : drawn) triangles += s.triangles.size() / 3;
+        return triangles;
+    };
+    for (const std::string& small : {spheres, cubes})
+        for (const size_t most : {20'000u, 3'000u, 200u}) {
+            const Scene scene = build(sensor("0,0,3", "0,0,0", 8) + room() + area_lamp() + small);
+            const auto drawn = drawn_shapes(scene, most);
+            EXPECT_LE(triangles_of(drawn), most);
+            EXPECT_GT(triangles_of(drawn), std::min<size_t>(most, 700) / 10);
+            // The walls, the lamp, and as many of the others as can be.
+            EXPECT_GE(drawn.size(), std::min(size_t(66), 6 + most / 70));
+            for (uint32_t i = 0; i < 6; ++i) EXPECT_EQ(drawn[i].shape, i);
+            for (const DrawnShape& s : drawn)
+                for (const uint32_t i : s.triangles) ASSERT_LT(i, s.positions.size() / 3);
+        }
 }
 
 /// A sphere about the origin, placed three times, one of them larger: each place has what rays hit there.

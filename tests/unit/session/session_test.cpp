@@ -2,12 +2,18 @@
 
 #include "session/session.h"
 
+#include <unistd.h>
+
+#include <atomic>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <future>
 #include <random>
 
 #include <gtest/gtest.h>
 
+#include "no_memory.h"
 #include "session/workers.h"
 #include "test_scenes.h"
 
@@ -157,8 +163,8 @@ TEST(Session, SavesBetweenPasses) {
         (std::filesystem::temp_directory_path() / "etendue-session-test.pfm").string();
     std::atomic<bool> is_done{false};
     std::string error;
-    session.save(run, file, [&](const std::string& e) {
-        error = e;
+    session.save(run, file, false, [&](const Saved& s) {
+        error = s.error;
         is_done = true;
     });
     ASSERT_TRUE(wait_for([&] { return is_done.load(); }));
@@ -233,9 +239,7 @@ TEST(Session, AStopFollowsTheResumptionBefore) {
     for (int i = 0; i < 20; ++i) {
         session.resume(run, {});
         session.stop(run);
-        std::atomic<bool> is_idle{false};
-        session.save(run, "", [&](const std::string&) { is_idle = true; });
-        ASSERT_TRUE(wait_for([&] { return is_idle.load(); }));  // after the commands before
+        session.settle();  // after the commands before
         ASSERT_TRUE(wait_for(is_stopped));
     }
 }
@@ -359,6 +363,213 @@ TEST(Session, ReplaysTheLastPass) {
     EXPECT_EQ(session.status(run).state, RunState::Rendering);
 }
 
+// -- What fails.
+
+/// No image can be copied when the run ends, or is stopped: the run keeps its passes, which are shown once there is
+/// memory again.
+TEST(SessionFailures, ARunOutlivesAPictureWithoutMemory) {
+    for (const bool stops : {false, true}) {
+        Session session(small_room, 1);
+        ASSERT_TRUE(wait_for_scene(session));
+        const int run = session.start(request("path", 1));
+        ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+        // Its reader keeps the memory, so that another picture needs new one.
+        const auto first = session.snapshot(run);
+        {
+            const NoMemoryFor images(size_t(24 * 24) * sizeof(Rgb));
+            RenderLimits more;
+            more.spp = stops ? 1u << 30 : 5;
+            session.resume(run, more);
+            ASSERT_TRUE(wait_for([&] { return session.status(run).passes >= 5; }));
+            if (stops) session.stop(run);
+            const RunState expected = stops ? RunState::Stopped : RunState::Finished;
+            ASSERT_TRUE(wait_for([&] { return session.status(run).state == expected; }))
+                << to_string(session.status(run).state);
+            EXPECT_EQ(session.snapshot(run), first);
+            session.settle();
+        }
+        const uint64_t passes = session.status(run).passes;
+        ASSERT_TRUE(wait_for([&] { return session.snapshot(run)->passes == passes; }));
+        RenderLimits more;
+        more.spp = passes + 2;
+        session.resume(run, more);
+        ASSERT_TRUE(wait_for([&] { return session.status(run).passes == passes + 2; }));
+    }
+}
+
+TEST(SessionFailures, TechniqueImagesWithoutMemoryComeLater) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    RunRequest r = request("bdpt", 3);
+    r.technique_depth = 3;
+    const int run = session.start(r);
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    session.settle();
+    {
+        const NoMemoryFor images(size_t(24 * 24) * sizeof(Rgb));
+        EXPECT_EQ(session.techniques(run), nullptr);
+        session.settle();
+        EXPECT_EQ(session.techniques(run), nullptr);
+        session.settle();
+    }
+    ASSERT_TRUE(wait_for([&] { return session.techniques(run) != nullptr; }));
+    EXPECT_EQ(session.status(run).state, RunState::Finished);
+}
+
+TEST(SessionFailures, ARunWithoutMemoryCanBeContinued) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    int run = 0;
+    {
+        const NoMemoryFor images(size_t(24 * 24) * sizeof(Rgb));
+        run = session.start(request("path", 4));
+        ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Failed; }));
+        EXPECT_EQ(session.status(run).message, "not enough memory");
+    }
+    session.resume(run, {});
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    EXPECT_EQ(session.status(run).passes, 4u);
+    EXPECT_EQ(session.status(run).message, "");
+}
+
+/// The file of user paths is gone when another seed needs it: the run fails, keeps the seeds that it has, and continues
+/// with the file.
+TEST(SessionFailures, AFailedSeedCanBeRepeated) {
+    const char* paths = R"([{"points": [[0, 0.98, 0], [0.3, -1, 0.2]]}])";
+    const std::filesystem::path file = std::filesystem::temp_directory_path() /
+                                       ("etendue-session-" + std::to_string(::getpid()) + ".json");
+    std::ofstream(file) << paths;
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    RunRequest r = request("mlt:groups=2,chains=16", 1);
+    r.seeds = 2;
+    r.user_paths = file.string();
+    const int run = session.start(r);
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }))
+        << session.status(run).message;
+    const int other = session.start(request("path", 1u << 30));
+    std::filesystem::remove(file);
+    session.resume(run, {});
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Failed; }));
+    EXPECT_NE(session.status(run).message.find(file.filename().string()), std::string::npos)
+        << session.status(run).message;
+    EXPECT_EQ(session.seed_series(run)->luminance.size(), 2u);
+    const uint64_t passes = session.status(other).passes;
+    EXPECT_TRUE(wait_for([&] { return session.status(other).passes > passes; }));
+    session.stop(other);
+    std::ofstream(file) << paths;
+    session.resume(run, {});
+    EXPECT_TRUE(wait_for([&] { return session.status(run).finished_seeds == 4; }));
+    std::filesystem::remove(file);
+}
+
+// -- Long passes.
+
+/// A scene whose passes take a while, compared with what is asked for in the meantime.
+Scene slow_room() {
+    return build(sensor("0,0,3.5", "0,0,0", 200) + room() + area_lamp());
+}
+
+/// Saving does not wait for the pass in flight: the file has the passes that are shown.
+TEST(Session, SavesDuringAPass) {
+    Session session(slow_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(request("bdpt:max_depth=12", 1u << 30));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).passes == 1; }));
+    const std::string file =
+        (std::filesystem::temp_directory_path() / "etendue-session-slow.pfm").string();
+    std::promise<Saved> answer;
+    session.save(run, file, true, [&](const Saved& s) { answer.set_value(s); });
+    const Saved saved = answer.get_future().get();
+    EXPECT_EQ(saved.error, "");
+    EXPECT_EQ(saved.passes, 1u);
+    EXPECT_EQ(session.status(run).passes, 1u);
+    EXPECT_TRUE(std::filesystem::remove(file));
+    session.stop_all(true);
+}
+
+TEST(Session, LoadsDuringAPass) {
+    std::atomic<int> loads{0};
+    Session session(
+        [&] {
+            ++loads;
+            return slow_room();
+        },
+        1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(request("bdpt:max_depth=12", 1u << 30));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).passes == 1; }));
+    session.reload();
+    ASSERT_TRUE(wait_for([&] { return session.scene_version() == 2; }));
+    EXPECT_EQ(session.status(run).passes, 1u);
+    EXPECT_FALSE(session.status(run).is_of_this_scene);
+    session.stop_all(true);
+}
+
+TEST(Session, ReplaysNoPixelOutsideOfTheImage) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(request("vcm", 2));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    for (const uint64_t pixel : {uint64_t(24 * 24), uint64_t(1) << 40}) {
+        std::promise<std::string> answer;
+        session.replay_last(run, pixel, 10, [&](const Replay&, const std::string& error) {
+            answer.set_value(error);
+        });
+        EXPECT_NE(answer.get_future().get().find("pixel"), std::string::npos);
+    }
+}
+
+/// Scenes of alternating size are loaded while runs are started: a run that is said to be of the scene has its size.
+TEST(Session, RunsBelongToTheSceneTheyAreStartedWith) {
+    std::atomic<int> loads{0};
+    Session session(
+        [&] {
+            return build(sensor("0,0,3.5", "0,0,0", ++loads % 2 == 0 ? 8 : 16) + room() +
+                         area_lamp());
+        },
+        1);
+    ASSERT_TRUE(wait_for_scene(session));
+    for (int i = 0; i < 30; ++i) {
+        session.reload();
+        for (int j = 0; j < 4; ++j) {
+            const int run = session.start(request("path", 1));
+            ASSERT_TRUE(wait_for([&] {
+                const RunState s = session.status(run).state;
+                return s == RunState::Finished || s == RunState::Stopped;
+            }));
+            const auto scene = session.scene();
+            const auto shown = session.snapshot(run);
+            if (shown && session.status(run).is_of_this_scene && session.scene() == scene) {
+                EXPECT_EQ(shown->width, scene->film().crop_width);
+            }
+            session.remove(run);
+        }
+    }
+}
+
+/// With the first seed under way, its image is shown and saved.
+TEST(Session, RunsWithSeveralSeedsShowAllTheirPasses) {
+    Session session(small_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    RunRequest r = request("path", 1u << 30);
+    r.seeds = 2;
+    const int run = session.start(r);
+    ASSERT_TRUE(wait_for([&] {
+        const auto shown = session.snapshot(run);
+        return shown && shown->passes > 2;
+    }));
+    session.stop(run);
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Stopped; }));
+    const uint64_t passes = session.status(run).passes;
+    EXPECT_EQ(session.snapshot(run)->passes, passes);
+    r.limits.spp = passes;
+    const std::vector<Rgb> expected = plain_image(small_room(), r);
+    for (size_t i = 0; i < expected.size(); ++i)
+        for (int c = 0; c < 3; ++c)
+            ASSERT_NEAR(session.snapshot(run)->mean[i][c], expected[i][c], 1e-5f);
+}
+
 TEST(SnapshotBudget, KeepsTheShare) {
     SnapshotBudget budget;
     SnapshotBudget::Clock::time_point now{};
@@ -421,7 +632,8 @@ TEST(SnapshotPool, GivesNoMemoryAwayThatAReaderHolds) {
 TEST(Workers, RefuseWhenTooManyWait) {
     std::atomic<bool> may_end{false};
     std::atomic<int> ended{0};
-    Workers workers;
+    constexpr size_t kThreads = 2;
+    Workers workers(kThreads);
     size_t taken = 0;
     for (int i = 0; i < 100; ++i)
         taken += workers.post([&] {
@@ -429,7 +641,7 @@ TEST(Workers, RefuseWhenTooManyWait) {
             ++ended;
         });
     EXPECT_GE(taken, Workers::kMostWaiting);
-    EXPECT_LE(taken, Workers::kMostWaiting + Workers::kThreads);
+    EXPECT_LE(taken, Workers::kMostWaiting + kThreads);
     may_end = true;
     EXPECT_TRUE(wait_for([&] { return size_t(ended.load()) == taken; }));
 }

@@ -138,8 +138,9 @@ TEST(RectangleValues, LeaveOutPixelsThatAreNotFinite) {
 TEST(Images, KeepRectanglesLevelsAndLargeValues) {
     std::vector<Rgb> pixels;
     for (int i = 0; i < 15; ++i) pixels.push_back(Rgb(float(i), 1, 1e6f));
-    ImageHeader h{.run = 7, .passes = 3, .width = 5, .height = 3, .rect = {1, 1, 3, 2}, .level = 0};
-    const std::string whole = encode_image(h, pixels);
+    const PixelRows<Rgb> rows(pixels, 5, 3);
+    ImagePart part{.run = 7, .passes = 3, .rect = ImageRect{1, 1, 3, 2}, .level = 0};
+    const std::string whole = encode_image(part, rows);
     EXPECT_EQ(whole.size(), 64 + 3 * 2 * 3 * 2u);
     EXPECT_EQ(whole.substr(0, 4), "ETND");
     EXPECT_EQ(field_at(whole, 1), 7u);
@@ -148,17 +149,45 @@ TEST(Images, KeepRectanglesLevelsAndLargeValues) {
     EXPECT_GT(scale, 1);
     EXPECT_EQ(half_at(whole, 0) * scale, 6);
     EXPECT_NEAR(half_at(whole, 2) * scale, 1e6f, 1e3f);
-    h.level = 1;
-    const std::string coarse = encode_image(h, pixels);
+    part.level = 1;
+    const std::string coarse = encode_image(part, rows);
     EXPECT_EQ(coarse.size(), 64 + 2 * 1 * 3 * 2u);
     EXPECT_NEAR(half_at(coarse, 0) * scale, (6 + 7 + 11 + 12) / 4.0f, 0.01f);
     EXPECT_NEAR(half_at(coarse, 3) * scale, (8 + 13) / 2.0f, 0.01f);
     for (const ImageRect bad :
          {ImageRect{-1, 0, 1, 1}, ImageRect{0, 0, 6, 1}, ImageRect{4, 2, 2, 1},
           ImageRect{0, 0, 0, 1}, ImageRect{1, 1, 2147483647, 1}}) {
-        h.rect = bad;
-        EXPECT_THROW(check(h), std::runtime_error);
+        part.rect = bad;
+        EXPECT_THROW(encode_image(part, rows), std::runtime_error);
     }
+    for (const int level : {-1, 9})
+        EXPECT_THROW(encode_image({.run = 0, .passes = 0, .rect = {}, .level = level}, rows),
+                     std::runtime_error);
+    for (const auto& [width, height] : {std::pair{5, 4}, {4, 3}, {15, 2}, {-5, -3}})
+        EXPECT_THROW(PixelRows<Rgb>(pixels, width, height), std::logic_error);
+}
+
+TEST(Images, KeepDigitsOfSmallValues) {
+    for (const float largest : {1e-3f, 1e-9f, 1e-30f, 1e-37f, 1.0f, 65504.0f, 1e30f}) {
+        const std::vector<Rgb> pixels{Rgb(largest), Rgb(0.3f * largest), Rgb(-1e-3f * largest),
+                                      Rgb(0)};
+        const std::string body = encode_image({}, PixelRows<Rgb>(pixels, 2, 2));
+        for (size_t i = 0; i < 4; ++i)
+            EXPECT_NEAR(std::ldexp(half_at(body, 3 * i), int32_t(field_at(body, 9))), pixels[i].r,
+                        1e-3f * std::abs(pixels[i].r));
+    }
+    const std::vector<float> none(1);
+    EXPECT_EQ(half_at(encode_image({}, PixelRows<float>(none, 1, 1)), 0), 0);
+}
+
+TEST(RelativeErrors, OfOneChannelAndOfThree) {
+    Snapshot s;
+    s.width = 2, s.height = 1;
+    s.mean = {Rgb(1), Rgb(1)};
+    s.variance = {Rgb(0.04f), Rgb(0.04f, 0, 0)};
+    const std::vector<float> errors = relative_errors(s);
+    EXPECT_NEAR(errors[0], 0.2f, 1e-6f);
+    EXPECT_NEAR(errors[1], luminance(Rgb(0.2f, 0, 0)), 1e-6f);
 }
 
 }  // namespace

@@ -1,0 +1,36 @@
+// A file of its own: where the operators are inlined, GCC takes malloc and delete for a mismatch.
+
+#include "no_memory.h"
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+namespace {
+
+std::atomic<size_t> failing_size{0};  ///< 0: none.
+
+}  // namespace
+
+void* operator new(size_t size) {
+    if (size > 0 && size == failing_size.load(std::memory_order_relaxed)) throw std::bad_alloc();
+    if (void* p = std::malloc(size > 0 ? size : 1)) return p;
+    throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept {
+    std::free(p);
+}
+void operator delete(void* p, size_t) noexcept {
+    std::free(p);
+}
+
+namespace etendue::test {
+
+NoMemoryFor::NoMemoryFor(size_t size) {
+    failing_size = size;
+}
+NoMemoryFor::~NoMemoryFor() {
+    failing_size = 0;
+}
+
+}  // namespace etendue::test

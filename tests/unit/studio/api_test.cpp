@@ -1,0 +1,335 @@
+// What the protocol answers, without sockets: images of another size than the scene, files that exist, replays of runs of
+// an earlier scene.
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "image/image.h"
+#include "run_program.h"
+#include "studio/api.h"
+#include "test_scenes.h"
+
+namespace etendue::test {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+/// A session and its protocol; the size of the image can be changed before the scene is loaded again.
+class ApiTest : public ::testing::Test {
+protected:
+    void open(ApiOptions options = {}, const std::string& lamp = "12,11,9") {
+        lamp_ = lamp;
+        session.emplace([this] { return scene(); }, 1);
+        options.token = "secret";
+        options.scene_file = (folder.path() / "room.xml").string();
+        options.output_folder = folder.path().string();
+        api.emplace(*session, std::move(options));
+        ASSERT_TRUE(wait_for([&] { return session->scene() != nullptr; }));
+    }
+    Scene scene() const {
+        return build(sensor("0,0,3.5", "0,0,0", size) + room() + area_lamp(lamp_));
+    }
+    void reload(int new_size) {
+        size = new_size;
+        const uint64_t before = session->scene_version();
+        EXPECT_EQ(post("/v1/run", {{"action", "reload"}}).status, 200);
+        ASSERT_TRUE(wait_for([&] { return session->scene_version() > before; }));
+    }
+    template <class Condition>
+    static bool wait_for(const Condition& condition) {
+        for (int i = 0; i < 6000; ++i) {
+            if (condition()) return true;
+            std::this_thread::sleep_for(5ms);
+        }
+        return false;
+    }
+    Reply ask(const std::string& method, const std::string& target, const std::string& body = {},
+              const std::string& version = {}) {
+        std::promise<Reply> answer;
+        api->handle({.method = method,
+                     .target = target,
+                     .host = "localhost",
+                     .origin = {},
+                     .fetch_site = {},
+                     .authorization = "Bearer secret",
+                     .if_match = version,
+                     .body = body,
+                     .local_address = "127.0.0.1"},
+                    [&](Reply reply) { answer.set_value(std::move(reply)); });
+        return answer.get_future().get();
+    }
+    Reply get(const std::string& target) { return ask("GET", target); }
+    Reply post(const std::string& target, const json& body) {
+        return ask("POST", target, body.dump());
+    }
+    int start(const json& more) {
+        json request{{"action", "start"}, {"integrator", "path"}, {"spp", 2}};
+        request.update(more);
+        const Reply reply = post("/v1/run", request);
+        EXPECT_EQ(reply.status, 200) << reply.body;
+        return json::parse(reply.body).value("run", 0);
+    }
+    int finished_run(const json& more = json::object()) {
+        const int run = start(more);
+        EXPECT_TRUE(wait_for([&] { return session->status(run).state == RunState::Finished; }));
+        return run;
+    }
+    std::string saved(const std::string& name) const { return read_text(folder.path() / name); }
+
+    TemporaryFolder folder;
+    std::atomic<int> size = 16;
+    std::optional<Session> session;
+    std::optional<Api> api;
+
+private:
+    std::string lamp_;
+};
+
+uint32_t field_at(const std::string& body, size_t index) {
+    uint32_t value = 0;
+    std::memcpy(&value, body.data() + 4 + 4 * index, 4);
+    return value;
+}
+/// A value of an image as the page reads it.
+float value_at(const std::string& body, size_t index) {
+    uint16_t bits = 0;
+    std::memcpy(&bits, body.data() + 64 + 2 * index, 2);
+    return std::ldexp(float(Half(Half::FromBits, bits)), int32_t(field_at(body, 9)));
+}
+
+TEST_F(ApiTest, AReferenceOfAnotherSizeIsNotShown) {
+    for (const auto& [width, height] : {std::pair{8, 8}, {16, 8}, {8, 32}, {16, 17}}) {
+        session.reset();
+        open(
+            {.token = {},
+             .scene_file = {},
+             .output_folder = {},
+             .reference = RgbImage{width, height, std::vector<Rgb>(size_t(width) * size_t(height))},
+             .hosts = {}});
+        const Reply reply = get("/v1/image?view=reference");
+        EXPECT_EQ(reply.status, 409) << width << " x " << height;
+        const json state = json::parse(get("/v1/state").body);
+        EXPECT_EQ(state["has_reference"], false);
+        EXPECT_NE(state["reference_problem"].get<std::string>().find(std::to_string(width) + " × " +
+                                                                     std::to_string(height)),
+                  std::string::npos)
+            << state;
+        api.reset();
+    }
+}
+
+TEST_F(ApiTest, AReferenceOfTheSameSizeIsShown) {
+    open({.token = {},
+          .scene_file = {},
+          .output_folder = {},
+          .reference = RgbImage{16, 16, std::vector<Rgb>(256, Rgb(0.5f))},
+          .hosts = {}});
+    const Reply reply = get("/v1/image?view=reference");
+    ASSERT_EQ(reply.status, 200);
+    EXPECT_EQ(value_at(reply.body, 5), 0.5f);
+    EXPECT_EQ(json::parse(get("/v1/state").body)["has_reference"], true);
+    reload(20);
+    EXPECT_EQ(get("/v1/image?view=reference").status, 409);
+    EXPECT_EQ(json::parse(get("/v1/state").body)["has_reference"], false);
+}
+
+TEST_F(ApiTest, ImagesOfARunOfASceneOfAnotherSizeAreNotShown) {
+    open();
+    const int run = finished_run({{"integrator", "bdpt"}, {"techniques", 3}});
+    const std::string of_run = "&run=" + std::to_string(run);
+    ASSERT_TRUE(wait_for([&] { return get("/v1/image?view=length:2" + of_run).status == 200; }));
+    const json list =
+        json::parse(get("/v1/techniques?run=" + std::to_string(run)).body)["techniques"];
+    ASSERT_FALSE(list.empty());
+    std::vector<std::string> views{"image", "variance", "error", "length:2"};
+    for (const char* kind : {"technique:", "unweighted:"})
+        views.push_back(kind + list[0]["key"].get<std::string>());
+    for (const std::string& view : views)
+        EXPECT_EQ(get("/v1/image?view=" + view + of_run).status, 200) << view;
+    for (const int other : {24, 8}) {
+        reload(other);
+        for (const std::string& view : views)
+            EXPECT_EQ(get("/v1/image?view=" + view + of_run).status, 409) << view;
+    }
+    reload(16);
+    for (const std::string& view : views)
+        EXPECT_EQ(get("/v1/image?view=" + view + of_run).status, 200) << view;
+}
+
+/// A view is of the same technique, whichever others are found later.
+TEST_F(ApiTest, TechniquesAreNamedNotNumbered) {
+    open();
+    const int run = finished_run({{"integrator", "bdpt"}, {"techniques", 3}});
+    const std::string of_run = "&run=" + std::to_string(run);
+    json list;
+    ASSERT_TRUE(wait_for([&] {
+        list = json::parse(get("/v1/techniques?run=" + std::to_string(run)).body)["techniques"];
+        return !list.empty();
+    }));
+    const auto shown = session->techniques(run);
+    ASSERT_EQ(list.size(), shown->images.size());
+    for (size_t i = 0; i < list.size(); ++i) {
+        const Reply reply =
+            get("/v1/image?view=unweighted:" + list[i]["key"].get<std::string>() + of_run);
+        ASSERT_EQ(reply.status, 200) << list[i];
+        for (size_t pixel = 0; pixel < 256; ++pixel)
+            ASSERT_NEAR(value_at(reply.body, 3 * pixel), shown->images[i].unweighted[pixel].r,
+                        1e-3f * (1 + shown->images[i].unweighted[pixel].r));
+    }
+    EXPECT_EQ(get("/v1/image?view=technique:nothing" + of_run).status, 404);
+}
+
+/// Half floats have 5 bits of exponent: 6e-8 is the least value.
+TEST_F(ApiTest, DimImagesKeepTheirDigits) {
+    open({}, "1.2e-6,1.1e-6,9e-7");
+    const int run = finished_run();
+    const std::string of_run = "&run=" + std::to_string(run);
+    const auto shown = session->snapshot(run);
+    const Reply image = get("/v1/image?view=image" + of_run),
+                variance = get("/v1/image?view=variance" + of_run);
+    float largest = 0;
+    for (const Rgb v : shown->variance) largest = std::max({largest, v.r, v.g, v.b});
+    for (size_t pixel = 0; pixel < 256; ++pixel)
+        for (size_t c = 0; c < 3; ++c) {
+            const float mean = shown->mean[pixel][int(c)], squared = shown->variance[pixel][int(c)];
+            EXPECT_NEAR(value_at(image.body, 3 * pixel + c), mean, 2e-3f * mean);
+            EXPECT_NEAR(value_at(variance.body, 3 * pixel + c), squared,
+                        2e-3f * squared + 1e-9f * largest);
+        }
+}
+
+TEST_F(ApiTest, FilesAreNotReplacedUnasked) {
+    open();
+    const int run = finished_run();
+    std::ofstream(folder.path() / "mine.pfm") << "mine";
+    const Reply refused = post("/v1/save", {{"run", run}, {"file", "mine.pfm"}});
+    EXPECT_EQ(refused.status, 409);
+    EXPECT_NE(refused.body.find("mine.pfm"), std::string::npos) << refused.body;
+    EXPECT_EQ(saved("mine.pfm"), "mine");
+    EXPECT_EQ(post("/v1/save", {{"run", run}, {"file", "mine.pfm"}, {"overwrite", false}}).status,
+              409);
+    EXPECT_EQ(post("/v1/save", {{"run", run}, {"file", "mine.pfm"}, {"overwrite", "yes"}}).status,
+              422);
+    const Reply asked = post("/v1/save", {{"run", run}, {"file", "mine.pfm"}, {"overwrite", true}});
+    EXPECT_EQ(asked.status, 200) << asked.body;
+    EXPECT_EQ(saved("mine.pfm").substr(0, 2), "PF");
+    EXPECT_EQ(json::parse(asked.body)["passes"], 2);
+    // Neither links nor folders are replaced, nor written through.
+    std::ofstream(folder.path() / "secret") << "secret";
+    fs::create_symlink(folder.path() / "secret", folder.path() / "link.pfm");
+    fs::create_symlink(folder.path() / "nothing", folder.path() / "broken.pfm");
+    fs::create_directory(folder.path() / "folder.pfm");
+    for (const char* name : {"link.pfm", "broken.pfm", "folder.pfm"})
+        for (const bool overwrite : {false, true})
+            EXPECT_EQ(
+                post("/v1/save", {{"run", run}, {"file", name}, {"overwrite", overwrite}}).status,
+                409)
+                << name;
+    EXPECT_EQ(saved("secret"), "secret");
+    EXPECT_TRUE(fs::is_symlink(folder.path() / "link.pfm"));
+    EXPECT_FALSE(fs::exists(folder.path() / "nothing"));
+    // The same name twice at a time.
+    EXPECT_EQ(post("/v1/save", {{"run", run}, {"file", "new.pfm"}}).status, 200);
+    EXPECT_EQ(post("/v1/save", {{"run", run}, {"file", "new.pfm"}}).status, 409);
+}
+
+TEST_F(ApiTest, FilesThatAreNoPathsAreNotReplacedByPaths) {
+    open();
+    const json list = json::array({{{"points", {{0, 1, 0}, {0, 0, 0}}}, {"name", "mine"}}});
+    const std::string version = get("/v1/paths?file=new.json").etag;
+    const auto put = [&](const char* name) {
+        return ask("PUT", std::string("/v1/paths?file=") + name, list.dump(), version);
+    };
+    const std::string large = "[" + std::string(size_t(2) << 20, ' ') + "]";
+    std::ofstream(folder.path() / "large.json") << large;
+    std::ofstream(folder.path() / "report.json") << "{\"spp\": 3}";
+    std::ofstream(folder.path() / "secret.json") << "[]";
+    fs::create_symlink(folder.path() / "secret.json", folder.path() / "link.json");
+    for (const char* name : {"large.json", "report.json", "link.json"}) {
+        EXPECT_GE(get(std::string("/v1/paths?file=") + name).status, 400) << name;
+        EXPECT_GE(put(name).status, 400) << name;
+    }
+    EXPECT_EQ(saved("large.json"), large);
+    EXPECT_EQ(saved("report.json"), "{\"spp\": 3}");
+    EXPECT_EQ(saved("secret.json"), "[]");
+    EXPECT_TRUE(fs::is_symlink(folder.path() / "link.json"));
+    EXPECT_EQ(put("new.json").status, 200);
+}
+
+TEST_F(ApiTest, DeepJsonIsRefused) {
+    open();
+    const std::string deep(size_t(1) << 20, '[');
+    const std::string whole = std::string(size_t(1) << 19, '[') + std::string(size_t(1) << 19, ']');
+    const std::string version = get("/v1/paths?file=new.json").etag;
+    for (const std::string& text :
+         {deep, whole,
+          std::string("[{\"points\":") + whole.substr(100, whole.size() - 200) + "}]"}) {
+        EXPECT_GE(ask("PUT", "/v1/paths?file=new.json", text, version).status, 400);
+        EXPECT_GE(ask("POST", "/v1/paths/check", "{\"paths\":" + text + "}").status, 400);
+        EXPECT_GE(ask("POST", "/v1/paths/snap", "{\"index\":1,\"points\":" + text + "}").status,
+                  400);
+        EXPECT_GE(ask("POST", "/v1/ray", "{\"origin\":" + text + ",\"direction\":[0,0,1]}").status,
+                  400);
+    }
+    EXPECT_EQ(get("/v1/state").status, 200);
+}
+
+/// Rays and points that are far out of the scene, or equal, have an answer.
+TEST_F(ApiTest, ExtremeRaysHaveAnswers) {
+    open();
+    for (const double v : {1e-40, 1e-20, 1e20, 3e38, -3e38}) {
+        EXPECT_EQ(
+            post("/v1/ray", {{"origin", {0, 0, 0}}, {"direction", {v, v, 0}}, {"trace", true}})
+                    .status /
+                100 % 2,
+            0);
+        EXPECT_EQ(post("/v1/ray", {{"origin", {v, 0, v}}, {"direction", {-v, 0, -v}}}).status /
+                      100 % 2,
+                  0);
+        for (int index = 0; index < 4; ++index)
+            EXPECT_EQ(post("/v1/paths/snap",
+                           {{"index", index},
+                            {"points", {{0, 0.9, 0}, {v, 0, 0}, {v, 0, 0}, {0, -v, v}}}})
+                              .status /
+                          100 % 2,
+                      0);
+        EXPECT_EQ(post("/v1/paths/check",
+                       {{"paths", {{{"points", {{0, 0.9, 0}, {v, 0, 0}, {v, 0, 0}, {0, -v, v}}}}}}})
+                          .status /
+                      100 % 2,
+                  0);
+    }
+    for (int index = 0; index < 4; ++index)
+        EXPECT_EQ(post("/v1/paths/snap",
+                       {{"index", index}, {"points", {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}}})
+                      .status,
+                  200);
+}
+
+/// Names of files that were edited are not kept for ever.
+TEST_F(ApiTest, EventsDoNotGrowWithTheFilesThatAreSaved) {
+    open();
+    const size_t before = api->event().size();
+    const std::string version = get("/v1/paths?file=new.json").etag;
+    for (int i = 0; i < 50; ++i)
+        EXPECT_EQ(
+            ask("PUT", "/v1/paths?file=p" + std::to_string(i) + ".json", "[]", version).status,
+            200);
+    EXPECT_LT(api->event().size(), before + 50);
+}
+
+}  // namespace
+}  // namespace etendue::test
