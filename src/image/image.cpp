@@ -1,6 +1,7 @@
 #include "image/image.h"
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -80,10 +81,26 @@ void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
     for (const char* name : {"R", "G", "B"}) image.channels.push_back(channel_name(layer, name));
 }
 
-Image rgb_image(int width, int height, std::span<const Rgb> pixels) {
-    Image image;
-    add_rgb_layer(image, width, height, "", pixels);
+Image layered_image(int width, int height, std::span<const RgbLayer> layers) {
+    std::vector<std::string> channels;
+    for (const RgbLayer& l : layers)
+        for (const char* name : {"R", "G", "B"}) channels.push_back(channel_name(l.name, name));
+    Image image(width, height, std::move(channels));
+    for (size_t l = 0; l < layers.size(); ++l) {
+        if (layers[l].pixels.size() != image.pixel_count())
+            throw std::invalid_argument(
+                fmt::format("layer \"{}\" has another size than the image", layers[l].name));
+        float* to = image.data.data() + 3 * l;
+        for (const Rgb& c : layers[l].pixels) {
+            for (int i = 0; i < 3; ++i) to[i] = c[i];
+            to += image.channels.size();
+        }
+    }
     return image;
+}
+
+Image rgb_image(int width, int height, std::span<const Rgb> pixels) {
+    return layered_image(width, height, std::array{RgbLayer{"", pixels}});
 }
 
 size_t PixelBuffer::memory_bytes() const {

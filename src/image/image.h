@@ -46,6 +46,12 @@ std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer = "");
 void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
                    std::span<const Rgb> pixels);
 Image rgb_image(int width, int height, std::span<const Rgb> pixels);
+/// An image of several layers, whose memory is allocated once.
+struct RgbLayer {
+    std::string name;  ///< Empty: the channels have no prefix.
+    std::span<const Rgb> pixels;
+};
+Image layered_image(int width, int height, std::span<const RgbLayer> layers);
 
 using Half = Imath::half;
 

@@ -1,20 +1,14 @@
 #pragma once
 // The file formats of image_io.h that need a library. There are two implementations: over OpenImageIO, and a small one.
 
-#include <span>
-
-#include "image/atomic_file.h"
 #include "image/image_io.h"
+#include "system/output_file.h"
 
 namespace etendue {
 
-// read_image(), read_pixels() and encode_png() of image_io.h, and:
+// read_image(), read_pixels(), decode_pixels() and encode_png() of image_io.h, and:
 
-/// Stores all channels and attributes; `image` has any channels.
-void write_exr(const PendingFile& file, const Image& image, ExrPrecision precision);
-/// Radiance's format, ".hdr".
-void write_rgbe(const PendingFile& file, int width, int height, std::span<const Rgb> pixels);
-/// Three sRGB codes a pixel.
-void write_png(const PendingFile& file, int width, int height, std::span<const uint8_t> codes);
+/// Stores all channels and attributes; `image` has any channels. Errors of the file are left to its commit().
+void write_exr(OutputFile& file, const Image& image, ExrPrecision precision);
 
 }  // namespace etendue

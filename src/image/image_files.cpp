@@ -1,16 +1,10 @@
 // The parts of image_io.h that need no library.
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
-#include <system_error>
 
 #include <fmt/format.h>
 
@@ -26,7 +20,7 @@ namespace fs = std::filesystem;
     throw std::runtime_error(fmt::format("cannot write \"{}\": {}", path, why));
 }
 
-std::vector<Rgb> colours(const PendingFile& file, const Image& image) {
+std::vector<Rgb> colours(const OutputFile& file, const Image& image) {
     try {
         return rgb_pixels(image);
     } catch (const std::runtime_error& e) {
@@ -35,41 +29,70 @@ std::vector<Rgb> colours(const PendingFile& file, const Image& image) {
 }
 
 // Portable float map: rows from the bottom, little-endian where the scale is negative.
-void write_pfm(const PendingFile& file, const Image& image, ExrPrecision) {
+void write_pfm(OutputFile& file, const Image& image, ExrPrecision) {
     static_assert(std::endian::native == std::endian::little);
     const bool grey = image.channels.size() == 1;
     const std::vector<Rgb> pixels = colours(file, image);
-    errno = 0;
-    std::ofstream out(file.temporary(), std::ios::binary);
-    out << fmt::format("{}\n{} {}\n-1.0\n", grey ? "Pf" : "PF", image.width, image.height);
+    file.write(fmt::format("{}\n{} {}\n-1.0\n", grey ? "Pf" : "PF", image.width, image.height));
     std::vector<float> row;
     for (int y = image.height - 1; y >= 0; --y) {
         row.clear();
         for (int x = 0; x < image.width; ++x)
             for (int c = 0; c < (grey ? 1 : 3); ++c)
                 row.push_back(pixels[size_t(y) * image.width + x][c]);
-        out.write(reinterpret_cast<const char*>(row.data()),
-                  std::streamsize(row.size() * sizeof(float)));
+        file.write(row.data(), row.size() * sizeof(float));
     }
-    out.close();
-    if (!out) file.fail(std::generic_category().message(errno));
 }
 
-void write_hdr(const PendingFile& file, const Image& image, ExrPrecision) {
-    write_rgbe(file, image.width, image.height, colours(file, image));
+// Radiance's format: a common exponent for each pixel [Ward 1991].
+void to_rgbe(const Rgb& c, uint8_t* code) {
+    const float largest = std::isfinite(c.max()) ? std::max(c.max(), 0.0f) : 0.0f;
+    std::fill(code, code + 4, uint8_t(0));
+    if (!(largest > 1e-32f)) return;
+    int exponent = 0;
+    const float scale = std::frexp(largest, &exponent) * 256 / largest;
+    for (int i = 0; i < 3; ++i) code[i] = uint8_t(std::max(c[i], 0.0f) * scale);
+    code[3] = uint8_t(exponent + 128);
+}
+
+void write_hdr(OutputFile& file, const Image& image, ExrPrecision) {
+    const std::vector<Rgb> pixels = colours(file, image);
+    const size_t width = size_t(image.width);
+    file.write(fmt::format("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", image.height,
+                           image.width));
+    // With run lengths, all of them runs of different bytes, since a plain row could look as if it had them.
+    const bool has_runs = width >= 8 && width < 32768;
+    std::vector<uint8_t> row(4 * width);
+    std::string bytes;
+    for (size_t y = 0; y < size_t(image.height); ++y) {
+        for (size_t x = 0; x < width; ++x) to_rgbe(pixels[y * width + x], &row[4 * x]);
+        bytes.clear();
+        if (has_runs) {
+            for (const size_t b : {size_t(2), size_t(2), width >> 8, width & 255}) bytes += char(b);
+            for (size_t c = 0; c < 4; ++c)
+                for (size_t x = 0; x < width; x += 128) {
+                    const size_t end = std::min(x + 128, width);
+                    bytes += char(end - x);
+                    for (size_t i = x; i < end; ++i) bytes += char(row[4 * i + c]);
+                }
+        } else {
+            bytes.assign(row.begin(), row.end());
+        }
+        file.write(bytes);
+    }
 }
 
 uint8_t srgb_code(float v) {
     return uint8_t(linear_to_srgb(std::clamp(v, 0.0f, 1.0f)) * 255 + 0.5f);
 }
 
-void write_srgb(const PendingFile& file, const Image& image, ExrPrecision) {
-    write_png(file, image.width, image.height, srgb_codes(colours(file, image)));
+void write_srgb(OutputFile& file, const Image& image, ExrPrecision) {
+    file.write(encode_png(image.width, image.height, srgb_codes(colours(file, image))));
 }
 
 struct Writer {
     const char* extension;
-    void (*write)(const PendingFile& file, const Image& image, ExrPrecision precision);
+    void (*write)(OutputFile& file, const Image& image, ExrPrecision precision);
 };
 constexpr Writer kWriters[] = {
     {".exr", write_exr}, {".pfm", write_pfm}, {".hdr", write_hdr}, {".png", write_srgb}};
@@ -95,40 +118,20 @@ std::vector<uint8_t> srgb_codes(std::span<const Rgb> pixels) {
     return codes;
 }
 
+int png_channels(int width, int height, size_t codes) {
+    if (width > 0 && height > 0)
+        for (const int channels : {1, 3})
+            if (codes == size_t(width) * size_t(height) * size_t(channels)) return channels;
+    throw std::runtime_error(fmt::format("cannot encode a PNG of {} x {} pixels from {} values; "
+                                         "expected one or three values for each pixel",
+                                         width, height, codes));
+}
+
 std::string image_extension(const std::string& path) {
     std::string e = fs::path(path).extension().string();
     std::transform(e.begin(), e.end(), e.begin(),
                    [](unsigned char c) { return char(std::tolower(c)); });
     return e;
-}
-
-PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, bool raw) {
-    // The libraries select the format by the name of a file, so the bytes become one.
-    const char* extension = bytes.rfind("\xff\xd8", 0) == 0 ? ".jpg" : ".png";
-    std::string path = (fs::temp_directory_path() / "image-XXXXXX").string() + extension;
-    const int handle = mkstemps(path.data(), 4);
-    if (handle < 0)
-        throw std::runtime_error(
-            fmt::format("cannot write \"{}\": {}", path, std::generic_category().message(errno)));
-    close(handle);
-    const auto remove = [&] {
-        std::error_code ignored;
-        fs::remove(path, ignored);
-    };
-    try {
-        std::ofstream out(path, std::ios::binary);
-        out << bytes;
-        out.close();
-        if (!out) throw std::runtime_error(fmt::format("cannot write \"{}\"", path));
-        PixelBuffer pixels = read_pixels(path, raw);
-        remove();
-        return pixels;
-    } catch (const std::runtime_error& e) {
-        remove();
-        std::string why = e.what();
-        if (const size_t at = why.find(path); at != why.npos) why.replace(at, path.size(), name);
-        throw std::runtime_error(why);
-    }
 }
 
 RgbImage read_rgb(const std::string& path, std::string_view layer) {
@@ -144,12 +147,12 @@ void check_image_extension(const std::string& path) {
     writer_for(path);
 }
 
-void write_image(const std::string& path, const Image& image, ExrPrecision precision) {
+void write_image(const std::string& path, const Image& image, ExrPrecision precision, Links links) {
     const Writer& writer = writer_for(path);
     if (image.pixel_count() == 0 ||
         image.data.size() != image.pixel_count() * image.channels.size())
         fail_write(path, "the image is empty");
-    PendingFile file(path);
+    OutputFile file(path, links);
     writer.write(file, image, precision);
     file.commit();
 }

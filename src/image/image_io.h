@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "image/image.h"
+#include "system/output_file.h"
 
 namespace etendue {
 
@@ -30,17 +31,20 @@ PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, boo
 enum class ExrPrecision { Float, Half };
 
 /// Writes the format given by the name's extension: .exr stores all channels and attributes; .pfm, .hdr and .png (sRGB,
-/// clamped, NaN as magenta) store the colours of the unnamed layer. Missing folders are created. The file appears, or
-/// is replaced, only once it is complete. With ExrPrecision::Half finite values are clamped to the range of half
+/// clamped, NaN as magenta) store the colours of the unnamed layer. The file is an OutputFile. With ExrPrecision::Half finite values are clamped to the range of half
 /// floats.
 void write_image(const std::string& path, const Image& image,
-                 ExrPrecision precision = ExrPrecision::Float);
+                 ExrPrecision precision = ExrPrecision::Float, Links links = Links::Follow);
 
 /// The 8-bit sRGB codes that write_image() stores in a .png: colours are clamped, NaN is magenta.
 std::vector<uint8_t> srgb_codes(std::span<const Rgb> pixels);
 
-/// The bytes of a PNG file with these 8-bit sRGB codes, of one (grey) or three channels.
+/// The bytes of a PNG file with these 8-bit sRGB codes, of one (grey) or three channels. Throws if their number is not
+/// that of an image with at least one pixel.
 std::string encode_png(int width, int height, std::span<const uint8_t> codes);
+
+/// The number of channels of `codes` values: 1 or 3. Throws std::runtime_error for others, and for an empty image.
+int png_channels(int width, int height, size_t codes);
 
 /// The extension of a file name in lower case, with its dot: ".exr".
 std::string image_extension(const std::string& path);

@@ -1,11 +1,12 @@
 #include "image/image_io.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <filesystem>
-#include <fstream>
-#include <limits>
 #include <new>
 #include <stdexcept>
 
@@ -36,23 +37,39 @@ std::string one_line(std::string s) {
 
 // ------------------------------------------------------------------------------------------------------- reading
 
-std::unique_ptr<OIIO::ImageInput> open_input(const std::string& path) {
+/// A file, or its bytes in memory.
+struct Source {
+    std::string name;  ///< In messages.
+    std::string file;  ///< For OpenImageIO, which selects the format by its extension.
+    uint64_t bytes;
+    OIIO::Filesystem::IOProxy* memory = nullptr;
+};
+
+Source source_of(const std::string& path) {
     std::error_code error;
     const fs::file_status status = fs::status(path, error);
     if (!fs::exists(status)) fail_read(path, "there is no such file");
     if (!fs::is_regular_file(status)) fail_read(path, "it is not a regular file");
+    if (::faccessat(AT_FDCWD, path.c_str(), R_OK, AT_EACCESS) != 0)
+        fail_read(path, std::generic_category().message(errno));
+    const uint64_t bytes = fs::file_size(path, error);
+    if (error) fail_read(path, error.message());
+    return {path, path, bytes};
+}
+
+std::unique_ptr<OIIO::ImageInput> open_input(const Source& source) {
     OIIO::ImageSpec config;
     config["oiio:UnassociatedAlpha"] = 1;  // the file's own colours, not premultiplied
-    auto input = OIIO::ImageInput::open(path, &config);
-    if (!input) fail_read(path, one_line(OIIO::geterror()));
+    auto input = OIIO::ImageInput::open(source.file, &config, source.memory);
+    if (!input) fail_read(source.name, one_line(OIIO::geterror()));
     const OIIO::ImageSpec& spec = input->spec();
     if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep)
-        fail_read(path, "it is not a flat image with at least one pixel and one channel");
+        fail_read(source.name, "it is not a flat image with at least one pixel and one channel");
     // No codec compresses better than this. A header with a larger size is damaged, and would exhaust the memory.
     constexpr uint64_t kBestRatio = 4096, kAlwaysFine = 256u << 20;
     const uint64_t bytes = spec.image_bytes();
-    if (bytes > kAlwaysFine && bytes / kBestRatio > fs::file_size(path))
-        fail_read(path,
+    if (bytes > kAlwaysFine && bytes / kBestRatio > source.bytes)
+        fail_read(source.name,
                   fmt::format("its header claims {} x {} pixels, too many for the file's size",
                               spec.width, spec.height));
     if (const auto free = available_memory(); free && bytes > *free)
@@ -107,19 +124,25 @@ void read_attributes(Image& image, const OIIO::ImageSpec& spec) {
 
 // ------------------------------------------------------------------------------------------------------- writing
 
-void write_with_oiio(const PendingFile& file, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
-                     const void* pixels) {
-    const auto output = OIIO::ImageOutput::create(file.temporary());
-    if (!output) file.fail(one_line(OIIO::geterror()));
-    if (!output->open(file.temporary(), spec)) file.fail(one_line(output->geterror()));
-    const bool written = output->write_image(type, pixels);
-    const std::string why = written ? "" : one_line(output->geterror());
-    if (!output->close() || !written) file.fail(written ? one_line(output->geterror()) : why);
-}
+/// An OutputFile as a file of OpenImageIO. Errors stay in the file until its commit().
+class FileProxy final : public OIIO::Filesystem::IOProxy {
+public:
+    explicit FileProxy(OutputFile& file) : IOProxy("", Write), file_(file) {}
+    const char* proxytype() const override { return "output"; }
+    int64_t tell() override { return int64_t(file_.position()); }
+    bool seek(int64_t offset) override { return file_.seek(uint64_t(offset)); }
+    size_t write(const void* data, size_t size) override {
+        return file_.write(data, size) ? size : 0;
+    }
+    void flush() const override {}
+
+private:
+    OutputFile& file_;
+};
 
 }  // namespace
 
-void write_exr(const PendingFile& file, const Image& image, ExrPrecision precision) {
+void write_exr(OutputFile& file, const Image& image, ExrPrecision precision) {
     const bool half = precision == ExrPrecision::Half;
     OIIO::ImageSpec spec(image.width, image.height, int(image.channels.size()),
                          half ? OIIO::TypeHalf : OIIO::TypeFloat);
@@ -134,36 +157,27 @@ void write_exr(const PendingFile& file, const Image& image, ExrPrecision precisi
         else
             spec.attribute(name, OIIO::TypeDesc(OIIO::TypeDesc::DOUBLE), &std::get<double>(value));
     }
-    if (!half) return write_with_oiio(file, spec, OIIO::TypeFloat, image.data.data());
-    std::vector<float> clamped = image.data;
-    for (float& v : clamped)
-        if (std::isfinite(v)) v = std::clamp(v, -kMaxHalf, kMaxHalf);
-    write_with_oiio(file, spec, OIIO::TypeFloat, clamped.data());
-}
-
-void write_rgbe(const PendingFile& file, int width, int height, std::span<const Rgb> pixels) {
-    static_assert(sizeof(Rgb) == 3 * sizeof(float));
-    write_with_oiio(file, OIIO::ImageSpec(width, height, 3, OIIO::TypeFloat), OIIO::TypeFloat,
-                    pixels.data());
-}
-
-// Whether the file contains these pixels: OpenImageIO's PNG writer does not report a full disk.
-static bool holds(const std::string& path, std::span<const uint8_t> codes) try {
-    return std::ranges::equal(std::get<std::vector<uint8_t>>(read_pixels(path, true).data), codes);
-} catch (const std::runtime_error&) {
-    return false;
-}
-
-void write_png(const PendingFile& file, int width, int height, std::span<const uint8_t> codes) {
-    OIIO::ImageSpec spec(width, height, 3, OIIO::TypeUInt8);
-    spec["oiio:ColorSpace"] = "sRGB";
-    write_with_oiio(file, spec, OIIO::TypeUInt8, codes.data());
-    if (!holds(file.temporary(), codes))
-        file.fail("the file differs when read back; the disk may be full");
+    std::vector<float> clamped;
+    if (half) {
+        clamped = image.data;
+        for (float& v : clamped)
+            if (std::isfinite(v)) v = std::clamp(v, -kMaxHalf, kMaxHalf);
+    }
+    FileProxy target(file);
+    const auto output = OIIO::ImageOutput::create("openexr", &target);
+    if (!output) file.fail(one_line(OIIO::geterror()));
+    if (!output->open("image.exr", spec)) file.fail(one_line(output->geterror()));
+    const bool written =
+        output->write_image(OIIO::TypeFloat, half ? clamped.data() : image.data.data());
+    const std::string why = written ? "" : one_line(output->geterror());
+    const bool closed = output->close();
+    // Where the file has the reason, its commit() says it better.
+    if ((!written || !closed) && file.is_good())
+        file.fail(written ? one_line(output->geterror()) : why);
 }
 
 Image read_image(const std::string& path) {
-    const auto input = open_input(path);
+    const auto input = open_input(source_of(path));
     const OIIO::ImageSpec& spec = input->spec();
     Image image;
     image.width = spec.width;
@@ -175,8 +189,9 @@ Image read_image(const std::string& path) {
     return image;
 }
 
-PixelBuffer read_pixels(const std::string& path, bool raw) {
-    const auto input = open_input(path);
+static PixelBuffer pixels_of(const Source& source, bool raw) {
+    const auto input = open_input(source);
+    const std::string& path = source.name;
     const OIIO::ImageSpec& spec = input->spec();
     PixelBuffer buffer{.width = spec.width,
                        .height = spec.height,
@@ -195,8 +210,18 @@ PixelBuffer read_pixels(const std::string& path, bool raw) {
     return buffer;
 }
 
+PixelBuffer read_pixels(const std::string& path, bool raw) {
+    return pixels_of(source_of(path), raw);
+}
+
+PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, bool raw) {
+    OIIO::Filesystem::IOMemReader memory(const_cast<char*>(bytes.data()), bytes.size());
+    const bool is_jpeg = bytes.starts_with("\xff\xd8");
+    return pixels_of({name, is_jpeg ? "image.jpg" : "image.png", bytes.size(), &memory}, raw);
+}
+
 std::string encode_png(int width, int height, std::span<const uint8_t> codes) {
-    const int channels = int(codes.size() / (size_t(width) * height));
+    const int channels = png_channels(width, height, codes.size());
     OIIO::ImageSpec spec(width, height, channels, OIIO::TypeUInt8);
     spec["oiio:ColorSpace"] = "sRGB";
     std::vector<unsigned char> bytes;

@@ -11,8 +11,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <system_error>
 
@@ -21,6 +19,7 @@
 #include <OpenEXR/ImfFloatAttribute.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfOutputFile.h>
@@ -42,20 +41,27 @@ namespace fs = std::filesystem;
     throw std::runtime_error(fmt::format("cannot read \"{}\": {}", path, why));
 }
 
+/// The bytes of a file, and its name for messages.
+struct Source {
+    std::string name;
+    std::string_view bytes;
+};
+
 /// No codec compresses better than this. A header with a larger size is damaged, and would exhaust the memory.
-void check_size(const std::string& path, uint64_t width, uint64_t height, uint64_t pixel_bytes) {
+void check_size(const Source& source, uint64_t width, uint64_t height, uint64_t pixel_bytes) {
     constexpr uint64_t kBestRatio = 4096, kAlwaysFine = 256u << 20;
     constexpr uint64_t kLargestSide = 1 << 20;
-    if (width < 1 || height < 1) fail_read(path, "it has no pixels");
+    if (width < 1 || height < 1) fail_read(source.name, "it has no pixels");
     const uint64_t bytes = width * height * pixel_bytes;
     if (width > kLargestSide || height > kLargestSide || pixel_bytes > kLargestSide ||
-        (bytes > kAlwaysFine && bytes / kBestRatio > fs::file_size(path)))
-        fail_read(path,
+        (bytes > kAlwaysFine && bytes / kBestRatio > source.bytes.size()))
+        fail_read(source.name,
                   fmt::format("its header claims {} x {} pixels, too many for the file's size",
                               width, height));
     if (const auto free = available_memory(); free && bytes > *free)
-        fail_read(path, fmt::format("its {} x {} pixels need {} of memory, but only {} are free",
-                                    width, height, format_bytes(bytes), format_bytes(*free)));
+        fail_read(source.name,
+                  fmt::format("its {} x {} pixels need {} of memory, but only {} are free", width,
+                              height, format_bytes(bytes), format_bytes(*free)));
 }
 
 /// What a file holds, before any conversion of colours.
@@ -111,8 +117,44 @@ std::vector<T> read_exr_pixels(Imf::InputFile& file, const std::vector<std::stri
     return data;
 }
 
-Contents read_exr(const std::string& path, bool as_floats) {
-    Imf::InputFile file(path.c_str());
+/// The bytes of a file, for OpenEXR.
+class ExrInput final : public Imf::IStream {
+public:
+    explicit ExrInput(const Source& source) : IStream(source.name.c_str()), bytes_(source.bytes) {}
+    bool read(char to[], int size) override {
+        if (size < 0 || uint64_t(size) > bytes_.size() - at_)
+            throw Iex::InputExc("the file ends too early");
+        std::memcpy(to, bytes_.data() + at_, size_t(size));
+        at_ += uint64_t(size);
+        return at_ < bytes_.size();
+    }
+    uint64_t tellg() override { return at_; }
+    void seekg(uint64_t position) override {
+        if (position > bytes_.size()) throw Iex::InputExc("the file ends too early");
+        at_ = position;
+    }
+
+private:
+    std::string_view bytes_;
+    uint64_t at_ = 0;
+};
+
+/// An OutputFile for OpenEXR. Errors stay in the file until its commit().
+class ExrOutput final : public Imf::OStream {
+public:
+    explicit ExrOutput(OutputFile& file) : OStream("image.exr"), file_(file) {}
+    void write(const char from[], int size) override { file_.write(from, size_t(size)); }
+    uint64_t tellp() override { return file_.position(); }
+    void seekp(uint64_t position) override { file_.seek(position); }
+
+private:
+    OutputFile& file_;
+};
+
+Contents read_exr(const Source& source, bool as_floats) {
+    const std::string& path = source.name;
+    ExrInput input(source);
+    Imf::InputFile file(input);
     const Imf::Header& header = file.header();
     const Imath::Box2i window = header.dataWindow();
     Contents c;
@@ -127,7 +169,7 @@ Contents read_exr(const std::string& path, bool as_floats) {
     PixelBuffer& p = c.pixels;
     const int64_t width = int64_t(window.max.x) - window.min.x + 1,
                   height = int64_t(window.max.y) - window.min.y + 1;
-    check_size(path, uint64_t(width), uint64_t(height), c.channels.size() * 4);
+    check_size(source, uint64_t(width), uint64_t(height), c.channels.size() * 4);
     p.width = int(width), p.height = int(height);
     p.channels = int(c.channels.size());
     const auto alpha = std::find(c.channels.begin(), c.channels.end(), "A");
@@ -151,23 +193,6 @@ Contents read_exr(const std::string& path, bool as_floats) {
 }
 
 // ------------------------------------------------------------------------------------------------------- PNG
-
-struct File {
-    File(const std::string& path, const char* mode) : handle(std::fopen(path.c_str(), mode)) {}
-    ~File() {
-        if (handle) std::fclose(handle);
-    }
-    File(const File&) = delete;
-    File& operator=(const File&) = delete;
-    /// Whether everything reached the disk.
-    bool close() {
-        const bool is_written = handle && std::fflush(handle) == 0 && !std::ferror(handle);
-        const bool is_closed = handle && std::fclose(handle) == 0;
-        handle = nullptr;
-        return is_written && is_closed;
-    }
-    FILE* handle;
-};
 
 /// Where libpng and libjpeg leave after an error, and what they said. No object with a destructor may be made between
 /// setjmp() and a call of the library.
@@ -200,11 +225,19 @@ struct PngHeader {
     bool is_linear;
 };
 
-bool read_png_header(PngReader& reader, FILE* file, Escape& escape, PngHeader& header) {
+void take_bytes(png_structp png, png_bytep to, size_t size) {
+    auto& rest = *static_cast<std::string_view*>(png_get_io_ptr(png));
+    if (size > rest.size()) png_error(png, "the file ends too early");
+    std::memcpy(to, rest.data(), size);
+    rest.remove_prefix(size);
+}
+
+/// `rest`: the bytes that are not yet read.
+bool read_png_header(PngReader& reader, std::string_view& rest, Escape& escape, PngHeader& header) {
     if (setjmp(escape.place)) return false;
     png_structp png = reader.png;
     png_infop info = reader.info;
-    png_init_io(png, file);
+    png_set_read_fn(png, &rest, take_bytes);
     png_read_info(png, info);
     const int type = png_get_color_type(png, info);
     if (type == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);
@@ -230,14 +263,15 @@ bool read_png_rows(PngReader& reader, Escape& escape, png_bytepp rows) {
     return true;
 }
 
-Contents read_png(const std::string& path) {
-    File file(path, "rb");
+Contents read_png(const Source& source) {
+    const std::string& path = source.name;
+    std::string_view rest = source.bytes;
     Escape escape;
     PngReader reader(escape);
     PngHeader header{};
-    if (!read_png_header(reader, file.handle, escape, header)) fail_read(path, escape.message);
+    if (!read_png_header(reader, rest, escape, header)) fail_read(path, escape.message);
     const size_t samples = size_t(header.width) * size_t(header.channels);
-    check_size(path, header.width, header.height, size_t(header.channels * header.depth / 8));
+    check_size(source, header.width, header.height, size_t(header.channels * header.depth / 8));
     Contents c;
     PixelBuffer& p = c.pixels;
     p.width = int(header.width), p.height = int(header.height), p.channels = header.channels;
@@ -265,25 +299,22 @@ Contents read_png(const std::string& path) {
     return c;
 }
 
-/// Where the bytes of a PNG go.
-struct PngTarget {
-    std::string* bytes;
-    FILE* file;
-};
-
 void append_bytes(png_structp png, png_bytep data, size_t size) {
-    const auto& target = *static_cast<PngTarget*>(png_get_io_ptr(png));
-    if (target.bytes)
-        target.bytes->append(reinterpret_cast<const char*>(data), size);
-    else if (std::fwrite(data, 1, size, target.file) != size)
-        png_error(png, "the disk may be full");
+    auto& bytes = *static_cast<std::string*>(png_get_io_ptr(png));
+    bool is_stored = true;
+    try {
+        bytes.append(reinterpret_cast<const char*>(data), size);
+    } catch (const std::exception&) {
+        is_stored = false;
+    }
+    if (!is_stored) png_error(png, "not enough memory");
 }
 void flush_nothing(png_structp) {}
 
-bool encode_rows(png_structp png, png_infop info, Escape& escape, PngTarget& target, int width,
+bool encode_rows(png_structp png, png_infop info, Escape& escape, std::string& bytes, int width,
                  int height, int channels, const uint8_t* codes) {
     if (setjmp(escape.place)) return false;
-    png_set_write_fn(png, &target, append_bytes, flush_nothing);
+    png_set_write_fn(png, &bytes, append_bytes, flush_nothing);
     png_set_IHDR(png, info, png_uint_32(width), png_uint_32(height), 8,
                  channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
@@ -293,18 +324,6 @@ bool encode_rows(png_structp png, png_infop info, Escape& escape, PngTarget& tar
         png_write_row(png, codes + size_t(y) * size_t(width * channels));
     png_write_end(png, nullptr);
     return true;
-}
-
-/// Empty, or what went wrong.
-std::string encode(PngTarget target, int width, int height, std::span<const uint8_t> codes) {
-    Escape escape;
-    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &escape, png_fails, png_warns);
-    png_infop info = png_create_info_struct(png);
-    const int channels = int(codes.size() / (size_t(width) * size_t(height)));
-    const bool is_good =
-        encode_rows(png, info, escape, target, width, height, channels, codes.data());
-    png_destroy_write_struct(&png, &info);
-    return is_good ? "" : escape.message;
 }
 
 // ------------------------------------------------------------------------------------------------------- JPEG
@@ -323,10 +342,11 @@ void jpeg_fails(j_common_ptr info) {
 }
 void jpeg_warns(j_common_ptr, int) {}
 
-bool read_jpeg_header(jpeg_decompress_struct& jpeg, FILE* file, JpegErrors& errors) {
+bool read_jpeg_header(jpeg_decompress_struct& jpeg, std::string_view bytes, JpegErrors& errors) {
     if (setjmp(errors.escape.place)) return false;
     jpeg_create_decompress(&jpeg);
-    jpeg_stdio_src(&jpeg, file);
+    jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(bytes.data()),
+                 static_cast<unsigned long>(bytes.size()));
     jpeg_read_header(&jpeg, TRUE);
     jpeg_start_decompress(&jpeg);
     return true;
@@ -342,8 +362,8 @@ bool read_jpeg_rows(jpeg_decompress_struct& jpeg, JpegErrors& errors, uint8_t* t
     return true;
 }
 
-Contents read_jpeg(const std::string& path) {
-    File file(path, "rb");
+Contents read_jpeg(const Source& source) {
+    const std::string& path = source.name;
     JpegErrors errors;
     jpeg_decompress_struct jpeg{};
     jpeg.err = jpeg_std_error(&errors.manager);
@@ -353,10 +373,10 @@ Contents read_jpeg(const std::string& path) {
         jpeg_decompress_struct& of;
         ~Cleanup() { jpeg_destroy_decompress(&of); }
     } cleanup{jpeg};
-    if (!read_jpeg_header(jpeg, file.handle, errors)) fail_read(path, errors.escape.message);
+    if (!read_jpeg_header(jpeg, source.bytes, errors)) fail_read(path, errors.escape.message);
     const int channels = jpeg.output_components;
     if (channels != 1 && channels != 3) fail_read(path, "a JPEG must be grey or RGB");
-    check_size(path, jpeg.output_width, jpeg.output_height, size_t(channels));
+    check_size(source, jpeg.output_width, jpeg.output_height, size_t(channels));
     Contents c;
     c.pixels.width = int(jpeg.output_width), c.pixels.height = int(jpeg.output_height);
     c.pixels.channels = channels;
@@ -375,10 +395,7 @@ Contents read_jpeg(const std::string& path) {
 /// The bytes of a file, read in order.
 class Bytes {
 public:
-    explicit Bytes(const std::string& path) : path_(path) {
-        std::ifstream in(path, std::ios::binary);
-        bytes_.assign(std::istreambuf_iterator<char>(in), {});
-    }
+    explicit Bytes(const Source& source) : path_(source.name), bytes_(source.bytes) {}
     uint8_t next() {
         if (at_ >= bytes_.size()) fail_read(path_, "the file ends too early");
         return uint8_t(bytes_[at_++]);
@@ -386,7 +403,7 @@ public:
     std::string line() {
         const size_t end = bytes_.find('\n', at_);
         if (end == std::string::npos) fail_read(path_, "the header is incomplete");
-        std::string text = bytes_.substr(at_, end - at_);
+        std::string text(bytes_.substr(at_, end - at_));
         at_ = end + 1;
         return text;
     }
@@ -400,8 +417,22 @@ public:
     size_t left() const { return bytes_.size() - at_; }
     const char* here() const { return bytes_.data() + at_; }
 
+    /// A word that is a number.
+    template <class T>
+    T number() {
+        std::string text = word();
+        if (text.starts_with('+')) text.erase(0, 1);
+        T value{};
+        const char* const end = text.data() + text.size();
+        const auto [rest, error] = std::from_chars(text.data(), end, value);
+        if (error != std::errc() || rest != end)
+            fail_read(path_, fmt::format("\"{}\" in its header is no number", text.substr(0, 40)));
+        return value;
+    }
+
 private:
-    std::string path_, bytes_;
+    std::string path_;
+    std::string_view bytes_;
     size_t at_ = 0;
 };
 
@@ -439,8 +470,9 @@ void read_rgbe_row(Bytes& bytes, const std::string& path, size_t width, std::vec
         }
 }
 
-Contents read_rgbe(const std::string& path) {
-    Bytes bytes(path);
+Contents read_rgbe(const Source& source) {
+    const std::string& path = source.name;
+    Bytes bytes(source);
     if (!bytes.line().starts_with("#?")) fail_read(path, "it does not begin with \"#?\"");
     while (!bytes.line().empty()) {
     }
@@ -448,7 +480,7 @@ Contents read_rgbe(const std::string& path) {
     const std::string size = bytes.line();
     if (std::sscanf(size.c_str(), "-Y %d +X %d", &height, &width) != 2 || width < 1 || height < 1)
         fail_read(path, "expected a size of the form \"-Y HEIGHT +X WIDTH\"");
-    check_size(path, uint64_t(width), uint64_t(height), 12);
+    check_size(source, uint64_t(width), uint64_t(height), 12);
     std::vector<float> values;
     values.reserve(size_t(width) * size_t(height) * 3);
     std::vector<uint8_t> row;
@@ -463,25 +495,17 @@ Contents read_rgbe(const std::string& path) {
     return radiance_of(width, height, 3, std::move(values));
 }
 
-Contents read_pfm(const std::string& path) {
-    Bytes bytes(path);
+Contents read_pfm(const Source& source) {
+    const std::string& path = source.name;
+    Bytes bytes(source);
     const std::string kind = bytes.word();
     if (kind != "PF" && kind != "Pf") fail_read(path, "it does not begin with \"PF\" or \"Pf\"");
     const int channels = kind == "PF" ? 3 : 1;
-    const auto number = [&]<class T>(T value) {
-        std::string text = bytes.word();
-        if (text.starts_with('+')) text.erase(0, 1);
-        const char* end = text.data() + text.size();
-        if (const auto [stop, error] = std::from_chars(text.data(), end, value);
-            error != std::errc() || stop != end)
-            fail_read(path, fmt::format("\"{}\" in its header is no number", text.substr(0, 40)));
-        return value;
-    };
-    const int width = number(0), height = number(0);
-    const double scale = number(0.0);
+    const int width = bytes.number<int>(), height = bytes.number<int>();
+    const double scale = bytes.number<double>();
     if (width < 1 || height < 1 || !std::isfinite(scale) || scale == 0)
         fail_read(path, "its header is invalid");
-    check_size(path, uint64_t(width), uint64_t(height), 4 * size_t(channels));
+    check_size(source, uint64_t(width), uint64_t(height), 4 * size_t(channels));
     const size_t row = size_t(width) * size_t(channels);
     if (bytes.left() < row * size_t(height) * 4) fail_read(path, "the file ends too early");
     std::vector<float> values(row * size_t(height));
@@ -499,30 +523,42 @@ Contents read_pfm(const std::string& path) {
 
 // -------------------------------------------------------------------------------------------------------
 
+std::string bytes_of(const std::string& path) {
+    const auto fail = [&] { fail_read(path, std::generic_category().message(errno)); };
+    const auto close = [](FILE* f) { std::fclose(f); };
+    const std::unique_ptr<FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
+    if (!file) fail();
+    std::string bytes(fs::file_size(path), '\0');
+    bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file.get()));
+    if (std::ferror(file.get())) fail();
+    return bytes;
+}
+
 /// By the first bytes, as a name may be wrong.
+Contents contents_of(const Source& source, bool as_floats) {
+    const std::string_view magic = source.bytes;
+    try {
+        if (magic.starts_with("\x76\x2f\x31\x01")) return read_exr(source, as_floats);
+        if (magic.starts_with("\x89PNG")) return read_png(source);
+        if (magic.starts_with("\xff\xd8\xff")) return read_jpeg(source);
+        if (magic.starts_with("#?")) return read_rgbe(source);
+        if (magic.starts_with("PF") || magic.starts_with("Pf")) return read_pfm(source);
+    } catch (const std::bad_alloc&) {
+        fail_read(source.name, "its pixels do not fit into memory");
+    } catch (const Iex::BaseExc& e) {
+        fail_read(source.name, e.what());
+    }
+    fail_read(source.name,
+              "its format is none of EXR, PNG, JPEG, HDR and PFM, which this build reads");
+}
+
 Contents read_contents(const std::string& path, bool as_floats) {
     std::error_code error;
     const fs::file_status status = fs::status(path, error);
     if (!fs::exists(status)) fail_read(path, "there is no such file");
     if (!fs::is_regular_file(status)) fail_read(path, "it is not a regular file");
-    char start[8] = {};
-    errno = 0;
-    std::ifstream in(path, std::ios::binary);
-    if (!in) fail_read(path, std::generic_category().message(errno));
-    in.read(start, sizeof start);
-    const std::string_view magic(start, sizeof start);
-    try {
-        if (magic.starts_with("\x76\x2f\x31\x01")) return read_exr(path, as_floats);
-        if (magic.starts_with("\x89PNG")) return read_png(path);
-        if (magic.starts_with("\xff\xd8\xff")) return read_jpeg(path);
-        if (magic.starts_with("#?")) return read_rgbe(path);
-        if (magic.starts_with("PF") || magic.starts_with("Pf")) return read_pfm(path);
-    } catch (const std::bad_alloc&) {
-        fail_read(path, "its pixels do not fit into memory");
-    } catch (const Iex::BaseExc& e) {
-        fail_read(path, e.what());
-    }
-    fail_read(path, "its format is none of EXR, PNG, JPEG, HDR and PFM, which this build reads");
+    const std::string bytes = bytes_of(path);
+    return contents_of({path, bytes}, as_floats);
 }
 
 /// Codes become numbers in [0, 1], and those of colours linear.
@@ -543,16 +579,6 @@ std::vector<float> to_floats(const Contents& c, bool keep_codes) {
     return out;
 }
 
-void to_rgbe(const Rgb& c, uint8_t* code) {
-    const float largest = std::isfinite(c.max()) ? std::max(c.max(), 0.0f) : 0.0f;
-    std::fill(code, code + 4, uint8_t(0));
-    if (!(largest > 1e-32f)) return;
-    int exponent = 0;
-    const float scale = std::frexp(largest, &exponent) * 256 / largest;
-    for (int i = 0; i < 3; ++i) code[i] = uint8_t(std::max(c[i], 0.0f) * scale);
-    code[3] = uint8_t(exponent + 128);
-}
-
 }  // namespace
 
 Image read_image(const std::string& path) {
@@ -565,56 +591,34 @@ Image read_image(const std::string& path) {
     return image;
 }
 
-PixelBuffer read_pixels(const std::string& path, bool raw) {
-    Contents c = read_contents(path, false);
+static PixelBuffer to_pixels(Contents c, bool raw) {
     const bool is_deep = std::holds_alternative<std::vector<float>>(c.pixels.data);
     if (is_deep && !c.is_linear && !raw) c.pixels.data = to_floats(c, false);
     return std::move(c.pixels);
 }
 
+PixelBuffer read_pixels(const std::string& path, bool raw) {
+    return to_pixels(read_contents(path, false), raw);
+}
+
+PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, bool raw) {
+    return to_pixels(contents_of({name, bytes}, false), raw);
+}
+
 std::string encode_png(int width, int height, std::span<const uint8_t> codes) {
+    const int channels = png_channels(width, height, codes.size());
     std::string bytes;
-    if (const std::string why = encode({&bytes, nullptr}, width, height, codes); !why.empty())
-        throw std::runtime_error("cannot encode a PNG: " + why);
+    Escape escape;
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &escape, png_fails, png_warns);
+    png_infop info = png_create_info_struct(png);
+    const bool is_good =
+        encode_rows(png, info, escape, bytes, width, height, channels, codes.data());
+    png_destroy_write_struct(&png, &info);
+    if (!is_good) throw std::runtime_error(fmt::format("cannot encode a PNG: {}", escape.message));
     return bytes;
 }
 
-void write_png(const PendingFile& file, int width, int height, std::span<const uint8_t> codes) {
-    File out(file.temporary(), "wb");
-    if (!out.handle) file.fail("it cannot be opened");
-    const std::string why = encode({nullptr, out.handle}, width, height, codes);
-    if (!out.close() || !why.empty()) file.fail(why.empty() ? "the disk may be full" : why);
-}
-
-void write_rgbe(const PendingFile& file, int width, int height, std::span<const Rgb> pixels) {
-    std::ofstream out(file.temporary(), std::ios::binary);
-    out << fmt::format("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", height, width);
-    // With run lengths, all of them runs of different bytes, since a plain row could look as if it had them.
-    const bool has_runs = width >= 8 && width < 32768;
-    std::vector<uint8_t> row(4 * size_t(width));
-    std::string bytes;
-    for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x)
-            to_rgbe(pixels[size_t(y) * size_t(width) + size_t(x)], &row[4 * size_t(x)]);
-        bytes.clear();
-        if (has_runs) {
-            for (const int b : {2, 2, width >> 8, width & 255}) bytes += char(b);
-            for (size_t c = 0; c < 4; ++c)
-                for (size_t x = 0; x < size_t(width); x += 128) {
-                    const size_t end = std::min(x + 128, size_t(width));
-                    bytes += char(end - x);
-                    for (size_t i = x; i < end; ++i) bytes += char(row[4 * i + c]);
-                }
-        } else {
-            bytes.assign(row.begin(), row.end());
-        }
-        out.write(bytes.data(), std::streamsize(bytes.size()));
-    }
-    out.close();
-    if (!out) file.fail("the disk may be full");
-}
-
-void write_exr(const PendingFile& file, const Image& image, ExrPrecision precision) {
+void write_exr(OutputFile& file, const Image& image, ExrPrecision precision) {
     constexpr float kMaxHalf = 65504;
     const bool is_half = precision == ExrPrecision::Half;
     Imf::Header header(image.width, image.height);
@@ -636,7 +640,8 @@ void write_exr(const PendingFile& file, const Image& image, ExrPrecision precisi
     char* base = is_half ? reinterpret_cast<char*>(halves.data())
                          : reinterpret_cast<char*>(const_cast<float*>(image.data.data()));
     try {
-        Imf::OutputFile out(file.temporary().c_str(), header);
+        ExrOutput target(file);
+        Imf::OutputFile out(target, header);
         Imf::FrameBuffer buffer;
         for (size_t i = 0; i < image.channels.size(); ++i)
             buffer.insert(image.channels[i],

@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "image/atomic_file.h"
 #include "math/content_hash.h"
 #include "mcmc/pick_paths.h"
 #include "render/aov.h"
@@ -20,6 +19,7 @@
 #include "studio/page.h"
 #include "studio/reply_json.h"
 #include "studio/request_values.h"
+#include "system/output_file.h"
 
 namespace etendue {
 namespace {
@@ -319,7 +319,7 @@ Reply Api::put_paths(const Request& request) {
         reply.status = 409;
         reply.body = std::move(current);
     } else {
-        write_file_atomically(options_.output_folder + "/" + name, reply.body);
+        write_file(options_.output_folder + "/" + name, reply.body, Links::Replace);
         ++own_revision_;
     }
     reply.etag = hash_of(reply.body);

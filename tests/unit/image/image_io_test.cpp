@@ -8,6 +8,8 @@
 #include <csignal>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "math/hash.h"
 #include "math/vec.h"
@@ -215,6 +217,59 @@ TEST_F(ImageIo, ReadErrorsNameTheFile) {
                   read_image(write_bytes("huge.pfm", "PF\n60000 60000\n-1.0\nxxxx"));
               }).find("60000"),
               std::string::npos);
+}
+
+TEST_F(ImageIo, UnreadableFilesAreNamedSo) {
+    const std::string path = write_bytes("secret.png", "text");
+    fs::permissions(folder_, fs::perms(0755));
+    fs::permissions(path, fs::perms(0));
+    const pid_t child = fork();
+    if (child == 0) {
+        // Root may read everything.
+        if (geteuid() == 0 && seteuid(65534) != 0) _exit(2);
+        _exit(error([&] { read_image(path); }) ==
+                      "cannot read \"" + path + "\": Permission denied"
+                  ? 0
+                  : 1);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST_F(ImageIo, ImagesInMemoryNeedNoFiles) {
+    write_image(file("a.png"), sample_image({"R", "G", "B"}));
+    const PixelBuffer expected = read_pixels(file("a.png"), true);
+    std::ifstream in(file("a.png"), std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    // No place for temporary files, and no room in any file.
+    const char* const old = std::getenv("TMPDIR");
+    setenv("TMPDIR", "/nonexistent", 1);
+    rlimit limit;
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
+    const rlimit none = {0, limit.rlim_max};
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &none), 0);
+    PixelBuffer found;
+    const std::string complaint =
+        error([&] { found = decode_pixels(bytes, "the picture", true); });
+    const std::string damaged =
+        error([&] { decode_pixels(bytes.substr(0, bytes.size() / 2), "the picture", true); });
+    setrlimit(RLIMIT_FSIZE, &limit);
+    std::signal(SIGXFSZ, handler);
+    old ? setenv("TMPDIR", old, 1) : unsetenv("TMPDIR");
+    EXPECT_EQ(complaint, "");
+    EXPECT_EQ(found.data, expected.data);
+    EXPECT_TRUE(damaged.starts_with("cannot read \"the picture\": ")) << damaged;
+}
+
+TEST_F(ImageIo, EncodesPngsOfCompletePixelsOnly) {
+    const std::vector<uint8_t> codes(12);
+    EXPECT_NO_THROW(encode_png(2, 2, codes));
+    EXPECT_NO_THROW(encode_png(4, 3, codes));  // grey
+    for (const auto& [w, h] : {std::pair{0, 0}, {0, 4}, {4, 0}, {2, 3}, {1, 3}, {-2, -2}, {5, 5}})
+        EXPECT_NE(error([&, width = w, height = h] { encode_png(width, height, codes); }), "")
+            << w << " x " << h;
 }
 
 TEST_F(ImageIo, TruncatedFilesAreErrors) {
