@@ -1,9 +1,6 @@
 #include "compare/reference.h"
 
-#include <bit>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -21,50 +18,6 @@ namespace fs = std::filesystem;
 constexpr uint64_t kFormat = 2;
 /// Unlikely as a seed on the command line, so that no method shares the reference's random numbers.
 constexpr uint64_t kSeed = 0x7265666572656e63;
-
-std::string contents_of(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
-
-/// Adds all bits of a parameter's value.
-struct AddValue {
-    ContentHash& hash;
-
-    void operator()(bool v) const { hash.add(uint64_t(v)); }
-    void operator()(int64_t v) const { hash.add(uint64_t(v)); }
-    void operator()(double v) const { hash.add(std::bit_cast<uint64_t>(v)); }
-    void operator()(const std::string& v) const { hash.add(v); }
-    void operator()(Vec3 v) const { add({v.x, v.y, v.z}); }
-    void operator()(Rgb v) const { add({v.r, v.g, v.b}); }
-    void operator()(const Transform& v) const {
-        for (const auto& row : v.matrix())
-            for (const double x : row) (*this)(x);
-    }
-
-private:
-    void add(std::initializer_list<float> values) const {
-        for (const float x : values) hash.add(uint64_t(std::bit_cast<uint32_t>(x)));
-    }
-};
-
-template <class T>
-void add_array(ContentHash& hash, const std::vector<T>& values) {
-    hash.add(
-        std::string_view(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)));
-}
-
-/// Adds the contents of the file `name` in the scene's search paths, if there is one.
-void add_file(ContentHash& hash, const SceneDescription& description, const std::string& name) {
-    if (name.empty()) return;
-    for (const std::string& folder : description.search_paths) {
-        const fs::path path = fs::path(folder) / name;
-        std::error_code ignored;
-        if (!fs::is_regular_file(path, ignored)) continue;
-        hash.add(contents_of(path));
-        return;
-    }
-}
 
 double number(const Image& image, const std::string& name) {
     const auto found = image.attributes.find("etendue." + name);
@@ -167,10 +120,16 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
                                         const std::function<void(const Progress&)>& progress,
                                         const std::atomic<bool>& interrupted) {
     const std::string file = cache_file(scene.film(), settings);
+    std::string damage;
     if (fs::exists(file)) {
-        Reference kept = read_reference(file, scene.film());
-        kept.reused = true;
-        if (kept.has_variance() && is_long_enough(kept, settings.render)) return kept;
+        try {
+            Reference kept = read_reference(file, scene.film());
+            kept.reused = true;
+            if (kept.has_variance() && is_long_enough(kept, settings.render)) return kept;
+        } catch (const std::runtime_error& e) {
+            damage = fmt::format(
+                "the reference that was kept is damaged and was rendered again ({})", e.what());
+        }
     }
     Reference r;
     r.file = file;
@@ -197,36 +156,14 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
     r.pixels = mean_of(r.first, r.second);
     if (mean > 0) r.mean_relative_error = std::sqrt(variance) / mean;
     r.warnings = warnings(stats);
-    write_reference(r, stats);
+    try {
+        write_reference(r, stats);
+    } catch (const std::runtime_error& e) {
+        // It serves this comparison all the same.
+        r.warnings.push_back(fmt::format("the reference cannot be kept: {}", e.what()));
+    }
+    if (!damage.empty()) r.warnings.push_back(damage);
     return r;
-}
-
-uint64_t scene_fingerprint(const SceneDescription& description) {
-    ContentHash hash;
-    for (const int root : description.roots) hash.add(uint64_t(root));
-    for (const SceneObject& object : description.objects) {
-        hash.add(object.category).add(object.type).add(object.id);
-        hash.add(uint64_t(object.params.size())).add(uint64_t(object.children.size()));
-        for (const Param& p : object.params) {
-            hash.add(p.name).add(uint64_t(p.value.index()));
-            std::visit(AddValue{hash}, p.value);
-            if (const auto* name = std::get_if<std::string>(&p.value))
-                add_file(hash, description, *name);
-        }
-        for (const SceneObject::Child& c : object.children)
-            hash.add(c.name).add(uint64_t(c.object));
-    }
-    for (const MeshData& mesh : description.meshes) {
-        add_array(hash, mesh.positions);
-        add_array(hash, mesh.normals);
-        add_array(hash, mesh.uvs);
-        add_array(hash, mesh.triangles);
-    }
-    return hash.value();
-}
-
-uint64_t program_fingerprint(const std::string& file) {
-    return ContentHash().add(contents_of(file)).value();
 }
 
 }  // namespace etendue

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "description/scene_description.h"
+#include "description/fingerprint.h"
 #include "render/renderer.h"
 
 namespace etendue {
@@ -50,11 +50,5 @@ struct ReferenceSettings {
 std::optional<Reference> make_reference(const Scene& scene, const ReferenceSettings& settings,
                                         const std::function<void(const Progress&)>& progress,
                                         const std::atomic<bool>& interrupted);
-
-/// Hash of the scene's contents: all bits of the description, and the bytes of every mesh, texture and other file that
-/// it names.
-uint64_t scene_fingerprint(const SceneDescription& description);
-/// Hash of the file with the program, since another build may render another image.
-uint64_t program_fingerprint(const std::string& file = "/proc/self/exe");
 
 }  // namespace etendue

@@ -3,30 +3,21 @@
 // it, and only the scene builder interprets it. Names are those of Mitsuba 3 (snake_case), whatever the file's dialect.
 
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "color/rgb.h"
 #include "description/mesh_data.h"
+#include "description/shared.h"
 #include "description/source_location.h"
 #include "math/transform.h"
 #include "math/vec.h"
 
 namespace etendue {
 
-/// A transform that copies share, so that the values of other parameters do not take its space.
-class SharedTransform {
-public:
-    SharedTransform(const Transform& transform)
-        : transform_(std::make_shared<const Transform>(transform)) {}
-    operator const Transform&() const { return *transform_; }
-    bool operator==(const SharedTransform& b) const { return *transform_ == *b.transform_; }
-
-private:
-    std::shared_ptr<const Transform> transform_;
-};
+/// Shared, so that the values of other parameters do not take its space.
+using SharedTransform = Shared<Transform>;
 
 /// Type of a `ParamValue`, in the order of its alternatives.
 enum class ParamType { Bool, Int, Float, String, Vector, Rgb, Transform };
@@ -79,12 +70,14 @@ struct EncodedImage {
     std::string bytes;
 };
 
+/// What an image depends on is part of its fingerprint, see fingerprint.cpp.
 struct SceneDescription {
     std::vector<SceneObject> objects;  ///< In any order; the graph of children has no cycles.
     std::vector<int> roots;            ///< The scene's own children, in file order.
-    std::vector<MeshData> meshes;  ///< Meshes that the scene file holds itself; see shape `mesh`.
-    std::vector<EncodedImage>
-        images;        ///< Images that the scene file holds itself; see texture `bitmap`.
+    /// Meshes that the scene file holds itself, see shape `mesh`; not copied with the description.
+    std::vector<Shared<MeshData>> meshes;
+    /// Images that the scene file holds itself, see texture `bitmap`.
+    std::vector<Shared<EncodedImage>> images;
     std::string file;  ///< The scene file, as given.
     /// Directories in which relative file names are looked up, in order; the scene file's own comes first.
     std::vector<std::string> search_paths;

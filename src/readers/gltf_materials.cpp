@@ -284,9 +284,9 @@ int GltfReader::bitmap(const JsonValue& info, bool raw, const char* channel) {
             const auto view = image["bufferView"].index(buffers_.view_count());
             if (!view && uri.empty()) image.fail("has neither a uri nor a bufferView");
             watch(view ? buffers_.view(*view).size() : uri.size(), image);
-            scene_.images.push_back(
-                {fmt::format("{}{}", file_.str(), image.path()),
-                 view ? std::string(buffers_.view(*view)) : buffers_.uri(image["uri"])});
+            scene_.images.push_back(EncodedImage{fmt::format("{}{}", file_.str(), image.path()),
+                                                 view ? std::string(buffers_.view(*view))
+                                                      : buffers_.uri(image["uri"])});
         }
         set(made, "image", at->second);
     }

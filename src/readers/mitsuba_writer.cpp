@@ -222,7 +222,7 @@ private:
 
     void write_image(SceneObject& o) {
         const auto index = size_t(std::get<int64_t>(o.find("image")->value));
-        const std::string& bytes = scene_.images[index].bytes;
+        const std::string& bytes = scene_.images[index]->bytes;
         const char* extension = bytes.starts_with("\xff\xd8") ? "jpg"
                                 : bytes.starts_with("PF\n")   ? "pfm"
                                                               : "png";

@@ -230,7 +230,7 @@ private:
     }
     void set_image(SceneObject& o, std::string bytes) {
         set(o, "image", int64_t(scene_.images.size()));
-        scene_.images.push_back({"texture", std::move(bytes)});
+        scene_.images.push_back(EncodedImage{"texture", std::move(bytes)});
     }
     int add(SceneObject&& o) {
         scene_.objects.push_back(std::move(o));

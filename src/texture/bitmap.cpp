@@ -193,7 +193,8 @@ const PixelBuffer& load_image(const Params& params, TextureContext& context, boo
     const auto& images = params.scene().images;
     if (!params.has("image") || images.empty())
         return context.images().load(resolve_file(params), raw);
-    const auto& image = images[size_t(params.integer("image", 0, 0, int64_t(images.size()) - 1))];
+    const EncodedImage& image =
+        images[size_t(params.integer("image", 0, 0, int64_t(images.size()) - 1))];
     return context.images().decode(image.bytes, image.name, raw);
 }
 

@@ -93,8 +93,8 @@ TEST(Gltf, ReadsASquare) {
         R"({"pbrMetallicRoughness":{"baseColorFactor":[0.1,0.2,0.3,1],"metallicFactor":0.25,
             "roughnessFactor":0.5},"extensions":{"KHR_materials_ior":{"ior":1.25}}})");
     ASSERT_EQ(scene.meshes.size(), 1u);
-    EXPECT_EQ(scene.meshes[0].positions[2], (Vec3{1, 1, 0}));
-    EXPECT_EQ(scene.meshes[0].triangles[1], (MeshData::Triangle{0, 2, 3}));
+    EXPECT_EQ(scene.meshes[0]->positions[2], (Vec3{1, 1, 0}));
+    EXPECT_EQ(scene.meshes[0]->triangles[1], (MeshData::Triangle{0, 2, 3}));
     const SceneObject& m = find(scene, "principled");
     EXPECT_EQ(value<Rgb>(m, "base_color"), Rgb(0.1f, 0.2f, 0.3f));
     EXPECT_EQ(value<double>(m, "metallic"), 0.25);
@@ -114,8 +114,8 @@ TEST(Gltf, StripsAndFansHaveTheSameSides) {
                                  R"(,"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"mode":)" +
                                  std::to_string(mode) + R"(,"attributes":{"POSITION":0}}]}])"),
                  b);
-        ASSERT_EQ(scene.meshes[0].triangles.size(), 2u);
-        EXPECT_EQ(scene.meshes[0].triangles[1], expected);
+        ASSERT_EQ(scene.meshes[0]->triangles.size(), 2u);
+        EXPECT_EQ(scene.meshes[0]->triangles[1], expected);
     }
 }
 
@@ -152,8 +152,8 @@ TEST(Gltf, SparseAccessorsReplaceValues) {
             {"buffer":0,"byteOffset":60,"byteLength":1},{"buffer":0,"byteOffset":64,"byteLength":12}],
             "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}])"),
         b);
-    EXPECT_EQ(scene.meshes[0].positions[2], (Vec3{5, 6, 7}));
-    EXPECT_EQ(scene.meshes[0].positions[1], (Vec3{1, 0, 0}));
+    EXPECT_EQ(scene.meshes[0]->positions[2], (Vec3{5, 6, 7}));
+    EXPECT_EQ(scene.meshes[0]->positions[1], (Vec3{1, 0, 0}));
 }
 
 TEST(Gltf, NodesMultiplyFromTheRootAndSharedMeshesAreInstances) {

@@ -197,10 +197,10 @@ TEST(Pbrt, TriangleMeshesAreHeldByTheDescription) {
     const auto scene = parse4("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0]\n"
                               "\"integer indices\" [0 1 2 2 1 3] \"point2 uv\" [0 0 1 0 0 1 1 1]");
     ASSERT_EQ(scene.meshes.size(), 1u);
-    EXPECT_EQ(scene.meshes[0].triangles.size(), 2u);
-    EXPECT_EQ(scene.meshes[0].positions[3], (Vec3{1, 1, 0}));
-    EXPECT_EQ(scene.meshes[0].uvs[2], (Vec2{0, 1}));
-    EXPECT_TRUE(scene.meshes[0].normals.empty());
+    EXPECT_EQ(scene.meshes[0]->triangles.size(), 2u);
+    EXPECT_EQ(scene.meshes[0]->positions[3], (Vec3{1, 1, 0}));
+    EXPECT_EQ(scene.meshes[0]->uvs[2], (Vec2{0, 1}));
+    EXPECT_TRUE(scene.meshes[0]->normals.empty());
     EXPECT_FALSE(value<bool>(find(scene, "shape"), "compute_normals"));
 }
 
@@ -245,10 +245,10 @@ TEST(Pbrt, LoopSubdivisionOfAnOctahedronEndsOnItsLimit) {
 
 TEST(Pbrt, BilinearMeshes) {
     const auto flat = parse4("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0]");
-    EXPECT_EQ(flat.meshes.at(0).triangles.size(), 2u);
-    EXPECT_GT(flat.meshes[0].normals[0].z, 0.99f);
+    EXPECT_EQ(flat.meshes.at(0)->triangles.size(), 2u);
+    EXPECT_GT(flat.meshes[0]->normals[0].z, 0.99f);
     const auto bent = parse4("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]");
-    EXPECT_EQ(bent.meshes.at(0).triangles.size(), 512u);
+    EXPECT_EQ(bent.meshes.at(0)->triangles.size(), 512u);
 }
 
 TEST(Pbrt, AlphaBecomesAMask) {

@@ -163,7 +163,7 @@ TEST(PlainMitsuba, TexturesOfUvBecomeImages) {
     const SceneObject& texture = scene.objects[size_t(bsdf.children[0].object)];
     EXPECT_EQ(texture.type, "bitmap");
     ASSERT_EQ(scene.images.size(), 1u);
-    EXPECT_TRUE(scene.images[0].bytes.starts_with("PF\n"));
+    EXPECT_TRUE(scene.images[0]->bytes.starts_with("PF\n"));
 }
 
 // The pixels of a square image have one colour each, so the other image is much finer.
@@ -172,7 +172,7 @@ TEST(PlainMitsuba, SquareEnvironmentsAreFine) {
                                              "/tests/scenes/formats/pbrt4/environment.pbrt");
     make_plain_mitsuba(scene);
     ASSERT_EQ(scene.images.size(), 1u);
-    EXPECT_TRUE(scene.images[0].bytes.starts_with("PF\n1024 512\n"));
+    EXPECT_TRUE(scene.images[0]->bytes.starts_with("PF\n1024 512\n"));
 }
 
 // Mitsuba 3 renders no bump map of another texture: it has no gradient of it.

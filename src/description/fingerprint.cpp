@@ -1,0 +1,121 @@
+#include "description/fingerprint.h"
+
+#include <bit>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "math/content_hash.h"
+
+namespace etendue {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string contents_of(const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Adds the parts of a description. Every function names all members of its type, so that a new one does not compile
+/// until it is added here, or left out with a reason.
+class Fingerprint {
+public:
+    explicit Fingerprint(const SceneDescription& scene) {
+        // The folders count by the files that are found in them. `file`, `warnings` and `left_out` say what was read.
+        const auto& [objects, roots, meshes, images, file, search_paths, warnings, left_out] =
+            scene;
+        folders_ = &search_paths;
+        add_list(roots, [&](int root) { add(root); });
+        add_list(objects, [&](const SceneObject& o) { add(o); });
+        add_list(meshes, [&](const MeshData& m) { add(m); });
+        add_list(images, [&](const EncodedImage& i) { add(i); });
+    }
+    uint64_t value() const { return hash_.value(); }
+
+private:
+    void add(const SceneObject& object) {
+        const auto& [category, type, id, where, params, children] = object;
+        hash_.add(category).add(type).add(id);
+        add_list(params, [&](const Param& p) { add(p); });
+        add_list(children, [&](const SceneObject::Child& c) { add(c); });
+    }
+    void add(const SceneObject::Child& child) {
+        const auto& [name, object, where] = child;
+        hash_.add(name);
+        add(object);
+    }
+    void add(const Param& param) {
+        const auto& [name, value, where] = param;
+        hash_.add(name).add(uint64_t(value.index()));
+        std::visit([&](const auto& v) { add(v); }, value);
+        if (const auto* text = std::get_if<std::string>(&value)) add_file(*text);
+    }
+    void add(const MeshData& mesh) {
+        // The name and the counts of what was mended are for messages.
+        const auto& [name, positions, normals, uvs, colors, triangles, face_normals,
+                     dropped_degenerate, replaced_normals] = mesh;
+        add_array(positions);
+        add_array(normals);
+        add_array(uvs);
+        add_array(colors);
+        add_array(triangles);
+        add(face_normals);
+    }
+    void add(const EncodedImage& image) {
+        const auto& [name, bytes] = image;  // the name is for messages
+        hash_.add(bytes);
+    }
+
+    void add(bool v) { hash_.add(uint64_t(v)); }
+    void add(int v) { hash_.add(uint64_t(v)); }
+    void add(int64_t v) { hash_.add(uint64_t(v)); }
+    void add(float v) { hash_.add(uint64_t(std::bit_cast<uint32_t>(v))); }
+    void add(double v) { hash_.add(std::bit_cast<uint64_t>(v)); }
+    void add(const std::string& v) { hash_.add(v); }
+    void add(Vec3 v) { add(v.x), add(v.y), add(v.z); }
+    void add(Rgb v) { add(v.r), add(v.g), add(v.b); }
+    void add(const Transform& v) {
+        for (const auto& row : v.matrix())
+            for (const double x : row) add(x);
+    }
+
+    template <class List, class Use>
+    void add_list(const List& list, const Use& use) {
+        hash_.add(uint64_t(list.size()));
+        for (const auto& element : list) use(element);
+    }
+    template <class T>
+    void add_array(const std::vector<T>& values) {
+        static_assert(std::has_unique_object_representations_v<T> || std::is_same_v<T, Vec2> ||
+                      std::is_same_v<T, Vec3>);
+        hash_.add(std::string_view(reinterpret_cast<const char*>(values.data()),
+                                   values.size() * sizeof(T)));
+    }
+    /// The contents of the file `name` in the scene's search paths, if there is one.
+    void add_file(const std::string& name) {
+        if (name.empty()) return;
+        for (const std::string& folder : *folders_) {
+            const fs::path path = fs::path(folder) / name;
+            std::error_code ignored;
+            if (!fs::is_regular_file(path, ignored)) continue;
+            hash_.add(contents_of(path));
+            return;
+        }
+    }
+
+    ContentHash hash_;
+    const std::vector<std::string>* folders_ = nullptr;
+};
+
+}  // namespace
+
+uint64_t scene_fingerprint(const SceneDescription& description) {
+    return Fingerprint(description).value();
+}
+
+uint64_t program_fingerprint(const std::string& file) {
+    return ContentHash().add(contents_of(file)).value();
+}
+
+}  // namespace etendue
