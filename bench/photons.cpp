@@ -87,6 +87,8 @@ public:
         whole_->learn(pass);
         paths_.learn(pass);
     }
+    void save(LearnedState&) const override {}
+    void load(LearnedState&) override {}
     std::unique_ptr<PassSums> make_sums() const override { return whole_->make_sums(); }
     void collect(std::span<const std::unique_ptr<PassSums>> workers) override {
         whole_->collect(workers);

@@ -28,11 +28,11 @@ public:
     virtual void learn(const LearnContext&) {}
     /// Whether learn() changes the sampling or the weights of later passes.
     virtual bool is_learning() const { return false; }
-    /// Writes the state that later passes need. Called between passes. After load(), an integrator with the same
-    /// parameters continues as this one would. The state includes neither the film and the statistics nor the data of a
-    /// single pass. load() throws std::runtime_error if the state is that of another integrator.
-    virtual void save(LearnedState&) const {}
-    virtual void load(LearnedState&) {}
+    /// Writes the state that later passes need, if there is any. Called between passes. After load(), an integrator with
+    /// the same parameters continues as this one would. The state includes neither the film and the statistics nor the
+    /// data of a single pass. load() throws std::runtime_error if the state is that of another integrator.
+    virtual void save(LearnedState& to) const = 0;
+    virtual void load(LearnedState& from) = 0;
     /// Traces the paths that the samples of the pass share. Called by one thread, before the samples. An exception,
     /// here or in a sample, discards the pass.
     virtual void trace(const PassContext&) {}

@@ -25,6 +25,8 @@ public:
           eye_paths_(uint32_t(eye_paths)) {}
 
     void learn(const LearnContext& pass) override { mapping_.learn(pass); }
+    void save(LearnedState& to) const override { mapping_.paths().save(to); }
+    void load(LearnedState& from) override { mapping_.load(from); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         radius_ = radius_params_.radius(pass.scene, pass.index);

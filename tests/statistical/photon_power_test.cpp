@@ -41,6 +41,8 @@ public:
                                                                   .user_share = 0.25});
     }
 
+    void save(LearnedState&) const override {}
+    void load(LearnedState&) override {}
     void trace(const PassContext& pass) override {
         // Lopsided importance, of few places.
         const auto importons = [&] {

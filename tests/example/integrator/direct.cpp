@@ -28,6 +28,9 @@ public:
     TechniqueCounts counts(const Scene&, uint64_t) const override { return counts_; }
     uint64_t light_paths(const Scene&) const override { return 0; }
     Estimator estimator() const override { return Estimator::Unbiased; }
+    // It learns nothing from earlier passes.
+    void save(LearnedState&) const override {}
+    void load(LearnedState&) override {}
 
 private:
     void add_hits(const SampleContext& c, const SubPath& z, int t) const {

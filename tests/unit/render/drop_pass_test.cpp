@@ -28,6 +28,8 @@ public:
         inner_->learn(context);
     }
     bool is_learning() const override { return inner_->is_learning(); }
+    void save(LearnedState& to) const override { inner_->save(to); }
+    void load(LearnedState& from) override { inner_->load(from); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         hooks_.trace(pass_);

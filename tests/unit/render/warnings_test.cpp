@@ -41,6 +41,8 @@ public:
     TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
     uint64_t light_paths(const Scene&) const override { return 0; }
     Estimator estimator() const override { return Estimator::Unbiased; }
+    void save(LearnedState&) const override {}
+    void load(LearnedState&) override {}
 };
 
 TEST(Warnings, CountWhatTheFilmRefusesToo) {

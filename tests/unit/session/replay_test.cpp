@@ -82,6 +82,8 @@ public:
     uint64_t light_paths(const Scene&) const override { return 0; }
     bool samples_alone() const override { return samples_alone_; }
     Estimator estimator() const override { return Estimator::Unbiased; }
+    void save(LearnedState&) const override {}
+    void load(LearnedState&) override {}
 
 private:
     std::unique_ptr<Integrator> path_ = make_integrator(IntegratorSpec::parse("path"));
