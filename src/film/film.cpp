@@ -20,13 +20,16 @@ void Film::average_blocks() {
     const int width = geometry_.crop_width, height = geometry_.crop_height;
     const int rows = (height + kBlock - 1) / kBlock;
     expected_blocks_.assign(blocks_across() * uint64_t(rows), 0);
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            const int columns = std::min(kBlock, width - x / kBlock * kBlock),
-                      lines = std::min(kBlock, height - y / kBlock * kBlock);
-            expected_blocks_[uint64_t(y / kBlock) * blocks_across() + uint64_t(x / kBlock)] +=
-                expected_[uint64_t(y) * width + x] / float(columns * lines);
-        }
+    tbb::parallel_for(0, rows, [&](int row) {
+        float* const blocks = expected_blocks_.data() + uint64_t(row) * blocks_across();
+        const int begin = row * kBlock, end = std::min(begin + kBlock, height);
+        for (int y = begin; y < end; ++y)
+            for (int x = 0; x < width; ++x) {
+                const int columns = std::min(kBlock, width - x / kBlock * kBlock);
+                blocks[x / kBlock] +=
+                    expected_[uint64_t(y) * width + x] / float(columns * (end - begin));
+            }
+    });
 }
 
 void Film::set_groups(int count) {
@@ -142,18 +145,30 @@ double Film::group_error2(size_t pair, size_t pixel) const {
 ErrorEstimate Film::group_error() const {
     ErrorEstimate e;
     if (!has_all_groups()) return e;
+    const uint64_t n = moments_.size(), chunks = film_chunks(n);
+    const size_t pairs = group_sums_.size() / 2;
+    std::vector<double> luminance_sum(chunks), error_sum(chunks * pairs);
+    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+        for (uint64_t i = begin; i < end; ++i)
+            luminance_sum[chunk] += double(moments_[i].luminance_sum());
+    });
     double mean = 0;
-    for (const Moments& m : moments_) mean += double(m.luminance_sum());
-    mean /= double(passes_) * double(moments_.size());
-    etendue::Moments errors;
-    for (size_t pair = 0; pair < group_sums_.size() / 2; ++pair) {
-        double sum = 0;
-        for (size_t i = 0; i < moments_.size(); ++i) {
+    for (const double sum : luminance_sum) mean += sum;
+    mean /= double(passes_) * double(n);
+    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+        for (uint64_t i = begin; i < end; ++i) {
             const double y = double(moments_[i].luminance_sum()) / double(passes_);
             const double scale2 = y * y + 0.01 * mean * mean;
-            if (scale2 > 0) sum += group_error2(pair, i) / scale2;
+            if (!(scale2 > 0)) continue;
+            for (size_t pair = 0; pair < pairs; ++pair)
+                error_sum[chunk * pairs + pair] += group_error2(pair, i) / scale2;
         }
-        errors.add(sum / double(moments_.size()));
+    });
+    etendue::Moments errors;
+    for (size_t pair = 0; pair < pairs; ++pair) {
+        double sum = 0;
+        for (uint64_t c = 0; c < chunks; ++c) sum += error_sum[c * pairs + pair];
+        errors.add(sum / double(n));
     }
     const double half =
         student_quantile(0.05, double(errors.count() - 1)) * std::sqrt(errors.squared_error());

@@ -94,7 +94,9 @@ public:
     std::vector<Rgb> image() const;
     /// Variance of that mean, per pixel and channel; zero with fewer than two passes.
     std::vector<Rgb> variance() const;
+    /// Reads the sums of all groups if there are any, and otherwise only one number for each pair of passes.
     ErrorEstimate error() const;
+    bool has_groups() const { return !group_sums_.empty(); }
     /// Mean luminance of the crop, and its standard error.
     struct MeanEstimate {
         double mean = 0, standard_error = 0;
@@ -117,7 +119,6 @@ public:
 private:
     static constexpr int kBlock = 4;
 
-    bool has_groups() const { return !group_sums_.empty(); }
     bool has_all_groups() const { return passes_ >= group_sums_.size(); }
     uint64_t passes_of_group(size_t group) const {
         return (passes_ + group_sums_.size() - 1 - group) / group_sums_.size();

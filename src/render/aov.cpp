@@ -8,6 +8,7 @@
 #include <tbb/task_arena.h>
 
 #include "pathspace/walk.h"
+#include "system/threads.h"
 
 namespace etendue {
 namespace {
@@ -53,7 +54,7 @@ std::vector<std::vector<Rgb>> average_first_hits(const Scene& scene, size_t laye
                                                  const FirstHitValue& value) {
     std::vector<std::vector<Rgb>> images(layers, std::vector<Rgb>(scene.film().pixel_count()));
     const Film film(scene.film(), scene.filter());
-    tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+    tbb::task_arena arena(thread_count(threads));
     arena.execute([&] {
         tbb::parallel_for(0, scene.film().crop_height, [&](int row) {
             SubPath z;

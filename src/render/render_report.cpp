@@ -71,16 +71,24 @@ void add_attributes(const nlohmann::json& report, Image& image) {
     image.attributes["etendue.version"] = std::string(ETENDUE_VERSION);
 }
 
+Image image_with_layers(const Renderer& renderer, const Scene& scene,
+                        const std::vector<AovImage>& layers, bool has_variance,
+                        const nlohmann::json& report) {
+    const std::vector<Rgb> pixels = renderer.film().image();
+    const std::vector<Rgb> variance =
+        has_variance ? renderer.film().variance() : std::vector<Rgb>();
+    std::vector<RgbLayer> all{{"", pixels}};
+    for (const AovImage& a : layers) all.push_back({a.name, a.pixels});
+    if (has_variance) all.push_back({"variance", variance});
+    Image image = layered_image(scene.film().crop_width, scene.film().crop_height, all);
+    add_attributes(report, image);
+    return image;
+}
+
 Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
                         const std::vector<std::string>& aovs, const nlohmann::json& report) {
-    Image image =
-        rgb_image(scene.film().crop_width, scene.film().crop_height, renderer.film().image());
-    add_attributes(report, image);
-    for (const AovImage& a : render_aovs(scene, aovs, kAovSamples, seed, threads))
-        add_rgb_layer(image, image.width, image.height, a.name, a.pixels);
-    if (std::find(aovs.begin(), aovs.end(), "variance") != aovs.end())
-        add_rgb_layer(image, image.width, image.height, "variance", renderer.film().variance());
-    return image;
+    return image_with_layers(renderer, scene, render_aovs(scene, aovs, kAovSamples, seed, threads),
+                             std::find(aovs.begin(), aovs.end(), "variance") != aovs.end(), report);
 }
 
 }  // namespace etendue

@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "image/image.h"
+#include "render/aov.h"
 #include "render/renderer.h"
 
 namespace etendue {
@@ -36,7 +37,12 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
 
 /// Sets the texts and numbers of a report as metadata, with the version of the program.
 void add_attributes(const nlohmann::json& report, Image& image);
-/// The image, the layers of aov_registry() that `aovs` names, and the texts and numbers of `report` as metadata.
+/// The image with `layers`, with a layer of its variance if `has_variance`, and with the texts and numbers of `report` as
+/// metadata.
+Image image_with_layers(const Renderer& renderer, const Scene& scene,
+                        const std::vector<AovImage>& layers, bool has_variance,
+                        const nlohmann::json& report);
+/// The same with the layers of aov_registry() that `aovs` names, which are rendered here.
 Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
                         const std::vector<std::string>& aovs, const nlohmann::json& report);
 

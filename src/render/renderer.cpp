@@ -1,4 +1,5 @@
 #include "render/renderer.h"
+#include "system/threads.h"
 
 #include <algorithm>
 #include <array>
@@ -219,9 +220,7 @@ const FilmGeometry& fitting_film(const Scene& scene, const RenderSettings& setti
 }  // namespace
 
 struct Renderer::Workers {
-    explicit Workers(int threads)
-        : allowed(allow_threads(threads)),
-          arena(threads > 0 ? threads : tbb::task_arena::automatic) {}
+    explicit Workers(int threads) : allowed(allow_threads(threads)), arena(thread_count(threads)) {}
 
     /// Returns the sum of all workers' statistics and resets them.
     RenderStats take_stats() {
@@ -389,14 +388,33 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
     if (techniques_) techniques_->end_pass();
 }
 
+ErrorEstimate Renderer::error() const {
+    return workers_->arena.execute([&] { return film_.error(); });
+}
+
+ErrorEstimate Progress::error() const {
+    return renderer.error();
+}
+
+const ErrorEstimate& RecentError::update(const Progress& progress) {
+    // Without a valid one, there is nothing to compute yet. The last one is that of the whole rendering.
+    const bool is_last = progress.fraction.value_or(0) >= 1;
+    if (!progress.renderer.film().has_groups() || !last_.valid || is_last ||
+        progress.seconds >= seconds_ + 1) {
+        last_ = progress.error();
+        seconds_ = progress.seconds;
+    }
+    return last_;
+}
+
 std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
-                                            const ErrorEstimate& error) const {
+                                            const std::optional<ErrorEstimate>& error) const {
     if (film_.passes() == 0) return {};
     if (film_.passes() >= limits.spp.value_or(kMostPasses)) return StopReason::Samples;
     // A pass is begun only if at least half of it is expected to fit.
     if (limits.seconds && seconds_ + 0.5 * seconds_ / double(film_.passes()) > *limits.seconds)
         return StopReason::Time;
-    if (limits.error && error.valid && error.relative_rms <= *limits.error)
+    if (limits.error && error && error->valid && error->relative_rms <= *limits.error)
         return StopReason::Error;
     return {};
 }
@@ -408,7 +426,11 @@ StopReason Renderer::run(const RenderLimits& limits,
     const auto begin = Clock::now();
     const double before = seconds_;
     check_limits(limits);
-    if (const auto reason = reached(limits, film_.error())) return *reason;
+    // Computed only where it matters, since it may take as long as a pass.
+    const auto error_of_image = [&] {
+        return limits.error ? std::optional(error()) : std::nullopt;
+    };
+    if (const auto reason = reached(limits, error_of_image())) return *reason;
     while (true) {
         try {
             pass(drop);
@@ -417,19 +439,20 @@ StopReason Renderer::run(const RenderLimits& limits,
         }
         seconds_ = before + std::chrono::duration<double>(Clock::now() - begin).count();
 
-        Progress now{film_.passes(), seconds_, {}, double(stats_.rays()) / seconds_, film_.error()};
+        const std::optional<ErrorEstimate> found = error_of_image();
+        Progress now{*this, film_.passes(), seconds_, {}, double(stats_.rays()) / seconds_};
         if (limits.spp) now.fraction = double(now.passes) / double(*limits.spp);
         if (limits.seconds)
             now.fraction = std::max(now.fraction.value_or(0), seconds_ / *limits.seconds);
         // The error falls with the square root of the number of passes.
-        if (limits.error && now.error.valid)
+        if (found && found->valid)
             now.fraction =
-                std::max(now.fraction.value_or(0), sqr(*limits.error / now.error.relative_rms));
+                std::max(now.fraction.value_or(0), sqr(*limits.error / found->relative_rms));
         if (now.fraction) now.fraction = std::min(*now.fraction, 1.0);
         progress(now);
 
         if (interrupted.load(std::memory_order_relaxed)) return StopReason::Interrupted;
-        if (const auto reason = reached(limits, now.error)) return *reason;
+        if (const auto reason = reached(limits, found)) return *reason;
     }
 }
 

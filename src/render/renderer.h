@@ -39,12 +39,28 @@ struct RenderSettings : RenderLimits {
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
 };
 
+class Renderer;
+
 struct Progress {
+    const Renderer& renderer;
     uint64_t passes;
     double seconds;                  ///< See Renderer::seconds().
     std::optional<double> fraction;  ///< Finished fraction of the work; empty if it is unknown.
     double rays_per_second;
-    ErrorEstimate error;
+
+    /// The image's error, which is computed by this call; for methods with groups of passes, from all pixels.
+    ErrorEstimate error() const;
+};
+
+/// The error for those who are told of every pass, but do not need it of every pass: where it takes time, it is up to a
+/// second old. Of the pass that reaches a limit, it is not.
+class RecentError {
+public:
+    const ErrorEstimate& update(const Progress& progress);
+
+private:
+    ErrorEstimate last_;
+    double seconds_ = 0;
 };
 
 /// Why a rendering ended.
@@ -87,6 +103,7 @@ public:
     const Integrator& integrator() const { return *integrator_; }
     const RenderStats& stats() const { return stats_; }  ///< Statistics of the finished passes.
     double seconds() const { return seconds_; }          ///< Time of the finished passes in run().
+    ErrorEstimate error() const;  ///< Of the film, computed by the threads of this renderer.
     const TechniqueImages* techniques() const { return techniques_.get(); }
 
 private:
@@ -100,7 +117,9 @@ private:
     Numbers numbers(uint32_t index) const;
     void pass(const std::atomic<bool>& drop);
     void trace_pass(const std::atomic<bool>& drop);
-    std::optional<StopReason> reached(const RenderLimits& limits, const ErrorEstimate& error) const;
+    /// `error`: empty if there is no limit of the error.
+    std::optional<StopReason> reached(const RenderLimits& limits,
+                                      const std::optional<ErrorEstimate>& error) const;
 
     const Scene& scene_;
     RenderSettings settings_;

@@ -13,6 +13,7 @@
 
 #include "render/defaults.h"
 #include "render/render_report.h"
+#include "system/threads.h"
 
 namespace etendue {
 namespace {
@@ -86,6 +87,7 @@ struct Session::Run {
     int shown_seeds = 0;       ///< Of them, those in the last snapshot.
     double pass_seconds = 0;   ///< Of the last pass.
     double shown_seconds = 0;  ///< Processor time of the last snapshot.
+    RecentError error;
     SnapshotPool pool;
     uint64_t last_turn = 0;
 };
@@ -213,6 +215,7 @@ std::shared_ptr<Session::Run> Session::next_run() const {
 void Session::make_renderer(Run& run) {
     run.renderer.reset();
     run.is_counted = false;
+    run.error = {};
     run.settings.seed = run.status.seed + uint64_t(run.seeds.count());
     std::unique_ptr<Integrator> integrator = std::move(run.integrator);
     if (!integrator) integrator = make_integrator(run.settings.integrator);
@@ -304,6 +307,7 @@ void Session::finish_stop(Run& run) {
 }
 
 void Session::after_pass(Run& run, const Progress& p) {
+    const ErrorEstimate error = run.error.update(p);
     bool shows = false;
     {
         const std::lock_guard lock(mutex_);
@@ -318,12 +322,12 @@ void Session::after_pass(Run& run, const Progress& p) {
         if (run.has_seeds()) {
             if (s.fraction) *s.fraction = (s.finished_seeds + *s.fraction) / s.seeds;
         } else {
-            s.error = p.error;
+            s.error = error;
             s.figures = run.renderer->integrator().figures();
             constexpr double kSpacing = 1.05;
-            if (p.error.valid &&
+            if (error.valid &&
                 (s.history.empty() || p.seconds > kSpacing * s.history.back().seconds))
-                s.history.push_back({p.passes, p.seconds, p.error});
+                s.history.push_back({p.passes, p.seconds, error});
         }
     }
     // The first picture does not wait. Long passes are shown unasked, so that saving need not wait for the next one.
@@ -362,7 +366,7 @@ void Session::show(Run& run) noexcept {
     const double before = process_cpu_seconds();
     run.is_wanted = false;
     try {
-        tbb::task_arena arena(threads_ > 0 ? threads_ : tbb::task_arena::automatic);
+        tbb::task_arena arena(thread_count(threads_));
         if (const auto last = run.snapshot.load();
             !last || last->passes != passes || run.shown_seeds != run.seeds.count()) {
             const std::shared_ptr<Snapshot> snapshot = run.pool.take();
