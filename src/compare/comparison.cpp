@@ -19,6 +19,19 @@ struct MethodRun {
     std::unique_ptr<Renderer> renderer;
     MemoryMeter memory;
     std::vector<Checkpoint> checkpoints;
+    std::string failure;  ///< Why it ended early; empty otherwise.
+
+    /// Calls `task`. If it fails, the method gets no further turns, and the others go on.
+    template <class Task>
+    void attempt(const Task& task) {
+        try {
+            if (failure.empty()) task();
+        } catch (const std::bad_alloc&) {
+            failure = "not enough memory";
+        } catch (const std::runtime_error& e) {
+            failure = e.what();
+        }
+    }
 };
 
 ImageErrors errors_of(const std::vector<Rgb>& image, const Reference& r) {
@@ -68,16 +81,18 @@ void render_in_turns(std::vector<MethodRun>& method_runs, const CompareSettings&
             const size_t method = forwards ? i : method_runs.size() - 1 - i;
             MethodRun& c = method_runs[method];
             c.memory.begin();
-            c.renderer->run(
-                turn.limits,
-                [&](const Progress& p) {
-                    progress(fmt::format("{}{}: {} spp, {:.1f} s", label,
-                                         settings.methods[method].name, p.passes, p.seconds));
-                },
-                interrupted);
+            c.attempt([&] {
+                c.renderer->run(
+                    turn.limits,
+                    [&](const Progress& p) {
+                        progress(fmt::format("{}{}: {} spp, {:.1f} s", label,
+                                             settings.methods[method].name, p.passes, p.seconds));
+                    },
+                    interrupted);
+            });
             c.memory.end();
             if (interrupted.load()) return;
-            if (turn.is_checkpoint) add_checkpoint(c, reference);
+            if (turn.is_checkpoint) c.attempt([&] { add_checkpoint(c, reference); });
         }
         forwards = !forwards;
     }
@@ -231,21 +246,28 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
         const uint64_t seed = settings.seed + uint64_t(index);
         std::vector<MethodRun> method_runs(settings.methods.size());
         for (size_t i = 0; i < method_runs.size(); ++i) {
-            method_runs[i].memory.begin();
-            method_runs[i].renderer = std::make_unique<Renderer>(
-                scene, render_settings(settings, settings.methods[i].integrator, seed));
-            method_runs[i].memory.end();
+            MethodRun& c = method_runs[i];
+            c.memory.begin();
+            c.attempt([&] {
+                c.renderer = std::make_unique<Renderer>(
+                    scene, render_settings(settings, settings.methods[i].integrator, seed));
+            });
+            c.memory.end();
         }
         const std::string label =
             settings.runs > 1 ? fmt::format("run {} of {}, ", index + 1, settings.runs) : "";
         render_in_turns(method_runs, settings, reference, progress, label, interrupted);
         for (size_t i = 0; i < method_runs.size(); ++i) {
             MethodRun& c = method_runs[i];
+            Method& m = out.methods[i];
+            if (!c.failure.empty()) {
+                out.failures.push_back(fmt::format("{}{} failed: {}", label, m.name(), c.failure));
+                continue;
+            }
             add_checkpoint(c, reference);
             if (c.checkpoints.empty()) continue;  // interrupted before its first pass
-            Method& m = out.methods[i];
             m.runs.push_back(finished_run(c, seed, reference));
-            if (index > 0) continue;
+            if (m.runs.size() > 1) continue;
             m.estimator = c.renderer->integrator().estimator();
             m.image = c.renderer->film().image();
             m.peak_bytes = c.memory.peak_bytes();
@@ -262,6 +284,7 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
         render_techniques(scene, settings, m, interrupted);
     }
     std::erase_if(out.methods, [](const Method& m) { return m.runs.empty(); });
+    if (out.methods.empty() && !out.failures.empty()) throw std::runtime_error(out.failures[0]);
     out.interrupted = interrupted.load();
     return out;
 }

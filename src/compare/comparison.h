@@ -54,7 +54,7 @@ struct Method {
     MethodSpec spec;
     Estimator estimator = Estimator::Unbiased;
     std::vector<Run> runs;
-    // Of the first run:
+    // Of the first of them:
     std::vector<Rgb> image;
     std::vector<float> flip_map;
     double flip = 0;
@@ -77,13 +77,15 @@ struct Comparison {
     std::vector<Method> methods;
     size_t scene_bytes = 0;  ///< Resident memory before the first method started.
     bool interrupted = false;
+    std::vector<std::string> failures;  ///< Runs of methods that failed and are left out.
 };
 
 /// Receives the current status as one line of text.
 using CompareProgress = std::function<void(const std::string& text)>;
 
-/// Renders the methods and evaluates them. If `interrupted` is set, evaluates the images rendered until then. Throws
-/// std::runtime_error where a method or its parameters do not exist.
+/// Renders the methods and evaluates them. If `interrupted` is set, evaluates the images rendered until then. A method
+/// whose rendering fails does not affect the others. Throws std::runtime_error where a method or its parameters do not
+/// exist, or all methods fail.
 Comparison compare(const Scene& scene, const Reference& reference, const CompareSettings& settings,
                    const CompareProgress& progress, const std::atomic<bool>& interrupted);
 

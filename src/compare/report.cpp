@@ -5,8 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <set>
-#include <thread>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -15,9 +13,10 @@
 #include "compare/error_json.h"
 #include "compare/plot.h"
 #include "compare/report_page.h"
-#include "image/atomic_file.h"
 #include "image/image_io.h"
 #include "image/tonemap.h"
+#include "system/output_file.h"
+#include "system/threads.h"
 
 namespace etendue {
 namespace {
@@ -106,7 +105,7 @@ Json to_json(const CompareSettings& s) {
              s.shown.longest == PathSelection::kNoLimit ? Json() : Json(s.shown.longest)},
             {"seed", s.seed},
             {"sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"},
-            {"threads", s.threads > 0 ? s.threads : int(std::thread::hardware_concurrency())},
+            {"threads", thread_count(s.threads)},
             {"technique_depth", s.technique_depth}};
 }
 
@@ -252,7 +251,7 @@ private:
         for (const CurveKind& kind : kCurves) {
             const std::string svg = convergence(c_, summaries, kind, name_).svg();
             const std::string name = fmt::format("convergence-{}.svg", kind.file);
-            write_file_atomically(file(name), svg);
+            write_file(file(name), svg);
             page.push_back({{"label", kind.label},
                             {"file", fmt::format("{}-{}", name_, name)},
                             {"svg", "data:image/svg+xml;base64," + base64(svg)}});
@@ -304,6 +303,7 @@ Json to_json(const Comparison& c) {
             {"height", c.film.crop_height},
             {"crop", {c.film.crop_x, c.film.crop_y, c.film.crop_width, c.film.crop_height}},
             {"interrupted", c.interrupted},
+            {"failures", c.failures},
             {"scene_bytes", c.scene_bytes},
             {"reference",
              {{"file", r.file},
@@ -328,28 +328,42 @@ std::string file_stem(const std::string& text) {
     return out;
 }
 
-void write_report(const std::vector<Comparison>& comparisons, const ReportOptions& options) {
-    Json report{{"program", "etendue " + options.version},
-                {"processor", processor()},
-                {"settings", comparisons.empty() ? Json() : to_json(comparisons.front().settings)},
-                {"scenes", Json::array()}};
-    Json pictures = Json::array();
-    std::set<std::string> names;
-    for (const Comparison& c : comparisons) {
-        const std::string name = scene_name(c.scene_file, names);
-        Json scene = to_json(c);
-        scene["name"] = name;
-        report["scenes"].push_back(std::move(scene));
-        pictures.push_back(SceneFigures(c, options.folder, name).write());
-    }
+ReportWriter::ReportWriter(ReportOptions options)
+    : options_(std::move(options)), report_{{"program", "etendue " + options_.version},
+                                            {"processor", processor()},
+                                            {"settings", Json()},
+                                            {"failures", Json::array()},
+                                            {"scenes", Json::array()}},
+      pictures_(Json::array()) {}
+
+void ReportWriter::add(const Comparison& c) {
+    const std::string name = scene_name(c.scene_file, names_);
+    Json scene = to_json(c);
+    scene["name"] = name;
+    Json pictures = SceneFigures(c, options_.folder, name).write();
+    if (report_["settings"].is_null()) report_["settings"] = to_json(c.settings);
+    report_["scenes"].push_back(std::move(scene));
+    pictures_.push_back(std::move(pictures));
+}
+
+void ReportWriter::add_failure(const std::string& scene, const std::string& reason) {
+    report_["failures"].push_back({{"file", scene}, {"reason", reason}});
+}
+
+void ReportWriter::write() const {
     std::string page(kReportHtml);
     replace(page, "/*{{style}}*/", kReportCss);
     replace(page, "/*{{program}}*/", kReportJs);
-    replace(page, "{{report}}", script_json(report));
-    replace(page, "{{pictures}}", script_json(pictures));
-    write_file_atomically((fs::path(options.folder) / "report.json").string(),
-                          dumped(report, 2) + "\n");
-    write_file_atomically((fs::path(options.folder) / "report.html").string(), page);
+    replace(page, "{{report}}", script_json(report_));
+    replace(page, "{{pictures}}", script_json(pictures_));
+    write_file((fs::path(options_.folder) / "report.json").string(), dumped(report_, 2) + "\n");
+    write_file((fs::path(options_.folder) / "report.html").string(), page);
+}
+
+void write_report(const std::vector<Comparison>& comparisons, const ReportOptions& options) {
+    ReportWriter writer(options);
+    for (const Comparison& c : comparisons) writer.add(c);
+    writer.write();
 }
 
 }  // namespace etendue

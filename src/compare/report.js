@@ -741,6 +741,7 @@ function sceneSection(scene, page) {
         element('p', {className: 'note', textContent: `${scene.file}, ${scene.width} × ${scene.height} pixels`})]);
     if (scene.interrupted)
         section.append(element('p', {className: 'warning', textContent: 'The comparison was interrupted, so the times of the methods differ.'}));
+    section.append(...scene.failures.map(text => element('p', {className: 'warning', textContent: `${text}.`})));
     const warned = [['Reference', scene.reference], ...scene.methods.map(m => [m.name, m])];
     section.append(...warned.flatMap(([name, of]) => of.warnings.map(
         text => element('p', {className: 'warning', textContent: `${name}: ${text}.`}))));
@@ -761,13 +762,15 @@ const legend = [
 ];
 
 const s = report.settings;
-document.getElementById('settings').textContent =
+if (s) document.getElementById('settings').textContent =
     `${report.program}. Each method ${s.seconds ? `for ${s.seconds} s` : `with ${s.spp} samples per pixel`}, ` +
     `${s.runs === 1 ? 'one run' : `${s.runs} runs`} from seed ${s.seed}, sampler ${s.sampler}, ` +
     `${s.threads} threads of ${report.processor}.` +
     (s.paths === 'inner' ? ' Only paths that join two sub-paths inside the scene are shown and compared.' : '') +
     (s.shortest_path > 1 || s.longest_path
         ? ` Only paths of ${s.shortest_path} to ${s.longest_path ?? '∞'} edges are shown and compared.` : '');
+document.getElementById('scenes').append(...report.failures.map(failure => element('p', {
+    className: 'warning', textContent: `${failure.file} could not be compared: ${failure.reason}.`})));
 document.getElementById('contents').append(...report.scenes.map(
     scene => element('a', {href: `#${scene.name}`, textContent: scene.name})));
 document.getElementById('scenes').append(...report.scenes.map((scene, i) => sceneSection(scene, pictures[i])));

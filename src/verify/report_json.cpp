@@ -88,6 +88,8 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
                              {"alpha", options.alpha},
                              {"tests", report.tests},
                              {"level", report.level},
+                             {"interrupted", report.interrupted},
+                             {"failures", report.failures},
                              {"warnings", report.warnings}};
     if (options.detect) j["detect"] = *options.detect;
     for (const MethodReport& m : report.methods)

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "math/hash.h"
+#include "system/threads.h"
 #include "verify/verify.h"
 
 namespace etendue {
@@ -20,9 +21,12 @@ constexpr uint64_t kPilotSamples = 20000;
 /// δ is chosen so that this share of the light comes along paths whose shortest edge is shorter.
 constexpr double kShortShare = 0.2;
 
-void render_all(Renderer& renderer) {
-    const std::atomic<bool> interrupted{false};
-    renderer.run([](const Progress&) {}, interrupted);
+/// Throws VerifyInterrupted if the rendering does not reach its end.
+void render_all(Renderer& renderer, const std::atomic<bool>* interrupted) {
+    const std::atomic<bool> never{false};
+    const std::atomic<bool>& stop = interrupted ? *interrupted : never;
+    const StopReason reason = renderer.run([](const Progress&) {}, stop, stop);
+    if (reason == StopReason::Interrupted) throw VerifyInterrupted();
 }
 
 /// Shortest edge and contribution of every path of a rendering, by path length.
@@ -141,8 +145,7 @@ SeriesRenderer::SeriesRenderer(const Scene& scene, const VerifyOptions& options,
       cut_offs_(size_t(options.longest) + 1) {}
 
 int SeriesRenderer::threads() const {
-    return options_.threads > 0 ? options_.threads
-                                : std::max(1, int(std::thread::hardware_concurrency()));
+    return thread_count(options_.threads);
 }
 
 uint64_t SeriesRenderer::pilot_spp() const {
@@ -168,14 +171,14 @@ Renderer SeriesRenderer::renderer(const IntegratorSpec& spec, uint64_t seed, uin
 void SeriesRenderer::choose_cut_offs(const IntegratorSpec& spec) {
     ShortestEdges edges(scene_, options_.longest);
     Renderer pilot = renderer(spec, hash_combine(options_.seed, 0), pilot_spp(), &edges);
-    render_all(pilot);
+    render_all(pilot, options_.interrupted);
     for (size_t i = 0; i < cut_offs_.size(); ++i) cut_offs_[i] = edges.quantile(i, kShortShare);
 }
 
 double SeriesRenderer::seconds_a_pass(const IntegratorSpec& spec, uint64_t seed) const {
     ContributionTally tally(scene_, grid_, cut_offs_);
     Renderer pilot = renderer(spec, seed, pilot_spp(), &tally);
-    render_all(pilot);
+    render_all(pilot, options_.interrupted);
     return pilot.seconds() / double(pilot_spp());
 }
 
@@ -183,7 +186,7 @@ IndependentRun SeriesRenderer::render(const IntegratorSpec& spec, uint64_t seed,
                                       uint64_t spp) const {
     ContributionTally tally(scene_, grid_, cut_offs_);
     Renderer r = renderer(spec, seed, spp, &tally);
-    render_all(r);
+    render_all(r, options_.interrupted);
     const double scale = 1 / (double(spp) * double(scene_.film().pixel_count()));
     IndependentRun out{r.film().image(), tally.entries(), tally.tiles(), {}, r.stats()};
     for (ContributionTally::Entry& e : out.entries) {
@@ -227,29 +230,31 @@ RunSeries SeriesRenderer::begin(const IntegratorSpec& spec, uint64_t stream,
 }
 
 void SeriesRenderer::extend(RunSeries& series, uint64_t renderings) const {
-    const auto begin = std::chrono::steady_clock::now();
+    using Clock = std::chrono::steady_clock;
     const size_t runs = series.runs.size();
+    const uint64_t wanted = series.renderings + renderings;
     std::mutex mutex;
     size_t done = 0;
-    for_each_in_parallel(runs, threads(), [&](size_t i) {
-        IndependentRun& run = series.runs[i];
-        for (uint64_t k = 0; k < renderings; ++k) {
-            const uint64_t number = series.renderings + k;
-            IndependentRun more = render(series.spec, seed(series, i, number), series.spp);
-            if (number == 0)
-                run = std::move(more);
+    // One rendering in every run at a time, so that all runs are equally long whenever this ends.
+    while (series.renderings < wanted) {
+        const auto begin = Clock::now();
+        std::vector<IndependentRun> more(runs);
+        for_each_in_parallel(runs, threads(), [&](size_t i) {
+            more[i] = render(series.spec, seed(series, i, series.renderings), series.spp);
+            const std::scoped_lock lock(mutex);
+            ++done;
+            if (progress_)
+                progress_(fmt::format("{}: {} of {} runs of {} spp", series.spec.to_string(),
+                                      done / renderings, runs, series.spp * wanted));
+        });
+        ++series.renderings;
+        for (size_t i = 0; i < runs; ++i)
+            if (series.renderings == 1)
+                series.runs[i] = std::move(more[i]);
             else
-                run.merge(more, number + 1);
-        }
-        const std::scoped_lock lock(mutex);
-        ++done;
-        if (progress_)
-            progress_(fmt::format("{}: {} of {} runs of {} spp", series.spec.to_string(), done,
-                                  runs, series.spp * (series.renderings + renderings)));
-    });
-    series.renderings += renderings;
-    series.seconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+                series.runs[i].merge(more[i], series.renderings);
+        series.seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+    }
 }
 
 }  // namespace etendue

@@ -64,6 +64,9 @@ struct RunSeries {
     }
 };
 
+/// Thrown when VerifyOptions::interrupted is set.
+struct VerifyInterrupted {};
+
 /// Renders series with common scene, options and δ: techniques are compared on paths whose edges have at least the
 /// length δ.
 class SeriesRenderer {
@@ -82,7 +85,8 @@ public:
     /// rendering in every run takes `seconds` altogether, as measured by a pilot rendering.
     RunSeries begin(const IntegratorSpec& spec, uint64_t stream, std::optional<uint64_t> spp,
                     double seconds) const;
-    /// Adds `renderings` renderings to every run. Rethrows exceptions of renderings.
+    /// Adds `renderings` renderings to every run. Rethrows exceptions of renderings; the series then has the renderings
+    /// that were finished in all runs.
     void extend(RunSeries& series, uint64_t renderings) const;
 
 private:

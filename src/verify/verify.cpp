@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <new>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -71,6 +72,22 @@ void finish(VerifyReport& report, const VerifyOptions& options) {
     report.level = sidak(options.alpha, std::max(1, report.tests));
 }
 
+/// Renders by `task`. Returns false if it was interrupted or failed, which the report then says.
+template <class Task>
+bool attempt(const IntegratorSpec& method, VerifyReport& report, const Task& task) {
+    try {
+        task();
+        return true;
+    } catch (const VerifyInterrupted&) {
+        report.interrupted = true;
+    } catch (const std::bad_alloc&) {
+        report.failures.push_back(method.to_string() + ": not enough memory");
+    } catch (const std::runtime_error& e) {
+        report.failures.push_back(fmt::format("{}: {}", method.to_string(), e.what()));
+    }
+    return false;
+}
+
 VerifyReport verify_with_image(const std::vector<IntegratorSpec>& methods,
                                const VerifyOptions& options, const ReferenceImage& image,
                                const SeriesRenderer& renderer) {
@@ -78,9 +95,14 @@ VerifyReport verify_with_image(const std::vector<IntegratorSpec>& methods,
     report.reference = image.name;
     const ErrorReference error_reference(image);
     for (size_t i = 0; i < methods.size(); ++i) {
-        RunSeries series = renderer.begin(methods[i], 2 + i, options.spp,
-                                          options.seconds.value_or(kDefaultSeconds));
-        renderer.extend(series, 1);
+        RunSeries series;
+        const bool is_rendered = attempt(methods[i], report, [&] {
+            series = renderer.begin(methods[i], 2 + i, options.spp,
+                                    options.seconds.value_or(kDefaultSeconds));
+            renderer.extend(series, 1);
+        });
+        if (report.interrupted) break;
+        if (!is_rendered) continue;
         MethodReport m = start_report(methods[i], series);
         compare_images(series, image, renderer.grid(), m);
         m.errors = errors_of_runs(series, error_reference);
@@ -120,12 +142,22 @@ public:
             references_.push_back(start(reference_specs_[i]));
     }
 
-    /// Makes one rendering in every run. Methods come first, since they may fail.
+    /// Makes one rendering in every run. The first method comes first, since it may fail, then the references; from then
+    /// on, there are results.
     void render() {
-        for (RunSeries& s : methods_) renderer_.extend(s, 1);
-        for (auto& s : unthinned_)
-            if (s) renderer_.extend(*s, 1);
-        for (RunSeries& s : references_) renderer_.extend(s, 1);
+        for (size_t i = 0; i < methods_.size() && !ended_.interrupted; ++i) {
+            attempt(specs_[i], ended_, [&] {
+                renderer_.extend(methods_[i], 1);
+                if (unthinned_[i]) renderer_.extend(*unthinned_[i], 1);
+            });
+            if (specs_.size() == 1 && !ended_.failures.empty()) break;
+            if (i == 0 && !ended_.interrupted) try {
+                    for (RunSeries& s : references_) renderer_.extend(s, 1);
+                } catch (const VerifyInterrupted&) {
+                    ended_.interrupted = true;
+                }
+        }
+        drop_unfinished();
     }
     VerifyReport report() const;
     /// Adds renderings until a relative error of `size` would be found or the time is over.
@@ -140,6 +172,25 @@ public:
     VerifyReport render_until(double size, const SeriesRenderer::Report& progress);
 
 private:
+    /// Leaves out what has no rendering.
+    void drop_unfinished() {
+        const auto is_unfinished = [](const RunSeries& s) { return s.renderings == 0; };
+        for (size_t i = methods_.size(); i-- > 0;)
+            if (is_unfinished(methods_[i]) || (unthinned_[i] && is_unfinished(*unthinned_[i]))) {
+                const auto at = std::ptrdiff_t(i);
+                specs_.erase(specs_.begin() + at);
+                methods_.erase(methods_.begin() + at);
+                unthinned_.erase(unthinned_.begin() + at);
+            }
+        // Methods are compared with the first reference at least.
+        if (is_unfinished(references_.front()))
+            specs_.clear(), methods_.clear(), unthinned_.clear();
+        for (size_t i = references_.size(); i-- > 1;)
+            if (is_unfinished(references_[i])) {
+                references_.erase(references_.begin() + std::ptrdiff_t(i));
+                reference_specs_.erase(reference_specs_.begin() + std::ptrdiff_t(i));
+            }
+    }
     double seconds() const {
         return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
     }
@@ -159,7 +210,8 @@ private:
         return all;
     }
 
-    const std::vector<IntegratorSpec>& specs_;
+    std::vector<IntegratorSpec> specs_;
+    VerifyReport ended_;  ///< What was interrupted or failed.
     const VerifyOptions& options_;
     SeriesRenderer& renderer_;
     std::chrono::steady_clock::time_point begin_;
@@ -185,7 +237,8 @@ MethodReport MethodVerification::compare(size_t i) const {
 }
 
 VerifyReport MethodVerification::report() const {
-    VerifyReport report;
+    VerifyReport report = ended_;
+    if (methods_.empty()) return report;
     std::vector<std::string> names;
     for (const IntegratorSpec& s : reference_specs_) names.push_back(s.to_string());
     report.reference = fmt::format("{}", fmt::join(names, ", "));
@@ -260,6 +313,7 @@ VerifyReport MethodVerification::render_until(double size, const SeriesRenderer:
     while (true) {
         const VerifyReport now = report();
         bool is_enough = true;
+        if (now.interrupted || now.methods.empty()) return now;
         for (const MethodReport& m : now.methods) is_enough &= now.detectable(m).reaches(size);
         if (is_enough) return now;
 
@@ -278,13 +332,18 @@ VerifyReport MethodVerification::render_until(double size, const SeriesRenderer:
         if (!is_any) return now;
         if (progress)
             progress(fmt::format("{:.0f} s done, {:.0f} s more", seconds(), cost * share));
+        // Renderings that are finished count, whatever happens to later ones.
+        bool is_good = true;
+        const auto extend = [&](RunSeries& s, uint64_t renderings) {
+            is_good = is_good && attempt(s.spec, ended_, [&] { renderer_.extend(s, renderings); });
+        };
         for (size_t i = 0; i < all.size(); ++i)
-            if (more[i] > 0) renderer_.extend(*all[i], uint64_t(more[i]));
+            if (more[i] > 0) extend(*all[i], uint64_t(more[i]));
         for (size_t i = 0; i < methods_.size(); ++i)
             if (auto& u = unthinned_[i]; u && u->renderings < methods_[i].renderings &&
                                          2 * u->seconds < kTechniqueTime * seconds())
-                renderer_.extend(*u,
-                                 std::min(u->renderings, methods_[i].renderings - u->renderings));
+                extend(*u, std::min(u->renderings, methods_[i].renderings - u->renderings));
+        if (!is_good) return report();
     }
 }
 
@@ -328,11 +387,22 @@ VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& metho
                     const VerifyOptions& options, const std::optional<ReferenceImage>& reference,
                     const std::function<void(const std::string&)>& progress) {
     SeriesRenderer renderer(scene, options, progress);
-    if (reference) return verify_with_image(methods, options, *reference, renderer);
-    MethodVerification verification(methods, options, renderer);
-    verification.render();
-    return options.detect ? verification.render_until(*options.detect, progress)
-                          : verification.report();
+    VerifyReport report;
+    try {
+        if (reference) {
+            report = verify_with_image(methods, options, *reference, renderer);
+        } else {
+            MethodVerification verification(methods, options, renderer);
+            verification.render();
+            report = options.detect ? verification.render_until(*options.detect, progress)
+                                    : verification.report();
+        }
+    } catch (const VerifyInterrupted&) {
+        report.interrupted = true;  // in a trial rendering at the start
+    }
+    if (report.methods.empty() && !report.failures.empty())
+        throw std::runtime_error(report.failures.front());
+    return report;
 }
 
 }  // namespace etendue

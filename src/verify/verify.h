@@ -9,6 +9,7 @@
 // Single techniques: an unweighted connection has infinite variance where surfaces meet, since its second moment is
 // ∝ 1/(shortest edge). So both sides are multiplied by [every edge ≥ δ], with one δ per path length.
 
+#include <atomic>
 #include <functional>
 #include <optional>
 
@@ -37,6 +38,8 @@ struct VerifyOptions {
     int tiles = 4;    ///< Number of tiles in each direction.
     /// Methods to compare with: the first one, and the others for classes of paths that they sample much better.
     std::vector<IntegratorSpec> against{{"path", {}}, {"light", {}}};
+    /// Set from outside to end the verification at once, with the comparisons that are then possible.
+    const std::atomic<bool>* interrupted = nullptr;
 };
 
 /// An image to compare with instead of a method: the mean of `samples` per pixel, and the variance of that mean.
@@ -148,6 +151,9 @@ struct VerifyReport {
     std::vector<MethodReport> methods;
     /// Of all renderings, references included: "METHOD: …", see render/warnings.h.
     std::vector<std::string> warnings;
+    bool interrupted = false;
+    /// Methods that are left out because their renderings failed: "METHOD: reason".
+    std::vector<std::string> failures;
 
     /// Undecided where too much light is too rare for a test (kTooMuchTooRare).
     Verdict verdict(const MethodReport& method) const;
@@ -156,7 +162,7 @@ struct VerifyReport {
 };
 
 /// `progress` receives lines of text, from one thread at a time. Throws std::runtime_error where a method's parameters
-/// are invalid, and rethrows exceptions of renderings.
+/// are invalid, or the renderings of all methods fail. Other exceptions of renderings are rethrown.
 VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& methods,
                     const VerifyOptions& options,
                     const std::optional<ReferenceImage>& reference = {},

@@ -2,6 +2,8 @@
 
 #include "verify/verify.h"
 
+#include <atomic>
+
 #include <gtest/gtest.h>
 
 #include "test_scenes.h"
@@ -33,6 +35,76 @@ TEST(Verify, ThrowsWhatARenderingThrows) {
         FAIL() << "expected an error";
     } catch (const std::runtime_error& e) {
         EXPECT_NE(std::string(e.what()).find("more than 1 MiB"), std::string::npos) << e.what();
+    }
+}
+
+/// Whenever it ends, what it reports is what it would have reported of these methods anyway.
+TEST(Verify, KeepsWhatWasCompleteWhenItIsInterrupted) {
+    const Scene scene = build(lit_room(8));
+    const std::vector<IntegratorSpec> methods{IntegratorSpec::parse("path"),
+                                              IntegratorSpec::parse("bdpt")};
+    VerifyOptions options = quick_options();
+    options.spp = 4;
+    options.against = {IntegratorSpec::parse("path")};
+    int lines = 0;
+    const VerifyReport whole =
+        verify(scene, methods, options, {}, [&](const std::string&) { ++lines; });
+    EXPECT_FALSE(whole.interrupted);
+    ASSERT_EQ(whole.methods.size(), 2u);
+    size_t most = 0;
+    for (int stop_at = 1; stop_at < lines; stop_at += 3) {
+        std::atomic<bool> interrupted{false};
+        options.interrupted = &interrupted;
+        int line = 0;
+        const VerifyReport report = verify(scene, methods, options, {}, [&](const std::string&) {
+            if (++line == stop_at) interrupted = true;
+        });
+        EXPECT_TRUE(report.interrupted);
+        EXPECT_LT(line, stop_at + 3);
+        ASSERT_LT(report.methods.size(), 2u) << stop_at;
+        EXPECT_GE(report.methods.size(), most) << "fewer than when it was interrupted earlier";
+        most = report.methods.size();
+        if (report.methods.empty()) continue;
+        EXPECT_EQ(report.methods[0].method, "path");
+        EXPECT_EQ(report.methods[0].image[1].p, whole.methods[0].image[1].p);
+        EXPECT_EQ(report.methods[0].lengths[1].comparison.p,
+                  whole.methods[0].lengths[1].comparison.p);
+    }
+    EXPECT_EQ(most, 1u);
+}
+
+TEST(Verify, KeepsRenderingsOfAnInterruptedSearch) {
+    const Scene scene = build(lit_room(8));
+    VerifyOptions options = quick_options();
+    options.spp = 4;
+    options.detect = 1e-4;
+    options.against = {IntegratorSpec::parse("path")};
+    std::atomic<bool> interrupted{false};
+    options.interrupted = &interrupted;
+    int plans = 0;
+    const VerifyReport report =
+        verify(scene, {IntegratorSpec::parse("path")}, options, {}, [&](const std::string& line) {
+            plans += line.find("s more") != line.npos;
+            if (plans == 3) interrupted = true;
+        });
+    EXPECT_TRUE(report.interrupted);
+    ASSERT_EQ(report.methods.size(), 1u);
+    EXPECT_GT(report.methods[0].spp, 4u);
+    EXPECT_TRUE(report.methods[0].image[1].is_tested());
+}
+
+TEST(Verify, LeavesOutMethodsThatFail) {
+    const Scene scene = build(lit_room(8));
+    VerifyOptions options = quick_options();
+    options.spp = 1;
+    for (const char* first : {"path", "vcm:memory=1,light_paths=40000"}) {
+        const char* second = first == std::string("path") ? "vcm:memory=1,light_paths=40000" : "path";
+        const VerifyReport report = verify(
+            scene, {IntegratorSpec::parse(first), IntegratorSpec::parse(second)}, options);
+        ASSERT_EQ(report.methods.size(), 1u);
+        EXPECT_EQ(report.methods[0].method, "path");
+        ASSERT_EQ(report.failures.size(), 1u);
+        EXPECT_TRUE(report.failures[0].starts_with("vcm:")) << report.failures[0];
     }
 }
 
