@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <new>
+#include <optional>
 #include <stdexcept>
 
 #include <CLI/CLI.hpp>
@@ -15,10 +17,12 @@
 #include "compare/default_reference.h"
 #include "compare/report.h"
 #include "interrupt.h"
+#include "messages.h"
 #include "number_checks.h"
 #include "path_lengths.h"
 #include "render/defaults.h"
 #include "scene_options.h"
+#include "system/output_file.h"
 
 namespace etendue {
 namespace {
@@ -36,7 +40,14 @@ struct CompareCommand {
     void run() const;
 
 private:
+    struct Job;
+    Job load(size_t scene) const;
+    /// Empty if it was interrupted before the methods began.
+    std::optional<Comparison> compare_scene(size_t scene,
+                                            const std::atomic<bool>& interrupted) const;
     void check() const;
+    /// Whether the report can be written.
+    void check_report() const;
     PathSelection shown() const;
     CompareSettings settings(const Scene& scene) const;
     RenderSettings reference_settings(const Scene& scene,
@@ -52,10 +63,10 @@ public:
         const auto now = Clock::now();
         if (!active_ || now - last_ < std::chrono::milliseconds(100)) return;
         last_ = now;
-        fmt::print(stderr, "\r{}\033[K", text);
+        message("\r{}\033[K", text);
     }
     void clear() const {
-        if (active_) fmt::print(stderr, "\r\033[K");
+        if (active_) message("\r\033[K");
     }
 
 private:
@@ -121,73 +132,120 @@ RenderSettings CompareCommand::reference_settings(const Scene& scene,
 }
 
 void print_summary(const Comparison& c) {
-    fmt::print(stderr, "{}\n  {:<28} {:>8} {:>9} {:>10} {:>10} {:>8} {:>8} {:>11}\n", c.scene_file,
-               "method", "spp", "time", "relMSE", "trimmed", "FLIP", "mean", "efficiency");
+    message("{}\n  {:<28} {:>8} {:>9} {:>10} {:>10} {:>8} {:>8} {:>11}\n", c.scene_file, "method",
+            "spp", "time", "relMSE", "trimmed", "FLIP", "mean", "efficiency");
     const std::vector<MethodSummary> summaries = summarize(c);
     for (size_t i = 0; i < summaries.size(); ++i) {
         const MethodSummary& s = summaries[i];
-        fmt::print(stderr,
-                   "  {:<28} {:>8.0f} {:>7.2f} s {:>10.3e} {:>10.3e} {:>8.4f} {:>8.4f} {:>11}\n",
-                   c.methods[i].name(), s.spp, s.seconds, s.rel_mse, s.rel_mse_trimmed,
-                   c.methods[i].flip, s.mean_ratio.value,
-                   s.efficiency ? fmt::format("{:.3g}", s.efficiency->value) : "unknown");
+        message("  {:<28} {:>8.0f} {:>7.2f} s {:>10.3e} {:>10.3e} {:>8.4f} {:>8.4f} {:>11}\n",
+                c.methods[i].name(), s.spp, s.seconds, s.rel_mse, s.rel_mse_trimmed,
+                c.methods[i].flip, s.mean_ratio.value,
+                s.efficiency ? fmt::format("{:.3g}", s.efficiency->value) : "unknown");
     }
 }
 
-void print_warnings(const Comparison& c) {
+void print_warnings_of(const Comparison& c) {
+    for (const std::string& f : c.failures) message("warning: {}: {}\n", c.scene_file, f);
     const auto print = [&](const std::string& name, const std::vector<std::string>& warnings) {
         for (const std::string& w : warnings)
-            fmt::print(stderr, "warning: {}: {}: {}\n", c.scene_file, name, w);
+            message("warning: {}: {}: {}\n", c.scene_file, name, w);
     };
     print("reference", c.reference.warnings);
     for (const Method& m : c.methods) print(m.name(), m.warnings());
 }
 
+/// A scene with the settings of its comparison.
+struct CompareCommand::Job {
+    SceneDescription description;
+    Scene scene;
+    CompareSettings settings;
+};
+
+CompareCommand::Job CompareCommand::load(size_t i) const {
+    SceneOptions options = reading;
+    options.file = scenes[i];
+    options.threads = threads;
+    SceneDescription description = read_scene(options);
+    Scene scene = build_scene(description, options);
+    CompareSettings s = settings(scene);
+    check_methods(s.methods);
+    if (references.empty()) {
+        const RenderSettings how = reference_settings(scene, s.methods);
+        if (s.shown.inner_only) check_inner_paths(scene, s.methods, how.integrator);
+    }
+    return {std::move(description), std::move(scene), std::move(s)};
+}
+
+void CompareCommand::check_report() const {
+    OutputFile::check((std::filesystem::path(report) / "report.html").string());
+}
+
+std::optional<Comparison>
+CompareCommand::compare_scene(size_t i, const std::atomic<bool>& interrupted) const {
+    const Job job = load(i);
+    print_warnings(job.scene.warnings());
+    StatusLine status(quiet);
+    std::optional<Reference> reference;
+    if (!references.empty()) {
+        reference = read_reference(references[i], job.scene.film());
+        check_report();
+    } else {
+        check_report();
+        const RenderSettings how = reference_settings(job.scene, job.settings.methods);
+        print_warnings(depth_warnings(job.settings.methods, how.integrator));
+        reference = make_reference(
+            job.scene,
+            {how, kept_references, scene_fingerprint(job.description), program_fingerprint()},
+            [&](const Progress& p) {
+                status.show(
+                    fmt::format("{}: reference, {} spp, {:.1f} s", scenes[i], p.passes, p.seconds));
+            },
+            interrupted);
+        if (!reference) return {};
+    }
+    return compare(
+        job.scene, *reference, job.settings,
+        [&](const std::string& text) { status.show(scenes[i] + ": " + text); }, interrupted);
+}
+
 void CompareCommand::run() const {
     check();
-    std::vector<Comparison> comparisons;
-    const std::atomic<bool>& interrupted = catch_interrupts();
-    for (size_t i = 0; i < scenes.size() && !interrupted.load(); ++i) {
-        SceneOptions options = reading;
-        options.file = scenes[i];
-        options.threads = threads;
-        const SceneDescription description = read_scene(options);
-        const Scene scene = build_scene(description, options);
-        for (const std::string& w : scene.warnings()) fmt::print(stderr, "warning: {}\n", w);
-        const CompareSettings s = settings(scene);
-        check_methods(s.methods);
-
-        StatusLine status(quiet);
-        std::optional<Reference> reference;
-        if (!references.empty()) {
-            reference = read_reference(references[i], scene.film());
-        } else {
-            const RenderSettings how = reference_settings(scene, s.methods);
-            if (s.shown.inner_only) check_inner_paths(scene, s.methods, how.integrator);
-            for (const std::string& w : depth_warnings(s.methods, how.integrator))
-                fmt::print(stderr, "warning: {}\n", w);
-            reference = make_reference(
-                scene,
-                {how, kept_references, scene_fingerprint(description), program_fingerprint()},
-                [&](const Progress& p) {
-                    status.show(fmt::format("{}: reference, {} spp, {:.1f} s", scenes[i], p.passes,
-                                            p.seconds));
-                },
-                interrupted);
-            if (!reference) break;
+    // What is wrong with a scene or an image is found before the first one is rendered.
+    if (scenes.size() > 1)
+        for (size_t i = 0; i < scenes.size(); ++i) {
+            const Job job = load(i);
+            if (!references.empty()) read_reference(references[i], job.scene.film());
         }
-        comparisons.push_back(compare(
-            scene, *reference, s,
-            [&](const std::string& text) { status.show(scenes[i] + ": " + text); }, interrupted));
-        status.clear();
-        print_warnings(comparisons.back());
-        if (!quiet) print_summary(comparisons.back());
+    ReportWriter writer({report, ETENDUE_VERSION});
+    const std::atomic<bool>& interrupted = catch_interrupts();
+    std::vector<std::string> failures;
+    size_t compared = 0;
+    for (size_t i = 0; i < scenes.size() && !interrupted.load(); ++i) {
+        // Each scene is written when it is finished, and does not depend on those after it.
+        try {
+            const std::optional<Comparison> comparison = compare_scene(i, interrupted);
+            if (!comparison) break;
+            print_warnings_of(*comparison);
+            if (!quiet) print_summary(*comparison);
+            for (const std::string& f : comparison->failures)
+                failures.push_back(fmt::format("{}: {}", scenes[i], f));
+            writer.add(*comparison);
+            ++compared;
+        } catch (const std::exception& e) {
+            if (scenes.size() == 1) throw;
+            const bool is_memory = dynamic_cast<const std::bad_alloc*>(&e) != nullptr;
+            const std::string why = is_memory ? "not enough memory" : e.what();
+            failures.push_back(fmt::format("{}: {}", scenes[i], why));
+            writer.add_failure(scenes[i], why);
+            message("warning: {}\n", failures.back());
+        }
+        if (compared > 0) writer.write();
     }
-    if (comparisons.empty())
+    if (compared == 0 && failures.empty())
         throw std::runtime_error("interrupted before the first comparison: nothing was written");
-    write_report(comparisons, {report, ETENDUE_VERSION});
-    if (!quiet)
-        fmt::print(stderr, "{}\n", (std::filesystem::path(report) / "report.html").string());
+    if (compared > 0 && !quiet)
+        message("{}\n", (std::filesystem::path(report) / "report.html").string());
+    if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
 }
 
 }  // namespace

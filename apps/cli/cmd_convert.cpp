@@ -6,11 +6,12 @@
 #include <fmt/format.h>
 
 #include "commands.h"
-#include "image/atomic_file.h"
+#include "messages.h"
 #include "readers/mitsuba_writer.h"
 #include "scene/mitsuba_manual.h"
 #include "scene/plain_mitsuba.h"
 #include "scene_options.h"
+#include "system/output_file.h"
 
 namespace etendue {
 namespace {
@@ -40,7 +41,7 @@ void warn_of_foreign_names(const SceneDescription& scene) {
                                           o.type)];
     }
     for (const auto& [name, count] : foreign)
-        fmt::print(stderr, "warning: Mitsuba 3 has no {} ({} in the scene)\n", name, count);
+        message("warning: Mitsuba 3 has no {} ({} in the scene)\n", name, count);
 }
 
 void convert(const SceneOptions& options, const std::string& output, bool keep_plugins) {
@@ -49,18 +50,16 @@ void convert(const SceneOptions& options, const std::string& output, bool keep_p
     if (fs::exists(output) && fs::equivalent(output, options.file))
         throw std::runtime_error(fmt::format("{}: the output is the scene itself", output));
     SceneDescription scene = read_scene(options);
-    for (const std::string& w : scene.warnings) fmt::print(stderr, "warning: {}\n", w);
+    print_warnings(scene.warnings);
     if (keep_plugins)
         warn_of_foreign_names(scene);
     else
-        for (const std::string& w : make_plain_mitsuba(scene))
-            fmt::print(stderr, "warning: {}\n", w);
+        print_warnings(make_plain_mitsuba(scene));
     const fs::path folder = fs::path(output).parent_path();
     const std::string xml = write_mitsuba_xml(
-        scene, output, fs::path(output).stem().string() + "_files", [&](const SceneFile& file) {
-            write_file_atomically((folder / file.name).string(), file.bytes);
-        });
-    write_file_atomically(output, xml);
+        scene, output, fs::path(output).stem().string() + "_files",
+        [&](const SceneFile& file) { write_file((folder / file.name).string(), file.bytes); });
+    write_file(output, xml);
 }
 
 }  // namespace

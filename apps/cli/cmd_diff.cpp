@@ -14,6 +14,8 @@
 #include "image/image_io.h"
 #include "image/metrics.h"
 #include "image/tonemap.h"
+#include "json_text.h"
+#include "system/output_file.h"
 
 namespace etendue {
 namespace {
@@ -77,7 +79,7 @@ void DiffCommand::print_json(const ImageErrors& e,
     nlohmann::ordered_json j = {{"image", image}, {"reference", reference}};
     j.update(to_json(e));
     if (flip_result) j[is_hdr() ? "flip_hdr" : "flip_ldr"] = flip_result->mean;
-    fmt::print("{}\n", j.dump(2));
+    fmt::print("{}", json_text(j));
 }
 
 // A .png file shows the errors in false colours; the other formats store their values.
@@ -93,7 +95,10 @@ void DiffCommand::write_map(const std::vector<float>& errors, int width, int hei
 }
 
 void DiffCommand::run() const {
-    if (!map.empty()) check_image_extension(map);
+    if (!map.empty()) {
+        check_image_extension(map);
+        OutputFile::check(map);
+    }
     const RgbImage x = read_rgb(image, layer), r = read_like(reference, x);
     const RgbImage r2 = reference2.empty() ? RgbImage() : read_like(reference2, x);
     const ImageErrors errors = image_errors(x.pixels, r.pixels, {r2.pixels, ignore_above});
@@ -105,11 +110,12 @@ void DiffCommand::run() const {
     if (flip_map && !flip_result)
         throw std::runtime_error(
             "--map with --map-metric flip cannot be combined with --flip none");
-    json ? print_json(errors, flip_result) : print(errors, flip_result);
+    // The file first, since standard output may have gone.
     if (!map.empty())
         write_map(flip_map ? flip_result->map
                            : relative_squared_errors(x.pixels, r.pixels, r2.pixels),
                   x.width, x.height);
+    json ? print_json(errors, flip_result) : print(errors, flip_result);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "commands.h"
 #include "guide_info.h"
+#include "json_text.h"
 #include "render/defaults.h"
 #include "scene_options.h"
 
@@ -44,7 +45,7 @@ void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
                          {"accelerator_bytes", st.accelerator_bytes},
                          {"warnings", s.warnings()}};
         if (guide.is_wanted) j["guide"] = learned;
-        fmt::print("{}\n", j.dump(2));
+        fmt::print("{}", json_text(j));
         return;
     }
     fmt::print("{}\n", s.file());

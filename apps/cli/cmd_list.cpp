@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "json_text.h"
 #include "render/plugin_list.h"
 #include "scene/builder.h"
 #include "scene/mitsuba_manual.h"
@@ -73,7 +74,7 @@ void ListCommand::run() const {
     }
     const std::vector<PluginEntry> entries = choose_plugins(plugin_list(), category, name);
     if (json)
-        fmt::print("{}\n", to_json(entries).dump(2));
+        fmt::print("{}", json_text(to_json(entries)));
     else if (markdown)
         print_markdown(entries, name.empty());
     else

@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include "commands.h"
-#include "image/atomic_file.h"
 #include "mcmc/pick_paths.h"
 #include "scene_options.h"
+#include "system/output_file.h"
 
 namespace etendue {
 namespace {
@@ -42,10 +42,11 @@ void PathsCommand::run() {
         throw std::runtime_error("paths: --pick needs --pixel x,y and -o FILE");
     const Scene s = load_scene(scene);
     if (count == 0) return check_paths(s, check);
+    OutputFile::check(output);
     pick.count = count;
     pick.x = pixel[0], pick.y = pixel[1];
     const std::vector<GivenPath> picked = pick_paths(s, pick);
-    write_file_atomically(output, to_json(picked));
+    write_file(output, to_json(picked));
     fmt::print("{}: {} path{}\n", output, picked.size(), picked.size() == 1 ? "" : "s");
 }
 

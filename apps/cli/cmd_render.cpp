@@ -1,21 +1,20 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <new>
-#include <system_error>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
-#include "image/atomic_file.h"
 #include "image/image_io.h"
 #include "interrupt.h"
+#include "json_text.h"
+#include "messages.h"
 #include "number_checks.h"
 #include "preview.h"
 #include "render/aov.h"
@@ -25,6 +24,7 @@
 #include "render/warnings.h"
 #include "scene_options.h"
 #include "system/available_memory.h"
+#include "system/output_file.h"
 
 namespace etendue {
 namespace {
@@ -47,8 +47,12 @@ private:
     void check_options() const;
     /// Checks before rendering that all outputs can be written; creates missing folders.
     void check_outputs() const;
-    void write_outputs(const Renderer& renderer, const Scene& scene,
-                       const nlohmann::json& report) const;
+    /// Writes as much as possible. Returns what could not be written, in words.
+    std::vector<std::string> write_outputs(const Renderer& renderer, const Scene& scene,
+                                           const std::vector<AovImage>& layers,
+                                           const nlohmann::json& report) const;
+    /// Writes the image elsewhere if it cannot be written to `output`.
+    void write_image_somewhere(const Image& image, std::vector<std::string>& failures) const;
 };
 
 std::string format_seconds(double s) {
@@ -76,7 +80,8 @@ public:
             line += fmt::format(", {:.0f} %, {} left", 100 * *p.fraction,
                                 format_seconds(p.seconds * (1 / *p.fraction - 1)));
         line += fmt::format(", {:.2f} Mrays/s", p.rays_per_second * 1e-6);
-        if (p.error.valid) line += fmt::format(", relative error {:.4f}", p.error.relative_rms);
+        if (const ErrorEstimate& e = error_.update(p); e.valid)
+            line += fmt::format(", relative error {:.4f}", e.relative_rms);
         if (terminal_)
             std::fprintf(stderr, "\r%s\033[K", line.c_str());
         else
@@ -87,6 +92,7 @@ public:
 private:
     bool quiet_, terminal_, written_ = false;
     double last_ = 0;
+    RecentError error_;
 };
 
 void write_techniques(const Renderer& r, const Scene& scene, const std::string& folder) {
@@ -99,13 +105,6 @@ void write_techniques(const Renderer& r, const Scene& scene, const std::string& 
         write_image(stem + "_weighted.exr", rgb_image(w, h, t.weighted));
         write_image(stem + "_unweighted.exr", rgb_image(w, h, t.unweighted));
     }
-}
-
-/// Throws std::runtime_error where the file could not be written.
-void check_writable(const std::string& path) {
-    const PendingFile file(path);
-    errno = 0;
-    if (!std::ofstream(file.temporary())) file.fail(std::generic_category().message(errno));
 }
 
 void RenderCommand::check_options() const {
@@ -123,9 +122,9 @@ void RenderCommand::check_options() const {
 }
 
 void RenderCommand::check_outputs() const {
-    check_writable(output);
-    if (!stats.empty()) check_writable(stats);
-    if (!techniques.empty()) check_writable(techniques + "/length01_s00_t02_weighted.exr");
+    OutputFile::check(output);
+    if (!stats.empty()) OutputFile::check(stats);
+    if (!techniques.empty()) OutputFile::check(techniques + "/length01_s00_t02_weighted.exr");
 }
 
 RenderSettings RenderCommand::settings_for(const Scene& s) const {
@@ -150,12 +149,55 @@ std::unique_ptr<Renderer> make_renderer(const Scene& s, const RenderSettings& se
                     s.film().crop_width, s.film().crop_height));
 }
 
-void RenderCommand::write_outputs(const Renderer& renderer, const Scene& s,
-                                  const nlohmann::json& report) const {
-    const Image image = image_with_layers(renderer, s, seed, threads, aovs, report);
-    write_image(output, image);
-    if (!techniques.empty()) write_techniques(renderer, s, techniques);
-    if (!stats.empty()) write_file_atomically(stats, report.dump(2) + "\n");
+/// Calls `task`. Adds the reason to `failures` if it fails.
+template <class Task>
+bool attempt(std::vector<std::string>& failures, const Task& task) {
+    try {
+        task();
+        return true;
+    } catch (const std::bad_alloc&) {
+        failures.push_back("not enough memory");
+    } catch (const std::exception& e) {
+        failures.push_back(e.what());
+    }
+    return false;
+}
+
+void RenderCommand::write_image_somewhere(const Image& image,
+                                          std::vector<std::string>& failures) const {
+    namespace fs = std::filesystem;
+    if (attempt(failures, [&] { write_image(output, image); })) return;
+    const std::string name =
+        fmt::format("etendue-{}{}", ::getpid(), fs::path(output).extension().string());
+    std::error_code error;
+    for (const fs::path& folder : {fs::current_path(error), fs::temp_directory_path(error)}) {
+        const fs::path file = folder / name;
+        std::vector<std::string> ignored;
+        if (folder.empty() || fs::exists(file, error)) continue;
+        if (!attempt(ignored, [&] { write_image(file.string(), image); })) continue;
+        failures.back() += fmt::format("; the image is in {}", file.string());
+        return;
+    }
+}
+
+std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer, const Scene& s,
+                                                      const std::vector<AovImage>& layers,
+                                                      const nlohmann::json& report) const {
+    std::vector<std::string> failures;
+    const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
+    // The image alone needs the least memory and space. The one with layers replaces it.
+    if (attempt(failures,
+                [&] {
+                    write_image_somewhere(image_with_layers(renderer, s, {}, false, report),
+                                          failures);
+                }) &&
+        failures.empty() && (has_variance || !layers.empty()) && !attempt(failures, [&] {
+            write_image(output, image_with_layers(renderer, s, layers, has_variance, report));
+        }))
+        failures.back() += fmt::format("; {} has the image without further layers", output);
+    if (!techniques.empty()) attempt(failures, [&] { write_techniques(renderer, s, techniques); });
+    if (!stats.empty()) attempt(failures, [&] { write_file(stats, json_text(report)); });
+    return failures;
 }
 
 void RenderCommand::run() const {
@@ -163,19 +205,19 @@ void RenderCommand::run() const {
     SceneOptions loading = scene;
     loading.threads = threads;
     const Scene s = load_scene(loading);
-    for (const std::string& w : s.warnings()) fmt::print(stderr, "warning: {}\n", w);
+    print_warnings(s.warnings());
     const RenderSettings settings = settings_for(s);
     if (settings.technique_depth > 0 && !quiet)
-        fmt::print(stderr, "technique images of paths up to {} edges: {:.0f} MiB\n",
-                   technique_depth,
-                   double(TechniqueImages::memory_bytes(s.film().pixel_count(), technique_depth)) /
-                       (1 << 20));
+        message("technique images of paths up to {} edges: {:.0f} MiB\n", technique_depth,
+                double(TechniqueImages::memory_bytes(s.film().pixel_count(), technique_depth)) /
+                    (1 << 20));
     const std::unique_ptr<Renderer> owned = make_renderer(s, settings);
     Renderer& renderer = *owned;
-    for (const std::string& w :
-         memory_warnings(s, settings.integrator, renderer.light_paths(), available_memory()))
-        fmt::print(stderr, "warning: {}\n", w);
+    print_warnings(
+        memory_warnings(s, settings.integrator, renderer.light_paths(), available_memory()));
     check_outputs();
+    // Before the passes, so that nothing that can fail stands between them and their image.
+    const std::vector<AovImage> layers = render_aovs(s, aovs, kAovSamples, seed, threads);
 
     const Interrupts interrupts = catch_interrupts(grace);
     std::unique_ptr<Preview> viewer;
@@ -191,7 +233,7 @@ void RenderCommand::run() const {
             [&](const Progress& p) {
                 line.show(p);
                 log.add(p.seconds, renderer.stats().pairs);
-                if (viewer) viewer->update(renderer.film(), p.seconds);
+                if (viewer && !viewer->update(renderer.film(), p.seconds)) viewer.reset();
             },
             interrupts.stop, interrupts.drop));
     } catch (const std::exception& e) {
@@ -205,22 +247,23 @@ void RenderCommand::run() const {
 
     nlohmann::json report = to_json(renderer, s, settings, stopped_by, log);
     if (!failure.empty()) report["failure"] = failure;
-    write_outputs(renderer, s, report);
+    std::vector<std::string> failures = write_outputs(renderer, s, layers, report);
 
-    for (const std::string& w : warnings(renderer.stats())) fmt::print(stderr, "warning: {}\n", w);
+    print_warnings(warnings(renderer.stats()));
     if (!failure.empty())
-        throw std::runtime_error(
-            fmt::format("pass {} failed: {}; {} contains the {} before it", passes + 1, failure,
-                        output, passes == 1 ? "pass" : fmt::format("{} passes", passes)));
+        failures.insert(failures.begin(),
+                        fmt::format("pass {} failed: {}; {} contains the {} before it", passes + 1,
+                                    failure, output,
+                                    passes == 1 ? "pass" : fmt::format("{} passes", passes)));
+    if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
     if (quiet) return;
     const ErrorEstimate e = renderer.film().error();
-    fmt::print(stderr, "{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output, passes,
-               format_seconds(renderer.seconds()),
-               report["samples_per_second"].get<double>() * 1e-6,
-               report["rays_per_second"].get<double>() * 1e-6,
-               e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})",
-                                     e.relative_rms, e.low, e.high)
-                       : "");
+    message("{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output, passes,
+            format_seconds(renderer.seconds()), report["samples_per_second"].get<double>() * 1e-6,
+            report["rays_per_second"].get<double>() * 1e-6,
+            e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})",
+                                  e.relative_rms, e.low, e.high)
+                    : "");
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "commands.h"
 #include "image/image_io.h"
 #include "interrupt.h"
+#include "messages.h"
 #include "scene_options.h"
 #include "session/session.h"
 #include "studio/api.h"
@@ -44,15 +45,6 @@ private:
     void save_all(Session& session) const;
 };
 
-/// Without an exception where nobody reads it, or the disk is full: no image is lost for a message.
-template <class... Args>
-void tell(fmt::format_string<Args...> format, Args&&... args) noexcept {
-    try {
-        fmt::print(stderr, format, std::forward<Args>(args)...);
-    } catch (const std::exception&) {
-    }
-}
-
 /// A name in the folder that no file has yet.
 std::string free_name(const std::string& folder, const std::string& stem) {
     for (int i = 1;; ++i) {
@@ -68,7 +60,7 @@ void StudioCommand::start_first_run(Session& session) const {
     try {
         session.start(request);
     } catch (const std::exception& e) {
-        tell("warning: nothing is rendered yet: {}\n", e.what());
+        message("warning: nothing is rendered yet: {}\n", e.what());
     }
 }
 
@@ -95,11 +87,11 @@ void StudioCommand::save_all(Session& session) const {
             const std::string file = free_name(folder, stem);
             const Saved saved = save_and_wait(session, s.id, file);
             if (saved.error.empty()) {
-                tell("{}: run {}, {}, {} spp\n", file, s.id, s.integrator, saved.passes);
+                message("{}: run {}, {}, {} spp\n", file, s.id, s.integrator, saved.passes);
                 break;
             }
             if (session.status(s.id).passes == 0) break;
-            tell("{}: {}\n", file, saved.error);
+            message("{}: {}\n", file, saved.error);
             if (folder == output)
                 errors +=
                     fmt::format("{}run {}: {}", errors.empty() ? "" : "; ", s.id, saved.error);
@@ -133,7 +125,7 @@ void StudioCommand::print_urls(const Server& server, const std::string& token) c
     for (const std::string& url : urls) fmt::print("{}/#token={}\n", url, token);
     std::fflush(stdout);
     if (!server.is_local())
-        tell("warning: {} can be reached from other machines, without encryption\n", listen);
+        message("warning: {} can be reached from other machines, without encryption\n", listen);
 }
 
 /// Until `stop`: starts the first run, and tells what becomes of the scene.
@@ -145,14 +137,14 @@ void StudioCommand::watch(Session& session, const Api& api, const std::atomic<bo
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
         if (session.scene_version() != version) {
             version = session.scene_version();
-            for (const std::string& w : session.scene()->warnings()) tell("warning: {}\n", w);
+            for (const std::string& w : session.scene()->warnings()) message("warning: {}\n", w);
             if (const std::string problem = api.reference_problem(); !problem.empty())
-                tell("warning: {}\n", problem);
+                message("warning: {}\n", problem);
             if (!is_started) start_first_run(session);
             is_started = true;
         }
         if (const std::string e = session.load_error(); e != reported) {
-            if (!e.empty()) tell("{}\n", e);
+            if (!e.empty()) message("{}\n", e);
             reported = e;
         }
     }

@@ -12,10 +12,13 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
-#include "image/atomic_file.h"
+#include "interrupt.h"
+#include "json_text.h"
+#include "messages.h"
 #include "number_checks.h"
 #include "path_lengths.h"
 #include "scene_options.h"
+#include "system/output_file.h"
 #include "verify/reference_image.h"
 #include "verify/report_json.h"
 #include "verify/verify.h"
@@ -248,26 +251,34 @@ void VerifyCommand::run() {
     SceneOptions loading = scene;
     loading.threads = options.threads;
     const Scene s = load_scene(loading);
-    for (const std::string& w : s.warnings()) fmt::print(stderr, "warning: {}\n", w);
+    print_warnings(s.warnings());
     std::optional<ReferenceImage> image;
     if (!reference.empty()) image = read_reference_image(reference, s);
     const bool is_terminal = isatty(STDERR_FILENO) != 0;
+    if (!json.empty()) OutputFile::check(json);
+    options.interrupted = &catch_interrupts();
     const VerifyReport report = verify(s, specs, options, image, [&](const std::string& line) {
-        if (!quiet && is_terminal) fmt::print(stderr, "\r{}\033[K", line);
+        if (!quiet && is_terminal) message("\r{}\033[K", line);
     });
-    if (!quiet && is_terminal) fmt::print(stderr, "\r\033[K");
+    if (!quiet && is_terminal) message("\r\033[K");
 
-    for (const std::string& w : report.warnings) fmt::print(stderr, "warning: {}\n", w);
+    if (report.methods.empty())
+        throw std::runtime_error("interrupted before the first comparison: nothing was written");
+    // The file first, since standard output may have gone.
+    if (!json.empty()) write_file(json, json_text(to_json(report, s, sampler, options)));
+    print_warnings(report.warnings);
+    if (report.interrupted)
+        message("warning: interrupted; what follows is based on the renderings until then\n");
     if (!quiet) print_report(report, s, sampler, options);
-    if (!json.empty())
-        write_file_atomically(json, to_json(report, s, sampler, options).dump(2) + "\n");
     std::vector<std::string> rejected;
     for (const MethodReport& m : report.methods)
         if (m.estimator == Estimator::Unbiased && report.verdict(m) == Verdict::Deviates)
             rejected.push_back(m.method);
+    std::vector<std::string> failures = report.failures;
     if (!rejected.empty())
-        throw std::runtime_error(
+        failures.push_back(
             fmt::format("claimed to be unbiased, but rejected: {}", fmt::join(rejected, ", ")));
+    if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
 }
 
 }  // namespace

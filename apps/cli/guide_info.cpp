@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "image/image_io.h"
+#include "system/output_file.h"
 #include "render/defaults.h"
 #include "render/learned_guide.h"
 
@@ -129,7 +130,10 @@ void GuideInfo::add_to(CLI::App& command) {
 
 void GuideInfo::check() const {
     for (const std::string& file : {shares, directions})
-        if (!file.empty()) check_image_extension(file);
+        if (!file.empty()) {
+            check_image_extension(file);
+            OutputFile::check(file);
+        }
 }
 
 json GuideInfo::run(const Scene& scene) const {

@@ -5,6 +5,8 @@
 
 #include <unistd.h>
 
+#include "system/output_file.h"
+
 namespace etendue {
 namespace {
 
@@ -20,18 +22,37 @@ extern "C" void on_interrupt(int) {
         else
             drop = true;
     } else if (!is_graceful || drop.exchange(true)) {
+        remove_temporary_files();
         std::_Exit(130);
     }
+}
+extern "C" void on_end(int signal) {
+    remove_temporary_files();
+    if (signal == SIGINT) std::_Exit(130);
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
 }
 extern "C" void on_end_of_grace(int) {
     drop = true;
 }
 
+void handle_all(void (*handler)(int)) {
+    std::signal(SIGINT, handler);
+    std::signal(SIGTERM, handler);
+    // nohup asks not to be told.
+    if (std::signal(SIGHUP, handler) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+}
+
 }  // namespace
 
+void end_by_signals() {
+    handle_all(on_end);
+    std::signal(SIGXFSZ, SIG_IGN);
+}
+
 const std::atomic<bool>& catch_interrupts() {
-    std::signal(SIGINT, on_interrupt);
-    std::signal(SIGTERM, on_interrupt);
+    handle_all(on_interrupt);
+    std::signal(SIGPIPE, SIG_IGN);
     return stop;
 }
 

@@ -4,17 +4,22 @@
 
 namespace etendue {
 
-/// Handles SIGINT (Ctrl-C) and SIGTERM from now on: the first signal sets the returned flag, the second ends the
-/// program.
+/// Called once at the start. Until one of the functions below is called, SIGINT (Ctrl-C), SIGTERM and SIGHUP (the
+/// terminal was closed) end the program, with status 130 after SIGINT. No signal leaves temporary files. A file that
+/// grows beyond a limit is an error of its writer, instead of a signal.
+void end_by_signals();
+
+/// Handles the three signals from now on: the first one sets the returned flag, the second ends the program. A pipe
+/// that nobody reads any longer does not end it.
 const std::atomic<bool>& catch_interrupts();
 
-/// Flags set by SIGINT (Ctrl-C) and SIGTERM.
+/// Flags set by the three signals.
 struct Interrupts {
     const std::atomic<bool>& stop;  ///< Set by the first signal: finish the current work, then end.
     const std::atomic<bool>&
         drop;  ///< Set by the second signal or after `grace`: abandon that work.
 };
-/// Handles both signals from now on by setting these flags; a further signal once `drop` is set ends the program.
+/// Handles the signals from now on by setting these flags; a further signal once `drop` is set ends the program.
 /// `grace`: seconds after the first signal.
 Interrupts catch_interrupts(unsigned grace);
 

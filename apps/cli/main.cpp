@@ -1,38 +1,76 @@
+#include <fcntl.h>
+
+#include <cerrno>
 #include <cstdio>
+#include <iostream>
 #include <new>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 
 #include "commands.h"
+#include "interrupt.h"
+#include "messages.h"
 
-int main(int argc, char** argv) {
-    CLI::App app{"etendue: unbiased light transport with reused light paths", "etendue"};
-    app.set_version_flag("--version", ETENDUE_VERSION);
-    app.require_subcommand(1);
-    etendue::add_render_command(app);
-    etendue::add_info_command(app);
-    etendue::add_convert_command(app);
-    etendue::add_compare_command(app);
-    etendue::add_diff_command(app);
-    etendue::add_tonemap_command(app);
-    etendue::add_paths_command(app);
-    etendue::add_list_command(app);
-    etendue::add_verify_command(app);
-    etendue::add_studio_command(app);
+namespace etendue {
+namespace {
+
+/// A standard stream that is closed gets a descriptor with which every use fails, so that no file takes its number and
+/// receives what is printed.
+void occupy_standard_streams() {
+    for (const int stream : {0, 1, 2})
+        if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", stream == 0 ? O_WRONLY : O_RDONLY);
+}
+
+int run(CLI::App& app, int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::Success& e) {
         return app.exit(e);
     } catch (const CLI::Error& e) {
         // One line that points to --help, instead of printing all of it.
-        std::fprintf(stderr, "etendue: %s (see etendue --help)\n", e.what());
+        message("etendue: {} (see etendue --help)\n", e.what());
         return 2;
     } catch (const std::bad_alloc&) {
-        std::fprintf(stderr, "etendue: not enough memory\n");
+        message("etendue: not enough memory\n");
         return 1;
     } catch (const std::exception& e) {
-        std::fprintf(stderr, "etendue: %s\n", e.what());
+        message("etendue: {}\n", e.what());
         return 1;
     }
     return 0;
+}
+
+/// What is printed may be lost as late as here.
+bool is_output_complete() {
+    std::cout.flush();
+    return std::fflush(stdout) == 0 && !std::ferror(stdout) && std::cout.good();
+}
+
+}  // namespace
+}  // namespace etendue
+
+int main(int argc, char** argv) {
+    using namespace etendue;
+    occupy_standard_streams();
+    end_by_signals();
+    CLI::App app{"etendue: unbiased light transport with reused light paths", "etendue"};
+    app.set_version_flag("--version", ETENDUE_VERSION);
+    app.require_subcommand(1);
+    add_render_command(app);
+    add_info_command(app);
+    add_convert_command(app);
+    add_compare_command(app);
+    add_diff_command(app);
+    add_tonemap_command(app);
+    add_paths_command(app);
+    add_list_command(app);
+    add_verify_command(app);
+    add_studio_command(app);
+    const int status = run(app, argc, argv);
+    errno = 0;
+    if (is_output_complete() || status != 0) return status;
+    message("etendue: cannot write to standard output{}\n",
+            errno != 0 ? ": " + std::generic_category().message(errno) : "");
+    return 1;
 }

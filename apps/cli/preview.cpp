@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "messages.h"
+
 namespace etendue {
 namespace {
 
@@ -92,15 +94,15 @@ void Preview::send(const std::string& payload) {
         if (n <= 0) {
             ::close(socket_);
             socket_ = -1;
-            fmt::print(stderr, "warning: the preview's viewer closed the connection\n");
+            message("warning: the preview's viewer closed the connection\n");
             return;
         }
         sent += size_t(n);
     }
 }
 
-void Preview::update(const Film& film, double seconds) {
-    if (socket_ < 0 || (last_ >= 0 && seconds - last_ < 1)) return;
+bool Preview::update(const Film& film, double seconds) try {
+    if (last_ >= 0 && seconds - last_ < 1) return true;
     last_ = seconds;
     const std::vector<Rgb> pixels = film.image();
     Packet packet(kUpdateImageV3);
@@ -111,6 +113,10 @@ void Preview::update(const Film& film, double seconds) {
     for (int i = 0; i < 3; ++i) packet.number<int64_t>(3);
     for (const Rgb& c : pixels) packet.number(c.r).number(c.g).number(c.b);
     send(packet.finished());
+    return socket_ >= 0;
+} catch (const std::bad_alloc&) {
+    message("warning: not enough memory for the preview\n");
+    return false;
 }
 
 }  // namespace etendue

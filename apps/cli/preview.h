@@ -17,7 +17,8 @@ public:
     Preview(const Preview&) = delete;
     Preview& operator=(const Preview&) = delete;
 
-    void update(const Film& film, double seconds);
+    /// At most once a second. Returns false if the viewer can show no more.
+    bool update(const Film& film, double seconds);
 
 private:
     void send(const std::string& payload);

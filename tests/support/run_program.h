@@ -43,17 +43,17 @@ public:
         constexpr int kFlags = O_WRONLY | O_CREAT | O_TRUNC;
         dup2(open(out_.c_str(), kFlags, 0600), STDOUT_FILENO);
         dup2(open(err_.c_str(), kFlags, 0600), STDERR_FILENO);
+        ::signal(SIGPIPE, SIG_DFL);
         execv(argv[0], argv.data());
         _exit(127);
     }
     void interrupt() const { kill(pid_, SIGINT); }
+    void send(int signal) const { kill(pid_, signal); }
     /// Whether it has a handler of SIGINT by now.
+    bool handles_interrupts() const { return has_signal("SigCgt:\t", SIGINT); }
+    /// Whether it finishes its work after SIGINT by now, as commands that render do, which also ignore closed pipes.
     bool catches_interrupts() const {
-        const std::string status = read_text("/proc/" + std::to_string(pid_) + "/status");
-        const std::string mark = "SigCgt:\t";
-        const size_t at = status.find(mark);
-        return at != std::string::npos &&
-               (std::stoull(status.substr(at + mark.size(), 16), nullptr, 16) >> (SIGINT - 1) & 1);
+        return handles_interrupts() && has_signal("SigIgn:\t", SIGPIPE);
     }
     /// Number of its file descriptors.
     int open_files() const {
@@ -75,6 +75,14 @@ public:
     }
 
 private:
+    /// Whether a set of signals in /proc/PID/status has this one.
+    bool has_signal(const std::string& set, int signal) const {
+        const std::string status = read_text("/proc/" + std::to_string(pid_) + "/status");
+        const size_t at = status.find(set);
+        return at != std::string::npos &&
+               (std::stoull(status.substr(at + set.size(), 16), nullptr, 16) >> (signal - 1) & 1);
+    }
+
     pid_t pid_;
     std::filesystem::path out_, err_;
 };
