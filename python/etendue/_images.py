@@ -26,6 +26,8 @@ def _pixels(image: Any) -> Image:
         pixels = np.repeat(pixels[:, :, None], 3, axis=2)
     if pixels.ndim != 3 or pixels.shape[2] != 3:
         raise ValueError(f"an image has the shape (H, W, 3) or (H, W), but this one has {pixels.shape}")
+    if pixels.size == 0:
+        raise ValueError(f"the image has no pixels: its shape is {pixels.shape}")
     return pixels
 
 
@@ -41,16 +43,17 @@ def read_image(file: str | PathLike[str], layer: str = "") -> Image:
 
 def write_image(file: str | PathLike[str], image: ArrayLike) -> None:
     """Writes linear RGB of shape (H, W, 3) as .exr, .pfm, .hdr or .png (sRGB, clamped to [0, 1]); or 8-bit sRGB codes of
-    that shape, as tonemap() makes them, as .png. An existing file is replaced only when the new one is complete.
+    that shape, as tonemap() makes them, as .png. Missing folders are created. An existing file is replaced only when the
+    new one is complete.
 
     Raises RuntimeError for another extension or if the file cannot be written, and ValueError for another shape.
     """
     if isinstance(image, np.ndarray) and image.dtype == np.uint8:
         if Path(file).suffix.lower() != ".png":
             raise ValueError(f"8-bit codes can be written as .png only, not as {fspath(file)}")
-        unfinished = Path(f"{fspath(file)}.part")
-        unfinished.write_bytes(_etendue.png(np.ascontiguousarray(image)))
-        unfinished.replace(file)
+        if image.ndim != 3 or image.shape[2] != 3 or image.size == 0:
+            raise ValueError(f"8-bit codes have the shape (H, W, 3), but these have {image.shape}")
+        _etendue.write_png(fspath(file), np.ascontiguousarray(image))
         return
     _etendue.write_image(fspath(file), _pixels(image))
 

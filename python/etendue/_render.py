@@ -19,7 +19,9 @@ Image = NDArray[np.float32]
 
 
 class FilmView:
-    """Sums over the passes, as read-only views of the film's memory, without copies."""
+    """Sums over the passes: after the rendering, read-only views of the film's memory, without copies; in callbacks, copies
+    that later passes do not change. In other threads they cannot be read while it runs (RuntimeError).
+    """
 
     def __init__(self, rendering: _etendue.Rendering):
         self._rendering = rendering
@@ -55,7 +57,7 @@ class Progress:
     error: float | None
     """Estimated relative error of the image, dimensionless; None before there are enough passes."""
     film: FilmView
-    """The film's sums. They are valid while the callback runs, and after the rendering."""
+    """The film's sums, to be read in the callback or after the rendering."""
     _rendering: _etendue.Rendering
 
     @property
@@ -286,10 +288,10 @@ def render(
     live: shows the image during the rendering, in notebooks; see show().
 
     Ctrl-C discards the current pass and returns the result of the passes before it, with stopped_by "interrupted". If no
-    pass is complete yet, it raises KeyboardInterrupt. Other Python threads continue during the rendering. A forked process
-    cannot render; use the start method "spawn".
+    pass is complete yet, it raises KeyboardInterrupt. Other Python threads continue during the rendering.
 
-    Raises RuntimeError for an unknown integrator, parameter or layer, and ValueError for limits that are not above 0.
+    Raises RuntimeError for an unknown integrator, parameter or layer, and in a process forked from one that had built or
+    rendered a scene (use the start method "spawn"); ValueError for limits that are not above 0.
     """
     _etendue.check_aovs(list(aovs))
     depth = 6 if techniques is True else int(techniques)

@@ -2,6 +2,7 @@
 
 import json
 import sys
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
@@ -179,9 +180,10 @@ class VerifyReport:
     def save(self, folder: str | PathLike[str]) -> None:
         """Writes verify.json and verify.html to a folder, which is created."""
         path = Path(folder)
-        path.mkdir(parents=True, exist_ok=True)
-        (path / "verify.json").write_text(json.dumps(self.data, indent=2) + "\n")
-        (path / "verify.html").write_text(f"<!DOCTYPE html><meta charset=utf-8>{self._repr_html_()}\n")
+        _etendue.write_text(fspath(path / "verify.json"), json.dumps(self.data, indent=2) + "\n")
+        _etendue.write_text(
+            fspath(path / "verify.html"), f"<!DOCTYPE html><meta charset=utf-8>{self._repr_html_()}\n"
+        )
 
     def __repr__(self) -> str:
         return "\n".join(
@@ -227,7 +229,8 @@ def compare(
     techniques: longest path with technique images, in edges; 0: none.
     progress: shows a status line; None: on terminals.
 
-    Ctrl-C ends the comparison; the report contains the results so far.
+    Ctrl-C ends the comparison; the report contains the results so far. If a scene or a method fails, a RuntimeWarning says
+    so, and the report contains the others; if all fail, RuntimeError is raised.
     """
     wanted = [scenes] if isinstance(scenes, (Scene, Description, str, PathLike)) else list(scenes)
     images = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
@@ -240,7 +243,13 @@ def compare(
         )
     finally:
         end()
-    return CompareReport(comparisons, json.loads(text))
+    data = json.loads(text)
+    for failure in data["failures"]:
+        warnings.warn(f"{failure['file']} could not be compared: {failure['reason']}", RuntimeWarning, stacklevel=2)
+    for scene in data["scenes"]:
+        for reason in scene["failures"]:
+            warnings.warn(f"{scene['file']}: {reason}", RuntimeWarning, stacklevel=2)
+    return CompareReport(comparisons, data)
 
 
 def verify(
@@ -277,7 +286,9 @@ def verify(
     threads: number of runs rendered at the same time; 0 for one per core.
     progress: shows a status line; None: on terminals.
 
-    Ctrl-C ends the verification after the current run and raises KeyboardInterrupt.
+    Ctrl-C ends the verification. The report contains the comparisons that are then possible, and data["interrupted"] is
+    True; if there are none, KeyboardInterrupt is raised. Methods that fail are left out with a RuntimeWarning; if all fail,
+    RuntimeError is raised.
     """
     listener, end = _status(progress)
     try:
@@ -287,4 +298,7 @@ def verify(
         )
     finally:
         end()
-    return VerifyReport(json.loads(text))
+    data = json.loads(text)
+    for reason in data["failures"]:
+        warnings.warn(f"left out, since it failed: {reason}", RuntimeWarning, stacklevel=2)
+    return VerifyReport(data)

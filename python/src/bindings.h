@@ -22,15 +22,25 @@ namespace etendue::python {
 namespace nb = nanobind;
 
 /// A scene, and the description that it was built from.
-struct SceneHandle {
-    SceneHandle(SceneDescription d, Scene s)
-        : description(std::move(d)), scene(std::move(s)), film(scene.film(), scene.filter()) {}
+struct SceneHandle : std::enable_shared_from_this<SceneHandle> {
+    SceneHandle(SceneDescription d, Scene s);
+    SceneHandle(const SceneHandle&) = delete;
+    SceneHandle& operator=(const SceneHandle&) = delete;
+    ~SceneHandle();
+    /// The handle of a scene, which keeps it alive.
+    static std::shared_ptr<SceneHandle> of(const Scene& scene);
 
     SceneDescription description;
     Scene scene;
     Film film;  ///< For film points of single paths; never rendered into.
 };
 using ScenePtr = std::shared_ptr<SceneHandle>;
+
+/// Called by everything that uses threads. Raises RuntimeError in a process that was forked from one which had used them,
+/// since these threads do not exist in it, and work for them would never be done.
+void use_threads();
+/// To be called once, when the module is loaded.
+void watch_forks();
 
 /// A NumPy array of the vector's elements, `channels` floats each, which owns them: nothing is copied.
 using FloatArray = nb::ndarray<nb::numpy, float>;
@@ -68,6 +78,12 @@ private:
     struct State;
     State* state_ = nullptr;
 };
+
+/// Names of files may hold any bytes; those that are not UTF-8 are replaced.
+template <class Json>
+std::string json_text(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 void bind_description(nb::module_& m);
 void bind_render(nb::module_& m);

@@ -158,7 +158,6 @@ struct JoinHandle {
     Rgb contribution;
     PathPtr y, z;
     ScenePtr scene;
-    const Scene* in = nullptr;
 };
 
 VertexHandle end_vertex(Vertex vertex, const ScenePtr& scene) {
@@ -179,27 +178,36 @@ std::vector<VertexHandle> vertices_of(const JoinHandle& j) {
     }
     for (int i = q.t - 1; i >= 0; --i) {
         if (i == 0 && q.strategy == Strategy::Splat)
-            x.push_back(end_vertex(lens_end(*j.in, j.join), j.scene));
+            x.push_back(end_vertex(lens_end(j.scene->scene, j.join), j.scene));
         else
             x.push_back({j.z, i, nullptr, nullptr, nullptr});
     }
     return x;
 }
 
+/// Whether the joins of s and t vertices are made of a light sub-path, and of an eye sub-path beyond the lens.
+bool uses_light_path(int s, int t) {
+    return s >= 2 || (s == 1 && t == 1);
+}
+bool uses_eye_path(int t) {
+    return t >= 2;
+}
+
 /// All joins of y_{s-1} and z_{t-1} with a contribution, after their shadow rays.
-std::vector<JoinHandle> joins(const Scene& scene, const ScenePtr& kept, const PathPtr& y, int s,
-                              const PathPtr& z, int t, Sampler& sampler,
-                              const TechniqueCounts& counts, RenderStats& stats) {
+std::vector<JoinHandle> joins(const ScenePtr& kept, const PathPtr& y, int s, const PathPtr& z,
+                              int t, Sampler& sampler, const TechniqueCounts& counts,
+                              RenderStats& stats) {
+    const Scene& scene = kept->scene;
     if (s < 0 || t < 1) throw nb::value_error("s must be at least 0, and t at least 1");
     if (s + t < 2) throw nb::value_error("a path has at least two vertices");
-    const bool needs_y = s >= 2 || (s == 1 && t == 1), needs_z = t >= 2;
+    const bool needs_y = uses_light_path(s, t), needs_z = uses_eye_path(t);
     if (needs_y && (!y || s > y->sub_path().size()))
         throw nb::index_error("the light sub-path has fewer than s vertices");
     if (needs_z && (!z || t > z->sub_path().size()))
         throw nb::index_error("the eye sub-path has fewer than t vertices");
     std::vector<JoinHandle> all;
     const auto add = [&](const Join& j, float Tr) {
-        if (Tr > 0) all.push_back({j, j.contribution * Tr, y, z, kept, &scene});
+        if (Tr > 0) all.push_back({j, j.contribution * Tr, y, z, kept});
     };
     if (t == 1) {
         if (const auto j = join_splat(scene, y->sub_path(), s, sampler, counts))
@@ -249,7 +257,8 @@ class Sample {
 public:
     Sample(const SampleContext& context, Workspace& work, const TechniqueCounts& counts,
            int max_depth)
-        : context_(&context), work_(&work), counts_(counts), max_depth_(max_depth) {}
+        : scene_(SceneHandle::of(context.scene)), context_(&context), work_(&work), counts_(counts),
+          max_depth_(max_depth) {}
 
     void expire() {
         context_ = nullptr;
@@ -278,18 +287,25 @@ public:
         return y_;
     }
     std::vector<JoinHandle> join(int s, int t) {
-        return joins(context().scene, nullptr, y_, s, z_, t, context().sampler, counts_,
-                     work_->stats);
+        const SampleContext& c = context();
+        return joins(scene_, y_, s, z_, t, c.sampler, counts_, work_->stats);
     }
     double uniform() {
         context().sampler.seek(Stream::Auxiliary, numbers_++);
         return context().sampler.next_1d_unstructured();
     }
     void add(const JoinHandle& j, std::optional<float> mis_weight, double factor) {
+        const SampleContext& c = context();
+        // The sinks look at the sub-paths of this sample, as they are now.
+        const Technique& q = j.join.technique;
+        if ((uses_light_path(q.s, q.t) && j.y != y_) || (uses_eye_path(q.t) && j.z != z_))
+            throw nb::value_error(
+                "this join belongs to another sample, or one of its sub-paths has "
+                "been replaced; add joins in the sample that made them");
         if (j.join.technique.vertices() - 1 > max_depth_) return;
         Join join = j.join;
         if (mis_weight) join.mis_weight = *mis_weight;
-        context().sink.add(join, j.contribution * float(factor));
+        c.sink.add(join, j.contribution * float(factor));
     }
 
 private:
@@ -303,6 +319,7 @@ private:
         work_->stats.is_timed = false;
     }
 
+    ScenePtr scene_;
     const SampleContext* context_;
     Workspace* work_;
     TechniqueCounts counts_;
@@ -345,6 +362,9 @@ public:
         return traces_light_paths_ ? scene.film().pixel_count() : 0;
     }
     Estimator estimator() const override { return estimator_; }
+    // What the object keeps is its own: samples are expected to depend on their random numbers alone.
+    void save(LearnedState&) const override {}
+    void load(LearnedState&) override {}
 
 private:
     std::shared_ptr<nb::object> object_;
@@ -423,6 +443,7 @@ private:
 
 nb::tuple sample_paths(const ScenePtr& scene, size_t n, nb::handle integrator, uint64_t seed,
                        int most_vertices, const std::string& sampler) {
+    use_threads();
     PathRecorder recorder(scene->scene, n, size_t(most_vertices));
     RenderSettings settings;
     settings.integrator = to_spec(scene->scene, integrator);
@@ -799,7 +820,7 @@ void bind_core(nb::module_& m) {
             sampler.start(0, 0);
             RenderStats stats;
             const TechniqueCounts own = z ? z->counts : y ? y->counts : TechniqueCounts{};
-            return joins(scene->scene, scene, y, s, z, t, sampler, counts.value_or(own), stats);
+            return joins(scene, y, s, z, t, sampler, counts.value_or(own), stats);
         },
         "scene"_a, "y"_a.none(), "s"_a, "z"_a.none(), "t"_a, "seed"_a, "counts"_a.none());
     m.def(

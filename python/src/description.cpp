@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 #include <nanobind/stl/array.h>
@@ -15,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings.h"
+#include "embedded.h"
 #include "readers/mitsuba_values.h"
 #include "readers/mitsuba_xml.h"
 #include "readers/nesting.h"
@@ -144,8 +146,15 @@ private:
     }
     void read_entry(int index, const std::string& name, nb::handle value, const std::string& path,
                     bool in_emitter, int depth) {
-        if (!is_value(value)) return read_child(index, name, value, path, in_emitter, depth);
         SceneObject& object = scene_.objects[size_t(index)];
+        const char* const embedded = embedded_parameter(object);
+        if (embedded && name == embedded && nb::isinstance<nb::dict>(value)) {
+            const int64_t number =
+                add_embedded(scene_, object, nb::borrow<nb::dict>(value), at(path));
+            object.params.push_back({name, number, at(path)});
+            return;
+        }
+        if (!is_value(value)) return read_child(index, name, value, path, in_emitter, depth);
         ValueContext context{object.category, name, {}, in_emitter, at(path)};
         if (const PluginInfo* info = find_plugin(object.category, object.type))
             for (const ParamInfo& p : info->params)
@@ -203,18 +212,26 @@ std::vector<Named> children_of(const SceneDescription& scene, int index) {
     return all;
 }
 
+/// Objects that are used several times are written where they are first used; then they are named by their ids, which
+/// those without one get.
 class DictWriter {
 public:
     explicit DictWriter(const SceneDescription& scene)
-        : scene_(scene), is_written_(scene.objects.size()) {
-        if (!scene.meshes.empty())
-            throw SceneError({scene.file, 0}, "the scene file has meshes of its own, which a dict "
-                                              "cannot hold");
+        : scene_(scene), is_written_(scene.objects.size()), uses_(scene.objects.size()) {
+        for (const int root : scene.roots) ++uses_[size_t(root)];
+        for (const SceneObject& o : scene.objects) {
+            if (!o.id.empty()) ids_.insert(o.id);
+            for (const SceneObject::Child& c : o.children) ++uses_[size_t(c.object)];
+        }
     }
     nb::dict scene() {
         nb::dict d;
         d["type"] = "scene";
-        for (const Named& c : children_of(scene_, -1)) d[c.key.c_str()] = object(c.object, true);
+        for (const Named& c : children_of(scene_, -1)) {
+            // The key of an object of the scene is its id.
+            ids_.insert(c.key);
+            d[c.key.c_str()] = object(c.object, true);
+        }
         return d;
     }
     nb::dict object(int index, bool is_root) {
@@ -222,21 +239,37 @@ public:
         nb::dict d;
         if (is_written_[size_t(index)]) {
             d["type"] = "ref";
-            d["id"] = o.id;
+            d["id"] = o.id.empty() ? made_ids_.at(index) : o.id;
             return d;
         }
         is_written_[size_t(index)] = true;
         d["type"] = o.type;
         if (!o.id.empty() && !is_root) d["id"] = o.id;
-        for (const Param& p : o.params) d[p.name.c_str()] = to_python(p.value);
+        if (o.id.empty() && uses_[size_t(index)] > 1) d["id"] = make_id(index, o.category);
+        const char* const embedded = embedded_parameter(o);
+        for (const Param& p : o.params)
+            d[p.name.c_str()] = embedded && p.name == embedded ? embedded_to_python(scene_, o, p)
+                                                               : to_python(p.value);
         for (const Named& c : children_of(scene_, index))
             d[c.key.c_str()] = object(c.object, false);
         return d;
     }
 
 private:
+    /// Unlike automatic keys: "bsdf-1".
+    std::string make_id(int index, const std::string& category) {
+        std::string id;
+        do id = fmt::format("{}-{}", category, ++numbers_[category]);
+        while (!ids_.insert(id).second);
+        return made_ids_[index] = id;
+    }
+
     const SceneDescription& scene_;
     std::vector<bool> is_written_;
+    std::vector<int> uses_;
+    std::set<std::string> ids_;
+    std::map<int, std::string> made_ids_;
+    std::map<std::string, int> numbers_;
 };
 
 /// What a path such as "ball.bsdf.reflectance" names: an object, or a parameter of one (`parameter` is not empty).
@@ -296,8 +329,12 @@ nb::object get(const SceneDescription& scene, const std::string& path) {
         return at.object < 0 ? DictWriter(scene).scene()
                              : DictWriter(scene).object(at.object, at.parent < 0);
     if (at.object >= 0)
-        if (const Param* p = scene.objects[size_t(at.object)].find(at.parameter))
-            return to_python(p->value);
+        if (const Param* p = scene.objects[size_t(at.object)].find(at.parameter)) {
+            const SceneObject& o = scene.objects[size_t(at.object)];
+            const char* const embedded = embedded_parameter(o);
+            return embedded && p->name == embedded ? embedded_to_python(scene, o, *p)
+                                                   : to_python(p->value);
+        }
     fail_unknown(scene, path, at);
 }
 
@@ -333,6 +370,16 @@ void check_name(const SceneDescription& scene, const std::string& path, const Pl
 void set_in(SceneDescription& scene, const std::string& path, nb::handle value) {
     const Place at = find(scene, path);
     const SourceLocation where{path, 0};
+    if (at.object >= 0 && !at.parameter.empty() && nb::isinstance<nb::dict>(value)) {
+        SceneObject& object = scene.objects[size_t(at.object)];
+        if (const char* embedded = embedded_parameter(object);
+            embedded && at.parameter == embedded) {
+            const int64_t number = add_embedded(scene, object, nb::borrow<nb::dict>(value), where);
+            std::erase_if(object.params, [&](const Param& p) { return p.name == at.parameter; });
+            object.params.push_back({at.parameter, number, where});
+            return;
+        }
+    }
     if (!is_value(value)) {
         // An object: in the place of the old one, or added.
         const int parent = at.parameter.empty() ? at.parent : at.object;
@@ -380,7 +427,8 @@ void set_in(SceneDescription& scene, const std::string& path, nb::handle value) 
     object.params.push_back(std::move(changed));
 }
 
-/// All or nothing: a value that is refused leaves the description as it was.
+/// All or nothing: a value that is refused leaves the description as it was. Copies of descriptions share their meshes and
+/// images.
 void set(SceneDescription& scene, const std::string& path, nb::handle value) {
     SceneDescription changed = scene;
     set_in(changed, path, value);
@@ -429,6 +477,7 @@ ScenePtr build(const SceneDescription& description,
         options.resolution = resolution;
     }
     options.crop = crop;
+    use_threads();
     nb::gil_scoped_release no_gil;
     Scene scene = build_scene(description, options);
     return std::make_shared<SceneHandle>(description, std::move(scene));
@@ -572,8 +621,11 @@ void bind_description(nb::module_& m) {
     m.def(
         "load_string",
         [](const std::string& xml, const std::map<std::string, std::string>& defines,
-           const std::string& name,
-           bool lenient) { return parse_mitsuba_xml(xml, name, read_options(defines, lenient)); },
+           const std::string& name, bool lenient) {
+            const ReadOptions options = read_options(defines, lenient);
+            const nb::gil_scoped_release no_gil;
+            return parse_mitsuba_xml(xml, name, options);
+        },
         "xml"_a, "defines"_a, "name"_a, "lenient"_a);
     m.def(
         "load_dict",

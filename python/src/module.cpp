@@ -4,6 +4,7 @@ NB_MODULE(_etendue, m) {
     using namespace etendue::python;
     m.doc() = "The compiled part of etendue.";
     m.attr("__version__") = ETENDUE_VERSION;
+    watch_forks();
     bind_description(m);
     bind_images(m);
     bind_core(m);

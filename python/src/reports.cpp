@@ -54,15 +54,12 @@ private:
 /// Runs `task(status, stop)`; KeyboardInterrupt goes on to the caller unless the task ends well in spite of it.
 template <class Task>
 bool run(const Task& task, const nb::object& listener) {
+    use_threads();
     Background background;
     StatusLine status;
     background.run([&] { task(status, background.stop); }, [&] { status.tell(listener); });
     return background.interrupted;
 }
-
-struct Interrupted : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
 
 [[noreturn]] void raise_interrupt() {
     PyErr_SetNone(PyExc_KeyboardInterrupt);
@@ -139,34 +136,47 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
         jobs.push_back(std::move(job));
     }
 
+    nlohmann::ordered_json failures = nlohmann::ordered_json::array();
+    const auto fail = [&](size_t i, const std::string& reason) {
+        failures.push_back({{"file", scenes[i]->scene.file()}, {"reason", reason}});
+    };
     const uint64_t program = program_fingerprint(module_file());
     const bool interrupted = run(
         [&](StatusLine& status, std::atomic<bool>& stop) {
-            for (size_t i = 0; i < jobs.size() && !stop; ++i) {
-                const SceneHandle& scene = *scenes[i];
-                std::optional<Reference> reference;
-                if (!references.empty())
-                    reference = read_reference(references[i], scene.scene.film());
-                else
-                    reference = make_reference(
-                        scene.scene,
-                        {jobs[i].reference, folder, scene_fingerprint(scene.description), program},
-                        [&](const Progress& p) {
-                            status.set(
-                                fmt::format("reference, {} spp, {:.1f} s", p.passes, p.seconds));
-                        },
-                        stop);
-                if (!reference) break;
-                out->all.push_back(compare(
-                    scene.scene, *reference, jobs[i].settings,
-                    [&](const std::string& text) { status.set(text); }, stop));
-            }
+            // Scenes that fail do not lose those that were compared.
+            for (size_t i = 0; i < jobs.size() && !stop; ++i) try {
+                    const SceneHandle& scene = *scenes[i];
+                    std::optional<Reference> reference;
+                    if (!references.empty())
+                        reference = read_reference(references[i], scene.scene.film());
+                    else
+                        reference = make_reference(
+                            scene.scene,
+                            {jobs[i].reference, folder, scene_fingerprint(scene.description),
+                             program},
+                            [&](const Progress& p) {
+                                status.set(fmt::format("reference, {} spp, {:.1f} s", p.passes,
+                                                       p.seconds));
+                            },
+                            stop);
+                    if (!reference) break;
+                    out->all.push_back(compare(
+                        scene.scene, *reference, jobs[i].settings,
+                        [&](const std::string& text) { status.set(text); }, stop));
+                } catch (const std::bad_alloc&) {
+                    fail(i, "not enough memory");
+                } catch (const std::runtime_error& e) {
+                    fail(i, e.what());
+                }
         },
         listener);
+    if (out->all.empty() && !failures.empty())
+        throw std::runtime_error(failures[0]["reason"].get<std::string>());
     if (interrupted && out->all.empty()) raise_interrupt();
     nlohmann::ordered_json all = nlohmann::ordered_json::array();
     for (const Comparison& c : out->all) all.push_back(to_json(c));
-    return nlohmann::ordered_json{{"scenes", all}, {"warnings", notes}}.dump();
+    return json_text(
+        nlohmann::ordered_json{{"scenes", all}, {"failures", failures}, {"warnings", notes}});
 }
 
 std::string verify_methods(const ScenePtr& scene, const nb::list& methods,
@@ -179,21 +189,16 @@ std::string verify_methods(const ScenePtr& scene, const nb::list& methods,
                             : to_spec(scene->scene, method));
     for (const IntegratorSpec& s : specs) make_integrator(s);
     std::optional<VerifyReport> report;
-    bool was_interrupted = false;
-    try {
-        run(
-            [&](StatusLine& status, std::atomic<bool>& stop) {
-                report = verify(scene->scene, specs, options, {}, [&](const std::string& text) {
-                    status.set(text);
-                    if (stop) throw Interrupted("interrupted");
-                });
-            },
-            listener);
-    } catch (const Interrupted&) {
-        was_interrupted = true;
-    }
-    if (was_interrupted) raise_interrupt();
-    return to_json(*report, scene->scene, sampler, options).dump();
+    const bool was_interrupted = run(
+        [&](StatusLine& status, std::atomic<bool>& stop) {
+            VerifyOptions o = options;
+            o.interrupted = &stop;
+            report = verify(scene->scene, specs, o, {},
+                            [&](const std::string& text) { status.set(text); });
+        },
+        listener);
+    if (was_interrupted && report->methods.empty()) raise_interrupt();
+    return json_text(to_json(*report, scene->scene, sampler, options));
 }
 
 }  // namespace

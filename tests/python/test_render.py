@@ -104,19 +104,6 @@ def test_arrays_are_not_copied(cornell: et.Scene) -> None:
     np.testing.assert_allclose(sums / result.film.passes, image, rtol=1e-6)
 
 
-def test_the_films_sums_are_the_same_memory_while_it_renders(cornell: et.Scene) -> None:
-    addresses = set()
-    passes = []
-
-    def callback(p: et.Progress) -> None:
-        addresses.add(p.film.sums.ctypes.data)
-        passes.append(p.passes)
-        np.testing.assert_allclose(p.film.sums / p.passes, p.image, rtol=1e-6)
-
-    result = et.render(cornell, spp=5, callback=callback)
-    assert addresses == {result.film.sums.ctypes.data} and passes == [1, 2, 3, 4, 5]
-
-
 def test_arrays_outlive_result_and_scene(scenes: Path) -> None:
     scene = et.load(scenes / "cornell.xml").build(resolution=(8, 8))
     result = et.render(scene, spp=2)

@@ -1,0 +1,153 @@
+#include "embedded.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nanobind/stl/string.h>
+
+#include "readers/mitsuba_values.h"
+
+namespace etendue::python {
+namespace {
+
+/// A read-only array of the elements of a vector in something that is shared, which it keeps alive.
+template <class Number, class Owner, class T>
+nb::object view(const Shared<Owner>& owner, const std::vector<T>& values) {
+    constexpr size_t kColumns = sizeof(T) / sizeof(Number);
+    nb::capsule kept(new Shared<Owner>(owner),
+                     [](void* p) noexcept { delete static_cast<Shared<Owner>*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, const Number, nb::ndim<2>>(
+        reinterpret_cast<const Number*>(values.data()), {values.size(), kColumns}, kept));
+}
+
+nb::object to_python(const Shared<MeshData>& mesh) {
+    nb::dict d;
+    if (!mesh->name.empty()) d["name"] = mesh->name;
+    d["positions"] = view<float>(mesh, mesh->positions);
+    d["triangles"] = view<uint32_t>(mesh, mesh->triangles);
+    if (!mesh->normals.empty()) d["normals"] = view<float>(mesh, mesh->normals);
+    if (!mesh->uvs.empty()) d["uvs"] = view<float>(mesh, mesh->uvs);
+    if (!mesh->colors.empty()) d["colors"] = view<float>(mesh, mesh->colors);
+    if (mesh->face_normals) d["face_normals"] = true;
+    return d;
+}
+
+/// Rows of numbers, from an array or a sequence.
+template <class Number, class T>
+std::vector<T> rows_of(nb::handle value, const char* dtype, const SourceLocation& where) {
+    constexpr size_t kColumns = sizeof(T) / sizeof(Number);
+    using Array = nb::ndarray<const Number, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+    Array array;
+    nb::object converted;
+    try {
+        converted = nb::module_::import_("numpy").attr("ascontiguousarray")(value, dtype);
+        array = nb::cast<Array>(converted);
+    } catch (const std::exception&) {
+        throw SceneError(where,
+                         fmt::format("expected an array of shape (N, {}) of {}", kColumns, dtype));
+    }
+    if (array.shape(1) != kColumns)
+        throw SceneError(where,
+                         fmt::format("expected an array of shape (N, {}), found one of shape "
+                                     "({}, {})",
+                                     kColumns, array.shape(0), array.shape(1)));
+    std::vector<T> rows(array.shape(0));
+    const Number* from = array.data();
+    for (T& row : rows)
+        for (size_t c = 0; c < kColumns; ++c) row[int(c)] = *from++;
+    return rows;
+}
+
+bool has_unit_normals(const MeshData& mesh) {
+    for (const Vec3& n : mesh.normals)
+        if (!(std::fabs(length2(n) - 1) < 1e-6f)) return false;
+    return true;
+}
+
+MeshData mesh_of(nb::dict d, const SourceLocation& where) {
+    MeshData mesh;
+    const std::vector<std::string> known = {"name", "positions", "triangles",   "normals",
+                                            "uvs",  "colors",    "face_normals"};
+    for (const auto& [key, value] : d) {
+        const std::string name = nb::cast<std::string>(nb::str(key));
+        const SourceLocation at{where.file.str() + "/" + name, 0};
+        if (name == "name")
+            mesh.name = nb::cast<std::string>(nb::str(value));
+        else if (name == "positions")
+            mesh.positions = rows_of<float, Vec3>(value, "float32", at);
+        else if (name == "normals")
+            mesh.normals = rows_of<float, Vec3>(value, "float32", at);
+        else if (name == "colors")
+            mesh.colors = rows_of<float, Vec3>(value, "float32", at);
+        else if (name == "uvs")
+            mesh.uvs = rows_of<float, Vec2>(value, "float32", at);
+        else if (name == "face_normals")
+            mesh.face_normals = nb::cast<bool>(nb::bool_(value));
+        else if (name == "triangles") {
+            for (const auto& t : rows_of<int64_t, std::array<int64_t, 3>>(value, "int64", at)) {
+                MeshData::Triangle triangle{};
+                for (size_t i = 0; i < 3; ++i) {
+                    if (t[i] < 0 || t[i] > int64_t(UINT32_MAX))
+                        throw SceneError(at, fmt::format("{} is no number of a vertex", t[i]));
+                    triangle[i] = uint32_t(t[i]);
+                }
+                mesh.triangles.push_back(triangle);
+            }
+        } else
+            throw SceneError(at, fmt::format("a mesh has no {}{}", quote(name), hint(name, known)));
+    }
+    for (const auto& [name, count] : {std::pair{"normals", mesh.normals.size()},
+                                      {"uvs", mesh.uvs.size()},
+                                      {"colors", mesh.colors.size()}})
+        if (count > 0 && count != mesh.positions.size())
+            throw SceneError(where, fmt::format("there are {} {}, but {} positions", count, name,
+                                                mesh.positions.size()));
+    MeshData finished = mesh;
+    finish_mesh(finished, {}, where);
+    // The mesh of a description is finished already, and stays the same to the last bit.
+    const bool is_finished = finished.triangles.size() == mesh.triangles.size() &&
+                             finished.normals.size() == mesh.normals.size() &&
+                             has_unit_normals(mesh);
+    return is_finished ? mesh : finished;
+}
+
+}  // namespace
+
+const char* embedded_parameter(const SceneObject& object) {
+    if (object.category == "shape" && object.type == "mesh") return "mesh";
+    if (object.category == "texture" && object.type == "bitmap") return "image";
+    return nullptr;
+}
+
+nb::object embedded_to_python(const SceneDescription& scene, const SceneObject& object,
+                              const Param& param) {
+    const int64_t* index = param.as<int64_t>();
+    if (!index || *index < 0) return to_python(param.value);
+    if (object.category == "shape" && uint64_t(*index) < scene.meshes.size())
+        return to_python(scene.meshes[size_t(*index)]);
+    if (object.category == "texture" && uint64_t(*index) < scene.images.size()) {
+        const EncodedImage& image = scene.images[size_t(*index)];
+        nb::dict d;
+        d["name"] = image.name;
+        d["bytes"] = nb::bytes(image.bytes.data(), image.bytes.size());
+        return d;
+    }
+    return to_python(param.value);
+}
+
+int64_t add_embedded(SceneDescription& scene, const SceneObject& object, nb::dict value,
+                     const SourceLocation& where) {
+    if (object.category == "shape") {
+        scene.meshes.push_back(mesh_of(value, where));
+        return int64_t(scene.meshes.size()) - 1;
+    }
+    if (!value.contains("bytes") || !nb::isinstance<nb::bytes>(value["bytes"]))
+        throw SceneError(where, "expected \"bytes\", the contents of an image file");
+    const auto bytes = nb::borrow<nb::bytes>(value["bytes"]);
+    scene.images.push_back(EncodedImage{
+        value.contains("name") ? nb::cast<std::string>(nb::str(value["name"])) : where.file.str(),
+        std::string(bytes.c_str(), bytes.size())});
+    return int64_t(scene.images.size()) - 1;
+}
+
+}  // namespace etendue::python

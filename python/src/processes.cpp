@@ -1,0 +1,52 @@
+// What outlives single calls: scenes by address, and the threads of forked processes.
+
+#include <pthread.h>
+
+#include <map>
+#include <mutex>
+#include <stdexcept>
+
+#include "bindings.h"
+
+namespace etendue::python {
+namespace {
+
+std::mutex scenes_mutex;
+std::map<const Scene*, SceneHandle*> scenes;
+
+std::atomic<bool> has_used_threads{false}, has_lost_threads{false};
+
+}  // namespace
+
+SceneHandle::SceneHandle(SceneDescription d, Scene s)
+    : description(std::move(d)), scene(std::move(s)), film(scene.film(), scene.filter()) {
+    const std::scoped_lock lock(scenes_mutex);
+    scenes.emplace(&scene, this);
+}
+
+SceneHandle::~SceneHandle() {
+    const std::scoped_lock lock(scenes_mutex);
+    scenes.erase(&scene);
+}
+
+ScenePtr SceneHandle::of(const Scene& scene) {
+    const std::scoped_lock lock(scenes_mutex);
+    return scenes.at(&scene)->shared_from_this();
+}
+
+void use_threads() {
+    if (has_lost_threads)
+        throw std::runtime_error(
+            "this process was forked from one that had already built or rendered a scene; its "
+            "threads do not exist here. Use the start method \"spawn\" or \"forkserver\": "
+            "multiprocessing.get_context(\"spawn\")");
+    has_used_threads = true;
+}
+
+void watch_forks() {
+    pthread_atfork(nullptr, nullptr, [] {
+        if (has_used_threads) has_lost_threads = true;
+    });
+}
+
+}  // namespace etendue::python

@@ -1,0 +1,332 @@
+"""Arguments that are wrong, objects that outlive others, threads, forks, and files that cannot be written."""
+
+import gc
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import etendue as et
+from conftest import ROOT
+from etendue import _etendue
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (8, 8, 0), (8, 8, 1), (8, 8, 2), (8, 8, 4), (0, 0, 3), (8, 0, 3), (8, 8, 3, 1)])
+def test_codes_of_another_shape_are_refused(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="8-bit codes have the shape"):
+        et.write_image(tmp_path / "a.png", np.zeros(shape, np.uint8))
+    with pytest.raises((TypeError, RuntimeError)):
+        _etendue.png(np.zeros(shape, np.uint8))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_codes_are_written_as_they_are(tmp_path: Path) -> None:
+    codes = np.arange(8 * 5 * 3, dtype=np.uint8).reshape(8, 5, 3)
+    et.write_image(tmp_path / "new" / "a.png", codes)
+    assert [p.name for p in (tmp_path / "new").iterdir()] == ["a.png"]
+    np.testing.assert_array_equal(et.tonemap(et.read_image(tmp_path / "new" / "a.png"), "srgb"), codes)
+    # Every second column: the array is not contiguous.
+    et.write_image(tmp_path / "b.png", codes[:, ::2])
+    np.testing.assert_array_equal(et.tonemap(et.read_image(tmp_path / "b.png"), "srgb"), codes[:, ::2])
+
+
+@pytest.mark.parametrize("shape", [(0, 0, 3), (0, 8, 3), (8, 0, 3), (0, 8)])
+def test_empty_images_are_refused(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    empty = np.zeros(shape, np.float32)
+    calls: list[Callable[[], Any]] = [
+        lambda: et.tonemap(empty), lambda: et.diff(empty, empty), lambda: et.show(empty),
+        lambda: et.write_image(tmp_path / "a.exr", empty), lambda: et.write_image(tmp_path / "a.png", empty),
+    ]
+    for call in calls:
+        with pytest.raises(ValueError, match="no pixels"):
+            call()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failed_writes_say_so_and_keep_what_there_was(tmp_path: Path) -> None:
+    codes = np.zeros((8, 8, 3), np.uint8)
+    (tmp_path / "full.png").symlink_to("/dev/full")
+    (tmp_path / "folder.png").mkdir()
+    for name, why in [("full.png", "No space left"), ("folder.png", "there is a folder")]:
+        for image in (codes, codes.astype(np.float32)):
+            with pytest.raises(RuntimeError, match=why):
+                et.write_image(tmp_path / name, image)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder.png", "full.png"]
+    assert (tmp_path / "full.png").is_symlink()
+
+
+class _Keeps(et.Integrator):
+    """Keeps all joins, and adds the first one again in every later sample."""
+
+    traces_light_paths = True
+
+    def __init__(self) -> None:
+        self.kept: list[et.core.Join] = []
+        self.refused = 0
+
+    def counts(self, light_paths: int) -> et.core.Counts:
+        return et.core.Counts(hit=1, next_event=1, splat=light_paths)
+
+    def sample(self, c: et.core.Sample) -> None:
+        z = c.eye_path(max_vertices=4)
+        y = c.light_path(max_vertices=3)
+        for join in self.kept[:3]:
+            try:
+                c.add(join)
+            except ValueError as e:
+                assert "another sample" in str(e)
+                self.refused += 1
+        for s, t in [(0, t) for t in range(2, len(z) + 1)] + [(1, t) for t in range(2, len(z) + 1)] + [
+            (s, 1) for s in range(1, len(y) + 1)
+        ]:
+            for join in c.join(s, t):
+                c.add(join)
+                if len(self.kept) < 50:
+                    self.kept.append(join)
+        last = c.join(0, 2)
+        c.eye_path(max_vertices=2)
+        for join in last:
+            with pytest.raises(ValueError, match="replaced"):
+                c.add(join)
+
+
+def test_joins_that_outlive_their_sample(scenes: Path) -> None:
+    integrator = _Keeps()
+    scene = et.load(scenes / "cornell.xml").build(resolution=(8, 8))
+    et.verify(scene, integrator, spp=1, runs=8, lengths=(1, 3), tiles=1, threads=1, progress=False)
+    assert integrator.kept and integrator.refused > 100
+    del scene
+    gc.collect()
+    for join in integrator.kept:
+        assert np.isfinite(join.contribution).all()
+        try:
+            vertices = join.vertices()
+        except RuntimeError as e:
+            assert "has ended" in str(e)
+            continue
+        for vertex in vertices:
+            try:
+                assert np.isfinite(vertex.p).all()
+            except RuntimeError as e:
+                assert "has ended" in str(e)
+
+
+FORMATS = ROOT / "tests" / "scenes" / "formats"
+
+
+@pytest.mark.parametrize(
+    "name", sorted(str(p.relative_to(FORMATS)) for p in FORMATS.rglob("*") if p.suffix in (".pbrt", ".gltf", ".glb"))
+)
+def test_scenes_of_all_formats_survive_the_way_through_a_dict(name: str) -> None:
+    d = et.load(FORMATS / name, lenient=True)
+    as_dict = d.to_dict()
+    again = et.load_dict(as_dict, folder=(FORMATS / name).parent)
+    for path in d.paths():
+        d[path]
+    try:
+        scene = d.build(resolution=(16, 12), lenient=True)
+    except (et.SceneError, RuntimeError) as e:
+        if "its format is none of" in str(e):
+            pytest.skip("the package does not read its textures")
+        raise
+    images = [et.render(s, "path", spp=1, progress=False).image
+              for s in (scene, again.build(resolution=(16, 12), lenient=True))]
+    np.testing.assert_array_equal(images[0], images[1])
+
+
+TRIANGLE = {
+    "type": "scene",
+    "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8},
+               "to_world": et.look_at((0, 0, 4), (0, 0, 0))},
+    "emitter": {"type": "constant"},
+    "thing": {"type": "mesh", "mesh": {"positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]},
+              "bsdf": {"type": "diffuse"}},
+}
+
+
+def test_meshes_from_arrays() -> None:
+    d = et.load_dict(TRIANGLE)
+    assert d["thing.mesh"]["positions"].shape == (3, 3) and d["thing.mesh"]["positions"].dtype == np.float32
+    assert not d["thing.mesh"]["positions"].flags.writeable
+    image = et.render(d.build(), "path", spp=4, progress=False).image
+    # Beside the triangle is the sky.
+    assert image[0, 0] == pytest.approx(1) and image[4, 4, 0] < 0.9
+    d["thing.mesh"] = {"positions": np.array([[5, 5, 0], [6, 5, 0], [5, 6, 0.0]]), "triangles": np.array([[0, 1, 2]])}
+    assert et.render(d.build(), "path", spp=4, progress=False).image[4, 4] == pytest.approx(1)
+
+    for mesh, message in [
+        ({"positions": np.zeros((3, 2)), "triangles": [[0, 1, 2]]}, r"shape \(N, 3\)"),
+        ({"positions": np.eye(3), "triangles": [[0, 1, 3]]}, "3"),
+        ({"positions": np.eye(3), "triangles": [[0, 1, -1]]}, "-1"),
+        ({"positions": np.full((3, 3), np.nan), "triangles": [[0, 1, 2]]}, "finite"),
+        ({"positions": np.eye(3), "triangles": []}, ""),
+        ({"positions": np.eye(3), "triangles": [[0, 1, 2]], "normals": np.eye(3)[:2]}, "2 normals, but 3 positions"),
+        ({"positions": "many", "triangles": [[0, 1, 2]]}, "positions"),
+        ({"position": np.eye(3)}, 'did you mean "positions"'),
+    ]:
+        before = d.dump()
+        with pytest.raises(et.SceneError, match=message):
+            d["thing.mesh"] = mesh
+        assert d.dump() == before
+
+
+def test_copies_and_edits_share_meshes() -> None:
+    d = et.load_dict(TRIANGLE)
+    address = d["thing.mesh"]["positions"].ctypes.data
+    copy = d.copy()
+    for i in range(3):
+        d["thing.bsdf.reflectance"] = 0.1 * i
+    assert copy["thing.mesh"]["positions"].ctypes.data == address
+    assert d["thing.mesh"]["positions"].ctypes.data == address
+    scene = d.build()
+    assert scene.description["thing.mesh"]["positions"].ctypes.data == address
+    array = d["thing.mesh"]["positions"]
+    del d, copy, scene
+    gc.collect()
+    np.testing.assert_array_equal(array[0], (-1, -1, 0))
+
+
+def _ticks_during(task: Callable[[], Any]) -> tuple[int, float]:
+    """How often another thread runs while a task does, and the seconds that it takes."""
+    done = threading.Event()
+    count = 0
+
+    def tick() -> None:
+        nonlocal count
+        while not done.is_set():
+            count += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begin = time.monotonic()
+    before = count
+    task()
+    ticks, seconds = count - before, time.monotonic() - begin
+    done.set()
+    thread.join()
+    return ticks, seconds
+
+
+def test_other_threads_run_while_images_are_computed(tmp_path: Path, scenes: Path) -> None:
+    image = np.random.default_rng(1).random((700, 700, 3), dtype=np.float32)
+    et.write_image(tmp_path / "a.exr", image)
+    xml = (scenes / "cornell.xml").read_text()
+    cube = '<shape type="cube"><bsdf type="diffuse"/></shape>'
+    long = xml.replace("</scene>", 20000 * cube + "</scene>")
+    scene = et.load(scenes / "cornell.xml").build(resolution=(64, 64))
+    tasks: dict[str, Callable[[], Any]] = {
+        "diff": lambda: et.diff(image, image[::-1]),
+        "write": lambda: et.write_image(tmp_path / "b.exr", image),
+        "load_string": lambda: et.load_string(long),
+        "pilot": lambda: _etendue.Rendering(scene, "upg+pssmlt", 1, None, None, 0, "sobol", 1, 0),
+    }
+    for name, task in tasks.items():
+        ticks, seconds = _ticks_during(task)
+        # A thread that waits for the GIL gets none in all that time.
+        assert ticks > 5 or seconds < 0.02, (name, ticks, seconds)
+
+
+def _child(code: str) -> str:
+    """Output of a Python process."""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, env=os.environ)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+FORK = """
+import os, sys
+import etendue as et
+d = et.load({scene!r})
+{before}
+child = os.fork()
+if child == 0:
+    try:
+        et.render(d.build(resolution=(8, 8)), "path", spp=1, progress=False)
+        print("rendered", flush=True)
+    except RuntimeError as e:
+        print(e, flush=True)
+    os._exit(0)
+os.waitpid(child, 0)
+"""
+
+
+def test_forked_processes_refuse_instead_of_hanging(scenes: Path) -> None:
+    scene = str(scenes / "cornell.xml")
+    before = 'et.render(d.build(resolution=(8, 8)), "path", spp=1, progress=False)'
+    assert "forked" in _child(FORK.format(scene=scene, before=before))
+    assert "rendered" in _child(FORK.format(scene=scene, before=""))
+
+
+def test_the_film_of_a_running_rendering(cornell: et.Scene) -> None:
+    kept: list[Any] = []
+    copies: list[Any] = []
+    errors: list[str] = []
+
+    def callback(p: et.Progress) -> None:
+        kept.append(p.film.sums)
+        copies.append(p.film.sums.copy())
+        np.testing.assert_allclose(p.film.sums / p.passes, p.image, rtol=1e-6)
+
+        def read() -> None:
+            try:
+                p.film.sums
+            except RuntimeError as e:
+                errors.append(str(e))
+
+        thread = threading.Thread(target=read)
+        thread.start()
+        thread.join()
+
+    result = et.render(cornell, "path", spp=4, callback=callback, progress=False)
+    assert [len(x) for x in kept] == [24] * 4
+    for array, copy in zip(kept, copies, strict=True):
+        np.testing.assert_array_equal(array, copy)
+    np.testing.assert_array_equal(kept[-1], result.film.sums)
+    assert len(errors) == 4 and "is running" in errors[0]
+
+
+INTERRUPTED = """
+import os, signal, sys, threading
+import etendue as et
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background ignores it
+scene = et.load({scene!r}).build(resolution=(8, 8))
+threading.Timer({seconds}, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+try:
+    r = et.verify(scene, ["path", "bdpt"], spp=4, runs=8, lengths=(1, 2), detect=0.0001, progress=False)
+    print(r.data["interrupted"], r.data["methods"][0]["method"], r.verdicts)
+except KeyboardInterrupt:
+    print("nothing")
+"""
+
+
+def test_interrupted_verifications_return_what_they_have(scenes: Path) -> None:
+    scene = str(scenes / "cornell.xml")
+    seconds = 2.0
+    output = "nothing"
+    while output.startswith("nothing") and seconds < 60:
+        output = _child(INTERRUPTED.format(scene=scene, seconds=seconds))
+        seconds *= 3
+    assert output.startswith("True path"), output
+
+
+def test_reports_keep_what_does_not_fail(scenes: Path, tmp_path: Path) -> None:
+    small = et.load(scenes / "cornell.xml").build(resolution=(16, 16))
+    large = et.load(scenes / "cornell.xml").build(resolution=(128, 128))
+    with pytest.warns(RuntimeWarning, match="1 MiB"):
+        report = et.compare([small, large], ["vcm:memory=1"], spp=1, reference_spp=2, references=tmp_path, techniques=0,
+                            progress=False)
+    assert len(report.data) == 1
+    with pytest.warns(RuntimeWarning, match="1 MiB"):
+        report = et.compare(large, ["vcm:memory=1", "path"], spp=1, reference_spp=2, references=tmp_path, techniques=0,
+                            progress=False)
+    assert [m["name"] for m in report.data[0]["methods"]] == ["path"]
+    with pytest.raises(RuntimeError, match="1 MiB"):
+        et.compare(large, ["vcm:memory=1"], spp=1, reference_spp=2, references=tmp_path, techniques=0, progress=False)
