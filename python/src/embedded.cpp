@@ -1,6 +1,7 @@
 #include "embedded.h"
 
 #include <cmath>
+#include <cstring>
 
 #include <fmt/format.h>
 #include <nanobind/stl/string.h>
@@ -51,10 +52,9 @@ std::vector<T> rows_of(nb::handle value, const char* dtype, const SourceLocation
                          fmt::format("expected an array of shape (N, {}), found one of shape "
                                      "({}, {})",
                                      kColumns, array.shape(0), array.shape(1)));
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) == kColumns * sizeof(Number));
     std::vector<T> rows(array.shape(0));
-    const Number* from = array.data();
-    for (T& row : rows)
-        for (size_t c = 0; c < kColumns; ++c) row[int(c)] = *from++;
+    if (!rows.empty()) std::memcpy(rows.data(), array.data(), rows.size() * sizeof(T));
     return rows;
 }
 
