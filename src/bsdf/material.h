@@ -21,8 +21,9 @@ struct SurfacePoint {
     Vec2 uv;
     Vec3 wo;              ///< Toward the predecessor.
     Vec3 color{1, 1, 1};  ///< Vertex colour.
+    float alpha = 1;      ///< Of the vertex colour.
 
-    TexturePoint texture_point() const { return {uv, color, p, dpdu, dpdv}; }
+    TexturePoint texture_point() const { return {uv, color, p, dpdu, dpdv, alpha}; }
 };
 
 /// Storage for the second and further components of mixtures during a walk. reset() keeps the memory for reuse.

@@ -51,6 +51,9 @@ void check_vertices(const MeshData& mesh, const SourceLocation& where) {
     for (size_t i = 0; i < mesh.colors.size(); ++i)
         if (!is_finite(mesh.colors[i]))
             throw SceneError(where, "colour of vertex " + std::to_string(i) + " is not finite");
+    for (size_t i = 0; i < mesh.alphas.size(); ++i)
+        if (!std::isfinite(mesh.alphas[i]))
+            throw SceneError(where, "alpha of vertex " + std::to_string(i) + " is not finite");
 }
 
 void check_indices(const MeshData& mesh, const SourceLocation& where) {

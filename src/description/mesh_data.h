@@ -19,10 +19,12 @@ struct MeshData {
     std::vector<Vec3> normals;  ///< Unit vectors, one per vertex, or empty.
     std::vector<Vec2> uvs;      ///< One per vertex, or empty.
     std::vector<Vec3> colors;   ///< Linear colours, one per vertex, or empty.
+    std::vector<float> alphas;  ///< Alpha of the colours, one per vertex, or empty.
     std::vector<Triangle> triangles;
     bool face_normals = false;        ///< The file asks for flat shading; normals is empty then.
     uint32_t dropped_degenerate = 0;  ///< Triangles of zero area, removed by finish_mesh().
     uint32_t replaced_normals = 0;    ///< Normals that were zero or not finite in the file.
+    std::vector<std::string> notes;   ///< What the file has that is not used.
 };
 
 /// Memory of the arrays.

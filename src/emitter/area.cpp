@@ -1,6 +1,7 @@
 // Area emitter: radiance L_e(uv) from the front of a shape, or from both sides, the same in all directions. Sampling
 // chooses a primitive with probability proportional to area times mean radiance, a point uniform in area, and a
-// direction with density cos θ / π, or |cos θ| / 2π.
+// direction with density cos θ / π, or |cos θ| / 2π. Where the shape is masked, a ray meets it, and sees L_e, with a
+// probability equal to the opacity, so that the light it emits has this factor.
 
 #include "emitter/area.h"
 
@@ -13,8 +14,9 @@ namespace {
 
 class AreaEmitter final : public Emitter {
 public:
-    AreaEmitter(const Shape& shape, TextureRef radiance, bool two_sided)
-        : shape_(shape), radiance_(radiance), two_sided_(two_sided) {
+    AreaEmitter(const Shape& shape, TextureRef radiance, bool two_sided,
+                std::function<float(Vec2 uv)> opacity)
+        : shape_(shape), radiance_(radiance), two_sided_(two_sided), opacity_(std::move(opacity)) {
         const size_t n = shape.primitive_count();
         std::vector<double> weights(n), areas(n);
         double flux = 0, floor = 0;
@@ -25,16 +27,17 @@ public:
         for (uint32_t i = 0; i < n; ++i) {
             areas[i] = shape.primitive_area(i);
             double L = mean;
-            if (!radiance.is_constant()) {
+            if (!radiance.is_constant() || opacity_) {
                 // Mean over points of the primitive. A share of the overall mean is added below, so that a
                 // primitive that is dark at all these points can still be chosen.
                 double sum = 0;
-                for (int k = 0; k < grid * grid; ++k)
-                    sum += luminance(
-                        radiance.eval(shape
-                                          .sample(i, {(float(k % grid) + 0.5f) / float(grid),
-                                                      (float(k / grid) + 0.5f) / float(grid)})
-                                          .uv));
+                for (int k = 0; k < grid * grid; ++k) {
+                    const Vec2 uv = shape
+                                        .sample(i, {(float(k % grid) + 0.5f) / float(grid),
+                                                    (float(k / grid) + 0.5f) / float(grid)})
+                                        .uv;
+                    sum += double(luminance(radiance.eval(uv)) * this->opacity(uv));
+                }
                 L = sum / (grid * grid);
                 flux += areas[i] * L;
                 L += kFloor * mean;
@@ -56,7 +59,7 @@ public:
     EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const override {
         const ShapeSample s = sample_point(u_y0);
         const Vec3 d = sample_direction(s.ng, u_d);
-        return {s.p,  s.ng,  d, radiance(s.uv), pdf_[s.prim], pdf_direction(emitted_cos(s.ng, d)),
+        return {s.p,  s.ng,  d, emitted(s.uv), pdf_[s.prim], pdf_direction(emitted_cos(s.ng, d)),
                 s.uv, s.prim};
     }
     Vec3 sample_direction(Vec3 ng, Vec2 u) const override {
@@ -76,7 +79,7 @@ public:
         const float cos = emitted_cos(s.ng, -wi);
         if (!(cos > 0)) return false;
         const float pdf = pdf_[s.prim];
-        out = {s.p,  s.ng,   wi,     dist, radiance(s.uv), pdf, pdf, pdf_direction(cos),
+        out = {s.p,  s.ng,   wi,     dist, emitted(s.uv), pdf, pdf, pdf_direction(cos),
                s.uv, s.prim, s.slack};
         return true;
     }
@@ -90,7 +93,7 @@ public:
     Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const override {
         const float cos = emitted_cos(ng, w);
         if (!(cos > 0)) return {Rgb(), 0};
-        return {radiance(uv) * cos, pdf_direction(cos)};
+        return {emitted(uv) * cos, pdf_direction(cos)};
     }
 
     void set_power(double power) {
@@ -99,6 +102,7 @@ public:
         power_ = power;
     }
     double power() const override { return power_; }
+    float opacity(Vec2 uv) const override { return opacity_ ? opacity_(uv) : 1.0f; }
     bool is_area() const override { return true; }
     float slack(uint32_t prim) const override { return shape_.slack(prim); }
     float max_pdf_d() const override { return pdf_direction(1); }
@@ -112,6 +116,7 @@ private:
     }
     float pdf_direction(float cos) const { return cos * kInvPi * (two_sided_ ? 0.5f : 1.0f); }
     Rgb radiance(Vec2 uv) const { return radiance_.eval(uv) * factor_; }
+    Rgb emitted(Vec2 uv) const { return opacity_ ? radiance(uv) * opacity_(uv) : radiance(uv); }
     ShapeSample sample_point(FinePoint u) const {
         const auto choice = choice_.sample(u.x);
         return shape_.sample(choice.index, {to_float(choice.u), to_float(u.y)});
@@ -120,7 +125,8 @@ private:
     const Shape& shape_;
     TextureRef radiance_;
     bool two_sided_;
-    float factor_ = 1;  ///< Of the radiance.
+    std::function<float(Vec2 uv)> opacity_;  ///< Empty where the shape is opaque.
+    float factor_ = 1;                       ///< Of the radiance.
     AliasTable choice_;
     std::vector<float> pdf_;  ///< Area density of points, by primitive.
     double power_;
@@ -129,8 +135,8 @@ private:
 }  // namespace
 
 std::unique_ptr<Emitter> make_area_emitter(const Shape& shape, TextureRef radiance, bool two_sided,
-                                           double power) {
-    auto emitter = std::make_unique<AreaEmitter>(shape, radiance, two_sided);
+                                           double power, std::function<float(Vec2 uv)> opacity) {
+    auto emitter = std::make_unique<AreaEmitter>(shape, radiance, two_sided, std::move(opacity));
     if (power > 0) emitter->set_power(power);
     return emitter;
 }
@@ -148,7 +154,7 @@ EmitterEntry area_entry() {
                 std::vector<std::unique_ptr<Emitter>> made;
                 made.push_back(make_area_emitter(*c.shape(), c.texture(p, "radiance", Rgb(1)),
                                                  p.flag("two_sided", false),
-                                                 p.number("power", 0, 0)));
+                                                 p.number("power", 0, 0), c.opacity()));
                 return made;
             }};
 }

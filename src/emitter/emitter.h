@@ -4,6 +4,7 @@
 // a direction with a solid-angle density, and its light starts on a disc outside the scene [Veach 1997, §8.2].
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -63,7 +64,9 @@ public:
     /// Emitted power in W, weighted by luminance; emitters are chosen proportionally to it.
     virtual double power() const = 0;
 
-    /// Finite emitters: radiance from a surface point along the unit vector `w`, and densities; zero from behind.
+    /// Finite emitters: radiance from a surface point along the unit vector `w`, and densities; zero from behind. The
+    /// radiance is what a ray sees that meets the surface there. All other functions include the factor opacity(),
+    /// which is the probability that a ray meets it.
     virtual EmitterHit eval_surface(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const;
     /// Infinite emitters: radiance arriving from direction `d`, and densities.
     virtual EmitterHit eval_infinite(Vec3 d) const;
@@ -75,6 +78,9 @@ public:
     virtual Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const = 0;
     /// Finite emitters: a direction of emission from a point with normal `ng`, with density eval_emission().pdf_d.
     virtual Vec3 sample_direction(Vec3 ng, Vec2 u) const = 0;
+
+    /// Of a masked surface that emits.
+    virtual float opacity(Vec2 /*uv*/) const { return 1; }
 
     /// Infinite emitters: emission of light that arrives from direction `d`, however that was chosen; `pdf_y0` is that
     /// of sample_emission().
@@ -116,6 +122,8 @@ public:
                                float hi = kInf) = 0;
     /// The shape of an area emitter; nullptr for emitters that are not nested in a shape.
     virtual const Shape* shape() const = 0;
+    /// Opacity of that shape by (u, v); empty where it is opaque.
+    virtual std::function<float(Vec2 uv)> opacity() const = 0;
 };
 
 struct EmitterEntry {

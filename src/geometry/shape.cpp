@@ -76,6 +76,7 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
         }
     }
     if (!colors.empty()) g.color = colors[ia] * w + colors[ib] * u + colors[ic] * v;
+    if (!alphas.empty()) g.alpha = alphas[ia] * w + alphas[ib] * u + alphas[ic] * v;
     if (uvs.empty()) {
         g.uv = {u, v};
         if (tangents) g.dpdu = e1, g.dpdv = e2;
@@ -104,6 +105,7 @@ ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
 size_t TriangleMesh::memory_bytes() const {
     return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) +
            uvs.size() * sizeof(Vec2) + colors.size() * sizeof(Vec3) +
+           alphas.size() * sizeof(float) +
            triangles.size() * (sizeof(triangles[0]) + sizeof(face_normals[0]));
 }
 

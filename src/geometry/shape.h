@@ -21,6 +21,7 @@ struct SurfaceGeometry {
     Vec3 dpdu, dpdv;  ///< Zero unless requested.
     Vec2 uv;
     Vec3 color{1, 1, 1};  ///< Interpolated vertex colour; white where the shape has none.
+    float alpha = 1;      ///< Of the vertex colour.
     /// Bound of the distance from p, along the normal, at which a ray from p may meet the same primitive again because
     /// of the rounding in its intersection. The rounding of p is not part of it.
     float slack = 0;
@@ -56,6 +57,7 @@ public:
     std::vector<Vec3> normals;  ///< Empty, or one unit vector per vertex.
     std::vector<Vec2> uvs;      ///< Empty, or one per vertex.
     std::vector<Vec3> colors;   ///< Empty, or one per vertex.
+    std::vector<float> alphas;  ///< Of the colours; empty, or one per vertex.
     std::vector<std::array<uint32_t, 3>> triangles;
     std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see compute_face_normals().
 

@@ -39,10 +39,11 @@ void PathState::append(const Vertex& v) {
     if (added.kind == Vertex::Kind::Surface) {
         arena_.adopt(added.bsdf);
         const Material& material = *added.shape->material;
-        x_.back().opacity =
-            material.is_opaque() ? 1 : material.opacity({added.uv, {1, 1, 1}, added.p});
+        x_.back().opacity = material.is_opaque() ? 1 : measure_.scene.opacity(added.location);
     } else {
         added.bsdf = {};
+        if (added.kind == Vertex::Kind::Emitter)
+            x_.back().opacity = added.emitter->opacity(added.uv);
     }
 }
 

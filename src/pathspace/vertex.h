@@ -91,7 +91,8 @@ struct Vertex {
         location = at;
         uv = g.uv;
         slack = g.slack;
-        on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo, g.color}, arena, bsdf);
+        on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo, g.color, g.alpha}, arena,
+                               bsdf);
         is_connectible = bsdf.has_smooth();
         gloss = gloss_of_roughness(bsdf.roughness());
     }

@@ -191,14 +191,25 @@ private:
         }
         if (emitters.empty()) return s;
         const SourceLocation& where = emitters[0].where;
-        if (!s.material->is_opaque())
-            plugins_.problem(where, "an emitter on a masked shape is not supported");
+        if (!materials.empty() && is_invisible(materials[0].object))
+            plugins_.problem(where, "an emitter on a shape with bsdf \"null\" is not supported: "
+                                    "what no ray meets emits nothing");
+        else if (!materials.empty() && !models_.has_plain_opacity(materials[0].object))
+            plugins_.problem(where,
+                             "the opacity of a shape that emits must be a function of (u, v) "
+                             "alone, not of space or vertex colours");
         else if (in_group)
             plugins_.problem(where, "an emitter in a shapegroup is not supported (add the shape to "
                                     "the scene instead)");
         else
-            s.emitter = models_.make_emitters(emitters[0].object, s.shape);
+            s.emitter = models_.make_emitters(emitters[0].object, s.shape, s.material);
         return s;
+    }
+    /// Whether a material is `null`, perhaps within others.
+    bool is_invisible(int bsdf) const {
+        const auto inner = plugins_.params(bsdf).children("bsdf");
+        return plugins_.object(bsdf).type == "null" ||
+               (inner.size() == 1 && is_invisible(inner[0].object));
     }
 
     /// The squares of distances must be numbers of single precision.

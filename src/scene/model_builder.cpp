@@ -12,8 +12,9 @@ namespace etendue {
 TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fallback, float hi) {
     for (const auto& c : p.object().children)
         if (c.name == name && plugins_.object(c.object).category == "texture") {
-            if (emitting_shape_ && is_solid(c.object))
-                p.fail(name, "an emitter cannot have a texture of space: only one of (u, v)");
+            if (emitting_shape_ && is_of_space(c.object))
+                p.fail(name, "an emitter cannot have a texture of space or of vertex colours: only "
+                             "one of (u, v)");
             const Texture* texture = make_texture(c.object);
             return texture ? TextureRef(texture) : TextureRef(fallback);
         }
@@ -26,13 +27,31 @@ TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fal
     return TextureRef(c);
 }
 
-bool ModelBuilder::is_solid(int texture) const {
+bool ModelBuilder::is_of_space(int texture) const {
     const SceneObject& object = plugins_.object(texture);
+    if (object.type == "mesh_attribute") return true;
     for (const TextureEntry& e : texture_registry())
         if (object.type == e.info.name && e.is_solid) return true;
     for (const auto& c : object.children)
-        if (is_solid(c.object)) return true;
+        if (is_of_space(c.object)) return true;
     return false;
+}
+
+bool ModelBuilder::has_plain_opacity(int bsdf) const {
+    const SceneObject& object = plugins_.object(bsdf);
+    for (const auto& c : object.children) {
+        const std::string& category = plugins_.object(c.object).category;
+        const bool is_opacity =
+            category == "texture" && (object.type == "mask" || object.type == "blendbsdf");
+        if (is_opacity && is_of_space(c.object)) return false;
+        if (category == "bsdf" && !has_plain_opacity(c.object)) return false;
+    }
+    return true;
+}
+
+std::function<float(Vec2 uv)> ModelBuilder::opacity() const {
+    if (!emitting_material_ || emitting_material_->is_opaque()) return {};
+    return [material = emitting_material_](Vec2 uv) { return material->opacity(uv); };
 }
 
 std::vector<const Material*> ModelBuilder::nested(const Params& p) {
@@ -109,7 +128,8 @@ MediumId ModelBuilder::make_medium(int index) {
     return media_[index] = MediumId(models_.media.size() - 1);
 }
 
-const Emitter* ModelBuilder::make_emitters(int index, const Shape* on_shape) {
+const Emitter* ModelBuilder::make_emitters(int index, const Shape* on_shape,
+                                           const Material* material) {
     const EmitterEntry* entry = plugins_.find(index, emitter_registry());
     if (!entry) return nullptr;
     if (on_shape && std::string_view(entry->info.name) != "area") {
@@ -118,9 +138,9 @@ const Emitter* ModelBuilder::make_emitters(int index, const Shape* on_shape) {
                                      entry->info.name));
         return nullptr;
     }
-    emitting_shape_ = on_shape;
+    emitting_shape_ = on_shape, emitting_material_ = material;
     auto made = plugins_.attempt(index, [&] { return entry->make(plugins_.params(index), *this); });
-    emitting_shape_ = nullptr;
+    emitting_shape_ = nullptr, emitting_material_ = nullptr;
     const Emitter* first = made.empty() ? nullptr : made.front().get();
     for (auto& e : made) models_.emitters.push_back(std::move(e));
     return first;

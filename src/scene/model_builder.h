@@ -32,8 +32,12 @@ public:
     const Texture* make_texture(int index);
     const Material* make_material(int index);
     MediumId make_medium(int index);
-    /// Constructs all emitters of the object and returns the first one. With `on_shape` it must be an area emitter.
-    const Emitter* make_emitters(int index, const Shape* on_shape = nullptr);
+    /// Constructs all emitters of the object and returns the first one. With `on_shape` it must be an area emitter;
+    /// `material` is that of the shape.
+    const Emitter* make_emitters(int index, const Shape* on_shape = nullptr,
+                                 const Material* material = nullptr);
+    /// Whether the opacity of a material is a function of (u, v) alone, as emitters need it.
+    bool has_plain_opacity(int bsdf) const;
     TextureCache& images() override { return *models_.images; }
     /// The material of shapes without one: diffuse.
     const Material* default_material(Rgb reflectance);
@@ -46,10 +50,11 @@ public:
 private:
     TextureRef texture(const Params& p, std::string_view name, Rgb fallback, float hi) override;
     std::vector<const Material*> nested(const Params& p) override;
-    /// Whether a texture, or one nested in it, is a function of the position.
-    bool is_solid(int texture) const;
+    /// Whether a texture, or one nested in it, is a function of more than (u, v).
+    bool is_of_space(int texture) const;
     const Material* stand_in(int index);
     const Shape* shape() const override { return emitting_shape_; }
+    std::function<float(Vec2 uv)> opacity() const override;
 
     PluginLookup& plugins_;
     Models models_;
@@ -58,6 +63,7 @@ private:
     std::map<int, MediumId> media_;
     const Material *grey_ = nullptr, *black_ = nullptr;
     const Shape* emitting_shape_ = nullptr;
+    const Material* emitting_material_ = nullptr;
 };
 
 }  // namespace etendue

@@ -52,6 +52,11 @@ RayEnd ray_end(const SurfaceGeometry& g) {
     return {g.p, g.ng, g.slack};
 }
 
+float opacity_of(const SceneShape& shape, const SurfaceGeometry& g) {
+    if (shape.material->is_opaque()) return 1;
+    return shape.material->opacity({g.uv, g.color, g.p, {}, {}, g.alpha});
+}
+
 /// The medium beyond a surface that a ray along `d` passes.
 MediumId medium_beyond(const SurfaceHit& hit, Vec3 d, MediumId before) {
     return hit.shape->is_interface ? hit.shape->medium_toward(hit.geometry.ng, d) : before;
@@ -73,6 +78,10 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
     if (at.instance != kNoInstance)
         transform_geometry(accelerator_.instance_transform(at.instance), g);
     return g;
+}
+
+float Scene::opacity(const SurfaceLocation& at) const {
+    return opacity_of(shapes_[at.shape], surface(at));
 }
 
 void Scene::fill_hit(const RayHit& raw, SurfaceHit& hit) const {
@@ -119,10 +128,7 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage
         travelled += next.t;
         hit.t = travelled;
         passage.attenuation *= attenuation(passage.medium, next.t);
-        const float opacity = next.shape->material->is_opaque()
-                                  ? 1
-                                  : next.shape->material->opacity(
-                                        {next.geometry.uv, next.geometry.color, next.geometry.p});
+        const float opacity = opacity_of(*next.shape, next.geometry);
         found = u < opacity;
         if (found) return false;
         u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
@@ -141,10 +147,7 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit) const {
 float Scene::masked_transmittance(const Ray& ray) const {
     float Tr = 1;
     for_each_surface(ray, [&](const SurfaceHit& hit) {
-        Tr *= hit.shape->material->is_opaque()
-                  ? 0
-                  : 1 - hit.shape->material->opacity(
-                            {hit.geometry.uv, hit.geometry.color, hit.geometry.p});
+        Tr *= 1 - opacity_of(*hit.shape, hit.geometry);
         return Tr > 0;
     });
     return Tr;

@@ -79,6 +79,8 @@ public:
     bool intersect(const Ray& ray, float u, SurfaceHit& hit) const;
     /// Geometry of a surface point.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
+    /// Probability that a ray meets the surface there.
+    float opacity(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
     const Accelerator& accelerator() const { return accelerator_; }
     /// The origin of a ray of direction `d` from a surface point, see etendue::offset_origin().

@@ -56,6 +56,8 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
         warn(fmt::format("{}: {} triangle{} of zero area left out",
                          params.text("filename", data.name), data.dropped_degenerate,
                          data.dropped_degenerate == 1 ? "" : "s"));
+    for (const std::string& note : data.notes)
+        warn(fmt::format("{}: {}", params.text("filename", data.name), note));
     const Transform t = params.transform("to_world");
     const bool compute_normals = params.flag("compute_normals", true);
     bool flat = params.flag("face_normals", false) || data.face_normals;
@@ -79,6 +81,7 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     mesh->normals = std::move(data.normals);
     mesh->uvs = std::move(data.uvs);
     mesh->colors = std::move(data.colors);
+    mesh->alphas = std::move(data.alphas);
     mesh->triangles = std::move(data.triangles);
     for (Vec3 p : mesh->positions)
         if (!is_finite(p))

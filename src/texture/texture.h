@@ -16,19 +16,20 @@ namespace etendue {
 /// What a texture knows of the point at which it is evaluated.
 struct TexturePoint {
     TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3{1, 1, 1}, Vec3 p_ = {}, Vec3 dpdu_ = {},
-                 Vec3 dpdv_ = {})
-        : uv(uv_), color(color_), p(p_), dpdu(dpdu_), dpdv(dpdv_) {}
+                 Vec3 dpdv_ = {}, float alpha_ = 1)
+        : uv(uv_), color(color_), p(p_), dpdu(dpdu_), dpdv(dpdv_), alpha(alpha_) {}
     TexturePoint(float u, float v) : TexturePoint(Vec2{u, v}) {}
 
     /// The point at (u, v) + `d` on the tangent plane.
     TexturePoint moved(Vec2 d) const {
-        return {{uv.x + d.x, uv.y + d.y}, color, p + dpdu * d.x + dpdv * d.y, dpdu, dpdv};
+        return {{uv.x + d.x, uv.y + d.y}, color, p + dpdu * d.x + dpdv * d.y, dpdu, dpdv, alpha};
     }
 
     Vec2 uv;
     Vec3 color;       ///< Interpolated vertex colour; white where the shape has none.
     Vec3 p;           ///< Position in the world.
     Vec3 dpdu, dpdv;  ///< Its derivatives; needed for gradients only.
+    float alpha;      ///< Of the vertex colour; one where the shape has none.
 };
 
 class Texture {

@@ -102,6 +102,14 @@ std::vector<AgreementCase> cases() {
          front + room() + area_lamp() +
              rectangle("<scale value=\"0.6\"/><rotate x=\"1\" angle=\"-60\"/>", kMasked),
          true},
+        // A pierced lamp: where a ray passes, nothing is emitted.
+        {"masked_lamp",
+         front + room() +
+             rectangle("<scale value=\"0.3\"/><rotate x=\"1\" angle=\"90\"/><translate "
+                       "y=\"0.5\"/>",
+                       kMasked + "<emitter type=\"area\"><rgb name=\"radiance\" value=\"9,8,7\"/>"
+                                 "<boolean name=\"two_sided\" value=\"true\"/></emitter>"),
+         true},
         {"blend", front + room() + area_lamp() + sphere("0,-0.4,0", "0.5", kBlend), true},
         {"gloss", front + room() + area_lamp() + sphere("0,-0.4,0", "0.5", kGloss), false, 384},
         {"bump",

@@ -24,6 +24,7 @@ class NoContext final : public EmitterContext {
         return TextureRef(fallback);
     }
     const Shape* shape() const override { return nullptr; }
+    std::function<float(Vec2)> opacity() const override { return {}; }
 };
 
 std::unique_ptr<Emitter> spot(const char* falloff) {
