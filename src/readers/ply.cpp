@@ -1,6 +1,7 @@
 #include "readers/ply.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -265,17 +266,20 @@ private:
 
 /// What a property of the element "vertex" is, as the index of a float within VertexRecord.
 struct VertexRecord {
-    float values[11];  // x y z, nx ny nz, u v, r g b
+    float values[12];  // x y z, nx ny nz, u v, r g b a
 };
-constexpr int kPositionSlot = 0, kNormalSlot = 3, kUvSlot = 6, kColorSlot = 8, kNoSlot = -1;
+constexpr int kPositionSlot = 0, kNormalSlot = 3, kUvSlot = 6, kColorSlot = 8, kAlphaSlot = 11,
+              kNoSlot = -1;
 
 int vertex_slot(std::string_view name) {
-    constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz", "u", "v", "r", "g", "b"};
+    constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz",
+                                      "u", "v", "r", "g",  "b",  "a"};
     constexpr const char* kColorNames[] = {"red", "green", "blue"};
     constexpr const char* kUvNames[][2] = {
         {"s", "t"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}};
-    for (int i = 0; i < 11; ++i)
+    for (int i = 0; i < 12; ++i)
         if (name == kNames[i]) return i;
+    if (name == "alpha") return kAlphaSlot;
     for (int i = 0; i < 3; ++i)
         if (name == kColorNames[i]) return kColorSlot + i;
     for (const auto& pair : kUvNames)
@@ -292,6 +296,64 @@ float unit_scale(Type type) {
     }
 }
 
+/// Names of per-vertex and per-face data that are no part of what a mesh looks like.
+bool is_measurement(std::string_view name) {
+    constexpr const char* kNames[] = {"flags",   "quality", "confidence", "intensity", "radius",
+                                      "density", "value",   "id",         "object_id", "label"};
+    return std::any_of(std::begin(kNames), std::end(kNames),
+                       [&](const char* known) { return name == known; });
+}
+
+/// What a corner of a face has of its own; vertices are split where their corners differ.
+struct CornerData {
+    Vec2 uv;
+    Vec3 color;
+    bool operator==(const CornerData&) const = default;
+};
+
+/// Gives each distinct pair of a vertex and the data of a corner a vertex of its own. `corners`: three per triangle.
+void split_vertices(MeshData& mesh, const std::vector<CornerData>& corners, bool has_uvs,
+                    bool has_colors) {
+    constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+    const size_t original = mesh.positions.size();
+    std::vector<uint32_t> next(original, kNone);  // the next vertex split from the same one
+    std::vector<CornerData> data(original);
+    std::vector<bool> is_used(original);
+    const auto copy = [](auto& list, uint32_t from) {
+        if (list.empty()) return;
+        const auto value = list[from];
+        list.push_back(value);
+    };
+    size_t corner = 0;
+    for (MeshData::Triangle& t : mesh.triangles)
+        for (uint32_t& v : t) {
+            const CornerData& own = corners[corner++];
+            if (!is_used[v]) {
+                is_used[v] = true;
+                data[v] = own;
+                continue;
+            }
+            uint32_t at = v;
+            while (!(data[at] == own) && next[at] != kNone) at = next[at];
+            if (!(data[at] == own)) {
+                const auto added = uint32_t(data.size());
+                copy(mesh.positions, v), copy(mesh.normals, v), copy(mesh.uvs, v);
+                copy(mesh.colors, v), copy(mesh.alphas, v);
+                data.push_back(own);
+                next.push_back(kNone);
+                next[at] = added;
+                at = added;
+            }
+            v = at;
+        }
+    const auto take = [&](auto& list, auto member) {
+        list.clear();
+        for (const CornerData& d : data) list.push_back(d.*member);
+    };
+    if (has_uvs) take(mesh.uvs, &CornerData::uv);
+    if (has_colors) take(mesh.colors, &CornerData::color);
+}
+
 template <class Body>
 class BodyParser {
 public:
@@ -304,9 +366,26 @@ public:
                 vertices(e);
             else if (e.name == "face")
                 faces(e);
+            else if (e.name == "tristrips")
+                strips(e);
             else
                 skip(e);
         }
+        // Vertices have the better claim to colours, faces to texture coordinates.
+        const bool face_colors = has_face_colors_ && mesh_.colors.empty();
+        if (has_face_colors_ && !face_colors)
+            mesh_.notes.push_back(
+                "the colours of faces are not used, since the vertices have some");
+        if (has_face_uvs_ || face_colors) {
+            check_indices();
+            complete_corners();
+            split_vertices(mesh_, corners_, has_face_uvs_, face_colors);
+        }
+        if (has_several_textures_)
+            mesh_.notes.push_back("its faces name several textures (texnumber), but all have the "
+                                  "one material of the shape");
+        if (!unused_.empty())
+            mesh_.notes.push_back(fmt::format("not used: {}", fmt::join(unused_, ", ")));
         return std::move(mesh_);
     }
 
@@ -332,16 +411,20 @@ private:
         };
         if (!has(kPositionSlot, 3)) in_.fail("the vertices have no x, y and z");
         const bool has_normals = has(kNormalSlot, 3), has_uvs = has(kUvSlot, 2),
-                   has_colors = has(kColorSlot, 3);
+                   has_colors = has(kColorSlot, 3), has_alphas = has(kAlphaSlot, 1);
         // Integers are fractions of their largest value.
-        float color_scale = 1;
-        for (size_t k = 0; k < slots.size(); ++k)
+        float color_scale = 1, alpha_scale = 1;
+        for (size_t k = 0; k < slots.size(); ++k) {
             if (slots[k] == kColorSlot) color_scale = unit_scale(e.properties[k].type);
+            if (slots[k] == kAlphaSlot) alpha_scale = unit_scale(e.properties[k].type);
+            if (slots[k] == kNoSlot) note_unused("vertex", e.properties[k]);
+        }
 
         mesh_.positions.resize(e.count);
         if (has_normals) mesh_.normals.resize(e.count);
         if (has_uvs) mesh_.uvs.resize(e.count);
         if (has_colors) mesh_.colors.resize(e.count);
+        if (has_alphas) mesh_.alphas.resize(e.count);
         for_records(e, slots, [&](uint64_t i, const VertexRecord& r) {
             const float* v = r.values;
             if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2]))
@@ -350,6 +433,7 @@ private:
             if (has_normals) mesh_.normals[i] = {v[3], v[4], v[5]};
             if (has_uvs) mesh_.uvs[i] = {v[6], v[7]};
             if (has_colors) mesh_.colors[i] = Vec3{v[8], v[9], v[10]} * color_scale;
+            if (has_alphas) mesh_.alphas[i] = v[11] * alpha_scale;
         });
     }
     /// Calls `use(i, record)` for each vertex.
@@ -394,22 +478,142 @@ private:
         }
     }
 
-    void faces(const Element& e) {
+    void note_unused(const char* element, const Property& p) {
+        constexpr size_t kMost = 8, kLongest = 40;
+        if (is_measurement(p.name) || unused_.size() > kMost) return;
+        unused_.push_back(unused_.size() == kMost
+                              ? "..."
+                              : fmt::format("{} of {}", p.name.substr(0, kLongest), element));
+    }
+
+    const Property& index_list(const Element& e) {
         const auto is_indices = [](const Property& p) {
             return p.count_type && (p.name == "vertex_indices" || p.name == "vertex_index");
         };
         const auto indices = std::find_if(e.properties.begin(), e.properties.end(), is_indices);
-        if (indices == e.properties.end()) in_.fail("the faces have no list vertex_indices");
+        if (indices == e.properties.end())
+            in_.fail(fmt::format("the {} have no list vertex_indices",
+                                 e.name == "face" ? "faces" : e.name));
         if (!is_integer(indices->type)) in_.fail("vertex_indices must be integers");
+        return *indices;
+    }
 
+    /// The properties of faces that are used, other than their indices.
+    struct FaceProperties {
+        const Property *uvs = nullptr, *texture = nullptr;
+        std::array<const Property*, 3> color{};
+        float color_scale = 1;
+
+        bool has_color() const { return color[0] && color[1] && color[2]; }
+        /// 0 to 2 of a colour's channel, else -1.
+        int channel(const Property& p) const {
+            for (int c = 0; c < 3; ++c)
+                if (&p == color[size_t(c)]) return c;
+            return -1;
+        }
+    };
+    FaceProperties find_properties(const Element& e, const Property& indices) {
+        FaceProperties f;
+        for (const Property& p : e.properties) {
+            const int slot = p.count_type ? kNoSlot : vertex_slot(p.name);
+            if (&p == &indices) continue;
+            if (p.count_type && (p.name == "texcoord" || p.name == "texcoords"))
+                f.uvs = &p;
+            else if (!p.count_type && p.name == "texnumber")
+                f.texture = &p;
+            else if (slot >= kColorSlot && slot < kColorSlot + 3)
+                f.color[size_t(slot - kColorSlot)] = &p;
+            else
+                note_unused("face", p);
+        }
+        if (f.has_color()) f.color_scale = unit_scale(f.color[0]->type);
+        return f;
+    }
+
+    void faces(const Element& e) {
+        const Property& indices = index_list(e);
+        const FaceProperties extra = find_properties(e, indices);
+        has_face_uvs_ |= extra.uvs != nullptr;
+        has_face_colors_ |= extra.has_color();
+        complete_corners();
         mesh_.triangles.reserve(mesh_.triangles.size() + e.count);
-        for (uint64_t i = triangles(e); i < e.count; ++i)
-            for (auto p = e.properties.begin(); p != e.properties.end(); ++p) {
-                if (p == indices)
-                    polygon(*p);
-                else
-                    skip(*p);
+        std::optional<double> texture;
+        for (uint64_t i = triangles(e); i < e.count; ++i) {
+            Vec3 color;
+            uvs_.clear();
+            polygon_.clear();
+            for (const Property& p : e.properties) {
+                if (&p == &indices) {
+                    read_polygon(p);
+                } else if (&p == extra.uvs) {
+                    const uint64_t count = list_count(p);
+                    for (uint64_t k = 0; k < count; ++k) uvs_.push_back(float(in_.value(p.type)));
+                } else if (&p == extra.texture) {
+                    const double number = in_.value(p.type);
+                    has_several_textures_ |= texture && *texture != number;
+                    texture = number;
+                } else if (const int c = extra.channel(p); c >= 0) {
+                    color[c] = float(in_.value(p.type)) * extra.color_scale;
+                } else {
+                    skip(p);
+                }
             }
+            add_polygon(color);
+        }
+    }
+    void add_polygon(Vec3 color) {
+        if (polygon_.size() < 3) {
+            ++mesh_.dropped_degenerate;
+            return;
+        }
+        // Faces without texture have an empty list.
+        if (!uvs_.empty() && uvs_.size() != 2 * polygon_.size())
+            in_.fail(fmt::format("a face of {} corners has {} texture coordinates, but needs {}",
+                                 polygon_.size(), uvs_.size(), 2 * polygon_.size()));
+        const auto add_corner = [&](size_t k) {
+            if (!has_face_uvs_ && !has_face_colors_) return;
+            const Vec2 uv = uvs_.empty() ? Vec2() : Vec2{uvs_[2 * k], uvs_[2 * k + 1]};
+            if (!std::isfinite(uv.x) || !std::isfinite(uv.y))
+                in_.fail("a texture coordinate of a face is not finite");
+            corners_.push_back({uv, color});
+        };
+        for (size_t k = 2; k < polygon_.size(); ++k) {
+            mesh_.triangles.push_back({polygon_[0], polygon_[k - 1], polygon_[k]});
+            for (const size_t corner : {size_t(0), k - 1, k}) add_corner(corner);
+        }
+    }
+    /// Corners of triangles that came without data.
+    void complete_corners() {
+        if (has_face_uvs_ || has_face_colors_) corners_.resize(3 * mesh_.triangles.size());
+    }
+    /// Strips of triangles; -1 begins a new one.
+    void strips(const Element& e) {
+        const Property& indices = index_list(e);
+        for (uint64_t i = 0; i < e.count; ++i)
+            for (const Property& p : e.properties) {
+                if (&p != &indices) {
+                    skip(p);
+                    continue;
+                }
+                polygon_.clear();
+                const uint64_t count = list_count(p);
+                for (uint64_t k = 0; k < count; ++k) {
+                    const int64_t v = in_.integer(p.type);
+                    if (v == -1) {
+                        add_strip();
+                        polygon_.clear();
+                    } else {
+                        polygon_.push_back(vertex_index(v));
+                    }
+                }
+                add_strip();
+            }
+    }
+    void add_strip() {
+        for (size_t k = 2; k < polygon_.size(); ++k) {
+            const size_t odd = k % 2;
+            mesh_.triangles.push_back({polygon_[k - 2 + odd], polygon_[k - 1 - odd], polygon_[k]});
+        }
     }
     /// Reads the faces up to the first that is not a triangle, or is invalid, in the most frequent binary layout. Returns
     /// their number.
@@ -427,31 +631,28 @@ private:
         }
         return count;
     }
-    void polygon(const Property& p) {
+    void read_polygon(const Property& p) {
         const uint64_t count = list_count(p);
-        if (count < 3) {
-            in_.skip(p.type, count);
-            ++mesh_.dropped_degenerate;
-            return;
-        }
-        const uint32_t first = vertex_index(p.type);
-        uint32_t previous = vertex_index(p.type);
-        for (uint64_t i = 2; i < count; ++i) {
-            const uint32_t v = vertex_index(p.type);
-            mesh_.triangles.push_back({first, previous, v});
-            previous = v;
-        }
+        if (count < 3) return in_.skip(p.type, count);
+        for (uint64_t i = 0; i < count; ++i) polygon_.push_back(vertex_index(in_.integer(p.type)));
     }
     /// Checks the index where the vertices were read before the faces, as usual, so that the error names the line.
     /// Otherwise finish_mesh() checks it.
-    uint32_t vertex_index(Type type) {
-        const int64_t v = in_.integer(type);
+    uint32_t vertex_index(int64_t v) const {
         const size_t limit =
             mesh_.positions.empty() ? std::numeric_limits<uint32_t>::max() : mesh_.positions.size();
         if (v < 0 || uint64_t(v) >= limit)
             in_.fail("vertex index " + std::to_string(v) + " must lie in [0, " +
                      std::to_string(limit - 1) + "]");
         return uint32_t(v);
+    }
+    /// Of all triangles, once the vertices are known.
+    void check_indices() const {
+        for (const MeshData::Triangle& t : mesh_.triangles)
+            for (const uint32_t v : t)
+                if (v >= mesh_.positions.size())
+                    in_.fail(fmt::format("a face refers to vertex {}, but there are only {}", v,
+                                         mesh_.positions.size()));
     }
 
     uint64_t list_count(const Property& p) {
@@ -468,6 +669,12 @@ private:
 
     Body in_;
     MeshData mesh_;
+    std::vector<uint32_t> polygon_;  ///< Of the face that is being read,
+    std::vector<float> uvs_;         ///< and its texture coordinates.
+    bool has_face_uvs_ = false, has_face_colors_ = false, has_several_textures_ = false;
+    std::vector<CornerData>
+        corners_;  ///< Three for each triangle, if faces have data of their own.
+    std::vector<std::string> unused_;
 };
 
 template <class Body>

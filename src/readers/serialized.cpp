@@ -95,8 +95,9 @@ public:
 
     MeshData parse() {
         flags_ = in_.read<uint32_t>();
-        if (((flags_ & kSinglePrecision) != 0) == ((flags_ & kDoublePrecision) != 0))
-            throw SceneError(where_, "the flags must name either single or double precision");
+        // Old files name no precision and are in single precision.
+        if ((flags_ & kSinglePrecision) && (flags_ & kDoublePrecision))
+            throw SceneError(where_, "the flags name both single and double precision");
         MeshData mesh;
         if (version_ == kVersion) mesh.name = read_name();
         const uint64_t vertices = count("vertices"), triangles = count("triangles");
@@ -104,7 +105,7 @@ public:
         mesh.positions = points<Vec3>(vertices);
         if (flags_ & kHasNormals) mesh.normals = points<Vec3>(vertices);
         if (flags_ & kHasTexcoords) mesh.uvs = points<Vec2>(vertices);
-        if (flags_ & kHasColors) points<Vec3>(vertices);
+        if (flags_ & kHasColors) mesh.colors = points<Vec3>(vertices);
         mesh.triangles = in_.read_array<MeshData::Triangle>(
             triangles, [](const MeshData::Triangle& t) { return t; });
         mesh.face_normals = (flags_ & kFaceNormals) != 0;
@@ -155,8 +156,8 @@ private:
             else
                 return Vec3{float(p[0]), float(p[1]), float(p[2])};
         };
-        return flags_ & kSinglePrecision ? in_.read_array<std::array<float, n>>(count, to_vec)
-                                         : in_.read_array<std::array<double, n>>(count, to_vec);
+        return flags_ & kDoublePrecision ? in_.read_array<std::array<double, n>>(count, to_vec)
+                                         : in_.read_array<std::array<float, n>>(count, to_vec);
     }
 
     InflateStream in_;
