@@ -76,11 +76,12 @@ void upgrade_bitmap(SceneObject& object) {
         if (auto* filter = std::get_if<std::string>(&p.value))
             if (p.name == "filter_type" && (*filter == "ewa" || *filter == "trilinear"))
                 *filter = "bilinear";
+    // Each direction has its own mode, which is `repeat` unless it is given.
     const Param *u = object.find("wrap_mode_u"), *v = object.find("wrap_mode_v");
-    if (u && v && u->value == v->value) {
-        rename(object, "wrap_mode_u", "wrap_mode");
-        take(object, "wrap_mode_v");
-    }
+    const ParamValue repeat = std::string("repeat");
+    if (v && v->value == (u ? u->value : repeat)) take(object, "wrap_mode_v");
+    if (u && !v) object.params.push_back({"wrap_mode_v", repeat, u->where});
+    rename(object, "wrap_mode_u", "wrap_mode");
 }
 
 /// Rough diffuse: the α of Mitsuba 0.6 is an RMS slope, √2 times the standard deviation of the angle of [Oren & Nayar

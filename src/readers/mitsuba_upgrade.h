@@ -16,7 +16,7 @@ std::string snake_case(std::string_view camel_case);
 ///   uscale, vscale, uoffset, voffset   → to_uv, scale before offset
 ///   bitmap: gamma 1 or -1              → raw true or false
 ///   bitmap: filter_type ewa, trilinear → bilinear (there are no mip maps to select from)
-///   bitmap: wrap_mode_u = wrap_mode_v  → wrap_mode
+///   bitmap: wrap_mode_u, wrap_mode_v   → wrap_mode, and wrap_mode_v if it differs
 ///   diffuse, roughdiffuse: diffuse_reflectance → reflectance
 ///   conductor, roughconductor without a material, eta or k → material Cu, the default of Mitsuba 0.6
 ///   roughdiffuse: alpha → orennayar: sigma; difftrans → diffusetransmission without reflection

@@ -68,24 +68,31 @@ int make_imagemap(PbrtScene& scene, const PbrtArguments& args) {
     const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1});
     set_to_uv(scene, image, flip * mapping(scene, args));
     const std::string wrap = args.text("wrap", "repeat");
-    if (wrap == "black")
-        scene.refuse(args.find("wrap")->where, "the wrap mode \"black\" is not supported",
-                     "\"clamp\"");
-    else if (wrap != "repeat" && wrap != "clamp")
+    if (wrap != "repeat" && wrap != "clamp" && wrap != "black")
         args.fail("wrap",
                   fmt::format("unknown wrap mode {} (known: repeat, clamp, black)", quote(wrap)));
-    if (wrap != "repeat") scene.set(image, "wrap_mode", std::string("clamp"));
+    if (wrap != "repeat")
+        scene.set(image, "wrap_mode", std::string(wrap == "black" ? "zero" : "clamp"));
     if (args.text("filter", "bilinear") == "point")
         scene.set(image, "filter_type", std::string("nearest"));
     if (is_raw(scene, args)) scene.set(image, "raw", true);
-    if (args.flag("invert", false))
-        scene.reject(args.find("invert")->where, "inverted images are not supported");
     const float scale = args.number("scale", 1);
-    if (scale == 1) return image;
-    const int scaled = scene.add("texture", "scale", args.where());
-    scene.add_child(scaled, "value", image);
-    scene.set(scaled, "scale", Rgb(scale));
-    return scaled;
+    int texture = image;
+    if (scale != 1) {
+        texture = scene.add("texture", "scale", args.where());
+        scene.add_child(texture, "value", image);
+        scene.set(texture, "scale", Rgb(scale));
+    }
+    if (!args.flag("invert", false)) return texture;
+    if (!is_float(args)) {
+        scene.reject(args.find("invert")->where, "inverted images of colours are not supported");
+        return texture;
+    }
+    const int inverted = scene.add("texture", "mix", args.where());
+    scene.set(inverted, "value0", Rgb(1));
+    scene.set(inverted, "value1", Rgb(0));
+    scene.add_child(inverted, "weight", texture);
+    return inverted;
 }
 
 int make_scale(PbrtScene& scene, const PbrtArguments& args) {
@@ -199,7 +206,7 @@ const std::vector<PbrtEntry>& pbrt_textures() {
         {"imagemap", kV3And4, "Becomes bitmap, turned upside down.",
          with_mapping(
              {{"filename", ParamKind::String, "", "Image."},
-              {"wrap", ParamKind::String, "repeat", "repeat or clamp; black is rejected."},
+              {"wrap", ParamKind::String, "repeat", "repeat, clamp or black."},
               {"scale", ParamKind::Float, "1",
                "Factor by which the values of the image are multiplied."},
               {"gamma", ParamKind::Bool, "true", "Whether 8-bit codes are sRGB.", kV3},
@@ -208,7 +215,8 @@ const std::vector<PbrtEntry>& pbrt_textures() {
               {"filter", ParamKind::String, "bilinear",
                "point is nearest; all others are bilinear.", kV4},
               {"maxanisotropy", ParamKind::Float, "", "Accepted; without effect."},
-              {"invert", ParamKind::Bool, "false", "Rejected unless false.", kV4}}),
+              {"invert", ParamKind::Bool, "false", "1 minus the value; of colours it is rejected.",
+               kV4}}),
          make_imagemap},
         {"constant",
          kV3And4,

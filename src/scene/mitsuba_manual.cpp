@@ -137,7 +137,7 @@ std::vector<ManualEntry> bsdfs() {
         {"bsdf", "twosided", kBothManuals, ""},
         {"bsdf", "mask", kBothManuals, "opacity"},
         {"bsdf", "blendbsdf", kBothManuals, "weight"},
-        {"bsdf", "mixturebsdf", kMitsuba06, "weights"},
+        {"bsdf", "mixturebsdf", kMitsuba06, "weights", "ensure_energy_conservation"},
         {"bsdf", "bump", kMitsuba06, "", "", "", {}, nullptr, "bumpmap"},
         {"bsdf",
          "bumpmap",
@@ -195,7 +195,7 @@ std::vector<ManualEntry> textures() {
          "filename filter_type wrap_mode to_uv",
          "wrap_mode_u wrap_mode_v gamma channel cache max_anisotropy",
          "raw bitmap data format",
-         {{"wrap_mode_u wrap_mode_v", kRefused, "u and v must have the same wrap mode"},
+         {{"wrap_mode_u", kAccepted, "becomes wrap_mode"},
           {"gamma", kRefused, "must be 1 (linear) or -1 (sRGB)"},
           {"cache max_anisotropy", kAccepted, "images are kept in memory and not filtered"},
           {"format", kAccepted, "images are stored as they are in the file"},
@@ -300,16 +300,18 @@ std::vector<ManualEntry> emitters() {
 std::vector<ManualEntry> sensors() {
     constexpr const char* kMeter = "only cameras are supported";
     constexpr const char* kShutter = "shutter_open shutter_close";
+    const ManualNote kNoLens = {"focus_distance", kAccepted,
+                                "without a lens everything is in focus"};
     const ManualNote kNoClip = {"near_clip far_clip", kAccepted, kClip};
     const ManualNote kNoShutter = {kShutter, kAccepted, "nothing moves"};
     return {
         {"sensor",
          "perspective",
          kBothManuals,
-         "to_world fov fov_axis focal_length near_clip far_clip",
+         "to_world fov fov_axis focal_length near_clip far_clip focus_distance",
          kShutter,
          "principal_point_offset_x principal_point_offset_y srf",
-         {kSpectralResponse}},
+         {kSpectralResponse, kNoLens}},
         {"sensor",
          "thinlens",
          kBothManuals,
@@ -320,10 +322,10 @@ std::vector<ManualEntry> sensors() {
         {"sensor",
          "orthographic",
          kBothManuals,
-         "to_world near_clip far_clip",
+         "to_world near_clip far_clip focus_distance",
          kShutter,
          "srf",
-         {kSpectralResponse, kNoShutter, kNoClip}},
+         {kSpectralResponse, kNoShutter, kNoClip, kNoLens}},
         {"sensor", "batch", kMitsuba3, "srf", "", "", {kSpectralResponse}},
         {"sensor",
          "telecentric",

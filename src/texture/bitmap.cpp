@@ -2,7 +2,8 @@
 // lie at half-integers, as in Mitsuba 3 (which flips v in some mesh readers, not in textures).
 //   filename (required)       any format OpenImageIO reads
 //   filter_type (bilinear)    or nearest
-//   wrap_mode (repeat)        or mirror, clamp
+//   wrap_mode (repeat)        or mirror, clamp, zero, one; the last two: this constant outside the unit square
+//   wrap_mode_v (wrap_mode)   the same along v, if it differs from that along u
 //   raw (false)               whether integer formats contain linear data, not sRGB; floating-point ones always do
 //   channel (all)             r, g, b or a: one channel as grey (alpha is linear); all: the colours without alpha
 //   to_uv (identity)          affine map of (u, v) before the look-up; the upper 2D part of a 4×4 matrix
@@ -48,6 +49,8 @@ Wrapped wrap(float u, TextureWrap mode) {
         if (w.t > 1) w = {2 - w.t, -1};
         break;
     case TextureWrap::Clamp: break;
+    case TextureWrap::Zero:
+    case TextureWrap::One: return {u > -1 ? std::min(u, 2.0f) : -1.0f, 1};
     }
     // NaN becomes zero, so that indices are valid for any mesh.
     return {w.t > 0 ? std::min(w.t, 1.0f) : 0.0f, w.slope};
@@ -59,9 +62,21 @@ struct Neighbours {
     float weight;
 };
 
-Neighbours neighbours(float t, int n, bool repeat) {
+/// Index of a texel outside the unit square where its value is a constant.
+constexpr int kOutside = -1;
+
+bool is_bounded(TextureWrap mode) {
+    return mode == TextureWrap::Zero || mode == TextureWrap::One;
+}
+
+Neighbours neighbours(float t, int n, TextureWrap mode) {
     const float x = t * float(n) - 0.5f, floor = std::floor(x);
     int i0 = int(floor), i1 = i0 + 1;
+    if (is_bounded(mode)) {
+        const auto inside = [n](int i) { return i >= 0 && i < n ? i : kOutside; };
+        return {inside(i0), inside(i1), x - floor};
+    }
+    const bool repeat = mode == TextureWrap::Repeat;
     // Beyond its edge a mirrored image continues with the edge texel itself, so mirroring clamps here too.
     if (i0 < 0) i0 = repeat ? n - 1 : 0;
     if (i1 >= n) i1 = repeat ? 0 : n - 1;
@@ -79,21 +94,26 @@ struct BitmapTexture::Footprint {
 BitmapTexture::BitmapTexture(const PixelBuffer& image, const Options& options)
     : image_(&image), options_(options), is_grey_(options.channel >= 0 || image.channels < 3),
       first_channel_(std::max(options.channel, 0)),
+      is_bounded_(is_bounded(options.wrap) || is_bounded(options.wrap_v.value_or(options.wrap))),
       decode_(decoding(!options.raw && !(is_grey_ && first_channel_ == image.alpha_channel))) {
     mean_ = std::visit([&](const auto& texels) { return image_mean(texels); }, image.data);
 }
 
 BitmapTexture::Footprint BitmapTexture::footprint(Vec2 uv) const {
     const Vec2 p = options_.to_uv.point(uv);
-    const Wrapped u = wrap(p.x, options_.wrap), v = wrap(p.y, options_.wrap);
+    const TextureWrap along_u = options_.wrap, along_v = options_.wrap_v.value_or(along_u);
+    const Wrapped u = wrap(p.x, along_u), v = wrap(p.y, along_v);
     if (options_.filter == TextureFilter::Nearest) {
-        const int x = std::min(int(u.t * float(image_->width)), image_->width - 1);
-        const int y = std::min(int(v.t * float(image_->height)), image_->height - 1);
+        const auto nearest = [](float t, int n, TextureWrap mode) {
+            if (is_bounded(mode) && !(t >= 0 && t <= 1)) return kOutside;
+            return std::min(int(t * float(n)), n - 1);
+        };
+        const int x = nearest(u.t, image_->width, along_u);
+        const int y = nearest(v.t, image_->height, along_v);
         return {{x, x, 0}, {y, y, 0}, {}};
     }
-    const bool repeat = options_.wrap == TextureWrap::Repeat;
-    return {neighbours(u.t, image_->width, repeat),
-            neighbours(v.t, image_->height, repeat),
+    return {neighbours(u.t, image_->width, along_u),
+            neighbours(v.t, image_->height, along_v),
             {u.slope, v.slope}};
 }
 
@@ -113,7 +133,20 @@ inline Rgb BitmapTexture::texel(const Texels& texels, int x, int y) const {
 }
 
 template <class Texels>
+Rgb BitmapTexture::texel_or_outside(const Texels& texels, int x, int y) const {
+    if (x != kOutside && y != kOutside) return texel(texels, x, y);
+    const TextureWrap mode =
+        x == kOutside ? options_.wrap : options_.wrap_v.value_or(options_.wrap);
+    return Rgb(mode == TextureWrap::One ? 1.0f : 0.0f);
+}
+
+template <class Texels>
 inline Rgb BitmapTexture::filtered(const Texels& texels, const Footprint& f) const {
+    if (is_bounded_) [[unlikely]] {
+        const auto at = [&](int x, int y) { return texel_or_outside(texels, x, y); };
+        return lerp(f.y.weight, lerp(f.x.weight, at(f.x.i0, f.y.i0), at(f.x.i1, f.y.i0)),
+                    lerp(f.x.weight, at(f.x.i0, f.y.i1), at(f.x.i1, f.y.i1)));
+    }
     if (options_.filter == TextureFilter::Nearest) return texel(texels, f.x.i0, f.y.i0);
     return lerp(f.y.weight,
                 lerp(f.x.weight, texel(texels, f.x.i0, f.y.i0), texel(texels, f.x.i1, f.y.i0)),
@@ -134,7 +167,7 @@ Vec2 BitmapTexture::gradient(const TexturePoint& at) const {
     const Footprint f = footprint(at.uv);
     const auto slopes = [&](const auto& texels) -> Vec2 {
         const auto scalar = [&](int x, int y) {
-            const Rgb c = texel(texels, x, y);
+            const Rgb c = is_bounded_ ? texel_or_outside(texels, x, y) : texel(texels, x, y);
             return is_grey_ ? c.r : luminance(c);
         };
         const float h00 = scalar(f.x.i0, f.y.i0), h10 = scalar(f.x.i1, f.y.i0);
@@ -201,7 +234,11 @@ const PixelBuffer& load_image(const Params& params, TextureContext& context, boo
 std::unique_ptr<Texture> make_bitmap(const Params& params, TextureContext& context) {
     BitmapTexture::Options options;
     options.filter = TextureFilter(params.choice("filter_type", {"bilinear", "nearest"}, 0));
-    options.wrap = TextureWrap(params.choice("wrap_mode", {"repeat", "mirror", "clamp"}, 0));
+    const auto wrapping = [&](const char* name) {
+        return TextureWrap(params.choice(name, {"repeat", "mirror", "clamp", "zero", "one"}, 0));
+    };
+    options.wrap = wrapping("wrap_mode");
+    if (params.has("wrap_mode_v")) options.wrap_v = wrapping("wrap_mode_v");
     options.raw = params.flag("raw", false);
     options.to_uv = UvTransform(params.transform("to_uv"));
     const int channel = params.choice("channel", {"all", "r", "g", "b", "a", "opacity"}, 0);
@@ -232,7 +269,9 @@ TextureEntry bitmap_entry() {
          {{"filename", ParamKind::String, "", "Image file of any format that OpenImageIO reads."},
           {"filter_type", ParamKind::String, "bilinear", "Interpolation: bilinear or nearest."},
           {"wrap_mode", ParamKind::String, "repeat",
-           "Outside the unit square: repeat, mirror or clamp."},
+           "Outside the unit square: repeat, mirror, clamp, zero or one."},
+          {"wrap_mode_v", ParamKind::String, "wrap_mode",
+           "The same along v, if it differs from that along u."},
           {"raw", ParamKind::Bool, "false",
            "Whether integer formats hold linear data instead of sRGB."},
           {"channel", ParamKind::String, "all",

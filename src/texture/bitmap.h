@@ -18,7 +18,8 @@ struct BitmapFile {
 std::optional<BitmapFile> bitmap_file(const Params& params);
 
 enum class TextureFilter { Bilinear, Nearest };
-enum class TextureWrap { Repeat, Mirror, Clamp };
+/// What lies outside the unit square; Zero and One: a constant.
+enum class TextureWrap { Repeat, Mirror, Clamp, Zero, One };
 
 /// An image over the unit square; (0, 0) is the upper left corner of its first row. See bitmap.cpp.
 class BitmapTexture final : public Texture {
@@ -26,6 +27,7 @@ public:
     struct Options {
         TextureFilter filter = TextureFilter::Bilinear;
         TextureWrap wrap = TextureWrap::Repeat;
+        std::optional<TextureWrap> wrap_v = {};  ///< Along v, if it differs from that along u.
         bool raw = false;  ///< Whether 8-bit codes are linear values instead of sRGB.
         int channel =
             -1;  ///< The one channel to use; -1: the colours, or the first channel of grey images.
@@ -49,6 +51,8 @@ private:
     template <class Texels>
     Rgb texel(const Texels& texels, int x, int y) const;
     template <class Texels>
+    Rgb texel_or_outside(const Texels& texels, int x, int y) const;
+    template <class Texels>
     Rgb filtered(const Texels& texels, const Footprint& f) const;
     template <class Texels>
     Rgb image_mean(const Texels& texels) const;
@@ -57,6 +61,7 @@ private:
     Options options_;
     bool is_grey_;
     int first_channel_;
+    bool is_bounded_;      ///< Whether a constant lies outside the unit square.
     const float* decode_;  ///< Of 8-bit codes: 256 linear values.
     Rgb mean_;
 };

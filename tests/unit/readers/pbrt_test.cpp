@@ -413,6 +413,24 @@ TEST(Pbrt, ImagesAreTurnedUpsideDown) {
     expect_near(value<Transform>(image, "to_uv").point({0.5f, 0.1f, 0}), {0.75f, 0.8f, 0});
 }
 
+TEST(Pbrt, ImagesMayEndAndBeInverted) {
+    const auto scene =
+        parse4("Texture \"a\" \"float\" \"imagemap\" \"string filename\" \"a.png\" \"string wrap\" "
+               "\"black\" \"bool invert\" true\nShape \"sphere\" \"texture alpha\" \"a\"\n");
+    const SceneObject* image = nullptr;
+    const SceneObject* inverted = nullptr;
+    for (const SceneObject& o : scene.objects) {
+        if (o.type == "bitmap") image = &o;
+        if (o.type == "mix") inverted = &o;
+    }
+    ASSERT_TRUE(image && inverted);
+    EXPECT_EQ(*image->find("wrap_mode")->as<std::string>(), "zero");
+    EXPECT_EQ(*inverted->find("value0")->as<Rgb>(), Rgb(1));
+    EXPECT_EQ(*inverted->find("value1")->as<Rgb>(), Rgb(0));
+    ASSERT_EQ(inverted->children.size(), 1u);
+    EXPECT_EQ(inverted->children[0].name, "weight");
+}
+
 TEST(Pbrt, ConstantsAndProductsOfConstantsAreColours) {
     const auto scene =
         parse3("Texture \"a\" \"color\" \"constant\" \"rgb value\" [.5 .6 .7]\n"
