@@ -1,6 +1,6 @@
 // Sum of materials with constant weights, as in Mitsuba 0.6.
-//   weights (required)  one number per material, separated by blanks or commas; if their sum exceeds one, they are
-//                       divided by it
+//   weights (required)  one number per material, separated by blanks or commas
+//   ensure_energy_conservation (true)   whether weights are divided by their sum if it exceeds one
 //   nested: as many bsdfs, none of them masked
 
 #include <charconv>
@@ -22,6 +22,7 @@ public:
                 params.fail(
                     "bsdf \"mixturebsdf\" cannot hold a masked material (to mask it, put the "
                     "\"mixturebsdf\" into a \"mask\")");
+        if (!params.flag("ensure_energy_conservation", true)) return;
         float sum = 0;
         for (float w : weights_) sum += w;
         for (float& w : weights_) w /= std::max(sum, 1.0f);
@@ -79,8 +80,9 @@ MaterialEntry mixturebsdf_entry() {
     return {{"bsdf",
              "mixturebsdf",
              "Sum of materials with constant weights.",
-             {{"weights", ParamKind::String, "",
-               "One number for each material; if their sum exceeds 1, they are divided by it."},
+             {{"weights", ParamKind::String, "", "One number for each material."},
+              {"ensure_energy_conservation", ParamKind::Bool, "true",
+               "Whether weights are divided by their sum if it exceeds 1."},
               {"bsdf", ParamKind::Object, "", "The nested materials."}}},
             make_material<MixtureBsdf>};
 }

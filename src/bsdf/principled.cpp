@@ -10,6 +10,9 @@
 //   sheen (0), sheen_tint (0)      retroreflective cloth at grazing angles, and its hue
 //   flatness (0)           share of fake subsurface scattering in the diffuse part
 //   clearcoat (0), clearcoat_gloss (0)   second, isotropic specular lobe, and its sharpness
+//   specular_weight (1), specular_color (1)   factors of the reflectance of what is not metal: at all angles, and at
+//                          normal incidence, where it is at most one; as in the glTF extension KHR_materials_specular.
+//                          With spec_trans, an index of refraction with this reflectance replaces eta.
 // All of them may be textures, except eta and specular. From below, the surface is rough glass only.
 //
 // Reflection is reciprocal. Energy is not conserved: specular reflection is added to the diffuse part without reducing
@@ -81,8 +84,9 @@ float PrincipledLobe::roughness() const {
 }
 
 PrincipledLobe::Selection PrincipledLobe::selection() const {
-    const float d = diffuse_weight(), c = 0.25f * clearcoat, total = 1 + d + c;
-    return {d / total, c / total, 1 / total};
+    const float d = diffuse_weight(), c = 0.25f * clearcoat, m = has_main() ? 1.0f : 0.0f;
+    const float total = m + d + c;
+    return {d / total, c / total, m / total};
 }
 
 float PrincipledLobe::reflection_probability(bool is_above, float F) const {
@@ -224,9 +228,10 @@ std::optional<BsdfSample> PrincipledLobe::sample(Vec3 wo, float u_lobe, Vec2 u) 
     };
     if (is_above) {
         const Selection p = selection();
-        if (u_lobe < p.diffuse) return reflected(sample_cosine_hemisphere(u));
+        if (u_lobe < p.diffuse || !(p.main + p.clearcoat > 0))
+            return reflected(sample_cosine_hemisphere(u));
         u_lobe -= p.diffuse;
-        if (u_lobe < p.clearcoat)
+        if (u_lobe < p.clearcoat || !(p.main > 0))
             return reflected(
                 normalize(reflect(wo, Gtr1{sqr(clearcoat_alpha(clearcoat_gloss))}.sample(u))));
         u_lobe = (u_lobe - p.clearcoat) / p.main;
@@ -255,6 +260,9 @@ public:
           flatness_(context.texture(params, "flatness", Rgb(0), 1)),
           clearcoat_(context.texture(params, "clearcoat", Rgb(0), 1)),
           clearcoat_gloss_(context.texture(params, "clearcoat_gloss", Rgb(0), 1)),
+          specular_weight_(context.texture(params, "specular_weight", Rgb(1), 1)),
+          specular_color_(context.texture(params, "specular_color", Rgb(1))),
+          has_own_reflectance_(!is_one(specular_weight_) || !is_one(specular_color_)),
           eta_(read_eta(params)) {
         if (is_transmissive() && eta_ == 1) eta_ = kEtaOfClearGlass;
     }
@@ -264,20 +272,20 @@ public:
         const auto scalar = [&](const TextureRef& texture) {
             return clamp(texture.eval_scalar(point.texture_point()), 0, 1);
         };
-        list.add(frame,
-                 PrincipledLobe{.base_color = base_color_.eval(point.texture_point()),
-                                .surface_roughness = scalar(roughness_),
-                                .anisotropic = scalar(anisotropic_),
-                                .metallic = scalar(metallic_),
-                                .spec_trans = scalar(spec_trans_),
-                                .eta = eta_,
-                                .spec_tint = scalar(spec_tint_),
-                                .sheen = scalar(sheen_),
-                                .sheen_tint = scalar(sheen_tint_),
-                                .flatness = scalar(flatness_),
-                                .clearcoat = scalar(clearcoat_),
-                                .clearcoat_gloss = scalar(clearcoat_gloss_)},
-                 weight);
+        PrincipledLobe lobe{.base_color = base_color_.eval(point.texture_point()),
+                            .surface_roughness = scalar(roughness_),
+                            .anisotropic = scalar(anisotropic_),
+                            .metallic = scalar(metallic_),
+                            .spec_trans = scalar(spec_trans_),
+                            .eta = eta_,
+                            .spec_tint = scalar(spec_tint_),
+                            .sheen = scalar(sheen_),
+                            .sheen_tint = scalar(sheen_tint_),
+                            .flatness = scalar(flatness_),
+                            .clearcoat = scalar(clearcoat_),
+                            .clearcoat_gloss = scalar(clearcoat_gloss_)};
+        if (has_own_reflectance_) append_specular(point, frame, weight, lobe, list);
+        list.add(frame, lobe, weight);
     }
     bool is_transmissive() const override {
         return !spec_trans_.is_constant() || spec_trans_.eval_scalar(Vec2()) > 0;
@@ -285,6 +293,10 @@ public:
     Rgb mean_albedo() const override { return base_color_.mean(); }
 
 private:
+    static bool is_one(const TextureRef& texture) {
+        return texture.is_constant() && texture.eval(TexturePoint()) == Rgb(1);
+    }
+    static constexpr float kLargestR0 = 0.98f;
     /// Replaces η = 1, where refraction would be a delta event, as in Mitsuba 3.
     static constexpr float kEtaOfClearGlass = 1.001f;
 
@@ -302,8 +314,40 @@ private:
         return 2 / (1 - std::sqrt(0.08f * params.number("specular", 0.5f, 0, 1))) - 1;
     }
 
+    /// The dielectric reflection is that of a metal of its colour, with its weight; none is left in `lobe`.
+    void append_specular(const SurfacePoint& point, const Frame& frame, float weight,
+                         PrincipledLobe& lobe, ComponentList& list) const {
+        const float R0 = sqr((eta_ - 1) / (eta_ + 1));
+        const float factor = clamp(specular_weight_.eval_scalar(point.texture_point()), 0, 1);
+        const Rgb color = specular_color_.eval(point.texture_point());
+        if (lobe.spec_trans > 0) {
+            const float root = std::sqrt(std::min(R0 * factor * luminance(color), kLargestR0));
+            lobe.eta = std::max((1 + root) / (1 - root), kEtaOfClearGlass);
+            return;
+        }
+        const float lum = luminance(lobe.base_color);
+        const Rgb hue = lum > 0 ? lobe.base_color / lum : Rgb(1);
+        PrincipledLobe coloured{.base_color = color * lerp(lobe.spec_tint, Rgb(1), hue) * R0,
+                                .surface_roughness = lobe.surface_roughness,
+                                .anisotropic = lobe.anisotropic,
+                                .metallic = 1,
+                                .spec_trans = 0,
+                                .eta = eta_,
+                                .spec_tint = 0,
+                                .sheen = 0,
+                                .sheen_tint = 0,
+                                .flatness = 0,
+                                .clearcoat = 0,
+                                .clearcoat_gloss = 0};
+        for (int c = 0; c < 3; ++c) coloured.base_color[c] = std::min(coloured.base_color[c], 1.0f);
+        list.add(frame, coloured, weight * factor * (1 - lobe.metallic));
+        lobe.eta = 1;
+        lobe.spec_tint = 0;
+    }
+
     TextureRef base_color_, roughness_, anisotropic_, metallic_, spec_trans_, spec_tint_, sheen_,
-        sheen_tint_, flatness_, clearcoat_, clearcoat_gloss_;
+        sheen_tint_, flatness_, clearcoat_, clearcoat_gloss_, specular_weight_, specular_color_;
+    bool has_own_reflectance_;
     float eta_;
 };
 
@@ -337,7 +381,11 @@ MaterialEntry principled_entry() {
           {"clearcoat", ParamKind::Texture, "0",
            "Strength of the second specular lobe, in [0, 1]."},
           {"clearcoat_gloss", ParamKind::Texture, "0",
-           "Sharpness of the second specular lobe, in [0, 1]."}}},
+           "Sharpness of the second specular lobe, in [0, 1]."},
+          {"specular_weight", ParamKind::Texture, "1",
+           "Factor of the reflectance of what is not metal, in [0, 1]."},
+          {"specular_color", ParamKind::Texture, "1",
+           "Factor of this reflectance at normal incidence; may exceed 1."}}},
         make_material<Principled>};
 }
 

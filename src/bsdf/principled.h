@@ -43,6 +43,7 @@ private:
 
     BsdfEval eval_reflection(Vec3 wo, Vec3 wi) const;
     BsdfEval eval_refraction(Vec3 wo, Vec3 wi) const;
+    bool has_main() const { return eta != 1 || metallic > 0 || spec_trans > 0 || spec_tint > 0; }
     Rgb specular_color(bool is_above, float cos_m, float F) const;
     Rgb diffuse_and_sheen(Vec3 wo, Vec3 wi, float cos_m) const;
     Rgb tint() const;

@@ -89,6 +89,39 @@ TEST(Mixtures, WeightsAboveOneAreScaled) {
     EXPECT_THROW(mixture(m, "1 -1"), SceneError);
 }
 
+TEST(Mixtures, WeightsAboveOneMayStay) {
+    TestMaterials m;
+    const auto make = [&](bool ensures) {
+        const int a = m.bsdf("diffuse", {{"reflectance", 0.4}}),
+                  b = m.bsdf("diffuse", {{"reflectance", 0.5}});
+        return &m.make(
+            "mixturebsdf",
+            {{"weights", std::string("0.9, 0.4")}, {"ensure_energy_conservation", ensures}},
+            {{"", a}, {"", b}});
+    };
+    const Vec3 wo = direction(30, 0), wi = direction(20, 170);
+    EXPECT_FLOAT_EQ(MaterialLobe{make(false)}.eval(wo, wi).f.g, 0.56f * kInvPi * wi.z);
+    EXPECT_FLOAT_EQ(MaterialLobe{make(true)}.eval(wo, wi).f.g, 0.56f / 1.3f * kInvPi * wi.z);
+    EXPECT_FLOAT_EQ(make(false)->mean_albedo().g, 0.56f);
+    check(*make(false), wo, 1e-3);
+}
+
+// A dielectric with a reflectance of its own has a component for it.
+TEST(Mixtures, ColouredReflectionsAgreeWithTheirDensities) {
+    TestMaterials m;
+    const auto make = [&](double weight, double metallic) -> const Material& {
+        return m.make("principled", {{"base_color", Rgb(0.3f, 0.5f, 0.2f)},
+                                     {"roughness", 0.6},
+                                     {"metallic", metallic},
+                                     {"clearcoat", 0.4},
+                                     {"specular_weight", weight},
+                                     {"specular_color", Rgb(9, 4, 0)}});
+    };
+    const double significance = sidak(1e-3, int(2 * 2 * test_directions().size()));
+    for (const Material* material : {&make(0.8, 0), &make(1, 0.3)})
+        for (const Vec3 wo : test_directions()) check(*material, wo, significance);
+}
+
 // α of 0.25 = (16/32)² is one of the roughnesses that have a transmittance of their own.
 TEST(Mixtures, TexturedRoughPlasticIsThatOfItsRoughness) {
     TestMaterials m;

@@ -54,6 +54,18 @@ PrincipledLobe glass() {
     lobe.surface_roughness = 0.4f;
     return lobe;
 }
+/// Without dielectric reflection.
+PrincipledLobe dull() {
+    PrincipledLobe lobe = opaque();
+    lobe.eta = 1;
+    return lobe;
+}
+PrincipledLobe dull_coat() {
+    PrincipledLobe lobe = car_paint();
+    lobe.metallic = 0;
+    lobe.eta = 1;
+    return lobe;
+}
 /// Everything at once.
 PrincipledLobe mixed() {
     PrincipledLobe lobe = cloth();
@@ -69,8 +81,9 @@ struct Named {
     PrincipledLobe lobe;
 };
 std::vector<Named> all_lobes() {
-    return {{"opaque", opaque()},       {"metal", metal()}, {"cloth", cloth()},
-            {"car paint", car_paint()}, {"glass", glass()}, {"mixed", mixed()}};
+    return {{"opaque", opaque()},       {"metal", metal()},        {"cloth", cloth()},
+            {"car paint", car_paint()}, {"glass", glass()},        {"mixed", mixed()},
+            {"dull", dull()},           {"dull coat", dull_coat()}};
 }
 
 TEST(Principled, SamplesMatchPdf) {
@@ -128,6 +141,37 @@ TEST(Principled, HasTheClosedFormValueAtNormalIncidence) {
 }
 
 // α along ∂p/∂u is the larger one [Burley 2012, §5.4].
+// As KHR_materials_specular: F0 = min(R0 · color, 1) · weight, and F90 = weight.
+TEST(Principled, ReflectanceMayBeGiven) {
+    const Vec3 n{0, 0, 1};
+    TestMaterials m;
+    const auto f = [&](const std::vector<TestMaterials::Value>& values) {
+        ComponentArena arena;
+        const Material& material = m.make("principled", values);
+        return material.bsdf(plane_point(n), arena).eval(n, n, TransportMode::Radiance).f;
+    };
+    const float D_4 = 1 / (4 * kPi * sqr(sqr(0.5f)));
+    const TestMaterials::Value base{"base_color", Rgb(0.8f, 0.4f, 0.2f)},
+        weight{"specular_weight", 0.5}, color{"specular_color", Rgb(0, 10, 50)},
+        black{"specular_color", Rgb(0)}, mirror{"eta", 1000.0};
+    const Rgb diffuse = Rgb(0.8f, 0.4f, 0.2f) * kInvPi;
+    const auto expect = [&](const Rgb& found, const Rgb& F0) {
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], diffuse[c] + F0[c] * D_4, 2e-5f);
+    };
+    expect(f({base}), Rgb(0.04f));
+    expect(f({base, weight}), Rgb(0.02f));
+    expect(f({base, weight, color}), Rgb(0, 0.2f, 0.5f));
+    // What converters write for a material without specular part.
+    expect(f({base, mirror, black}), Rgb(0));
+    expect(f({base, mirror}), Rgb(sqr(999.0f / 1001)));
+    // Glass has an index of refraction with the same reflectance.
+    ComponentArena arena;
+    const Material& clear =
+        m.make("principled", {{"spec_trans", 1.0}, {"eta", 1.5}, {"specular_weight", 0.25}});
+    const auto& lobe = std::get<PrincipledLobe>(clear.bsdf(plane_point(n), arena).front().lobe);
+    EXPECT_NEAR(sqr((lobe.eta - 1) / (lobe.eta + 1)), 0.01f, 1e-6f);
+}
+
 TEST(Principled, AnisotropyStretchesHighlightsAlongU) {
     PrincipledLobe lobe = opaque();
     lobe.metallic = 1;
