@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "description/params.h"
 
@@ -11,5 +12,12 @@ namespace etendue {
 /// Path of the file named by string parameter `name`: an absolute path, or one relative to the first of the scene's
 /// search paths that contains it. Throws SceneError with the folders searched and the nearest name found there.
 std::string resolve_file(const Params& params, std::string_view name = "filename");
+
+/// The names under which a file is looked for: its own, and with '/' for '\', which scenes written on Windows have.
+std::vector<std::string> spellings(const std::string& file);
+
+/// What follows the message about a missing file: "; did you mean "wood.png"?", or "". Names that differ in case alone
+/// are near, and so are files of the same name in other folders than that of a path of another machine.
+std::string near_file_hint(const std::string& file, const std::vector<std::string>& folders);
 
 }  // namespace etendue

@@ -51,12 +51,13 @@ std::string directory_of(const std::string& file) {
 }
 
 ReadOptions with_disk(ReadOptions options) {
-    if (!options.read_file)
-        options.read_file = [](const std::string& path) -> std::optional<std::string> {
-            std::error_code error;
-            if (!std::filesystem::is_regular_file(path, error)) return {};
-            return read_file_bytes(path);
-        };
+    if (options.read_file) return options;
+    options.is_disk = true;
+    options.read_file = [](const std::string& path) -> std::optional<std::string> {
+        std::error_code error;
+        if (!std::filesystem::is_regular_file(path, error)) return {};
+        return read_file_bytes(path);
+    };
     return options;
 }
 

@@ -83,8 +83,12 @@ std::string decode_base64(std::string_view text, const JsonValue& where) {
     return bytes;
 }
 
-/// A file name with %20 and the like decoded.
-std::string decode_percent(const std::string& uri) {
+constexpr int64_t kMost = int64_t(1)
+                          << 40;  ///< Of bytes and counts; what is there is checked later.
+
+}  // namespace
+
+std::string decode_percent(std::string_view uri) {
     std::string name;
     const auto digit = [](char c) {
         return c >= '0' && c <= '9'                 ? c - '0'
@@ -101,11 +105,6 @@ std::string decode_percent(const std::string& uri) {
         }
     return name;
 }
-
-constexpr int64_t kMost = int64_t(1)
-                          << 40;  ///< Of bytes and counts; what is there is checked later.
-
-}  // namespace
 
 struct GltfBuffers::Layout {
     const ComponentType* component;
@@ -129,9 +128,10 @@ std::string GltfBuffers::uri(const JsonValue& where) {
     const std::string text = where.text("");
     if (text.rfind("data:", 0) != 0) return load_(decode_percent(text), where);
     const size_t comma = text.find(',');
-    if (comma == text.npos || text.substr(0, comma).find(";base64") == text.npos)
-        where.fail("only data in base64 are supported");
-    return decode_base64(std::string_view(text).substr(comma + 1), where);
+    if (comma == text.npos) where.fail("a data URI has a comma before the data");
+    std::string data = decode_percent(std::string_view(text).substr(comma + 1));
+    if (!std::string_view(text).substr(0, comma).ends_with(";base64")) return data;
+    return decode_base64(data, where);
 }
 
 const std::string& GltfBuffers::buffer(size_t index) {
@@ -184,8 +184,12 @@ void GltfBuffers::read(const JsonValue& a, const Layout& layout, Range range, co
     if (const auto in = a["bufferView"].index(views_.size())) {
         const std::string_view bytes = view(*in);
         const auto offset = size_t(a["byteOffset"].integer(0, 0, kMost));
-        const auto stride =
-            size_t(views_[*in]["byteStride"].integer(int64_t(element), int64_t(element), 1 << 20));
+        // Zero, of the time before glTF 2, means that elements follow each other.
+        const JsonValue byte_stride = views_[*in]["byteStride"];
+        const auto given = size_t(byte_stride.integer(0, 0, 1 << 20));
+        if (given > 0 && given < element)
+            byte_stride.fail(fmt::format("is {}, but elements have {} bytes", given, element));
+        const size_t stride = given > 0 ? given : element;
         if (layout.count > 0 && (offset > bytes.size() || bytes.size() - offset < element ||
                                  (bytes.size() - offset - element) / stride < layout.count - 1))
             a.fail(fmt::format("needs more than the {} bytes of its bufferView", bytes.size()));
@@ -245,7 +249,11 @@ GltfBuffers::Values GltfBuffers::floats(const JsonValue& accessor_index, std::st
     if (const auto in = a["bufferView"].index(views_.size()); in && layout.count > view(*in).size())
         a.fail(fmt::format("needs more than the {} bytes of its bufferView", view(*in).size()));
     range.end = std::min(range.end, layout.count);
-    Values v{range.end - std::min(range.first, range.end), layout.components, {}};
+    Values v{range.end - std::min(range.first, range.end),
+             layout.components,
+             {},
+             layout.normalized,
+             layout.component->largest};
     v.numbers.resize(v.count * layout.components);
     read(a, layout, range, [&](size_t i, double x) { v.numbers[i] = float(x); });
     return v;

@@ -11,6 +11,9 @@
 
 namespace etendue {
 
+/// Text with %20 and the like decoded.
+std::string decode_percent(std::string_view uri);
+
 class GltfBuffers {
 public:
     /// Returns the contents of a file that the scene names; fails at `where` if there are none.
@@ -22,13 +25,15 @@ public:
     size_t view_count() const { return views_.size(); }
     /// The bytes of a bufferView.
     std::string_view view(size_t index);
-    /// The bytes that a URI stands for: data in base64, or a file.
+    /// The bytes that a URI stands for: data, in base64 or not, or a file.
     std::string uri(const JsonValue& where);
 
     /// The values of an accessor.
     struct Values {
         size_t count = 0, components = 0;
         std::vector<float> numbers;  ///< count × components; normalised integers are fractions.
+        bool normalized = false;
+        double largest = 0;  ///< Of the type if it is an integer.
     };
     /// Some of the values of an accessor.
     struct Range {

@@ -35,46 +35,42 @@ bool has_volume(const JsonValue& m) {
     return extension(m, "KHR_materials_volume")["thicknessFactor"].number(0, 0) > 0;
 }
 
-/// From "ior" and "specularFactor" to the index of refraction with the same reflectance at normal incidence.
-double relative_ior(const JsonValue& m) {
-    double eta = extension(m, "KHR_materials_ior")["ior"].number(1.5, 0);
-    if (eta == 0) eta = 1e3;  // by its specification: total reflection
-    eta = std::max(eta, 1.0);
-    const double factor = extension(m, "KHR_materials_specular")["specularFactor"].number(1, 0, 1);
-    if (factor == 1) return std::max(eta, 1.0001);
-    const double r = (eta - 1) / (eta + 1) * std::sqrt(factor);
-    return std::max((1 + r) / (1 - r), 1.0001);
+/// The index of refraction.
+double ior(const JsonValue& m) {
+    const double eta = extension(m, "KHR_materials_ior")["ior"].number(1.5, 0);
+    // Zero is total reflection, by its specification.
+    return eta == 0 ? 1e3 : std::max(eta, 1.0001);
 }
 
 }  // namespace
 
-const GltfReader::Material& GltfReader::material(size_t index, bool has_colors) {
-    const auto key = std::pair(index, has_colors);
+const GltfReader::Material& GltfReader::material(size_t index, VertexColors colors) {
+    const auto key = std::pair(index, colors);
     if (const auto it = made_materials_.find(key); it != made_materials_.end()) return it->second;
     const bool is_default = index >= materials_.size();
     const Material made = read_material(
-        is_default ? JsonValue(nullptr, &file_, "/materials") : materials_[index], has_colors);
+        is_default ? JsonValue(nullptr, &file_, "/materials") : materials_[index], colors);
     return made_materials_.emplace(key, made).first->second;
 }
 
-GltfReader::Material GltfReader::read_material(const JsonValue& m, bool has_colors) {
+GltfReader::Material GltfReader::read_material(const JsonValue& m, VertexColors colors) {
     uv_set_.reset();
     Material made;
     if (extension(m, "KHR_materials_unlit")) {
         warn(fmt::format("{}: an unlit material is rendered as a diffuse one", m.path()));
         made.bsdf = add("bsdf", "diffuse", m);
         Rgb factor;
-        const int texture = base_color(m, has_colors, factor);
+        const int texture = base_color(m, colors, factor);
         if (texture >= 0)
             add_child(made.bsdf, "reflectance", texture);
         else
             set(made.bsdf, "reflectance", clamped(factor));
     } else {
         made.bsdf = add("bsdf", "principled", m);
-        read_principled(m, made.bsdf, has_colors);
+        read_principled(m, made.bsdf, colors);
     }
     const bool transmits = transmission(m) > 0;
-    if (transmits && !has_volume(m)) made.bsdf = thin_glass(m, made.bsdf, has_colors);
+    if (transmits && !has_volume(m)) made.bsdf = thin_glass(m, made.bsdf, colors);
     if (const JsonValue normals = m["normalTexture"]) {
         if (const int image = bitmap(normals, true); image >= 0) {
             const int map = add("bsdf", "normalmap", normals);
@@ -93,18 +89,17 @@ GltfReader::Material GltfReader::read_material(const JsonValue& m, bool has_colo
         read_volume(m, made);
     }
     read_emission(m, made);
-    if (made.emitter < 0)
-        made.bsdf = with_opacity(m, made.bsdf);
-    else if (m["alphaMode"].text("OPAQUE") != "OPAQUE")
-        warn(fmt::format("{}: alpha has no effect, since the material emits light", m.path()));
+    apply_opacity(m, made, colors);
     made.uv_set = uv_set_.value_or(0);
     return made;
 }
 
-void GltfReader::read_principled(const JsonValue& m, int principled, bool has_colors) {
+void GltfReader::read_principled(const JsonValue& m, int principled, VertexColors colors) {
+    if (const JsonValue old = extension(m, "KHR_materials_pbrSpecularGlossiness"))
+        return read_specular_glossiness(old, principled, colors);
     const JsonValue pbr = m["pbrMetallicRoughness"];
     Rgb factor;
-    const int texture = base_color(m, has_colors, factor);
+    const int texture = base_color(m, colors, factor);
     if (texture >= 0)
         add_child(principled, "base_color", texture);
     else
@@ -113,7 +108,7 @@ void GltfReader::read_principled(const JsonValue& m, int principled, bool has_co
     set_scalar(principled, "metallic", pbr["metallicFactor"].number(1, 0, 1), metal_and_rough, "b");
     set_scalar(principled, "roughness", pbr["roughnessFactor"].number(1, 0, 1), metal_and_rough,
                "g");
-    set(principled, "eta", relative_ior(m));
+    set(principled, "eta", ior(m));
     if (const double t = transmission(m); t > 0 && has_volume(m))
         set_scalar(principled, "spec_trans", t,
                    extension(m, "KHR_materials_transmission")["transmissionTexture"], "r");
@@ -137,43 +132,90 @@ void GltfReader::read_principled(const JsonValue& m, int principled, bool has_co
         if (brushed["anisotropyRotation"].number(0) != 0 || brushed["anisotropyTexture"])
             warn(fmt::format("{}: the direction has no effect", brushed.path()));
     }
-    const JsonValue specular = extension(m, "KHR_materials_specular");
-    for (const char* name : {"specularTexture", "specularColorTexture", "specularColorFactor"})
-        if (specular[name]) warn(fmt::format("{}: has no effect", specular[name].path()));
+    if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
+        set_scalar(principled, "specular_weight", specular["specularFactor"].number(1, 0, 1),
+                   specular["specularTexture"], "opacity");
+        set_color(principled, "specular_color", colour(specular["specularColorFactor"], Rgb(1)),
+                  specular["specularColorTexture"]);
+    }
+}
+
+/// The older workflow: c_diff = diffuse (1 − max(specular)), F0 = specular, α = (1 − glossiness)².
+void GltfReader::read_specular_glossiness(const JsonValue& s, int principled, VertexColors colors) {
+    constexpr double kReflectsAll = 1e3;  // index of refraction with F0 ≈ 1, times specular_color
+    const Rgb specular = clamped(colour(s["specularFactor"], Rgb(1)));
+    const JsonValue both = s["specularGlossinessTexture"];
+    const std::vector<double> diffuse = s["diffuseFactor"].numbers(4, {1, 1, 1, 1});
+    // The share that the specular reflection leaves to the diffuse one; with a texture unknown, and none is taken off.
+    const float rest = both ? 1 : 1 - specular.max();
+    const Rgb factor = clamped({float(diffuse[0]), float(diffuse[1]), float(diffuse[2])}) * rest;
+    const int image = bitmap(s["diffuseTexture"], false);
+    const int tint = colors == VertexColors::None ? -1 : vertex_attribute("vertex_color");
+    const int texture = image >= 0 && tint >= 0 ? product(image, tint) : std::max(image, tint);
+    if (texture >= 0)
+        add_child(principled, "base_color", factor == Rgb(1) ? texture : scaled(texture, factor));
+    else
+        set(principled, "base_color", factor);
+    set(principled, "eta", kReflectsAll);
+    set_color(principled, "specular_color", specular, both);
+    const double glossiness = s["glossinessFactor"].number(1, 0, 1);
+    if (both) {
+        warn(fmt::format("{}: the diffuse part is not reduced by it", both.path()));
+        const int rough = add("texture", "mix", s);
+        set(rough, "value0", 1.0);
+        set(rough, "value1", 1 - glossiness);
+        add_child(rough, "weight", bitmap(both, true, "opacity"));
+        add_child(principled, "roughness", rough);
+    } else {
+        set(principled, "roughness", 1 - glossiness);
+    }
 }
 
 /// The texture of the base colour, with vertex colours and factor; -1 where it is constant, namely `factor`.
-int GltfReader::base_color(const JsonValue& m, bool has_colors, Rgb& factor) {
+int GltfReader::base_color(const JsonValue& m, VertexColors colors, Rgb& factor) {
     const JsonValue pbr = m["pbrMetallicRoughness"];
     const std::vector<double> f = pbr["baseColorFactor"].numbers(4, {1, 1, 1, 1});
     factor = clamped({float(f[0]), float(f[1]), float(f[2])});
     int texture = bitmap(pbr["baseColorTexture"], false);
-    if (has_colors) {
-        const int colors = add("texture", "mesh_attribute", m);
-        set(colors, "name", std::string("vertex_color"));
-        if (texture >= 0) {
-            const int product = add("texture", "scale", m);
-            add_child(product, "value", texture);
-            add_child(product, "scale", colors);
-            texture = product;
-        } else {
-            texture = colors;
-        }
+    if (colors != VertexColors::None) {
+        const int tint = vertex_attribute("vertex_color");
+        texture = texture >= 0 ? product(texture, tint) : tint;
     }
     return texture >= 0 && !(factor == Rgb(1)) ? scaled(texture, factor) : texture;
 }
 
+int GltfReader::vertex_attribute(const char* name) {
+    const int attribute = add("texture", "mesh_attribute", root_);
+    set(attribute, "name", std::string(name));
+    return attribute;
+}
+
+int GltfReader::product(int a, int b) {
+    const int both = add("texture", "scale", root_);
+    add_child(both, "value", a);
+    add_child(both, "scale", b);
+    return both;
+}
+
 /// A surface without volume does not refract: it is a pane of glass, coloured by the base colour.
-int GltfReader::thin_glass(const JsonValue& m, int principled, bool has_colors) {
+int GltfReader::thin_glass(const JsonValue& m, int principled, VertexColors colors) {
     const JsonValue pbr = m["pbrMetallicRoughness"];
     if (pbr["roughnessFactor"].number(1, 0, 1) > 0.1)
         warn(fmt::format("{}: transmission without volume is clear, whatever the roughness",
                          m.path()));
     const int pane = add("bsdf", "thindielectric", m);
-    set(pane, "int_ior", relative_ior(m));
+    set(pane, "int_ior", ior(m));
     set(pane, "ext_ior", 1.0);
+    if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
+        const Rgb weight = colour(specular["specularColorFactor"], Rgb(1)) *
+                           float(specular["specularFactor"].number(1, 0, 1));
+        if (!(weight == Rgb(1))) set(pane, "specular_reflectance", clamped(weight));
+        for (const char* name : {"specularTexture", "specularColorTexture"})
+            if (specular[name])
+                warn(fmt::format("{}: has no effect on the pane", specular[name].path()));
+    }
     Rgb factor;
-    const int tint = base_color(m, has_colors, factor);
+    const int tint = base_color(m, colors, factor);
     if (tint >= 0)
         add_child(pane, "specular_transmittance", tint);
     else
@@ -216,37 +258,72 @@ void GltfReader::read_emission(const JsonValue& m, Material& made) {
     if (m["doubleSided"].flag(false)) set(made.emitter, "two_sided", true);
 }
 
-int GltfReader::with_opacity(const JsonValue& m, int bsdf) {
+GltfReader::Alpha GltfReader::alpha(const JsonValue& m, VertexColors colors) {
+    const JsonValue pbr = m["pbrMetallicRoughness"];
+    const JsonValue old = extension(m, "KHR_materials_pbrSpecularGlossiness");
+    Alpha a;
+    a.factor = (old ? old["diffuseFactor"] : pbr["baseColorFactor"]).numbers(4, {1, 1, 1, 1})[3];
+    a.texture = bitmap(old ? old["diffuseTexture"] : pbr["baseColorTexture"], false, "opacity");
+    if (colors == VertexColors::Rgba) {
+        const int vertices = vertex_attribute("vertex_alpha");
+        a.texture = a.texture >= 0 ? product(a.texture, vertices) : vertices;
+    }
+    return a;
+}
+
+void GltfReader::apply_opacity(const JsonValue& m, Material& made, VertexColors colors) {
     const std::string mode = m["alphaMode"].text("OPAQUE");
-    if (mode == "OPAQUE") return bsdf;
+    if (mode == "OPAQUE") return;
     if (mode != "MASK" && mode != "BLEND")
         m["alphaMode"].fail(fmt::format("is \"{}\", but must be OPAQUE, MASK or BLEND", mode));
-    const JsonValue pbr = m["pbrMetallicRoughness"];
-    const double factor = pbr["baseColorFactor"].numbers(4, {1, 1, 1, 1})[3];
-    const double cutoff = m["alphaCutoff"].number(0.5, 0);
-    const int texture = bitmap(pbr["baseColorTexture"], false, "opacity");
-    const int mask = add("bsdf", "mask", m);
-    if (texture < 0) {
-        set(mask, "opacity",
-            std::clamp(mode == "BLEND"    ? factor
-                       : factor >= cutoff ? 1.0
-                                          : 0.0,
-                       0.0, 1.0));
-    } else {
-        const int product = factor == 1 ? texture : scaled(texture, factor);
-        int opacity = product;
-        if (mode == "MASK") {
-            opacity = add("texture", "threshold", m);
-            set(opacity, "cutoff", cutoff);
-            add_child(opacity, "value", product);
-        }
-        add_child(mask, "opacity", opacity);
+    if (made.emitter >= 0 && colors == VertexColors::Rgba) {
+        warn(fmt::format("{}: the alpha of vertex colours has no effect, since the material emits "
+                         "light",
+                         m.path()));
+        colors = VertexColors::Rgb;
     }
-    add_child(mask, "", bsdf);
-    return mask;
+    const double cutoff = m["alphaCutoff"].number(0.5, 0);
+    const auto [texture, factor] = alpha(m, colors);
+    int opacity = -1;
+    if (texture >= 0) {
+        opacity = factor == 1 ? texture : scaled(texture, factor);
+        if (mode == "MASK") {
+            const int threshold = add("texture", "threshold", m);
+            set(threshold, "cutoff", cutoff);
+            add_child(threshold, "value", opacity);
+            opacity = threshold;
+        }
+    }
+    const double constant =
+        std::clamp(mode == "BLEND" ? factor : double(factor >= cutoff), 0.0, 1.0);
+    if (opacity < 0 && constant == 1) return;
+    if (opacity < 0 && constant == 0) made.emitter = -1;
+    const int mask = add("bsdf", "mask", m);
+    if (opacity >= 0)
+        add_child(mask, "opacity", opacity);
+    else
+        set(mask, "opacity", constant);
+    add_child(mask, "", made.bsdf);
+    made.bsdf = mask;
 }
 
 // ---- Textures
+
+namespace {
+
+std::string wrapping(const JsonValue& mode) {
+    constexpr int64_t kClamp = 33071, kMirror = 33648, kRepeat = 10497;
+    switch (const int64_t code = mode.integer(kRepeat, 0, 1 << 20)) {
+    case kRepeat: return "repeat";
+    case kClamp: return "clamp";
+    case kMirror: return "mirror";
+    default:
+        mode.fail(fmt::format("is {}, but must be 33071 (clamp), 33648 (mirror) or 10497 (repeat)",
+                              code));
+    }
+}
+
+}  // namespace
 
 /// A mesh has one set of texture coordinates in the description.
 void GltfReader::check_uv_set(const JsonValue& info) {
@@ -276,7 +353,7 @@ int GltfReader::bitmap(const JsonValue& info, bool raw, const char* channel) {
     const int made = add("texture", "bitmap", info);
     const std::string uri = image["uri"].text("");
     if (!uri.empty() && uri.rfind("data:", 0) != 0) {
-        set(made, "filename", uri);
+        set(made, "filename", decode_percent(uri));
     } else {
         const auto [at, is_new] =
             loaded_images_.try_emplace(*source, int64_t(scene_.images.size()));
@@ -294,14 +371,12 @@ int GltfReader::bitmap(const JsonValue& info, bool raw, const char* channel) {
     if (channel && std::string_view(channel) != "all") set(made, "channel", std::string(channel));
     if (const auto sampler = t["sampler"].index(samplers_.size())) {
         const JsonValue& s = samplers_[*sampler];
-        constexpr int64_t kNearest = 9728, kClamp = 33071, kMirror = 33648, kRepeat = 10497;
+        constexpr int64_t kNearest = 9728;
         if (s["magFilter"].integer(0, 0, 1 << 20) == kNearest)
             set(made, "filter_type", std::string("nearest"));
-        const int64_t u = s["wrapS"].integer(kRepeat, 0, 1 << 20),
-                      v = s["wrapT"].integer(kRepeat, 0, 1 << 20);
-        if (u != v) warn(fmt::format("{}: both directions wrap as wrapS says", s.path()));
-        if (u == kClamp) set(made, "wrap_mode", std::string("clamp"));
-        if (u == kMirror) set(made, "wrap_mode", std::string("mirror"));
+        const std::string u = wrapping(s["wrapS"]), v = wrapping(s["wrapT"]);
+        if (u != "repeat") set(made, "wrap_mode", u);
+        if (v != u) set(made, "wrap_mode_v", v);
     }
     if (const JsonValue transform = info["extensions"]["KHR_texture_transform"]) {
         const std::vector<double> offset = transform["offset"].numbers(2, {0, 0}),
@@ -322,6 +397,14 @@ int GltfReader::scaled(int texture, ParamValue factor) {
     add_child(product, "value", texture);
     set(product, "scale", std::move(factor));
     return product;
+}
+
+void GltfReader::set_color(int object, const char* name, Rgb factor, const JsonValue& texture) {
+    const int image = factor.max() > 0 ? bitmap(texture, false) : -1;
+    if (image < 0)
+        set(object, name, factor);
+    else
+        add_child(object, name, factor == Rgb(1) ? image : scaled(image, factor));
 }
 
 void GltfReader::set_scalar(int object, const char* name, double factor, const JsonValue& texture,

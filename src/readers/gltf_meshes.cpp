@@ -52,7 +52,7 @@ void GltfReader::place_meshes() {
                                               corner & 2 ? p.bounds.hi.y : p.bounds.lo.y,
                                               corner & 4 ? p.bounds.hi.z : p.bounds.lo.z}));
             // Emitters cannot be instanced.
-            if (!is_shared || material(p.material, p.has_colors).emitter >= 0)
+            if (!is_shared || material(p.material, p.colors).emitter >= 0)
                 scene_.roots.push_back(add_shape(p, placement.to_world, false));
             else
                 has_shared_part = true;
@@ -63,7 +63,7 @@ void GltfReader::place_meshes() {
         if (is_new) {
             group->second = add("shape", "shapegroup", mesh);
             for (const Primitive& p : primitives(placement.mesh))
-                if (material(p.material, p.has_colors).emitter < 0)
+                if (material(p.material, p.colors).emitter < 0)
                     add_child(group->second, "", add_shape(p, Transform(), true));
         }
         const int instance = add("shape", "instance", mesh);
@@ -103,8 +103,7 @@ std::optional<GltfReader::Primitive> GltfReader::read_primitive(const JsonValue&
     }
     const size_t material_index =
         primitive["material"].index(materials_.size()).value_or(kNoMaterial);
-    Primitive made{int64_t(scene_.meshes.size()), material_index, bool(attributes["COLOR_0"]), {}};
-    const Material& m = material(material_index, made.has_colors);
+    Primitive made{int64_t(scene_.meshes.size()), material_index, VertexColors::None, {}};
 
     MeshData mesh;
     mesh.name = name;
@@ -130,13 +129,24 @@ std::optional<GltfReader::Primitive> GltfReader::read_primitive(const JsonValue&
     mesh.positions = triples(read(attributes["POSITION"], "VEC3"));
     if (const JsonValue normals = attributes["NORMAL"])
         mesh.normals = triples(read(normals, "VEC3"));
+    if (const JsonValue colors = attributes["COLOR_0"]) {
+        GltfBuffers::Values v = read(colors, "VEC3 VEC4");
+        // Integers are fractions, also where an exporter does not say so.
+        if (v.largest > 0 && !v.normalized)
+            for (float& x : v.numbers) x = float(double(x) / v.largest);
+        mesh.colors = triples(v);
+        if (v.components == 4)
+            for (size_t i = 0; i < v.count; ++i) mesh.alphas.push_back(v.numbers[4 * i + 3]);
+        if (std::all_of(mesh.alphas.begin(), mesh.alphas.end(), [](float a) { return a == 1; }))
+            mesh.alphas.clear();
+        made.colors = mesh.alphas.empty() ? VertexColors::Rgb : VertexColors::Rgba;
+    }
+    const Material& m = material(material_index, made.colors);
     if (const JsonValue uvs = attributes[fmt::format("TEXCOORD_{}", m.uv_set)]) {
         const GltfBuffers::Values v = read(uvs, "VEC2");
         for (size_t i = 0; i < v.count; ++i)
             mesh.uvs.push_back({v.numbers[2 * i], v.numbers[2 * i + 1]});
     }
-    if (const JsonValue colors = attributes["COLOR_0"])
-        mesh.colors = triples(read(colors, "VEC3 VEC4"));
     if (!primitive["indices"])
         for (size_t i = 0; i < count; ++i) vertices.push_back(uint32_t(i));
     mesh.triangles = triangles(vertices, mode);
@@ -156,7 +166,7 @@ std::optional<GltfReader::Primitive> GltfReader::read_primitive(const JsonValue&
 }
 
 int GltfReader::add_shape(const Primitive& primitive, const Transform& to_world, bool in_group) {
-    const Material& m = material(primitive.material, primitive.has_colors);
+    const Material& m = material(primitive.material, primitive.colors);
     const int shape = add("shape", "mesh", root_);
     set(shape, "mesh", primitive.mesh);
     set(shape, "compute_normals", false);

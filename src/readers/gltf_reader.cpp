@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "description/json_text.h"
+#include "description/resolve_file.h"
 #include "readers/file_bytes.h"
 #include "readers/gltf.h"
 #include "readers/object_graph.h"
@@ -49,6 +50,18 @@ Transform turned() {
     return Transform::scale({-1, 1, -1});
 }
 
+/// The position and the directions of a transform without its scale, which cameras ignore. Empty where it has no
+/// direction to look in.
+std::optional<Transform> without_scale(const Transform& t) {
+    const Vec3 back = t.vector({0, 0, 1}), up = t.vector({0, 1, 0}), p = t.point({0, 0, 0});
+    if (!(length2(back) > 0) || !(length2(up) > 0)) return {};
+    const Vec3 z = normalize(back), side = cross(normalize(up), z);
+    if (!(length2(side) > 0)) return {};
+    const Vec3 x = normalize(side), y = cross(z, x);
+    return Transform(Transform::Matrix{
+        {{x.x, y.x, z.x, p.x}, {x.y, y.y, z.y, p.y}, {x.z, y.z, z.z, p.z}, {0, 0, 0, 1}}});
+}
+
 bool is_known_extension(const std::string& name) {
     const std::vector<std::string>& known = gltf_extensions();
     return std::find(known.begin(), known.end(), name) != known.end();
@@ -65,11 +78,15 @@ GltfReader::GltfReader(const std::string& file, const ReadOptions& options,
       cameras_(root_["cameras"].elements()),
       lights_(root_["extensions"]["KHR_lights_punctual"]["lights"].elements()),
       buffers_(root_, chunk, [this](const std::string& name, const JsonValue& where) {
-          const std::string path =
-              (std::filesystem::path(scene_.search_paths[0]) / name).lexically_normal().string();
-          auto bytes = options_.read_file ? options_.read_file(path) : std::nullopt;
-          if (!bytes) where.fail(fmt::format("cannot read the file {}", path));
-          return *std::move(bytes);
+          const std::string& folder = scene_.search_paths[0];
+          for (const std::string& spelling : spellings(name)) {
+              const auto path = (std::filesystem::path(folder) / spelling).lexically_normal();
+              if (!options_.read_file) continue;
+              if (auto bytes = options_.read_file(path.string())) return *std::move(bytes);
+          }
+          where.fail(fmt::format("cannot read the file {}{}",
+                                 (std::filesystem::path(folder) / name).lexically_normal().string(),
+                                 options_.is_disk ? near_file_hint(name, {folder}) : ""));
       }) {
     scene_.file = file;
     scene_.search_paths.push_back(directory_of(file));
@@ -269,7 +286,9 @@ void GltfReader::add_camera(const JsonValue& camera, const Transform& to_world) 
     has_camera_ = true;
     const std::string type = camera["type"].text("");
     const int sensor = add("sensor", type == "orthographic" ? type.c_str() : "perspective", camera);
-    Transform placed = to_world * turned();
+    const std::optional<Transform> unscaled = without_scale(to_world);
+    if (!unscaled) camera.fail("the camera's transform is singular");
+    Transform placed = *unscaled * turned();
     double aspect = kDefaultAspect;
     if (type == "perspective") {
         const JsonValue p = camera["perspective"];
@@ -290,7 +309,6 @@ void GltfReader::add_camera(const JsonValue& camera, const Transform& to_world) 
         camera["type"].fail(
             fmt::format("is \"{}\", but must be perspective or orthographic", type));
     }
-    if (!placed.is_invertible()) camera.fail("the camera's transform is singular");
     set(sensor, "to_world", placed);
     add_child(sensor, "", add_film(aspect));
     scene_.roots.push_back(sensor);
@@ -334,7 +352,8 @@ void GltfReader::add_light(const JsonValue& light, const Transform& to_world) {
     } else if (type == "spot") {
         const JsonValue spot = light["spot"];
         const double outer = spot["outerConeAngle"].number(double(kPi) / 4, 1e-3, double(kPi) / 2);
-        const double inner = spot["innerConeAngle"].number(0, 0, outer);
+        // Exporters write equal angles with different rounding.
+        const double inner = std::min(spot["innerConeAngle"].number(0, 0, double(kPi) / 2), outer);
         emitter = add("emitter", "spot", light);
         set(emitter, "intensity", colour);
         set(emitter, "cutoff_angle", std::min(outer * 180 / double(kPi), 89.999));
@@ -409,6 +428,7 @@ const std::vector<std::string>& gltf_extensions() {
                                                    "KHR_materials_sheen",
                                                    "KHR_materials_specular",
                                                    "KHR_materials_anisotropy",
+                                                   "KHR_materials_pbrSpecularGlossiness",
                                                    "KHR_materials_unlit",
                                                    "KHR_materials_variants",
                                                    "KHR_texture_transform",

@@ -30,11 +30,13 @@ private:
         int interior = -1;
         size_t uv_set = 0;
     };
+    /// What COLOR_0 of a primitive has; an alpha of one everywhere counts as none.
+    enum class VertexColors { None, Rgb, Rgba };
     /// A mesh primitive in the description.
     struct Primitive {
         int64_t mesh;  ///< Index into SceneDescription::meshes.
         size_t material;
-        bool has_colors;
+        VertexColors colors;
         Bounds3 bounds;
     };
     /// A mesh to be placed.
@@ -61,14 +63,24 @@ private:
     int add_shape(const Primitive& primitive, const Transform& to_world, bool in_group);
 
     // Materials and textures: gltf_materials.cpp.
-    const Material& material(size_t index, bool has_colors);
-    Material read_material(const JsonValue& m, bool has_colors);
-    void read_principled(const JsonValue& m, int principled, bool has_colors);
-    int base_color(const JsonValue& m, bool has_colors, Rgb& factor);
-    int with_opacity(const JsonValue& m, int bsdf);
+    const Material& material(size_t index, VertexColors colors);
+    Material read_material(const JsonValue& m, VertexColors colors);
+    void read_principled(const JsonValue& m, int principled, VertexColors colors);
+    int base_color(const JsonValue& m, VertexColors colors, Rgb& factor);
+    int vertex_attribute(const char* name);
+    int product(int a, int b);
+    void set_color(int object, const char* name, Rgb factor, const JsonValue& texture);
+    void read_specular_glossiness(const JsonValue& s, int principled, VertexColors colors);
+    void apply_opacity(const JsonValue& m, Material& made, VertexColors colors);
+    /// The product of the factors of alpha; a constant where there is no texture.
+    struct Alpha {
+        int texture = -1;
+        double factor = 1;
+    };
+    Alpha alpha(const JsonValue& m, VertexColors colors);
     void read_emission(const JsonValue& m, Material& made);
     void read_volume(const JsonValue& m, Material& made);
-    int thin_glass(const JsonValue& m, int principled, bool has_colors);
+    int thin_glass(const JsonValue& m, int principled, VertexColors colors);
     /// The bitmap that a textureInfo names; -1 where it is absent.
     int bitmap(const JsonValue& info, bool raw, const char* channel = nullptr);
     /// Sets `name` of `object` to a factor, times the channel of a texture where there is one.
@@ -96,7 +108,7 @@ private:
     std::vector<bool> visited_;  ///< Nodes.
     std::vector<Placement> placements_;
     std::map<size_t, std::vector<Primitive>> primitives_;
-    std::map<std::pair<size_t, bool>, Material> made_materials_;
+    std::map<std::pair<size_t, VertexColors>, Material> made_materials_;
     std::map<size_t, int64_t> loaded_images_;  ///< Index into SceneDescription::images.
     std::optional<size_t> uv_set_;             ///< Of the material that is being read.
     Bounds3 bounds_;

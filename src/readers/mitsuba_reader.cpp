@@ -7,11 +7,13 @@
 
 #include <fmt/format.h>
 
+#include "description/resolve_file.h"
 #include "readers/file_bytes.h"
 #include "readers/mitsuba_upgrade.h"
 #include "readers/mitsuba_values.h"
 #include "readers/nesting.h"
 #include "readers/object_graph.h"
+#include "readers/xml_entities.h"
 #include "readers/xml_tags.h"
 
 namespace etendue {
@@ -100,6 +102,10 @@ void MitsubaReader::check_leaf(const pugi::xml_node& node) const {
 
 void MitsubaReader::read_document(std::string_view text, const std::string& file, Scope& scope,
                                   const Element* include) {
+    const std::optional<std::string> expanded = expand_entities(text, file, [&](size_t offset) {
+        return 1 + int(std::count(text.begin(), text.begin() + ptrdiff_t(offset), '\n'));
+    });
+    if (expanded) text = *expanded;
     Source source(file, text, source_ && source_->old_dialect);
     plain_text(text, file);  // refuses UTF-16; the parser knows the mark of UTF-8
     if (const size_t zero = text.find('\0'); zero != text.npos)
@@ -393,13 +399,15 @@ std::string MitsubaReader::load(const std::string& name, const SourceLocation& w
     std::vector<std::string> directories = {source_->directory};
     for (const std::string& directory : scene_.search_paths)
         if (directory != source_->directory) directories.push_back(directory);
-    for (const std::string& directory : directories) {
-        path = join(directory, name);
-        if (!options_.read_file) continue;
-        if (auto contents = options_.read_file(path)) return *std::move(contents);
-    }
-    throw SceneError(where, fmt::format("cannot read the file {} (looked in {})", quote(name),
-                                        fmt::join(directories, ", ")));
+    for (const std::string& spelling : spellings(name))
+        for (const std::string& directory : directories) {
+            path = join(directory, spelling);
+            if (!options_.read_file) continue;
+            if (auto contents = options_.read_file(path)) return *std::move(contents);
+        }
+    throw SceneError(where, fmt::format("cannot read the file {} (looked in {}{})", quote(name),
+                                        fmt::join(directories, ", "),
+                                        options_.is_disk ? near_file_hint(name, directories) : ""));
 }
 
 }  // namespace etendue

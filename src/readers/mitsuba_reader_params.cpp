@@ -18,7 +18,7 @@ const std::vector<MitsubaReader::Rule> MitsubaReader::kRules = {
     {"rgb", "name value", "intent", &MitsubaReader::read_rgb},
     {"srgb", "name value", "", &MitsubaReader::read_srgb},
     {"blackbody", "name temperature", "scale", &MitsubaReader::read_blackbody},
-    {"spectrum", "name", "value filename type intent", &MitsubaReader::read_spectrum},
+    {"spectrum", "name", "value filename type intent id", &MitsubaReader::read_spectrum},
     {"transform", "name", "", &MitsubaReader::read_transform},
     {"default", "name value", "", &MitsubaReader::read_default},
     {"include", "filename", "name", &MitsubaReader::read_include},
@@ -42,6 +42,12 @@ void check_intent(const Element& e) {
         throw SceneError(e.where,
                          fmt::format("the intent must be \"reflectance\" or \"illuminant\", not {}",
                                      quote(*intent)));
+}
+
+/// Whether a spectrum of this type is a texture.
+bool is_texture_type(std::string_view type) {
+    constexpr std::string_view kTypes[] = {"bitmap", "checkerboard", "mesh_attribute", "volume"};
+    return std::find(std::begin(kTypes), std::end(kTypes), type) != std::end(kTypes);
 }
 
 }  // namespace
@@ -125,6 +131,12 @@ void MitsubaReader::read_spectrum(const Element& e, const pugi::xml_node& node, 
     if (!!value + !!file + !!type != 1)
         throw SceneError(
             e.where, "<spectrum> needs one of the attributes \"value\", \"filename\" and \"type\"");
+    // In Mitsuba 2 and 3, textures are spectra that vary.
+    if (type && is_texture_type(*type)) {
+        Element texture = e;
+        texture.name = "texture";
+        return read_object(texture, node, scope);
+    }
     const std::string name = source_->old_dialect ? snake_case(e["name"]) : e["name"];
     const SpectrumRole role = spectrum_role(scope.category, name, scope.in_emitter);
     if (type) {

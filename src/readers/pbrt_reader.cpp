@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -63,6 +64,10 @@ std::string_view reason(std::string_view doc) {
     return doc;
 }
 
+std::string normal_path(const std::string& path) {
+    return std::filesystem::path(path).lexically_normal().string();
+}
+
 std::vector<std::string> names_of(const auto& map) {
     std::vector<std::string> names;
     for (const auto& [name, value] : map) names.push_back(name);
@@ -102,7 +107,7 @@ const std::vector<PbrtReader::Directive> PbrtReader::kDirectives = {
     {"ObjectEnd", kV3And4, Place::World, &PbrtReader::object_end},
     {"ObjectInstance", kV3And4, Place::World, &PbrtReader::object_instance},
     {"Include", kV3And4, Place::Anywhere, &PbrtReader::include},
-    {"Import", kV4, Place::World, &PbrtReader::include},
+    {"Import", kV4, Place::World, &PbrtReader::import},
     {"Camera", kV3And4, Place::Options, &PbrtReader::camera},
     {"Film", kV3And4, Place::Options, &PbrtReader::film},
     {"PixelFilter", kV3And4, Place::Options, &PbrtReader::pixel_filter},
@@ -124,18 +129,24 @@ SceneDescription PbrtReader::read(std::string_view text) {
 
 // ---- Files and directives
 
-void PbrtReader::read_file(std::string_view text, const std::string& file) {
-    const FileName& name = file_names_.emplace_back(file);
-    open_files_.push_back(std::filesystem::path(file).lexically_normal().string());
-    PbrtTokenizer in(plain_text(text, file), name);
+void PbrtReader::read_file(std::string_view text, const std::string& path) {
+    const size_t outer = std::exchange(first_open_, open_files_.size());
+    open_files_.push_back({path, {}});
+    PbrtTokenizer in(plain_text(text, path), file_names_.emplace_back(path));
     while (const char c = in.peek()) {
+        close_files(in);
         if (c == '"')
             in.fail(fmt::format("expected a directive, found the string {}", quote(in.string())));
         if (c == '[' || c == ']') in.fail(fmt::format("expected a directive, found \"{}\"", c));
         const std::string_view word = in.word();
         read_directive(in, word);
     }
-    open_files_.pop_back();
+    open_files_.resize(first_open_);
+    first_open_ = outer;
+}
+
+void PbrtReader::close_files(const PbrtTokenizer& in) {
+    open_files_.resize(std::min(open_files_.size(), first_open_ + 1 + in.depth()));
 }
 
 void PbrtReader::read_directive(PbrtTokenizer& in, std::string_view word) {
@@ -158,9 +169,24 @@ void PbrtReader::read_directive(PbrtTokenizer& in, std::string_view word) {
     (this->*it->read)(in);
 }
 
+/// pbrt includes text: the parameters of a directive may go on behind the Include of the file in which it begins.
 void PbrtReader::include(PbrtTokenizer& in) {
+    OpenFile file = load_included(in);
+    const FileName& name = file_names_.emplace_back(file.path);
+    open_files_.push_back(std::move(file));
+    in.include(plain_text(open_files_.back().text, name.str()), name);
+}
+
+/// What is imported is complete.
+void PbrtReader::import(PbrtTokenizer& in) {
+    const OpenFile file = load_included(in);
+    read_file(file.text, file.path);
+}
+
+PbrtReader::OpenFile PbrtReader::load_included(PbrtTokenizer& in) {
     const PbrtPlace where = in.where();
     const std::string name = unescape(in.string());
+    close_files(in);
     if (++includes_ > kMostIncludes)
         throw SceneError(where,
                          fmt::format("the scene includes more than {} files", kMostIncludes));
@@ -168,13 +194,12 @@ void PbrtReader::include(PbrtTokenizer& in) {
         throw SceneError(
             where, fmt::format("files include each other more than {} deep", kDeepestInclude));
     std::string path;
-    std::string& text = texts_.emplace_back(scene_.load(name, where, path));
+    std::string text = scene_.load(name, where, path);
     if (is_gzip(text)) text = unpack_gzip(text, path);
-    const std::string normal = std::filesystem::path(path).lexically_normal().string();
-    if (std::find(open_files_.begin(), open_files_.end(), normal) != open_files_.end())
-        throw SceneError(where, fmt::format("{} includes itself", quote(path)));
-    read_file(text, path);
-    texts_.pop_back();
+    for (const OpenFile& open : open_files_)
+        if (normal_path(open.path) == normal_path(path))
+            throw SceneError(where, fmt::format("{} includes itself", quote(path)));
+    return {std::move(path), std::move(text)};
 }
 
 PbrtArguments PbrtReader::arguments(PbrtTokenizer& in, const char* kind, const char* defaults) {

@@ -27,7 +27,13 @@ private:
     };
     static const std::vector<Directive> kDirectives;
 
-    void read_file(std::string_view text, const std::string& file);
+    struct OpenFile {
+        std::string path, text;  ///< The main file and imported ones store their text elsewhere.
+    };
+    void read_file(std::string_view text, const std::string& path);
+    /// Forgets the included files that the tokenizer has left.
+    void close_files(const PbrtTokenizer& in);
+    OpenFile load_included(PbrtTokenizer& in);
     void read_directive(PbrtTokenizer& in, std::string_view word);
 
     void identity(PbrtTokenizer&);
@@ -60,6 +66,7 @@ private:
     void object_end(PbrtTokenizer& in);
     void object_instance(PbrtTokenizer& in);
     void include(PbrtTokenizer& in);
+    void import(PbrtTokenizer& in);
     void camera(PbrtTokenizer& in);
     void film(PbrtTokenizer& in);
     void pixel_filter(PbrtTokenizer& in);
@@ -96,9 +103,9 @@ private:
     PbrtArguments camera_, film_, filter_, sampler_, integrator_;
     Transform camera_from_world_;
     bool in_world_ = false, world_ended_ = false;
-    std::vector<std::string> open_files_;
+    std::deque<OpenFile> open_files_;  ///< Each includes the next one.
+    size_t first_open_ = 0;            ///< The main file, or the one that is being imported.
     std::deque<FileName> file_names_;  ///< Of all files; parameters refer to them.
-    std::deque<std::string> texts_;
     int includes_ = 0;
 };
 

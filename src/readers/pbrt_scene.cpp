@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "description/resolve_file.h"
 #include "readers/file_bytes.h"
 #include "readers/mitsuba_values.h"
 #include "readers/pbrt_spectrum.h"
@@ -108,12 +109,16 @@ void PbrtScene::bind_float(int object, const char* to, const PbrtArguments& args
 
 std::string PbrtScene::load(const std::string& name, const SourceLocation& where,
                             std::string& path) const {
-    path = description.search_paths[0] == "." || std::filesystem::path(name).is_absolute()
-               ? name
-               : (std::filesystem::path(description.search_paths[0]) / name).string();
-    if (options.read_file)
+    const std::string& folder = description.search_paths[0];
+    for (const std::string& spelling : spellings(name)) {
+        path = folder == "." || std::filesystem::path(spelling).is_absolute()
+                   ? spelling
+                   : (std::filesystem::path(folder) / spelling).string();
+        if (!options.read_file) continue;
         if (auto contents = options.read_file(path)) return *std::move(contents);
-    throw SceneError(where, fmt::format("cannot read the file {}", quote(path)));
+    }
+    throw SceneError(where, fmt::format("cannot read the file {}{}", quote(path),
+                                        options.is_disk ? near_file_hint(name, {folder}) : ""));
 }
 
 void PbrtScene::reject(const SourceLocation& where, const std::string& what,

@@ -8,8 +8,25 @@
 
 namespace etendue {
 
+void PbrtTokenizer::include(std::string_view text, const FileName& file) {
+    outer_.push_back({at_, end_, file_, line_});
+    at_ = text.data();
+    end_ = at_ + text.size();
+    file_ = &file;
+    line_ = 1;
+}
+
+void PbrtTokenizer::leave() {
+    const Text& outer = outer_.back();
+    at_ = outer.at;
+    end_ = outer.end;
+    file_ = outer.file;
+    line_ = outer.line;
+    outer_.pop_back();
+}
+
 std::string_view PbrtTokenizer::word() {
-    skip_blanks();
+    peek();
     const char* begin = at_;
     while (!ends_word(at_)) ++at_;
     return {begin, size_t(at_ - begin)};

@@ -26,9 +26,20 @@ public:
         : at_(text.data()), end_(text.data() + text.size()), file_(&file) {}
     PbrtTokenizer(std::string_view text, FileName&& file) = delete;
 
-    /// The character that the next token begins with; 0 at the end of the text.
+    /// Goes on with another text, and afterwards where it is now. Both arguments must outlive the tokenizer.
+    void include(std::string_view text, const FileName& file);
+    void include(std::string_view text, FileName&& file) = delete;
+    /// Number of included texts that are not at their end, as of the last peek().
+    size_t depth() const { return outer_.size(); }
+
+    /// The character that the next token begins with; 0 at the end of the text. Tokens may stand in the text that
+    /// includes the one before, so that a directive can begin in one and go on in the other.
     char peek() {
         skip_blanks();
+        while (at_ == end_ && !outer_.empty()) {
+            leave();
+            skip_blanks();
+        }
         return at_ == end_ ? '\0' : *at_;
     }
     /// Whether the next token is this bracket, which is then passed over.
@@ -44,7 +55,7 @@ public:
     /// A finite number.
     template <class T>
     T number(const char* expected) {
-        skip_blanks();
+        peek();
         const char* begin = at_ != end_ && *at_ == '+' ? at_ + 1 : at_;
         T value{};
         const auto [stop, error] = std::from_chars(begin, end_, value);
@@ -82,10 +93,18 @@ private:
         return value - value == 0;
     }
     [[noreturn]] void fail_number(const char* expected);
+    /// Goes on behind the Include of the text that ends here.
+    void leave();
 
+    struct Text {
+        const char *at, *end;
+        const FileName* file;
+        int line;
+    };
     const char *at_, *end_;
     const FileName* file_;
     int line_ = 1;
+    std::vector<Text> outer_;  ///< Texts that include this one, the nearest last.
 };
 
 /// `text` with its escapes (\n, \t, \", \\ ...) replaced.

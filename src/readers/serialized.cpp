@@ -126,7 +126,7 @@ private:
     /// Refuses counts of which a small file could hold nothing but zeros.
     void check_size(uint64_t vertices, uint64_t triangles) const {
         constexpr uint64_t kAlways = uint64_t(256) << 20, kMostRatio = 64;
-        const uint64_t number = flags_ & kSinglePrecision ? sizeof(float) : sizeof(double);
+        const uint64_t number = flags_ & kDoublePrecision ? sizeof(double) : sizeof(float);
         const uint64_t numbers = 3 + (flags_ & kHasNormals ? 3 : 0) +
                                  (flags_ & kHasTexcoords ? 2 : 0) + (flags_ & kHasColors ? 3 : 0);
         const uint64_t bytes = vertices * numbers * number + triangles * sizeof(MeshData::Triangle);

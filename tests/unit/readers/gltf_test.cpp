@@ -234,6 +234,73 @@ TEST(Gltf, TexturesKeepTheirTransformAndSampler) {
     EXPECT_EQ(value<double>(find(scene, "threshold"), "cutoff"), 0.25);
 }
 
+TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
+    const SceneDescription scene = with_material(
+        R"({"extensions":{"KHR_materials_ior":{"ior":1000},"KHR_materials_specular":{"specularFactor":0.5,
+            "specularTexture":{"index":0},"specularColorFactor":[2,1,0],"specularColorTexture":{"index":1}}}})",
+        R"(,"textures":[{"source":0},{"source":1}],"images":[{"uri":"a.png"},{"uri":"b.png"}])");
+    EXPECT_TRUE(std::none_of(scene.warnings.begin(), scene.warnings.end(),
+                             [](const auto& w) { return w.find("specular") != w.npos; }));
+    const SceneObject& m = find(scene, "principled");
+    EXPECT_EQ(value<double>(m, "eta"), 1000);
+    ASSERT_EQ(m.children.size(), 2u);
+    for (const auto& [name, expected] :
+         {std::pair("specular_weight", ParamValue(0.5)), {"specular_color", Rgb(2, 1, 0)}}) {
+        const auto c = std::find_if(m.children.begin(), m.children.end(),
+                                    [&](const auto& child) { return child.name == name; });
+        ASSERT_NE(c, m.children.end()) << name;
+        const SceneObject& product = scene.objects[size_t(c->object)];
+        EXPECT_EQ(product.find("scale")->value, expected);
+        const SceneObject& image = scene.objects[size_t(product.children[0].object)];
+        const bool is_weight = std::string_view(name) == "specular_weight";
+        EXPECT_EQ(image.find("channel") != nullptr, is_weight);  // alpha
+        EXPECT_EQ(image.find("raw") != nullptr, is_weight);      // and not sRGB
+        EXPECT_EQ(value<std::string>(image, "filename"), is_weight ? "a.png" : "b.png");
+    }
+    // Without textures the factors alone.
+    const SceneDescription black = with_material(
+        R"({"extensions":{"KHR_materials_specular":{"specularColorFactor":[0,0,0]}}})");
+    EXPECT_EQ(value<Rgb>(find(black, "principled"), "specular_color"), Rgb(0));
+}
+
+TEST(Gltf, SpecularGlossinessIsReadAsWell) {
+    const SceneDescription scene = with_material(
+        R"({"alphaMode":"BLEND","extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":
+            [0.5,0.25,1,0.75],"specularFactor":[0.1,0.2,0.04],"glossinessFactor":0.7}}})");
+    const SceneObject& m = find(scene, "principled");
+    const Rgb base = value<Rgb>(m, "base_color");  // diffuse (1 - 0.2)
+    EXPECT_FLOAT_EQ(base.r, 0.4f);
+    EXPECT_FLOAT_EQ(base.b, 0.8f);
+    EXPECT_EQ(value<Rgb>(m, "specular_color"), Rgb(0.1f, 0.2f, 0.04f));
+    EXPECT_GT(value<double>(m, "eta"), 500);
+    EXPECT_NEAR(value<double>(m, "roughness"), 0.3, 1e-9);
+    EXPECT_EQ(m.find("metallic"), nullptr);
+    EXPECT_EQ(value<double>(find(scene, "mask"), "opacity"), 0.75);
+}
+
+// What older exporters write, though the format does not allow it.
+TEST(Gltf, HabitsOfExportersAreAccepted) {
+    Bytes b = square();
+    b.add<uint8_t>({51, 0, 255, 255, 51, 0, 255, 255, 51, 0, 255, 255, 51, 0, 255, 255});
+    const SceneDescription scene = read(
+        document(b, R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":4},
+            {"bufferView":1,"componentType":5123,"type":"SCALAR","count":6},
+            {"bufferView":2,"componentType":5121,"type":"VEC4","count":4}],
+            "bufferViews":[{"buffer":0,"byteLength":48,"byteStride":0},
+            {"buffer":0,"byteOffset":48,"byteLength":12},{"buffer":0,"byteOffset":60,"byteLength":16}],
+            "nodes":[{"mesh":0},{"extensions":{"KHR_lights_punctual":{"light":0}}}],
+            "extensions":{"KHR_lights_punctual":{"lights":[{"type":"spot",
+            "spot":{"innerConeAngle":0.7853983,"outerConeAngle":0.7853981}}]}},
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":2},"indices":1}]}])"),
+        b);
+    EXPECT_EQ(scene.meshes[0].positions[2], (Vec3{1, 1, 0}));
+    EXPECT_FLOAT_EQ(scene.meshes[0].colors[1].x, 0.2f);
+    EXPECT_FLOAT_EQ(scene.meshes[0].colors[1].z, 1);
+    EXPECT_TRUE(scene.meshes[0].alphas.empty());  // one everywhere
+    EXPECT_EQ(value<double>(find(scene, "spot"), "beam_width"),
+              value<double>(find(scene, "spot"), "cutoff_angle"));
+}
+
 TEST(Gltf, CamerasLookAlongMinusZ) {
     const SceneDescription scene = read(
         R"({"asset":{"version":"2.0"},"nodes":[{"camera":0,"translation":[0,0,5]},{"camera":1}],"cameras":[
