@@ -62,6 +62,8 @@ public:
         // Objects that are added on the way are plain.
         const size_t count = scene_.objects.size();
         for (size_t i = 0; i < count; ++i) replace_textures(int(i));
+        for (size_t i = 0; i < count; ++i) unwrap_relief(int(i));
+        for (size_t i = 0; i < count; ++i) report_masked_emission(int(i));
         for (size_t i = 0; i < count; ++i) replace(int(i));
         for (size_t i = 0; i < scene_.objects.size(); ++i) hoist_masks(int(i));
         for (size_t i = 0; i < count; ++i) strip(int(i));
@@ -124,6 +126,12 @@ private:
         if (const auto* c = p->as<Rgb>()) return double(luminance(*c));
         return fallback;
     }
+    static std::string text(const SceneObject& o, std::string_view name,
+                            std::string_view fallback) {
+        const Param* p = o.find(name);
+        const auto* s = p ? p->as<std::string>() : nullptr;
+        return s ? *s : std::string(fallback);
+    }
     static Rgb rgb(const SceneObject& o, std::string_view name, Rgb fallback) {
         const Param* p = o.find(name);
         if (!p) return fallback;
@@ -141,6 +149,8 @@ private:
         const std::string* name = file ? file->as<std::string>() : nullptr;
         if (o.type == "bitmap" && (o.find("channel") || (name && !reads_image(*name))))
             return false;
+        if (o.type == "mesh_attribute" && text(o, "name", "vertex_color") != "vertex_color")
+            return false;
         return std::all_of(o.children.begin(), o.children.end(),
                            [&](const auto& c) { return is_plain_texture(c.object); });
     }
@@ -150,8 +160,32 @@ private:
                                       [&](const auto& c) { return depends_on(c.object, what); });
     }
 
+    static bool is_relief(const SceneObject& o) {
+        return o.category == "bsdf" && (o.type == "bumpmap" || o.type == "normalmap");
+    }
+
+    /// Mitsuba 3 wraps in the same way along u and v, and its images have no end.
+    void replace_wrapping(SceneObject& o) {
+        const std::string u = text(o, "wrap_mode", "repeat"), v = text(o, "wrap_mode_v", u);
+        const auto known = [](const std::string& mode) {
+            return mode == "zero" || mode == "one" ? "clamp" : mode;
+        };
+        if (v != u)
+            warn(o, fmt::format("Mitsuba 3 wraps images in the same way along u and v: \"{}\" "
+                                "stands in for \"{}\" along v",
+                                known(u), v));
+        if (known(u) != u)
+            warn(o,
+                 fmt::format("Mitsuba 3 has no wrap mode \"{}\": \"clamp\" stands in for it", u));
+        remove(o, "wrap_mode_v");
+        if (o.find("wrap_mode")) set(o, "wrap_mode", known(u));
+    }
+
     void replace_textures(int index) {
-        if (object(index).category == "texture") return;
+        if (object(index).category == "texture") {
+            if (object(index).type == "bitmap") replace_wrapping(object(index));
+            return;
+        }
         const SceneObject parent = object(index);
         for (const SceneObject::Child& c : parent.children) {
             if (scene_.objects[size_t(c.object)].category != "texture") continue;
@@ -174,6 +208,15 @@ private:
                 child->object = baked(c.object, *texture);
                 continue;
             }
+            if (is_relief(parent)) {  // unwrap_relief() leaves it out
+                if (!is_uniform)
+                    warn(original_.objects[size_t(c.object)],
+                         fmt::format("Mitsuba 3 has no such texture for bsdf \"{}\": the relief "
+                                     "is left out",
+                                     parent.type));
+                remove_child(index, c.object);
+                continue;
+            }
             if (!is_uniform)
                 warn(original_.objects[size_t(c.object)],
                      fmt::format("Mitsuba 3 has no such texture for \"{}\" of {} \"{}\": its mean "
@@ -187,6 +230,26 @@ private:
             else
                 set(object(index), c.name, mean);
         }
+    }
+    /// A relief without texture, which Mitsuba 3 refuses, is the material that it wraps.
+    void unwrap_relief(int index) {
+        const SceneObject& o = object(index);
+        if (!is_relief(o)) return;
+        int inner = -1;
+        for (const auto& c : o.children) {
+            if (object(c.object).category == "texture") return;
+            if (object(c.object).category == "bsdf") inner = c.object;
+        }
+        if (inner < 0) return;
+        for (SceneObject& parent : scene_.objects)
+            for (auto& c : parent.children)
+                if (c.object == index) c.object = inner;
+        const bool is_root =
+            std::find(scene_.roots.begin(), scene_.roots.end(), inner) != scene_.roots.end();
+        if (is_root)
+            std::erase(scene_.roots, index);
+        else
+            std::replace(scene_.roots.begin(), scene_.roots.end(), index, inner);
     }
     void remove_child(int index, int child) {
         std::erase_if(object(index).children, [&](const auto& k) { return k.object == child; });
@@ -210,6 +273,8 @@ private:
         // Edges between the cells of the grid stay sharp only in an image that is much finer.
         if (original.type != "bitmap")
             width *= 1 + kBakedSize / width, height *= 1 + kBakedSize / height;
+        if (std::max(width, height) > kLargestBaked)
+            warn(original, fmt::format("the image of {}×{} pixels is reduced", width, height));
         width = std::min(width, kLargestBaked), height = std::min(height, kLargestBaked);
         std::vector<Rgb> pixels;
         pixels.reserve(size_t(width) * size_t(height));
@@ -223,8 +288,9 @@ private:
                                        original.type, width, height));
         SceneObject bitmap{"texture", "bitmap", "", original.where, {}, {}};
         set(bitmap, "raw", true);
-        for (const char* name : {"filter_type", "wrap_mode"})
+        for (const char* name : {"filter_type", "wrap_mode", "wrap_mode_v"})
             if (const Param* p = original.find(name)) bitmap.params.push_back(*p);
+        replace_wrapping(bitmap);
         set_image(bitmap, pfm(width, height, pixels));
         return baked_[index] = add(std::move(bitmap));
     }
@@ -238,6 +304,20 @@ private:
     }
 
     // ---- Plug-ins
+
+    /// Emission of a shape is hidden by its mask here, but not in Mitsuba 3.
+    void report_masked_emission(int index) {
+        const SceneObject& o = original_.objects[size_t(index)];
+        if (o.category != "shape") return;
+        const bool emits = std::any_of(o.children.begin(), o.children.end(), [&](const auto& c) {
+            return original_.objects[size_t(c.object)].category == "emitter";
+        });
+        const bool is_masked = depends_on(index, [](const SceneObject& part) {
+            return part.category == "bsdf" && part.type == "mask";
+        });
+        if (emits && is_masked)
+            warn(o, "Mitsuba 3 lets the emission of a shape through its mask: it emits everywhere");
+    }
 
     void replace(int index) {
         SceneObject& o = object(index);
@@ -314,6 +394,8 @@ private:
             set(o, "sigma_t", t * (1 / t.max()));
             set(o, "scale", number(o, "scale", 1) * double(t.max()));
         }
+        if (o.find("material") && !o.find("sigma_t"))
+            warn(o, "Mitsuba 3 has no named media: the material is left out");
         remove(o, "material");
     }
 
@@ -408,7 +490,12 @@ private:
         remove(o, "projection"), remove(o, "tint");
         if (!name || (!is_equal_area && tint == Rgb(1) && reads_image(*name))) return;
         RgbImage image = read_emission_image({original_, index}, tint);
-        if (is_equal_area) image = latitudes_and_longitudes(image);
+        if (is_equal_area) {
+            image = latitudes_and_longitudes(image);
+            warn(o, fmt::format("Mitsuba 3 has no equal-area projection: the image becomes one of "
+                                "latitudes and longitudes, {}×{} pixels",
+                                image.width, image.height));
+        }
         remove(o, "filename");
         set_image(o, pfm(image.width, image.height, image.pixels));
     }
@@ -485,7 +572,13 @@ private:
                 set(o, "material", std::string("none"));
             }
         }
+        if (o.type == "principled") replace_own_reflectance(o);
         if (o.type == "roughplastic") {
+            const bool is_anisotropic = number(o, "alpha_u", 0.1) != number(o, "alpha_v", 0.1) ||
+                                        has_texture(o, "alpha_u") || has_texture(o, "alpha_v");
+            if (is_anisotropic && !stand_ins_.count(index))
+                warn(o, "Mitsuba 3 has no parameters \"alpha_u\" and \"alpha_v\" of bsdf "
+                        "\"roughplastic\": their geometric mean stands in for them");
             if (o.find("alpha_u") || o.find("alpha_v"))
                 set(o, "alpha", std::sqrt(number(o, "alpha_u", 0.1) * number(o, "alpha_v", 0.1)));
             remove(o, "alpha_u"), remove(o, "alpha_v");
@@ -494,6 +587,23 @@ private:
     }
     bool has_texture(const SceneObject& o, std::string_view name) {
         return has(o, name) && !o.find(name);
+    }
+    /// The reflectance at normal incidence becomes an index of refraction.
+    void replace_own_reflectance(SceneObject& o) {
+        if (!has(o, "specular_weight") && !has(o, "specular_color")) return;
+        const auto factor = [&](const char* name) {
+            if (has_texture(o, name)) return 1.0;
+            return double(luminance(rgb(o, name, Rgb(1))));
+        };
+        const double eta = number(o, "eta", 1.5), specular = number(o, "specular", 0.5);
+        const double F0 = o.find("specular") ? 0.08 * specular : std::pow((eta - 1) / (eta + 1), 2);
+        const double root = std::sqrt(
+            std::clamp(F0 * factor("specular_weight") * factor("specular_color"), 0.0, 0.98));
+        warn(o, "Mitsuba 3 has no parameters \"specular_weight\" and \"specular_color\" of bsdf "
+                "\"principled\": an index of refraction with their mean reflectance at normal "
+                "incidence stands in for them");
+        for (const char* name : {"specular_weight", "specular_color", "specular"}) remove(o, name);
+        set(o, "eta", std::max((1 + root) / (1 - root), 1.001));
     }
     static void set_ior(SceneObject& o, double ior) {
         constexpr double kLeast = 1.001;  // Mitsuba 3 refuses coats without an interface.
@@ -529,8 +639,13 @@ private:
         if (weights.size() != materials.size() || weights.empty()) return;
         double sum = 0;
         for (const double w : weights) sum += w;
-        if (sum > 1)
+        if (sum > 1) {
+            const Param* p = mixture.find("ensure_energy_conservation");
+            if (p && !std::get<bool>(p->value))
+                warn(mixture, "Mitsuba 3 has no weights with a sum above one: they are divided by "
+                              "their sum");
             for (double& w : weights) w /= sum;
+        }
         if (sum < 1) {
             SceneObject black{"bsdf", "diffuse", "", mixture.where, {}, {}};
             set(black, "reflectance", Rgb(0));
@@ -613,8 +728,13 @@ private:
             return true;
         });
         std::erase_if(o.children, [&](const SceneObject::Child& c) {
-            return object(c.object).category == "texture" && !c.name.empty() &&
-                   !documents(*entry, c.name) && o.type != "bumpmap" && o.type != "normalmap";
+            if (object(c.object).category != "texture" || c.name.empty() ||
+                documents(*entry, c.name) || is_relief(o))
+                return false;
+            if (!stand_ins_.count(index))
+                warn(o, fmt::format("Mitsuba 3 has no parameter \"{}\" of {} \"{}\": left out",
+                                    c.name, o.category, o.type));
+            return true;
         });
     }
 

@@ -191,6 +191,80 @@ TEST(PlainMitsuba, BumpMapsAreOfImages) {
     EXPECT_EQ(scene.images.size(), 1u);
 }
 
+// A bump map whose texture Mitsuba 3 lacks is no bump map: it refuses one without texture.
+TEST(PlainMitsuba, ReliefWithoutTextureIsLeftOut) {
+    SceneDescription scene = parse(R"(<bsdf type="bumpmap" id="rough"><texture type="scale">
+        <texture type="fbm" name="value"/><float name="scale" value="0.1"/></texture>
+        <bsdf type="diffuse"/></bsdf><shape type="sphere"><ref id="rough"/></shape>
+        <shape type="cube"><bsdf type="twosided"><bsdf type="bumpmap"><texture type="fbm"/>
+        <bsdf type="plastic"/></bsdf></bsdf></shape>)");
+    const std::vector<std::string> warnings = make_plain_mitsuba(scene);
+    ASSERT_EQ(warnings.size(), 2u);
+    for (const std::string& w : warnings)
+        EXPECT_NE(w.find("Mitsuba 3 has no such texture for bsdf \"bumpmap\": the relief is left "
+                         "out"),
+                  std::string::npos)
+            << w;
+    const std::string xml = write_mitsuba_xml(scene, "out.xml", "files", [](const SceneFile&) {});
+    EXPECT_EQ(xml.find("bumpmap"), std::string::npos) << xml;
+    EXPECT_NE(xml.find("plastic"), std::string::npos) << xml;
+    EXPECT_NE(xml.find("<ref id="), std::string::npos) << xml;
+}
+
+TEST(PlainMitsuba, ReliefOfAConstantIsLeftOutInSilence) {
+    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="bumpmap"><texture
+        type="constant"/><bsdf type="diffuse"/></bsdf></shape>)");
+    EXPECT_TRUE(make_plain_mitsuba(scene).empty());
+    EXPECT_EQ(scene.objects[size_t(only(scene, "shape").children[0].object)].type, "diffuse");
+}
+
+/// The only warning of a scene with this shape.
+std::string warning_of(const std::string& inside) {
+    SceneDescription scene = parse("<shape type=\"sphere\">" + inside + "</shape>");
+    const std::vector<std::string> warnings = make_plain_mitsuba(scene);
+    EXPECT_EQ(warnings.size(), 1u) << fmt::format("{}", fmt::join(warnings, "\n"));
+    return warnings.empty() ? "" : warnings[0];
+}
+
+TEST(PlainMitsuba, EveryApproximationIsReported) {
+    const std::string image = std::string("<string name=\"filename\" value=\"") +
+                              ETENDUE_SOURCE_DIR + "/tests/scenes/formats/data/image.ppm\"/>";
+    const auto bitmap = [&](const std::string& modes) {
+        return "<bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\">" + image +
+               modes + "</texture></bsdf>";
+    };
+    const std::pair<std::string, const char*> cases[] = {
+        {bitmap(R"(<string name="wrap_mode_v" value="mirror"/>)"),
+         "wraps images in the same way along u and v"},
+        {bitmap(R"(<string name="wrap_mode" value="zero"/>)"), "no wrap mode \"zero\""},
+        {R"(<bsdf type="roughplastic"><float name="alpha_u" value="0.1"/>
+            <float name="alpha_v" value="0.4"/></bsdf>)",
+         "their geometric mean stands in"},
+        {R"(<bsdf type="principled"><rgb name="specular_color" value="1 0.5 0.2"/></bsdf>)",
+         "\"specular_weight\" and \"specular_color\""},
+        {R"(<bsdf type="mixturebsdf"><string name="weights" value="0.9 0.4"/>
+            <boolean name="ensure_energy_conservation" value="false"/><bsdf type="diffuse"/>
+            <bsdf type="diffuse"/></bsdf>)",
+         "no weights with a sum above one"},
+        {R"(<bsdf type="mask"><bsdf type="diffuse"/></bsdf><emitter type="area"/>)",
+         "through its mask"},
+        {R"(<bsdf type="mask"><texture type="mesh_attribute" name="opacity"><string name="name"
+            value="vertex_alpha"/></texture><bsdf type="diffuse"/></bsdf>)",
+         "its mean stands in"},
+    };
+    for (const auto& [inside, expected] : cases)
+        EXPECT_NE(warning_of(inside).find(expected), std::string::npos) << expected << "\n"
+                                                                        << warning_of(inside);
+}
+
+TEST(PlainMitsuba, ReflectanceBecomesAnIndexOfRefraction) {
+    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="principled">
+        <float name="eta" value="1000"/><rgb name="specular_color" value="0.04"/></bsdf></shape>)");
+    make_plain_mitsuba(scene);
+    EXPECT_NEAR(number(only(scene, "bsdf"), "eta"), 1.5, 0.01);
+    EXPECT_FALSE(only(scene, "bsdf").find("specular_color"));
+}
+
 TEST(PlainMitsuba, ColoursOfMeshesAreWrittenAsFloats) {
     SceneDescription scene = read_scene_file(std::string(ETENDUE_SOURCE_DIR) +
                                              "/tests/scenes/formats/mitsuba3/textures.xml");
