@@ -119,8 +119,7 @@ void repair_normals(MeshData& mesh) {
 size_t memory_bytes(const MeshData& mesh) {
     const auto bytes = [](const auto& values) { return values.size() * sizeof(values[0]); };
     return bytes(mesh.positions) + bytes(mesh.normals) + bytes(mesh.uvs) + bytes(mesh.colors) +
-           bytes(mesh.alphas) +
-           bytes(mesh.triangles);
+           bytes(mesh.alphas) + bytes(mesh.triangles);
 }
 
 void compute_vertex_normals(MeshData& mesh) {
