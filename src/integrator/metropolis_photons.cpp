@@ -6,6 +6,7 @@
 #include "integrator/path_photons.h"
 #include "math/hash.h"
 #include "math/statistics.h"
+#include "mcmc/addresses.h"
 #include "mcmc/primary_space.h"
 
 namespace etendue {
@@ -13,9 +14,6 @@ namespace {
 
 /// Purposes of the random numbers of this source.
 enum Purpose : uint64_t { kScale = 0x6d7073, kPilot, kChains, kDeposits };
-
-/// Vertex of Stream::Selection in states.
-enum PathNumber : uint64_t { kFollowsUserPath = 2 };
 
 /// A vertex at which a state may store a photon.
 struct Candidate {
@@ -75,7 +73,9 @@ protected:
         for_each_photon(mapping_, c.work.y, [&](MapPhoton photon) {
             photon.power *= float(share(photon.s - 1));
             const double part = double(luminance(photon.power)) * double((*importance)(photon));
-            if (part > 0 && is_finite(photon.power))
+            if (!is_finite(photon.power) || !std::isfinite(part))
+                ++c.work.stats.rejected;
+            else if (part > 0)
                 state.candidates.push_back({photon, {true, photon.is_caustic()}, part});
         });
         state.target = 0;
@@ -100,7 +100,7 @@ private:
         const WalkContext walk = light_walk(c);
         SubPath& y = c.work.y;
         if (user_paths) {
-            sampler.seek(Stream::Selection, kFollowsUserPath);
+            sampler.seek(Stream::Selection, addresses::kFollowsUserPath);
             if (double(sampler.next_1d()) < user_share) {
                 bool goes_on = user_paths->sample(walk, sampler, y);
                 while (goes_on) goes_on = extend<TransportMode::Importance>(walk, sampler, y);

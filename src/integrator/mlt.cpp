@@ -35,7 +35,7 @@ protected:
                             hits_emitters(scene), n.hit_lens > 0, pilot)};
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(4 * pilot.precise_samples, options_),
-                             .c = pilot.b};
+                             .c = pilot.constant()};
         PathMutations mutations;
         if (!user_paths_.empty()) {
             target.user = {UserPaths::load(scene, user_paths_), user_ratio_ / (1 + user_ratio_)};

@@ -3,8 +3,9 @@
 //
 // The contribution of C(s,t) of length k is C·w/p(s|k), with the weights of bidirectional path tracing. A pilot fixes
 // p(s|k): four fifths are proportional to the energy of each technique, and one fifth is uniform. Walks have no Russian
-// roulette. The last class contains all longer paths; its states also choose their length, from a geometric
-// distribution. Only large and block steps change the technique and the length.
+// roulette. The last class contains all longer paths; its states also choose their length, four fifths in proportion to
+// the energy of each length, and one fifth from a geometric distribution. Only large and block steps change the technique
+// and the length.
 
 #include "integrator/mmlt.h"
 
@@ -12,6 +13,7 @@
 #include <cmath>
 
 #include "integrator/markov.h"
+#include "mcmc/addresses.h"
 #include "mcmc/technique_choice.h"
 
 namespace etendue {
@@ -21,8 +23,11 @@ namespace {
 class PathChoice {
 public:
     /// The classes are the lengths from `shortest` on. The last class also contains all longer paths, up to `longest`.
-    PathChoice(int shortest, int classes, int longest, const TechniqueChoice& technique)
-        : shortest_(shortest), classes_(classes), longest_(longest), technique_(technique) {}
+    PathChoice(int shortest, int classes, int longest, bool hits, bool hits_lens,
+               const Pilot& pilot)
+        : shortest_(shortest), classes_(classes), longest_(longest),
+          longer_(shortest + classes - 1, longest, pilot),
+          technique_(shortest, classes + kTabulated, hits, hits_lens, pilot) {}
 
     struct Chosen {
         int s, t;
@@ -30,29 +35,21 @@ public:
     };
     /// Reads `u_length` only if has_length_choice().
     Chosen choose(int chain_class, double u_length, double u_s) const {
-        int k = shortest_ + chain_class;
-        double pmf = 1;
-        if (has_length_choice(chain_class)) {
-            // Geometric, truncated at the longest length: P(k+j) = (1-r) r^j, and the remaining probability at the last
-            // one.
-            const int most = longest_ - k;
-            const int j = std::min(most, int(std::log1p(-u_length) / std::log(kLonger)));
-            pmf = std::pow(kLonger, j) * (j == most ? 1 : 1 - kLonger);
-            k += j;
-        }
+        const bool has_choice = has_length_choice(chain_class);
+        const int k = has_choice ? longer_.choose(u_length) : shortest_ + chain_class;
         const int s = technique_.choose(k, u_s);
-        return {s, k + 1 - s, pmf * technique_.pmf(k, s)};
+        return {s, k + 1 - s, (has_choice ? longer_.pmf(k) : 1.0) * technique_.pmf(k, s)};
     }
     bool has_length_choice(int chain_class) const {
         return chain_class == classes_ - 1 && shortest_ + chain_class < longest_;
     }
+
+private:
     /// Number of lengths of the last class for which the pilot's statistics of techniques are used.
     static constexpr int kTabulated = 16;
 
-private:
-    static constexpr double kLonger = 0.75;
-
     int shortest_, classes_, longest_;
+    LengthChoice longer_;  ///< Of the last class.
     TechniqueChoice technique_;
 };
 
@@ -68,47 +65,26 @@ protected:
         const int longest = paths_.max_depth();
         const int classes = std::min(lengths_, longest - kShortest + 1);
         const auto choice = std::make_shared<PathChoice>(
-            kShortest, classes, longest,
-            TechniqueChoice(kShortest, classes + PathChoice::kTabulated, hits_emitters(pass.scene),
-                            n.hit_lens > 0, pilot));
+            kShortest, classes, longest, hits_emitters(pass.scene), n.hit_lens > 0, pilot);
         PrimarySample sample = [this, n, choice](int k, const SampleContext& c, Workspace& work) {
-            c.sampler.seek(Stream::Selection, 0);
+            c.sampler.seek(Stream::Selection, addresses::kKind);
             const double u_length = c.sampler.next_1d_fine_if(choice->has_length_choice(k));
             const auto q = choice->choose(k, u_length, c.sampler.next_1d_fine());
             paths_.add_technique(c, n, q.s, q.t, float(1 / q.pmf), work);
         };
-        std::vector<ClassPlan> plan = shared_out(pilot, classes);
+        std::vector<ClassPlan> classes_plan = plan(pilot, classes);
         return {std::make_unique<PrimarySpace>(classes, std::move(sample), pilot.map),
-                std::move(plan)};
+                std::move(classes_plan)};
     }
 
 private:
-    /// Divides the chains among the classes in proportion to b_k/√k, since steps on longer paths take longer.
-    std::vector<ClassPlan> shared_out(const Pilot& pilot, int classes) const {
-        constexpr int kFewest = 4;
-        constexpr uint64_t kSmallestPool = 64;
-        std::vector<double> b(size_t(classes), 0.0), share(b);
+    std::vector<ClassPlan> plan(const Pilot& pilot, int classes) const {
+        std::vector<double> b(size_t(classes), 0.0), cost;
         for (const auto& [technique, value] : pilot.by_technique)
             b[size_t(std::clamp(technique.first - kShortest, 0, classes - 1))] += value;
-        double total = 0;
-        for (int i = 0; i < classes; ++i)
-            total += share[size_t(i)] = b[size_t(i)] / std::sqrt(double(kShortest + i));
-        const uint64_t pool = pool_samples(4 * pilot.precise_samples, options_);
-        const int spare = std::max(0, options_.chains - kFewest * classes);
-        std::vector<ClassPlan> plan;
-        double sum = 0;
-        int given = 0;
-        for (int i = 0; i < classes; ++i) {
-            sum += total > 0 ? share[size_t(i)] / total : 1.0 / classes;
-            const int upto = int(std::lround(sum * spare));
-            const int chains = kFewest + upto - given;
-            given = upto;
-            plan.push_back({.chains = chains,
-                            .pool = std::max(kSmallestPool,
-                                             pool * uint64_t(chains) / uint64_t(options_.chains)),
-                            .c = b[size_t(i)]});
-        }
-        return plan;
+        for (int i = 0; i < classes; ++i) cost.push_back(double(kShortest + i));
+        return share_out(pilot.constant(), std::move(b), cost,
+                         pool_samples(4 * pilot.precise_samples, options_), options_.chains);
     }
 
     int lengths_;

@@ -6,7 +6,7 @@
 //
 // The target of a photon with flux Φ at x is lum(Φ) times
 // - importons: the density of importance I at x, plus a floor. The power of a photon is b Φ / (lum(Φ) I).
-// - path: q min(1, h/h_0), where q is the density of the remainder of the path from x to the lens, and h the response of
+// - path: q a, with a = min(1, h/h_0) but at least 0.05, where q is the density of the remainder of the path from x to the lens, and h the response of
 //   the lens to this remainder. The power of a photon is b Φ/lum(Φ) r, where r is the number of trials of remainders until one succeeds with probability a, so that
 //   E[r] = 1/P(x). The printed power, Φ times a ratio of path contributions, compares densities over spaces of different
 //   dimensions.

@@ -1,6 +1,6 @@
 // A state is a path x_0 … x_k with photons at some of its vertices. Let x_i be one of them. The part of the target for this
 // photon is
-//     lum(f_map) q min(1, h/h_0) = min(lum(f_map) q, lum(f)/h_0),    h = lum(f) / (lum(f_map) q),
+//     lum(f_map) q a,    a = min(1, h/h_0) but at least 0.05,    h = lum(f) / (lum(f_map) q),
 // with the flux f_map of x_0 … x_i, the contribution f of the path to the image, and the density q of the remainder
 // x_{i+1} … x_k given x_0 … x_i. A photon of the global map is met by gather rays from D, the first diffuse vertex from
 // the eye. q is the even mixture of two ways to sample its remainder:
@@ -9,7 +9,7 @@
 // The remainder of a photon of the caustic map is a point on the lens.
 //
 // The power of a photon is (b/N) f_map/lum(f_map) r. Trials sample remainders from q until one succeeds with probability
-// min(1, h/h_0), and r is their number, so that E[r] is the reciprocal of the probability of success. It is independent of
+// a, and r is their number, so that E[r] is the reciprocal of the probability of success. It is independent of
 // the remainder of the state. Photons at the same x_0 … x_i therefore have the same expected power for every remainder.
 
 #include "integrator/path_photons.h"
@@ -20,6 +20,7 @@
 
 #include "math/hash.h"
 #include "math/statistics.h"
+#include "mcmc/addresses.h"
 #include "mcmc/path_space.h"
 
 namespace etendue {
@@ -51,10 +52,12 @@ public:
     std::array<double, 2> h0{};
 
     bool is_diffuse(const Vertex& v) const { return mapping_.is_diffuse(v); }
-    /// min(1, h/h_0)
+    /// a = min(1, h/h_0), but not below kLeast: any function of the path will do that is positive where f is, and a small
+    /// one costs many trials.
     double clamped(const Deposit& d) const {
+        constexpr double kLeast = 0.05;
         const double limit = h0[d.is_caustic];
-        return limit > 0 ? std::min(1.0, d.h / limit) : 1.0;
+        return limit > 0 ? std::clamp(d.h / limit, kLeast, 1.0) : 1.0;
     }
 
     template <class Use>
@@ -79,13 +82,13 @@ public:
                       .h = 0};
             d.unclamped = luminance(d.flux) * q;
             d.h = f / d.unclamped;
-            if (d.unclamped > 0 && std::isfinite(d.h)) use(d);
+            if (d.unclamped > 0) use(d);
         };
         for (int i = 1; i < k; ++i) {
             const auto origin = origins.next(x[i].v);
             if (!origin || k - i > kLongestRemainder) continue;
             if (i == k - 1 && *origin != MapPhoton::Origin::Any && !x[i].v.is_delta)
-                add(i, *origin, true, x[k].eye);
+                add(i, *origin, true, x.eye(k));
             if (i >= first && i < D && !x[D].v.is_delta) add(i, *origin, false, gathered(x, i, D));
         }
     }
@@ -118,18 +121,18 @@ private:
         const int k = x.last();
         double by_light = 0, by_eye = 0;
         if (d == k - 1) {
-            by_light = x[k].eye;
-            for (int j = i + 1; j < k; ++j) by_light *= x.ray_density_from_light(j);
+            by_light = x.eye(k);
+            for (int j = i + 1; j < k; ++j) by_light *= x.light(j);
         }
         if (d == i + 1 && !x[i].v.is_delta) {
-            by_eye = x[k].eye;
-            for (int j = i + 1; j < k; ++j) by_eye *= x.ray_density_from_eye(j);
+            by_eye = 1;
+            for (int j = i + 1; j <= k; ++j) by_eye *= x.eye(j);
         }
         return 0.5 * (by_light + by_eye);
     }
 
     bool sample_remainder(PathBuilder& builder, Sampler& sampler) const {
-        sampler.seek(Stream::Selection, 0);
+        sampler.seek(Stream::Selection, addresses::kKind);
         if (sampler.next_1d() < 0.5f) {
             for (int n = 0; n < kLongestRemainder; ++n) {
                 if (!builder.sample_light_step()) return false;
@@ -249,9 +252,12 @@ private:
                 x, [&](const Deposit& d) { sum += d.unclamped * rule_.clamped(d); });
             return sum / x.large_step_density();
         };
+        const auto stores = [this](const Vertex& v) {
+            return v.kind == Vertex::Kind::Surface && v.is_connectible && rule_.is_diffuse(v);
+        };
         space_.emplace(PathTarget{measure_, importance,
                                   LengthChoice(kShortest, measure_.longest, pilot), *techniques_,
-                                  user_},
+                                  user_, stores},
                        mutations_, TechniqueCounts{});
     }
 

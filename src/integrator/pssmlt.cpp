@@ -21,7 +21,7 @@ protected:
         use_roulette(pass.scene.film(), pilot);
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(pilot.precise_samples, options_),
-                             .c = pilot.b};
+                             .c = pilot.constant()};
         return {
             std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene, paths_), pilot.map),
             {plan}};

@@ -215,7 +215,10 @@ private:
                 const double part = W * double(luminance(join->contribution)) *
                                     double(join->mis_weight) * double(search.scale()) /
                                     double(join->pair_probability);
-                if (!std::isfinite(part)) return;
+                if (!std::isfinite(part)) {
+                    ++work.stats.rejected;
+                    return;
+                }
                 sum += part;
                 // Contributions that are small beside the target need not be precise.
                 const auto value = Bidirectional::test_with_survival(
@@ -293,7 +296,7 @@ protected:
 
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(pilot.precise_samples, options_),
-                             .c = pilot.b};
+                             .c = pilot.constant()};
         return {std::make_unique<GatherSpace>(*gathering_, map_, pilot.map), {plan}};
     }
 

@@ -1,6 +1,7 @@
 #include "mcmc/chain.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "math/hash.h"
 
@@ -106,6 +107,11 @@ void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t ke
         } else {
             proposal = space_.propose(class_, *x_, y_key, c, *y_);
             if (!proposal.has_failed) accept = y_->target * proposal.Q_ratio / x_->target;
+        }
+        if (!std::isfinite(accept)) {
+            // Of a NaN, std::min(1.0, accept) would make 1.
+            c.work.stats.rejected += std::isnan(accept);
+            accept = std::isnan(accept) ? 0 : 1;
         }
         accept = std::min(1.0, accept);
 

@@ -1,5 +1,6 @@
 #include "mcmc/chain_groups.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -46,6 +47,34 @@ std::vector<size_t> resample(std::span<const double> weights, size_t count, doub
         out.push_back(chosen);
     }
     return out;
+}
+
+std::vector<ClassPlan> share_out(double b, std::vector<double> b_of_class,
+                                 std::span<const double> cost, uint64_t pool, int chains) {
+    constexpr int kFewest = 4;
+    constexpr uint64_t kSmallestPool = 64;
+    constexpr double kLeast = 0.25;
+    const int classes = int(b_of_class.size());
+    double total = 0;
+    std::vector<double> shares;
+    for (size_t k = 0; k < b_of_class.size(); ++k) {
+        b_of_class[k] = std::max(b_of_class[k], kLeast * b / double(classes));
+        total += shares.emplace_back(b_of_class[k] / std::sqrt(cost[k]));
+    }
+    const int spare = std::max(0, chains - kFewest * classes);
+    std::vector<ClassPlan> plan;
+    double sum = 0;
+    int given = 0;
+    for (size_t k = 0; k < b_of_class.size(); ++k) {
+        sum += shares[k] / total;
+        const int upto = int(std::lround(sum * spare)), of_class = kFewest + upto - given;
+        given = upto;
+        plan.push_back(
+            {.chains = of_class,
+             .pool = std::max(kSmallestPool, pool * uint64_t(of_class) / uint64_t(chains)),
+             .c = b_of_class[k]});
+    }
+    return plan;
 }
 
 ChainGroups::ChainGroups(const StateSpace& space, const ChainOptions& options,

@@ -34,6 +34,12 @@ struct ClassPlan {
     double c = 0;       ///< See chain.h.
 };
 
+/// Plans for classes, of which a pilot found the parts `b_of_class` of b, and of which steps have these costs. Chains are
+/// shared out in proportion to b_k/√cost. A class of which the pilot found little counts as a quarter of the mean: its
+/// large steps may yet find light, which a constant c of zero would leave to chains that may never start.
+std::vector<ClassPlan> share_out(double b, std::vector<double> b_of_class,
+                                 std::span<const double> cost, uint64_t pool, int chains);
+
 class ChainGroups {
 public:
     ChainGroups(const StateSpace& space, const ChainOptions& options, std::vector<ClassPlan> plan);

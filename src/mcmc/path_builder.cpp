@@ -50,8 +50,12 @@ EmissionSample emission_from(const Vertex& x0, Vec2 u) {
 
 PathBuilder::PathBuilder(const PathMeasure& measure, Sampler& sampler, Workspace& work,
                          const PathState* x, int l, int m)
-    : measure_(measure), sampler_(sampler), work_(work), x_(x), l_(l),
-      m_(m), walk_{measure.scene, kNoCounts, work.stats, {}} {
+    : measure_(measure), sampler_(sampler), work_(work), x_(x), l_(l), m_(m),
+      light_end_(keeps_light() ? LightEnd::Kept : LightEnd::Hit),
+      eye_end_(keeps_eye() ? EyeEnd::Kept : EyeEnd::Connected), walk_{measure.scene,
+                                                                      kNoCounts,
+                                                                      work.stats,
+                                                                      {}} {
     work_.y.clear(), work_.z.clear();
     if (keeps_light()) keep(work_.y, (*x)[l].v, l >= 1 ? &(*x)[l - 1].v : nullptr);
     if (keeps_eye()) {
@@ -73,7 +77,8 @@ bool PathBuilder::step(const BsdfSample& s) {
 
 template <TransportMode mode>
 bool PathBuilder::sample_step() {
-    const SubPath& path = side(work_, mode);
+    SubPath& path = side(work_, mode);
+    path.flight.pdf_sa = 0;
     const Vertex& v = path[path.size() - 1];
     if (v.kind != Vertex::Kind::Surface) return false;
     sampler_.seek(mode == TransportMode::Radiance ? Stream::Eye : Stream::Light,
@@ -97,21 +102,41 @@ bool PathBuilder::step_eye(const BsdfSample& s) {
 }
 
 bool PathBuilder::start_light(const Emitter& emitter, const EmissionSample& e) {
+    if (!keeps_light()) light_end_ = LightEnd::Sampled;
     start_light_path(walk_, emitter, e, sampler_, work_.y);
     new_light_ = work_.y.size() - keeps_light();
     return work_.y.size() == 2;
 }
 
 bool PathBuilder::follow(const UserPaths& paths) {
+    light_end_ = LightEnd::Sampled;
     if (!paths.sample(walk_, sampler_, work_.y) || !light_end().is_connectible) return false;
     new_light_ = work_.y.size();
     return true;
 }
 
-bool PathBuilder::sample_light(int count, bool ends_at_lens) {
-    if (count == 0) return true;
-    ends_at_lens_ = ends_at_lens;
-    if (l_ < 0 && count == 1) return has_next_event_ = true;
+bool PathBuilder::sample(int from_light, int from_eye) {
+    if (!keeps_light())
+        light_end_ = from_light == 0   ? LightEnd::Hit
+                     : from_light == 1 ? LightEnd::NextEvent
+                                       : LightEnd::Sampled;
+    if (!keeps_eye())
+        eye_end_ = from_eye == 0   ? EyeEnd::Hit
+                   : from_eye == 1 ? EyeEnd::Connected
+                                   : EyeEnd::Sampled;
+    return sample_light(from_light) && sample_eye(from_eye);
+}
+
+bool PathBuilder::sample_eye_path(int count) {
+    eye_end_ = count == 1 ? EyeEnd::Connected : EyeEnd::Sampled;
+    return sample_eye(count);
+}
+
+bool PathBuilder::sample_light(int count) {
+    const bool ends_at_lens = eye_end_ == EyeEnd::Hit;
+    // The ray to the lens leaves a new vertex or a kept one; a next event has none.
+    if (ends_at_lens && (count == 0 || light_end_ == LightEnd::NextEvent)) return false;
+    if (count == 0 || light_end_ == LightEnd::NextEvent) return true;
     if (l_ <= 0) {
         sampler_.seek(Stream::Light, 0);
         const Scene& scene = measure_.scene;
@@ -150,6 +175,7 @@ bool PathBuilder::start_eye(Vec2 film) {
 }
 
 bool PathBuilder::start_eye_anywhere() {
+    eye_end_ = EyeEnd::Sampled;
     sampler_.seek(Stream::Eye, 0);
     const Vec2 u = sampler_.next_2d();
     film_ = {measure_.film.low.x + u.x * measure_.film.size.x,
@@ -160,9 +186,8 @@ bool PathBuilder::start_eye_anywhere() {
 }
 
 bool PathBuilder::sample_eye(int count) {
-    if (count == 0) return true;
+    if (count == 0 || eye_end_ == EyeEnd::Connected) return true;
     if (!keeps_eye()) {
-        if (count == 1) return true;
         if (!start_eye_anywhere()) return false;
     } else if (m_ == x_->last()) {
         sampler_.seek(Stream::Eye, 0);
@@ -275,33 +300,41 @@ bool PathBuilder::finish(PathState& y) {
     for (int i = keeps_light(); i < light.size(); ++i) y.append(light[i]);
 
     int sampled_eye = eye.size() - keeps_eye();
-    bool is_joined = !ends_at_lens_;
-    if (y.size() == 0) {
+    if (light_end_ == LightEnd::NextEvent || light_end_ == LightEnd::Hit) {
         if (eye.size() == 0) return false;
-        if (has_next_event_) {
+        if (light_end_ == LightEnd::NextEvent) {
             if (!append_emitter_point(eye_end(), y)) return false;
         } else {
             if (sampled_eye == 0 || !append_hit_emitter(eye_end(), y)) return false;
             --sampled_eye;
-            is_joined = false;
         }
     }
     const int joint = y.size() - 1;  // The edge that starts here joins both sides.
     const int first_eye = keeps_eye();
     for (int i = first_eye + sampled_eye; i-- > first_eye;) y.append(eye[i]);
     int changed = y.size();  // The last vertex with another neighbour.
-    if (ends_at_lens_) {
+    switch (eye_end_) {
+    case EyeEnd::Hit:
         if (!append_lens_hit(y)) return false;
-    } else if (sampled_eye == 0 && (!keeps_eye() || m_ == x_->last())) {
+        break;
+    case EyeEnd::Connected:
         if (!append_lens(y[joint].v, y)) return false;
-    } else if (keeps_eye()) {
+        break;
+    case EyeEnd::Kept:
+        if (m_ == x_->last() && sampled_eye == 0) {  // The kept lens, through another film point.
+            if (!append_lens(y[joint].v, y)) return false;
+            break;
+        }
         for (int i = m_; i <= x_->last(); ++i) y.append((*x_)[i]);
         y[changed].v.is_delta = eye[0].is_delta;
         y[changed].v.event = eye[0].event;
+        break;
+    case EyeEnd::Sampled: break;
     }
     const int k = y.last();
     changed = std::min(changed, k);
     if (k < measure_.shortest || k > measure_.longest) return false;
+    const bool is_joined = light_end_ != LightEnd::Hit && eye_end_ != EyeEnd::Hit;
     if (is_joined) {
         for (const int i : {joint, joint + 1}) {
             if (!y[i].v.is_connectible) return false;

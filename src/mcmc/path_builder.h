@@ -6,6 +6,22 @@
 
 namespace etendue {
 
+/// Where the first vertex of a path comes from.
+enum class LightEnd : uint8_t {
+    Kept,
+    Sampled,    ///< By emission.
+    NextEvent,  ///< As seen from x_1; there is no other new vertex on the light's side.
+    Hit         ///< The last vertex of the eye sub-path lies on an emitter.
+};
+
+/// Where the last vertex of a path comes from.
+enum class EyeEnd : uint8_t {
+    Kept,
+    Sampled,    ///< With a film point.
+    Connected,  ///< As seen from x_{k-1}; there is no other new vertex on the eye's side.
+    Hit         ///< The last ray of the light sub-path hits the lens.
+};
+
 class PathBuilder {
 public:
     /// Keeps x_0 … x_l and x_m … x_k. With l = -1 nothing is kept on the light's side, with m = k+1 nothing on the eye's
@@ -13,12 +29,11 @@ public:
     PathBuilder(const PathMeasure& measure, Sampler& sampler, Workspace& work, const PathState* x,
                 int l, int m);
 
-    /// Samples `count` vertices, starting from x_l or from an emitter; a single vertex on an emitter is a next event. If the
-    /// eye's side keeps no vertex and samples none (`ends_at_lens`), the last vertex is the point where the ray hits the
-    /// lens. False if a walk ends early.
-    bool sample_light(int count, bool ends_at_lens = false);
-    /// The same from x_m or from the lens. If the light's side has no vertex, the last one must lie on an emitter.
-    bool sample_eye(int count);
+    /// Samples vertices from x_l or from an emitter, and from x_m or from the lens. A side without a kept vertex gets its
+    /// end by a hit if it samples no vertex, and as seen from the other side if it samples one. False if a walk ends early.
+    bool sample(int from_light, int from_eye);
+    /// The same for the eye's side alone, where it keeps no vertex; `count` is at least 1.
+    bool sample_eye_path(int count);
 
     /// Starts the eye sub-path at the kept lens point, through a film point in pixels, and walks to its first surface.
     bool start_eye(Vec2 film);
@@ -44,6 +59,8 @@ public:
     bool finish(PathState& y);
 
 private:
+    bool sample_light(int count);
+    bool sample_eye(int count);
     template <TransportMode mode>
     bool step(const BsdfSample& s);
     template <TransportMode mode>
@@ -60,8 +77,9 @@ private:
     Workspace& work_;
     const PathState* x_;
     int l_, m_;
+    LightEnd light_end_;
+    EyeEnd eye_end_;
     int new_light_ = 0, new_eye_ = 0;  ///< Vertices sampled so far.
-    bool has_next_event_ = false, ends_at_lens_ = false;
     WalkContext walk_;
     Vec2 film_{};
 };

@@ -1,5 +1,9 @@
 #include "mcmc/path_space.h"
 
+#include <stdexcept>
+
+#include "mcmc/addresses.h"
+#include "mcmc/chain.h"
 #include "mcmc/mutation/bidirectional.h"
 #include "mcmc/mutation/caustic.h"
 #include "mcmc/mutation/eye_chain.h"
@@ -8,6 +12,25 @@
 #include "mcmc/mutation/user_path.h"
 
 namespace etendue {
+namespace {
+
+static_assert(1 + PathMutations::kCount <= ChainStats::kMutations);
+
+bool is_same_place(const Vertex& a, const Vertex& b) {
+    return a.p.x == b.p.x && a.p.y == b.p.y && a.p.z == b.p.z;
+}
+
+/// Throws std::logic_error if y does not have the kept ends of x where `way` says: Q would be that of another proposal.
+void expect_announced(const PathState& x, const PathState& y, const MutationWay& way) {
+    const int k = x.last(), k_y = y.last();
+    const bool is_as_announced = k_y - way.m_y == k - way.m && way.l < way.m && way.l < way.m_y &&
+                                 (way.l < 0 || is_same_place(x[way.l].v, y[way.l].v)) &&
+                                 (way.m > k || is_same_place(x[way.m].v, y[way.m_y].v));
+    if (!is_as_announced)
+        throw std::logic_error("Markov chain: a mutation made another path than it announced");
+}
+
+}  // namespace
 
 PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, TechniqueCounts counts)
     : target_(std::move(target)), options_(mutations), counts_(counts) {
@@ -24,7 +47,7 @@ PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, Techniqu
     mutations_[PathMutations::GlossyCaustic] =
         std::make_unique<CausticMutation>(Followed::Glossy, measure);
     mutations_[PathMutations::LensSubpath] = std::make_unique<LensSubpathMutation>();
-    mutations_[PathMutations::PhotonMap] = std::make_unique<PhotonMapMutation>();
+    mutations_[PathMutations::PhotonMap] = std::make_unique<PhotonMapMutation>(target_.stores);
     if (target_.user.paths)
         mutations_[PathMutations::UserPath] =
             std::make_unique<UserPathMutation>(*target_.user.paths);
@@ -34,7 +57,7 @@ void PathSpace::draw(int, uint64_t key, const ChainContext& c, ChainState& state
     auto& y = static_cast<PathState&>(state);
     Sampler sampler(SamplerKind::Independent, key);
     sampler.start(0, 0);
-    sampler.seek(Stream::Selection, 0);
+    sampler.seek(Stream::Selection, addresses::kKind);
     const double u_length = sampler.next_1d_fine(), u_technique = sampler.next_1d_fine();
     const bool follows_user = target_.user.paths && sampler.next_1d_fine() < target_.user.share;
     const MutationContext context{target_.measure, c, sampler};
@@ -42,24 +65,23 @@ void PathSpace::draw(int, uint64_t key, const ChainContext& c, ChainState& state
     y.set_black();
     if (follows_user) {
         y.edges = 0;
-        if (draw_user_path(builder, sampler) && builder.finish(y)) y.finish();
+        if (draw_user_path(builder, sampler) && builder.finish(y)) y.finish(c.work.stats);
         return;
     }
     const int k = target_.lengths.choose(u_length);
     const int s = target_.techniques.choose(k, u_technique);
     y.edges = k;
-    if (builder.sample_light(s, s == k + 1) && builder.sample_eye(k + 1 - s) && builder.finish(y))
-        y.finish();
+    if (builder.sample(s, k + 1 - s) && builder.finish(y)) y.finish(c.work.stats);
 }
 
 bool PathSpace::draw_user_path(PathBuilder& builder, Sampler& sampler) const {
     if (!builder.follow(*target_.user.paths)) return false;
     const int s = builder.light_vertices(), longest = target_.measure.longest;
     int t = std::max(1, target_.measure.shortest + 1 - s);
-    sampler.seek(Stream::Selection, 1);
+    sampler.seek(Stream::Selection, addresses::kPart);
     for (double u = sampler.next_1d_fine(); u < UserSteps::kLonger && s + t <= longest + 1; ++t)
         u /= UserSteps::kLonger;
-    return s + t <= longest + 1 && builder.sample_eye(t);
+    return s + t <= longest + 1 && builder.sample_eye_path(t);
 }
 
 PathSpace::Choices PathSpace::choices(const PathState& x) const {
@@ -90,7 +112,7 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
     auto& y = static_cast<PathState&>(to);
     Sampler sampler(SamplerKind::Independent, key);
     sampler.start(0, 0);
-    sampler.seek(Stream::Selection, 0);
+    sampler.seek(Stream::Selection, addresses::kKind);
     double u = double(sampler.next_1d());
     const Choices p = choices(x);
     int chosen = 0;
@@ -107,7 +129,8 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
         proposal.has_failed = true;
         return proposal;
     }
-    y.finish();
+    expect_announced(x, y, way);
+    y.finish(c.work.stats);
     if (!(y.target > 0)) return proposal;
     const double there = Q(kind, p, x, y, way), back = Q(kind, choices(y), y, x, way.back());
     // Targets are relative to the densities of large steps, Q is not.

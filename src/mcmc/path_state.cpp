@@ -94,11 +94,11 @@ void PathState::scatter(int i) {
         pdf_light = e.pdf;
         if (!e.f.is_zero()) pdf_eye = x.v.bsdf.eval(to_eye, to_light, TransportMode::Radiance).pdf;
     }
-    after.light = pdf_light * geometry_from_light(i + 1);
-    before.eye = pdf_eye * geometry_from_eye(i - 1);
+    after.light_ = pdf_light * geometry(i, i + 1);
+    before.eye_ = pdf_eye * geometry(i, i - 1);
     // An eye path that leaves the scene chooses among the emitters at infinity.
     if (before.v.is_infinite && !emitter().is_delta())
-        before.eye /= double(measure_.scene.infinite_emitters().size());
+        before.eye_ /= double(measure_.scene.infinite_emitters().size());
     x.value *= float(arrival(i)) * x.opacity;
 }
 
@@ -116,22 +116,22 @@ bool PathState::evaluate(int first, int last) {
         const Emitter::Emission emission = e.eval_emission(x0.v.ng, x0.v.uv, w);
         x0.value = emission.Le_cos;
         if (x0.value.is_zero()) return false;
-        x0.light = x0.next_event = measure_.unit_area * double(e.selection_pmf);
+        x0.light_ = x0.next_event_ = measure_.unit_area * double(e.selection_pmf);
         if (!e.is_delta()) {
             const EmitterHit hit = e.is_infinite()
                                        ? e.eval_infinite(x0.v.p)
                                        : e.eval_surface(x0.v.ng, x0.v.uv, x0.v.location.prim, w);
-            x0.light *= double(hit.pdf_y0);
-            x0.next_event *= double(hit.pdf);
+            x0.light_ *= double(hit.pdf_y0);
+            x0.next_event_ *= double(hit.pdf);
         }
-        x_[1].light = emission.pdf_d * geometry_from_light(1);
+        x_[1].light_ = emission.pdf_d * geometry(0, 1);
     }
     if (last >= k) {
         PathVertex& xk = x_[size_t(k)];
         const float pdf_dir =
             scene.sensor().pdf_direction(xk.v.p, direction(xk.v, x_[size_t(k) - 1].v));
-        xk.eye = measure_.unit_area * double(xk.v.pdf_fwd);
-        x_[size_t(k) - 1].eye = double(pdf_dir / measure_.film.area()) * geometry_from_eye(k - 1);
+        xk.eye_ = measure_.unit_area * double(xk.v.pdf_fwd);
+        x_[size_t(k) - 1].eye_ = double(pdf_dir / measure_.film.area()) * geometry(k, k - 1);
         xk.value = Rgb(float(sqr(measure_.unit_area) * inverse_square(x_[size_t(k) - 1].v, xk.v) *
                              double(pdf_dir * xk.v.pdf_fwd)));
         if (xk.value.is_zero()) return false;
@@ -175,27 +175,24 @@ double PathState::density(int s) const {
     const int n = size();
     if (s == 0 ? emitter().is_delta() : s < n && !is_connected_at(s - 1)) return 0;
     double p = 1;
-    for (int i = 0; i < s; ++i)
-        p *= i > 0 ? ray_density_from_light(i) : s == 1 ? x_[0].next_event : x_[0].light;
+    for (int i = 0; i < s; ++i) p *= s == 1 ? next_event() : light(i);
     return p * eye_density(s);
 }
 
 double PathState::eye_density(int s) const {
-    const int k = last();
     double p = 1;
-    for (int i = s; i <= k; ++i) p *= i == k ? x_[size_t(i)].eye : ray_density_from_eye(i);
+    for (int i = s; i <= last(); ++i) p *= eye(i);
     return p;
 }
 
 double PathState::density(const UserPaths& paths, int s) const {
-    if (s < 2) return 0;
+    if (s < 2 || s >= size() || !is_connected_at(s - 1)) return 0;
     std::vector<const Vertex*> light;
     double p = 1;
     for (int i = 0; i < s; ++i) {
-        const PathVertex& x = x_[size_t(i)];
-        light.push_back(&x.v);
+        light.push_back(&x_[size_t(i)].v);
         p *= measure_.unit_area;
-        if (i > 0) p *= double(x_[size_t(i) - 1].transmittance * x.opacity);
+        if (i > 0) p *= met_from_light(i);
     }
     return p * paths.density(light);
 }
@@ -209,11 +206,9 @@ double PathState::independent_path_density() const {
     const UserSteps& user = target_.user;
     if (!user.paths) return T;
     double T_user = 0;
-    for (int s = 2; s <= std::min(k, user.paths->longest()); ++s) {
-        if (!is_connected_at(s - 1)) continue;
+    for (int s = 2; s <= std::min(k, user.paths->longest()); ++s)
         if (const double p = density(*user.paths, s); p > 0)
             T_user += p * UserSteps::pmf(s, k + 1 - s, measure_.shortest) * eye_density(s);
-    }
     return (1 - user.share) * T + user.share * T_user;
 }
 
@@ -245,15 +240,18 @@ void PathState::set_black() {
     splats.clear();
 }
 
-void PathState::finish() {
+void PathState::finish(RenderStats& stats) {
     set_black();
     edges = last();
     const double T = large_step_density_ = independent_path_density();
-    if (!(T > 0)) return;
+    if (T == 0) return;
     const PathProduct f = contribution();
     const Rgb value(float(f[0] / T), float(f[1] / T), float(f[2] / T));
-    if (!is_finite(value)) return;
     const double I = target_.importance(*this, value);
+    if (!std::isfinite(T) || !is_finite(value) || !std::isfinite(I)) {
+        ++stats.rejected;
+        return;
+    }
     if (!(I > 0)) return;
     target = I;
     splats.push_back({film, value});
@@ -360,7 +358,8 @@ void PathState::load(LearnedState& from) {
         x_.back().transmittance = s.transmittance;
     }
     const double saved_target = target;
-    if (size() >= 2 && evaluate(0, last())) finish();
+    RenderStats unused;
+    if (size() >= 2 && evaluate(0, last())) finish(unused);
     if (target != saved_target) throw std::runtime_error("the learned state is of another scene");
 }
 

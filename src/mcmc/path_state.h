@@ -58,6 +58,8 @@ struct PathTarget {
     LengthChoice lengths;
     TechniqueChoice techniques;
     UserSteps user{};
+    /// Whether photons are stored at a vertex, for photon map proposals; by default wherever it can be connected.
+    std::function<bool(const Vertex&)> stores = [](const Vertex& v) { return v.is_connectible; };
 };
 
 /// A product over the vertices of a path, by colour. Long paths exceed the range of float.
@@ -65,13 +67,10 @@ using PathProduct = std::array<double, 3>;
 double luminance(const PathProduct& f);
 
 /// A vertex of a full path.
-struct PathVertex {
+class PathVertex {
+public:
     /// `is_delta` and `event` describe how the path scatters here; x_0 has Kind::Emitter.
     Vertex v;
-    /// Densities per unit_area, as sampled from the light's side and from the eye's side. That of x_{k-1} as sampled from
-    /// x_k is that of a film point anywhere on the film.
-    double light = 1, eye = 1;
-    double next_event = 0;  ///< For x_0: its density as next event estimation samples it from x_1.
     /// Probabilities of a delta event from either side.
     float light_pmf = 1, eye_pmf = 1;
     /// The factor of f that belongs to this vertex, with the edge before it.
@@ -79,6 +78,13 @@ struct PathVertex {
     Rgb attenuation;          ///< On the edge to the next vertex.
     float transmittance = 1;  ///< Of the masks on this edge; 0 if the edge is blocked.
     float opacity = 1;        ///< Probability that a ray meets the surface.
+
+private:
+    friend class PathState;
+    /// Densities per unit_area of its place, without masks, as sampled from the light's side and from the eye's side. Only
+    /// PathState::light() and eye(), which include masks, are densities of a traced path.
+    double light_ = 1, eye_ = 1;
+    double next_event_ = 0;
 };
 
 class PathState final : public ChainState {
@@ -94,9 +100,17 @@ public:
     bool is_connected_at(int i) const {
         return !x_[size_t(i)].v.is_delta && !x_[size_t(i) + 1].v.is_delta;
     }
-    /// Density of x_i per unit_area, given x_{i+1} or x_{i-1}, if directions have density 1 per steradian.
-    double geometry_from_eye(int i) const { return geometry(i + 1, i); }
-    double geometry_from_light(int i) const { return geometry(i - 1, i); }
+    /// Density of x_i per unit_area, as a walk from the light samples it after x_{i-1}: the ray passes the masks of the
+    /// edge, and meets the surface. That of x_0 is the density of emission; that of x_k belongs to a ray that hits the lens.
+    double light(int i) const { return x_[size_t(i)].light_ * (i == 0 ? 1.0 : met_from_light(i)); }
+    /// The same for a walk from the eye, after x_{i+1}. That of x_{k-1} is the density of a film point anywhere on the
+    /// film, that of x_0 belongs to a ray that hits the emitter or leaves the scene.
+    double eye(int i) const { return x_[size_t(i)].eye_ * (i == last() ? 1.0 : met_from_eye(i)); }
+    /// Density of x_0, as next event estimation samples it from x_1.
+    double next_event() const { return x_[0].next_event_; }
+    /// Density of x_i, i ≥ 1, after x_{i-1}, and of x_i, i < k, after x_{i+1}, if directions have density 1 per steradian.
+    double geometry_from_light(int i) const { return geometry(i - 1, i) * met_from_light(i); }
+    double geometry_from_eye(int i) const { return geometry(i + 1, i) * met_from_eye(i); }
     Vec2 film{};
 
     void clear() {
@@ -113,23 +127,14 @@ public:
     /// Traces the edge from x_i to x_{i+1}. In scenes without masks, only edges that no ray has tested need this.
     bool trace_edge(int i, RenderStats& stats);
     /// Sets the target and the contribution to the film, when everything else is known. Both are divided by the density of
-    /// large steps, as if the state were one of primary sample space.
-    void finish();
+    /// large steps, as if the state were one of primary sample space. Values that are not finite are left out and counted.
+    void finish(RenderStats& stats);
     /// Makes this a path that contributes nothing.
     void set_black();
     /// Density with which the technique C(s, k+1-s) samples the path.
     double density(int s) const;
-    /// Density per unit_area with which `paths` sample x_0 … x_{s-1}.
+    /// Density per unit_area with which `paths` sample x_0 … x_{s-1}, to be joined to x_s; zero if these are not joined.
     double density(const UserPaths& paths, int s) const;
-    /// Density of x_i per unit_area as a ray from x_{i-1} or from x_{i+1} samples it: it passes the masks before it, and
-    /// meets its surface.
-    double ray_density_from_light(int i) const {
-        return x_[size_t(i)].light *
-               double(x_[size_t(i) - 1].transmittance * x_[size_t(i)].opacity);
-    }
-    double ray_density_from_eye(int i) const {
-        return x_[size_t(i)].eye * double(x_[size_t(i)].transmittance * x_[size_t(i)].opacity);
-    }
     double large_step_density() const { return large_step_density_; }
     /// f, the contribution to the image.
     PathProduct contribution() const;
@@ -147,7 +152,15 @@ private:
     double independent_path_density() const;
     /// Density with which an eye sub-path samples x_s … x_k.
     double eye_density(int s) const;
+    /// Without masks.
     double geometry(int from, int to) const;
+    /// Probability that a ray from x_{i-1} to x_i, or from x_{i+1} to x_i, passes the masks of the edge and meets x_i.
+    double met_from_light(int i) const {
+        return double(x_[size_t(i) - 1].transmittance * x_[size_t(i)].opacity);
+    }
+    double met_from_eye(int i) const {
+        return double(x_[size_t(i)].transmittance * x_[size_t(i)].opacity);
+    }
     double arrival(int i) const;
     void scatter(int i);
     Vec3 lens_point() const;

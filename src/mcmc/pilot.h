@@ -22,6 +22,10 @@ struct Pilot {
     /// Mean of the target by length and number of light vertices.
     std::map<std::pair<int, int>, double> by_technique;  ///< (edges, s)
 
+    /// The constant c of chains (chain.h): b. If the pilot found nothing, large steps alone find light, and count as
+    /// independent samples.
+    double constant() const { return b > 0 ? b : 1e30; }
+
     void save(LearnedState& to) const;
     void load(LearnedState& from);
 };

@@ -66,10 +66,30 @@ LengthChoice::LengthChoice(int shortest, int longest, const Pilot& pilot)
     if (!(sum > 0)) return;
     by_energy_ = 1 - kUniform;
     for (double& e : energy_) e /= sum;
+    fit_ratio();
+}
+
+void LengthChoice::fit_ratio() {
+    constexpr double kSmallest = 0.75, kLargest = 0.98;
+    // A geometric distribution of j ≥ 0 with the mean m has the ratio m/(1+m). Here j counts from the median on. The square
+    // root is larger, since the pilot may have missed the longest paths.
+    double shorter = 0, longer = 0, sum = 0;
+    for (size_t i = 0, median = 0; i < energy_.size(); ++i) {
+        shorter += energy_[i];
+        if (shorter < 0.5) {
+            median = i + 1;
+            continue;
+        }
+        longer += energy_[i];
+        sum += energy_[i] * double(i - median);
+    }
+    const double ratio = longer > 0 ? std::sqrt(sum / (longer + sum)) : 0.0;
+    ratio_ = std::clamp(ratio, kSmallest, kLargest);
 }
 
 double LengthChoice::geometric(int k) const {
-    return std::pow(kLonger, k - shortest_) * (k == longest_ ? 1 : 1 - kLonger);
+    const double lengths = double(longest_ - shortest_) + 1;
+    return std::pow(ratio_, k - shortest_) * (1 - ratio_) / (1 - std::pow(ratio_, lengths));
 }
 
 double LengthChoice::pmf(int k) const {
@@ -79,9 +99,9 @@ double LengthChoice::pmf(int k) const {
 
 int LengthChoice::choose(double u) const {
     if (u < by_energy_) return shortest_ + pick(energy_, u / by_energy_);
-    const double v = (u - by_energy_) / (1 - by_energy_);
-    const double longer = std::log1p(-v) / std::log(kLonger);
-    return longer < longest_ - shortest_ ? shortest_ + int(longer) : longest_;
+    const double most = longest_ - shortest_;
+    const double v = (u - by_energy_) / (1 - by_energy_) * (1 - std::pow(ratio_, most + 1));
+    return shortest_ + int(std::min(most, std::log1p(-v) / std::log(ratio_)));
 }
 
 }  // namespace etendue

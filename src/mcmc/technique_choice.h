@@ -26,7 +26,9 @@ private:
     std::vector<std::vector<double>> pmf_;  ///< By length, then s.
 };
 
-/// p(k): four fifths in proportion to the light of each length, one fifth geometric, so that every length is possible.
+/// p(k): four fifths in proportion to the light of each length, one fifth geometric, so that every length is possible. The
+/// ratio of the latter is fitted to the pilot: if light decreased more slowly with the length than p(k) does, the few
+/// longest paths would have arbitrarily large weights.
 class LengthChoice {
 public:
     LengthChoice(int shortest, int longest, const Pilot& pilot);
@@ -34,10 +36,11 @@ public:
     int choose(double u) const;
 
 private:
-    static constexpr double kLonger = 0.75;
+    void fit_ratio();
     double geometric(int k) const;
 
     int shortest_, longest_;
+    double ratio_ = 0.75;  ///< Of the probabilities of successive lengths of the geometric part.
     double by_energy_ = 0;
     std::vector<double> energy_;  ///< Shares of the light, from the shortest length on.
 };

@@ -9,6 +9,7 @@
 #include "description/json_text.h"
 #include "description/source_location.h"
 #include "math/warp.h"
+#include "mcmc/addresses.h"
 #include "readers/file_bytes.h"
 
 namespace etendue {
@@ -371,7 +372,7 @@ int UserPaths::longest() const {
 
 bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) const {
     y.clear();
-    sampler.seek(Stream::Selection, 0x100);
+    sampler.seek(Stream::Selection, addresses::kUserPath);
     const auto i = std::min(size_t(sampler.next_1d() * float(paths_.size())), paths_.size() - 1);
     const UserPath& path = paths_[i];
     const Emitter& emitter = *path.emitter;
@@ -384,6 +385,8 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
                      .pdf_d = 0,
                      .uv = path.uv,
                      .prim = path.prim};
+    // As for traced paths, each vertex has its own numbers, even if it reads only that of a mask.
+    sampler.seek(Stream::Light, 0);
     const Vec2 u = sampler.next_2d();
     if (emitter.is_area()) {
         const Vec2 disc = sample_uniform_disk(u) * path.radius;
@@ -414,10 +417,10 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
     for (size_t j = 1; j + 1 < points.size(); ++j) {
         const Vertex& v = y[int(j)];
         std::optional<BsdfSample> s;
+        sampler.seek(Stream::Light, j);
         if (points[j].is_delta) {
             s = v.bsdf.sample_delta(v.wo, points[j].event, TransportMode::Importance);
         } else if (v.is_connectible) {
-            sampler.seek(Stream::Selection, 0x100 + j);
             const Vec3 w =
                 sample_cone(normalize(points[j + 1].p - v.p), points[j].versine, sampler.next_2d());
             const BsdfEval f = v.eval_unguided(w, TransportMode::Importance);

@@ -1,22 +1,29 @@
 #include "mcmc/mutation/bidirectional.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
+
+#include "mcmc/addresses.h"
 
 namespace etendue {
 namespace {
 
 /// Weight of deleting this number of edges, where an edge beyond the emitter or the lens counts, too.
 double deletion_weight(int edges) {
-    return edges == 1 ? 0.25 : edges == 2 ? 0.5 : std::exp2(-edges);
+    return edges == 1 ? 0.25 : edges == 2 ? 0.5 : std::ldexp(1.0, -edges);
 }
 
-/// Weight of inserting `more` edges more than are deleted.
+/// Weights of inserting up to this many edges more or fewer than are deleted.
 constexpr int kMostMore = 12;
+constexpr auto kInsertionWeights = [] {
+    std::array<double, kMostMore + 1> weights{0.5, 0.15};
+    for (size_t n = 2; n < weights.size(); ++n) weights[n] = 0.2 / double(uint64_t(1) << n);
+    return weights;
+}();
 double insertion_weight(int more) {
-    const int n = std::abs(more);
-    return n == 0 ? 0.5 : n == 1 ? 0.15 : n <= kMostMore ? 0.2 * std::exp2(-n) : 0.0;
+    return std::abs(more) <= kMostMore ? kInsertionWeights[size_t(std::abs(more))] : 0.0;
 }
 
 /// Largest number of edges that can be deleted, including those to x_{-1} and x_{k+1}, which are not vertices.
@@ -24,107 +31,109 @@ int most_deleted(int edges) {
     return edges + 2;
 }
 
+/// Σ deletion_weight
 double deletion_sum(int edges) {
-    double sum = 0;
-    for (int d = 1; d <= most_deleted(edges); ++d) sum += deletion_weight(d);
-    return sum;
+    return 1 - std::ldexp(1.0, -most_deleted(edges));
 }
+
+/// Where this number of edges can be deleted: the smallest index l, and the number of places. Nothing is kept beyond the
+/// emitter or the lens: l < k and m > 0.
+struct Places {
+    int first, count;
+    Places(int deleted, int edges)
+        : first(std::max(-1, 1 - deleted)),
+          count(std::min(edges - 1, edges + 1 - deleted) - first + 1) {}
+};
 
 /// p_d(l, m | x)
 double deletion_pmf(int deleted, int edges) {
-    const int places = most_deleted(edges) + 1 - deleted;
-    return deletion_weight(deleted) / (deletion_sum(edges) * places);
+    return deletion_weight(deleted) / (deletion_sum(edges) * Places(deleted, edges).count);
 }
 
 }  // namespace
 
 BidirectionalMutation::BidirectionalMutation(const PathMeasure& measure)
     : measure_(measure), hits_(false), hits_lens_(measure.scene.sensor().has_finite_lens()) {
-    for (const auto& e : measure.scene.emitters()) hits_ |= !e->is_delta();
+    const auto& emitters = measure.scene.emitters();
+    for (const auto& e : emitters) hits_ |= !e->is_delta();
+    has_one_origin_ = emitters.size() == 1 && !hits_;
 }
 
-bool BidirectionalMutation::is_possible(int inserted, int deleted, int edges) const {
-    // One edge for one is the same path.
-    const int k = edges - deleted + inserted;
-    return inserted >= 1 && !(inserted == 1 && deleted == 1) && k >= measure_.shortest &&
-           k <= measure_.longest;
+bool BidirectionalMutation::is_possible(const Gap& gap, int inserted) const {
+    const int k = gap.edges - gap.deleted() + inserted;
+    if (inserted < 1 || k < measure_.shortest || k > measure_.longest) return false;
+    // Without a new vertex, both sides need a kept one. One edge for one is the same path, as is another end of the path if
+    // there is only one.
+    if (inserted == 1) return gap.deleted() > 1 && gap.l >= 0 && gap.m <= gap.edges;
+    if (inserted == 2 && gap.deleted() == 2)
+        return gap.m > gap.edges ? hits_lens_ : gap.l >= 0 || !has_one_origin_;
+    return true;
 }
 
-double BidirectionalMutation::insertion_pmf(int inserted, int deleted, int edges) const {
-    if (!is_possible(inserted, deleted, edges)) return 0;
+double BidirectionalMutation::insertion_sum(const Gap& gap) const {
     double sum = 0;
-    for (int a = deleted - kMostMore; a <= deleted + kMostMore; ++a)
-        if (is_possible(a, deleted, edges)) sum += insertion_weight(a - deleted);
-    return insertion_weight(inserted - deleted) / sum;
+    for (int more = -kMostMore; more <= kMostMore; ++more)
+        if (is_possible(gap, gap.deleted() + more)) sum += insertion_weight(more);
+    return sum;
 }
 
-BidirectionalMutation::Splits BidirectionalMutation::splits(const PathState& x, int l, int m,
+BidirectionalMutation::Splits BidirectionalMutation::splits(const PathState& x, const Gap& gap,
                                                             int n) const {
     // If no vertex is sampled on a side, the kept vertex there is connected; if none is kept, the emitter or lens is hit.
-    const bool joins_light = l >= 0 ? x[l].v.is_connectible : hits_;
-    const bool joins_eye = m <= x.last() ? x[m].v.is_connectible : hits_lens_;
+    const bool joins_light = gap.l >= 0 ? x[gap.l].v.is_connectible : hits_;
+    const bool joins_eye = gap.m <= x.last() ? x[gap.m].v.is_connectible : hits_lens_;
     return {joins_light ? 0 : 1, joins_eye ? n : n - 1};
 }
 
 bool BidirectionalMutation::propose(const PathState& x, const MutationContext& c, PathState& y,
                                     MutationWay& way) const {
     const int k = x.last();
-    c.sampler.seek(Stream::Selection, 1);
+    c.sampler.seek(Stream::Selection, addresses::kPart);
     double u = double(c.sampler.next_1d()) * deletion_sum(k);
     int deleted = 1;
     for (; deleted < most_deleted(k); ++deleted)
         if ((u -= deletion_weight(deleted)) < 0) break;
-    const int places = most_deleted(k) + 1 - deleted;
-    way.l = std::min(int(c.sampler.next_1d() * float(places)), places - 1) - 1;
-    way.m = way.l + deleted;
+    const Places places(deleted, k);
+    const int place = std::min(int(c.sampler.next_1d() * float(places.count)), places.count - 1);
+    const Gap gap{places.first + place, places.first + place + deleted, k};
 
-    double v = c.sampler.next_1d();
+    double v = double(c.sampler.next_1d()) * insertion_sum(gap);
     int inserted = 0;
-    for (int a = std::max(1, deleted - kMostMore); a <= deleted + kMostMore; ++a) {
-        const double p = insertion_pmf(a, deleted, k);
-        if (p > 0) inserted = a;
-        if ((v -= p) < 0) break;
+    for (int more = -kMostMore; more <= kMostMore; ++more) {
+        if (!is_possible(gap, deleted + more)) continue;
+        inserted = deleted + more;
+        if ((v -= insertion_weight(more)) < 0) break;
     }
     if (inserted == 0) return false;
-    way.m_y = way.l + inserted;
+    way = {.l = gap.l, .m = gap.m, .m_y = gap.l + inserted};
     const int n = inserted - 1;
-    const Splits s = splits(x, way.l, way.m, n);
+    const Splits s = splits(x, gap, n);
     if (s.last < s.first) return false;
     const int from_light =
         std::min(s.first + int(c.sampler.next_1d() * float(s.last - s.first + 1)), s.last);
-
     PathBuilder builder = c.builder(&x, way.l, way.m);
-    const int from_eye = n - from_light;
-    const bool ends_at_lens = way.m > k && from_eye == 0;
-    return builder.sample_light(from_light, ends_at_lens) && builder.sample_eye(from_eye) &&
-           builder.finish(y);
+    return builder.sample(from_light, n - from_light) && builder.finish(y);
 }
 
 double BidirectionalMutation::Q(const PathState& x, const PathState& y,
                                 const MutationWay& way) const {
-    const int deleted = way.m - way.l, inserted = way.m_y - way.l, n = inserted - 1;
-    const Splits s = splits(x, way.l, way.m, n);
-    if (s.last < s.first) return 0;
-    const auto from_light = [&](int i, int count) {
-        // If x_0 is the only vertex on the light's side, a next event samples it.
-        if (i == 0) return count == 1 ? y[0].next_event : y[0].light;
-        return y[i].light * double(y[i - 1].transmittance * y[i].opacity);
-    };
-    const auto from_eye = [&](int i) {
-        return i == y.last() ? y[i].eye : y[i].eye * double(y[i].transmittance * y[i].opacity);
-    };
+    const Gap gap{way.l, way.m, x.last()};
+    const int inserted = way.m_y - way.l;
+    const Splits s = splits(x, gap, inserted - 1);
+    if (s.last < s.first || !is_possible(gap, inserted)) return 0;
     double sum = 0;
     for (int count = s.first; count <= s.last; ++count) {
         const int joint = way.l + count;  // The vertex before the edge that joins both sides.
         const bool is_hit = joint < 0 || joint == y.last();
         if (is_hit ? joint < 0 && y.emitter().is_delta() : !y.is_connected_at(joint)) continue;
         double p = 1;
-        for (int i = way.l + 1; i <= joint; ++i) p *= from_light(i, joint + 1);
-        for (int i = joint + 1; i < way.m_y; ++i) p *= from_eye(i);
+        // If x_0 is the only vertex on the light's side, a next event samples it.
+        for (int i = way.l + 1; i <= joint; ++i) p *= joint == 0 ? y.next_event() : y.light(i);
+        for (int i = joint + 1; i < way.m_y; ++i) p *= y.eye(i);
         sum += p;
     }
-    return deletion_pmf(deleted, x.last()) * insertion_pmf(inserted, deleted, x.last()) * s.pmf() *
-           sum;
+    return deletion_pmf(gap.deleted(), gap.edges) *
+           (insertion_weight(inserted - gap.deleted()) / insertion_sum(gap)) * s.pmf() * sum;
 }
 
 }  // namespace etendue

@@ -22,13 +22,20 @@ private:
         int first, last;
         double pmf() const { return 1.0 / (last - first + 1); }
     };
-    Splits splits(const PathState& x, int l, int m, int n) const;
-    /// p(inserted edges | deleted edges, edges of x).
-    double insertion_pmf(int inserted, int deleted, int edges) const;
-    bool is_possible(int inserted, int deleted, int edges) const;
+    /// What a mutation deletes of a path of `edges` edges: everything between x_l and x_m.
+    struct Gap {
+        int l, m, edges;
+        int deleted() const { return m - l; }
+    };
+    Splits splits(const PathState& x, const Gap& gap, int n) const;
+    /// Whether a new path can come of inserting so many edges.
+    bool is_possible(const Gap& gap, int inserted) const;
+    /// Sum of the weights of all numbers of edges that can be inserted.
+    double insertion_sum(const Gap& gap) const;
 
     const PathMeasure& measure_;
     bool hits_, hits_lens_;
+    bool has_one_origin_;  ///< Whether all paths begin at one point or direction.
 };
 
 }  // namespace etendue

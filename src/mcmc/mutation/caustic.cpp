@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mcmc/addresses.h"
+
 namespace etendue {
 
 CausticMutation::CausticMutation(Followed events, const PathMeasure& measure)
@@ -44,7 +46,7 @@ bool CausticMutation::propose(const PathState& x, const MutationContext& c, Path
                               MutationWay& way) const {
     const int k = x.last(), l = first(x);
     way = {.l = l, .m = k, .m_y = k};
-    c.sampler.seek(Stream::Selection, 1);
+    c.sampler.seek(Stream::Selection, addresses::kPart);
     way.angle = range(x, l).sample(c.sampler.next_1d());
     const float u = c.sampler.next_1d();
     PathBuilder builder = c.builder(&x, l, k);

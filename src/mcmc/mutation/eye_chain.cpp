@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mcmc/addresses.h"
+
 namespace etendue {
 namespace {
 
@@ -44,7 +46,7 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
                                MutationWay& way) const {
     const int k = x.last(), end = chains(x).end;
     way = {.l = end - 1, .m = k, .m_y = k};
-    c.sampler.seek(Stream::Selection, 1);
+    c.sampler.seek(Stream::Selection, addresses::kPart);
     const float r = range_.sample(c.sampler.next_1d());
     const float azimuth = 2 * kPi * c.sampler.next_1d();
     PathBuilder builder = c.builder(&x, end - 1, k);
@@ -57,7 +59,7 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
         if (is_followed(x, i, events_)) {
             s = follow(at, x, i, TransportMode::Radiance);
         } else if (at.is_connectible) {
-            c.sampler.seek(Stream::Selection, 2 + uint64_t(i));
+            c.sampler.seek(Stream::Selection, addresses::kTurn + uint64_t(i));
             const float angle = kTurns.sample(c.sampler.next_1d());
             s = BsdfSample{.wi = turned(direction(like, x[i - 1].v), angle, c.sampler.next_1d()),
                            .weight = Rgb(1),
@@ -77,7 +79,7 @@ double EyeChainMutation::Q(const PathState& x, const PathState& y, const Mutatio
     for (int i = k - 1; i > std::max(way.l, 0); --i)
         if (!is_same_event(x, y, i, events_)) return 0;
     // Film points, turned directions and half vectors have the same density in both directions.
-    double p = y[k - 1].eye;
+    double p = y.eye(k - 1);
     for (int i = k - 1; i > way.l + 1; --i)
         p *= is_followed(y, i, events_) ? followed_density(y, i, TransportMode::Radiance)
                                         : y.geometry_from_eye(i - 1);

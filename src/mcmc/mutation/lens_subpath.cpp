@@ -27,7 +27,7 @@ bool LensSubpathMutation::propose(const PathState& x, const MutationContext& c, 
 
 double LensSubpathMutation::Q(const PathState&, const PathState& y, const MutationWay& way) const {
     double p = 1;
-    for (int i = way.l + 1; i <= y.last(); ++i) p *= y[i].eye;
+    for (int i = way.l + 1; i <= y.last(); ++i) p *= y.eye(i);
     return p;
 }
 

@@ -61,7 +61,7 @@ double followed_density(const PathState& x, int i, TransportMode mode) {
     const bool from_eye = mode == TransportMode::Radiance;
     const PathVertex& at = x[i];
     if (at.v.is_delta)
-        return from_eye ? x[i - 1].eye / double(at.eye_pmf) : x[i + 1].light / double(at.light_pmf);
+        return from_eye ? x.eye(i - 1) / double(at.eye_pmf) : x.light(i + 1) / double(at.light_pmf);
     // A half vector turns by dω / (4 cos θ) if one direction turns by dω.
     const double cosine = double(dot(direction(at.v, x[i - 1].v), direction(at.v, x[i + 1].v)));
     const double cos_half = std::sqrt(std::max(0.5 * (1 + cosine), 1e-12));

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "mcmc/addresses.h"
 #include "mcmc/mutation/perturbation.h"
 
 namespace etendue {
@@ -11,9 +12,9 @@ constexpr float kCone = 30 * kPi / 180;  ///< Half-angle [Fan et al. 2005, §5.3
 
 }  // namespace
 
-int PhotonMapMutation::next(const PathState& x, int i) {
+int PhotonMapMutation::next(const PathState& x, int i) const {
     do --i;
-    while (i > 0 && !x[i].v.is_connectible);
+    while (i > 0 && !stores_(x[i].v));
     return i;
 }
 
@@ -27,7 +28,7 @@ bool PhotonMapMutation::suits(const PathState& x) const {
 bool PhotonMapMutation::propose(const PathState& x, const MutationContext& c, PathState& y,
                                 MutationWay& way) const {
     const int m = seen(x), l = next(x, m) - 1;
-    c.sampler.seek(Stream::Selection, 1);
+    c.sampler.seek(Stream::Selection, addresses::kPart);
     const float versine = 2 * float(std::pow(std::sin(kCone / 2), 2)) * c.sampler.next_1d();
     const float u = c.sampler.next_1d();
     PathBuilder builder = c.builder(&x, l, m);
@@ -36,7 +37,7 @@ bool PhotonMapMutation::propose(const PathState& x, const MutationContext& c, Pa
                        .pdf = 1,
                        .pdf_rev = 1};
     if (!builder.step_eye(s)) return false;
-    for (int n = l + 3; !builder.eye_end().is_connectible; ++n)
+    for (int n = l + 3; !stores_(builder.eye_end()); ++n)
         if (n > c.measure.longest || !builder.sample_eye_step()) return false;
     if (!builder.finish(y)) return false;
     way = {.l = l, .m = m, .m_y = y.last() - (x.last() - m)};
@@ -46,7 +47,7 @@ bool PhotonMapMutation::propose(const PathState& x, const MutationContext& c, Pa
 double PhotonMapMutation::Q(const PathState&, const PathState& y, const MutationWay& way) const {
     // The density in the cone is the same in both directions.
     double p = y.geometry_from_eye(way.m_y - 1);
-    for (int i = way.m_y - 2; i > way.l; --i) p *= y[i].eye;
+    for (int i = way.m_y - 2; i > way.l; --i) p *= y.eye(i);
     return p;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
-// Photon map proposal [Fan et al. 2005, §5.3]: the direction from the first vertex that the eye sees is turned, as for
-// another ray of a final gather. The eye sub-path continues by delta events to the next vertex that can be connected, where
-// the photon is stored, and this vertex is joined to the kept part.
+// Photon map proposal [Fan et al. 2005, §5.3]: the direction from the first vertex from the eye that stores photons is turned,
+// as for another ray of a final gather. The eye sub-path continues to the next vertex that stores photons, which is joined
+// to the kept part.
 //
 // Directions are uniform in solid angle within the cone.
 
@@ -11,16 +11,21 @@ namespace etendue {
 
 class PhotonMapMutation final : public PathMutation {
 public:
+    explicit PhotonMapMutation(std::function<bool(const Vertex&)> stores)
+        : stores_(std::move(stores)) {}
+
     bool suits(const PathState& x) const override;
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
                  MutationWay& way) const override;
     double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
 
 private:
-    /// Index of the next vertex before x_i, toward the light, that can be connected; 0 if there is none.
-    static int next(const PathState& x, int i);
-    /// Index of the first vertex from the eye that can be connected; 0 if there is none.
-    static int seen(const PathState& x) { return next(x, x.last()); }
+    /// Index of the next vertex before x_i, toward the light, that stores photons; 0 if there is none.
+    int next(const PathState& x, int i) const;
+    /// Index of the first such vertex from the eye; 0 if there is none.
+    int seen(const PathState& x) const { return next(x, x.last()); }
+
+    std::function<bool(const Vertex&)> stores_;
 };
 
 }  // namespace etendue

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "math/statistics.h"
+#include "mcmc/pilot.h"
 #include "toy.h"
 
 namespace etendue::test {
@@ -147,6 +148,59 @@ TEST(ChainGroups, APassThatIsNotCommittedLeavesNothing) {
         return std::pair(kept.sums, groups.b());
     };
     EXPECT_EQ(run(false), run(true));
+}
+
+TEST(SharedOut, ClassesThatThePilotDidNotSeeHaveChainsAndLargeSteps) {
+    const std::vector<double> cost{3, 4, 5, 6};
+    const std::vector<ClassPlan> plan = share_out(8, {5, 0, 3, 0}, cost, 4096, 256);
+    ASSERT_EQ(plan.size(), 4u);
+    int chains = 0;
+    for (const ClassPlan& p : plan) {
+        chains += p.chains;
+        EXPECT_GT(p.chains, 8);
+        EXPECT_GE(p.pool, 128u);
+    }
+    EXPECT_EQ(chains, 256);
+    EXPECT_EQ(plan[0].c, 5);
+    EXPECT_EQ(plan[2].c, 3);
+    for (const size_t k : {1u, 3u}) EXPECT_EQ(plan[k].c, 0.5);
+    // Few chains in all: each class has some nevertheless.
+    for (const ClassPlan& p : share_out(1, {1, 0, 0, 0}, cost, 64, 4)) EXPECT_GE(p.chains, 4);
+}
+
+/// Classes of one cell each. The pools find no light in the last one, but later large steps do.
+TEST(SharedOut, LargeStepsCountWhereNoChainHasStarted) {
+    ToyPasses toy;
+    const auto sample = [](int, const SampleContext& c, Workspace& work) {
+        work.z.film_weight = 1;
+        c.sampler.seek(Stream::Eye, 0);
+        const float value = c.sampler.next_1d() < 1e-3f ? 1000.0f : 0.0f;
+        c.sink.add({.technique = {Strategy::Splat, 3, 1},
+                    .emitter = nullptr,
+                    .contribution = Rgb(value),
+                    .mis_weight = 1,
+                    .film = {0.5f, 0.5f}},
+                   Rgb(value));
+    };
+    const PrimarySpace space(1, sample, TargetMap(toy.geometry()));
+    const std::vector<double> cost{3};
+    const Pilot black{.map = TargetMap(toy.geometry()), .by_technique = {}};
+    for (const double b : {1.0, black.constant()}) {
+        const std::vector<ClassPlan> plan = share_out(b, {0}, cost, 4, 4);
+        Moments large;  // Of groups whose pool was black.
+        for (uint64_t run = 0; run < 200; ++run) {
+            ChainGroups groups(space, {.groups = 2, .chains = 4, .p_large = 0.5},
+                               {{.chains = 4, .pool = 16, .c = plan[0].c}});
+            CellSums sums;
+            groups.advance(toy.pass(0, hash_combine(23, run), 400, sums));
+            groups.commit();
+            if (groups.stats().chain_light == 0) large.add(sums.sums[0]);
+        }
+        EXPECT_GT(large.count(), 150);
+        // Of large steps the part 1 - w counts, with I = 1000.
+        const double part = 1 - 1000 / (1000 + plan[0].c * 0.5);
+        EXPECT_NEAR(large.mean(), part, 0.5 * part) << b;
+    }
 }
 
 }  // namespace

@@ -77,6 +77,42 @@ TEST(Chain, MutationsKeepDetailedBalance) {
     EXPECT_GT(tested, 15);
 }
 
+/// Proposals whose acceptance cannot be computed are counted and left out. The others are symmetric.
+TEST(Chain, NothingIsAcceptedWithoutAnAcceptance) {
+    class Space final : public PrimarySpace {
+    public:
+        explicit Space(const FilmGeometry& g) : PrimarySpace(1, toy_sample, TargetMap(g)) {}
+        Proposal propose(int chain_class, const ChainState& x, uint64_t key, const ChainContext& c,
+                         ChainState& y) const override {
+            Proposal p = PrimarySpace::propose(chain_class, x, key, c, y);
+            p.Q_ratio = std::nan("");
+            return p;
+        }
+    };
+    class NoStates final : public StateSink {
+        void add(const ChainState&, double) override {}
+    };
+    ToyPasses toy;
+    const Space space(toy.geometry());
+    CellSums sums;
+    const PassContext pass = toy.pass(0, 1, 8, sums);
+    const WholeFilm whole(pass);
+    const ChainContext c{whole.sample, toy.work()};
+    Chain chain(space, 0);
+    chain.start(1, c);
+    NoStates none;
+    ChainStats stats;
+    chain.advance({.p_large = 0.5, .c = 1}, 1, 1, 2, 0, 1000, c, none, stats);
+    EXPECT_GT(stats.steps[0][3].accepted, 0);
+    double accepted = 0;
+    uint64_t proposed = 0;
+    for (size_t m = 1; m < stats.steps.size(); ++m)
+        for (const StepCounts& n : stats.steps[m]) accepted += n.accepted, proposed += n.proposed;
+    EXPECT_GT(proposed, 300u);
+    EXPECT_EQ(accepted, 0);
+    EXPECT_EQ(toy.work().stats.rejected, proposed);
+}
+
 TEST(Chain, ResamplingIsSystematic) {
     const std::vector<double> weights{0, 3, 0, 1, 4, 0};
     std::array<Moments, 6> times;

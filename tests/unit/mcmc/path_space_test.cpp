@@ -13,16 +13,24 @@
 namespace etendue::test {
 namespace {
 
+using Kinds = std::vector<PathMutations::Kind>;
+
+constexpr int kPixels = 8;
+
 struct Case {
     const char* name;
     std::string xml;
+    Kinds rare{};  ///< Mutations that only such scenes have, and that need more samples.
+    float cone = 8, radius = 0.1f;  ///< Of user paths; the cone in degrees.
 };
+void PrintTo(const Case& c, std::ostream* out) {
+    *out << c.name;
+}
 
 const std::string kConstant =
     "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>";
 
 std::vector<Case> cases() {
-    constexpr int kPixels = 8;
     const std::string sky = room() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
                             sphere("0.1,0.2,-0.1", "0.3", kGlass) + kConstant;
     const std::string lens_scene = mixed_room(lens_camera(kPixels));
@@ -32,6 +40,32 @@ std::vector<Case> cases() {
     const std::string glossy = front_camera(kPixels) + room() + area_lamp() + kFloor +
                                sphere("-0.4,-0.4,0.1", "0.45", kRoughMetal) +
                                sphere("0.5,-0.5,0.2", "0.4", kRoughMetal);
+    // A veil with an opacity of 0.2 and 0.9, before mirrors, glass and rough metal.
+    const std::string kMasked =
+        "<bsdf type=\"mask\"><texture name=\"opacity\" type=\"checkerboard\"><float "
+        "name=\"color0\" value=\"0.2\"/><float name=\"color1\" value=\"0.9\"/><transform "
+        "name=\"to_uv\"><scale value=\"3\"/></transform></texture>" +
+        diffuse("0.6,0.5,0.4") + "</bsdf>";
+    const std::string veil = mixed_room(front_camera(kPixels)) +
+                             rectangle("<scale value=\"0.9\"/><rotate x=\"1\" angle=\"-60\"/>"
+                                       "<translate z=\"0.6\"/>",
+                                       kMasked);
+    // Smooth and delta events at one wall, where user paths from a large lamp end.
+    const std::string kGloss =
+        "<bsdf type=\"twosided\"><bsdf type=\"blendbsdf\"><float name=\"weight\" "
+        "value=\"0.5\"/><bsdf type=\"diffuse\"/><bsdf type=\"conductor\"/></bsdf></bsdf>";
+    const std::string gloss_wall =
+        front_camera(kPixels) + room() +
+        rectangle("<scale value=\"0.8\"/><rotate x=\"1\" angle=\"90\"/>"
+                  "<translate y=\"0.98\"/>",
+                  "<emitter type=\"area\"><rgb name=\"radiance\" value=\"2\"/></emitter>") +
+        rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"-0.99\"/>", kGloss);
+    // Paths with several chains of mirrors.
+    const std::string kMirror = "<bsdf type=\"twosided\"><bsdf type=\"conductor\"/></bsdf>";
+    const std::string mirrors =
+        front_camera(kPixels) + room() + area_lamp() +
+        rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"-0.95\"/>", kMirror) +
+        rectangle("<translate z=\"-0.95\"/>", kMirror);
     return {
         {"mixed", mixed_room(front_camera(kPixels))},
         {"thinlens", lens_scene},
@@ -43,7 +77,10 @@ std::vector<Case> cases() {
         {"sun", front_camera(kPixels) + room() + sphere("0.1,0.2,-0.1", "0.4", kGlass) +
                     "<emitter type=\"directional\"><vector name=\"direction\" "
                     "value=\"0.2,-0.4,-1\"/></emitter>"},
-        {"glossy", glossy}};
+        {"glossy", glossy, {PathMutations::GlossyLens, PathMutations::GlossyCaustic}},
+        {"veil", veil},
+        {"gloss_wall", gloss_wall, {PathMutations::UserPath}, 40, 0.6f},
+        {"mirrors", mirrors, {PathMutations::MultiChain}}};
 }
 
 class Paths : public ::testing::TestWithParam<Case> {
@@ -51,13 +88,15 @@ protected:
     Paths() : passes(build(GetParam().xml)) {}
     /// From the lamp to a wall, in the scenes that have a lamp there.
     std::optional<UserPaths> user_paths() const {
-        const CheckedPath checked =
-            check_user_path(passes.scene(), {.name = {},
-                                             .points = {{0.1f, 0.98f, 0.15f}, {-1, 0, 0.3f}},
-                                             .cones = {8},
-                                             .radius = 0.1f});
-        if (!checked.path) return {};
-        return UserPaths(passes.scene(), {*checked.path});
+        for (const float wall : {-1.0f, -0.99f}) {
+            const CheckedPath checked =
+                check_user_path(passes.scene(), {.name = {},
+                                                 .points = {{0.1f, 0.98f, 0.15f}, {wall, 0, 0.3f}},
+                                                 .cones = {GetParam().cone},
+                                                 .radius = GetParam().radius});
+            if (checked.path) return UserPaths(passes.scene(), {*checked.path});
+        }
+        return {};
     }
     PathPasses passes;
 };
@@ -87,14 +126,22 @@ TEST_P(Paths, HaveTheValueAndDensitiesOfTheirVertices) {
             const size_t escapes = passes.scene().infinite_emitters().size();
             const double choice =
                 s == 0 && state[0].v.is_infinite && escapes > 0 ? double(escapes) : 1.0;
+            // Walks pass the masks of their edges, and meet the surfaces there.
+            double masks = 1;
+            for (int i = 1; i < s; ++i)
+                masks *= double(state[i - 1].transmittance * state[i].opacity);
+            for (int i = s; i + 1 < n; ++i)
+                masks *= double(state[i].transmittance * state[i].opacity);
             const double expected =
-                value.pdfs.density(q) * units / ((n - s >= 2 ? A : 1.0) * choice);
+                masks * value.pdfs.density(q) * units / ((n - s >= 2 ? A : 1.0) * choice);
             ASSERT_NEAR(state.density(s), expected,
                         1e-3 * expected + 1e-12 * state.large_step_density())
                 << "s = " << s;
         }
+        double masks = 1;
+        for (int i = 0; i + 1 < n; ++i) masks *= double(state[i].transmittance * state[i].opacity);
         for (int i = 0; i < 3; ++i) {
-            const double expected = double(value.f[i]) * units / state.large_step_density();
+            const double expected = masks * double(value.f[i]) * units / state.large_step_density();
             ASSERT_NEAR(double(state.splats[0].value[i]), expected, 1e-3 * expected + 1e-12);
         }
         ++tested;
@@ -219,8 +266,12 @@ std::vector<double> features(const PathState& x) {
         return x[at].v.has_cosine ? log_of(double(abs_dot(x[at].v.ng, direction(x[at].v, x[to].v))))
                                   : 0.0;
     };
-    double edges = 0, cosines = 0;
-    for (int i = 1; i <= k; ++i) edges += edge(i - 1, i);
+    double edges = 0, cosines = 0, masks = 0, deltas = 0;
+    for (int i = 1; i <= k; ++i) {
+        edges += edge(i - 1, i);
+        masks += log_of(double(x[i - 1].transmittance)) + log_of(double(x[i].opacity));
+        deltas += x[i].v.is_delta;
+    }
     for (int i = 1; i < k; ++i) cosines += cosine(i, i + 1);
     const Vertex &seen = x[k - 1].v, &first = x[1].v;
     return {double(x.film.x),
@@ -243,15 +294,56 @@ std::vector<double> features(const PathState& x) {
             between(k - 1),
             between(1),
             double(x[k - 2].v.gloss),
-            double(x[1].v.gloss)};
+            double(x[1].v.gloss),
+            masks,
+            std::fabs(double(x.film.x) - kPixels / 2.0),  // beyond the film's border
+            deltas,
+            double(x[1].v.is_delta)};
 }
 
-/// Each mutation alone: from independent states x, whose density is T, the flow min(T(x) Q(x→y), T(y) Q(y→x)) is the same
-/// there and back. So Σ min(1, T(y) Q(y→x) / (T(x) Q(x→y))) (h(y) - h(x)) has the mean zero for any h. With T in place of
-/// the target no state counts more than another one.
+/// From independent states x, whose density is T, the flow min(T(x) Q(x→y), T(y) Q(y→x)) is the same there and back. So
+/// Σ min(1, T(y) Q(y→x) / (T(x) Q(x→y))) (h(y) - h(x)) has the mean zero for any h. With T in place of the target no state
+/// counts more than another one. A proposal that T hardly changes is always accepted, whatever its Q. So the same is tested
+/// with the target I, where x has the weight I(x)/T(x), over paths without short edges, whose weights are bounded.
+class Flows {
+public:
+    void add(const PathState& x, const PathState& y, const Proposal& p) {
+        const auto before = features(x), after = features(y);
+        change_.resize(2 * before.size());
+        const double rate = std::min(1.0, p.Q_ratio);
+        const bool is_bounded = has_no_edge_below(x, 0.3) && has_no_edge_below(y, 0.3);
+        const double flow = is_bounded ? std::min(x.target, y.target * p.Q_ratio) : 0.0;
+        for (size_t f = 0; f < before.size(); ++f) {
+            change_[2 * f].add(rate * (after[f] - before[f]));
+            change_[2 * f + 1].add(flow * (after[f] - before[f]));
+        }
+        ++moves_;
+    }
+    uint64_t moves() const { return moves_; }
+    void expect_balance(const std::string& name) const {
+        const double level = sidak(1e-3, change_.size());
+        for (size_t f = 0; f < change_.size(); ++f) {
+            if (!(change_[f].variance() > 0)) continue;
+            EXPECT_GT(welch_p(change_[f], Moments::exact(0), 0), level)
+                << name << ", feature " << f / 2 << (f % 2 ? " of the target: " : ": ")
+                << change_[f].mean() << " ± " << std::sqrt(change_[f].squared_error()) << " of "
+                << moves_ << " moves";
+        }
+    }
+
+private:
+    std::vector<Moments> change_;
+    uint64_t moves_ = 0;
+};
+
+/// Fewer moves of a kind would see little.
+constexpr uint64_t kMoves = 1000;
+
+/// Each mutation alone.
 TEST_P(Paths, MutationsKeepDetailedBalance) {
     const WholeFilm whole(passes.pass());
     const ChainContext c{whole.sample, passes.work()};
+    const Kinds& rare = GetParam().rare;
     for (int kind = 0; kind < PathMutations::kCount; ++kind) {
         PathMutations alone;
         alone.weights.fill(0);
@@ -265,37 +357,46 @@ TEST_P(Paths, MutationsKeepDetailedBalance) {
         }
         const auto space = passes.space(alone, user);
         const auto x = space->make_state(), y = space->make_state();
-        std::vector<Moments> change;
-        const bool is_glossy =
-            (kind == PathMutations::GlossyLens || kind == PathMutations::GlossyCaustic) &&
-            GetParam().name == std::string("glossy");
-        const uint64_t samples = is_glossy ? 400000 : 60000;
-        uint64_t moves = 0;
+        Flows flows;
+        const bool is_rare = std::find(rare.begin(), rare.end(), kind) != rare.end();
+        const uint64_t samples = is_rare ? 400000 : 60000;
         for (uint64_t i = 0; i < samples; ++i) {
             space->draw(0, hash_combine(5, i), c, *x);
             if (!(x->target > 0)) continue;
             const Proposal p = space->propose(0, *x, hash_combine(6, i), c, *y);
             if (p.has_failed || !(y->target > 0)) continue;
-            ++moves;
-            const double rate = std::min(1.0, p.Q_ratio);
-            const auto before = features(static_cast<const PathState&>(*x)),
-                       after = features(static_cast<const PathState&>(*y));
-            change.resize(before.size());
-            for (size_t f = 0; f < change.size(); ++f) change[f].add(rate * (after[f] - before[f]));
+            flows.add(static_cast<const PathState&>(*x), static_cast<const PathState&>(*y), p);
         }
-        if (is_glossy) {
-            EXPECT_GT(moves, 5000);
+        const bool is_common = kind <= PathMutations::Caustic || kind >= PathMutations::LensSubpath;
+        if (is_rare || is_common) {
+            EXPECT_GE(flows.moves(), kMoves) << PathMutations::kNames[size_t(kind)];
         }
-        if (moves < 200) continue;
-        const double level = sidak(1e-3, change.size());
-        for (size_t f = 0; f < change.size(); ++f) {
-            if (!(change[f].variance() > 0)) continue;
-            EXPECT_GT(welch_p(change[f], Moments::exact(0), 0), level)
-                << PathMutations::kNames[size_t(kind)] << ", feature " << f << ": "
-                << change[f].mean() << " ± " << std::sqrt(change[f].squared_error()) << " of "
-                << moves << " moves";
-        }
+        if (flows.moves() >= 200) flows.expect_balance(PathMutations::kNames[size_t(kind)]);
     }
+}
+
+/// All of them, so that the choice among those that suit a path is a part of Q.
+TEST_P(Paths, AllMutationsTogetherKeepDetailedBalance) {
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    PathMutations all;
+    all.weights[PathMutations::PhotonMap] = 2;
+    UserSteps user;
+    if ((user.paths = user_paths())) {
+        user.share = 0.3;
+        all.weights[PathMutations::UserPath] = 1;
+    }
+    const auto space = passes.space(all, user);
+    const auto x = space->make_state(), y = space->make_state();
+    Flows flows;
+    for (uint64_t i = 0; i < 100000; ++i) {
+        space->draw(0, hash_combine(8, i), c, *x);
+        if (!(x->target > 0)) continue;
+        const Proposal p = space->propose(0, *x, hash_combine(9, i), c, *y);
+        if (p.has_failed || !(y->target > 0)) continue;
+        flows.add(static_cast<const PathState&>(*x), static_cast<const PathState&>(*y), p);
+    }
+    flows.expect_balance("all mutations");
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Paths, ::testing::ValuesIn(cases()),

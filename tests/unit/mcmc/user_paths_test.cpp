@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "math/statistics.h"
+#include "mcmc/numbers.h"
 #include "mcmc/pick_paths.h"
 #include "test_scenes.h"
 
@@ -189,6 +190,54 @@ TEST(UserPaths, DensityRatiosAreThoseToTracedPaths) {
             << k << ": " << followed[k].mean() << " ± " << std::sqrt(followed[k].squared_error())
             << " and " << traced[k].mean() << " ± " << std::sqrt(traced[k].squared_error());
     }
+}
+
+/// As states of chains, whose numbers each vertex has a few of: a path over three delta events in a scene with masks.
+/// Steps that move all numbers but those of choices move the path within its disc and cones.
+TEST(UserPaths, AreMovedByStepsOfChains) {
+    const std::string veil = "<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.5\"/>" +
+                             diffuse("0.5,0.5,0.5") + "</bsdf>";
+    const Scene scene =
+        build(front_camera(16) + room() + area_lamp() +
+              rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-0.9\"/>", kMirror) +
+              rectangle("<rotate y=\"1\" angle=\"-90\"/><translate x=\"0.95\"/>", kMirror) +
+              rectangle("<translate z=\"-0.95\"/>", kMirror) +
+              rectangle("<scale value=\"0.1\"/><translate z=\"0.9\"/>", veil));
+    // By the mirrors on the floor, the right and the back wall to the ceiling.
+    std::vector<Vec3> points{{0.1f, 0.98f, 0.1f}};
+    Vec3 d{0.4f, -1, -0.3f};
+    const auto go_to = [&](float Vec3::*axis, float at) {
+        const Vec3 from = points.back();
+        points.push_back(from + d * ((at - from.*axis) / d.*axis));
+        d.*axis = -(d.*axis);
+    };
+    go_to(&Vec3::y, -0.9f), go_to(&Vec3::x, 0.95f), go_to(&Vec3::z, -0.95f), go_to(&Vec3::y, 1);
+    const CheckedPath checked =
+        check_user_path(scene, {.name = {}, .points = points, .cones = {0.5f}, .radius = 0.05f});
+    ASSERT_TRUE(checked.path) << checked.point + 1 << ": " << checked.problem;
+    const UserPaths paths(scene, {*checked.path});
+
+    const TechniqueCounts none{};
+    RenderStats stats;
+    const WalkContext walk{scene, none, stats, {}};
+    SubPath y;
+    int started = 0, followed = 0, moved = 0;
+    for (uint64_t i = 0; i < 200; ++i) {
+        NumberTable numbers, next;
+        NumberSource fresh(NumberStep::Fresh, i, nullptr, &numbers);
+        Sampler first(fresh);
+        if (!paths.sample(walk, first, y)) continue;
+        ++started;
+        const Vec3 y0 = y[0].p, y4 = y[4].p;
+        NumberSource wide(NumberStep::Wide, i, &numbers, &next);
+        Sampler second(wide);
+        if (!paths.sample(walk, second, y)) continue;
+        ++followed;
+        moved += length(y[0].p - y0) > 0 && length(y[4].p - y4) > 0;
+    }
+    EXPECT_GT(started, 100);
+    EXPECT_GT(followed, started / 2);
+    EXPECT_EQ(moved, followed);
 }
 
 TEST(UserPaths, PickedOnesPassTheirChecks) {
