@@ -52,13 +52,14 @@ private:
         if (const auto* text = std::get_if<std::string>(&value)) add_file(*text);
     }
     void add(const MeshData& mesh) {
-        // The name and the counts of what was mended are for messages.
-        const auto& [name, positions, normals, uvs, colors, triangles, face_normals,
-                     dropped_degenerate, replaced_normals] = mesh;
+        // The name, the counts of what was mended and the notes are for messages.
+        const auto& [name, positions, normals, uvs, colors, alphas, triangles, face_normals,
+                     dropped_degenerate, replaced_normals, notes] = mesh;
         add_array(positions);
         add_array(normals);
         add_array(uvs);
         add_array(colors);
+        add_array(alphas);
         add_array(triangles);
         add(face_normals);
     }
@@ -87,7 +88,8 @@ private:
     }
     template <class T>
     void add_array(const std::vector<T>& values) {
-        static_assert(std::has_unique_object_representations_v<T> || std::is_same_v<T, Vec2> ||
+        static_assert(std::has_unique_object_representations_v<T> ||
+                      std::is_same_v<T, float> || std::is_same_v<T, Vec2> ||
                       std::is_same_v<T, Vec3>);
         hash_.add(std::string_view(reinterpret_cast<const char*>(values.data()),
                                    values.size() * sizeof(T)));

@@ -73,7 +73,7 @@ std::unique_ptr<OIIO::ImageInput> open_input(const Source& source) {
                   fmt::format("its header claims {} x {} pixels, too many for the file's size",
                               spec.width, spec.height));
     if (const auto free = available_memory(); free && bytes > *free)
-        fail_read(path,
+        fail_read(source.name,
                   fmt::format("its {} x {} pixels need {} of memory, but only {} are free",
                               spec.width, spec.height, format_bytes(bytes), format_bytes(*free)));
     return input;

@@ -45,6 +45,7 @@ struct Parts {
         mesh.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
         mesh.uvs = {{0, 0}, {1, 0}, {0, 1}};
         mesh.colors = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+        mesh.alphas = {0.5f, 1, 0.25f};
         mesh.triangles = {{0, 1, 2}};
     }
     uint64_t fingerprint() const {
@@ -111,6 +112,8 @@ TEST(Fingerprint, CountsEveryBitOfTheContents) {
             "uv", +[](Parts& p) -> Vec2& { return p.mesh.uvs[2]; }),
         flip(
             "colour of a vertex", +[](Parts& p) -> Vec3& { return p.mesh.colors[2]; }),
+        flip(
+            "alpha of a vertex", +[](Parts& p) -> float& { return p.mesh.alphas[1]; }),
         flip(
             "triangle", +[](Parts& p) -> MeshData::Triangle& { return p.mesh.triangles[0]; }),
         flip(
