@@ -8,26 +8,29 @@ namespace etendue {
 Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
            double typical_radiance)
     : geometry_(geometry), filter_(filter), pass_(geometry_, filter_, typical_radiance),
-      moments_(geometry.pixel_count()), expected_(geometry.pixel_count()),
+      moments_(geometry.pixel_count()), expected_(geometry), expected_in_last_pass_(geometry),
       previous_(geometry.pixel_count()) {}
 
 void Film::begin_pass(uint64_t light_paths) {
     pass_.begin(light_paths);
-    if (pass_.has_splats() && expected_blocks_.empty()) average_blocks();
+    if (!pass_.has_splats()) return;
+    // This also allocates the blocks of the second one, into which the pass is folded.
+    for (ExpectedLuminance* e : {&expected_, &expected_in_last_pass_})
+        if (e->blocks_.empty()) e->average_blocks();
 }
 
-void Film::average_blocks() {
+void ExpectedLuminance::average_blocks() {
     const int width = geometry_.crop_width, height = geometry_.crop_height;
     const int rows = (height + kBlock - 1) / kBlock;
-    expected_blocks_.assign(blocks_across() * uint64_t(rows), 0);
+    blocks_.assign(blocks_across() * uint64_t(rows), 0);
     tbb::parallel_for(0, rows, [&](int row) {
-        float* const blocks = expected_blocks_.data() + uint64_t(row) * blocks_across();
+        float* const blocks = blocks_.data() + uint64_t(row) * blocks_across();
         const int begin = row * kBlock, end = std::min(begin + kBlock, height);
         for (int y = begin; y < end; ++y)
             for (int x = 0; x < width; ++x) {
                 const int columns = std::min(kBlock, width - x / kBlock * kBlock);
                 blocks[x / kBlock] +=
-                    expected_[uint64_t(y) * width + x] / float(columns * (end - begin));
+                    pixels_[uint64_t(y) * width + x] / float(columns * (end - begin));
             }
     });
 }
@@ -60,6 +63,8 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     for (std::vector<double>* list : {&pass_means_, &pair_errors_})
         if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);
     ++passes_;
+    std::swap(expected_, expected_in_last_pass_);
+    std::vector<float>& expected = expected_.pixels_;
     for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
             const Rgb v = pass[i];
@@ -70,8 +75,8 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
             }
             const float y = luminance(v);
             luminance_sum[chunk] += y;
-            expected_[i] = m.luminance_sum() / float(passes_);
-            total[chunk] += expected_[i];
+            expected[i] = m.luminance_sum() / float(passes_);
+            total[chunk] += expected[i];
             if (group)
                 group[i] +=
                     float((1 - splat_factor) * double(previous_[i]) + splat_factor * double(y));
@@ -87,12 +92,12 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
         for (uint64_t i = begin; i < end; ++i) {
             // Half the squared difference of two passes estimates the variance of one pass, even if its samples are
             // correlated.
-            const double scale2 = sqr(double(expected_[i])) + 0.01 * mean * mean;
+            const double scale2 = sqr(double(expected[i])) + 0.01 * mean * mean;
             if (second && scale2 > 0) pair_sum[chunk] += 0.5 * sqr(double(previous_[i])) / scale2;
-            expected_[i] = std::max(expected_[i], float(0.1 * mean));
+            expected[i] = std::max(expected[i], float(0.1 * mean));
         }
     });
-    if (pass_.has_splats()) average_blocks();
+    if (pass_.has_splats()) expected_.average_blocks();
     if (!second) return;
     double pair = 0;
     for (double p : pair_sum) pair += p;

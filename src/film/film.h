@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "color/rgb.h"
+#include "film/expected_luminance.h"
 #include "film/pass_image.h"
 
 namespace etendue {
@@ -82,14 +83,10 @@ public:
     // -- Totals of the finished passes; they do not include the current pass.
 
     uint64_t passes() const { return passes_; }
-    /// Mean luminance of a pixel in the finished passes, at least a tenth of the image's mean; 0 in the first pass.
-    float expected_luminance(uint64_t pixel) const { return expected_[pixel]; }
-    /// The same at a film point (clamped to the crop), averaged over a block of pixels. Splats read this in random
-    /// order; unlike the pixels, the blocks fit into the processor's cache.
-    float expected_luminance(Vec2 point) const {
-        const auto [x, y] = geometry_.pixel_near(point);
-        return expected_blocks_[uint64_t(y / kBlock) * blocks_across() + uint64_t(x / kBlock)];
-    }
+    /// What samples of the next pass know of the earlier ones.
+    const ExpectedLuminance& expected() const { return expected_; }
+    /// What samples of the last finished pass knew.
+    const ExpectedLuminance& expected_in_last_pass() const { return expected_in_last_pass_; }
     /// Mean of all passes.
     std::vector<Rgb> image() const;
     /// Variance of that mean, per pixel and channel; zero with fewer than two passes.
@@ -117,8 +114,6 @@ public:
     std::span<const Moments> moments() const { return moments_; }
 
 private:
-    static constexpr int kBlock = 4;
-
     bool has_all_groups() const { return passes_ >= group_sums_.size(); }
     uint64_t passes_of_group(size_t group) const {
         return (passes_ + group_sums_.size() - 1 - group) / group_sums_.size();
@@ -129,15 +124,12 @@ private:
     double group_error2(size_t pair, size_t pixel) const;
     ErrorEstimate group_error() const;
     void fold(std::span<const Rgb> pass, double splat_factor);
-    uint64_t blocks_across() const { return uint64_t(geometry_.crop_width + kBlock - 1) / kBlock; }
-    void average_blocks();
 
     FilmGeometry geometry_;
     ReconstructionFilter filter_;
     PassImage pass_;
     std::vector<Moments> moments_;
-    std::vector<float> expected_;
-    std::vector<float> expected_blocks_;  ///< Means of kBlock × kBlock pixels.
+    ExpectedLuminance expected_, expected_in_last_pass_;
     /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. With
     /// groups: the luminance of the eye paths in the pass that is being added.
     std::vector<float> previous_;

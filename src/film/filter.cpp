@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace etendue {
 namespace {
@@ -34,7 +35,7 @@ double lanczos_shape(double x, double lobes, double) {
     x = std::fabs(x);
     if (x < 1e-9) return 1;
     if (x >= lobes) return 0;
-    const double px = x * double(kPi);
+    const double px = x * std::numbers::pi;
     return std::sin(px) * std::sin(px / lobes) * lobes / (px * px);
 }
 

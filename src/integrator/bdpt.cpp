@@ -87,10 +87,9 @@ private:
     void choose_draws(const PassContext& pass) {
         constexpr uint64_t kPilotPaths = 8192;
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
-        const uint64_t pixels = pass.scene.film().pixel_count();
         std::vector<int> found(kPilotPaths);
         pass.for_each_other_path(kPilotPaths, [&](uint64_t i, Sampler& sampler, Workspace& work) {
-            sampler.start(0, pixels + i);
+            sampler.start(0, i);
             trace_light_path(paths_.light_walk(pass.scene, n, work.stats), sampler, work.y);
             for (int s = 2; s <= work.y.size(); ++s) found[i] += work.y[s - 1].is_connectible;
         });

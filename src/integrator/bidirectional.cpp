@@ -45,6 +45,17 @@ void Bidirectional::trace_light_path(const SampleContext& c, const TechniqueCoun
     }
 }
 
+void Bidirectional::trace_further_light_paths(const SampleContext& c, const TechniqueCounts& counts,
+                                              Workspace& work) const {
+    if (c.is_of_whole_film) return;
+    const uint64_t pixels = c.scene.film().pixel_count();
+    for (uint64_t path = c.pixel + pixels; path < c.light_paths; path += pixels) {
+        Sampler sampler = c.sampler;
+        sampler.start(path);
+        trace_light_path(c.with(sampler, c.sink), counts, work);
+    }
+}
+
 namespace {
 
 void start_eye_path(const SampleContext& c, const WalkContext& walk, SubPath& z) {
@@ -67,7 +78,10 @@ void Bidirectional::trace_eye_path(const SampleContext& c, const TechniqueCounts
 void Bidirectional::add_sample(const SampleContext& c, const TechniqueCounts& counts,
                                Workspace& work) const {
     const bool has_light_path = counts.uses_light_paths();
-    if (has_light_path) trace_light_path(c, counts, work);  // C(s,1), C(s,0)
+    if (has_light_path) {
+        trace_further_light_paths(c, counts, work);  // C(s,1), C(s,0)
+        trace_light_path(c, counts, work);           // C(s,1), C(s,0)
+    }
     add_eye_path(c, counts, work, nullptr, [&](int t) {
         if (has_light_path) add_connections(c, counts, t, work);
     });
@@ -139,8 +153,7 @@ float Bidirectional::threshold(const SampleContext& c, const Vec2* film) const {
     if (!thresholds_.empty())
         return thresholds_[film ? c.film.geometry().pixel_at(*film) : c.pixel];
     if (is_optimised_ || roulette_ == 0) return 0;
-    return roulette_ *
-           (film ? c.film.expected_luminance(*film) : c.film.expected_luminance(c.pixel));
+    return roulette_ * (film ? c.expected.at(*film) : c.expected.at(c.pixel));
 }
 
 void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCounts& counts,

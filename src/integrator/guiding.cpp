@@ -7,6 +7,7 @@
 
 #include "guide/random_guide.h"
 #include "math/hash.h"
+#include "sampler/pilot_seed.h"
 
 namespace etendue {
 namespace {
@@ -261,7 +262,7 @@ std::vector<ParamInfo> Guiding::params() {
          "for tests."},
         {"guide_walks", ParamKind::Int, "100000",
          "Number of light walks, and of eye walks, that train the guide before the first pass. A "
-         "refit traces as many, after 8, 64, 512 … times as many samples of pixels."},
+         "refit traces as many, when the image has had 8, 64, 512 … times as many samples."},
         {"guide_roulette", ParamKind::Bool, "true",
          "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
          "walks had from the same place on. Has no effect if `guide` is off."}};
@@ -321,7 +322,7 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
         pass.index == 0 || (guide_->uses_surfaces && refits(pass.index) > refits(pass.index - 1));
     if (!is_due) return;
     const auto begin = Clock::now();
-    const uint64_t seed = hash_combine(pass.seed, 0x67756964ull + pass.index);
+    const uint64_t seed = pilot_seed(pass.seed, PilotUse::Guide, pass.index);
     // Walks that end early would teach less.
     if (guide_) guide_->has_roulette = false;
     if (mode_ == Mode::Random) {

@@ -2,14 +2,17 @@
 
 #include <algorithm>
 
+#include "sampler/pilot_seed.h"
+
 namespace etendue {
 
 std::vector<ParamInfo> LightPathOptions::params() {
-    return {{"light_paths", ParamKind::Int, "0",
-             "Number of light paths in a pass; pixel i uses light path i modulo light_paths. 0: "
-             "one for each pixel, or as many as fit into `memory`."},
-            {"memory", ParamKind::Int, "6144",
-             "Largest memory for the light vertices of a pass, in MiB."}};
+    return {
+        {"light_paths", ParamKind::Int, "0",
+         "Number of light paths in a pass; pixel i connects to light path i modulo light_paths. "
+         "0: one for each pixel, or as many as fit into `memory`."},
+        {"memory", ParamKind::Int, "6144",
+         "Largest memory for the light vertices of a pass, in MiB."}};
 }
 
 LightPathOptions::LightPathOptions(const IntegratorParams& p)
@@ -28,7 +31,7 @@ uint64_t LightPathOptions::count(const Scene& scene, const DepthOptions& depth,
     const TechniqueCounts none;
     RenderStats stats;
     const WalkContext walk{scene, none, stats, depth.walk()};
-    Sampler sampler(SamplerKind::Independent, 0);
+    Sampler sampler(SamplerKind::Independent, pilot_seed(0, PilotUse::LightPathCount));
     SubPath y;
     uint64_t vertices = 0;
     for (uint64_t i = 0; i < kPilotPaths; ++i) {

@@ -8,12 +8,13 @@
 #include "math/statistics.h"
 #include "mcmc/addresses.h"
 #include "mcmc/primary_space.h"
+#include "sampler/pilot_seed.h"
 
 namespace etendue {
 namespace {
 
 /// Purposes of the random numbers of this source.
-enum Purpose : uint64_t { kScale = 0x6d7073, kPilot, kChains, kDeposits };
+enum Purpose : uint64_t { kChains = 0x6d7075, kDeposits };
 
 /// A vertex at which a state may store a photon.
 struct Candidate {
@@ -166,7 +167,7 @@ float importance_floor(const PassContext& context, const PhotonMapping& mapping,
     constexpr double kShareOfMean = 0.02;
     std::vector<std::array<double, 2>> sums(kScaleSamples);
     for_each_independent(context, kScaleSamples, [&](uint64_t i, const ChainContext& c) {
-        space.draw_light_path(hash_combine(hash_combine(context.seed, kScale), i), c);
+        space.draw_light_path(hash_combine(pilot_seed(context.seed, PilotUse::PhotonScale), i), c);
         sums[i] = {};
         for_each_photon(mapping, c.work.y, [&](const MapPhoton& photon) {
             const double flux = double(luminance(photon.power));
@@ -192,7 +193,7 @@ MetropolisPhotons::Pilot MetropolisPhotons::run_pilot(const PassContext& context
     constexpr uint64_t kFewest = 4096, kMost = uint64_t(1) << 20;
     // A lower precision than that of the pool suffices.
     const double precision = 2 * options_.precision;
-    const uint64_t key = hash_combine(context.seed, kPilot);
+    const uint64_t key = pilot_seed(context.seed, PilotUse::PhotonPilot);
     std::vector<double> targets;
     while (true) {
         const uint64_t done = targets.size();

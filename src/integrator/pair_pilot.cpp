@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "math/hash.h"
 #include "reuse/gather_constants.h"
 #include "reuse/reciprocal.h"
+#include "sampler/pilot_seed.h"
 
 namespace etendue {
 namespace {
@@ -34,7 +34,7 @@ struct Block {
 PairPilot run_pair_pilot(const PassContext& pass, const Bidirectional& paths,
                          const TechniqueCounts& counts) {
     constexpr uint64_t kBlock = 256, kFewest = 1024, kMost = uint64_t(1) << 17, kShare = 4;
-    const uint64_t seed = hash_combine(pass.seed, 0x7061697273ull);
+    const uint64_t seed = pilot_seed(pass.seed, PilotUse::Pairs);
     const uint64_t walks = std::clamp(pass.light_paths / kShare, kFewest, kMost);
     std::vector<Block> blocks((walks + kBlock - 1) / kBlock);
     pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {

@@ -22,6 +22,7 @@
 #include "math/statistics.h"
 #include "mcmc/addresses.h"
 #include "mcmc/path_space.h"
+#include "sampler/pilot_seed.h"
 
 namespace etendue {
 namespace {
@@ -273,7 +274,8 @@ private:
         std::vector<Sample> samples(kSamples);
         for_each_independent(context, kSamples, [&](uint64_t i, const ChainContext& c) {
             const auto state = space_->make_state();
-            space_->draw(0, hash_combine(hash_combine(context.seed, 0x6d70737061), i), c, *state);
+            space_->draw(0, hash_combine(pilot_seed(context.seed, PilotUse::PhotonPaths), i), c,
+                         *state);
             if (!(state->target > 0)) return;
             const auto& x = static_cast<const PathState&>(*state);
             Sample& sample = samples[i];

@@ -90,6 +90,7 @@ public:
         std::vector<std::pair<std::string, double>> figures{
             {"connections", connections_},
             {"stored_vertices", vertices_.size()},
+            {"path_bytes", path_bytes_},
             {"records", records_.size()},
             {"record_bytes", records_.memory_bytes()}};
         paths_.guiding().add_figures(figures);
@@ -106,10 +107,17 @@ private:
                        paths_.guiding().guide());
         paths_.trace_light_paths(pass, n, M, compact_);
         compact_.assemble();
+        // The memory of the pass before is freed, since its paths had other lengths.
+        stored_.clear();
         stored_.resize(M);
         vertices_.clear();
+        path_bytes_ = compact_.memory_bytes() + M * sizeof(SubPath);
         for (uint32_t i = 0; i < M; ++i) {
+            stored_[i].reserve(compact_.path_size(i));
             compact_.restore(pass.scene, i, stored_[i]);
+            path_bytes_ +=
+                stored_[i].memory_bytes() + uint64_t(stored_[i].size()) * sizeof(StoredVertex);
+            check_memory(path_bytes_, "light paths with");
             for (int s = direct_ == Direct::NextEvent ? 2 : 1; s <= stored_[i].size(); ++s)
                 if (stored_[i][s - 1].is_connectible) vertices_.push_back({i, s});
         }
@@ -125,7 +133,7 @@ private:
         pass.for_each_other_path(count, [&](uint64_t i, Sampler& sampler, Workspace& work) {
             const PhaseTimer timer(work.stats, &PhaseSeconds::records);
             record_chunks_[i].clear();
-            sampler.start(pass.index, pixels + i);
+            sampler.start(pass.index, i);
             const uint64_t before = work.stats.shadow_rays;
             const uint64_t pixel = low_discrepancy_pixel(g, pass.index * count + i);
             trace_eye_path(paths_.eye_walk(pass.scene, n, work.stats), pass.film, pixel, sampler,
@@ -135,7 +143,8 @@ private:
                 evaluate(pass.scene, n, t, work);
                 record_chunks_[i].add(work.z[t - 1], work.masses);
                 ++found[i].first;
-                check_memory(bytes += 2 * sizeof(float) * vertices_.size());
+                check_memory(bytes += 2 * sizeof(float) * vertices_.size(),
+                             "importance records of");
             }
             found[i].second = work.stats.shadow_rays - before;
         });
@@ -154,12 +163,12 @@ private:
         connections_ = std::max(kFewest, left / kRaysOfDraw);
     }
 
-    void check_memory(uint64_t bytes_of_records) const {
-        if (bytes_of_records > memory_)
+    void check_memory(uint64_t bytes, const char* what) const {
+        if (bytes > memory_)
             throw std::runtime_error(fmt::format(
-                "pcbpt: importance records of {} light vertices need more than {} MiB; give fewer "
-                "light_paths or a smaller record_fraction, or raise \"memory\"",
-                vertices_.size(), memory_ >> 20));
+                "pcbpt: {} {} light vertices need more than {} MiB; give fewer light_paths or a "
+                "smaller record_fraction, or raise \"memory\"",
+                what, vertices_.size(), memory_ >> 20));
     }
 
     /// R2 sequence: multiples of the powers of the plastic number's inverse, modulo 1 [Roberts 2018].
@@ -207,9 +216,9 @@ private:
                    float(1 / (samples * pmf)), uint32_t(k) + 1);
     }
 
-    /// Memory per vertex: in the cache, and restored for joins.
-    static constexpr uint64_t kVertexBytes =
-        LightVertexCache::kVertexBytes + 2 * sizeof(Vertex) + sizeof(uint32_t) + sizeof(int);
+    /// Memory per vertex: in the cache, and restored for joins. What else the restored paths need is checked when they
+    /// are restored.
+    static constexpr uint64_t kVertexBytes = LightVertexCache::kVertexBytes + sizeof(Vertex);
     /// Smallest automatic K.
     static constexpr double kFewest = 0.125;
     /// Cost of the search for a mixture, and of a draw with its join, in units of a connection of bdpt.
@@ -232,6 +241,7 @@ private:
     // Of the pass.
     double connections_ = 0;  ///< K
     LightVertexCache compact_;
+    uint64_t path_bytes_ = 0;             ///< Memory of the M light paths.
     std::vector<SubPath> stored_;         ///< The M light paths, restored for joins.
     std::vector<StoredVertex> vertices_;  ///< Their V connectible vertices.
     ImportanceRecords records_;

@@ -108,7 +108,7 @@ public:
                 t, [&](const GatherPair& pair) { gather(c, n, search, pair, work); });  // U(s,t)
         };
         const auto observe_next_events = [&](int t, std::span<const NextEventDraw> draws) {
-            const float pixel = c.film.expected_luminance(c.pixel);
+            const float pixel = c.expected.at(c.pixel);
             if (work.z[t - 1].sees_lens && pixel > 0)
                 NextEventCount::observe(draws, double(std::fabs(work.z.film_weight) / pixel),
                                         GatherSums::of(work));
@@ -188,7 +188,7 @@ private:
         const bool sees_lens = work.z[pair.technique.t - 1].sees_lens;
         const double x = double(pair.unlimited_survival);
         if (sees_lens) GatherRadius::observe_trials(trials, x, sums);
-        const float pixel = c.film.expected_luminance(work.z.film);
+        const float pixel = c.expected.at(work.z.film);
         if (!(pixel > 0)) return;
         const double weight_scale = double(learned_.weight_scale.value());
         const GatherMoment moment = GatherMoment::of(

@@ -99,7 +99,7 @@ public:
             n.pairs.clamps = false;
             n.pairs.first_merge = first_merge();
         }
-        if (!is_exact_) n.continued = continuation_;
+        if (merges_ && !is_exact_) n.continued = continuation_;
         n.guide = paths_.guiding().guide();
         return n;
     }
@@ -210,7 +210,7 @@ IntegratorEntry vcm_entry() {
          "not a mirror or clear glass. Merges at this vertex make most of the image, so the rest "
          "of "
          "the path is worth less than its cost. The MIS weights know this probability. Has no "
-         "effect with exact=true."});
+         "effect with exact=true or merges=false."});
     params.push_back({"connections", ParamKind::Bool, "true",
                       "Whether sub-paths are connected to each other, to emitters and to the lens.",
                       true});

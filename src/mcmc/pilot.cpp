@@ -5,6 +5,7 @@
 
 #include "math/statistics.h"
 #include "mcmc/whole_film.h"
+#include "sampler/pilot_seed.h"
 
 namespace etendue {
 namespace {
@@ -109,7 +110,7 @@ Pilot run_pilot(const PassContext& pass, const PrimarySample& sample, const Prim
     constexpr uint64_t kFewest = 1024, kMost = uint64_t(1) << 18;
     constexpr double kPrecision = 0.02;
     const uint64_t most = std::clamp(2 * pass.pixels, kFewest, kMost);
-    const uint64_t seed = hash_combine(pass.seed, 0x70696c6f74);
+    const uint64_t seed = pilot_seed(pass.seed, PilotUse::Chains);
     std::vector<PilotSample> drawn;
     Pilot pilot{.map = TargetMap(pass.film.geometry()), .by_technique = {}};
     while (true) {

@@ -10,6 +10,7 @@ public:
     explicit WholeFilm(const PassContext& pass)
         : sample{.scene = pass.scene,
                  .film = pass.film,
+                 .expected = pass.film.expected(),
                  .pixel = 0,
                  .chunk = 0,
                  .light_paths = pass.light_paths,

@@ -32,7 +32,8 @@ struct Workspace {
 struct SampleContext {
     const Scene& scene;
     const Film& film;
-    uint64_t pixel;  ///< Index within the crop.
+    const ExpectedLuminance& expected;  ///< What the samples of a pass know of earlier ones.
+    uint64_t pixel;                     ///< Index within the crop.
     uint64_t chunk;  ///< Part of the pass, whose samples are processed in order by one thread.
     uint64_t light_paths;  ///< N_L of the pass.
     float splat_scale;     ///< 1 / N_L: factor of splats.
@@ -49,11 +50,13 @@ struct SampleContext {
 
     /// The same sample with other random numbers and another sink.
     SampleContext with(Sampler& numbers, ContributionSink& to) const {
-        return {scene, film, pixel, chunk, light_paths, splat_scale, numbers, to, is_of_whole_film};
+        return {scene,       film,        expected, pixel, chunk,
+                light_paths, splat_scale, numbers,  to,    is_of_whole_film};
     }
     /// The same sample where `n` light paths are stored.
     SampleContext with_light_paths(uint64_t n) const {
-        return {scene, film, pixel, chunk, n, 1 / float(n), sampler, sink, is_of_whole_film};
+        return {scene, film,         expected, pixel, chunk,
+                n,     1 / float(n), sampler,  sink,  is_of_whole_film};
     }
 };
 
@@ -79,7 +82,7 @@ struct PassContext {
     std::function<void(uint64_t count, const Use& use)> for_each_sample;
     std::function<uint64_t(uint64_t count)> chunks;  ///< Number of chunks for `count` samples.
     /// Calls `task(i, sampler, work)` for i < count in parallel, for paths that do not contribute to the film. The task
-    /// must call Sampler::start(); path numbers from `pixels` on are unused by samples.
+    /// must call Sampler::start(). No sample uses the sampler's numbers (pilot_seed()).
     using Task = std::function<void(uint64_t, Sampler&, Workspace&)>;
     std::function<void(uint64_t count, const Task& task)> for_each_other_path;
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "sampler/pilot_seed.h"
 #include "system/available_memory.h"
 
 namespace etendue {
@@ -187,7 +189,7 @@ double typical_radiance(const Scene& scene) {
     double power = 0;
     for (const auto& emitter : scene.emitters()) power += emitter->power();
     const double radius = scene.bounds().is_empty() ? 0 : double(scene.bounds().radius());
-    return radius > 0 ? power / (4 * sqr(double(kPi) * radius)) : power;
+    return radius > 0 ? power / (4 * sqr(std::numbers::pi * radius)) : power;
 }
 
 /// By default, TBB limits the number of threads in all arenas together to that of the hardware. The limit applies to
@@ -296,8 +298,9 @@ bool Renderer::sample_again(uint64_t pixel, Workspace& work, ContributionSink& s
     work.sums = integrator_->make_sums();
     Sampler sampler(settings_.sampler, place.seed);
     sampler.start(place.pass, pixel);
-    integrator_->sample(
-        {scene_, film_, pixel, pixel / kChunk, light_paths_, splat_scale, sampler, sink}, work);
+    integrator_->sample({scene_, film_, film_.expected_in_last_pass(), pixel, pixel / kChunk,
+                         light_paths_, splat_scale, sampler, sink},
+                        work);
     return true;
 }
 
@@ -329,8 +332,8 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
                 go_on();
                 sampler.start(place.pass, pixel);
                 work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
-                use(SampleContext{scene_, film_, pixel, chunk, light_paths, splat_scale, sampler,
-                                  sink},
+                use(SampleContext{scene_, film_, film_.expected(), pixel, chunk, light_paths,
+                                  splat_scale, sampler, sink},
                     work, sink);
             }
         });
@@ -363,7 +366,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
              [&](uint64_t count, const PassContext::Task& task) {
                  tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
                      go_on();
-                     Sampler sampler(settings_.sampler, seed);
+                     Sampler sampler(settings_.sampler, pilot_seed(seed, PilotUse::OtherPaths));
                      Workspace& work = workspace();
                      work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
                      task(i, sampler, work);

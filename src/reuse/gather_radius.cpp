@@ -18,7 +18,7 @@ double relative_variance(const Film& film) {
     const std::vector<Rgb> variance = film.variance();
     std::vector<double> relative(variance.size());
     for (size_t i = 0; i < relative.size(); ++i) {
-        const double mean = double(film.expected_luminance(film.geometry().pixel_center(i)));
+        const double mean = double(film.expected().at(film.geometry().pixel_center(i)));
         if (mean > 0)
             relative[i] = double(film.passes()) * double(luminance(variance[i])) / sqr(mean);
     }

@@ -55,6 +55,11 @@ public:
     size_t size() const { return heads_.size(); }
     size_t memory_bytes() const;
 
+    /// Number of vertices of the path `index`.
+    int path_size(uint64_t index) const {
+        const Head& head = heads_[index];
+        return head.emitter ? int(head.end - head.begin) + 1 : 0;
+    }
     /// Restores the whole path `index`.
     void restore(const Scene& scene, uint64_t index, SubPath& y) const;
     /// Prefetches `vertex`, or the head of its path.

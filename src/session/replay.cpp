@@ -141,14 +141,19 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
         recorder.begin(pass, is_for_splats, splat_scale);
         sampler.start(pass, pixel);
         // Chunks matter only to integrators that share light paths.
-        integrator->sample({scene, film, pixel, 0, light_paths, splat_scale, sampler, recorder},
-                           work);
+        integrator->sample(
+            {scene, film, film.expected(), pixel, 0, light_paths, splat_scale, sampler, recorder},
+            work);
     };
     for (uint32_t i = 0; i < request.passes && has_time(); ++i, ++result.passes)
         trace(request.first_pass + i, request.pixel, false);
     if (request.splats)
-        for (uint64_t i = 0; i < light_paths && has_time(); ++i, ++result.light_paths)
+        // A sample traces the light paths of its pixel, which are several where there are more than pixels.
+        for (uint64_t i = 0, n = scene.film().pixel_count(); i < std::min(light_paths, n); ++i) {
+            if (!has_time()) break;
             trace(request.first_pass, i, true);
+            result.light_paths += (light_paths - i + n - 1) / n;
+        }
     sort_by_luminance(result);
     return result;
 }

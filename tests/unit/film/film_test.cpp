@@ -50,9 +50,9 @@ struct Totals {
         : image(f.image()), variance(f.variance()), error(f.error()), mean(f.mean_luminance()),
           passes(f.passes()), rejected(f.rejected()) {
         for (uint64_t i = 0; i < f.geometry().pixel_count(); ++i) {
-            expected.push_back(f.expected_luminance(i));
+            expected.push_back(f.expected().at(i));
             if (has_splats)
-                expected_blocks.push_back(f.expected_luminance(f.geometry().pixel_center(i)));
+                expected_blocks.push_back(f.expected().at(f.geometry().pixel_center(i)));
         }
     }
     void expect_same_bits(const Totals& o) const {

@@ -135,6 +135,38 @@ TEST(Replay, SplatsAreThoseOfOnePass) {
         EXPECT_NEAR(sum[c], renderer.film().image()[60][c], 1e-5f + 1e-4f * sum[c]);
 }
 
+/// Also where pixels have several light paths, and where some have none.
+TEST(Replay, TracesAllLightPaths) {
+    const Scene scene = small_room();
+    for (const int light_paths : {40, 64, 150}) {
+        RenderSettings settings;
+        settings.integrator =
+            IntegratorSpec::parse("bdpt:roulette=0,light_paths=" + std::to_string(light_paths));
+        settings.threads = 1;
+        settings.spp = 1;
+        settings.technique_depth = 12;
+        settings.integrator.params["max_depth"] = "10";
+        Renderer renderer(scene, settings);
+        renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+        ReplayRequest request;
+        request.integrator = settings.integrator;
+        request.sampler = settings.sampler;
+        request.seed = settings.seed;
+        request.pixel = 60;
+        request.splats = true;
+        request.passes = 0;
+        request.seconds = 100;
+        const Replay r = replay(scene, request);
+        EXPECT_EQ(r.light_paths, uint64_t(light_paths));
+        Rgb sum, expected;
+        for (const ReplayedPath& p : r.paths) sum += p.value;
+        for (const auto& e : renderer.techniques()->images())
+            if (e.technique.t <= 1) expected += e.weighted[60];
+        EXPECT_GT(expected.g, 0);
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c], expected[c], 1e-5f + 1e-4f * sum[c]);
+    }
+}
+
 TEST(Replay, EndsAtItsLimits) {
     const Scene scene = small_room();
     ReplayRequest request;
@@ -195,8 +227,7 @@ TEST_P(LastReplayOf, SumsToTheLastPass) {
     for (uint64_t pixel = 0; pixel < before.size(); ++pixel) {
         const Replay last = replay_last(renderer, pixel, 100000);
         const Rgb expected = after[pixel] - before[pixel];
-        // The roulette of sppm cannot be switched off.
-        for (int c = 0; c < 3 && settings.integrator.name != "sppm"; ++c)
+        for (int c = 0; c < 3; ++c)
             ASSERT_NEAR(last.sum[c], expected[c], 2e-4f * (1 + after[pixel][c])) << pixel;
         for (const ReplayedPath& p : last.paths) {
             ASSERT_EQ(int(p.points.size()), p.technique.vertices());
@@ -224,9 +255,14 @@ TEST_P(LastReplayOf, SumsToTheLastPass) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, LastReplayOf,
-                         ::testing::Values("vcm:roulette=0,radius=0.3", "upg:roulette=0,radius=0.3",
-                                           "upg+bdpt:roulette=0,radius=0.3", "pcbpt:roulette=0",
-                                           "bdpt:connections=cache,roulette=0", "path:guide=on",
+                         // Roulette has the thresholds of the pass.
+                         ::testing::Values("vcm:roulette=0,radius=0.3", "vcm:roulette=1,radius=0.3",
+                                           "upg:roulette=0,radius=0.3", "upg:roulette=1,radius=0.3",
+                                           "upg+bdpt:roulette=0,radius=0.3",
+                                           "upg+bdpt:roulette=1,radius=0.3", "pcbpt:roulette=0",
+                                           "pcbpt:roulette=1", "pcbpt:eorr=true",
+                                           "bdpt:connections=cache,roulette=0",
+                                           "bdpt:connections=cache,roulette=1", "path:guide=on",
                                            "sppm:radius=0.3"));
 
 }  // namespace
