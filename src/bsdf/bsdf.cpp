@@ -146,6 +146,8 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     if (!first_.next && first_.weight == 1)
         if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe))
             return sample_diffuse(ng_, has_strict_normals_, first_, *diffuse, wo, u, mode);
+    // Walks pass no number then. Others are not read either, so that every caller samples as walks do.
+    if (!uses_lobe_choice_) u_lobe = 0;
     const BsdfComponent* chosen = &first_;
     while (chosen && u_lobe >= chosen->weight) {
         u_lobe -= chosen->weight;

@@ -3,8 +3,9 @@
 namespace etendue {
 
 void Material::make_bsdf(const SurfacePoint& point, ComponentArena& arena, Bsdf& out) const {
-    ComponentList list(point.ng, has_strict_normals_, arena, out);
-    append(point, Frame::from_normal_and_tangent(point.ns, point.dpdu), 1, list);
+    const Frame frame = Frame::from_normal_and_tangent(point.ns, point.dpdu);
+    ComponentList list(point.ng, frame, has_strict_normals_, arena, out);
+    append(point, frame, 1, list);
 }
 
 }  // namespace etendue

@@ -2,8 +2,8 @@
 // Materials, each made from a <bsdf> of the scene file. A material looks up its textures at a surface point and returns
 // the `Bsdf` there; it is immutable and shared by all threads.
 
-#include <deque>
 #include <memory>
+#include <vector>
 
 #include "bsdf/bsdf.h"
 #include "description/params.h"
@@ -30,13 +30,16 @@ struct SurfacePoint {
 class ComponentArena {
 public:
     const BsdfComponent* keep(const BsdfComponent& c) {
-        if (used_ == store_.size()) store_.emplace_back();
-        store_[used_] = c;
-        return &store_[used_++];
+        if (used_ == blocks_.size() * kBlock)
+            blocks_.push_back(std::make_unique<BsdfComponent[]>(kBlock));
+        BsdfComponent& place = blocks_[used_ / kBlock][used_ % kBlock];
+        ++used_;
+        return &(place = c);
     }
     /// Stores the further components of a copied BSDF, which has read them from another arena.
     void adopt(Bsdf& bsdf) { bsdf.first_.next = copy_of(bsdf.first_.next); }
     void reset() { used_ = 0; }
+    size_t memory_bytes() const { return blocks_.size() * kBlock * sizeof(BsdfComponent); }
 
 private:
     /// In the same order.
@@ -47,7 +50,8 @@ private:
         return keep(copy);
     }
 
-    std::deque<BsdfComponent> store_;
+    static constexpr size_t kBlock = 4;
+    std::vector<std::unique_ptr<BsdfComponent[]>> blocks_;
     size_t used_ = 0;
 };
 
@@ -97,8 +101,10 @@ private:
 /// Collects the components of a tree of materials: the first in the Bsdf itself, the others in the arena.
 class ComponentList {
 public:
-    ComponentList(Vec3 ng, bool strict_normals, ComponentArena& arena, Bsdf& out)
-        : arena_(&arena), out_(&out) {
+    /// `frame`: that of a BSDF without components.
+    ComponentList(Vec3 ng, const Frame& frame, bool strict_normals, ComponentArena& arena,
+                  Bsdf& out)
+        : arena_(&arena), out_(&out), frame_(&frame) {
         out.ng_ = ng;
         out.has_strict_normals_ = strict_normals;
         out.has_smooth_ = out.has_delta_ = false;
@@ -106,6 +112,14 @@ public:
         out.first_.weight = 0;
         out.first_.next = nullptr;
     }
+    /// Without components, the BSDF is a black one: nothing is left of what it was before.
+    ~ComponentList() {
+        if (!is_empty_) return;
+        out_->first_.frame = *frame_;
+        out_->first_.lobe.emplace<DiffuseLobe>();
+    }
+    ComponentList(const ComponentList&) = delete;
+    ComponentList& operator=(const ComponentList&) = delete;
     template <class L>
     void add(const Frame& frame, const L& lobe, float weight) {
         if (!(weight > 0)) return;
@@ -116,7 +130,8 @@ public:
             first.frame = frame;
             first.lobe.template emplace<L>(lobe);
             first.weight = weight;
-            out_->uses_lobe_choice_ = L::kUsesLobeChoice;
+            // A component whose weight is below 1 may not be chosen at all.
+            out_->uses_lobe_choice_ = L::kUsesLobeChoice || weight < 1;
             is_empty_ = false;
         } else {
             out_->uses_lobe_choice_ = true;
@@ -128,6 +143,7 @@ public:
 private:
     ComponentArena* arena_;
     Bsdf* out_;
+    const Frame* frame_;
     bool is_empty_ = true;
 };
 

@@ -40,9 +40,9 @@ protected:
 
 // Options of the bump and normal maps of Mitsuba 3.7, which are known but not supported.
 inline constexpr const char* kFlipInvalidNormalsDoc =
-    "Accepted; must be false, since it would turn normals toward the viewer.";
+    "Refused if true: it would turn normals toward the viewer.";
 inline constexpr const char* kShadowingFunctionDoc =
-    "Accepted; must be false, since it would soften the shadow terminator for one view direction.";
+    "Refused if true: it would soften the shadow terminator for one view direction.";
 
 /// Throws SceneError where one of these options is set: they make a material depend on which of the two directions is
 /// that of the view.

@@ -1,6 +1,7 @@
 #pragma once
 // Vertices and sub-paths. After its walk a sub-path is read only: joins and weights never change it.
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -21,8 +22,9 @@ struct WalkContribution;
 class Survival {
 public:
     Survival() = default;
-    /// Rounded up.
-    explicit Survival(float q) : steps_(uint16_t(std::ceil(q * 0x1p10f) - 1)) {}
+    /// Rounded up, and limited to [2^-10, 1]; 1 if `q` is NaN.
+    explicit Survival(float q)
+        : steps_(q < 1 ? uint16_t(std::max(std::ceil(q * 0x1p10f) - 1, 0.0f)) : kMost) {}
     float value() const { return float(steps_ + 1) * 0x1p-10f; }
     uint16_t steps() const { return steps_; }
     static Survival from_steps(unsigned steps) {
@@ -32,7 +34,8 @@ public:
     }
 
 private:
-    uint16_t steps_ = 0x3ff;
+    static constexpr uint16_t kMost = 0x3ff;
+    uint16_t steps_ = kMost;
 };
 
 /// An end point or scattering point, with all data that joins and weights need.
@@ -242,6 +245,13 @@ struct SubPath {
         v.emitter = nullptr;
         v.guide = nullptr;
         return v;
+    }
+    /// Allocates memory for `size` vertices, and no more where they are all.
+    void reserve(int size) {
+        if (size_t(size) > store_.size()) store_.resize(size_t(size));
+    }
+    size_t memory_bytes() const {
+        return store_.capacity() * sizeof(Vertex) + arena.memory_bytes();
     }
     void truncate(int size) { size_ = size; }
     void clear() {

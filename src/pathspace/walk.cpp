@@ -36,7 +36,9 @@ std::optional<float> adjoint_survival(const WalkContext& walk, SubPath& path) {
         reference = path.expected;
     }
     if (!(reference > 0) || guide_class(v.gloss) == kGuideClasses - 1) return {};
-    return clamp(kFactor * beta * expected.beyond / reference, kLeast, 1.0f);
+    const float q = kFactor * beta * expected.beyond / reference;
+    if (!std::isfinite(q)) return {};
+    return clamp(q, kLeast, 1.0f);
 }
 
 /// Survival of Russian roulette at the last vertex: its throughput relative to that of the first scattering vertex. The

@@ -1,5 +1,7 @@
 #include "reuse/pair_density.h"
 
+#include <numbers>
+
 #include <tbb/parallel_for.h>
 
 namespace etendue {
@@ -9,7 +11,7 @@ PairDensity::PairDensity(const CellCounts& vertices, float radius, double correl
     : cells_(vertices.cells), levels_(vertices.counts.size()), correlation_(correlation) {
     // Ratio of the area of a disc to that of a cell's face: a plane through the cell has about that area in it.
     const double scale =
-        correlation * multiple * double(kPi) * sqr(double(radius / cells_.width()));
+        correlation * multiple * std::numbers::pi * sqr(double(radius / cells_.width()));
     tbb::parallel_for(size_t(0), levels_.size(), [&](size_t bucket) {
         if (const uint32_t n = vertices.counts[bucket])
             levels_[bucket] = pair_level_of_share(1 / (1 + scale * double(n)));

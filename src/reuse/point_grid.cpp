@@ -32,11 +32,16 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
     std::vector<uint32_t> next(begins_.begin(), begins_.end() - 1);
     for_each_part([&](size_t i) { entries_[next[bucket[i]]++] = entries[i]; });
     blocks_.resize((entries_.size() + kBlock - 1) / kBlock);
-    tbb::parallel_for(size_t(0), entries_.size(), [&](size_t i) {
-        Block& b = blocks_[i / kBlock];
-        b.x[i % kBlock] = entries_[i].p.x;
-        b.y[i % kBlock] = entries_[i].p.y;
-        b.z[i % kBlock] = entries_[i].p.z;
+    // By block, since the lanes of a vector are one object, which only one thread may write.
+    tbb::parallel_for(size_t(0), blocks_.size(), [&](size_t block) {
+        Block b{};
+        const size_t first = block * kBlock, end = std::min(first + kBlock, entries_.size());
+        for (size_t i = first; i < end; ++i) {
+            b.x[i - first] = entries_[i].p.x;
+            b.y[i - first] = entries_[i].p.y;
+            b.z[i - first] = entries_[i].p.z;
+        }
+        blocks_[block] = b;
     });
 }
 

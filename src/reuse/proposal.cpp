@@ -2,16 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "math/warp.h"
 
 namespace etendue {
 namespace {
 
-/// Thinning: an event of density `pdf` is kept with probability pdf / bound.
+/// Thinning: an event of density `pdf` is kept with probability pdf / bound. A number with few bits would keep improbable
+/// events too often.
 bool passes(float pdf, float bound, Sampler& sampler, RenderStats& stats) {
     if (pdf > bound * (1 + 1e-4f)) ++stats.bounds_exceeded;
-    return sampler.next_1d() * bound < pdf;
+    return sampler.next_1d_unstructured() * double(bound) < double(pdf);
 }
 
 /// A point of the region, drawn with the density of the cells' bounds and kept with that of `pdf`.
@@ -57,7 +59,7 @@ std::optional<BoxProposal> BoxProposal::make(const BallView& view) {
     BoxProposal p;
     p.low = {holds_pole ? 0.0f : sqr(std::sin(std::min(theta - alpha, kPi / 2))), -half_phi};
     p.size = {sqr(std::sin(std::min(theta + alpha, kPi / 2))) - p.low.x, 2 * half_phi};
-    p.mass = double(p.size.x) * double(p.size.y) / (2 * double(kPi));
+    p.mass = double(p.size.x) * double(p.size.y) / (2 * std::numbers::pi);
     if (!(p.mass > 0)) return {};
     p.frame = Frame::from_normal_and_tangent(*view.cosine, axis);
     return p;
@@ -101,7 +103,7 @@ std::optional<ConeProposal> ConeProposal::make(const BallView& view, const WalkD
     const double sin = std::sqrt(sin2), one_minus_cos = sin2 / (1 + std::sqrt(1 - sin2));
     const Vec3 axis = view.to_center / float(std::sqrt(view.dist2));
     const float bound = density.max_pdf({axis, float(std::asin(sin))});
-    return ConeProposal{.mass = 2 * double(kPi) * one_minus_cos * double(bound),
+    return ConeProposal{.mass = 2 * std::numbers::pi * one_minus_cos * double(bound),
                         .frame = Frame::from_normal(axis),
                         .max_pdf = bound,
                         .one_minus_cos = float(one_minus_cos)};

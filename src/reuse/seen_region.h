@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <numbers>
 
 #include "bsdf/lobe.h"
 #include "math/frame.h"
@@ -38,7 +39,7 @@ class SeenDisc {
 public:
     explicit SeenDisc(const SlabView& view);
 
-    double measure() const { return double(kPi) * radius_ * radius_; }
+    double measure() const { return std::numbers::pi * radius_ * radius_; }
     RegionPoint at(Vec2 u) const;
     RegionPart part(Vec2 lo, Vec2 size) const;
     /// Integral of the density cos θ/π about `n` over the disc; 0 where the horizon intersects the disc.

@@ -62,15 +62,18 @@ void expect_image(const Scene& scene, const std::vector<std::string>& integrator
 
 constexpr Rgb kAlbedo{0.7f, 0.5f, 0.2f}, kEmitted{1, 2, 3};
 
-const std::string kFurnaceWall = "<boolean name=\"flip_normals\" value=\"true\"/>" +
-                                 lambert(kAlbedo) + "<emitter type=\"area\">" +
-                                 rgb("radiance", kEmitted) + "</emitter>";
-
 /// Camera inside, off the centre.
 std::string furnace(const std::string& shape, const std::string& sensor_type = "perspective",
-                    const std::string& extra = "") {
+                    const std::string& extra = "", const std::string& bsdf = lambert(kAlbedo)) {
     return sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kSize, "70", extra, sensor_type) +
-           "<shape type=\"" + shape + "\">" + kFurnaceWall + "</shape>";
+           "<shape type=\"" + shape + "\"><boolean name=\"flip_normals\" value=\"true\"/>" + bsdf +
+           "<emitter type=\"area\">" + rgb("radiance", kEmitted) + "</emitter></shape>";
+}
+/// A Lambert surface of albedo ρ as the only part of a mixture that is not black.
+std::string part_of_mixture(float weight, const std::string& other) {
+    return fmt::format("<bsdf type=\"mixturebsdf\"><string name=\"weights\" value=\"{}\"/>",
+                       weight) +
+           lambert(kAlbedo / Rgb(weight)) + other + "</bsdf>";
 }
 
 /// Σ_{i<depth} ρ^i L_e: paths of at most `depth` edges.
@@ -121,6 +124,8 @@ INSTANTIATE_TEST_SUITE_P(
                     furnace("cube") +
                         rectangle("<translate z=\"0.3\"/>", "<bsdf type=\"thindielectric\"/>"),
                     false},
+        FurnaceCase{"part_of_mixture",
+                    furnace("sphere", "perspective", "", part_of_mixture(0.75f, ""))},
         FurnaceCase{"white", furnace("sphere") + sphere("-0.4,0,0.2", "0.3", lambert(Rgb(1)))},
         FurnaceCase{
             "masked_white",
@@ -129,6 +134,26 @@ INSTANTIATE_TEST_SUITE_P(
                        "<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.4\"/>" +
                            ("<bsdf type=\"twosided\">" + lambert(Rgb(1)) + "</bsdf></bsdf>"))}),
     [](const auto& p) { return std::string(p.param.name); });
+
+/// Fewer light paths than pixels, and more, also not a multiple.
+TEST(ClosedForm, FurnaceByNumberOfLightPaths) {
+    for (const char* sensor_type : {"perspective", "thinlens"}) {
+        const bool has_lens = sensor_type == std::string("thinlens");
+        const Scene scene = build(furnace("sphere", sensor_type,
+                                          has_lens ? "<float name=\"aperture_radius\" "
+                                                     "value=\"0.2\"/><float "
+                                                     "name=\"focus_distance\" value=\"0.7\"/>"
+                                                   : ""));
+        for (const int light_paths : {kSize * kSize / 4, 4 * kSize * kSize, 150})
+            for (const char* integrator : {"bdpt", "bdpt:connections=cache", "vcm:merges=false"}) {
+                IntegratorSpec with = IntegratorSpec::parse(integrator);
+                with.params["light_paths"] = std::to_string(light_paths);
+                const std::string spec = with.to_string();
+                expect_image(
+                    scene, {spec}, 512, [](float, float) { return furnace_radiance(60); }, 0.03);
+            }
+    }
+}
 
 TEST(ClosedForm, FurnaceByPathLength) {
     const Scene scene = build(furnace("sphere"));

@@ -28,6 +28,16 @@ private:
     std::mt19937_64 engine_;
 };
 
+/// The number for the choice of a lobe as walks pass it: 0 to a lobe that declares that it reads none. A `Bsdf` itself
+/// does not read numbers that walks do not pass.
+template <class L>
+float lobe_choice(const L&, float u) {
+    if constexpr (requires { L::kUsesLobeChoice; })
+        return L::kUsesLobeChoice ? u : 0;
+    else
+        return u;
+}
+
 inline Vec3 direction(double theta_degrees, double phi_degrees) {
     const double t = theta_degrees * M_PI / 180, p = phi_degrees * M_PI / 180;
     return normalize(
@@ -81,7 +91,7 @@ PolarMap fit_polar_map(const L& lobe, Vec3 wo, bool upper) {
     float peak_pdf = 0;
     for (int i = 0; i < 500; ++i) {
         const float u_lobe = random.next();
-        const auto s = lobe.sample(wo, u_lobe, random.next_2d());
+        const auto s = lobe.sample(wo, lobe_choice(lobe, u_lobe), random.next_2d());
         if (!s || s->is_delta || (s->wi.z > 0) != upper) continue;
         draws.push_back(s->wi);
         if (s->pdf > peak_pdf) {
@@ -113,7 +123,7 @@ void expect_samples_match_pdf(const L& lobe, Vec3 wo, double significance, int s
         LobeRandom random(2);
         for (int i = 0; i < samples; ++i) {
             const float u_lobe = random.next();
-            const auto s = lobe.sample(wo, u_lobe, random.next_2d());
+            const auto s = lobe.sample(wo, lobe_choice(lobe, u_lobe), random.next_2d());
             if (s && !s->is_delta && (s->wi.z > 0) == upper)
                 grid.add(map.t(s->wi), map.phi(s->wi));
             else
@@ -150,7 +160,7 @@ void expect_sample_agrees_with_eval(const L& lobe, Vec3 wo, double relative = 1e
     LobeRandom random(3);
     for (int i = 0; i < samples; ++i) {
         const float u_lobe = random.next();
-        const auto s = lobe.sample(wo, u_lobe, random.next_2d());
+        const auto s = lobe.sample(wo, lobe_choice(lobe, u_lobe), random.next_2d());
         if (!s) continue;
         ASSERT_NEAR(length(s->wi), 1, 2e-6);
         ASSERT_TRUE(is_finite(s->weight) && std::isfinite(s->pdf) && std::isfinite(s->pdf_rev));
@@ -192,7 +202,7 @@ void expect_adjoint_symmetry(const L& lobe, Vec3 wo, double relative = 1e-3, int
         const Vec2 u = random.next_2d();
         Vec3 wi = sample_uniform_sphere(u);
         if (i % 2 == 0) {
-            const auto s = lobe.sample(wo, u_lobe, u);
+            const auto s = lobe.sample(wo, lobe_choice(lobe, u_lobe), u);
             if (!s || s->is_delta) continue;
             wi = s->wi;
         }
@@ -220,11 +230,12 @@ void expect_delta_events_reverse(const L& lobe, Vec3 wo, int samples = 200) {
     LobeRandom random(5);
     for (int i = 0; i < samples; ++i) {
         const float u_lobe = random.next();
-        const auto s = lobe.sample(wo, u_lobe, random.next_2d());
+        const auto s = lobe.sample(wo, lobe_choice(lobe, u_lobe), random.next_2d());
         if (!s || !s->is_delta) continue;
         bool found = false;
         for (int j = 0; j < 1000 && !found; ++j) {
-            const auto back = lobe.sample(s->wi, (float(j) + 0.5f) / 1000, random.next_2d());
+            const auto back =
+                lobe.sample(s->wi, lobe_choice(lobe, (float(j) + 0.5f) / 1000), random.next_2d());
             if (!back || !back->is_delta || length(back->wi - wo) > 1e-4f) continue;
             found = true;
             ASSERT_TRUE(nearly(back->pdf, s->pdf_rev, 1e-3, 1e-6)) << describe(wo);
@@ -252,8 +263,9 @@ Albedo sampled_albedo(const L& lobe, Vec3 wo, int strata = 64) {
         const Vec2 jitter = random.next_2d();
         const Vec2 u{(float(i % strata) + jitter.x) / float(strata),
                      (float(i / strata) + jitter.y) / float(strata)};
-        const auto s = lobe.sample(
-            wo, random.next(), {std::min(u.x, kOneMinusEpsilon), std::min(u.y, kOneMinusEpsilon)});
+        const auto s =
+            lobe.sample(wo, lobe_choice(lobe, random.next()),
+                        {std::min(u.x, kOneMinusEpsilon), std::min(u.y, kOneMinusEpsilon)});
         for (int c = 0; s && c < 3; ++c) {
             sum[c] += s->weight[c];
             sum2[c] += sqr(double(s->weight[c]));
@@ -317,7 +329,7 @@ void expect_finite(const L& lobe) {
         for (float a : {0.0f, 0x1p-24f, 0.5f, kOneMinusEpsilon})
             for (float b : {0.0f, 0x1p-24f, 0.5f, kOneMinusEpsilon})
                 for (float l : {0.0f, 0.5f, kOneMinusEpsilon}) {
-                    const auto s = lobe.sample(wo, l, {a, b});
+                    const auto s = lobe.sample(wo, lobe_choice(lobe, l), {a, b});
                     if (!s) continue;
                     ASSERT_TRUE(ok(s->weight) && is_finite(s->wi) && std::isfinite(s->pdf) &&
                                 s->pdf > 0 && std::isfinite(s->pdf_rev) && s->pdf_rev >= 0)

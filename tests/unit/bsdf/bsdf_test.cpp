@@ -24,7 +24,7 @@ struct Mixture {
 
     Bsdf bsdf(Vec3 ng) {
         Bsdf made;
-        ComponentList list(ng, true, arena, made);
+        ComponentList list(ng, Frame{}, true, arena, made);
         for (const BsdfComponent& c : components)
             std::visit([&](const auto& lobe) { list.add(c.frame, lobe, c.weight); }, c.lobe);
         return made;
@@ -38,10 +38,13 @@ Vec3 tilted(Vec3 n, float amount, LobeRandom& random) {
 /// The lobe alone, or all of them mixed, about normals tilted against `ng`.
 std::vector<Mixture> random_mixtures(Vec3 ng, LobeRandom& random) {
     const auto frame = [&] { return Frame::from_normal(tilted(ng, 0.5f, random)); };
-    return {{{{frame(), kDiffuse}}},
-            {{{frame(), kMetal}}},
-            {{{frame(), kGlass}}},
-            {{{frame(), kGlass, 0.5f}, {frame(), kDiffuse, 0.2f}, {frame(), kMetal, 0.3f}}}};
+    std::vector<Mixture> mixtures;
+    mixtures.push_back({{{frame(), kDiffuse}}});
+    mixtures.push_back({{{frame(), kMetal}}});
+    mixtures.push_back({{{frame(), kGlass}}});
+    mixtures.push_back(
+        {{{frame(), kGlass, 0.5f}, {frame(), kDiffuse, 0.2f}, {frame(), kMetal, 0.3f}}});
+    return mixtures;
 }
 
 TEST(Bsdf, RadianceAndImportanceAreAdjoint) {

@@ -29,7 +29,7 @@ RoughConductorLobe gold(Kind kind, Roughness a) {
 TEST(Conductor, ReflectsAsAMirrorWithFresnelsReflectance) {
     const ConductorLobe lobe{kGoldEta, kGoldK, Rgb(0.5f, 1, 1)};
     for (Vec3 wo : test_directions()) {
-        const auto s = lobe.sample(wo, 0.3f, {0.1f, 0.2f});
+        const auto s = lobe.sample(wo, lobe_choice(lobe, 0.3f), {0.1f, 0.2f});
         ASSERT_TRUE(s);
         EXPECT_TRUE(s->is_delta);
         EXPECT_EQ(s->wi, reflect(wo));

@@ -82,6 +82,27 @@ TEST(LobeSum, DiffuseLightGoesToItsSide) {
     EXPECT_NEAR(bsdf.eval(wo, below, TransportMode::Importance).f.g, 0.1f * wi.z * kInvPi, 1e-6);
 }
 
+TEST(LobeSum, WithoutLobesNothingOfAnotherSurfaceIsLeft) {
+    TestMaterials m;
+    ComponentArena arena;
+    Bsdf bsdf;
+    const Vec3 wo = direction(30, 0), tilted = direction(20, 50);
+    m.make("roughconductor", {{"alpha", 0.3}}).make_bsdf(plane_point(wo), arena, bsdf);
+    ASSERT_FLOAT_EQ(bsdf.roughness(), 0.3f);
+    SurfacePoint point = plane_point(wo);
+    point.ns = tilted;
+    m.make("lobesum", {{"diffuse_reflectance", 0.0}, {"glossy_reflectance", 0.0}})
+        .make_bsdf(point, arena, bsdf);
+    EXPECT_NEAR(length(bsdf.shading_normal() - tilted), 0, 1e-6);
+    EXPECT_EQ(bsdf.roughness(), 0);
+    EXPECT_TRUE(bsdf.albedo_estimate().is_zero());
+    EXPECT_FALSE(bsdf.has_smooth() || bsdf.has_delta());
+    EXPECT_TRUE(bsdf.eval(wo, direction(10, 0), TransportMode::Radiance).f.is_zero());
+    EXPECT_EQ(bsdf.max_pdf(wo, {{0, 0, 1}, kPi}), 0);
+    for (const float u : {0.0f, 0.5f, kOneMinusEpsilon})
+        EXPECT_FALSE(bsdf.sample(wo, u, {0.3f, 0.6f}, TransportMode::Radiance));
+}
+
 TEST(LobeSum, WithoutContrastThereIsNoGloss) {
     TestMaterials m;
     ComponentArena arena;

@@ -79,6 +79,58 @@ TEST(Mixtures, WeightedSumsAgreeWithTheirDensities) {
         for (const Vec3 wo : test_directions()) check(mixture(m, weights), wo, significance);
 }
 
+/// What remains of a sum if other parts have no lobe, or no weight: a component that is not always chosen.
+std::vector<const Material*> parts_of_mixtures(TestMaterials& m) {
+    const auto mixed = [&](const char* weights, std::vector<int> parts) {
+        std::vector<TestMaterials::Child> children;
+        for (const int part : parts) children.push_back({"", part});
+        return &m.make("mixturebsdf", {{"weights", std::string(weights)}}, children);
+    };
+    const auto black = [&] {
+        return m.bsdf("lobesum", {{"diffuse_reflectance", 0.0}, {"glossy_reflectance", 0.0}});
+    };
+    std::vector<const Material*> all;
+    for (const auto& [type, values] :
+         std::vector<std::pair<const char*, std::vector<TestMaterials::Value>>>{
+             {"diffuse", {{"reflectance", 0.8}}},
+             {"orennayar", {}},
+             {"diffusetransmission", {}},
+             {"conductor", {}},
+             {"roughconductor", {{"alpha", 0.3}}},
+             {"dielectric", {}},
+             {"roughdielectric", {{"alpha", 0.3}}},
+             {"plastic", {}}}) {
+        all.push_back(mixed("0.5", {m.bsdf(type, values)}));
+        all.push_back(mixed("0.4, 0", {m.bsdf(type, values), m.bsdf("diffuse")}));
+        all.push_back(mixed("0.6, 0.4", {black(), m.bsdf(type, values)}));
+        all.push_back(
+            &m.make("blendbsdf", {{"weight", 0.3}}, {{"", black()}, {"", m.bsdf(type, values)}}));
+    }
+    return all;
+}
+
+TEST(Mixtures, PartsOfMixturesAgreeWithTheirDensities) {
+    TestMaterials m;
+    const auto materials = parts_of_mixtures(m);
+    const std::vector<Vec3> directions{direction(20, 0), direction(60, 130)};
+    const double significance = sidak(1e-3, int(2 * materials.size() * directions.size()));
+    for (const Material* material : materials)
+        for (const Vec3 wo : directions) check(*material, wo, significance);
+}
+
+TEST(Mixtures, WeightsScaleTheAlbedoOfAPart) {
+    TestMaterials m;
+    const Vec3 wo = direction(40, 20);
+    for (const char* type : {"diffuse", "conductor", "roughconductor", "plastic"}) {
+        const MaterialLobe whole{&m.make(type)},
+            half{&m.make("mixturebsdf", {{"weights", std::string("0.5")}}, {{"", m.bsdf(type)}})};
+        const Albedo a = sampled_albedo(whole, wo), b = sampled_albedo(half, wo);
+        EXPECT_NEAR(b.value.g, 0.5f * a.value.g, 5 * (a.standard_error.g + b.standard_error.g))
+            << type;
+        EXPECT_GT(b.standard_error.g, 0) << type;
+    }
+}
+
 TEST(Mixtures, WeightsAboveOneAreScaled) {
     TestMaterials m;
     const Vec3 wo = direction(30, 0), wi = direction(20, 170);

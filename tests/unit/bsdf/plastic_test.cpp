@@ -132,7 +132,8 @@ TEST_F(PlasticTest, RoughTransmittanceIsThatOfTheRoughDielectric) {
             for (int i = 0; i < n; ++i) {
                 const Vec3 wo = -sample_cosine_hemisphere(random.next_2d());
                 const float u_lobe = random.next();
-                if (const auto s = reflects.sample(wo, u_lobe, random.next_2d()))
+                if (const auto s =
+                        reflects.sample(wo, lobe_choice(reflects, u_lobe), random.next_2d()))
                     internal += double(s->weight.g) / n;
             }
             // Equal weights of 64 nodes are about 1 % low.

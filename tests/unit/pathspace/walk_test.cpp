@@ -2,8 +2,11 @@
 // survival.
 // Also: walks that meet a surface edge-on.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "math/statistics.h"
+#include "math/warp.h"
 #include "pathspace/walk.h"
 #include "test_scenes.h"
 
@@ -65,6 +68,95 @@ TEST_F(Walks, RouletteKeepsTheExpectedThroughputOfEyePaths) {
 TEST_F(Walks, RouletteKeepsTheExpectedThroughputOfLightPaths) {
     expect_expected_throughput<TransportMode::Importance>();
 }
+
+TEST(Survival, IsAProbability) {
+    EXPECT_EQ(Survival(1).value(), 1);
+    EXPECT_EQ(Survival(0.5f).value(), 0.5f);
+    for (const float q : {2.0f, kInf, std::nanf("")}) EXPECT_EQ(Survival(q).value(), 1) << q;
+    for (const float q : {0.0f, -0.0f, -1.0f, -kInf, 1e-30f})
+        EXPECT_EQ(Survival(q).value(), 0x1p-10f) << q;
+    for (unsigned steps = 0; steps < 1024; ++steps)
+        EXPECT_EQ(Survival(Survival::from_steps(steps).value()).steps(), steps);
+}
+
+/// Materials as walks sample them: the mean throughput of a step is the albedo, whatever numbers the walk reads.
+class ScatteringOfWalks : public ::testing::TestWithParam<std::string> {};
+
+const std::string kBlack =
+    "<bsdf type=\"lobesum\"><rgb name=\"diffuse_reflectance\" value=\"0\"/><rgb "
+    "name=\"glossy_reflectance\" value=\"0\"/></bsdf>";
+std::string mixed(const std::string& weights, const std::string& parts) {
+    return "<bsdf type=\"mixturebsdf\"><string name=\"weights\" value=\"" + weights + "\"/>" +
+           parts + "</bsdf>";
+}
+
+template <TransportMode mode>
+void expect_albedo(const std::string& bsdf) {
+    const Scene scene = test::build(
+        test::sensor("1,0.5,3", "0,0,0", 1, "1") + test::rectangle("<scale value=\"5\"/>", bsdf) +
+        "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"1\"/><float "
+        "name=\"beam_width\" value=\"0.9\"/><transform name=\"to_world\"><lookat "
+        "origin=\"1,0.5,3\" "
+        "target=\"0,0,0\" up=\"0,1,0\"/></transform></emitter>");
+    const Film film(scene.film(), scene.filter());
+    RenderStats stats;
+    const TechniqueCounts counts;
+    const WalkContext walk{scene, counts, stats, {3, 100}};
+    SubPath path;
+    Moments of_walks, of_values;
+    for (uint32_t i = 0; i < 10000; ++i) {
+        Sampler sampler(SamplerKind::Independent, 5);
+        sampler.start(i, 0);
+        if (mode == TransportMode::Radiance)
+            start_eye_path(walk, film, 0, sampler, path);
+        else
+            ASSERT_TRUE(start_light_path(walk, sampler, path));
+        ASSERT_EQ(path.size(), 2);
+        const auto s = sample_scattering<mode>(walk, sampler, path);
+        of_walks.add(s && !s->is_delta ? double(luminance(s->weight)) : 0);
+        sampler.seek(Stream::Auxiliary, 0);
+        const Vec3 w = sample_uniform_sphere(sampler.next_2d());
+        of_values.add(4 * M_PI * double(luminance(path[1].eval(w, mode).f)));
+    }
+    EXPECT_LT(std::fabs(of_walks.mean() - of_values.mean()),
+              5 * std::sqrt(of_walks.squared_error() + of_values.squared_error()) + 1e-6)
+        << of_walks.mean() << " and " << of_values.mean() << ", " << bsdf;
+    EXPECT_LT(std::sqrt(of_values.squared_error()), 0.03 * of_values.mean() + 1e-6) << bsdf;
+}
+
+TEST_P(ScatteringOfWalks, HasTheMeanOfItsValues) {
+    const std::string part = GetParam(), diffuse = test::diffuse("0.8,0.6,0.4");
+    for (const std::string& bsdf :
+         {part, mixed("0.5", part), mixed("0.5, 0", part + diffuse),
+          mixed("0.3, 0.5", part + diffuse), mixed("0.6, 0.4", kBlack + part),
+          "<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.3\"/>" + kBlack + part +
+              "</bsdf>"}) {
+        expect_albedo<TransportMode::Radiance>(bsdf);
+        expect_albedo<TransportMode::Importance>(bsdf);
+    }
+}
+
+/// As broad as the uniform directions that measure the values.
+std::vector<std::string> broad_materials() {
+    std::vector<std::string> all;
+    for (const auto& [type, alpha] :
+         std::vector<std::pair<const char*, const char*>>{{"diffuse", ""},
+                                                          {"orennayar", ""},
+                                                          {"diffusetransmission", ""},
+                                                          {"roughconductor", "alpha"},
+                                                          {"plastic", ""},
+                                                          {"roughplastic", "alpha"},
+                                                          {"phong", ""},
+                                                          {"principled", ""},
+                                                          {"coatedconductor", "alpha"},
+                                                          {"fresnelblend", "alpha"}})
+        all.push_back(
+            fmt::format("<bsdf type=\"{}\">{}</bsdf>", type,
+                        *alpha ? fmt::format("<float name=\"{}\" value=\"0.6\"/>", alpha) : ""));
+    return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(Materials, ScatteringOfWalks, ::testing::ValuesIn(broad_materials()));
 
 /// A unit sphere before a sky, which a ray along -x meets at the height `z`.
 struct Grazing : ::testing::Test {
