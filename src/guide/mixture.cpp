@@ -1,6 +1,7 @@
 #include "guide/mixture.h"
 
 #include <cmath>
+#include <numbers>
 
 #include "guide/exp_negative.h"
 #include "math/frame.h"
@@ -18,7 +19,7 @@ void GuideMixture::add(const Lobe& lobe) {
     inv_r_[k] = lobe.inv_r;
     const double kappa = double(kappa_[k] = clamp(lobe.kappa, kLeastKappa, kMostKappa));
     const double e = std::exp(-2 * kappa);
-    norm_[k] = float(kappa / (2 * double(kPi) * -std::expm1(-2 * kappa)));
+    norm_[k] = float(kappa / (2 * std::numbers::pi * -std::expm1(-2 * kappa)));
     rho_[k] = float((1 + e) / (1 - e) - 1 / kappa);
     weight_[k] = lobe.weight;
 }

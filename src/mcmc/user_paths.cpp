@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -137,7 +138,7 @@ constexpr float kTolerance = 1e-3f, kDisc = 1e-2f;
 constexpr double kLawTolerance = 2;
 
 double degrees(Vec3 a, Vec3 b) {
-    return 2 * std::asin(std::min(1.0, double(length(a - b)) / 2)) * 180 / double(kPi);
+    return 2 * std::asin(std::min(1.0, double(length(a - b)) / 2)) * 180 / std::numbers::pi;
 }
 
 std::string name_of(const Scene& scene, const SceneShape& shape) {
@@ -353,7 +354,7 @@ Vec3 sample_cone(Vec3 axis, float versine, Vec2 u) {
         Frame::from_normal(axis).to_world({s * std::cos(azimuth), s * std::sin(azimuth), 1 - v}));
 }
 double pdf_cone(float versine) {
-    return 1 / (2 * double(kPi) * double(versine));
+    return 1 / (2 * std::numbers::pi * double(versine));
 }
 
 }  // namespace

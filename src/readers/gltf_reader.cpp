@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -294,7 +295,7 @@ void GltfReader::add_camera(const JsonValue& camera, const Transform& to_world) 
         const JsonValue p = camera["perspective"];
         if (!p["yfov"]) p["yfov"].fail("is missing");
         aspect = p["aspectRatio"].number(kDefaultAspect, 1e-3, 1e3);
-        set(sensor, "fov", p["yfov"].number(0, 1e-4, 3.1415) * 180 / double(kPi));
+        set(sensor, "fov", p["yfov"].number(0, 1e-4, 3.1415) * 180 / std::numbers::pi);
         set(sensor, "fov_axis", std::string("y"));
     } else if (type == "orthographic") {
         const JsonValue o = camera["orthographic"];
@@ -351,13 +352,13 @@ void GltfReader::add_light(const JsonValue& light, const Transform& to_world) {
         set(emitter, "position", position);
     } else if (type == "spot") {
         const JsonValue spot = light["spot"];
-        const double outer = spot["outerConeAngle"].number(double(kPi) / 4, 1e-3, double(kPi) / 2);
+        const double outer = spot["outerConeAngle"].number(std::numbers::pi / 4, 1e-3, std::numbers::pi / 2);
         // Exporters write equal angles with different rounding.
-        const double inner = std::min(spot["innerConeAngle"].number(0, 0, double(kPi) / 2), outer);
+        const double inner = std::min(spot["innerConeAngle"].number(0, 0, std::numbers::pi / 2), outer);
         emitter = add("emitter", "spot", light);
         set(emitter, "intensity", colour);
-        set(emitter, "cutoff_angle", std::min(outer * 180 / double(kPi), 89.999));
-        set(emitter, "beam_width", std::min(inner * 180 / double(kPi), 89.999));
+        set(emitter, "cutoff_angle", std::min(outer * 180 / std::numbers::pi, 89.999));
+        set(emitter, "beam_width", std::min(inner * 180 / std::numbers::pi, 89.999));
         set(emitter, "falloff", std::string("quadratic"));
         const Vec3 axis = normalize(direction);
         const auto view = Transform::look_at(

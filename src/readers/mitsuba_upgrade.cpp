@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include <fmt/format.h>
@@ -90,7 +91,7 @@ void upgrade_roughdiffuse(SceneObject& object) {
     object.type = "orennayar";
     take(object, "use_fast_approx");
     const auto alpha = take(object, "alpha");
-    const double degrees = (alpha ? number(*alpha) : 0.2) / std::sqrt(2.0) * 180 / double(kPi);
+    const double degrees = (alpha ? number(*alpha) : 0.2) / std::sqrt(2.0) * 180 / std::numbers::pi;
     object.params.push_back({"sigma", degrees, alpha ? alpha->where : object.where});
 }
 

@@ -2,6 +2,7 @@
 // photometric units, stand for the scale that gives them.
 
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -55,7 +56,8 @@ int make_point(PbrtScene& scene, const PbrtArguments& args) {
     // In pbrt-v3 `from` is in world space, an offset from where the current transform puts the origin.
     scene.set(emitter, "position", scene.is_v3() ? ctm.point({0, 0, 0}) + from : ctm.point(from));
     scene.set(emitter, "intensity",
-              light_colour(scene, args, "I") * photometric_factor(args, "power", 4 * double(kPi)));
+              light_colour(scene, args, "I") *
+                  photometric_factor(args, "power", 4 * std::numbers::pi));
     return finish(scene, emitter);
 }
 
@@ -63,16 +65,16 @@ int make_spot(PbrtScene& scene, const PbrtArguments& args) {
     const int emitter = scene.add("emitter", "spot", args.where());
     const float cone = args.number("coneangle", 30, 0.01f, 179.9f);
     const float delta = args.number("conedeltaangle", 5, 0, cone);
-    const double radians = double(kPi) / 180, end = std::cos(cone * radians),
+    const double radians = std::numbers::pi / 180, end = std::cos(cone * radians),
                  start = std::cos((cone - delta) * radians);
     scene.set(emitter, "to_world", aimed(scene, args, {0, 0, 1}));
     scene.set(emitter, "cutoff_angle", double(cone));
     scene.set(emitter, "beam_width", double(cone - delta));
     scene.set(emitter, "falloff", std::string(scene.is_v3() ? "quartic" : "smooth"));
-    scene.set(
-        emitter, "intensity",
-        light_colour(scene, args, "I") *
-            photometric_factor(args, "power", 2 * double(kPi) * (1 - start + (start - end) / 2)));
+    scene.set(emitter, "intensity",
+              light_colour(scene, args, "I") *
+                  photometric_factor(args, "power",
+                                     2 * std::numbers::pi * (1 - start + (start - end) / 2)));
     return finish(scene, emitter);
 }
 
@@ -101,7 +103,7 @@ int make_infinite(PbrtScene& scene, const PbrtArguments& args) {
         const int emitter = scene.add("emitter", "constant", args.where());
         scene.set(emitter, "radiance",
                   light_colour(scene, args, "L") *
-                      photometric_factor(args, "illuminance", double(kPi)));
+                      photometric_factor(args, "illuminance", std::numbers::pi));
         return finish(scene, emitter);
     }
     const int emitter = scene.add("emitter", "envmap", args.where());
