@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "readers/scene_file.h"
+#include "render/defaults.h"
 #include "scene/builder.h"
 
 namespace etendue::bench {
@@ -104,10 +105,7 @@ std::optional<Scene> load_or_skip(const Report& report, const SceneFile& file,
 }
 
 IntegratorSpec integrator_for(const Scene& scene, const std::string& name) {
-    IntegratorSpec spec = IntegratorSpec::parse(name);
-    for (const auto& [parameter, value] : scene.defaults().integrator_params)
-        spec.params.emplace(parameter, value);
-    return spec;
+    return choose_integrator(scene, name);
 }
 
 Rendering render(const Scene& scene, const IntegratorSpec& integrator, int threads,

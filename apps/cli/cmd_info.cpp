@@ -6,6 +6,7 @@
 #include "guide_info.h"
 #include "json_text.h"
 #include "render/defaults.h"
+#include "render/scene_integrator.h"
 #include "scene_options.h"
 
 namespace etendue {
@@ -13,6 +14,13 @@ namespace {
 
 std::string mebibytes(size_t bytes) {
     return fmt::format("{:.1f} MiB", double(bytes) / (1 << 20));
+}
+
+/// The integrator of the scene file with its parameters, or what is wrong with it.
+std::string integrator_text(const Scene& s) try {
+    return scene_integrator(s).spec.to_string();
+} catch (const std::exception& e) {
+    return e.what();
 }
 
 void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
@@ -43,7 +51,9 @@ void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
                          {"geometry_bytes", st.geometry_bytes},
                          {"texture_bytes", st.texture_bytes},
                          {"accelerator_bytes", st.accelerator_bytes},
-                         {"warnings", s.warnings()}};
+                         {"integrator", integrator_text(s)},
+                         {"spp", default_spp(s)},
+                         {"warnings", warnings_of(s)}};
         if (guide.is_wanted) j["guide"] = learned;
         fmt::print("{}", json_text(j));
         return;
@@ -58,8 +68,7 @@ void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
         for (size_t i = 0; i < s.sensor_names().size(); ++i)
             fmt::print("  {}    {}: {}{}\n", i == 0 ? "sensors " : "        ", i,
                        s.sensor_names()[i], i == s.sensor_index() ? " (used)" : "");
-    fmt::print("  rendering   {}, {} spp\n",
-               s.defaults().integrator.empty() ? "path" : s.defaults().integrator, default_spp(s));
+    fmt::print("  rendering   {}, {} spp\n", integrator_text(s), default_spp(s));
     fmt::print("  shapes      {}: {} triangles, {} quadrics, {} instances\n", s.shapes().size(),
                st.triangles, st.quadrics, st.instances);
     fmt::print("  materials   {}\n", st.materials);
@@ -73,7 +82,7 @@ void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
                mebibytes(st.geometry_bytes), mebibytes(st.accelerator_bytes),
                mebibytes(st.texture_bytes));
     if (guide.is_wanted) fmt::print("{}", guide_text(learned));
-    for (const std::string& w : s.warnings()) fmt::print("  warning     {}\n", w);
+    for (const std::string& w : warnings_of(s)) fmt::print("  warning     {}\n", w);
 }
 
 }  // namespace

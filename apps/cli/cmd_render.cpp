@@ -21,6 +21,7 @@
 #include "render/defaults.h"
 #include "render/render_report.h"
 #include "render/renderer.h"
+#include "render/scene_integrator.h"
 #include "render/warnings.h"
 #include "scene_options.h"
 #include "system/available_memory.h"
@@ -205,7 +206,7 @@ void RenderCommand::run() const {
     SceneOptions loading = scene;
     loading.threads = threads;
     const Scene s = load_scene(loading);
-    print_warnings(s.warnings());
+    print_warnings(warnings_of(s, integrator));
     const RenderSettings settings = settings_for(s);
     if (settings.technique_depth > 0 && !quiet)
         message("technique images of paths up to {} edges: {:.0f} MiB\n", technique_depth,

@@ -18,6 +18,7 @@
 #include "image/image_io.h"
 #include "interrupt.h"
 #include "messages.h"
+#include "render/scene_integrator.h"
 #include "scene_options.h"
 #include "session/session.h"
 #include "studio/api.h"
@@ -137,7 +138,7 @@ void StudioCommand::watch(Session& session, const Api& api, const std::atomic<bo
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
         if (session.scene_version() != version) {
             version = session.scene_version();
-            for (const std::string& w : session.scene()->warnings()) message("warning: {}\n", w);
+            for (const std::string& w : warnings_of(*session.scene(), integrator)) message("warning: {}\n", w);
             if (const std::string problem = api.reference_problem(); !problem.empty())
                 message("warning: {}\n", problem);
             if (!is_started) start_first_run(session);

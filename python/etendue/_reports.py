@@ -140,7 +140,7 @@ class VerifyReport:
 
     @property
     def verdicts(self) -> dict[str, str]:
-        """A text for each method: "consistent", "deviates" or "undecided"."""
+        """A text for each method: "agrees" (no deviation was found), "deviates" or "undecided"."""
         return {m["method"]: m["verdict"] for m in self.data["methods"]}
 
     def _rows(self) -> list[dict[str, Any]]:

@@ -23,6 +23,7 @@
 #include "readers/object_graph.h"
 #include "readers/scene_file.h"
 #include "render/plugin_list.h"
+#include "render/scene_integrator.h"
 #include "scene/builder.h"
 #include "values.h"
 
@@ -593,7 +594,7 @@ void bind_description(nb::module_& m) {
             "height", [](const SceneHandle& s) { return s.scene.film().crop_height; },
             "Height of the rendered part, in pixels.")
         .def_prop_ro(
-            "warnings", [](const SceneHandle& s) { return s.scene.warnings(); },
+            "warnings", [](const SceneHandle& s) { return warnings_of(s.scene); },
             "What may be wrong with the scene, one sentence each.")
         .def_prop_ro(
             "bounds",

@@ -6,8 +6,8 @@
 
 #include "readers/mitsuba_spectrum.h"
 #include "readers/mitsuba_values.h"
+#include "render/scene_integrator.h"
 #include "scene/builder.h"
-#include "scene/settings.h"
 
 namespace etendue::python {
 namespace {
@@ -18,8 +18,8 @@ const std::map<Key, PluginInfo>& plugins() {
     static const std::map<Key, PluginInfo> all = [] {
         std::map<Key, PluginInfo> by_name;
         for (const PluginInfo& p : scene_plugins()) by_name.emplace(Key{p.category, p.name}, p);
-        for (const IntegratorAlias& a : integrator_aliases())
-            by_name.emplace(Key{"integrator", a.info.name}, a.info);
+        for (const PluginInfo& p : scene_file_integrators())
+            by_name.emplace(Key{p.category, p.name}, p);
         return by_name;
     }();
     return all;

@@ -19,17 +19,19 @@ const Param* SceneObject::find(std::string_view param_name) const {
 }
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
-    // Optimal string alignment distance. A candidate is near if the distance is at most a third of the name's length,
-    // or 1.
-    auto distance = [](std::string_view a, std::string_view b) {
+    // Optimal string alignment distance, whatever the case of letters. A candidate is near if the distance is at most a
+    // third of the name's length, or 1.
+    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; };
+    auto distance = [&](std::string_view a, std::string_view b) {
+        const auto differ = [&](char x, char y) { return lower(x) != lower(y); };
         std::vector<std::vector<size_t>> d(a.size() + 1, std::vector<size_t>(b.size() + 1));
         for (size_t i = 0; i <= a.size(); ++i) d[i][0] = i;
         for (size_t j = 0; j <= b.size(); ++j) d[0][j] = j;
         for (size_t i = 1; i <= a.size(); ++i)
             for (size_t j = 1; j <= b.size(); ++j) {
-                const size_t substitute = d[i - 1][j - 1] + (a[i - 1] != b[j - 1]);
+                const size_t substitute = d[i - 1][j - 1] + differ(a[i - 1], b[j - 1]);
                 d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, substitute});
-                if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+                if (i > 1 && j > 1 && !differ(a[i - 1], b[j - 2]) && !differ(a[i - 2], b[j - 1]))
                     d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
             }
         return d[a.size()][b.size()];

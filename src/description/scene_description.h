@@ -86,7 +86,7 @@ struct SceneDescription {
     int left_out = 0;  ///< Number of things that were.
 };
 
-/// The candidate nearest to `name` by edit distance; empty if none is near enough for a suggestion.
+/// The candidate nearest to `name` by edit distance, whatever the case of letters; empty if none is near enough for a suggestion.
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
 
 /// Canonical text of a description (for golden tests): one line per object and parameter, sorted by parameter name,

@@ -34,7 +34,7 @@ public:
 
     /// Memory of a film, by pixel. `groups`: see set_groups().
     static uint64_t bytes_per_pixel(bool has_splats, int groups) {
-        return sizeof(Moments) + sizeof(Rgb) + (2 + uint64_t(groups)) * sizeof(float) +
+        return sizeof(Moments) + sizeof(Rgb) + (3 + uint64_t(groups)) * sizeof(float) +
                (has_splats ? 3 * sizeof(int64_t) : 0);
     }
 

@@ -1,6 +1,8 @@
 // pbrt's cameras, films, filters, samplers and integrators: what is seen and how it is rendered.
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -51,7 +53,7 @@ Transform to_world(const PbrtScene& scene) {
 }
 
 double degrees(double radians) {
-    return radians * 180 / double(kPi);
+    return radians * 180 / std::numbers::pi;
 }
 
 int make_perspective(PbrtScene& scene, const PbrtArguments& args) {
@@ -66,7 +68,7 @@ int make_perspective(PbrtScene& scene, const PbrtArguments& args) {
         scene.set(sensor, "fov", fov);
         scene.set(sensor, "fov_axis", std::string("smaller"));
     } else {
-        const double half = std::tan(fov * double(kPi) / 360) * (w.x1 - w.x0) / 2;
+        const double half = std::tan(fov * std::numbers::pi / 360) * (w.x1 - w.x0) / 2;
         scene.set(sensor, "fov", degrees(2 * std::atan(half)));
         scene.set(sensor, "aspect", w.aspect());
         scene.set(sensor, "principal_point_offset_x", (w.x0 + w.x1) / (2 * (w.x1 - w.x0)));
@@ -222,24 +224,151 @@ int make_sampler(PbrtScene& scene, const PbrtArguments& args) {
     return sampler;
 }
 
+constexpr std::string_view kSampleCount = "sample_count";
+
+/// What becomes of a parameter of pbrt's integrators.
+struct IntegratorParam {
+    PbrtParamInfo info;
+    /// Parameter of the integrator used, or the sample count; nullptr: none.
+    const char* counterpart = nullptr;
+    bool has_effect =
+        true;  ///< Whether it concerns the image or its noise, so that a warning is due.
+};
+
+IntegratorParam counterpart(const char* name, ParamKind kind, const char* of_etendue,
+                            const char* doc, int versions = kV3And4) {
+    return {{name, kind, "", doc, versions}, of_etendue};
+}
+std::vector<IntegratorParam> missing(ParamKind kind, std::initializer_list<const char*> names) {
+    std::vector<IntegratorParam> all;
+    for (const char* name : names) all.push_back({{name, kind, "", "Ignored, with a warning."}});
+    return all;
+}
+std::vector<IntegratorParam> without_effect(ParamKind kind,
+                                            std::initializer_list<const char*> names) {
+    std::vector<IntegratorParam> all;
+    for (const char* name : names)
+        all.push_back({{name, kind, "", "Accepted; it changes no image."}, nullptr, false});
+    return all;
+}
+std::vector<IntegratorParam> operator+(std::vector<IntegratorParam> a,
+                                       const std::vector<IntegratorParam>& b) {
+    a.insert(a.end(), b.begin(), b.end());
+    return a;
+}
+
+/// An integrator of pbrt, and the one of etendue that renders it.
+struct IntegratorUse {
+    const char* name;
+    int versions;
+    const char* integrator;
+    std::vector<IntegratorParam> params;
+    bool is_substitute = false;
+};
+
+const std::vector<IntegratorUse>& integrator_uses() {
+    static const std::vector<IntegratorUse> uses = [] {
+        const std::vector<IntegratorParam> paths =
+            missing(ParamKind::Float, {"rrthreshold"}) +
+            missing(ParamKind::String, {"lightsampler", "lightsamplestrategy"}) +
+            missing(ParamKind::Bool, {"regularize"}) +
+            without_effect(ParamKind::Int, {"pixelbounds"});
+        const std::vector<IntegratorParam> samples =
+            missing(ParamKind::Bool, {"samplebsdf", "samplelights"});
+        const std::vector<IntegratorParam> progressive =
+            std::vector<IntegratorParam>{
+                counterpart("radius", ParamKind::Float, "radius", "Becomes radius."),
+                counterpart("photonsperiteration", ParamKind::Int, "light_paths",
+                            "Becomes light_paths."),
+                counterpart("numiterations", ParamKind::Int, "sample_count", "Samples per pixel.",
+                            kV3),
+                counterpart("iterations", ParamKind::Int, "sample_count", "The same.", kV3)} +
+            missing(ParamKind::Bool, {"regularize"}) +
+            without_effect(ParamKind::Int, {"imagewritefrequency", "pixelbounds"});
+        const std::vector<IntegratorParam> metropolis =
+            std::vector<IntegratorParam>{
+                counterpart("largestepprobability", ParamKind::Float, "p_large",
+                            "Becomes p_large."),
+                counterpart("mutationsperpixel", ParamKind::Int, "sample_count",
+                            "Samples per pixel."),
+                counterpart("chains", ParamKind::Int, "chains", "Becomes chains, of each group.")} +
+            missing(ParamKind::Int, {"bootstrapsamples"}) + missing(ParamKind::Float, {"sigma"}) +
+            missing(ParamKind::Bool, {"regularize"}) +
+            without_effect(ParamKind::Int, {"pixelbounds"});
+        const std::vector<IntegratorParam> bidirectional =
+            missing(ParamKind::String, {"lightsampler", "lightsamplestrategy"}) +
+            missing(ParamKind::Bool, {"regularize"}) +
+            without_effect(ParamKind::Bool, {"visualizestrategies", "visualizeweights"}) +
+            without_effect(ParamKind::Int, {"pixelbounds"});
+        const std::vector<IntegratorParam> substituted =
+            without_effect(ParamKind::Int, {"nsamples", "pixelbounds"}) +
+            without_effect(ParamKind::Float, {"maxdistance"}) +
+            without_effect(ParamKind::Bool, {"cossample"});
+        return std::vector<IntegratorUse>{
+            {"path", kV3And4, "path", paths},
+            {"volpath", kV3And4, "path", paths},
+            {"simplepath", kV4, "path", samples},
+            {"simplevolpath", kV4, "path", {}},
+            {"randomwalk", kV4, "path", {}},
+            {"directlighting", kV3, "path",
+             missing(ParamKind::String, {"strategy"}) +
+                 without_effect(ParamKind::Int, {"pixelbounds"})},
+            {"whitted", kV3, "path", without_effect(ParamKind::Int, {"pixelbounds"})},
+            {"bdpt", kV3And4, "bdpt", bidirectional},
+            {"lightpath", kV4, "ptracer", {}},
+            {"sppm", kV3And4, "sppm", progressive},
+            {"mlt", kV3And4, "mmlt", metropolis},
+            {"ambientocclusion", kV3And4, "path", substituted, true},
+            {"function", kV4, "path",
+             without_effect(ParamKind::String, {"function", "filename"}) +
+                 without_effect(ParamKind::Bool, {"skipbad"}) +
+                 without_effect(ParamKind::Int, {"imagewritefrequency"}),
+             true}};
+    }();
+    return uses;
+}
+
+/// What these integrators of pbrt count themselves takes the place of the sampler's count.
+void set_sample_count(PbrtScene& scene, int count) {
+    if (scene.sampler < 0 || count < 1) return;
+    for (Param& p : scene.description.objects[size_t(scene.sampler)].params)
+        if (p.name == kSampleCount) p.value = int64_t(count);
+}
+
 /// pbrt counts scatterings, etendue edges: one more.
-int make_integrator(PbrtScene& scene, const PbrtArguments& args, const char* type) {
-    const int integrator = scene.add("integrator", type, args.where());
+int make_integrator(PbrtScene& scene, const PbrtArguments& args) {
+    const auto use = std::ranges::find_if(
+        integrator_uses(), [&](const IntegratorUse& u) { return u.name == args.name(); });
+    if (use->is_substitute)
+        scene.warn(args.where(),
+                   fmt::format("the integrator \"{}\" is not one of etendue's; \"path\" instead",
+                               args.name()));
+    const int integrator = scene.add("integrator", use->integrator, args.where());
     constexpr int kMost = 1 << 19;
     scene.set(integrator, "max_depth", int64_t(args.integer("maxdepth", 5, 0, kMost)) + 1);
+    std::vector<std::string> ignored;
+    for (const IntegratorParam& p : use->params) {
+        const std::string name(p.info.name);
+        if (!args.has(name)) continue;
+        if (!p.counterpart) {
+            if (p.has_effect && !use->is_substitute) ignored.push_back(name);
+        } else if (p.info.kind == ParamKind::Int) {
+            // pbrt's -1 is the default: as many photons as pixels.
+            const int value = args.integer(name, -1, -1, 1 << 30);
+            if (value < 0) continue;
+            if (p.counterpart == kSampleCount)
+                set_sample_count(scene, value);
+            else
+                scene.set(integrator, p.counterpart, int64_t(value));
+        } else {
+            scene.set(integrator, p.counterpart, double(args.number(name, 0, 0)));
+        }
+    }
+    if (!ignored.empty())
+        scene.warn(args.where(),
+                   fmt::format("integrator \"{}\": without counterpart here, and ignored: {}",
+                               args.name(), fmt::join(ignored, ", ")));
     return integrator;
-}
-template <const char* type>
-int make_integrator(PbrtScene& scene, const PbrtArguments& args) {
-    return make_integrator(scene, args, type);
-}
-constexpr char kPath[] = "path", kBdpt[] = "bdpt", kLight[] = "ptracer", kSppm[] = "sppm";
-
-int make_other_integrator(PbrtScene& scene, const PbrtArguments& args) {
-    scene.warn(args.where(),
-               fmt::format("the integrator \"{}\" is not one of etendue's; \"path\" instead",
-                           args.name()));
-    return make_integrator(scene, args, kPath);
 }
 
 // ---- Tables
@@ -288,26 +417,6 @@ std::vector<PbrtParamInfo> filter_params(const char* v3, const char* v4) {
             {"ywidth", ParamKind::Float, v3, "The same.", kV3},
             {"xradius", ParamKind::Float, v4, "Radius in pixels.", kV4},
             {"yradius", ParamKind::Float, v4, "The same.", kV4}};
-}
-
-std::vector<PbrtParamInfo> integrator_params() {
-    std::vector<PbrtParamInfo> all = {
-        {"maxdepth", ParamKind::Int, "5",
-         "Scatterings of the longest path; etendue's max_depth is one more."}};
-    const char* floats[] = {"rrthreshold", "radius", "largestepprobability", "sigma",
-                            "maxdistance"};
-    const char* ints[] = {"pixelbounds",   "photonsperiteration", "iterations",
-                          "numiterations", "imagewritefrequency", "bootstrapsamples",
-                          "chains",        "mutationsperpixel",   "nsamples"};
-    const char* bools[] = {"regularize", "visualizestrategies", "visualizeweights",
-                           "samplebsdf", "samplelights",        "cossample"};
-    const char* strings[] = {"lightsampler", "lightsamplestrategy", "strategy"};
-    constexpr const char* kDoc = "Accepted; without effect.";
-    for (const char* name : floats) all.push_back({name, ParamKind::Float, "", kDoc});
-    for (const char* name : ints) all.push_back({name, ParamKind::Int, "", kDoc});
-    for (const char* name : bools) all.push_back({name, ParamKind::Bool, "", kDoc});
-    for (const char* name : strings) all.push_back({name, ParamKind::String, "", kDoc});
-    return all;
 }
 
 }  // namespace
@@ -410,22 +519,21 @@ const std::vector<PbrtEntry>& pbrt_samplers() {
 const std::vector<PbrtEntry>& pbrt_integrators() {
     static const std::vector<PbrtEntry> entries = [] {
         std::vector<PbrtEntry> all;
-        const std::vector<PbrtParamInfo> shared = integrator_params();
-        for (const auto& [name, versions] : {std::pair("path", kV3And4),
-                                             {"volpath", kV3And4},
-                                             {"simplepath", kV4},
-                                             {"simplevolpath", kV4},
-                                             {"randomwalk", kV4},
-                                             {"directlighting", kV3},
-                                             {"whitted", kV3}})
-            all.push_back({name, versions, "Rendered by path.", shared, make_integrator<kPath>});
-        all.push_back({"bdpt", kV3And4, "Rendered by bdpt.", shared, make_integrator<kBdpt>});
-        all.push_back({"lightpath", kV4, "Rendered by light.", shared, make_integrator<kLight>});
-        all.push_back({"sppm", kV3And4, "Rendered by sppm.", shared, make_integrator<kSppm>});
-        for (const auto& [name, versions] :
-             {std::pair("mlt", kV3And4), {"ambientocclusion", kV3And4}, {"function", kV4}})
-            all.push_back({name, versions, "Rendered by path, with a warning.", shared,
-                           make_other_integrator});
+        for (const IntegratorUse& use : integrator_uses()) {
+            std::vector<PbrtParamInfo> params = {
+                {"maxdepth", ParamKind::Int, "5",
+                 "Scatterings of the longest path; etendue's max_depth is one more."}};
+            for (const IntegratorParam& p : use.params) params.push_back(p.info);
+            const std::string_view by = use.integrator;
+            all.push_back({use.name, use.versions,
+                           use.is_substitute ? "Replaced by path, with a warning."
+                           : by == "bdpt"    ? "Rendered by bdpt."
+                           : by == "ptracer" ? "Rendered by light."
+                           : by == "sppm"    ? "Rendered by sppm."
+                           : by == "mmlt"    ? "Rendered by mmlt."
+                                             : "Rendered by path.",
+                           params, make_integrator});
+        }
         return all;
     }();
     return entries;

@@ -3,23 +3,43 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "render/scene_integrator.h"
+
 namespace etendue {
 
+namespace {
+
+/// Parameters that belong to the scene: which paths the image shows, and where they are hard to find.
+bool is_of_the_scene(const std::string& param) {
+    return param == "max_depth" || param == "user_paths";
+}
+
+IntegratorSpec chosen_by_scene(const Scene& scene) {
+    try {
+        return scene_integrator(scene).spec;
+    } catch (const std::exception& e) {
+        throw std::runtime_error(std::string(e.what()) + "; choose another one (-i)");
+    }
+}
+
+}  // namespace
+
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
-    const RenderDefaults& defaults = scene.defaults();
-    if (text.empty() && !defaults.integrator_problem.empty())
-        throw std::runtime_error(defaults.integrator_problem + "; choose another one (-i)");
-    IntegratorSpec spec =
-        IntegratorSpec::parse(!text.empty()                 ? text
-                              : defaults.integrator.empty() ? "path"
-                                                            : defaults.integrator);
+    if (text.empty()) return chosen_by_scene(scene);
+    IntegratorSpec spec = IntegratorSpec::parse(text);
     const std::vector<ParamInfo>& params = integrator_entry(spec.name).info.params;
     const auto takes = [&](const std::string& name) {
         return std::any_of(params.begin(), params.end(),
                            [&](const ParamInfo& p) { return p.name == name; });
     };
-    for (const auto& [name, value] : defaults.integrator_params)
-        if (takes(name)) spec.params.emplace(name, value);
+    try {
+        const IntegratorSpec of_scene = scene_integrator(scene).spec;
+        for (const auto& [name, value] : of_scene.params)
+            if (takes(name) && (of_scene.name == spec.name || is_of_the_scene(name)))
+                spec.params.emplace(name, value);
+    } catch (const std::exception&) {
+        // The scene's integrator does not matter where another one is chosen.
+    }
     return spec;
 }
 

@@ -9,8 +9,9 @@
 
 namespace etendue {
 
-/// The integrator that `text` names, or the scene's if `text` is empty. Parameters missing from `text` are taken
-/// from the scene's integrator, if this one has them.
+/// The integrator that `text` names, or the scene's if `text` is empty. Parameters missing from `text` are taken from the
+/// scene's integrator if it is the same one. From another one, only those are taken that belong to the scene, as max_depth
+/// does: other parameters of a method say nothing about another method.
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text);
 
 /// Samples per pixel that the scene file asks for, or 64.

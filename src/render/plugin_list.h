@@ -20,8 +20,9 @@ struct PluginEntry {
 
 /// All plug-ins, grouped by category.
 std::vector<PluginEntry> plugin_list();
-/// Keeps the entries of `category` and `name`, each of which may be empty for all. Throws std::runtime_error with the
-/// known names where there is no such entry.
+/// Keeps the entries of `category` and `name`, each of which may be empty for all. A category can be given in capitals, in
+/// the plural, or by another usual word, such as "lights". Throws std::runtime_error with the known names, and with the
+/// nearest one, where there is no such entry.
 std::vector<PluginEntry> choose_plugins(std::vector<PluginEntry> entries,
                                         const std::string& category, const std::string& name);
 /// One object for each name.

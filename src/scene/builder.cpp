@@ -411,64 +411,42 @@ private:
         return medium;
     }
 
-    /// A scene file's integrator is no more than a suggestion, so what is wrong with it is noted for the case that the
-    /// user chooses no other one.
+    /// The integrator is kept as it is. It is checked where it is used, since the command line may name another one.
     void read_integrator(int index) {
         RenderDefaults& defaults = scene_.defaults_;
-        if (!defaults.integrator.empty())
+        if (defaults.integrator)
             return plugins_.problem(plugins_.object(index).where,
                                     "a scene can have only one integrator; this is a second");
-        defaults.integrator = "path";
-        try {
-            apply_integrator(index);
-        } catch (const SceneError& e) {
-            defaults.integrator_problem = e.what();
+        defaults.is_lenient = options_.lenient;
+        index = unwrapped_integrator(index);
+        SceneObject& kept = defaults.integrator.emplace(plugins_.object(index));
+        kept.children.clear();
+        for (Param& param : kept.params) {
+            if (const bool* strict = param.as<bool>(); strict && param.name == "strict_normals")
+                strict_normals_ = *strict;
+            if (param.name != "user_paths" || !param.as<std::string>()) continue;
+            try {
+                param.value = resolve_file(plugins_.params(index), param.name);
+            } catch (const SceneError& e) {
+                defaults.integrator_problem = e.what();
+            }
         }
     }
 
-    void apply_integrator(int index) {
+    /// The integrator itself, or the innermost one of wrappers; `path` where they are empty.
+    int unwrapped_integrator(int index) {
         const Params p = plugins_.params(index);
-        const IntegratorAlias* alias = plugins_.find(index, integrator_aliases());
-        if (!alias) return;
         const std::string& type = p.object().type;
-        if (!*alias->integrator) {
-            const auto nested = p.children("integrator");
-            plugins_.warn(p.where(),
-                          nested.empty()
-                              ? fmt::format("integrator \"{}\" is rendered by path", type)
-                              : fmt::format("integrator \"{}\" is not supported; the one "
-                                            "within it, \"{}\", is rendered",
-                                            type, plugins_.object(nested[0].object).type));
-            if (!nested.empty()) apply_integrator(nested[0].object);
-            return;
-        }
-        scene_.defaults_.integrator = alias->integrator;
-        if (alias->is_substitute)
-            plugins_.warn(p.where(),
-                          fmt::format("integrator \"{}\" is not supported; {} is rendered", type,
-                                      alias->integrator));
-        strict_normals_ = p.flag("strict_normals", false);
-        constexpr int64_t kLatest = RenderDefaults::kLatestRoulette;
-        for (const char* name : {"max_depth", "rr_depth"}) {
-            if (!p.has(name)) continue;
-            int64_t depth = p.integer(name, 0, -1, INT32_MAX);
-            const int64_t longest = p.integer("max_depth", -1, -1, INT32_MAX);
-            if (name == std::string_view("rr_depth") && depth > kLatest &&
-                (longest < 0 || longest > kLatest)) {
-                plugins_.warn(p.where(name),
-                              fmt::format("rr_depth is {}; {} is used, so that paths "
-                                          "in closed rooms end",
-                                          depth, kLatest));
-                depth = kLatest;
-            }
-            scene_.defaults_.integrator_params.emplace_back(name, fmt::format("{}", depth));
-        }
-        if (alias->max_depth >= 0)
-            scene_.defaults_.integrator_params.emplace_back("max_depth",
-                                                            fmt::format("{}", alias->max_depth));
-        if (p.has("user_paths"))
-            scene_.defaults_.integrator_params.emplace_back("user_paths",
-                                                            resolve_file(p, "user_paths"));
+        const IntegratorAlias* alias = find_integrator_alias(type);
+        if (!alias || *alias->integrator) return index;
+        const auto nested = p.children("integrator");
+        plugins_.warn(p.where(),
+                      nested.empty()
+                          ? fmt::format("integrator \"{}\" is rendered by path", type)
+                          : fmt::format("integrator \"{}\" is not supported; the one within it, "
+                                        "\"{}\", is rendered",
+                                        type, plugins_.object(nested[0].object).type));
+        return nested.empty() ? index : unwrapped_integrator(nested[0].object);
     }
 
     void make_sensor(const View& view) {

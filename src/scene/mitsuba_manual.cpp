@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <optional>
 
 #include <fmt/format.h>
+
+#include "scene/settings.h"
 
 namespace etendue {
 namespace {
@@ -411,150 +414,72 @@ std::vector<ManualEntry> media() {
     };
 }
 
+/// What becomes of their parameters is in integrator_aliases(), except where they are not rendered themselves.
 std::vector<ManualEntry> integrators() {
-    const auto no_effect = [](const char* names) {
-        return ManualNote{names, kAccepted, "without effect; a parameter of Mitsuba's algorithm"};
-    };
     constexpr const char* kShared = "max_depth rr_depth hide_emitters";
     constexpr const char* kGradients = "reparam_max_depth sppc sppp sppi guiding guiding_proj "
                                        "guiding_rounds antithetic_sampling emitter_samples";
-    const auto no_image = "does not compute radiance; path is rendered";
-    std::vector<ManualEntry> all = {
+    constexpr const char* kProgressive =
+        "max_depth rr_depth photon_count initial_radius alpha granularity max_passes";
+    constexpr const char* kMutations = "bidirectional_mutation lens_perturbation "
+                                       "caustic_perturbation multi_chain_perturbation "
+                                       "manifold_perturbation lambda";
+    static const std::string gradients_of_paths = std::string(kPathDepths) + " " + kGradients,
+                             mlt = std::string("max_depth direct_samples luminance_samples "
+                                               "two_stage ") +
+                                   kMutations,
+                             erpt = std::string("max_depth rr_depth num_chains max_chains "
+                                                "chain_length direct_samples ") +
+                                    kMutations;
+    const auto of_wrapper = [](const char* names) {
+        return ManualNote{names, kAccepted, "the integrator in it is rendered"};
+    };
+    constexpr const char* kCache = "resolution quality gradients clamp_neighbor clamp_screen "
+                                   "overture quality_adjustment indirect_only debug";
+    return {
         {"integrator", "path", kBothManuals, kShared, "strict_normals"},
         {"integrator", "volpath", kBothManuals, kShared, "strict_normals"},
-        {"integrator",
-         "volpathmis",
-         kMitsuba3,
-         "max_depth rr_depth hide_emitters use_spectral_mis",
-         "",
-         "",
-         {no_effect("use_spectral_mis")}},
+        {"integrator", "volpathmis", kMitsuba3,
+         "max_depth rr_depth hide_emitters use_spectral_mis"},
         {"integrator", "volpath_simple", kMitsuba06,
          "max_depth rr_depth hide_emitters strict_normals"},
-        {"integrator",
-         "direct",
-         kBothManuals,
-         "shading_samples emitter_samples bsdf_samples hide_emitters",
-         "strict_normals",
-         "",
-         {no_effect("shading_samples emitter_samples bsdf_samples")}},
+        {"integrator", "direct", kBothManuals,
+         "shading_samples emitter_samples bsdf_samples hide_emitters", "strict_normals"},
         {"integrator", "bdpt", kMitsuba06, "max_depth rr_depth light_image sample_direct"},
-        {"integrator",
-         "ptracer",
-         kBothManuals,
-         kPathDepths,
-         "granularity brute_force",
-         "hide_emitters samples_per_pass",
-         {no_effect("granularity brute_force samples_per_pass")}},
-        {"integrator",
-         "photonmapper",
-         kMitsuba06,
+        {"integrator", "ptracer", kBothManuals, kPathDepths, "granularity brute_force",
+         "hide_emitters samples_per_pass"},
+        {"integrator", "photonmapper", kMitsuba06,
          "max_depth rr_depth hide_emitters direct_samples glossy_samples global_photons "
          "caustic_photons volume_photons global_lookup_radius caustic_lookup_radius lookup_size "
-         "granularity",
-         "",
-         "",
-         {no_effect("direct_samples glossy_samples global_photons caustic_photons volume_photons "
-                    "global_lookup_radius caustic_lookup_radius lookup_size granularity")}},
-        {"integrator",
-         "ppm",
-         kMitsuba06,
-         "max_depth rr_depth photon_count initial_radius alpha granularity max_passes",
-         "",
-         "",
-         {no_effect("photon_count initial_radius alpha granularity max_passes")}},
-        {"integrator",
-         "sppm",
-         kMitsuba06,
-         "max_depth rr_depth photon_count initial_radius alpha granularity max_passes",
-         "",
-         "",
-         {no_effect("photon_count initial_radius alpha granularity max_passes")}},
-        {"integrator",
-         "pssmlt",
-         kMitsuba06,
-         "max_depth rr_depth bidirectional direct_samples luminance_samples two_stage p_large",
-         "",
-         "",
-         {no_effect("bidirectional direct_samples luminance_samples two_stage p_large")}},
-        {"integrator",
-         "mlt",
-         kMitsuba06,
-         "max_depth direct_samples luminance_samples two_stage bidirectional_mutation "
-         "lens_perturbation caustic_perturbation multi_chain_perturbation manifold_perturbation "
-         "lambda",
-         "",
-         "",
-         {no_effect("direct_samples luminance_samples two_stage bidirectional_mutation "
-                    "lens_perturbation caustic_perturbation multi_chain_perturbation "
-                    "manifold_perturbation lambda")}},
-        {"integrator",
-         "erpt",
-         kMitsuba06,
-         "max_depth rr_depth num_chains max_chains chain_length direct_samples "
-         "bidirectional_mutation lens_perturbation caustic_perturbation multi_chain_perturbation "
-         "manifold_perturbation lambda",
-         "",
-         "",
-         {no_effect("num_chains max_chains chain_length direct_samples bidirectional_mutation "
-                    "lens_perturbation caustic_perturbation multi_chain_perturbation "
-                    "manifold_perturbation lambda")}},
-        {"integrator",
-         "vpl",
-         kMitsuba06,
-         "max_depth clamping shadow_map_resolution",
-         "",
-         "",
-         {no_effect("clamping shadow_map_resolution")}},
+         "granularity"},
+        {"integrator", "ppm", kMitsuba06, kProgressive},
+        {"integrator", "sppm", kMitsuba06, kProgressive},
+        {"integrator", "pssmlt", kMitsuba06,
+         "max_depth rr_depth bidirectional direct_samples luminance_samples two_stage p_large"},
+        {"integrator", "mlt", kMitsuba06, mlt.c_str()},
+        {"integrator", "erpt", kMitsuba06, erpt.c_str()},
+        {"integrator", "vpl", kMitsuba06, "max_depth clamping shadow_map_resolution"},
         {"integrator", "prb", kMitsuba3, kPathDepths},
         {"integrator", "prb_basic", kMitsuba3, kPathDepths},
         {"integrator", "prbvolpath", kMitsuba3, "max_depth rr_depth hide_emitters"},
-        {"integrator", "direct_projective", kMitsuba3, kGradients, "", "", {no_effect(kGradients)}},
-        {"integrator",
-         "prb_projective",
-         kMitsuba3,
-         "max_depth rr_depth reparam_max_depth sppc sppp sppi guiding guiding_proj guiding_rounds "
-         "antithetic_sampling emitter_samples",
-         "",
-         "",
-         {no_effect(kGradients)}},
+        {"integrator", "direct_projective", kMitsuba3, kGradients},
+        {"integrator", "prb_projective", kMitsuba3, gradients_of_paths.c_str()},
         {"integrator",
          "adaptive",
          kMitsuba06,
          "max_error p_value max_sample_factor",
          "",
          "",
-         {no_effect("max_error p_value max_sample_factor")}},
-        {"integrator",
-         "irrcache",
-         kMitsuba06,
-         "resolution quality gradients clamp_neighbor clamp_screen overture quality_adjustment "
-         "indirect_only debug",
-         "",
-         "",
-         {no_effect("resolution quality gradients clamp_neighbor clamp_screen overture "
-                    "quality_adjustment indirect_only debug")}},
+         {of_wrapper("max_error p_value max_sample_factor")}},
+        {"integrator", "irrcache", kMitsuba06, kCache, "", "", {of_wrapper(kCache)}},
         {"integrator", "multichannel", kMitsuba06, ""},
         {"integrator", "aov", kMitsuba3, "aovs", "", "", {{"aovs", kAccepted, "use --aov"}}},
         {"integrator", "moment", kMitsuba3, ""},
         {"integrator", "stokes", kMitsuba3, ""},
-        {"integrator",
-         "ao",
-         kMitsuba06,
-         "shading_samples ray_length",
-         "",
-         "",
-         {{"shading_samples ray_length", kAccepted, no_image}}},
-        {"integrator",
-         "field",
-         kMitsuba06,
-         "field undefined",
-         "",
-         "",
-         {{"field undefined", kAccepted, "use --aov; path is rendered"}}},
+        {"integrator", "ao", kMitsuba06, "shading_samples ray_length"},
+        {"integrator", "field", kMitsuba06, "field undefined"},
         {"integrator", "depth", kMitsuba3, ""},
     };
-    return all;
 }
 
 /// "to_world" → "toWorld", as the manual of Mitsuba 0.6 spells it.
@@ -585,22 +510,47 @@ const PluginInfo* find_plugin(const std::vector<PluginInfo>& plugins, std::strin
     return it == plugins.end() ? nullptr : &*it;
 }
 
+/// What the documentation of a parameter says of its support.
+std::string status_of_doc(std::string_view doc) {
+    const auto after = [&](std::string_view words) -> std::optional<std::string> {
+        if (!doc.starts_with(words)) return {};
+        return std::string(doc.substr(words.size(), doc.size() - words.size() - 1));
+    };
+    if (const auto why = after("Accepted; ")) return "accepted: " + *why;
+    if (const auto why = after("Refused if true: ")) return "refused if true: " + *why;
+    if (doc == "Ignored, with a warning.") return "ignored, with a warning";
+    if (const auto what = after("Becomes ")) return "becomes " + *what;
+    if (const auto what = after("Always ")) return "always " + *what;
+    return "supported";
+}
+
 /// What etendue does with a parameter.
 std::string param_status(const ManualEntry& entry, const PluginInfo* plugin,
                          const std::string& param) {
     if (plugin)
         for (const ParamInfo& p : plugin->params)
-            if (p.name == param) {
-                const std::string_view doc = p.doc;
-                constexpr std::string_view kWord = "Accepted; ";
-                return doc.substr(0, kWord.size()) == kWord
-                           ? fmt::format("accepted: {}",
-                                         doc.substr(kWord.size(), doc.size() - kWord.size() - 1))
-                           : "supported";
-            }
+            if (p.name == param) return status_of_doc(p.doc);
     const ManualNote* note = find_manual_note(entry.category, entry.name, param);
     if (!note) return "supported";
     return fmt::format("{}: {}", note->is_accepted ? "accepted" : "refused", note->text);
+}
+
+/// What etendue does with a plug-in.
+std::string plugin_status(const ManualEntry& e) {
+    if (e.refused) return fmt::format("refused: {}", e.refused);
+    if (e.replacement) return fmt::format("becomes `{}`", e.replacement);
+    const IntegratorAlias* alias =
+        std::string_view(e.category) == "integrator" ? find_integrator_alias(e.name) : nullptr;
+    if (!alias) return "supported";
+    if (!*alias->integrator) return "replaced by the integrator in it, with a warning";
+    if (alias->is_substitute)
+        return fmt::format("replaced by `{}`, with a warning", alias->integrator);
+    const std::string_view doc = alias->info.doc;
+    if (doc.find("derivatives are not computed") != doc.npos)
+        return fmt::format("rendered by `{}`: derivatives are not computed", alias->integrator);
+    return std::string_view(alias->integrator) == e.name
+               ? "supported"
+               : fmt::format("rendered by `{}`", alias->integrator);
 }
 
 }  // namespace
@@ -646,9 +596,7 @@ std::string mitsuba_manual_table(const std::vector<PluginInfo>& plugins) {
         const bool in_06 = e.manuals & kMitsuba06, in_3 = e.manuals & kMitsuba3;
         const std::string name = fmt::format("**`{}`**", e.name);
         out += fmt::format("| {} | {} | {} |\n", in_06 ? name : "", in_3 ? name : "",
-                           e.refused       ? fmt::format("refused: {}", e.refused)
-                           : e.replacement ? fmt::format("becomes `{}`", e.replacement)
-                                           : "supported");
+                           plugin_status(e));
         if (e.refused) continue;
         const PluginInfo* plugin =
             find_plugin(plugins, e.category, e.replacement ? e.replacement : e.name);

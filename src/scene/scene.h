@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "bsdf/material.h"
+#include "description/scene_description.h"
 #include "emitter/emitter.h"
 #include "film/film.h"
 #include "geometry/accelerator.h"
@@ -57,11 +59,12 @@ struct RenderDefaults {
     /// Largest rr_depth of paths that are longer: in closed rooms nothing but roulette ends walks.
     static constexpr int kLatestRoulette = 1000;
 
-    std::string integrator;  ///< Empty where the file names none.
-    std::vector<std::pair<std::string, std::string>> integrator_params;  ///< max_depth, rr_depth.
-    int spp = 0;                                                         ///< 0: not given.
-    /// Why the file's integrator cannot be used; empty where it can. Matters only where no other one is chosen.
-    std::string integrator_problem;
+    /// As in the file, without children; of a wrapper the one nested in it. Files have full paths. What it means, and
+    /// whether it is valid, is for scene_integrator() to say.
+    std::optional<SceneObject> integrator;
+    std::string integrator_problem;  ///< Why one of its files cannot be used; empty otherwise.
+    bool is_lenient = false;  ///< Whether what is unknown about it is left out, with a warning.
+    int spp = 0;              ///< 0: not given.
 };
 
 class Scene {

@@ -82,53 +82,219 @@ const std::vector<SamplerEntry>& sampler_registry() {
     return entries;
 }
 
+namespace {
+
+using Use = MitsubaIntegratorParam::Use;
+
+/// A parameter that becomes one of the integrator used.
+MitsubaIntegratorParam becomes(const char* name, ParamKind kind, const char* counterpart,
+                               const char* doc) {
+    return {{name, kind, "", doc}, Use::Counterpart, counterpart};
+}
+/// A parameter without counterpart.
+MitsubaIntegratorParam missing(const char* name, ParamKind kind) {
+    return {{name, kind, "", "Ignored, with a warning."}, Use::Missing};
+}
+/// A switch of what is always done, or never.
+MitsubaIntegratorParam fixed(const char* name, bool always) {
+    return {{name, ParamKind::Bool, always ? "true" : "false",
+             always ? "Always true; a warning says so otherwise."
+                    : "Always false; a warning says so otherwise."},
+            Use::Missing,
+            "",
+            false,
+            0,
+            always ? "true" : "false"};
+}
+/// A parameter that changes no image.
+MitsubaIntegratorParam of_the_work(const char* name, ParamKind kind) {
+    return {{name, kind, "", "Accepted; it divides the work, and changes no image."},
+            Use::NoEffect};
+}
+
+using IntegratorParamList = std::vector<MitsubaIntegratorParam>;
+
+IntegratorParamList all_missing(ParamKind kind, std::initializer_list<const char*> names) {
+    IntegratorParamList all;
+    for (const char* name : names) all.push_back(missing(name, kind));
+    return all;
+}
+
+IntegratorParamList operator+(IntegratorParamList a, const IntegratorParamList& b) {
+    a.insert(a.end(), b.begin(), b.end());
+    return a;
+}
+
+/// Parameters of ppm and sppm.
+IntegratorParamList progressive_params() {
+    IntegratorParamList all = {
+        becomes("photon_count", ParamKind::Int, "light_paths", "Becomes light_paths."),
+        becomes("initial_radius", ParamKind::Float, "radius", "Becomes radius."),
+        of_the_work("granularity", ParamKind::Int), missing("max_passes", ParamKind::Int)};
+    all.back().harmless = "-1";
+    return all;
+}
+
+IntegratorParamList photon_mapper_params() {
+    IntegratorParamList all = {
+        becomes("global_photons", ParamKind::Int, "light_paths",
+                "Becomes light_paths, each of which makes several photons."),
+        becomes("lookup_size", ParamKind::Int, "nearest", "Becomes nearest, at most 512."),
+        becomes("global_lookup_radius", ParamKind::Float, "radius",
+                "Becomes radius, in scene units: a fraction of the radius of the scene's bounds."),
+        of_the_work("granularity", ParamKind::Int)};
+    all[1].most = 512;
+    all[2].is_relative = true;
+    return all +
+           all_missing(ParamKind::Int,
+                       {"direct_samples", "glossy_samples", "caustic_photons", "volume_photons"}) +
+           all_missing(ParamKind::Float, {"caustic_lookup_radius"});
+}
+
+IntegratorParamList metropolis_params() {
+    return all_missing(ParamKind::Int, {"direct_samples", "luminance_samples"}) +
+           IntegratorParamList{fixed("two_stage", false)};
+}
+
+/// Mutations of paths: all but the last one are always used.
+IntegratorParamList mutation_params() {
+    return {fixed("bidirectional_mutation", true), fixed("lens_perturbation", true),
+            fixed("caustic_perturbation", true),   fixed("multi_chain_perturbation", true),
+            fixed("manifold_perturbation", false), missing("lambda", ParamKind::Float)};
+}
+
+/// Parameters of Mitsuba 3's integrators that compute derivatives.
+IntegratorParamList derivative_params() {
+    IntegratorParamList all;
+    for (const auto& [name, kind] : {std::pair("reparam_max_depth", ParamKind::Int),
+                                     {"sppc", ParamKind::Int},
+                                     {"sppp", ParamKind::Int},
+                                     {"sppi", ParamKind::Int},
+                                     {"guiding", ParamKind::String},
+                                     {"guiding_proj", ParamKind::Bool},
+                                     {"guiding_rounds", ParamKind::Int},
+                                     {"antithetic_sampling", ParamKind::Bool},
+                                     {"emitter_samples", ParamKind::Int}})
+        all.push_back({{name, kind, "", "Accepted; derivatives are not computed."}, Use::NoEffect});
+    return all;
+}
+
+}  // namespace
+
+const std::vector<MitsubaIntegratorParam>& shared_integrator_params() {
+    static const IntegratorParamList all = {
+        {{"hide_emitters", ParamKind::Bool, "false", "Always false; a warning says so otherwise."},
+         Use::Missing,
+         "",
+         false,
+         0,
+         "false"},
+        {{"strict_normals", ParamKind::Bool, "false",
+          "Whether nothing scatters where the geometric and the shading normal see a direction on "
+          "different sides."},
+         Use::OfTheScene},
+        of_the_work("samples_per_pass", ParamKind::Int),
+        of_the_work("block_size", ParamKind::Int),
+        missing("timeout", ParamKind::Float)};
+    return all;
+}
+
 const std::vector<IntegratorAlias>& integrator_aliases() {
     static const std::vector<IntegratorAlias> entries = [] {
-        const std::vector<ParamInfo> params = {
-            {"max_depth", ParamKind::Int, "-1",
-             "Number of edges of the longest paths; -1: no limit."},
-            {"rr_depth", ParamKind::Int, "5",
-             "Index of the first vertex of a sub-path at which Russian roulette is applied."},
-            {"hide_emitters", ParamKind::Bool, "", "Accepted; emitters are never hidden."},
-            {"strict_normals", ParamKind::Bool, "false",
-             "Whether nothing scatters where the geometric and the shading normal see a direction "
-             "on "
-             "different sides."},
-            {"light_image", ParamKind::Bool, "", "Accepted; splats are always made."},
-            {"sample_direct", ParamKind::Bool, "", "Accepted; direct light is always sampled."}};
-        std::vector<IntegratorAlias> all;
-        const auto add = [&](std::initializer_list<const char*> names, const char* doc,
-                             const char* integrator, bool is_substitute = false) {
-            for (const char* name : names)
-                all.push_back({{"integrator", name, doc, params}, integrator, is_substitute});
+        const ParamInfo max_depth = {"max_depth", ParamKind::Int, "-1",
+                                     "Number of edges of the longest paths; -1: no limit."};
+        const auto rr_depth = [](const char* fallback) {
+            return ParamInfo{"rr_depth", ParamKind::Int, fallback,
+                             "Index of the first vertex of a sub-path at which Russian roulette is "
+                             "applied."};
         };
-        add({"path", "volpath", "volpathmis", "volpath_simple", "prb", "prb_basic", "prbvolpath",
-             "prb_projective"},
-            "Path tracing.", "path");
+        std::vector<IntegratorAlias> all;
+        // `own`: parameters that Mitsuba's integrator shares with the one used.
+        const auto add = [&](std::initializer_list<const char*> names, const char* doc,
+                             const char* integrator, const std::vector<ParamInfo>& own,
+                             const IntegratorParamList& params = {}, bool is_substitute = false) {
+            for (const char* name : names) {
+                IntegratorAlias alias{{"integrator", name, doc, own},
+                                      integrator,
+                                      is_substitute,
+                                      params + shared_integrator_params()};
+                for (const MitsubaIntegratorParam& p : alias.params)
+                    alias.info.params.push_back(p.info);
+                all.push_back(std::move(alias));
+            }
+        };
+        const std::vector<ParamInfo> of_paths = {max_depth, rr_depth("5")},
+                                     of_sub_paths = {max_depth, rr_depth("2")};
+        add({"path", "volpath", "volpath_simple"}, "Path tracing.", "path", of_paths);
+        add({"volpathmis"}, "Path tracing.", "path", of_paths,
+            {{{"use_spectral_mis", ParamKind::Bool, "",
+               "Accepted; there are no spectral media for it."},
+              Use::NoEffect}});
+        add({"prb", "prb_basic", "prbvolpath", "prb_projective"},
+            "Path tracing; derivatives are not computed.", "path", of_paths, derivative_params());
         const size_t direct = all.size();
-        add({"direct", "direct_projective"}, "Path tracing of at most two edges.", "path");
-        for (size_t i = direct; i < all.size(); ++i) {
-            all[i].max_depth = 2;
-            std::erase_if(all[i].info.params, [](const ParamInfo& p) {
-                return p.name == std::string("max_depth") || p.name == std::string("rr_depth");
-            });
-        }
-        add({"ptracer", "light"}, "Light tracing.", "light");
-        add({"bdpt"}, "Bidirectional path tracing.", "bdpt");
-        add({"photonmapper"}, "Photon mapping.", "pm");
-        add({"ppm"}, "Progressive photon mapping.", "ppm");
-        add({"sppm"}, "Stochastic progressive photon mapping.", "sppm");
-        add({"pssmlt"}, "Metropolis light transport in primary sample space.", "pssmlt");
-        add({"mlt"}, "Metropolis light transport.", "mlt");
-        all.back().info.params.push_back({"user_paths", ParamKind::String, "",
-                                          "JSON file of important light sub-paths; see the "
-                                          "integrator mlt."});
-        add({"erpt", "vpl", "ao", "field", "depth"}, "Not supported.", "path", true);
+        add({"direct"}, "Path tracing of at most two edges.", "path", {},
+            all_missing(ParamKind::Int, {"shading_samples", "emitter_samples", "bsdf_samples"}));
+        add({"direct_projective"},
+            "Path tracing of at most two edges; derivatives are not computed.", "path", {},
+            derivative_params());
+        for (size_t i = direct; i < all.size(); ++i) all[i].max_depth = 2;
+        add({"ptracer"}, "Light tracing.", "light", of_paths,
+            {of_the_work("granularity", ParamKind::Int), fixed("brute_force", false)});
+        add({"bdpt"}, "Bidirectional path tracing.", "bdpt", of_sub_paths,
+            {fixed("light_image", true), fixed("sample_direct", true)});
+        add({"photonmapper"}, "Photon mapping.", "pm", of_sub_paths, photon_mapper_params());
+        const ParamInfo alpha = {"alpha", ParamKind::Float, "0.75",
+                                 "Controls how fast the radius shrinks."};
+        const std::vector<ParamInfo> progressive = {max_depth, rr_depth("2"), alpha};
+        add({"ppm"}, "Progressive photon mapping.", "ppm", progressive, progressive_params());
+        add({"sppm"}, "Stochastic progressive photon mapping.", "sppm", progressive,
+            progressive_params());
+        add({"pssmlt"}, "Metropolis light transport in primary sample space.", "pssmlt",
+            {max_depth,
+             rr_depth("2"),
+             {"p_large", ParamKind::Float, "0.1", "Probability of a large step."}},
+            metropolis_params() + IntegratorParamList{fixed("bidirectional", true)});
+        add({"mlt"}, "Metropolis light transport.", "mlt", {max_depth},
+            metropolis_params() + mutation_params() +
+                IntegratorParamList{missing("rr_depth", ParamKind::Int)});
+        // What computes something else says so; its parameters need no warnings of their own.
+        const auto no_effect = [](ParamKind kind, std::initializer_list<const char*> names) {
+            IntegratorParamList params;
+            for (const char* name : names)
+                params.push_back(
+                    {{name, kind, "", "Accepted; path is rendered instead."}, Use::NoEffect});
+            return params;
+        };
+        add({"erpt"}, "Not supported.", "path", of_paths,
+            no_effect(ParamKind::Float,
+                      {"num_chains", "max_chains", "chain_length", "direct_samples", "lambda"}) +
+                no_effect(ParamKind::Bool,
+                          {"bidirectional_mutation", "lens_perturbation", "caustic_perturbation",
+                           "multi_chain_perturbation", "manifold_perturbation"}),
+            true);
+        add({"vpl"}, "Not supported.", "path", of_paths,
+            no_effect(ParamKind::Float, {"clamping", "shadow_map_resolution"}), true);
+        add({"ao"}, "Not supported.", "path", of_paths,
+            no_effect(ParamKind::Float, {"shading_samples", "ray_length"}), true);
+        add({"field"}, "Not supported; see --aov.", "path", of_paths,
+            {{{"field", ParamKind::String, "", "Accepted; path is rendered instead."},
+              Use::NoEffect},
+             {{"undefined", ParamKind::Rgb, "", "Accepted; path is rendered instead."},
+              Use::NoEffect}},
+            true);
+        add({"depth"}, "Not supported; see --aov.", "path", of_paths, {}, true);
         add({"adaptive", "irrcache", "multichannel", "aov", "moment", "stokes"},
-            "A wrapper around other integrators.", "");
+            "A wrapper around other integrators.", "", {});
         return all;
     }();
     return entries;
+}
+
+const IntegratorAlias* find_integrator_alias(std::string_view name) {
+    for (const IntegratorAlias& alias : integrator_aliases())
+        if (name == alias.info.name) return &alias;
+    return nullptr;
 }
 
 const PluginInfo& medium_info() {

@@ -13,6 +13,7 @@
 #include "render/aov.h"
 #include "render/defaults.h"
 #include "render/plugin_list.h"
+#include "render/scene_integrator.h"
 #include "session/light_ray.h"
 #include "session/replay.h"
 #include "studio/guard.h"
@@ -191,15 +192,16 @@ Reply Api::state() {
     if (const auto scene = session_.scene()) {
         const FilmGeometry& g = scene->film();
         const bool is_empty = scene->bounds().is_empty();
-        j["scene"] = {{"width", g.crop_width},
-                      {"height", g.crop_height},
-                      {"crop", {g.crop_x, g.crop_y}},
-                      {"shapes", scene->shapes().size()},
-                      {"emitters", scene->emitters().size()},
-                      {"center", to_json(is_empty ? Vec3() : scene->bounds().center())},
-                      {"radius", is_empty ? 1.0f : scene->bounds().radius()},
-                      {"warnings", scene->warnings()},
-                      {"integrator", scene->defaults().integrator}};
+        j["scene"] = {
+            {"width", g.crop_width},
+            {"height", g.crop_height},
+            {"crop", {g.crop_x, g.crop_y}},
+            {"shapes", scene->shapes().size()},
+            {"emitters", scene->emitters().size()},
+            {"center", to_json(is_empty ? Vec3() : scene->bounds().center())},
+            {"radius", is_empty ? 1.0f : scene->bounds().radius()},
+            {"warnings", warnings_of(*scene)},
+            {"integrator", scene->defaults().integrator ? name_of_integrator(*scene) : ""}};
         const SensorRay eye =
             scene->sensor().sample_ray({float(g.width) / 2, float(g.height) / 2}, {0.5f, 0.5f});
         j["scene"]["eye"] = to_json(eye.p);

@@ -118,22 +118,6 @@ TEST(SceneBuilder, CountsInstancesInGroupsOnlyWhereTheyMultiply) {
     EXPECT_EQ(build(front_camera(4) + room() + scene).statistics().instances, 100u);
 }
 
-TEST(SceneBuilder, RouletteOfFilesBeginsInTime) {
-    const auto scene = [](const std::string& params) {
-        return build(front_camera(4) + room() + "<integrator type=\"path\">" + params +
-                     "</integrator>");
-    };
-    const Scene late = scene("<integer name=\"rr_depth\" value=\"1000000\"/>");
-    ASSERT_EQ(late.warnings().size(), 2u);  // the other: there is no light
-    EXPECT_NE(late.warnings()[0].find("rr_depth is 1000000; 1000 is used"), std::string::npos)
-        << late.warnings()[0];
-    const auto expected = std::vector<std::pair<std::string, std::string>>{{"rr_depth", "1000"}};
-    EXPECT_EQ(late.defaults().integrator_params, expected);
-    const Scene never = scene("<integer name=\"max_depth\" value=\"6\"/>"
-                              "<integer name=\"rr_depth\" value=\"1000000\"/>");
-    EXPECT_EQ(never.warnings().size(), 1u);
-}
-
 TEST(SceneBuilder, RefusesWhatSinglePrecisionCannotHold) {
     const auto scaled = [](const std::string& shape, const std::string& transform) {
         return "<shape type=\"" + shape + "\"><transform name=\"to_world\">" + transform +

@@ -74,7 +74,8 @@ bool is_without_effect(const ManualEntry& entry, const std::string& param) {
             std::string_view(info.name) != entry.name)
             continue;
         for (const ParamInfo& p : info.params)
-            if (p.name == param && std::string_view(p.doc).starts_with("Accepted")) return true;
+            for (const char* word : {"Accepted", "Ignored", "Always"})
+                if (p.name == param && std::string_view(p.doc).starts_with(word)) return true;
     }
     return false;
 }
@@ -183,7 +184,7 @@ bool is_of_version(std::string& doc, int version) {
 
 bool has_effect(const std::string& doc) {
     return !doc.starts_with("Rejected") && !doc.starts_with("Accepted") &&
-           !doc.starts_with("Only for mappings that are rejected");
+           !doc.starts_with("Ignored") && !doc.starts_with("Only for mappings that are rejected");
 }
 
 void expect_pbrt(const char* folder, int version) {

@@ -108,24 +108,25 @@ TEST(MitsubaScenes, AnythingAtTheTopCanBeReferredTo) {
     EXPECT_EQ(scene.film().width, 7);
     EXPECT_EQ(scene.filter().name(), "box");
     EXPECT_EQ(scene.defaults().spp, 9);
-    EXPECT_EQ(scene.defaults().integrator, "path");
+    ASSERT_TRUE(scene.defaults().integrator);
+    EXPECT_EQ(scene.defaults().integrator->type, "path");
     EXPECT_EQ(scene.emitters().size(), 1u);
     EXPECT_TRUE(has(scene.warnings(), "the one within it, \"path\", is rendered"));
 }
 
-TEST(MitsubaScenes, TheIntegratorDirectHasPathsOfTwoEdges) {
-    const Scene scene = read(front_camera(4) + kLamp + "<integrator type=\"direct\"/>");
-    EXPECT_EQ(scene.defaults().integrator, "path");
-    const std::vector<std::pair<std::string, std::string>> expected = {{"max_depth", "2"}};
-    EXPECT_EQ(scene.defaults().integrator_params, expected);
-}
-
-TEST(MitsubaScenes, TheIntegratorOfTheFileNeverStopsTheScene) {
-    const Scene scene = read(front_camera(4) + kLamp + "<integrator type=\"no_such\"/>");
-    EXPECT_NE(scene.defaults().integrator_problem.find("unknown integrator \"no_such\""),
-              std::string::npos);
-    const Scene lenient = read(front_camera(4) + kLamp + "<integrator type=\"no_such\"/>", true);
-    EXPECT_TRUE(lenient.defaults().integrator_problem.empty());
+TEST(MitsubaManual, SaysWhatIsReplaced) {
+    const std::string table = mitsuba_manual_table(all_plugins());
+    for (const char* row :
+         {"| **`erpt`** |  | replaced by `path`, with a warning |",
+          "|  | **`stokes`** | replaced by the integrator in it, with a warning |",
+          "|  | **`prb`** | rendered by `path`: derivatives are not computed |",
+          "| **`photonmapper`** |  | rendered by `pm` |", "| **`sppm`** |  | supported |",
+          "| `initialRadius` |  | becomes radius |", "| `alpha` |  | supported |",
+          "| `pLarge` |  | supported |", "| `luminanceSamples` |  | ignored, with a warning |",
+          "| `lightImage` |  | always true; a warning says so otherwise |",
+          "|  | `flip_invalid_normals` | refused if true: it would turn normals toward the viewer "
+          "|"})
+        EXPECT_NE(table.find(row), std::string::npos) << row;
 }
 
 TEST(MitsubaScenes, LenientLeavesOutWhatItCannotRender) {

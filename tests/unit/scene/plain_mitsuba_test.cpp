@@ -110,6 +110,22 @@ TEST(PlainMitsuba, FilmsAndIntegrators) {
     EXPECT_EQ(std::get<int64_t>(integrator.find("max_depth")->value), 7);
 }
 
+/// Mitsuba 3 has neither the other methods nor their parameters.
+TEST(PlainMitsuba, EveryIntegratorBecomesOneOfMitsuba) {
+    for (const char* type :
+         {"vcm", "upg+bdpt", "mmlt", "light", "ptracer", "sppm", "no_such", "aov"}) {
+        SceneDescription scene =
+            parse("<integrator type=\"" + std::string(type) +
+                  "\"><integer name=\"max_depth\" value=\"7\"/><float name=\"radius\" value=\"1\"/>"
+                  "<boolean name=\"merges\" value=\"false\"/></integrator>");
+        make_plain_mitsuba(scene);
+        const SceneObject& integrator = only(scene, "integrator");
+        EXPECT_EQ(integrator.type, "path") << type;
+        EXPECT_EQ(integrator.params.size(), 1u) << type;
+        EXPECT_TRUE(integrator.find("max_depth")) << type;
+    }
+}
+
 TEST(PlainMitsuba, SkyIsSunAndSkyWithoutSun) {
     SceneDescription scene = parse(R"(<emitter type="sky"><float name="scale" value="3"/>
         <integer name="resolution" value="64"/></emitter>)");
