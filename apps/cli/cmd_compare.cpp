@@ -132,15 +132,20 @@ RenderSettings CompareCommand::reference_settings(const Scene& scene,
 }
 
 void print_summary(const Comparison& c) {
-    message("{}\n  {:<28} {:>8} {:>9} {:>10} {:>10} {:>8} {:>8} {:>11}\n", c.scene_file, "method",
-            "spp", "time", "relMSE", "trimmed", "FLIP", "mean", "efficiency");
+    // Where it cannot be written, main() says so, after the report has been.
+    const auto print = [](const std::string& text) {
+        std::fwrite(text.data(), 1, text.size(), stdout);
+    };
+    print(fmt::format("{}\n  {:<28} {:>8} {:>9} {:>10} {:>10} {:>8} {:>8} {:>11}\n", c.scene_file,
+                      "method", "spp", "time", "relMSE", "trimmed", "FLIP", "mean", "efficiency"));
     const std::vector<MethodSummary> summaries = summarize(c);
     for (size_t i = 0; i < summaries.size(); ++i) {
         const MethodSummary& s = summaries[i];
-        message("  {:<28} {:>8.0f} {:>7.2f} s {:>10.3e} {:>10.3e} {:>8.4f} {:>8.4f} {:>11}\n",
-                c.methods[i].name(), s.spp, s.seconds, s.rel_mse, s.rel_mse_trimmed,
-                c.methods[i].flip, s.mean_ratio.value,
-                s.efficiency ? fmt::format("{:.3g}", s.efficiency->value) : "unknown");
+        print(fmt::format(
+            "  {:<28} {:>8.0f} {:>7.2f} s {:>10.3e} {:>10.3e} {:>8.4f} {:>8.4f} {:>11}\n",
+            c.methods[i].name(), s.spp, s.seconds, s.rel_mse, s.rel_mse_trimmed, c.methods[i].flip,
+            s.mean_ratio.value,
+            s.efficiency ? fmt::format("{:.3g}", s.efficiency->value) : "unknown"));
     }
 }
 

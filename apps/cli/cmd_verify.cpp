@@ -186,7 +186,7 @@ void print_verdict(const VerifyReport& report, const MethodReport& m,
     const char* claim = to_string(m.estimator);
     switch (report.verdict(m)) {
     case Verdict::Consistent:
-        fmt::print("  verdict: consistent with unbiased (it claims to be {})", claim);
+        fmt::print("  verdict: no bias was found (it claims to be {})", claim);
         break;
     case Verdict::Deviates:
         fmt::print("  verdict: NOT unbiased, where marked above (it claims to be {})", claim);

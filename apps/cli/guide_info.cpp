@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "image/image_io.h"
-#include "system/output_file.h"
 #include "render/defaults.h"
 #include "render/learned_guide.h"
+#include "system/output_file.h"
 
 namespace etendue {
 namespace {

@@ -4,11 +4,14 @@
 #include <cstdio>
 #include <iostream>
 #include <new>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "commands.h"
+#include "hints.h"
 #include "interrupt.h"
 #include "messages.h"
 
@@ -22,14 +25,15 @@ void occupy_standard_streams() {
         if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", stream == 0 ? O_WRONLY : O_RDONLY);
 }
 
-int run(CLI::App& app, int argc, char** argv) {
+int run(CLI::App& app, const std::vector<std::string>& arguments) {
     try {
-        app.parse(argc, argv);
+        // CLI11 takes them in reverse order.
+        app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
     } catch (const CLI::Success& e) {
         return app.exit(e);
     } catch (const CLI::Error& e) {
         // One line that points to --help, instead of printing all of it.
-        message("etendue: {} (see etendue --help)\n", e.what());
+        message("etendue: {}\n", refusal(app, arguments, e.what()));
         return 2;
     } catch (const std::bad_alloc&) {
         message("etendue: not enough memory\n");
@@ -67,7 +71,10 @@ int main(int argc, char** argv) {
     add_list_command(app);
     add_verify_command(app);
     add_studio_command(app);
-    const int status = run(app, argc, argv);
+    app.footer(
+        "Methods and their parameters: etendue list integrator. Options of a command: etendue "
+        "COMMAND --help.");
+    const int status = run(app, with_usual_words({argv + 1, argv + argc}));
     errno = 0;
     if (is_output_complete() || status != 0) return status;
     message("etendue: cannot write to standard output{}\n",

@@ -1,6 +1,7 @@
 #include "integrator/integrator.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
@@ -72,6 +73,11 @@ IntegratorParams::IntegratorParams(const IntegratorSpec& spec, const PluginInfo&
     }
     for (const auto& [key, value] : spec.params) {
         if (!values_.count(key)) {
+            if (key == "spp" || key == "samples" || key == "sample_count")
+                throw std::runtime_error(fmt::format("integrator \"{}\" has no parameter \"{}\" "
+                                                     "(the number of samples is an option of "
+                                                     "its own: --spp)",
+                                                     spec.name, key));
             const std::string near = nearest_name(key, known);
             throw std::runtime_error(
                 fmt::format("integrator \"{}\" has no parameter \"{}\" ({})", spec.name, key,
@@ -154,13 +160,68 @@ float IntegratorParams::number(const char* name, float low, float high) const {
     return checked_range(integrator_, name, number(name), low, high);
 }
 
+namespace {
+
+/// What an integrator is called elsewhere.
+struct OtherName {
+    const char *other, *name;
+};
+constexpr OtherName kOtherNames[] = {{"pt", "path"},
+                                     {"pathtracer", "path"},
+                                     {"pathtracing", "path"},
+                                     {"volpath", "path"},
+                                     {"direct", "path"},
+                                     {"lt", "light"},
+                                     {"ptracer", "light"},
+                                     {"lighttracer", "light"},
+                                     {"lighttracing", "light"},
+                                     {"particle", "light"},
+                                     {"bpt", "bdpt"},
+                                     {"bidir", "bdpt"},
+                                     {"bidirectional", "bdpt"},
+                                     {"photonmapper", "pm"},
+                                     {"photonmap", "pm"},
+                                     {"photonmapping", "pm"},
+                                     {"photon", "pm"},
+                                     {"vcmups", "vcm"},
+                                     {"ups", "vcm"},
+                                     {"metropolis", "mlt"},
+                                     {"veach", "mlt"},
+                                     {"kelemen", "pssmlt"},
+                                     {"pssmltbdpt", "pssmlt"},
+                                     {"multiplexed", "mmlt"},
+                                     {"upgbdpt", "upg+bdpt"},
+                                     {"upgpssmlt", "upg+pssmlt"},
+                                     {"gathering", "upg"}};
+
+/// The integrator that is probably meant; empty if none is near.
+std::string meant_integrator(const std::string& given, const std::vector<std::string>& known) {
+    std::string letters;
+    for (const char c : given)
+        if (std::isalnum(static_cast<unsigned char>(c)))
+            letters += char(std::tolower(static_cast<unsigned char>(c)));
+    for (const std::string& name : known)
+        if (letters == name) return name;
+    for (const OtherName& n : kOtherNames)
+        if (letters == n.other) return n.name;
+    return nearest_name(given, known);
+}
+
+}  // namespace
+
 const IntegratorEntry& integrator_entry(const std::string& name) {
     std::vector<std::string> known;
     for (const IntegratorEntry& e : integrator_registry()) {
         if (name == e.info.name) return e;
         known.push_back(e.info.name);
     }
-    const std::string near = nearest_name(name, known);
+    const std::string first = name.substr(0, name.find_first_of(" ,;=("));
+    if (first != name && std::ranges::find(known, first) != known.end())
+        throw std::runtime_error(fmt::format(
+            "there is no integrator \"{}\"; parameters follow a colon and are separated "
+            "by commas: {}:max_depth=8,...",
+            name, first));
+    const std::string near = meant_integrator(name, known);
     throw std::runtime_error(fmt::format(
         "there is no integrator \"{}\"; {}there are: {}", name,
         near.empty() ? "" : fmt::format("did you mean \"{}\"? ", near), fmt::join(known, ", ")));

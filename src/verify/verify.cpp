@@ -351,7 +351,7 @@ VerifyReport MethodVerification::render_until(double size, const SeriesRenderer:
 
 const char* to_string(Verdict verdict) {
     switch (verdict) {
-    case Verdict::Consistent: return "consistent";
+    case Verdict::Consistent: return "agrees";
     case Verdict::Deviates: return "deviates";
     case Verdict::Undecided: return "undecided";
     }
