@@ -352,9 +352,11 @@ void GltfReader::add_light(const JsonValue& light, const Transform& to_world) {
         set(emitter, "position", position);
     } else if (type == "spot") {
         const JsonValue spot = light["spot"];
-        const double outer = spot["outerConeAngle"].number(std::numbers::pi / 4, 1e-3, std::numbers::pi / 2);
+        const double outer =
+            spot["outerConeAngle"].number(std::numbers::pi / 4, 1e-3, std::numbers::pi / 2);
         // Exporters write equal angles with different rounding.
-        const double inner = std::min(spot["innerConeAngle"].number(0, 0, std::numbers::pi / 2), outer);
+        const double inner =
+            std::min(spot["innerConeAngle"].number(0, 0, std::numbers::pi / 2), outer);
         emitter = add("emitter", "spot", light);
         set(emitter, "intensity", colour);
         set(emitter, "cutoff_angle", std::min(outer * 180 / std::numbers::pi, 89.999));
