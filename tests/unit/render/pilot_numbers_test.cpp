@@ -25,6 +25,8 @@ public:
             add(sampler, others);
         });
     }
+    void save(LearnedState&) const override {}
+    void load(LearnedState&) override {}
     void sample(const SampleContext& c, Workspace&) const override { add(c.sampler, samples); }
     TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
     uint64_t light_paths(const Scene&) const override { return kLightPaths; }
