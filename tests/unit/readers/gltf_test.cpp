@@ -293,10 +293,10 @@ TEST(Gltf, HabitsOfExportersAreAccepted) {
             "spot":{"innerConeAngle":0.7853983,"outerConeAngle":0.7853981}}]}},
             "meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":2},"indices":1}]}])"),
         b);
-    EXPECT_EQ(scene.meshes[0].positions[2], (Vec3{1, 1, 0}));
-    EXPECT_FLOAT_EQ(scene.meshes[0].colors[1].x, 0.2f);
-    EXPECT_FLOAT_EQ(scene.meshes[0].colors[1].z, 1);
-    EXPECT_TRUE(scene.meshes[0].alphas.empty());  // one everywhere
+    EXPECT_EQ(scene.meshes[0]->positions[2], (Vec3{1, 1, 0}));
+    EXPECT_FLOAT_EQ(scene.meshes[0]->colors[1].x, 0.2f);
+    EXPECT_FLOAT_EQ(scene.meshes[0]->colors[1].z, 1);
+    EXPECT_TRUE(scene.meshes[0]->alphas.empty());  // one everywhere
     EXPECT_EQ(value<double>(find(scene, "spot"), "beam_width"),
               value<double>(find(scene, "spot"), "cutoff_angle"));
 }
