@@ -383,9 +383,26 @@ Detectable VerifyReport::detectable(const MethodReport& m) const {
     return d;
 }
 
-VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& methods,
+std::vector<IntegratorSpec> with_long_chains(const std::vector<IntegratorSpec>& methods) {
+    std::vector<IntegratorSpec> all;
+    for (const IntegratorSpec& method : methods) {
+        all.push_back(method);
+        const auto gives = [&](const char* name) { return method.params.contains(name); };
+        if (make_integrator(method)->error_groups() == 0 || gives("groups") || gives("chains"))
+            continue;
+        IntegratorSpec longer = method;
+        longer.params["groups"] = "2";
+        longer.params["chains"] = "16";
+        longer.params.emplace("p_large", "0.02");
+        all.push_back(std::move(longer));
+    }
+    return all;
+}
+
+VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& given_methods,
                     const VerifyOptions& options, const std::optional<ReferenceImage>& reference,
                     const std::function<void(const std::string&)>& progress) {
+    const std::vector<IntegratorSpec> methods = with_long_chains(given_methods);
     SeriesRenderer renderer(scene, options, progress);
     VerifyReport report;
     try {

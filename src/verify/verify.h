@@ -161,8 +161,14 @@ struct VerifyReport {
     Detectable detectable(const MethodReport& method) const;
 };
 
-/// `progress` receives lines of text, from one thread at a time. Throws std::runtime_error where a method's parameters
-/// are invalid, or the renderings of all methods fail. Other exceptions of renderings are rethrown.
+/// After each method with chains, the same with a few chains that go on for long. With the default parameters, all chains
+/// start in the first passes, which shows an error of the start-up best; an error of the steps shows in proportion to
+/// their number. A method that gives its groups or chains is left alone.
+std::vector<IntegratorSpec> with_long_chains(const std::vector<IntegratorSpec>& methods);
+
+/// Verifies with_long_chains(methods). `progress` receives lines of text, from one thread at a time. Throws
+/// std::runtime_error where a method's parameters are invalid, or the renderings of all methods fail. Other exceptions of
+/// renderings are rethrown.
 VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& methods,
                     const VerifyOptions& options,
                     const std::optional<ReferenceImage>& reference = {},

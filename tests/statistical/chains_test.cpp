@@ -1,9 +1,13 @@
 // Markov chains: filters and crops, path lengths, and the same image from few groups as from many.
 
+#include <filesystem>
+#include <fstream>
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "render_tiles.h"
+#include "run_program.h"
 #include "test_scenes.h"
 
 namespace etendue::test {
@@ -86,25 +90,127 @@ INSTANTIATE_TEST_SUITE_P(Depths, ChainLengths,
                                            "mlt:chains=16,groups=256,max_depth=3",
                                            "mlt:chains=16,groups=256,max_depth=5"));
 
-/// A few chains that go on for long agree with many that only start, by runs with seeds of their own.
-TEST(LongChains, GoOnAsTheyBegan) {
-    const Scene scene = build(mixed_room(front_camera(12)));
-    for (const char* name : {"pssmlt", "mmlt", "mlt"}) {
-        std::array<Tiles, 2> tiles{Tiles(4), Tiles(4)};
-        for (uint64_t run = 0; run < 40; ++run)
-            for (size_t i = 0; i < 2; ++i) {
-                RenderSettings settings;
-                settings.integrator = IntegratorSpec::parse(
-                    fmt::format("{}:chains={},groups={}", name, i == 0 ? 24 : 48, i == 0 ? 2 : 16));
-                settings.seed = 2 * run + i;
-                settings.threads = 1;
-                settings.spp = i == 0 ? 64 : 16;
-                Renderer renderer(scene, settings);
-                renderer.run([](const Progress&) {}, std::atomic<bool>{false});
-                const auto means = tile_means(renderer.film().image(), scene.film(), 4);
-                for (size_t k = 0; k < means.size(); ++k) tiles[i].values[k].add(means[k]);
-            }
-        expect_same_image(tiles[0], tiles[1], 0.1, name);
+/// A scene, and methods with chains that go on for long there.
+struct LongCase {
+    const char* name;
+    std::string xml;
+    std::vector<std::string> methods{"mlt"};
+    const char* user_paths = nullptr;  ///< Text of a file.
+};
+void PrintTo(const LongCase& c, std::ostream* out) {
+    *out << c.name;
+}
+
+std::vector<LongCase> long_cases() {
+    constexpr int kSize = 12;
+    const std::string front = front_camera(kSize);
+    const std::string kMasked =
+        "<bsdf type=\"mask\"><texture name=\"opacity\" type=\"checkerboard\"><float "
+        "name=\"color0\" value=\"0.2\"/><float name=\"color1\" value=\"0.9\"/><transform "
+        "name=\"to_uv\"><scale value=\"2\"/></transform></texture>" +
+        diffuse("0.6,0.5,0.4") + "</bsdf>";
+    const std::string kTinted =
+        "<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\"0.3\"/></bsdf><medium "
+        "type=\"homogeneous\" name=\"interior\"><rgb name=\"sigma_t\" value=\"0.5,1.5,4\"/>"
+        "<float name=\"albedo\" value=\"0\"/></medium>";
+    const std::string kGloss =
+        "<bsdf type=\"twosided\"><bsdf type=\"blendbsdf\"><float name=\"weight\" "
+        "value=\"0.4\"/><bsdf type=\"diffuse\"/><bsdf type=\"conductor\"/></bsdf></bsdf>";
+    const std::string veil =
+        front + room() + area_lamp() +
+        rectangle("<scale value=\"0.8\"/><rotate x=\"1\" angle=\"-60\"/><translate z=\"0.3\"/>",
+                  kMasked);
+    return {
+        {"mixed", mixed_room(front), {"pssmlt", "mmlt", "mlt"}},
+        {"veil", veil, {"pssmlt", "mmlt", "mlt"}},
+        {"thinlens", mixed_room(lens_camera(kSize))},
+        {"orthographic", mixed_room(sensor("0,0,3.4", "0,0,0", kSize, "", "", "orthographic"))},
+        {"gloss", front + room() + area_lamp() + sphere("0,-0.4,0", "0.5", kGloss)},
+        {"medium", front + room() + area_lamp() + sphere("0,-0.4,0", "0.5", kTinted)},
+        {"several",
+         front + room() + area_lamp() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
+             "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>"
+             "<emitter type=\"point\"><point name=\"position\" value=\"0.4,0.8,0.6\"/></emitter>"},
+        {"user_paths",
+         mixed_room(front),
+         {"mlt"},
+         R"([{"points": [[0, 0.98, 0], [-1, 0, 0.3]], "cone": 20, "radius": 0.2},
+             {"points": [[0, 0.98, 0], [0.1, -1, 0.8]], "cone": 15, "radius": 0.2}])"},
+    };
+}
+
+class LongChains : public ::testing::TestWithParam<LongCase> {};
+
+/// A few chains that go on for long, with hardly a large step, agree with bidirectional path tracing: a wrong density of a
+/// mutation shows in proportion to the number of steps. By runs with seeds of their own.
+TEST_P(LongChains, GoOnAsTheyBegan) {
+    const Scene scene = build(GetParam().xml);
+    const TemporaryFolder folder;
+    std::string options;
+    if (GetParam().user_paths) {
+        const std::filesystem::path file = folder.path() / "paths.json";
+        std::ofstream(file) << GetParam().user_paths;
+        options = ",user_paths=" + file.string();
+    }
+    const Tiles bdpt = render_tiles(scene, "bdpt", {4096, 4, 1});
+    for (const std::string& method : GetParam().methods) {
+        Tiles tiles(4);
+        for (uint64_t run = 0; run < 48; ++run) {
+            RenderSettings settings;
+            settings.integrator = IntegratorSpec::parse(
+                fmt::format("{}:chains=48,groups=2,p_large=0.01,mutations=4{}", method, options));
+            settings.seed = 2 + run;
+            settings.threads = 1;
+            settings.spp = 48;
+            Renderer renderer(scene, settings);
+            renderer.run([](const Progress&) {}, std::atomic<bool>{false});
+            const auto means = tile_means(renderer.film().image(), scene.film(), 4);
+            for (size_t k = 0; k < means.size(); ++k) tiles.values[k].add(means[k]);
+        }
+        expect_same_image(tiles, bdpt, 0.1, method);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, LongChains, ::testing::ValuesIn(long_cases()),
+                         [](const auto& p) { return std::string(p.param.name); });
+
+/// Mean over the pixels of the variance that a rendering states, divided by that of the spread between seeds.
+double stated_over_true_variance(const Scene& scene, const std::string& method,
+                                 SamplerKind sampler) {
+    const uint64_t pixels = scene.film().pixel_count();
+    std::vector<Moments> values(pixels);
+    double stated = 0, spread = 0;
+    constexpr uint64_t kSeeds = 48;
+    for (uint64_t seed = 0; seed < kSeeds; ++seed) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse(method);
+        settings.sampler = sampler;
+        settings.seed = 100 + seed;
+        settings.threads = 1;
+        settings.spp = 64;
+        Renderer renderer(scene, settings);
+        renderer.run([](const Progress&) {}, std::atomic<bool>{false});
+        const std::vector<Rgb> image = renderer.film().image(),
+                               variance = renderer.film().variance();
+        for (uint64_t i = 0; i < pixels; ++i) {
+            values[i].add(double(image[i].g));
+            stated += double(variance[i].g) / kSeeds;
+        }
+    }
+    for (const Moments& m : values) spread += m.variance();
+    return stated / spread;
+}
+
+/// The groups of chains are independent of each other. Their samples of direct light are so with independent numbers. With
+/// Sobol' points they are negatively correlated, as passes are with other methods, and the variance is an upper bound.
+TEST(ChainErrors, AreThoseOfSeeds) {
+    const Scene scene = build(front_camera(12) + room() + area_lamp());
+    for (const char* method : {"mlt:mutations=1", "pssmlt:mutations=1"}) {
+        const double independent =
+            stated_over_true_variance(scene, method, SamplerKind::Independent);
+        EXPECT_GT(independent, 0.8) << method;
+        EXPECT_LT(independent, 1.25) << method;
+        EXPECT_GT(stated_over_true_variance(scene, method, SamplerKind::Sobol), 0.9) << method;
     }
 }
 

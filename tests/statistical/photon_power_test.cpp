@@ -22,6 +22,12 @@ IntegratorParams params_of_mps() {
     throw std::logic_error("no mps");
 }
 
+/// How long chains go on: the mutations of a pass are shared by this number of chains.
+struct ChainLength {
+    int chains;
+    double p_large;
+};
+
 /// Passes that trace photons, and sum their power by region and map.
 class PhotonTotals final : public Integrator {
 public:
@@ -29,13 +35,14 @@ public:
     static constexpr size_t kRegions = 9, kSums = 2 * 2 * kRegions;
 
     PhotonTotals(const Scene& scene, std::optional<PhotonTarget> target,
-                 const std::string& user_paths, int chains = 16)
+                 const std::string& user_paths, const ChainLength& length)
         : scene_(scene), params_(params_of_mps()), mapping_(params_, true),
           traced_(mapping_, kPaths, uint64_t(1) << 30) {
         if (target)
             metropolis_.emplace(mapping_, MetropolisPhotonOptions{.target = *target,
                                                                   .mutations = kPaths,
-                                                                  .chains = chains,
+                                                                  .chains = length.chains,
+                                                                  .p_large = length.p_large,
                                                                   .precision = 0.05,
                                                                   .user_paths = user_paths,
                                                                   .user_share = 0.25});
@@ -96,12 +103,14 @@ private:
 
 std::array<Moments, PhotonTotals::kSums> totals(const Scene& scene,
                                                 std::optional<PhotonTarget> target, uint64_t passes,
-                                                const std::string& user_paths = {}) {
+                                                const std::string& user_paths = {},
+                                                bool is_long = false) {
     RenderSettings settings;
     settings.spp = passes;
     settings.seed = target ? 3 : 4;
     settings.threads = 1;
-    auto integrator = std::make_unique<PhotonTotals>(scene, target, user_paths);
+    auto integrator = std::make_unique<PhotonTotals>(
+        scene, target, user_paths, is_long ? ChainLength{2, 0.02} : ChainLength{16, 0.3});
     const PhotonTotals& sums = *integrator;
     Renderer renderer(scene, settings, std::move(integrator));
     renderer.run([](const Progress&) {}, std::atomic<bool>{false});
@@ -112,6 +121,8 @@ std::array<Moments, PhotonTotals::kSums> totals(const Scene& scene,
 struct PowerCase {
     PhotonTarget target;
     bool has_user_paths;
+    /// A few chains that go on for long, with hardly a large step, before a veil of fractional opacity.
+    bool is_long = false;
 };
 class PhotonPower : public ::testing::TestWithParam<PowerCase> {};
 
@@ -124,9 +135,14 @@ constexpr const char* kUserPaths = R"([
 
 /// A lamp, glass that makes caustics, rough metal.
 TEST_P(PhotonPower, IsThatOfTracedPhotons) {
-    const Scene scene = build(front_camera(8) + room() + area_lamp() +
-                              sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
-                              sphere("0.4,-0.4,0.3", "0.35", kGlass));
+    const std::string veil = rectangle(
+        "<scale value=\"0.8\"/><rotate x=\"1\" angle=\"-60\"/><translate z=\"0.3\"/>",
+        "<bsdf type=\"mask\"><texture name=\"opacity\" type=\"checkerboard\"><float "
+        "name=\"color0\" value=\"0.2\"/><float name=\"color1\" value=\"0.9\"/></texture>" +
+            diffuse("0.6,0.5,0.4") + "</bsdf>");
+    const Scene scene = build(
+        front_camera(8) + room() + area_lamp() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
+        sphere("0.4,-0.4,0.3", "0.35", kGlass) + (GetParam().is_long ? veil : ""));
     const TemporaryFolder folder;
     std::string user_paths;
     if (GetParam().has_user_paths) {
@@ -135,8 +151,9 @@ TEST_P(PhotonPower, IsThatOfTracedPhotons) {
     }
     const auto traced = totals(scene, {}, 256),
                // Chains of full paths find few caustics here, and user paths lead elsewhere.
-        sampled = totals(scene, GetParam().target,
-                         GetParam().target == PhotonTarget::Path ? 540 : 160, user_paths);
+        sampled =
+            totals(scene, GetParam().target, GetParam().target == PhotonTarget::Path ? 540 : 160,
+                   user_paths, GetParam().is_long);
     const double level = sidak(1e-4, int(traced.size()));
     for (size_t i = 0; i < traced.size(); ++i) {
         const bool is_caustic = i >= traced.size() / 2;
@@ -160,7 +177,8 @@ TEST(PhotonRepeats, OfOneChainAddTheirPower) {
     RenderSettings settings;
     settings.spp = 8;
     settings.threads = 1;
-    auto integrator = std::make_unique<PhotonTotals>(scene, PhotonTarget::Importons, "", 1);
+    auto integrator =
+        std::make_unique<PhotonTotals>(scene, PhotonTarget::Importons, "", ChainLength{1, 0.3});
     const PhotonTotals& sums = *integrator;
     Renderer renderer(scene, settings, std::move(integrator));
     renderer.run([](const Progress&) {}, std::atomic<bool>{false});
@@ -172,10 +190,12 @@ INSTANTIATE_TEST_SUITE_P(
     Targets, PhotonPower,
     ::testing::Values(PowerCase{PhotonTarget::Importons, false},
                       PowerCase{PhotonTarget::Importons, true},
-                      PowerCase{PhotonTarget::Path, false}, PowerCase{PhotonTarget::Path, true}),
+                      PowerCase{PhotonTarget::Path, false}, PowerCase{PhotonTarget::Path, true},
+                      PowerCase{PhotonTarget::Importons, true, true},
+                      PowerCase{PhotonTarget::Path, false, true}),
     [](const auto& p) {
         return std::string(p.param.target == PhotonTarget::Path ? "path" : "importons") +
-               (p.param.has_user_paths ? "_user_paths" : "");
+               (p.param.has_user_paths ? "_user_paths" : "") + (p.param.is_long ? "_long" : "");
     });
 
 }  // namespace

@@ -53,9 +53,7 @@ bool CausticMutation::propose(const PathState& x, const MutationContext& c, Path
     const Vertex& from = x[l].v;
     const Vec3 old = direction(from, x[l + 1].v);
     if (l > 0) {
-        const BsdfSample s{
-            .wi = turned(old, way.angle, u), .weight = Rgb(1), .pdf = 1, .pdf_rev = 1};
-        if (!builder.step_light(s)) return false;
+        if (!builder.step_light(given(turned(old, way.angle, u)))) return false;
     } else {
         const Emitter& emitter = x.emitter();
         EmissionSample e{.p = from.p,

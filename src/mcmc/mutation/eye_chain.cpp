@@ -61,10 +61,7 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
         } else if (at.is_connectible) {
             c.sampler.seek(Stream::Selection, addresses::kTurn + uint64_t(i));
             const float angle = kTurns.sample(c.sampler.next_1d());
-            s = BsdfSample{.wi = turned(direction(like, x[i - 1].v), angle, c.sampler.next_1d()),
-                           .weight = Rgb(1),
-                           .pdf = 1,
-                           .pdf_rev = 1};
+            s = given(turned(direction(like, x[i - 1].v), angle, c.sampler.next_1d()));
         }
         if (!s || !builder.step_eye(*s)) return false;
     }

@@ -38,6 +38,10 @@ Vec3 turned(Vec3 axis, float angle, float u) {
         frame.to_world({s * std::cos(azimuth), s * std::sin(azimuth), std::cos(angle)}));
 }
 
+BsdfSample given(Vec3 wi) {
+    return {.wi = wi, .weight = Rgb(1), .pdf = 1, .pdf_rev = 1};
+}
+
 bool is_followed(const PathState& x, int i, Followed events) {
     return x[i].v.is_delta || (events == Followed::Glossy && is_glossy_reflection(x, i));
 }
@@ -54,7 +58,7 @@ std::optional<BsdfSample> follow(const Vertex& at, const PathState& x, int i, Tr
     const Vec3 half = direction(like, x[i - 1].v) + direction(like, x[i + 1].v);
     const Vec3 h = normalize(shading_frame(at).to_world(shading_frame(like).to_local(half)));
     const Vec3 wi = normalize(h * (2 * dot(at.wo, h)) - at.wo);
-    return BsdfSample{.wi = wi, .weight = Rgb(1), .pdf = 1, .pdf_rev = 1};
+    return given(wi);
 }
 
 double followed_density(const PathState& x, int i, TransportMode mode) {

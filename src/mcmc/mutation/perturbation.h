@@ -19,6 +19,9 @@ LogRange film_range(const PathMeasure& measure);
 /// `axis` turned by `angle` (radians) toward the azimuth 2π u.
 Vec3 turned(Vec3 axis, float angle, float u);
 
+/// An event in a given direction. It needs no densities, since Q is computed from the finished path.
+BsdfSample given(Vec3 wi);
+
 /// Events that a perturbation repeats at the new place of a vertex.
 enum class Followed {
     Delta,

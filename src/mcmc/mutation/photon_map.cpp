@@ -32,11 +32,8 @@ bool PhotonMapMutation::propose(const PathState& x, const MutationContext& c, Pa
     const float versine = 2 * float(std::pow(std::sin(kCone / 2), 2)) * c.sampler.next_1d();
     const float u = c.sampler.next_1d();
     PathBuilder builder = c.builder(&x, l, m);
-    const BsdfSample s{.wi = turned(direction(x[m].v, x[m - 1].v), std::acos(1 - versine), u),
-                       .weight = Rgb(1),
-                       .pdf = 1,
-                       .pdf_rev = 1};
-    if (!builder.step_eye(s)) return false;
+    const Vec3 w = turned(direction(x[m].v, x[m - 1].v), std::acos(1 - versine), u);
+    if (!builder.step_eye(given(w))) return false;
     for (int n = l + 3; !stores_(builder.eye_end()); ++n)
         if (n > c.measure.longest || !builder.sample_eye_step()) return false;
     if (!builder.finish(y)) return false;

@@ -98,9 +98,10 @@ TEST(Verify, LeavesOutMethodsThatFail) {
     VerifyOptions options = quick_options();
     options.spp = 1;
     for (const char* first : {"path", "vcm:memory=1,light_paths=40000"}) {
-        const char* second = first == std::string("path") ? "vcm:memory=1,light_paths=40000" : "path";
-        const VerifyReport report = verify(
-            scene, {IntegratorSpec::parse(first), IntegratorSpec::parse(second)}, options);
+        const char* second =
+            first == std::string("path") ? "vcm:memory=1,light_paths=40000" : "path";
+        const VerifyReport report =
+            verify(scene, {IntegratorSpec::parse(first), IntegratorSpec::parse(second)}, options);
         ASSERT_EQ(report.methods.size(), 1u);
         EXPECT_EQ(report.methods[0].method, "path");
         ASSERT_EQ(report.failures.size(), 1u);
@@ -180,6 +181,32 @@ TEST(Verify, AllowsForCorrelatedPixelsOfAReference) {
     const double independent = error();
     image.correlation = 5;
     EXPECT_NEAR(error(), 5 * independent, 1e-9);
+}
+
+TEST(Verify, MethodsWithChainsAreAlsoVerifiedWithLongOnes) {
+    const auto specs = [](const std::vector<const char*>& names) {
+        std::vector<IntegratorSpec> out;
+        for (const char* name : names) out.push_back(IntegratorSpec::parse(name));
+        return out;
+    };
+    const auto all =
+        with_long_chains(specs({"mlt:max_depth=4", "path", "mmlt:groups=4", "pssmlt:p_large=0.5"}));
+    std::vector<std::string> names;
+    for (const IntegratorSpec& s : all) names.push_back(s.to_string());
+    const std::vector<std::string> expected{"mlt:max_depth=4",
+                                            "mlt:chains=16,groups=2,max_depth=4,p_large=0.02",
+                                            "path",
+                                            "mmlt:groups=4",
+                                            "pssmlt:p_large=0.5",
+                                            "pssmlt:chains=16,groups=2,p_large=0.5"};
+    EXPECT_EQ(names, expected);
+
+    VerifyOptions options = quick_options();
+    options.spp = 32;
+    const VerifyReport report = verify(build(lit_room(8)), specs({"mlt"}), options);
+    ASSERT_EQ(report.methods.size(), 2u);
+    for (const MethodReport& m : report.methods)
+        EXPECT_NE(report.verdict(m), Verdict::Deviates) << m.method;
 }
 
 }  // namespace
