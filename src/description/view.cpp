@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <numbers>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -39,7 +40,8 @@ double view_half_width(const Params& params, double aspect) {
     }
     if (!focal.empty())
         params.fail("focal_length", "give either \"fov\" or \"focal_length\", not both");
-    const double tangent = std::tan(params.number("fov", 0, 1e-3f, 179.9f) * double(kPi) / 360);
+    const double tangent =
+        std::tan(params.number("fov", 0, 1e-3f, 179.9f) * std::numbers::pi / 360);
     switch (params.choice("fov_axis", {"x", "y", "diagonal", "smaller", "larger"}, 0)) {
     case 0: return tangent;
     case 1: return tangent * aspect;

@@ -5,6 +5,8 @@
 
 #include "emitter/area.h"
 
+#include <numbers>
+
 #include "math/distribution.h"
 #include "math/frame.h"
 #include "math/warp.h"
@@ -49,7 +51,7 @@ public:
         }
         // So that the emitter itself can be chosen, even if all of its points were dark.
         flux = std::max(flux, floor);
-        power_ = double(kPi) * flux * (two_sided ? 2 : 1);
+        power_ = std::numbers::pi * flux * (two_sided ? 2 : 1);
         choice_ = AliasTable(weights);
         pdf_.resize(n);
         for (size_t i = 0; i < n && !choice_.empty(); ++i)

@@ -1,6 +1,7 @@
 #include "emitter/environment.h"
 
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -24,7 +25,8 @@ public:
             const double top = std::max(0.0, (y - 0.5) / height),
                          bottom = std::min(1.0, (y + 0.5) / height);
             // Integral of sin θ over the row, up to a constant.
-            const double area = std::cos(double(kPi) * top) - std::cos(double(kPi) * bottom);
+            const double area =
+                std::cos(std::numbers::pi * top) - std::cos(std::numbers::pi * bottom);
             for (int x = 0; x < width; ++x) {
                 const Rgb sum =
                     texel(x, y - 1) + texel(x + 1, y - 1) + texel(x, y) + texel(x + 1, y);
@@ -36,7 +38,7 @@ public:
     }
 
     double power() const override {
-        return 4 * double(kPi) * double(kPi) * sqr(double(scene_radius())) * mean_;
+        return 4 * std::numbers::pi * std::numbers::pi * sqr(double(scene_radius())) * mean_;
     }
 
 private:

@@ -2,6 +2,7 @@
 // image is that of directions over 4π.
 
 #include <cmath>
+#include <numbers>
 
 #include "emitter/environment.h"
 #include "math/distribution.h"
@@ -24,7 +25,7 @@ public:
     }
 
     double power() const override {
-        return 4 * double(kPi) * double(kPi) * sqr(double(scene_radius())) * mean_;
+        return 4 * std::numbers::pi * std::numbers::pi * sqr(double(scene_radius())) * mean_;
     }
 
 private:

@@ -6,7 +6,9 @@
 //   to_world (identity)    similarity; its origin is the light's position
 
 #include "emitter/environment.h"
+
 #include "emitter/point.h"
+#include <numbers>
 
 namespace etendue {
 namespace {
@@ -27,7 +29,7 @@ public:
         return {hit.Le, hit.pdf};
     }
     float max_pdf_d() const override { return kInf; }
-    double power() const override { return directions_->power() / double(kPi); }  // ∫ I dω
+    double power() const override { return directions_->power() / std::numbers::pi; }  // ∫ I dω
 
 private:
     Rgb intensity(Vec3 d) const override { return directions_->eval_infinite(d).Le; }

@@ -1,7 +1,9 @@
 #include "emitter/infinite.h"
 
 #include "math/frame.h"
+
 #include "math/warp.h"
+#include <numbers>
 
 namespace etendue {
 
@@ -50,7 +52,8 @@ class ConstantEmitter final : public InfiniteEmitter {
 public:
     explicit ConstantEmitter(Rgb L) : L_(L) {}
     double power() const override {
-        return 4 * double(kPi) * double(kPi) * sqr(double(scene_radius())) * luminance(L_);
+        return 4 * std::numbers::pi * std::numbers::pi * sqr(double(scene_radius())) *
+               luminance(L_);
     }
 
 private:
@@ -67,7 +70,7 @@ class DirectionalEmitter final : public InfiniteEmitter {
 public:
     DirectionalEmitter(Vec3 travel, Rgb irradiance) : d_(-travel), E_(irradiance) {}
     double power() const override {
-        return double(kPi) * sqr(double(scene_radius())) * luminance(E_);
+        return std::numbers::pi * sqr(double(scene_radius())) * luminance(E_);
     }
     bool is_delta() const override { return true; }
 

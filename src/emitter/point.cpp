@@ -3,6 +3,8 @@
 
 #include "emitter/point.h"
 
+#include <numbers>
+
 #include <fmt/format.h>
 
 #include "description/view.h"
@@ -39,7 +41,7 @@ public:
         const double mean = falloff_ == Falloff::Quartic     ? 0.2
                             : falloff_ == Falloff::Quadratic ? 1.0 / 3
                                                              : 0.5;  // of the ring
-        return 2 * double(kPi) *
+        return 2 * std::numbers::pi *
                ((1 - double(cos_beam_)) + mean * (double(cos_beam_) - double(cos_cutoff_)));
     }
     float cos_cutoff() const { return cos_cutoff_; }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 
 #include "emitter/emitter.h"
 #include "image/image_io.h"
@@ -36,7 +37,7 @@ public:
     }
     Vec3 sample_direction(Vec3, Vec2 u) const override { return sample_uniform_sphere(u); }
     float max_pdf_d() const override { return kUniformSpherePdf; }
-    double power() const override { return 4 * double(kPi) * luminance(intensity_); }
+    double power() const override { return 4 * std::numbers::pi * luminance(intensity_); }
     bool is_delta() const override { return true; }
 
 protected:

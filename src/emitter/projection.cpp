@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "emitter/environment.h"
 #include "emitter/plane.h"
@@ -30,7 +31,7 @@ public:
 
     /// v goes down.
     static Rectangle rectangle(const RgbImage& image, float fov_degrees) {
-        const double half = std::tan(double(fov_degrees) * double(kPi) / 360);
+        const double half = std::tan(double(fov_degrees) * std::numbers::pi / 360);
         const double shorter = std::min(image.width, image.height);
         return {half * image.width / shorter, -half * image.height / shorter};
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -459,7 +460,7 @@ private:
                              cos_theta = 1 / std::sqrt(1 + px * px + py * py);
                 pixels.push_back(
                     image.pixels[size_t(y / parts) * size_t(image.width) + size_t(x / parts)] *
-                    float(cos_theta * cos_theta * cos_theta / double(kPi)));
+                    float(cos_theta * cos_theta * cos_theta / std::numbers::pi));
             }
         const Param* to_world = o.find("to_world");
         // Cameras have +x on the left.
