@@ -5,7 +5,7 @@
 
 namespace etendue {
 
-/// exp(x) for x ≤ 0, to about 2 ulp; the same on every machine, unlike that of the C library, and in eight lanes.
+/// exp(x) for x ≤ 0, to about 2 ulp, in eight lanes.
 inline float exp_negative(float x) {
     constexpr float kLog2e = 1.44269504f, kLn2High = 0.693359375f, kLn2Low = -2.12194440e-4f;
     x = x > -87 ? x : -87.0f;

@@ -28,15 +28,21 @@ public:
     /// Whether walks have directions, densities and roulette of a cell at each surface.
     bool guides_surfaces() const { return uses_surfaces && !surfaces.is_empty(); }
 
-    /// Guides an emitter at infinity, unless its share is 0.
-    void add_at_infinity(const AtInfinity& learned) {
-        if (learned.fit.share[0] > 0) at_infinity_.push_back(learned);
-    }
-    /// The learned directions of an emitter at infinity, or nullptr.
+    void add_at_infinity(const AtInfinity& learned) { at_infinity_.push_back(learned); }
+    /// The learned directions of an emitter at infinity; nullptr where their share is 0.
     const GuideFit* at_infinity(uint32_t emitter) const {
         for (const AtInfinity& a : at_infinity_)
-            if (a.emitter == emitter) return &a.fit;
+            if (a.emitter == emitter) return a.fit.share[0] > 0 ? &a.fit : nullptr;
         return nullptr;
+    }
+
+    /// Prepares it for walks that only train: they are guided wherever they gain a little, and none is ended early.
+    void make_teacher() {
+        uses_surfaces = true;
+        has_roulette = false;
+        surfaces.use_training_shares();
+        emission.use_training_shares();
+        for (AtInfinity& a : at_infinity_) a.fit.share = a.fit.training_share;
     }
 
     /// Sets the relative probabilities with which light paths choose emitters, by Emitter::index.

@@ -28,13 +28,10 @@ void PlacedDensity::split(uint32_t node, PlacedWeight* begin, PlacedWeight* end)
     const float margin = end - begin > 1 ? d[axis] / (2 * float(end - begin - 1)) : 0.0f;
     box.bounds.lo = box.bounds.lo - Vec3{margin, margin, margin};
     box.bounds.hi = box.bounds.hi + Vec3{margin, margin, margin};
-    // Most surfaces are flat: the largest side of the box is about the surface in it.
-    const Vec3 size = box.bounds.hi - box.bounds.lo;
-    const double area =
-        std::max({double(size.x) * size.y, double(size.y) * size.z, double(size.z) * size.x});
+    const double area = surface_area(box.bounds);
     if (area > 0)
         for (const PlacedWeight* w = begin; w != end; ++w)
-            box.density[octant(w->n)] += double(w->weight) / area;
+            if (w->weight < kInf) box.density[surface_side(w->n)] += double(w->weight) / area;
     splits_.set_leaf(node, boxes_.size());
     boxes_.push_back(box);
 }
@@ -44,7 +41,7 @@ double PlacedDensity::operator()(Vec3 p, Vec3 n) const {
     const Box& box = boxes_[splits_.leaf(p)];
     for (int axis = 0; axis < 3; ++axis)
         if (!(p[axis] >= box.bounds.lo[axis] && p[axis] <= box.bounds.hi[axis])) return 0;
-    return box.density[octant(n)];
+    return box.density[surface_side(n)];
 }
 
 }  // namespace etendue

@@ -22,7 +22,7 @@ Guide random_guide(Vec3 center, float radius, std::vector<double> emission,
     GuideCell cell;
     cell.center = center;
     for (GuideCell::Field& field : cell.fields) {
-        field.share.fill(kShare);
+        field.share.fill(kShare), field.training_share.fill(kShare);
         make_random(field.mixture, 1 / radius);
         for (WalkContribution& c : field.contribution) c = {1, u()};
     }
@@ -33,7 +33,7 @@ Guide random_guide(Vec3 center, float radius, std::vector<double> emission,
     if (emission.size() > 1) guide.set_emission(std::move(emission));
     for (const uint32_t emitter : at_infinity) {
         Guide::AtInfinity learned{emitter, {}};
-        learned.fit.share.fill(kShare);
+        learned.fit.share.fill(kShare), learned.fit.training_share.fill(kShare);
         make_random(learned.fit.mixture, 0);
         guide.add_at_infinity(learned);
     }

@@ -10,8 +10,6 @@ namespace etendue {
 namespace {
 
 constexpr size_t kLobes = GuideMixture::kMostLobes;
-/// Share of the samples kept for the shares: every kHeldOut-th.
-constexpr size_t kHeldOut = 4;
 /// Weights are clamped at this factor of their mean.
 constexpr double kLargestWeight = 10;
 
@@ -131,11 +129,25 @@ Lobes refined(const Lobes& lobes, const std::vector<Seen>& samples, double sampl
 
 /// The share that maximises the likelihood of the light, with one half as prior, and its gain in nats.
 struct Share {
-    double share = 0, gain = 0, weight = 0;
+    double share = 0, gain = 0;
+    double training_share = 0;  ///< See GuideFit.
+    double weight = 0;          ///< Of the samples.
 };
+/// Of one direction. The weight is the flux, in proportion to which directions arrive: the unguided density has the cosine.
 struct Densities {
     double unguided, guided, weight;
 };
+
+/// The mean gain by a share, in nats.
+double gain_by(double share, const std::vector<Densities>& samples) {
+    double gain = 0, weight = 0;
+    for (const Densities& s : samples) {
+        gain += s.weight * std::log((1 - share) + share * s.guided / s.unguided);
+        weight += s.weight;
+    }
+    return gain / weight;
+}
+
 Share best_share(const std::vector<Densities>& samples, const GuideLearning& learning) {
     constexpr size_t kFewest = 16;
     constexpr int kSteps = 10;
@@ -151,31 +163,44 @@ Share best_share(const std::vector<Densities>& samples, const GuideLearning& lea
             sum += s.weight * a * s.guided / ((1 - a) * s.unguided + a * s.guided);
         a = (sum + 0.5 * prior) / (best.weight + prior);
     }
+    constexpr double kLeastTrainingGain = 0.1, kMostTrainingShare = 0.9;
+    best.training_share = std::min(a, kMostTrainingShare);
+    if (!(gain_by(best.training_share, samples) >= kLeastTrainingGain)) best.training_share = 0;
     best.share = std::min(a, double(learning.most_share));
-    for (const Densities& s : samples)
-        best.gain += s.weight * std::log((1 - best.share) + best.share * s.guided / s.unguided);
-    best.gain /= best.weight;
+    best.gain = gain_by(best.share, samples);
     if (!(best.gain >= double(learning.least_gain))) best.share = best.gain = 0;
     return best;
 }
 
+/// The mean of `weight` over the samples.
+template <class Weight>
+double mean_of(const std::vector<const GuideSample*>& samples, const Weight& weight) {
+    double sum = 0;
+    for (const GuideSample* s : samples) sum += double(weight(*s));
+    return sum / double(samples.size());
+}
+
 }  // namespace
 
-GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number,
+FitSamples FitSamples::held_out(std::span<const GuideSample* const> samples, size_t n) {
+    FitSamples all;
+    for (size_t i = 0; i < samples.size(); ++i)
+        (i % n == n - 1 ? all.shares : all.lobes).push_back(samples[i]);
+    return all;
+}
+
+GuideFit fit_guide(const FitSamples& samples, Vec3 center, uint64_t number,
                    const GuideLearning& learning) {
     constexpr int kSteps = 8;
     constexpr double kSamplesPerLobe = 6;
     GuideFit fit;
-    double mean = 0;
-    for (const GuideSample* s : samples) mean += double(s->weight) / double(samples.size());
-    if (!(mean > 0)) return fit;
-    const double largest = kLargestWeight * mean;
-
     std::vector<Seen> seen;
     double total = 0, squares = 0;
-    for (size_t i = 0; i < samples.size(); ++i)
-        if (i % kHeldOut != kHeldOut - 1 && samples[i]->weight > 0) {
-            seen.push_back(seen_from(*samples[i], center, largest));
+    const double largest =
+        kLargestWeight * mean_of(samples.lobes, [](const GuideSample& s) { return s.weight; });
+    for (const GuideSample* s : samples.lobes)
+        if (s->weight > 0) {
+            seen.push_back(seen_from(*s, center, largest));
             total += seen.back().weight;
             squares += sqr(seen.back().weight);
         }
@@ -189,13 +214,14 @@ GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uin
 
     std::array<std::vector<Densities>, kGuideClasses> by_class;
     std::vector<Densities> all;
-    for (size_t i = kHeldOut - 1; i < samples.size(); i += kHeldOut) {
-        const GuideSample& s = *samples[i];
-        if (!(s.unguided_pdf > 0 && s.weight > 0)) continue;
-        const Densities d{double(s.unguided_pdf),
-                          double(fit.mixture.pdf(s.view(center), s.direction.unpack())),
-                          std::min(double(s.weight), largest)};
-        by_class[s.gloss_class].push_back(d);
+    const double largest_flux =
+        kLargestWeight * mean_of(samples.shares, [](const GuideSample& s) { return s.flux(); });
+    for (const GuideSample* s : samples.shares) {
+        if (!(s->unguided_pdf > 0 && s->weight > 0)) continue;
+        const Densities d{double(s->unguided_pdf),
+                          double(fit.mixture.pdf(s->view(center), s->direction.unpack())),
+                          std::min(double(s->flux()), largest_flux)};
+        by_class[s->gloss_class].push_back(d);
         all.push_back(d);
     }
     const Share of_all = best_share(all, learning);
@@ -204,6 +230,7 @@ GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uin
         Share s = best_share(by_class[c], learning);
         if (!(s.weight > 0)) s = of_all;
         fit.share[c] = float(s.share);
+        fit.training_share[c] = float(s.training_share);
         weight += s.weight, gain += s.weight * s.gain;
     }
     if (weight > 0) fit.gain = float(gain / weight);
@@ -227,7 +254,7 @@ GuideFit footprint_guide(std::span<const GuideSample* const> samples, uint64_t n
         for (; made < count && (double(made) + offset) * total < sum * double(count); ++made)
             fit.mixture.add({s->direction.unpack(), 0, kappa, 1 / float(count)});
     }
-    if (!fit.mixture.is_empty()) fit.share.fill(kShare);
+    if (!fit.mixture.is_empty()) fit.share.fill(kShare), fit.training_share.fill(kShare);
     return fit;
 }
 

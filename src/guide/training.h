@@ -1,6 +1,7 @@
 #pragma once
 // Samples from which guides are learned, and the fit of one cell.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -53,7 +54,7 @@ inline int guide_class(uint8_t gloss) {
 struct GuideSample {
     Vec3 p;
     float inv_distance = 0;  ///< To the other end of the edge; 0 at infinity.
-    float weight = 0;        ///< Power along the direction.
+    float weight = 0;        ///< For the lobes, see set_flux().
     float unguided_pdf = 0;  ///< Of the direction without guide, in solid angle; 0 where unknown.
     PackedDirection direction;                  ///< From p.
     int8_t normal[3] = {};                      ///< As GuideView::normal, to about a degree.
@@ -62,10 +63,22 @@ struct GuideSample {
     void set_normal(Vec3 n) {
         for (int i = 0; i < 3; ++i) normal[i] = int8_t(std::lround(n[i] * 127));
     }
-    /// Seen from the centre of a cell.
-    GuideView view(Vec3 center) const {
+    Vec3 unpacked_normal() const {
         const Vec3 n{float(normal[0]), float(normal[1]), float(normal[2])};
-        return {center - p, length2(n) > 0 ? normalize(n) : n};
+        return length2(n) > 0 ? normalize(n) : n;
+    }
+    /// Sets the weight by the power along the direction, after normal and direction. With a normal, the lobes have to learn
+    /// power over cosine, since GuideMixture multiplies by the cosine.
+    void set_flux(float flux) { weight = flux / cosine(); }
+    float flux() const { return weight * cosine(); }
+    /// Seen from the centre of a cell.
+    GuideView view(Vec3 center) const { return {center - p, unpacked_normal()}; }
+
+private:
+    float cosine() const {
+        constexpr float kLeast = 0.05f;
+        const Vec3 n = unpacked_normal();
+        return length2(n) > 0 ? std::max(std::fabs(dot(n, direction.unpack())), kLeast) : 1.0f;
     }
 };
 static_assert(sizeof(GuideSample) == 32);
@@ -73,10 +86,13 @@ static_assert(sizeof(GuideSample) == 32);
 /// Mixture and shares of one cell and mode.
 struct GuideFit {
     GuideMixture mixture;
-    /// Share of directions taken from the mixture, by guide_class(); 0 where that gains little.
+    /// Share of directions taken from the mixture, by guide_class(); 0 where the gain is below GuideLearning::least_gain.
     std::array<float, kGuideClasses> share{};
+    /// The same for walks that only train: they are guided wherever a little is gained, since they have to find what other
+    /// walks miss.
+    std::array<float, kGuideClasses> training_share{};
     float gain =
-        0;  ///< Mean of log(guided pdf / unguided pdf) over the light, in nats, at these shares.
+        0;  ///< Mean of log(guided pdf / unguided pdf) over the light, in nats, at `share`.
 };
 
 /// How the cells of a guide learn.
@@ -88,10 +104,16 @@ struct GuideLearning {
     float most_share = 0.9f;  ///< Of guided directions.
 };
 
+/// Samples of a fit. Those of the shares are not those of the lobes, so that lobes that fit to noise have no share.
+struct FitSamples {
+    std::vector<const GuideSample*> lobes, shares;
+    /// Every `n`-th sample is kept for the shares.
+    static FitSamples held_out(std::span<const GuideSample* const> samples, size_t n = 4);
+};
+
 /// Fits lobes by expectation maximisation with a prior [Ruppert et al. 2020], and the shares with the BSDF as one more
-/// component. Every fourth sample is kept for the shares, so that lobes that fit to noise have none. A function of the
-/// samples' order; `number` seeds its choices.
-GuideFit fit_guide(std::span<const GuideSample* const> samples, Vec3 center, uint64_t number,
+/// component. A function of the samples' order; `number` seeds its choices.
+GuideFit fit_guide(const FitSamples& samples, Vec3 center, uint64_t number,
                    const GuideLearning& learning);
 
 /// Footprints of photons [Hey & Purgathofer 2002]: at most GuideMixture::kMostLobes samples, chosen in proportion to

@@ -27,23 +27,34 @@ struct EmissionRecord {
 
 struct Block {
     std::vector<GuideSample> samples;
-    std::vector<PlacedWeight> importons;  ///< That the lens sees.
+    GuideTree::LeftOut left_out;  ///< That the lens sees, and light of next events.
     std::vector<EmissionRecord> emission;
     std::vector<ContributionRecord> contributions;
     double light_contribution = 0;  ///< Sum over the light walks.
 };
 
+/// Inverse of the distance along the edges from v_i to the next vertex where a walk scatters, with `step` 1 on the way or -1
+/// back. Where there are mirrors or panes between, light seems to come from so far; curved ones may shift it.
+float inv_seen_distance(const SubPath& path, int i, int step) {
+    float distance = 0;
+    for (int j = i + step; j >= 0 && j < path.size(); j += step) {
+        if (path[j].is_infinite) return 0;
+        distance += length(path[j].p - path[j - step].p);
+        if (!path[j].is_delta) break;
+    }
+    return 1 / distance;
+}
+
 /// What walks in the other mode can learn at v_i of a walk in `mode`: the direction it came from. They would arrive from
 /// where it went on to.
 GuideSample sample_at(const SubPath& path, int i, TransportMode mode) {
-    constexpr float kLeastCos = 0.05f;
-    const Vertex &v = path[i], &previous = path[i - 1];
+    const Vertex& v = path[i];
     GuideSample s;
     s.p = v.p;
-    s.inv_distance = previous.is_infinite ? 0.0f : 1 / length(previous.p - v.p);
+    s.inv_distance = inv_seen_distance(path, i, -1);
     s.direction = PackedDirection(v.wo);
-    s.weight = luminance(v.beta) / std::max(abs_dot(v.ng, v.wo), kLeastCos);
-    if (!v.shape->material->is_transmissive()) s.set_normal(facing_normal(v));
+    s.set_normal(side_normal(v));
+    s.set_flux(luminance(v.beta));
     s.mode = uint8_t(mode == TransportMode::Radiance ? TransportMode::Importance
                                                      : TransportMode::Radiance);
     s.gloss_class = uint8_t(guide_class(v.gloss)) & 0xf;
@@ -52,26 +63,42 @@ GuideSample sample_at(const SubPath& path, int i, TransportMode mode) {
     return s;
 }
 
-/// Share of the light from y_0 that hits bring, rather than next events.
-float share_of_hits(const SubPath& y, const GuideSample& at_y1) {
+/// Share of the light from y_0 that hits bring, rather than next events. Where the walk ended at y_1, an eye walk would have
+/// come from where its last ray went, or from above.
+float share_of_hits(const SubPath& y) {
     if (y[0].emitter->is_delta()) return 0;
-    const double hit = double(at_y1.unguided_pdf) * double(y[1].to_predecessor),
-                 next_event = double(y[0].pdf_fwd) * double(y[1].next_event_ratio);
+    const Vertex& v = y[1];
+    const bool has_flight = y.flight.pdf_sa > 0 && !v.is_delta;
+    const Vec3 away = y.size() > 2 ? direction(v, y[2])
+                      : has_flight ? y.flight.d
+                                   : facing_normal(v);
+    const double hit = double(v.eval_unguided(away, TransportMode::Importance).pdf_rev) *
+                       double(v.to_predecessor),
+                 next_event = double(y[0].pdf_fwd) * double(v.next_event_ratio);
     return hit > 0 ? float(sqr(hit) / (sqr(hit) + sqr(next_event))) : 0.0f;
+}
+
+void record(const GuideSample& s, Block& block) {
+    if (s.weight > 0) block.samples.push_back(s);
 }
 
 void record_light_walk(const SubPath& y, Block& block) {
     for (int i = 1; i < y.size(); ++i) {
         if (!y[i].is_connectible) continue;
         GuideSample s = sample_at(y, i, TransportMode::Importance);
-        if (i == 1) s.weight *= share_of_hits(y, s);
-        if (s.weight > 0) block.samples.push_back(s);
+        if (i == 1) {
+            const float hits = share_of_hits(y);
+            s.weight *= hits;
+            block.left_out[s.mode].push_back(
+                {y[1].p, side_normal(y[1]), luminance(y[1].beta) * (1 - hits)});
+        }
+        record(s, block);
     }
     if (y.size() < 2) return;
     EmissionRecord r{{}, y[0].emitter, {}};
     for (int i = 1; i < y.size(); ++i)
         if (y[i].is_connectible)
-            r.reached.push_back({y[i].p, facing_normal(y[i]), luminance(y[i].beta)});
+            r.reached.push_back({y[i].p, side_normal(y[i]), luminance(y[i].beta)});
     r.sample.mode = uint8_t(TransportMode::Importance);
     if (y[0].is_infinite) {
         r.sample.direction = PackedDirection(y[0].p);
@@ -79,23 +106,26 @@ void record_light_walk(const SubPath& y, Block& block) {
     } else {
         const Vec3 w = direction(y[0], y[1]);
         r.sample.p = y[0].p;
-        r.sample.inv_distance = 1 / length(y[1].p - y[0].p);
+        r.sample.inv_distance = inv_seen_distance(y, 0, 1);
         r.sample.direction = PackedDirection(w);
+        if (y[0].emitter->emits_by_cosine()) r.sample.set_normal(y[0].ng);
         r.sample.unguided_pdf = y[0].eval_unguided(w, TransportMode::Importance).pdf;
     }
     if (!r.reached.empty()) block.emission.push_back(std::move(r));
 }
 
 void record_eye_walk(const SubPath& z, Block& block) {
+    bool is_seen = true;  // by the lens, perhaps in mirrors or through panes
     for (int i = 1; i < z.size(); ++i) {
-        if (!z[i].is_connectible || z[i].kind != Vertex::Kind::Surface) continue;
-        // Light walks are connected to the lens; few hit it.
-        if (i == 1) {
-            block.importons.push_back({z[i].p, facing_normal(z[i]), luminance(z[i].beta)});
-            continue;
+        if (z[i].is_connectible && z[i].kind == Vertex::Kind::Surface) {
+            // Light walks are connected to the lens. Few hit it, and even fewer by way of a mirror.
+            if (is_seen)
+                block.left_out[size_t(TransportMode::Importance)].push_back(
+                    {z[i].p, side_normal(z[i]), luminance(z[i].beta)});
+            else
+                record(sample_at(z, i, TransportMode::Radiance), block);
         }
-        if (const GuideSample s = sample_at(z, i, TransportMode::Radiance); s.weight > 0)
-            block.samples.push_back(s);
+        is_seen = is_seen && z[i].is_delta;
     }
 }
 
@@ -111,9 +141,10 @@ struct Contributions {
 };
 
 /// Joins both walks as bidirectional path tracing does, as far as the counts have its techniques; each eye vertex is
-/// connected to one vertex of the light walk, which stands for all. Splats are divided by the number of light paths.
-Contributions join_walks(const WalkContext& walk, int max_depth, Sampler& sampler, const SubPath& y,
-                         const SubPath& z) {
+/// connected to one vertex of the light walk, which stands for all. Splats are divided by the number of light paths. So many
+/// eye walks share each light walk.
+Contributions join_walks(const WalkContext& walk, int max_depth, float eye_walks, Sampler& sampler,
+                         const SubPath& y, const SubPath& z) {
     const TechniqueCounts& n = walk.counts;
     Contributions all;
     const auto value = [&](const Join& j) {
@@ -136,7 +167,7 @@ Contributions join_walks(const WalkContext& walk, int max_depth, Sampler& sample
         if (const auto j = join_connect(walk.scene, y, s, z, t, n)) {
             const float v = value(*j);
             all.by_eye[size_t(t)] += v * float(choices);
-            all.by_light[size_t(s)] += v * float(choices);
+            all.by_light[size_t(s)] += v * float(choices) * eye_walks;
         }
     }
     for (int s = 2; n.splat > 0 && s <= std::min(y.size(), max_depth); ++s)
@@ -156,7 +187,8 @@ void record_contributions(const SubPath& path, TransportMode mode, int max_verti
         if (!v.is_connectible || v.kind != Vertex::Kind::Surface) continue;
         const auto vertices = size_t(i + 1);
         records.push_back({v.p, luminance(v.beta), sums[vertices] - hits[vertices],
-                           sums[vertices + 1], uint8_t(mode), uint8_t(octant(facing_normal(v)))});
+                           sums[vertices + 1], uint8_t(mode),
+                           uint8_t(cube_face(facing_normal(v)))});
     }
 }
 
@@ -196,8 +228,9 @@ GuideLearning learning_of_emission(GuidedWalks walks) {
 }
 
 template <class T>
-void append(std::vector<T>& to, const std::vector<T>& more) {
-    to.insert(to.end(), more.begin(), more.end());
+void move_to_end(std::vector<T>& to, std::vector<T>& from) {
+    to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+    from = {};
 }
 
 /// Evenly chosen pointers to at most so many of the samples.
@@ -209,9 +242,9 @@ std::vector<const GuideSample*> thinned(const std::vector<GuideSample>& samples)
     return chosen;
 }
 
-double sum_of_weights(const std::vector<GuideSample>& samples) {
+double sum_of_flux(const std::vector<GuideSample>& samples) {
     double sum = 0;
-    for (const GuideSample& s : samples) sum += double(s.weight);
+    for (const GuideSample& s : samples) sum += double(s.flux());
     return sum;
 }
 
@@ -226,10 +259,12 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
     double sum = 0;
     for (const EmissionRecord& r : records) {
         GuideSample s = r.sample;
-        for (const PlacedWeight& v : r.reached) s.weight += v.weight * float(importance(v.p, v.n));
-        if (!(s.weight > 0)) continue;
-        by_emitter[r.emitter->index] += double(s.weight);
-        sum += double(s.weight);
+        float flux = 0;
+        for (const PlacedWeight& v : r.reached) flux += v.weight * float(importance(v.p, v.n));
+        if (!(flux > 0 && flux < kInf)) continue;
+        s.set_flux(flux);
+        by_emitter[r.emitter->index] += double(flux);
+        sum += double(flux);
         if (!r.emitter->is_infinite())
             finite.push_back(s);
         else if (!r.emitter->is_delta())
@@ -237,10 +272,11 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
     }
     if (!(sum > 0)) return;
     guide.emission = GuideTree(finite, seed, learning);
-    double gain = sum_of_weights(finite) * double(guide.emission.gain(TransportMode::Importance));
+    double gain = sum_of_flux(finite) * double(guide.emission.gain(TransportMode::Importance));
     for (const auto& [emitter, samples] : at_infinity) {
-        const GuideFit fit = fit_guide(thinned(samples), {}, hash_combine(seed, emitter), learning);
-        gain += sum_of_weights(samples) * double(fit.gain);
+        const GuideFit fit = fit_guide(FitSamples::held_out(thinned(samples)), {},
+                                       hash_combine(seed, emitter), learning);
+        gain += sum_of_flux(samples) * double(fit.gain);
         guide.add_at_infinity({emitter, fit});
     }
     guide.emission_gain = float(gain / sum);
@@ -279,15 +315,15 @@ Guiding::Guiding(const IntegratorParams& p) {
     has_roulette_ = p.flag("guide_roulette");
 }
 
-bool Guiding::gains_little(GuidedWalks walks) const {
+bool Guiding::gains_little(const Guide& guide, GuidedWalks walks) {
     // In nats; these tell the scenes of docs/guiding.md apart. Guided eye walks take paths away from techniques that need
     // no guide, so they must gain more than emission, without which most light paths may be lost. What light walks gain
     // says little about methods that have both walks.
     constexpr float kLeastEyeGain = 1.0f, kLeastGainAlone = 0.75f, kLeastLightGain = 0.4f;
-    const bool eye = guide_->surfaces.gain(TransportMode::Radiance) >=
+    const bool eye = guide.surfaces.gain(TransportMode::Radiance) >=
                      (walks == GuidedWalks::Eye ? kLeastGainAlone : kLeastEyeGain),
-               light = guide_->surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
-               emission = guide_->emission_gain >= kLeastLightGain;
+               light = guide.surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
+               emission = guide.emission_gain >= kLeastLightGain;
     switch (walks) {
     case GuidedWalks::Eye: return !eye;
     case GuidedWalks::Light: return !light && !emission;
@@ -297,14 +333,14 @@ bool Guiding::gains_little(GuidedWalks walks) const {
     return true;
 }
 
-bool Guiding::gains_nothing(GuidedWalks walks) const {
-    // Adjoint-driven roulette keeps more vertices, and a method that joins both walks joins each of them.
+bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
+    // Adjoint-driven roulette keeps more vertices, and a method that joins both walks joins each of them. What emission
+    // gains does not depend on it.
     constexpr float kLeastGain = 0.2f;
     const bool has_gains = mode_ == Mode::On || mode_ == Mode::Auto;
     return joins_both(walks) && has_gains &&
-           std::max({guide_->surfaces.gain(TransportMode::Radiance),
-                     guide_->surfaces.gain(TransportMode::Importance), guide_->emission_gain}) <
-               kLeastGain;
+           std::max(guide.surfaces.gain(TransportMode::Radiance),
+                    guide.surfaces.gain(TransportMode::Importance)) < kLeastGain;
 }
 
 void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks) {
@@ -323,8 +359,8 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     if (!is_due) return;
     const auto begin = Clock::now();
     const uint64_t seed = pilot_seed(pass.seed, PilotUse::Guide, pass.index);
-    // Walks that end early would teach less.
-    if (guide_) guide_->has_roulette = false;
+    // The pass may be dropped at any time, and traced again: nothing may be left of this training then.
+    std::unique_ptr<Guide> next;
     if (mode_ == Mode::Random) {
         constexpr float kKappa = 1000;
         const Bounds3& bounds = pass.scene.bounds();
@@ -334,34 +370,38 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
             pmf.push_back(double(e->selection_pmf));
             if (e->is_infinite() && !e->is_delta()) at_infinity.push_back(e->index);
         }
-        guide_ = std::make_unique<Guide>(random_guide(bounds.center(), bounds.radius(),
-                                                      std::move(pmf), at_infinity, kKappa, seed));
+        next = std::make_unique<Guide>(random_guide(bounds.center(), bounds.radius(),
+                                                    std::move(pmf), at_infinity, kKappa, seed));
     } else if (pass.index == 0) {
-        for (int round = 0; round < kRounds; ++round)
-            guide_ =
-                trained(pass, depth, walks, (walks_ / kFirstPart) << round,
+        for (int round = 0; round < kRounds; ++round) {
+            if (next) next->make_teacher();
+            next =
+                trained(pass, depth, walks, next.get(), (walks_ / kFirstPart) << round,
                         hash_combine(seed, uint64_t(round)), has_roulette_ && round == kRounds - 1);
-        if (mode_ == Mode::Auto && gains_little(walks)) {
-            is_given_up_ = true;
-            guide_ = nullptr;
         }
     } else {
-        guide_ = trained(pass, depth, walks, walks_, seed, has_roulette_);
+        Guide teacher = *guide_;
+        teacher.make_teacher();
+        next = trained(pass, depth, walks, &teacher, walks_, seed, has_roulette_);
     }
-    if (guide_) {
-        guide_->has_roulette = has_roulette_;
-        guide_->uses_surfaces = !gains_nothing(walks);
+    is_given_up_ = pass.index == 0 && mode_ == Mode::Auto && gains_little(*next, walks);
+    if (is_given_up_) next = nullptr;
+    if (next) {
+        next->has_roulette = has_roulette_;
+        next->uses_surfaces = !gains_nothing(*next, walks);
     }
+    guide_ = std::move(next);
     trained_passes_ = pass.index + 1;
     seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOptions& depth,
-                                        GuidedWalks guided, uint64_t walks, uint64_t seed,
-                                        bool for_roulette) const {
+                                        GuidedWalks guided, const Guide* teacher, uint64_t walks,
+                                        uint64_t seed, bool for_roulette) const {
     TechniqueCounts counts =
-        joins_of(for_roulette ? guided : GuidedWalks::Both, for_roulette ? pass.pixels : 1);
-    counts.guide = guide_.get();
+        for_roulette ? joins_of(guided, pass.light_paths) : joins_of(GuidedWalks::Both, 1);
+    counts.guide = teacher;
+    const float eye_walks = float(pass.pixels) / float(std::max<uint64_t>(pass.light_paths, 1));
     WalkOptions options = depth.walk();
     options.max_vertices = std::min(options.max_vertices, kMostVertices + 1);
     std::vector<Block> blocks((walks + kBlock - 1) / kBlock);
@@ -376,7 +416,8 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
             trace_eye_path(walk, pass.film, mix64(seed + i) % pass.pixels, sampler, work.z);
             record_eye_walk(work.z, blocks[b]);
             if (!for_roulette) continue;
-            const Contributions c = join_walks(walk, depth.max_depth, sampler, work.y, work.z);
+            const Contributions c =
+                join_walks(walk, depth.max_depth, eye_walks, sampler, work.y, work.z);
             blocks[b].light_contribution += double(c.by_light[0]);
             record_contributions(work.y, TransportMode::Importance, options.max_vertices,
                                  c.by_light, {}, blocks[b].contributions);
@@ -385,22 +426,24 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
         }
     });
     Block all;
-    for (const Block& b : blocks) {
-        append(all.samples, b.samples);
-        append(all.importons, b.importons);
-        append(all.emission, b.emission);
-        append(all.contributions, b.contributions);
+    for (Block& b : blocks) {
+        move_to_end(all.samples, b.samples);
+        for (size_t m = 0; m < 2; ++m) move_to_end(all.left_out[m], b.left_out[m]);
+        move_to_end(all.emission, b.emission);
+        move_to_end(all.contributions, b.contributions);
         all.light_contribution += b.light_contribution;
     }
     auto guide = std::make_unique<Guide>();
-    guide->surfaces =
-        GuideTree(all.samples, seed, learning_at_surfaces(guided, mode_ == Mode::Footprints));
+    guide->surfaces = GuideTree(
+        all.samples, seed, learning_at_surfaces(guided, mode_ == Mode::Footprints), all.left_out);
     if (guide->surfaces.is_empty()) return guide;
     guide->surfaces.set_contributions(all.contributions);
     guide->light_contribution = float(all.light_contribution / double(walks));
-    if (mode_ != Mode::Footprints)
-        learn_emission(pass.scene, all.emission, PlacedDensity(std::move(all.importons)),
+    if (mode_ != Mode::Footprints) {
+        auto& seen = all.left_out[size_t(TransportMode::Importance)];
+        learn_emission(pass.scene, all.emission, PlacedDensity(std::move(seen)),
                        learning_of_emission(guided), hash_combine(seed, 1), *guide);
+    }
     return guide;
 }
 

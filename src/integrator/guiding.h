@@ -25,8 +25,8 @@ public:
     void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks);
     /// What guides walks until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
-    /// Whether the guide gains so little that `auto` does without it. There must be a guide.
-    bool gains_little(GuidedWalks walks) const;
+    /// Whether a guide gains so little that `auto` does without it.
+    static bool gains_little(const Guide& guide, GuidedWalks walks);
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);
@@ -35,13 +35,14 @@ public:
 
 private:
     enum class Mode { Off, On, Auto, Footprints, Random };
-    /// `for_roulette`: whether the walks are joined, so that their contributions can be learned.
+    /// `teacher` guides the walks that train; `for_roulette`: whether they are joined, so that their contributions can be
+    /// learned.
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
-                                   GuidedWalks guided, uint64_t walks, uint64_t seed,
-                                   bool for_roulette) const;
+                                   GuidedWalks guided, const Guide* teacher, uint64_t walks,
+                                   uint64_t seed, bool for_roulette) const;
 
-    /// Whether walks are better off without a guide at surfaces. There must be a guide.
-    bool gains_nothing(GuidedWalks walks) const;
+    /// Whether walks are better off without a guide at surfaces.
+    bool gains_nothing(const Guide& guide, GuidedWalks walks) const;
 
     Mode mode_ = Mode::Off;
     uint64_t walks_ = 0;         ///< Of each kind, in training.

@@ -42,7 +42,7 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
         const double rev_prev =
             v.is_infinite
                 ? to_area(e.pdf_d, v, z[last - 1])
-                : emission_pdf(counts.guide, emitter, v.p, v.wo, e.pdf_d) * v.to_predecessor;
+                : emission_pdf(counts.guide, emitter, v.p, v.ng, v.wo, e.pdf_d) * v.to_predecessor;
         double inner = squares_at<Side::Eye>(z, last - 1, z[last - 1].is_delta, rev_prev,
                                              gloss_of_emitter(emitter.is_area()), last, counts) +
                        sum_below<Side::Eye>(z, last, last, counts);
@@ -87,7 +87,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                         ? 0.0
                         : sqr(double(counts.hit * counts.reaching(false)) * f.pdf * to_x0 / p_NE);
     if (counts.uses_light_paths()) {
-        const float pdf_d = emission_pdf(counts.guide, emitter, d.p, -d.wi, d.pdf_d);
+        const float pdf_d = emission_pdf(counts.guide, emitter, d.p, d.ng, -d.wi, d.pdf_d);
         const double rev_last = double(pdf_d) * abs_dot(v.ng, d.wi) * inv_dist2;
         const double rev_prev = f.pdf_rev * v.to_predecessor;
         const double p_L = double(emission_pmf(counts.guide, emitter)) *

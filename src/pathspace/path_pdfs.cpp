@@ -126,7 +126,8 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
         p.light[0] *= origin_pdf(guide, emitter, x[0]->p, hit.pdf_y0);
         p.next_event *= hit.pdf;
     }
-    p.light[1] = to_area(emission_pdf(guide, emitter, x[0]->p, w0, emission.pdf_d), *x[0], *x[1]);
+    p.light[1] =
+        to_area(emission_pdf(guide, emitter, x[0]->p, x[0]->ng, w0, emission.pdf_d), *x[0], *x[1]);
     v.f = emission.Le_cos;
 
     // Sensor: x_k and the direction to x_{k-1}.

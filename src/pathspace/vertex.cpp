@@ -21,14 +21,22 @@ float guide_share(const Vertex& v, const GuideCell& cell, TransportMode mode) {
 }
 
 GuideView guide_view(const Vertex& v, const GuideCell& cell, Vec3 from) {
-    const bool leaves_on_its_side =
-        v.kind == Vertex::Kind::Surface && !v.shape->material->is_transmissive();
+    if (v.kind == Vertex::Kind::Emitter) return emission_view(*v.emitter, cell, v.p, v.ng);
+    const bool leaves_on_its_side = !v.shape->material->is_transmissive();
     const Vec3 normal = !leaves_on_its_side ? Vec3{} : dot(v.ng, from) < 0 ? -v.ng : v.ng;
     return {cell.center - v.p, normal};
 }
 
+GuideView emission_view(const Emitter& emitter, const GuideCell& cell, Vec3 p, Vec3 ng) {
+    return {cell.center - p, emitter.emits_by_cosine() ? ng : Vec3{}};
+}
+
+bool Vertex::is_guided(TransportMode mode) const {
+    return guide && guide_share(*this, *guide, mode) > 0;
+}
+
 WalkContribution expected_contribution(const Vertex& v, const GuideCell& cell, TransportMode mode) {
-    return cell.field(mode).contribution[octant(facing_normal(v))];
+    return cell.field(mode).contribution[cube_face(facing_normal(v))];
 }
 
 void Vertex::set_guide(const GuideCell& cell, TransportMode mode, bool both) {
@@ -113,12 +121,13 @@ const GuideCell* emission_cell(const Guide* guide, const Emitter& emitter, Vec3 
     return cell.field(TransportMode::Importance).share[0] > 0 ? &cell : nullptr;
 }
 
-float emission_pdf(const Guide* guide, const Emitter& emitter, Vec3 p, Vec3 w, float unguided) {
+float emission_pdf(const Guide* guide, const Emitter& emitter, Vec3 p, Vec3 ng, Vec3 w,
+                   float unguided) {
     const GuideCell* cell = emission_cell(guide, emitter, p);
     if (!cell || !(unguided > 0)) return unguided;
     const GuideCell::Field& field = cell->field(TransportMode::Importance);
     const float a = field.share[0];
-    return (1 - a) * unguided + a * field.mixture.pdf({cell->center - p, {}}, w);
+    return (1 - a) * unguided + a * field.mixture.pdf(emission_view(emitter, *cell, p, ng), w);
 }
 
 }  // namespace etendue

@@ -99,6 +99,8 @@ struct Vertex {
         is_connectible = bsdf.has_smooth();
         gloss = gloss_of_roughness(bsdf.roughness());
     }
+    /// Whether some directions of walks in `mode` are guided here.
+    bool is_guided(TransportMode mode) const;
     /// Makes `cell`, which holds p, guide walks in `mode` here, if it has learned anything for such a vertex. `both`:
     /// whether the densities of walks in the other mode are needed.
     void set_guide(const GuideCell& cell, TransportMode mode, bool both);
@@ -180,14 +182,21 @@ WalkContribution expected_contribution(const Vertex& v, const GuideCell& cell, T
 inline Vec3 facing_normal(const Vertex& v) {
     return dot(v.ng, v.wo) < 0 ? -v.ng : v.ng;
 }
+/// The same as an argument of surface_side(): zero where light passes through the surface.
+inline Vec3 side_normal(const Vertex& v) {
+    return v.shape->material->is_transmissive() ? Vec3{} : facing_normal(v);
+}
 /// How a walk that arrives at `v` from `from` sees the lobes of the cell.
 GuideView guide_view(const Vertex& v, const GuideCell& cell, Vec3 from);
 
 /// Density of y_0 = `d` of an emitter at infinity for light paths, in solid angle, where that without guide is
 /// `unguided`; of finite emitters `unguided`, in area.
 float origin_pdf(const Guide* guide, const Emitter& emitter, Vec3 d, float unguided);
-/// Density p_d of emission along `w` from y_0 at `p`, where that without guide is `unguided`.
-float emission_pdf(const Guide* guide, const Emitter& emitter, Vec3 p, Vec3 w, float unguided);
+/// Density p_d of emission along `w` from y_0 at `p` with the normal `ng`, where that without guide is `unguided`.
+float emission_pdf(const Guide* guide, const Emitter& emitter, Vec3 p, Vec3 ng, Vec3 w,
+                   float unguided);
+/// How light that starts at `p` with the normal `ng` sees the lobes of the cell.
+GuideView emission_view(const Emitter& emitter, const GuideCell& cell, Vec3 p, Vec3 ng);
 float guided_emission_pmf(const Guide& guide, const Emitter& emitter);
 /// Probability that light paths choose the emitter; next events choose it with Emitter::selection_pmf.
 inline float emission_pmf(const Guide* guide, const Emitter& emitter) {

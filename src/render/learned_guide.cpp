@@ -58,7 +58,7 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
         guiding.train({.scene = scene,
                        .film = film,
                        .index = 0,
-                       .light_paths = 0,
+                       .light_paths = make_integrator(spec)->light_paths(scene),
                        .pixels = scene.film().pixel_count(),
                        .seed = seed,
                        .for_each_sample = {},
@@ -143,7 +143,7 @@ LearnedGuide::LearnedGuide(const Scene& scene, IntegratorSpec spec, uint64_t see
       guiding_(train(scene, spec, seed, threads)) {}
 
 bool LearnedGuide::is_kept_by_auto() const {
-    return !guiding_.gains_little(guided_walks(method_));
+    return !Guiding::gains_little(guide(), guided_walks(method_));
 }
 
 std::vector<LearnedGuide::EmitterChoice> LearnedGuide::emitter_choices(size_t most) const {
@@ -228,7 +228,7 @@ GuidedPlace LearnedGuide::at_pixel(int x, int y) const {
     if (v.emitter && !guide().emission.is_empty()) {
         const GuideCell& at = guide().emission.cell(v.p);
         const GuideCell::Field& f = at.field(TransportMode::Importance);
-        place.emission = {f.share[kOnlyClass], f.mixture, {at.center - v.p, {}}};
+        place.emission = {f.share[kOnlyClass], f.mixture, emission_view(*v.emitter, at, v.p, v.ng)};
     }
     return place;
 }

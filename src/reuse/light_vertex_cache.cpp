@@ -7,12 +7,14 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "guide/guide.h"
+
 namespace etendue {
 
 void LightVertexCache::begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes,
-                             bool is_guided) {
-    is_guided_ = is_guided;
-    vertex_bytes_ = vertex_bytes + (is_guided ? 3 * sizeof(LightVertexGuide) : 0);
+                             const Guide* guide) {
+    is_guided_ = guide && guide->guides_surfaces();
+    vertex_bytes_ = vertex_bytes + (is_guided_ ? 3 * sizeof(LightVertexGuide) : 0);
     max_bytes_ = max_bytes;
     taken_bytes_ = 0;
     chunks_.resize(chunks);

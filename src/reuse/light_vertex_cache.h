@@ -40,9 +40,9 @@ struct LightVertexGuide {
 class LightVertexCache {
 public:
     /// Starts the collection of the light paths of a pass in `chunks` chunks. `vertex_bytes`: memory per vertex, here
-    /// and in the data structures of the caller; `max_bytes`: limit of the total; `is_guided`: whether the walks have a
-    /// guide.
-    void begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes, bool is_guided = false);
+    /// and in the data structures of the caller; `max_bytes`: limit of the total; `guide`: of the walks, or nullptr.
+    void begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes,
+               const Guide* guide = nullptr);
     /// Adds the next path of a chunk; each chunk belongs to one thread at a time. Throws std::runtime_error where the
     /// paths exceed `max_bytes`.
     void add(uint64_t chunk, const SubPath& y);
@@ -109,7 +109,7 @@ private:
         std::vector<Head> heads;
         std::vector<LightVertex> vertices;
         std::vector<LightVertexPlace> places;
-        std::vector<LightVertexGuide> guides;  ///< Empty without a guide.
+        std::vector<LightVertexGuide> guides;  ///< Empty without a guide at surfaces.
     };
 
     void restore_head(const Scene& scene, uint64_t index, SubPath& y) const;
@@ -122,7 +122,7 @@ private:
     std::vector<Head> heads_;
     std::vector<LightVertex> vertices_;
     std::vector<LightVertexPlace> places_;
-    std::vector<LightVertexGuide> guides_;  ///< Empty without a guide.
+    std::vector<LightVertexGuide> guides_;  ///< Empty without a guide at surfaces.
     bool is_guided_ = false;
 };
 

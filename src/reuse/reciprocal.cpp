@@ -25,7 +25,7 @@ public:
             length(scene_.offset_origin(e_.from.ray_end(), e_.from.ng) - e_.from.p);
         const Vec3 to_center = e_.near.p - e_.from.p;
         choose({to_center, e_.near.radius + beside, double(length2(to_center)),
-                e_.from.guide ? std::nullopt : e_.from.cosine_normal()},
+                e_.from.is_guided(e_.mode) ? std::nullopt : e_.from.cosine_normal()},
                e_.near.half_height + beside);
     }
 

@@ -39,6 +39,29 @@ TEST(PlacedDensity, TellsTheSidesOfAWallApart) {
     EXPECT_EQ(density({0.1f, 0.2f, 0}, {0, 0, -1}), 0);
 }
 
+/// Normals of tessellated walls, or of transformed ones, differ from an axis by rounding errors.
+TEST(PlacedDensity, SmallDeviationsOfNormalsDoNotMatter) {
+    std::vector<PlacedWeight> weights = square({0, 0, 1});
+    for (size_t i = 0; i < weights.size(); ++i)
+        weights[i].n = {i & 1 ? 1e-7f : -1e-7f, i & 2 ? 1e-7f : -1e-7f, 1};
+    const PlacedDensity density(weights), plain(square({0, 0, 1}));
+    for (const float x : {-0.51f, 0.13f, 0.72f})
+        EXPECT_EQ(density({x, 0.2f, 0}, {1e-8f, -1e-8f, 1}), plain({x, 0.2f, 0}, {0, 0, 1}));
+}
+
+TEST(PlacedDensity, LightPassesThroughSurfacesWithoutNormal) {
+    const PlacedDensity density(square({}));
+    EXPECT_NEAR(density({0.1f, 0.2f, 0}, {}), 100, 50);
+    EXPECT_EQ(density({0.1f, 0.2f, 0}, {0, 0, 1}), 0) << "another surface";
+}
+
+TEST(PlacedDensity, InfiniteWeightsDoNotCount) {
+    std::vector<PlacedWeight> weights = square({0, 0, 1});
+    weights[0].weight = kInf;
+    const PlacedDensity density(weights);
+    EXPECT_LT(density(weights[0].p, {0, 0, 1}), 200);
+}
+
 TEST(PlacedDensity, IsZeroAwayFromTheWeights) {
     const PlacedDensity density(square({0, 0, 1}));
     EXPECT_EQ(density({1.1f, 0.2f, 0}, {0, 0, 1}), 0);

@@ -25,7 +25,6 @@ std::vector<GuideSample> samples_under_lamp(int count) {
         const Vec2 at = random.next_2d();
         s.p = {at.x, at.y, 0};
         s.set_normal({0, 0, 1});
-        s.weight = 1;
         const bool for_eye = i % 2 == 0;
         const Vec3 jitter = sample_uniform_sphere(random.next_2d());
         const Vec3 to =
@@ -34,9 +33,32 @@ std::vector<GuideSample> samples_under_lamp(int count) {
         s.inv_distance = for_eye ? 1 / length(to) : 0.0f;
         s.direction = PackedDirection(normalize(to));
         s.unguided_pdf = s.direction.unpack().z * kInvPi;
+        s.set_flux(1);
         samples.push_back(s);
     }
     return samples;
+}
+
+/// As under a lamp on [x, x + size] × [0, size], for walks in `mode`; or without structure. All have the power `flux`.
+void add_square(std::vector<GuideSample>& samples, int count, float x, float size,
+                TransportMode mode, bool has_lamp, float flux, uint64_t seed) {
+    Random random(seed);
+    for (int i = 0; i < count; ++i) {
+        GuideSample s;
+        const Vec2 at = random.next_2d();
+        s.p = {x + size * at.x, size * at.y, 0};
+        s.set_normal({0, 0, 1});
+        const Vec3 jitter = sample_uniform_sphere(random.next_2d());
+        const Vec3 to =
+            has_lamp ? Vec3{x + 0.5f * size, 0.5f * size, size} + jitter * (0.01f * size) - s.p
+                     : sample_cosine_hemisphere(random.next_2d());
+        s.mode = uint8_t(mode);
+        s.inv_distance = has_lamp ? 1 / length(to) : 0.0f;
+        s.direction = PackedDirection(normalize(to));
+        s.unguided_pdf = s.direction.unpack().z * kInvPi;
+        s.set_flux(flux);
+        samples.push_back(s);
+    }
 }
 
 TEST(PackedDirection, IsPrecise) {
@@ -64,6 +86,112 @@ TEST(GuideTree, LearnsALampWithParallax) {
     EXPECT_EQ(tree.gain(kLight), 0);
 }
 
+/// Under uniform light a cosine density is the best. Lobes have to follow the radiance, which is constant; shares are those
+/// of the power, which has the cosine.
+TEST(GuideTree, LearnsNothingFromUniformLight) {
+    std::vector<GuideSample> samples;
+    add_square(samples, 20000, 0, 1, kEye, false, 1, 5);
+    const GuideTree tree(samples, 1, {.least_gain = 0.05f});
+    for (const GuideCell& cell : tree.cells()) EXPECT_EQ(cell.field(kEye).share[0], 0);
+    EXPECT_EQ(tree.gain(kEye), 0);
+}
+
+/// Two rooms with a wall between x = 0 and 0.2. All light comes from a lamp in the right one; hardly any light walk, but many
+/// eye walks, come to the left one, whose few photons have no structure.
+TEST(GuideTree, LearnsNothingThroughAWall) {
+    std::vector<GuideSample> samples;
+    add_square(samples, 4000, 0.2f, 1, kEye, true, 1, 5);
+    add_square(samples, 100, -1, 1, kEye, false, 1, 6);
+    add_square(samples, 3900, -1, 1, kLight, false, 1, 7);
+    const GuideTree tree(samples, 1);
+    const GuideCell &left = tree.cell({-0.5f, 0.5f, 0}), &right = tree.cell({0.7f, 0.5f, 0});
+    ASSERT_LT(left.center.x, 0);
+    ASSERT_GT(right.center.x, 0.2f);
+    EXPECT_FALSE(left.field(kEye).mixture.is_empty());
+    EXPECT_EQ(left.field(kEye).share[0], 0);
+    EXPECT_EQ(left.field(kEye).training_share[0], 0);
+    EXPECT_GT(right.field(kEye).share[0], 0.8f);
+}
+
+/// A cell without enough of its own samples does not take lobes from the other side of a wall.
+TEST(GuideTree, BorrowsNoLobesFromTheOtherSide) {
+    std::vector<GuideSample> samples;
+    add_square(samples, 4000, 0, 1, kEye, true, 1, 5);
+    for (GuideSample& s : samples) s.set_normal({0, 0, -1});
+    add_square(samples, 100, -1, 1, kEye, false, 1, 6);
+    add_square(samples, 3900, -1, 1, kLight, false, 1, 7);
+    const GuideTree tree(samples, 1);
+    const GuideCell& cell = tree.cell({-0.5f, 0.5f, 0});
+    const Vec3 to_lamp = normalize(Vec3{0.5f, 0.5f, 1} - cell.center);
+    EXPECT_LT(cell.field(kEye).mixture.pdf({{}, {0, 0, 1}}, to_lamp), 2);
+}
+
+/// Most light times importance is on the small square, although it has no more samples than the other.
+TEST(GuideTree, GainIsThatOfWhatWalksContribute) {
+    const auto both = [](bool is_at_small, float outlier) {
+        std::vector<GuideSample> samples;
+        add_square(samples, 8000, 0, 0.1f, kEye, is_at_small, 1, 5);
+        add_square(samples, 8000, 0, 0.1f, kLight, false, 1, 6);
+        add_square(samples, 8000, 10, 3, kEye, !is_at_small, 1, 7);
+        add_square(samples, 8000, 10, 3, kLight, false, 1, 8);
+        add_square(samples, 1, 10, 3, kEye, false, outlier, 9);
+        return samples;
+    };
+    const double gain = double(GuideTree(both(true, 1), 1).gain(kEye));
+    EXPECT_GT(gain, 2.5);
+    EXPECT_LT(GuideTree(both(false, 1), 1).gain(kEye), 0.02 * gain);
+    EXPECT_NEAR(GuideTree(both(true, 1e5f), 1).gain(kEye), gain, 0.05 * gain)
+        << "one sample decides";
+}
+
+/// Importance that the lens gives directly makes places count, though light walks learn no direction from it.
+TEST(GuideTree, GainKnowsWhatTheLensSees) {
+    std::vector<GuideSample> samples;
+    add_square(samples, 8000, 0, 1, kEye, true, 1, 5);
+    add_square(samples, 8000, 0, 1, kLight, false, 1, 6);
+    add_square(samples, 8000, 10, 1, kEye, false, 1, 7);
+    add_square(samples, 8000, 10, 1, kLight, false, 1, 8);
+    const auto seen = [](float x) {
+        GuideTree::LeftOut left_out;
+        Random random(3);
+        for (int i = 0; i < 8000; ++i) {
+            const Vec2 at = random.next_2d();
+            left_out[size_t(kLight)].push_back({{x + at.x, at.y, 0}, {0, 0, 1}, 20});
+        }
+        return left_out;
+    };
+    const float plain = GuideTree(samples, 1).gain(kEye);
+    EXPECT_GT(GuideTree(samples, 1, {}, seen(0)).gain(kEye), 1.6f * plain);
+    EXPECT_LT(GuideTree(samples, 1, {}, seen(10)).gain(kEye), 0.4f * plain);
+}
+
+/// Walks that train are guided where those of a method gain too little.
+TEST(GuideTree, TeachesWhereAMethodGainsTooLittle) {
+    const GuideLearning learning{.least_gain = 100, .most_share = 0.3f};
+    GuideTree tree(samples_under_lamp(20000), 1, learning);
+    for (const GuideCell& cell : tree.cells()) EXPECT_EQ(cell.field(kEye).share[0], 0);
+    EXPECT_EQ(tree.gain(kEye), 0);
+    tree.use_training_shares();
+    for (const GuideCell& cell : tree.cells()) {
+        EXPECT_GT(cell.field(kEye).share[0], 0.8f);
+        EXPECT_EQ(cell.field(kLight).share[0], 0) << "nothing can be gained";
+    }
+}
+
+TEST(GuideTree, SamplesThatAreNotFiniteDoNotCount) {
+    const std::vector<GuideSample> samples = samples_under_lamp(20000);
+    std::vector<GuideSample> more = samples;
+    GuideSample bad = samples[0];
+    for (const float weight : {kInf, std::nanf(""), 0.0f}) {
+        bad.weight = weight;
+        more.push_back(bad);
+    }
+    const GuideTree tree(samples, 1), same(more, 1);
+    ASSERT_EQ(tree.cells().size(), same.cells().size());
+    EXPECT_EQ(tree.gain(kEye), same.gain(kEye));
+    EXPECT_EQ(tree.cell({}).field(kEye).share, same.cell({}).field(kEye).share);
+}
+
 /// Vertices on the floor of the same places, whose walks contribute more the larger x is, and least on its lower side.
 std::vector<ContributionRecord> contributions(int count) {
     Random random(9);
@@ -77,7 +205,7 @@ std::vector<ContributionRecord> contributions(int count) {
         r.beyond = r.beta * at.x * (is_above ? 1.0f : 0.1f) * (is_eye ? 1.0f : 5.0f);
         r.here = 2 * r.beyond;
         r.mode = uint8_t(is_eye ? kEye : kLight);
-        r.octant = uint8_t(octant({0, 0, is_above ? 1.0f : -1.0f}));
+        r.face = uint8_t(cube_face({0, 0, is_above ? 1.0f : -1.0f}));
         records.push_back(r);
     }
     return records;
@@ -85,9 +213,13 @@ std::vector<ContributionRecord> contributions(int count) {
 
 TEST(GuideTree, LearnsContributionsByPlaceSideAndMode) {
     GuideTree tree(samples_under_lamp(20000), 1);
-    constexpr size_t kAbove = 0, kBelow = 4, kNowhere = 1;
+    const size_t kAbove = cube_face({0, 0, 1}), kBelow = cube_face({0, 0, -1}),
+                 kNowhere = cube_face({1, 0, 0});
     EXPECT_LT(tree.cell({}).field(kEye).contribution[kAbove].beyond, 0) << "not known yet";
-    tree.set_contributions(contributions(40000));
+    std::vector<ContributionRecord> records = contributions(40000);
+    records.push_back(records[0]);
+    records.back().here = kInf;  // does not count
+    tree.set_contributions(records);
     for (const float x : {0.1f, 0.5f, 0.9f}) {
         // The mean is that over the cell, not at its centre.
         constexpr double kWithinCell = 0.2;

@@ -13,15 +13,14 @@ namespace {
 constexpr auto kEye = TransportMode::Radiance, kLight = TransportMode::Importance;
 constexpr float kLightContribution = 3;
 
-/// One cell without lobes, whose contributions differ by mode and octant; unknown on the ceiling.
+/// One cell without lobes, whose contributions differ by mode and side; unknown on the ceiling.
 Guide guide_of_contributions() {
     GuideCell cell;
     for (const auto mode : {kEye, kLight})
-        for (size_t k = 0; k < 8; ++k)
+        for (size_t k = 0; k < kCubeFaces; ++k)
             cell.fields[size_t(mode)].contribution[k] = {
                 0.5f + 0.1f * float(k), (mode == kEye ? 0.02f : 0.01f) * float(1 + k * k)};
-    for (const size_t below : {2, 3, 6, 7})
-        for (GuideCell::Field& field : cell.fields) field.contribution[below] = {};
+    for (GuideCell::Field& field : cell.fields) field.contribution[cube_face({0, -1, 0})] = {};
     Guide guide;
     guide.surfaces = GuideTree(cell);
     guide.has_roulette = true;
@@ -47,8 +46,11 @@ protected:
     /// The contribution at a vertex, by the side from which the walk came.
     static WalkContribution at(const Vertex& v, const Guide& guide, TransportMode mode) {
         const Vec3 n = dot(v.ng, v.wo) > 0 ? v.ng : -v.ng;
-        const size_t octant = (n.x < 0 ? 1 : 0) + (n.y < 0 ? 2 : 0) + (n.z < 0 ? 4 : 0);
-        return guide.surfaces.cell(v.p).fields[size_t(mode)].contribution[octant];
+        int axis = 0;
+        for (int i = 1; i < 3; ++i)
+            if (std::fabs(n[i]) > std::fabs(n[axis])) axis = i;
+        const size_t face = 2 * size_t(axis) + (n[axis] < 0 ? 1 : 0);
+        return guide.surfaces.cell(v.p).fields[size_t(mode)].contribution[face];
     }
 
     template <TransportMode mode>

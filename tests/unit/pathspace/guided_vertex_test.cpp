@@ -215,6 +215,127 @@ TEST(GuidedOrigin, IsSampledByItsDensity) {
     EXPECT_NEAR(flux / unguided_flux, 1, 0.02);
 }
 
+/// Light paths from one finite emitter, by a guide of emission.
+class GuidedEmission : public ::testing::TestWithParam<Case> {
+protected:
+    /// All light paths reach the wall around.
+    GuidedEmission()
+        : scene(test::build(test::front_camera(8) +
+                            test::sphere("0,0,0", "5", test::diffuse("0.5,0.5,0.5")) +
+                            GetParam().bsdf)) {}
+
+    const Emitter& emitter() const { return *scene.emitters().front(); }
+    /// Starts light path `index` from y_0.
+    bool start(uint32_t index) {
+        const TechniqueCounts counts{.hit = 1, .connect = 1, .guide = &guide};
+        sampler.start(index, 0);
+        return start_light_path({scene, counts, stats, {2, 1000}}, sampler, y);
+    }
+    void set_guide(const GuideCell& cell) {
+        guide.emission = GuideTree(cell);
+        ASSERT_FALSE(emitter().is_infinite());
+    }
+
+    const Scene scene;
+    Guide guide;
+    Sampler sampler{SamplerKind::Independent, 4};
+    RenderStats stats;
+    SubPath y;
+};
+
+std::vector<Case> emitters() {
+    // So small that the lobes look the same from all of a lamp.
+    return {{"area", test::rectangle("<scale value=\"0.001\"/><rotate x=\"1\" angle=\"60\"/>",
+                                     "<emitter type=\"area\"/>")},
+            {"area_with_two_sides",
+             test::rectangle("<scale value=\"0.001\"/><rotate x=\"1\" angle=\"70\"/>",
+                             "<emitter type=\"area\"><boolean name=\"two_sided\" "
+                             "value=\"true\"/></emitter>")},
+            {"point",
+             "<emitter type=\"point\"><point name=\"position\" value=\"0,0.6,0.3\"/></emitter>"},
+            {"spot", "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"70\"/><transform "
+                     "name=\"to_world\"><lookat origin=\"0,0.6,0.2\" target=\"0,-0.6,0\" "
+                     "up=\"0,0,1\"/></transform></emitter>"}};
+}
+
+TEST_P(GuidedEmission, IsSampledByItsDensity) {
+    Random random(5);
+    GuideCell cell;
+    cell.center = {0, 0.3f, 0};
+    GuideCell::Field& field = cell.fields[size_t(kLight)];
+    field.share.fill(0.7f);
+    // With a parallax, and without one.
+    for (int k = 0; k < 5; ++k)
+        field.mixture.add({normalize(random.unit_vector() + Vec3{0, -0.7f, 0}), k % 2 ? 0.3f : 0.0f,
+                           random.between(2, 25), random.next_1d()});
+    set_guide(cell);
+    testing::Chi2Grid grid(-1, 1, 16, -M_PI, M_PI, 32);
+    constexpr uint32_t kPaths = 200000;
+    Vec3 p, ng;
+    Vec2 uv;
+    double density_error = 0;
+    for (uint32_t i = 0; i < kPaths; ++i) {
+        if (!start(i) || y.size() < 2) {
+            grid.add_outside();
+            continue;
+        }
+        const Vec3 w = direction(y[0], y[1]);
+        grid.add(double(w.z), std::atan2(double(w.y), double(w.x)));
+        const float unguided = y[0].eval_unguided(w, kLight).pdf;
+        const float pdf = emission_pdf(&guide, emitter(), y[0].p, y[0].ng, w, unguided);
+        density_error =
+            std::max(density_error, std::fabs(1 - double(to_area(pdf, y[0], y[1]) / y[1].pdf_fwd)));
+        p = y[0].p, ng = y[0].ng, uv = y[0].uv;
+    }
+    EXPECT_LT(density_error, 2e-3);
+    const auto result = grid.test(
+        [&](double cos, double phi) {
+            const double sin = std::sqrt(1 - cos * cos);
+            const Vec3 w{float(sin * std::cos(phi)), float(sin * std::sin(phi)), float(cos)};
+            const Vec3 n = emitter().is_area() ? ng : w;
+            const float unguided = emitter().eval_emission(n, uv, w).pdf_d;
+            return double(emission_pdf(&guide, emitter(), p, n, w, unguided));
+        },
+        3);
+    EXPECT_GT(result.p_value, 1e-3 / 4) << result.total_probability;
+    EXPECT_GT(result.total_probability, 0.4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Emitters, GuidedEmission, ::testing::ValuesIn(emitters()),
+                         [](const auto& p) { return std::string(p.param.name); });
+
+/// A box of lamps is one cell, with lobes on all sides; each of its faces emits on its own side only.
+TEST(GuidedLamps, EmitOnTheirSide) {
+    const std::string lamp = "<emitter type=\"area\"/>";
+    const Scene scene =
+        test::build(test::front_camera(8) + test::room() +
+                    test::rectangle("<scale value=\"0.1\"/><rotate x=\"1\" angle=\"90\"/>", lamp) +
+                    test::rectangle("<scale value=\"0.1\"/><rotate x=\"1\" angle=\"-90\"/>"
+                                    "<translate y=\"0.1\"/>",
+                                    lamp));
+    GuideCell cell;
+    cell.center = {0, 0.05f, 0};
+    GuideCell::Field& field = cell.fields[size_t(kLight)];
+    field.share.fill(0.9f);
+    field.mixture.add({{0, 1, 0}, 0, 30, 1});
+    field.mixture.add({{0, -1, 0}, 0, 30, 1});
+    Guide guide;
+    guide.emission = GuideTree(cell);
+    const TechniqueCounts counts{.hit = 1, .connect = 1, .guide = &guide};
+    Sampler sampler(SamplerKind::Independent, 4);
+    RenderStats stats;
+    SubPath y;
+    int lost = 0;
+    constexpr int kPaths = 10000;
+    for (uint32_t i = 0; i < kPaths; ++i) {
+        sampler.start(i, 0);
+        ASSERT_TRUE(start_light_path({scene, counts, stats, {2, 1000}}, sampler, y));
+        lost += !(y[0].guide && y.size() == 2);
+    }
+    // Some leave by the open front.
+    EXPECT_LT(lost, kPaths / 50);
+}
+
 /// A guide that has learned nothing changes no bit of a walk.
 TEST(UntrainedGuide, LeavesWalksAsTheyAre) {
     const Scene scene = test::build(test::mixed_room(test::front_camera(8)));

@@ -18,6 +18,8 @@ public:
     struct Hooks {
         std::function<void(uint32_t pass)> trace = [](uint32_t) {}, end_of_trace = [](uint32_t) {};
         std::function<void(uint32_t pass, uint64_t pixel)> sample = [](uint32_t, uint64_t) {};
+        /// Before each group of paths that trace() makes for no pixel.
+        std::function<void(uint32_t pass)> other_paths = [](uint32_t) {};
     };
     Disturbed(const std::string& name, Hooks& hooks)
         : inner_(make_integrator(IntegratorSpec::parse(name))), hooks_(hooks) {}
@@ -33,7 +35,12 @@ public:
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         hooks_.trace(pass_);
-        inner_->trace(pass);
+        PassContext watched = pass;
+        watched.for_each_other_path = [&](uint64_t count, const PassContext::Task& task) {
+            hooks_.other_paths(pass_);
+            pass.for_each_other_path(count, task);
+        };
+        inner_->trace(watched);
         hooks_.end_of_trace(pass_);
     }
     std::unique_ptr<PassSums> make_sums() const override { return inner_->make_sums(); }
@@ -62,7 +69,7 @@ private:
 
 class DropPass : public ::testing::TestWithParam<const char*> {
 protected:
-    DropPass() : scene(build(mixed_room(lens_camera(24)))) {
+    explicit DropPass(Scene in = build(mixed_room(lens_camera(24)))) : scene(std::move(in)) {
         settings.sampler = SamplerKind::Sobol;
         settings.technique_depth = 4;
         settings.threads = 2;
@@ -186,6 +193,52 @@ TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
     run(r);
     EXPECT_EQ(disturbed.learned(), (std::vector<uint32_t>{0, 1, 4}));
 }
+
+/// Guides, whose training takes seconds. Nothing of it may be left where it is dropped.
+class DropTraining : public DropPass {
+protected:
+    DropTraining() : DropPass(build(lantern_room(lens_camera(24)))) {
+        settings.technique_depth = 0;
+        settings.spp = 113;  // A refit of 8000 walks comes before pass 112.
+    }
+    /// The number of groups of training walks in a whole rendering, and the pass of each.
+    std::vector<uint32_t> groups() {
+        std::vector<uint32_t> passes;
+        hooks.other_paths = [&](uint32_t pass) { passes.push_back(pass); };
+        Renderer r = renderer();
+        run(r);
+        hooks.other_paths = [](uint32_t) {};
+        return passes;
+    }
+};
+
+TEST_P(DropTraining, AnywhereChangesNothing) {
+    const std::vector<uint32_t> passes = groups();
+    ASSERT_GE(passes.size(), 5u);
+    ASSERT_EQ(passes.back(), 112u) << "the refit";
+    Disturbed::Hooks none;
+    Renderer whole(scene, settings, std::make_unique<Disturbed>(GetParam(), none));
+    run(whole);
+    for (const size_t at : {size_t(1), size_t(3), passes.size() - 1}) {
+        SCOPED_TRACE(at);
+        size_t group = 0;
+        hooks.other_paths = [&](uint32_t) {
+            if (group++ == at) throw std::runtime_error("dropped");
+        };
+        Renderer r = renderer();
+        EXPECT_THROW(run(r), std::runtime_error);
+        EXPECT_EQ(run(r), StopReason::Samples);
+        expect_same_bits(r.film().image(), whole.film().image());
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Guided, DropTraining,
+                         ::testing::Values("path:guide=on,guide_walks=8000",
+                                           "bdpt:guide=on,guide_walks=8000"),
+                         [](const auto& p) {
+                             const std::string name = p.param;
+                             return name.substr(0, name.find(':'));
+                         });
 
 INSTANTIATE_TEST_SUITE_P(Integrators, DropPass,
                          ::testing::Values("path", "light", "bdpt", "vcm:radius=0.3", "upg+bdpt",

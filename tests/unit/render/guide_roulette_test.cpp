@@ -82,7 +82,7 @@ TEST_F(LearnedRoulette, TellsTheSidesOfAWallApart) {
     EXPECT_GT(guide.light_contribution, 0);
     const GuideCell& cell = guide.surfaces.cell({0.4f, -0.5f, 0});
     const auto& eye = cell.field(kEye).contribution;
-    const WalkContribution lit = eye[octant({-1, 0, 0})], dark = eye[octant({1, 0, 0})];
+    const WalkContribution lit = eye[cube_face({-1, 0, 0})], dark = eye[cube_face({1, 0, 0})];
     ASSERT_GT(dark.here, 0);
     // The cell holds parts of other walls as well.
     EXPECT_GT(lit.here, 1.1f * dark.here);

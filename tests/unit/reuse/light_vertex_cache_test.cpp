@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "guide/random_guide.h"
 #include "pathspace/walk.h"
 #include "reuse/light_vertex_cache.h"
 #include "test_scenes.h"
@@ -14,10 +15,10 @@ namespace {
 
 constexpr uint32_t kPaths = 600, kChunks = 7;
 
-class KeptLightPaths : public ::testing::Test {
+class KeptLightPaths : public ::testing::TestWithParam<bool> {  // of guided walks
 protected:
     KeptLightPaths() {
-        kept.begin(kChunks, LightVertexCache::kVertexBytes, uint64_t(1) << 30);
+        kept.begin(kChunks, LightVertexCache::kVertexBytes, uint64_t(1) << 30, counts.guide);
         for (uint32_t chunk = 0; chunk < kChunks; ++chunk)
             for (uint32_t i = first(chunk); i < first(chunk + 1); ++i) {
                 walk(i);
@@ -60,6 +61,7 @@ protected:
         EXPECT_EQ(v.gloss, w.gloss);
         EXPECT_EQ(v.medium, w.medium);
         EXPECT_EQ(v.survival.steps(), w.survival.steps());
+        EXPECT_EQ(v.guide, w.guide);
         if (i == 0) {
             EXPECT_EQ(v.emitter, w.emitter);
             for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(v.ng[axis], w.ng[axis]);
@@ -68,6 +70,9 @@ protected:
         EXPECT_EQ(v.to_predecessor, w.to_predecessor);
         EXPECT_NEAR(v.weight_sum, w.weight_sum, 1e-6 * v.weight_sum);
         EXPECT_EQ(v.pair_level, w.pair_level);
+        if (v.guide) {
+            EXPECT_EQ(v.guide_rev, w.guide_rev);
+        }
         if (i == 1) {
             EXPECT_EQ(v.next_event_ratio, w.next_event_ratio);
         }
@@ -91,14 +96,21 @@ protected:
         test::mixed_room(test::front_camera(8)) +
         "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>"
         "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>");
-    const TechniqueCounts counts{.hit = 1, .next_event = 1, .connect = 1, .splat = 64};
+    /// Lobes wide enough that the offset of a ray hardly changes densities.
+    const Guide guide =
+        random_guide(scene.bounds().center(), scene.bounds().radius(), {1, 1, 1}, {}, 5, 7);
+    const TechniqueCounts counts{.hit = 1,
+                                 .next_event = 1,
+                                 .connect = 1,
+                                 .splat = 64,
+                                 .guide = GetParam() ? &guide : nullptr};
     Sampler sampler{SamplerKind::Independent, 9};
     RenderStats stats;
     SubPath y, restored;
     LightVertexCache kept;
 };
 
-TEST_F(KeptLightPaths, AreRestored) {
+TEST_P(KeptLightPaths, AreRestored) {
     ASSERT_EQ(kept.size(), kPaths);
     uint32_t vertex = 0;
     for (uint32_t path = 0; path < kPaths; ++path) {
@@ -126,9 +138,11 @@ TEST_F(KeptLightPaths, AreRestored) {
     }
     EXPECT_EQ(vertex, kept.vertices().size());
     EXPECT_GT(vertex, kPaths);
+    walk(0);
+    EXPECT_EQ(y[0].guide != nullptr || y[0].is_infinite, GetParam() || y[0].is_infinite);
 }
 
-TEST_F(KeptLightPaths, AreRestoredUpToAVertex) {
+TEST_P(KeptLightPaths, AreRestoredUpToAVertex) {
     for (uint32_t vertex = 0; vertex < kept.vertices().size(); ++vertex)
         for (const bool whole : {false, true}) {
             const int size = kept.depth(vertex) + 1;
@@ -143,7 +157,7 @@ TEST_F(KeptLightPaths, AreRestoredUpToAVertex) {
 }
 
 /// N_L² times the fourth power of a ratio of densities: more than a float can hold.
-TEST_F(KeptLightPaths, KeepLargeSumsOfWeights) {
+TEST_P(KeptLightPaths, KeepLargeSumsOfWeights) {
     constexpr double kSum = 1e60;
     walk(1);
     ASSERT_GT(y.size(), 1);
@@ -154,6 +168,32 @@ TEST_F(KeptLightPaths, KeepLargeSumsOfWeights) {
     one.assemble();
     one.restore(scene, 0, restored);
     EXPECT_NEAR(restored[1].weight_sum, kSum, 1e-6 * kSum);
+}
+
+INSTANTIATE_TEST_SUITE_P(Walks, KeptLightPaths, ::testing::Bool(),
+                         [](const auto& p) { return p.param ? "guided" : "unguided"; });
+
+/// Where light paths have a guide of emission alone, their vertices need no memory for it.
+TEST(KeptLightPathsOfEmission, NeedNoMemoryForTheGuide) {
+    const Scene scene = test::build(test::front_camera(8) + test::room() + test::area_lamp());
+    Guide guide = random_guide({}, 1, {1}, {}, 5, 7);
+    const auto add_path = [&] {
+        const TechniqueCounts counts{.hit = 1, .connect = 1, .guide = &guide};
+        Sampler sampler(SamplerKind::Independent, 9);
+        RenderStats stats;
+        SubPath y;
+        uint32_t index = 0;
+        while (y.size() < 3) {
+            sampler.start(0, index++);
+            trace_light_path({scene, counts, stats, {3, 3}}, sampler, y);
+        }
+        LightVertexCache cache;
+        cache.begin(1, LightVertexCache::kVertexBytes, 3 * LightVertexCache::kVertexBytes, &guide);
+        cache.add(0, y);
+    };
+    EXPECT_THROW(add_path(), std::runtime_error);
+    guide.uses_surfaces = false;
+    EXPECT_NO_THROW(add_path());
 }
 
 }  // namespace

@@ -280,6 +280,46 @@ RenderStats expect_reciprocal(const Scene& scene, const PairEvent& event, double
     return stats;
 }
 
+/// Where the guide is for walks in the other mode alone, a cosine density keeps its proposals in closed form.
+TEST(ReciprocalOfAWalkWithoutGuide, IsThatWithoutGuide) {
+    const Scene scene = test::build(
+        test::front_camera(8) + test::area_lamp() +
+        test::rectangle("<scale value=\"4\"/><rotate x=\"1\" angle=\"180\"/><translate z=\"2\"/>",
+                        test::diffuse("0.5,0.5,0.5")) +
+        test::rectangle("<scale value=\"4\"/>", test::diffuse("0.5,0.5,0.5")));
+    SurfaceHit hit;
+    ASSERT_TRUE(scene.intersect({{0, 0, 0.5f}, {0, 0, -1}, kInf}, 0, hit));
+    ComponentArena arena;
+    Vertex floor;
+    floor.set_surface(*hit.shape, hit.location, hit.geometry, normalize(Vec3{0.2f, 0, 1}), arena);
+    GuideCell cell;
+    auto& field = cell.fields[size_t(TransportMode::Importance)];
+    field.share.fill(0.9f);
+    field.mixture.add({{0, 0, 1}, 0, 20, 1});
+    const auto trials = [&](TrialBound bound) {
+        Sampler sampler(SamplerKind::Independent, 3);
+        sampler.start(0, 0);
+        sampler.seek(Stream::Auxiliary, 1);
+        RenderStats stats;
+        Vertex scratch;
+        const Vec3 n{0, 0, -1};
+        double sum = 0;
+        for (int i = 0; i < 1000; ++i)
+            sum += reciprocal_probability(
+                scene,
+                {floor, TransportMode::Radiance, {{1.5f, 0, 2}, n, {n, false}, 0.5f, 0.05f}, bound},
+                sampler, scratch, stats);
+        return std::pair(stats.trials, sum);
+    };
+    for (const TrialBound bound : {TrialBound::Box, TrialBound::Cone, TrialBound::Slab}) {
+        floor.guide = nullptr;
+        const auto without = trials(bound);
+        floor.set_guide(cell, TransportMode::Radiance, true);
+        ASSERT_NE(floor.guide, nullptr);
+        EXPECT_EQ(trials(bound), without);
+    }
+}
+
 /// A floor seen from a wall, close above its plane. p_c = ∫ cosθ H / (π |v|³) over the disc, with cosθ = x / |v|.
 TEST(ReciprocalSeenEdgeOn, EqualsTheIntegral) {
     constexpr double kDistance = 1, H = 0.012, kRadius = 0.4;
