@@ -1,0 +1,143 @@
+// What guides learn in small rooms: behind mirrors and panes, from lamps in shades, and where nothing can be gained.
+
+#include <gtest/gtest.h>
+
+#include "pathspace/walk.h"
+#include "render/learned_guide.h"
+#include "test_scenes.h"
+
+namespace etendue {
+namespace {
+
+constexpr int kSize = 64;
+
+LearnedGuide learn(const Scene& scene, const std::string& method) {
+    return {scene, IntegratorSpec::parse(method), 1, 2};
+}
+
+/// A lamp of the same power as area_lamp() behind the room, whose light nobody sees.
+std::string useless_lamp() {
+    return test::rectangle("<scale value=\"0.25\"/><rotate y=\"1\" angle=\"180\"/>"
+                           "<translate z=\"-3\"/>",
+                           test::diffuse("0.5,0.5,0.5") +
+                               "<emitter type=\"area\"><rgb name=\"radiance\" "
+                               "value=\"12,11,9\"/></emitter>");
+}
+
+/// In front of a camera: a pane that covers all of the image.
+std::string pane() {
+    return test::rectangle("<scale value=\"3\"/><translate z=\"2\"/>",
+                           "<bsdf type=\"thindielectric\"/>");
+}
+
+/// The room as front_camera() sees it, in a mirror.
+std::string mirrored_camera() {
+    return test::sensor("3.4,0,3.4", "0,0,3.4", kSize) +
+           test::rectangle("<scale value=\"3\"/><rotate y=\"1\" angle=\"135\"/>"
+                           "<translate z=\"3.4\"/>",
+                           "<bsdf type=\"twosided\"><bsdf type=\"conductor\"/></bsdf>");
+}
+
+/// Emission is learned by what the lens sees, by whatever delta events.
+TEST(LearnedEmission, IsThatOfWhatIsSeenInMirrorsAndPanes) {
+    const std::string lit = test::room() + test::area_lamp() + useless_lamp();
+    const auto learned = [&](const std::string& camera) {
+        const Scene scene = test::build(camera + lit);
+        const LearnedGuide guide = learn(scene, "light");
+        EXPECT_TRUE(guide.guide().chooses_emitters());
+        const auto choices = guide.emitter_choices(1);
+        return std::pair(choices.empty() ? 0.0f : choices[0].guided, guide.guide().emission_gain);
+    };
+    const auto [direct, direct_gain] = learned(test::front_camera(kSize));
+    EXPECT_GT(direct, 0.8f);
+    for (const std::string& camera : {test::front_camera(kSize) + pane(),
+                                      test::lens_camera(kSize) + pane(), mirrored_camera()}) {
+        const auto [choice, gain] = learned(camera);
+        EXPECT_NEAR(choice, direct, 0.05f);
+        EXPECT_NEAR(gain, direct_gain, 0.15f);
+    }
+}
+
+/// Light walks learn the way to what the lens sees, not to the pane before it.
+TEST(LearnedImportance, LeavesOutTheWayToTheLens) {
+    const Scene scene = test::build(test::front_camera(kSize) + pane() + test::room() +
+                                    test::area_lamp() + useless_lamp());
+    const GuidedPlace back = learn(scene, "bdpt").at_pixel(kSize / 2, kSize / 2);
+    ASSERT_EQ(back.delta_events, 1);
+    for (const GuidedPlace::Lobe& lobe : back.light.lobes())
+        EXPECT_FALSE(lobe.direction.z > 0.98f && lobe.kappa > 50 && lobe.share > 0.2f)
+            << lobe.kappa << ", " << lobe.share;
+}
+
+/// The distance of a lobe is that of the lamp, and not that of the pane through which it is seen.
+TEST(LearnedLobes, HaveTheDistanceOfALampBehindAPane) {
+    const Scene scene = test::build(
+        test::sensor("0,1.5,0.5", "0,0,0", kSize, "20") +
+        test::rectangle("<rotate x=\"1\" angle=\"-90\"/><scale value=\"4\"/>",
+                        test::diffuse("0.5,0.5,0.5")) +
+        test::rectangle("<scale value=\"3\"/><translate z=\"-0.5\"/>",
+                        "<bsdf type=\"thindielectric\"/>") +
+        test::sphere(
+            "0,1,-2.5", "0.15",
+            "<emitter type=\"area\"><rgb name=\"radiance\" value=\"40,40,40\"/></emitter>"));
+    const GuidedPlace place = learn(scene, "path").at_pixel(kSize / 2, kSize / 2);
+    EXPECT_GT(place.eye.share, 0.2f);
+    const auto lobes = place.eye.lobes();
+    ASSERT_FALSE(lobes.empty());
+    const float distance = length(Vec3{0, 1, -2.5f} - place.cell_center);
+    EXPECT_NEAR(lobes[0].distance, distance, 0.2f * distance);
+    EXPECT_GT(dot(lobes[0].direction, normalize(Vec3{0, 1, -2.5f} - place.p)), 0.999f);
+    EXPECT_GT(lobes[0].kappa, 300);
+}
+
+/// Light reaches a frosted panel on one side, and the lens sees the other.
+TEST(LearnedEmission, KnowsThatLightPassesThroughSheets) {
+    const Scene scene = test::build(
+        test::front_camera(kSize) +
+        test::rectangle("<scale value=\"2\"/>",
+                        "<bsdf type=\"diffusetransmission\"><rgb name=\"transmittance\" "
+                        "value=\"0.6,0.6,0.6\"/></bsdf>") +
+        test::rectangle(
+            "<scale value=\"0.25\"/><translate z=\"-1\"/>",
+            "<emitter type=\"area\"><rgb name=\"radiance\" value=\"12,11,9\"/></emitter>") +
+        useless_lamp());
+    const LearnedGuide learned = learn(scene, "light");
+    ASSERT_TRUE(learned.guide().chooses_emitters());
+    EXPECT_GT(learned.emitter_choices(1)[0].guided, 0.8f);
+}
+
+/// Where the walks of a training end at their first vertex, as most do outdoors, direct light is still learned.
+TEST(LearnedLobes, AreThoseOfDirectLightInTheOpen) {
+    const Scene scene = test::build(
+        test::front_camera(kSize) +
+        test::rectangle(
+            "<rotate x=\"1\" angle=\"-90\"/><scale value=\"2\"/><translate y=\"-0.5\"/>",
+            test::diffuse("0.5,0.5,0.5")) +
+        "<emitter type=\"constant\"/>");
+    const LearnedGuide learned = learn(scene, "path");
+    EXPECT_GT(learned.guide().surfaces.cells().size(), 4u);
+}
+
+/// A quarter of the light paths: each is joined to four eye paths, and its splats have four times the factor. Splats have
+/// smaller weights then.
+TEST(LearnedContributions, AreThoseOfTheLightPathsOfAPass) {
+    const Scene scene = test::build(test::front_camera(kSize) + test::room() + test::area_lamp());
+    const float all = learn(scene, "bdpt").guide().light_contribution,
+                quarter = learn(scene, "bdpt:light_paths=1024").guide().light_contribution;
+    EXPECT_GT(quarter, 1.5f * all);
+    EXPECT_LT(quarter, 4 * all);
+}
+
+/// Where emission alone gains, a method that joins both walks has no guide at surfaces.
+TEST(LearnedGuides, AreUsedWhereTheyGain) {
+    // Most of the light of a lamp at the open front is lost.
+    const Scene scene = test::build(test::front_camera(kSize) + test::room() +
+                                    "<emitter type=\"point\"><point name=\"position\" "
+                                    "value=\"0,0,1.5\"/></emitter>");
+    const LearnedGuide learned = learn(scene, "bdpt");
+    EXPECT_GT(learned.guide().emission_gain, 0.5f);
+    EXPECT_FALSE(learned.guide().guides_surfaces());
+}
+
+}  // namespace
+}  // namespace etendue
