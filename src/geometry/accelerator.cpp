@@ -1,13 +1,11 @@
 #include "geometry/accelerator.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <atomic>
 #include <bit>
-#include <fstream>
 #include <stdexcept>
 #include <string>
+
+#include "system/available_memory.h"
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
@@ -98,16 +96,7 @@ constexpr const char* kDevice = "ignore_config_files=1";
 }  // namespace
 
 size_t memory_of_machine() {
-    size_t bytes = size_t(sysconf(_SC_PHYS_PAGES)) * size_t(sysconf(_SC_PAGESIZE));
-    // Of a container; "max" where there is no limit.
-    if (std::ifstream file("/sys/fs/cgroup/memory.max"); file) {
-        size_t most = 0;
-        if (file >> most) bytes = std::min(bytes, most);
-    }
-    rlimit limit;
-    if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
-        bytes = std::min(bytes, size_t(limit.rlim_cur));
-    return bytes;
+    return size_t(available_memory().value_or(UINT64_MAX));
 }
 
 struct Accelerator::Impl {
@@ -145,9 +134,9 @@ struct Accelerator::Impl {
         if (error == RTC_ERROR_NONE) return;
         throw std::runtime_error(
             error == RTC_ERROR_OUT_OF_MEMORY
-                ? "Embree: the ray-tracing hierarchy needs more than " +
-                      std::to_string(memory.most >> 20) +
-                      " MiB, the memory of this machine; use instances or coarser meshes"
+                ? "the ray-tracing hierarchy needs more than " +
+                      format_bytes(uint64_t(memory.most)) +
+                      " of memory, which is all that is free; use instances or coarser meshes"
                 : "Embree: error " + std::to_string(int(error)));
     }
 

@@ -25,7 +25,7 @@ struct RayHit : SurfaceLocation {
     float t;
 };
 
-/// Physical memory, or what the process may use of it if that is less.
+/// Memory that is free, or what the process may use of it if that is less.
 size_t memory_of_machine();
 
 struct AcceleratorOptions {
