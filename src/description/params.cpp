@@ -220,4 +220,14 @@ void check_params(
     }
 }
 
+void check_param_types(const SceneDescription& scene, int index, const PluginInfo& info) {
+    for (const Param& p : scene.objects[size_t(index)].params)
+        for (const ParamInfo& known : info.params)
+            if (p.name == known.name && !accepts(known.kind, p.type()))
+                throw SceneError(p.where,
+                                 fmt::format("parameter \"{}\" of {} \"{}\" must be {}, but is {}",
+                                             p.name, info.category, info.name,
+                                             with_article(kind_name(known.kind)), type_name(p)));
+}
+
 }  // namespace etendue

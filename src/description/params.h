@@ -104,6 +104,9 @@ void check_params(
     const std::function<void(const SourceLocation&, const std::string&)>& report,
     const std::function<std::optional<ForeignParam>(const std::string& name)>& foreign = {});
 
+/// Throws SceneError where a parameter that the table has is of another type.
+void check_param_types(const SceneDescription& scene, int object, const PluginInfo& info);
+
 /// "boolean", "float", ... as printed in messages and by `etendue list`.
 const char* kind_name(ParamKind kind);
 

@@ -102,7 +102,7 @@ private:
         // Only the sample count of a sampler is used, and Mitsuba 3 does not have all of them.
         if (o.category == "sampler") o.type = "independent";
         if (o.category == "emitter" && !flag(o, "two_sided", true)) remove(o, "two_sided");
-        if (o.find("image")) write_image(o);
+        if (o.find("image")) write_image(index, o);
         std::string open = fmt::format("<{} type=\"{}\"", o.category, escape(o.type));
         // An object that is written several times has its id once.
         if (is_shared(index) || (!o.id.empty() && named_.insert(o.id).second))
@@ -192,6 +192,8 @@ private:
         if (o.type == "mesh") {
             const Params params(scene_, index);
             const auto count = int64_t(scene_.meshes.size());
+            if (!params.has("mesh") || count == 0)
+                params.fail("shape \"mesh\" needs a mesh, which only some formats can hold");
             mesh = scene_.meshes[size_t(params.integer("mesh", 0, 0, count - 1))];
         } else {
             mesh = read_ply(resolve_file({scene_, index}),
@@ -202,8 +204,8 @@ private:
                              (mesh.normals.empty() && !compute_normals);
         if (is_flat) {
             bool flip = flag(o, "flip_normals", false) != flag(o, "flip_flat_normals", false);
-            const Param* t = o.find("to_world");
-            if (t && !compute_normals && t->as<Transform>()->determinant3() < 0) flip = !flip;
+            const Transform t = Params(scene_, index).transform("to_world");
+            if (!compute_normals && t.determinant3() < 0) flip = !flip;
             if (flip)
                 for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
             mesh.normals.clear();
@@ -220,8 +222,10 @@ private:
         o.params.push_back({"filename", name, o.where});
     }
 
-    void write_image(SceneObject& o) {
-        const auto index = size_t(std::get<int64_t>(o.find("image")->value));
+    void write_image(int object, SceneObject& o) {
+        if (scene_.images.empty()) return remove(o, "image");  // without effect, as in a rendering
+        const auto count = int64_t(scene_.images.size());
+        const auto index = size_t(Params(scene_, object).integer("image", 0, 0, count - 1));
         const std::string& bytes = scene_.images[index]->bytes;
         const char* extension = bytes.starts_with("\xff\xd8") ? "jpg"
                                 : bytes.starts_with("PF\n")   ? "pfm"

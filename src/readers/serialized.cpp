@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cerrno>
+#include <cstdio>
 #include <cstring>
+#include <functional>
 #include <iterator>
 #include <limits>
+#include <memory>
 
 #include <fmt/format.h>
 
-#include "readers/file_bytes.h"
 #include "system/available_memory.h"
 
 namespace etendue {
@@ -167,51 +170,94 @@ private:
     SourceLocation where_;
 };
 
+/// A file of which parts are read as they are needed: scenes have a shape for each of its many meshes.
+struct Parts {
+    uint64_t size;
+    std::function<std::string(uint64_t begin, uint64_t size)> read;
+    SourceLocation where;
+};
+
 /// Version of the mesh that begins at `offset`.
-uint16_t check_mesh_header(std::string_view bytes, uint64_t offset, const SourceLocation& where) {
-    if (offset > bytes.size() || bytes.size() - offset < kMeshHeaderBytes)
-        throw SceneError(where, "a mesh begins beyond the end of the file");
-    if (load<uint16_t>(&bytes[offset]) != kMagic)
-        throw SceneError(where, "not a .serialized file: the identifier 0x041C is missing");
-    const auto version = load<uint16_t>(&bytes[offset + 2]);
+uint16_t check_mesh_header(const Parts& file, uint64_t offset) {
+    if (offset > file.size || file.size - offset < kMeshHeaderBytes)
+        throw SceneError(file.where, "a mesh begins beyond the end of the file");
+    const std::string bytes = file.read(offset, kMeshHeaderBytes);
+    if (load<uint16_t>(&bytes[0]) != kMagic)
+        throw SceneError(file.where, "not a .serialized file: the identifier 0x041C is missing");
+    const auto version = load<uint16_t>(&bytes[2]);
     if (version != kOldVersion && version != kVersion)
-        throw SceneError(where, "unknown version " + std::to_string(version) +
-                                    " of the format (known: 3, 4)");
+        throw SceneError(file.where, "unknown version " + std::to_string(version) +
+                                         " of the format (known: 3, 4)");
     return version;
 }
 
-/// Where mesh number `shape_index` begins, from the table at the end of the file.
-uint64_t mesh_offset(std::string_view bytes, int shape_index, uint16_t version,
-                     const SourceLocation& where) {
-    const auto meshes = load<uint32_t>(&bytes[bytes.size() - sizeof(uint32_t)]);
-    const size_t entry = version == kVersion ? sizeof(uint64_t) : sizeof(uint32_t);
-    const size_t body = bytes.size() - sizeof(uint32_t);
+/// Where a mesh begins and, at the latest, ends.
+struct Extent {
+    uint64_t begin, end;
+};
+
+/// Of mesh number `shape_index`, from the table at the end of the file.
+Extent mesh_extent(const Parts& file, int shape_index, uint16_t version) {
+    const uint64_t body = file.size - sizeof(uint32_t);
+    const auto meshes = load<uint32_t>(file.read(body, sizeof(uint32_t)).data());
+    const uint64_t entry = version == kVersion ? sizeof(uint64_t) : sizeof(uint32_t);
     if (meshes == 0 || meshes > body / entry)
-        throw SceneError(where, "the table of meshes at the end of the file is damaged");
+        throw SceneError(file.where, "the table of meshes at the end of the file is damaged");
     if (shape_index < 0 || uint32_t(shape_index) >= meshes)
-        throw SceneError(where, "there is no mesh " + std::to_string(shape_index) +
-                                    ": the file has " + std::to_string(meshes) +
-                                    ", counted from 0");
-    const char* at = &bytes[body - entry * (meshes - uint32_t(shape_index))];
-    return version == kVersion ? load<uint64_t>(at) : load<uint32_t>(at);
+        throw SceneError(file.where, "there is no mesh " + std::to_string(shape_index) +
+                                         ": the file has " + std::to_string(meshes) +
+                                         ", counted from 0");
+    const uint64_t table = body - entry * meshes;
+    const auto begin_of = [&](uint32_t mesh) {
+        const std::string at = file.read(table + entry * mesh, entry);
+        return version == kVersion ? load<uint64_t>(at.data())
+                                   : uint64_t(load<uint32_t>(at.data()));
+    };
+    Extent mesh{begin_of(uint32_t(shape_index)), file.size};
+    // Meshes usually stand in the order of the table.
+    if (uint32_t(shape_index) + 1 < meshes)
+        if (const uint64_t next = begin_of(uint32_t(shape_index) + 1); next > mesh.begin)
+            mesh.end = std::min(next, file.size);
+    return mesh;
+}
+
+MeshData parse(const Parts& file, int shape_index, const MeshOptions& options) {
+    const uint16_t file_version = check_mesh_header(file, 0);
+    const Extent extent = mesh_extent(file, shape_index, file_version);
+    const uint16_t version = check_mesh_header(file, extent.begin);
+    const uint64_t begin = std::min(extent.begin + kMeshHeaderBytes, extent.end);
+    const std::string bytes = file.read(begin, extent.end - begin);
+    MeshData mesh = SerializedMesh(bytes, version, file.where).parse();
+    if (mesh.name.empty()) mesh.name = file.where.file.str();
+    finish_mesh(mesh, options, file.where);
+    return mesh;
 }
 
 }  // namespace
 
 MeshData parse_serialized(std::string_view bytes, const std::string& name, int shape_index,
                           const MeshOptions& options) {
-    const SourceLocation where{name, 0};
-    const uint16_t file_version = check_mesh_header(bytes, 0, where);
-    const uint64_t offset = mesh_offset(bytes, shape_index, file_version, where);
-    const uint16_t version = check_mesh_header(bytes, offset, where);
-    MeshData mesh = SerializedMesh(bytes.substr(offset + kMeshHeaderBytes), version, where).parse();
-    if (mesh.name.empty()) mesh.name = name;
-    finish_mesh(mesh, options, where);
-    return mesh;
+    return parse(
+        {bytes.size(),
+         [bytes](uint64_t begin, uint64_t size) { return std::string(bytes.substr(begin, size)); },
+         {name, 0}},
+        shape_index, options);
 }
 
 MeshData read_serialized(const std::string& path, int shape_index, const MeshOptions& options) {
-    return parse_serialized(read_file_bytes(path), path, shape_index, options);
+    const auto fail = [&] {
+        throw SceneError({path, 0}, std::string("cannot read: ") + std::strerror(errno));
+    };
+    const auto close = [](std::FILE* f) { std::fclose(f); };
+    const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
+    if (!file || fseeko(file.get(), 0, SEEK_END) != 0) fail();
+    const auto read = [&](uint64_t begin, uint64_t size) {
+        std::string bytes(size, '\0');
+        if (fseeko(file.get(), off_t(begin), SEEK_SET) != 0) fail();
+        if (std::fread(bytes.data(), 1, size, file.get()) != size) fail();
+        return bytes;
+    };
+    return parse({uint64_t(ftello(file.get())), read, {path, 0}}, shape_index, options);
 }
 
 }  // namespace etendue

@@ -16,6 +16,7 @@
 #include "emitter/environment.h"
 #include "emitter/point.h"
 #include "emitter/sky_model.h"
+#include "scene/builder.h"
 #include "scene/mitsuba_manual.h"
 #include "scene/model_builder.h"
 
@@ -751,9 +752,22 @@ private:
     std::vector<std::string> warnings_;
 };
 
+/// What follows takes parameters by the types that the plug-ins' tables give.
+void check_types(const SceneDescription& scene) {
+    const std::vector<PluginInfo> plugins = scene_plugins();
+    for (size_t i = 0; i < scene.objects.size(); ++i) {
+        const SceneObject& o = scene.objects[i];
+        const auto info = std::find_if(plugins.begin(), plugins.end(), [&](const PluginInfo& p) {
+            return o.category == p.category && o.type == p.name;
+        });
+        if (info != plugins.end()) check_param_types(scene, int(i), *info);
+    }
+}
+
 }  // namespace
 
 std::vector<std::string> make_plain_mitsuba(SceneDescription& scene) {
+    check_types(scene);
     return Plainer(scene).run();
 }
 

@@ -1,12 +1,15 @@
-// Any bytes as a Mitsuba scene that is built and rendered: a SceneError, or an image without values that are not finite.
+// Any bytes as a Mitsuba scene that is converted, and that is built and rendered: a SceneError, or an image without values
+// that are not finite.
 
 #include <atomic>
 
 #include "fuzz_target.h"
 #include "math/vec.h"
+#include "readers/mitsuba_writer.h"
 #include "readers/mitsuba_xml.h"
 #include "render/renderer.h"
 #include "scene/builder.h"
+#include "scene/plain_mitsuba.h"
 
 namespace etendue::fuzz {
 namespace {
@@ -16,6 +19,12 @@ void run(std::string_view text) {
     if (text.find("filename") != text.npos) return;
     ReadOptions options;
     options.lenient = text.size() % 2 == 1;
+    try {
+        SceneDescription plain = parse_mitsuba_xml(text, "fuzz.xml", options);
+        make_plain_mitsuba(plain);
+        write_mitsuba_xml(plain, "out.xml", "files", [](const SceneFile&) {});
+    } catch (const SceneError&) {
+    }
     try {
         BuildOptions build;
         build.lenient = options.lenient;

@@ -416,5 +416,43 @@ TEST(HostileCompression, MeshesAreLimitedByTheirSize) {
                        [&] { parse_serialized(name, "f.serialized", 0); });
 }
 
+/// Bytes that this process has read from files.
+uint64_t bytes_read() {
+    std::ifstream in("/proc/self/io");
+    std::string name;
+    uint64_t bytes = 0;
+    in >> name >> bytes;
+    return bytes;
+}
+
+TEST(LargeFiles, OneMeshOfManyIsReadAlone) {
+    // 1000 meshes: the file is read once altogether, not once for each.
+    const std::string head = raw<uint32_t>(0x1000) + std::string("m\0", 2);
+    constexpr uint64_t kVertices = 1000;
+    std::string contents = head + raw<uint64_t>(kVertices) + raw<uint64_t>(1);
+    for (uint64_t i = 0; i < 3 * kVertices; ++i) contents += raw(float(i * i % 1009));
+    for (const uint32_t v : {0u, 1u, 2u}) contents += raw(v);
+    const std::string one = serialized(contents, 0);
+    const std::string mesh = one.substr(0, one.size() - 12);
+    constexpr uint64_t kMeshes = 1000;
+    std::string file, table;
+    for (uint64_t i = 0; i < kMeshes; ++i) {
+        table += raw<uint64_t>(file.size());
+        file += mesh;
+    }
+    file += table + raw<uint32_t>(kMeshes);
+    const std::string path = (std::filesystem::path(::testing::TempDir()) /
+                              ("many-" + std::to_string(getpid()) + ".serialized"))
+                                 .string();
+    std::ofstream(path, std::ios::binary) << file;
+    const uint64_t before = bytes_read();
+    for (const int i : {0, 1, 500, 998, 999})
+        EXPECT_EQ(read_serialized(path, i).triangles.size(), 1u);
+    const uint64_t read = bytes_read() - before;
+    std::filesystem::remove(path);
+    EXPECT_GT(read, 5 * mesh.size() / 2);
+    EXPECT_LT(read, file.size() / 10);
+}
+
 }  // namespace
 }  // namespace etendue

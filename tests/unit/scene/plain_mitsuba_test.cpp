@@ -76,6 +76,56 @@ INSTANTIATE_TEST_SUITE_P(Formats, PlainScenes,
                          ::testing::Values("mitsuba06", "mitsuba3", "pbrt3", "pbrt4", "gltf"),
                          [](const auto& format) { return std::string(format.param); });
 
+/// The message with which a scene cannot be converted, as plain Mitsuba or with its own plug-ins.
+std::string refusal(const std::string& body, bool plain) {
+    try {
+        SceneDescription scene = parse(body);
+        if (plain) make_plain_mitsuba(scene);
+        write_mitsuba_xml(scene, "out.xml", "files", [](const SceneFile&) {});
+    } catch (const SceneError& e) {
+        return e.message();
+    }
+    return "";
+}
+
+TEST(PlainMitsuba, ParametersOfOtherTypesAreRefused) {
+    for (const auto& [body, message] : std::vector<std::pair<std::string, std::string>>{
+             {"<emitter type=\"spot\"><string name=\"to_world\" value=\"x\"/></emitter>",
+              "\"to_world\" of emitter \"spot\" must be a transform, but is a string"},
+             {"<shape type=\"sphere\"><emitter type=\"area\"><string name=\"two_sided\" "
+              "value=\"x\"/></emitter></shape>",
+              "must be a boolean"},
+             {"<bsdf type=\"mixturebsdf\"><float name=\"weights\" value=\"1\"/></bsdf>",
+              "must be a string"},
+             {"<bsdf type=\"roughconductor\"><float name=\"material\" value=\"1\"/></bsdf>",
+              "must be a string"},
+             {"<emitter type=\"envmap\"><integer name=\"projection\" value=\"1\"/></emitter>",
+              "must be a string"}})
+        EXPECT_NE(refusal(body, true).find(message), std::string::npos)
+            << refusal(body, true) << "\nexpected: " << message;
+}
+
+TEST(PlainMitsuba, MeshesAndImagesThatTheFileDoesNotHoldAreNotWritten) {
+    for (const bool plain : {false, true}) {
+        EXPECT_NE(refusal("<shape type=\"mesh\"/>", plain).find("needs a mesh"), std::string::npos);
+        EXPECT_NE(
+            refusal("<shape type=\"mesh\"><integer name=\"mesh\" value=\"3\"/></shape>", plain)
+                .find("needs a mesh"),
+            std::string::npos);
+        for (const char* type : {"integer", "string"}) {
+            // Without effect, since the scene has no images of its own; a string is of the wrong type.
+            const std::string text = refusal(
+                std::string(
+                    "<bsdf type=\"diffuse\"><texture type=\"bitmap\" name=\"reflectance\"><") +
+                    type + " name=\"image\" value=\"7\"/></texture></bsdf>",
+                plain);
+            EXPECT_EQ(text.find("must be an integer") != std::string::npos,
+                      plain && type == std::string("string"))
+                << text;
+        }
+    }
+}
+
 TEST(PlainMitsuba, CoefficientsBecomeExtinctionAndAlbedo) {
     SceneDescription scene =
         parse(R"(<shape type="sphere"><medium type="homogeneous" name="interior">
