@@ -40,6 +40,15 @@ Vec3 direction(Vec3 a, Vec3 b) {
     return {float(x * scale), float(y * scale), float(z * scale)};
 }
 
+void check_sizes(const MeshData& mesh, const SourceLocation& where) {
+    for_each_vertex_array(mesh, [&](const std::string& name, const auto& values) {
+        if (!values.empty() && values.size() != mesh.positions.size())
+            throw SceneError(where, "the mesh has " + std::to_string(values.size()) + " " + name +
+                                        " for " + std::to_string(mesh.positions.size()) +
+                                        " vertices");
+    });
+}
+
 void check_vertices(const MeshData& mesh, const SourceLocation& where) {
     for (size_t i = 0; i < mesh.positions.size(); ++i)
         if (!is_finite(mesh.positions[i]))
@@ -81,18 +90,14 @@ void drop_unused(MeshData& mesh) {
     uint32_t next = 0;
     for (size_t i = 0; i < is_used.size(); ++i)
         if (is_used[i]) place[i] = next++;
-    const auto keep_used = [&](auto& values) {
+    for_each_vertex_array(mesh, [&](const char*, auto& values) {
         if (values.empty()) return;
         std::remove_reference_t<decltype(values)> kept;
         kept.reserve(used);
         for (size_t i = 0; i < values.size(); ++i)
             if (is_used[i]) kept.push_back(values[i]);
         values = std::move(kept);
-    };
-    keep_used(mesh.positions);
-    keep_used(mesh.normals);
-    keep_used(mesh.uvs);
-    keep_used(mesh.colors);
+    });
     for (MeshData::Triangle& t : mesh.triangles)
         for (uint32_t& v : t) v = place[v];
 }
@@ -117,9 +122,10 @@ void repair_normals(MeshData& mesh) {
 }  // namespace
 
 size_t memory_bytes(const MeshData& mesh) {
-    const auto bytes = [](const auto& values) { return values.size() * sizeof(values[0]); };
-    return bytes(mesh.positions) + bytes(mesh.normals) + bytes(mesh.uvs) + bytes(mesh.colors) +
-           bytes(mesh.alphas) + bytes(mesh.triangles);
+    size_t bytes = mesh.triangles.size() * sizeof(MeshData::Triangle);
+    for_each_vertex_array(
+        mesh, [&](const char*, const auto& values) { bytes += values.size() * sizeof(values[0]); });
+    return bytes;
 }
 
 void compute_vertex_normals(MeshData& mesh) {
@@ -145,6 +151,7 @@ void compute_vertex_normals(MeshData& mesh) {
 }
 
 void finish_mesh(MeshData& mesh, const MeshOptions& options, const SourceLocation& where) {
+    check_sizes(mesh, where);
     check_vertices(mesh, where);
     check_indices(mesh, where);
     drop_degenerate(mesh);

@@ -27,6 +27,16 @@ struct MeshData {
     std::vector<std::string> notes;   ///< What the file has that is not used.
 };
 
+/// Calls use(name, array) for each array with a value for every vertex; such an array has to be listed here.
+template <class Mesh, class Use>
+void for_each_vertex_array(Mesh& mesh, const Use& use) {
+    use("positions", mesh.positions);
+    use("normals", mesh.normals);
+    use("texture coordinates", mesh.uvs);
+    use("colours", mesh.colors);
+    use("alphas", mesh.alphas);
+}
+
 /// Memory of the arrays.
 size_t memory_bytes(const MeshData& mesh);
 
@@ -36,9 +46,10 @@ struct MeshOptions {
     bool flip_tex_coords = false;  ///< v becomes 1 - v.
 };
 
-/// Last step of every mesh reader: checks that indices are in range and that positions and texture coordinates are
-/// finite, removes triangles of zero area and vertices of no triangle, normalises normals (those that are zero or not finite are computed from the
-/// faces), and applies the options. Throws SceneError where a check fails or no triangle is left.
+/// Last step of every mesh reader: checks the lengths of the arrays, that indices are in range and that positions and
+/// texture coordinates are finite, removes triangles of zero area and vertices of no triangle, normalises normals (those
+/// that are zero or not finite are computed from the faces), and applies the options. Throws SceneError where a check
+/// fails or no triangle is left.
 void finish_mesh(MeshData& mesh, const MeshOptions& options, const SourceLocation& where);
 
 /// Replaces the normals by normalised sums of those of the adjacent faces, weighted by the angle at the vertex [Thürmer

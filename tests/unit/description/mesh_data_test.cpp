@@ -77,6 +77,46 @@ TEST(FinishMesh, DropsAndCountsTrianglesWithoutArea) {
     EXPECT_TRUE(m.normals.empty());
 }
 
+TEST(FinishMesh, DropsVerticesOfNoTriangle) {
+    MeshData m = bent_quad();
+    const MeshData all = m;
+    // One vertex before each of the quad: vertex v is at 2 v + 1 now.
+    m.positions.clear();
+    for (size_t i = 0; i < all.positions.size(); ++i) {
+        m.positions.push_back({9, 9, float(i)});
+        m.positions.push_back(all.positions[i]);
+        for (const float x : {-1.0f, float(i)}) {
+            m.normals.push_back({0, x < 0 ? -1.0f : 1.0f, x});
+            m.uvs.push_back({x, x});
+            m.colors.push_back({x, x, x});
+            m.alphas.push_back(x);
+        }
+    }
+    for (auto& t : m.triangles)
+        for (uint32_t& v : t) v = 2 * v + 1;
+    finish_mesh(m, {}, {});
+    EXPECT_EQ(m.positions, all.positions);
+    EXPECT_EQ(m.triangles, all.triangles);
+    for_each_vertex_array(m, [&](const char* name, const auto& values) {
+        EXPECT_EQ(values.size(), all.positions.size()) << name;
+    });
+    for (size_t i = 0; i < all.positions.size(); ++i) {
+        EXPECT_GT(m.normals[i].y, 0);
+        EXPECT_EQ(m.uvs[i].x, float(i));
+        EXPECT_EQ(m.colors[i].x, float(i));
+        EXPECT_EQ(m.alphas[i], float(i));
+    }
+}
+
+TEST(FinishMesh, RejectsArraysOfOtherLengths) {
+    MeshData m = bent_quad();
+    m.alphas = {1};
+    EXPECT_THROW(finish_mesh(m, {}, {}), SceneError);
+    m.alphas.clear();
+    m.uvs.resize(m.positions.size() + 1);
+    EXPECT_THROW(finish_mesh(m, {}, {}), SceneError);
+}
+
 TEST(FinishMesh, NormalisesNormalsAndReplacesMissingOnes) {
     MeshData m = bent_quad();
     m.normals = {{0, 0, 0}, {0, 3, 4}, {kNan, 0, 1}, {2, 0, 0}};

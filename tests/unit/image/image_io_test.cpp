@@ -227,8 +227,7 @@ TEST_F(ImageIo, UnreadableFilesAreNamedSo) {
     if (child == 0) {
         // Root may read everything.
         if (geteuid() == 0 && seteuid(65534) != 0) _exit(2);
-        _exit(error([&] { read_image(path); }) ==
-                      "cannot read \"" + path + "\": Permission denied"
+        _exit(error([&] { read_image(path); }) == "cannot read \"" + path + "\": Permission denied"
                   ? 0
                   : 1);
     }
@@ -251,8 +250,7 @@ TEST_F(ImageIo, ImagesInMemoryNeedNoFiles) {
     const auto handler = std::signal(SIGXFSZ, SIG_IGN);
     ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &none), 0);
     PixelBuffer found;
-    const std::string complaint =
-        error([&] { found = decode_pixels(bytes, "the picture", true); });
+    const std::string complaint = error([&] { found = decode_pixels(bytes, "the picture", true); });
     const std::string damaged =
         error([&] { decode_pixels(bytes.substr(0, bytes.size() / 2), "the picture", true); });
     setrlimit(RLIMIT_FSIZE, &limit);
