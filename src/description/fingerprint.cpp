@@ -88,9 +88,8 @@ private:
     }
     template <class T>
     void add_array(const std::vector<T>& values) {
-        static_assert(std::has_unique_object_representations_v<T> ||
-                      std::is_same_v<T, float> || std::is_same_v<T, Vec2> ||
-                      std::is_same_v<T, Vec3>);
+        static_assert(std::has_unique_object_representations_v<T> || std::is_same_v<T, float> ||
+                      std::is_same_v<T, Vec2> || std::is_same_v<T, Vec3>);
         hash_.add(std::string_view(reinterpret_cast<const char*>(values.data()),
                                    values.size() * sizeof(T)));
     }
