@@ -66,9 +66,15 @@ void StudioCommand::start_first_run(Session& session) const {
 }
 
 Saved save_and_wait(Session& session, int run, const std::string& file) {
-    std::promise<Saved> answer;
-    session.save(run, file, false, [&](const Saved& saved) { answer.set_value(saved); });
-    return answer.get_future().get();
+    auto answer = std::make_shared<std::promise<Saved>>();
+    std::future<Saved> saved = answer->get_future();
+    try {
+        session.save(run, file, false, [answer](const Saved& s) { answer->set_value(s); });
+        answer.reset();  // Without memory there may be no answer; its last owner tells so.
+        return saved.get();
+    } catch (const std::exception&) {
+        return {"not enough memory", 0};
+    }
 }
 
 /// Saves the image of every run, those first that need not wait for the pass in flight. What cannot be saved in the output

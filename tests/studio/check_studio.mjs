@@ -99,15 +99,44 @@ async function imagePart() {
             check(new Set(await pixels(browser, 'view')).size > 3, `${view} is drawn`);
         }
         await browser.until("document.getElementById('view-choice').dataset.key.includes('length:')", 'technique images are offered');
-        for (const view of ['length:2', 'technique:1', 'unweighted:1']) {
+        const techniques = await browser.evaluate("[...document.getElementById('view-choice').options].map(o => o.value).filter(v => v.includes('connect'))");
+        check(techniques.length > 1, `techniques have names: ${techniques.slice(0, 2)}`);
+        for (const view of ['length:2', ...techniques.slice(0, 2)]) {
             await browser.evaluate(`(() => { const s = document.getElementById('view-choice'); s.value = '${view}'; s.dispatchEvent(new Event('change')); })()`);
             await browser.until(`studio.shown[0].view === '${view}' && studio.shown[0].passes > 0`, view);
         }
         await browser.screenshot('5-technique');
+        check((await browser.evaluate("document.getElementById('label').textContent")).includes('connect'), 'the label names the technique');
+
+        // Another run has no technique images; until its image has come, the label says whose picture is drawn.
+        await browser.evaluate("studio.server.held = studio.server.image; studio.server.image = () => new Promise(() => {})");
+        await browser.evaluate("[...document.querySelectorAll('#run-list button')].find(b => b.getAttribute('aria-label') === 'Show run 1').click()");
+        const waiting = await browser.evaluate("document.getElementById('label').textContent");
+        check(waiting.startsWith('run 2') && waiting.includes('run 1') && waiting.includes('awaited'), `the label while the image is awaited: ${waiting}`);
+        check(await browser.evaluate("studio.shown[0].view === 'image' && document.getElementById('view-choice').value === 'image' && !document.getElementById('view-choice').dataset.key.includes('technique:')"),
+            'views that the run does not have are not offered');
+        await browser.evaluate("studio.server.image = studio.server.held");
+        await browser.evaluate("[...document.querySelectorAll('#run-list button')].find(b => b.getAttribute('aria-label') === 'Show run 2').click()");
+        await browser.until("studio.shown[0].passes > 0 && document.getElementById('label').textContent.startsWith('run 2, ')", 'the second run again');
+
+        // Files are replaced only if asked for.
+        const mine = join(folder, 'mine.pfm');
+        writeFileSync(mine, 'mine');
+        await browser.evaluate("window.prompt = () => 'mine.pfm'; window.confirm = text => { window.asked = text; return window.answer; }; window.answer = false");
+        const saves = () => browser.evaluate("[...document.querySelectorAll('#run-list button')].find(b => b.getAttribute('aria-label') === 'Save run 1').click()");
+        await saves();
+        await browser.until("window.asked?.includes('mine.pfm exists already')", 'a question');
+        await browser.until("document.getElementById('banner-text').textContent.includes('exists already')", 'the refusal');
+        check(readFileSync(mine, 'latin1') === 'mine', 'the file is not replaced without a yes');
+        await browser.evaluate('window.answer = true');
+        await saves();
+        await browser.until("/mine.pfm: [0-9]+ spp saved/.test(document.getElementById('banner-text').textContent + document.getElementById('spoken').textContent)", 'the answer');
+        check(readFileSync(mine, 'latin1').startsWith('PF'), 'and is with one');
+        await browser.evaluate("document.getElementById('banner-action').click()");
         await checkNames(browser, 'image');
         const bad = await browser.evaluate(`studio.server.post('/v1/run', {action: 'start', integrator: 'path:max_depth=-9'}).then(() => '', e => e.status + ' ' + e.message)`);
         check(bad.startsWith('422') && bad.includes('max_depth'), `a bad parameter is refused: ${bad}`);
-        check(browser.complaints.filter(c => !c.includes('422')).length === 0, `the console is quiet: ${browser.complaints.join('; ')}`);
+        check(browser.complaints.filter(c => !c.includes('422') && !c.includes('409')).length === 0, `the console is quiet: ${browser.complaints.join('; ')}`);
         check(browser.requests.every(u => u.startsWith(studio.url.split('/#')[0]) || u.startsWith('blob:')), 'no request leaves the page');
 
         // A rectangle by keys and by the pointer; how far two runs are apart.
@@ -350,7 +379,19 @@ async function pathPart() {
         await browser.evaluate("document.querySelector('#editor input[type=checkbox]').click()");
         await idle(browser);
         check(JSON.parse(readFileSync(file)).length === 1 + picked.length && existsSync(join(folder, 'paths-off.json')), 'a path can be switched off');
-        await browser.evaluate("document.querySelector('#editor input[type=checkbox]').click()");
+        // Also where the page was opened anew in the meantime.
+        const all = await browser.evaluate(`${paths}.length`);
+        await browser.evaluate("studio.editor().open('paths.json')");
+        check(await browser.evaluate(`${paths}.length === ${all} && !${paths}[${all - 1}].on`), 'it is in the second file');
+        await browser.evaluate("[...document.querySelectorAll('#editor input[type=checkbox]')].at(-1).click()");
+        await idle(browser);
+        check(JSON.parse(readFileSync(file)).length === all && JSON.parse(readFileSync(join(folder, 'paths-off.json'))).length === 0, 'and in one file only');
+        await browser.evaluate("studio.editor().open('other.json')");
+        await button('Undo');
+        await idle(browser);
+        check(!existsSync(join(folder, 'other.json')) && await browser.evaluate(`${paths}.length`) === 0, 'undo brings no paths into another file');
+        await browser.evaluate("studio.editor().open('paths.json')");
+        await browser.evaluate(`studio.editor().paths.unshift(studio.editor().paths.pop()); studio.editor().changed()`);
         await idle(browser);
 
         // The paths of a pixel, traced again.

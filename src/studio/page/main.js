@@ -279,7 +279,8 @@ async function updateViewOptions() {
         if (tools.listed.run !== shown[0].run) return;
     }
     setOptions(tools.view, options, 'image');
-    if (shown[0].view !== tools.view.value) showIn(0, shown[0].run, tools.view.value);
+    if (!options.some(([value]) => value === shown[0].view)) showIn(0, shown[0].run, 'image');
+    tools.view.value = shown[0].view;
 }
 
 // ---------------------------------------------------------------------------------------- runs
