@@ -50,7 +50,8 @@ private:
 std::string free_name(const std::string& folder, const std::string& stem) {
     for (int i = 1;; ++i) {
         const std::string name = fmt::format("{}/{}-{}.exr", folder, stem, i);
-        if (!std::filesystem::exists(name)) return name;
+        std::error_code ignored;  // Where the folder cannot be read, saving will tell.
+        if (!std::filesystem::exists(std::filesystem::symlink_status(name, ignored))) return name;
     }
 }
 
@@ -84,26 +85,31 @@ void StudioCommand::save_all(Session& session) const {
     std::error_code ignored;
     const std::string other = std::filesystem::temp_directory_path(ignored).string();
     std::string errors;
-    std::vector<RunStatus> runs = session.runs();
-    std::stable_partition(runs.begin(), runs.end(),
-                          [](const RunStatus& s) { return s.state != RunState::Stopping; });
-    for (const RunStatus& s : runs) {
-        // A run in its first pass may end it.
-        if (s.passes == 0 && s.state != RunState::Stopping) continue;
+    const auto save_one = [&](const RunStatus& s) {
         for (const std::string& folder : {output, other}) {
             const std::string file = free_name(folder, stem);
             const Saved saved = save_and_wait(session, s.id, file);
             if (saved.error.empty()) {
                 message("{}: run {}, {}, {} spp\n", file, s.id, s.integrator, saved.passes);
-                break;
+                return;
             }
-            if (session.status(s.id).passes == 0) break;
+            // A run in its first pass may have been discarded.
+            if (session.status(s.id).passes == 0) return;
             message("{}: {}\n", file, saved.error);
             if (folder == output)
                 errors +=
                     fmt::format("{}run {}: {}", errors.empty() ? "" : "; ", s.id, saved.error);
         }
-    }
+    };
+    std::vector<RunStatus> runs = session.runs();
+    std::stable_partition(runs.begin(), runs.end(),
+                          [](const RunStatus& s) { return s.state != RunState::Stopping; });
+    for (const RunStatus& s : runs) try {
+            if (s.passes > 0 || s.state == RunState::Stopping) save_one(s);
+        } catch (const std::exception& e) {
+            // Such as that the page has removed the run.
+            message("run {}: {}\n", s.id, e.what());
+        }
     if (!errors.empty()) throw std::runtime_error(errors);
 }
 
@@ -120,8 +126,9 @@ ApiOptions StudioCommand::api_options() const {
                 host));
         options.hosts.push_back(lower_case(host));
     }
-    // Where it is a name, the page is asked for by it.
-    options.hosts.push_back(lower_case(listen));
+    // Where it is a name, the page is asked for by it. Addresses are compared with the one at which a request arrives.
+    const bool is_address = listen.find_first_not_of("0123456789.") == std::string::npos;
+    if (is_host_name(listen) && !is_address) options.hosts.push_back(lower_case(listen));
     return options;
 }
 
