@@ -41,7 +41,7 @@ Rgb seen(const Scene& scene, float x, float y) {
     for (int i = 0; i < kMasks; ++i) {
         SurfaceHit hit;
         const float u = (float(i) + 0.5f) / kMasks;
-        if (scene.intersect({scene.offset_origin(eye.p, eye.ng, eye.d), eye.d, kInf}, u, hit)) {
+        if (scene.intersect({eye.p, eye.d, kInf}, u, hit)) {
             if (const Emitter* e = hit.shape->emitter)
                 sum +=
                     e->eval_surface(hit.geometry.ng, hit.geometry.uv, hit.location.prim, -eye.d).Le;
