@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "bsdf/coat.h"
 #include "bsdf/ior.h"
 #include "color/metals.h"
 #include "emitter/environment.h"
@@ -575,6 +576,7 @@ private:
             }
         }
         if (o.type == "principled") replace_own_reflectance(o);
+        if (o.type == "plastic" || o.type == "roughplastic") replace_absorption(o);
         if (o.type == "roughplastic") {
             const bool is_anisotropic = number(o, "alpha_u", 0.1) != number(o, "alpha_v", 0.1) ||
                                         has_texture(o, "alpha_u") || has_texture(o, "alpha_v");
@@ -589,6 +591,35 @@ private:
     }
     bool has_texture(const SceneObject& o, std::string_view name) {
         return has(o, name) && !o.find(name);
+    }
+    /// What a coat absorbs on the mean becomes part of the reflectance ρ of its base: ρ' reflects as much without it,
+    ///     ρ' / (1 − ρ' F) = A ρ / (1 − ρ F_τ),
+    /// or, where the coat does not saturate colours, ρ' / (1 − F) = A ρ / (1 − F_τ).
+    void replace_absorption(SceneObject& o) {
+        const double tau = number(o, "thickness", 0);
+        if (!(tau > 0) || has_texture(o, "diffuse_reflectance")) return;
+        const Params params{scene_, int(&o - scene_.objects.data())};
+        const float eta = read_ior(params, "int_ior", "polypropylene") /
+                          read_ior(params, "ext_ior", "air");
+        if (!(eta > 1)) return;
+        // Mean of 1 / cos below the coat for diffuse light from above, which passes twice.
+        const double eta2 = double(eta) * double(eta);
+        const double mean_path = 2 * eta2 * (1 - std::sqrt(1 - 1 / eta2));
+        const double A = std::exp(-2 * tau * mean_path), F = double(reflectance_below_coat(eta, 0)),
+                     F_tau = double(reflectance_below_coat(eta, float(tau)));
+        const Param* flag = o.find("nonlinear");
+        const bool saturates = flag && std::get<bool>(flag->value);
+        Rgb base = rgb(o, "diffuse_reflectance", Rgb(0.5f));
+        for (int c = 0; c < 3; ++c) {
+            const double rho = double(base[c]);
+            const double reflected = A * rho / (1 - (saturates ? rho : 1) * F_tau);
+            base[c] = float(saturates ? reflected / (1 + reflected * F) : reflected * (1 - F));
+        }
+        warn(o, fmt::format("Mitsuba 3 has no parameter \"thickness\" of bsdf \"{}\": the mean "
+                            "absorption of the coat becomes part of \"diffuse_reflectance\"",
+                            o.type));
+        remove(o, "thickness");
+        set(o, "diffuse_reflectance", base);
     }
     /// The reflectance at normal incidence becomes an index of refraction.
     void replace_own_reflectance(SceneObject& o) {

@@ -7,9 +7,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "bsdf/material.h"
 #include "readers/mitsuba_writer.h"
 #include "readers/mitsuba_xml.h"
 #include "readers/scene_file.h"
+#include "scene/builder.h"
 #include "scene/mitsuba_manual.h"
 
 namespace etendue::test {
@@ -321,6 +323,54 @@ TEST(PlainMitsuba, EveryApproximationIsReported) {
     for (const auto& [inside, expected] : cases)
         EXPECT_NE(warning_of(inside).find(expected), std::string::npos) << expected << "\n"
                                                                         << warning_of(inside);
+}
+
+/// Albedo for light from a direction, by the midpoint rule, of the diffuse part of the only shape's material.
+Rgb diffuse_albedo(const SceneDescription& description, float cos_o) {
+    const Scene scene = build_scene(description);
+    const Vec3 wo{std::sqrt(1 - cos_o * cos_o), 0, cos_o}, n{0, 0, 1};
+    ComponentArena arena;
+    const Bsdf bsdf = scene.shapes()[0].material->bsdf(
+        {{}, n, n, {1, 0, 0}, {0, 1, 0}, {0.5f, 0.5f}, wo}, arena);
+    constexpr int kSteps = 64;
+    Rgb sum;
+    for (int i = 0; i < kSteps * kSteps; ++i) {
+        // Uniform in cos² θ: f cos / (cos / π).
+        const float cosine = std::sqrt((float(i % kSteps) + 0.5f) / kSteps),
+                    phi = 2 * kPi * (float(i / kSteps) + 0.5f) / kSteps,
+                    sine = std::sqrt(1 - cosine * cosine);
+        const Vec3 wi{sine * std::cos(phi), sine * std::sin(phi), cosine};
+        sum += bsdf.eval(wo, wi, TransportMode::Radiance).f * (kPi / cosine);
+    }
+    return sum * (1.0f / (kSteps * kSteps));
+}
+
+// pbrt's coats absorb, about 2.5 % on the way through and back again.
+TEST(PlainMitsuba, CoatsKeepTheirMeanAbsorption) {
+    for (const char* nonlinear : {"true", "false"}) {
+        const auto scene = [&](const char* thickness) {
+            return parse(fmt::format(
+                R"(<sensor type="perspective"/><emitter type="constant"/><shape type="rectangle">
+                <bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.2 0.5 0.9"/>
+                <boolean name="nonlinear" value="{}"/><float name="thickness" value="{}"/></bsdf>
+                </shape>)",
+                nonlinear, thickness));
+        };
+        const SceneDescription coated = scene("0.01"), clear = scene("0");
+        SceneDescription plain = coated;
+        const std::vector<std::string> warnings = make_plain_mitsuba(plain);
+        ASSERT_EQ(warnings.size(), 1u);
+        EXPECT_NE(warnings[0].find("the mean absorption of the coat"), std::string::npos);
+        EXPECT_FALSE(only(plain, "bsdf").find("thickness"));
+        for (const float cosine : {0.9f, 0.5f}) {
+            const Rgb a = diffuse_albedo(coated, cosine), b = diffuse_albedo(plain, cosine),
+                      without = diffuse_albedo(clear, cosine);
+            for (int c = 0; c < 3; ++c) {
+                EXPECT_NEAR(b[c] / a[c], 1, 0.004) << cosine << " " << c;
+                EXPECT_GT(without[c] / a[c], 1.015) << cosine << " " << c;
+            }
+        }
+    }
 }
 
 TEST(PlainMitsuba, ReflectanceBecomesAnIndexOfRefraction) {
