@@ -165,7 +165,12 @@ void PbrtScene::place_shape(int shape, const PbrtArguments& args) {
     const bool is_interface = object(material).type == "null";
     const int alpha = texture(args, "alpha", true);
     const std::optional<float> constant_alpha = constant(args, "alpha", 1.0f);
-    if (!is_interface && (!constant_alpha || *constant_alpha < 1)) {
+    // In pbrt a light with the constant alpha 0 shines, though no ray meets it.
+    const bool is_invisible_light = state.area_light && constant_alpha && *constant_alpha == 0;
+    if (is_invisible_light)
+        refuse(args.find("alpha")->where,
+               "an area light that no ray meets (alpha 0) is not supported", "a visible one");
+    if (!is_interface && !is_invisible_light && (!constant_alpha || *constant_alpha < 1)) {
         // Shapes with the same material and alpha share their mask.
         int& masked = masked_.try_emplace({material, alpha}, -1).first->second;
         if (masked < 0 || alpha < 0) {

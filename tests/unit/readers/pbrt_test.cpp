@@ -431,6 +431,18 @@ TEST(Pbrt, ImagesMayEndAndBeInverted) {
     EXPECT_EQ(inverted->children[0].name, "weight");
 }
 
+// A light with a constant alpha of zero shines in pbrt; with any other alpha it shines where it is.
+TEST(Pbrt, InvisibleLightsAreRefused) {
+    const auto lamp = [](const char* alpha) {
+        return std::string("AreaLightSource \"diffuse\" \"rgb L\" [1 1 1]\nShape \"sphere\" "
+                           "\"float alpha\" ") +
+               alpha + "\n";
+    };
+    EXPECT_EQ(material(parse4(lamp("0.5"))).type, "mask");
+    expect_scene_error(3, "an area light that no ray meets (alpha 0) is not supported",
+                       [&] { parse4(lamp("0")); });
+}
+
 TEST(Pbrt, ConstantsAndProductsOfConstantsAreColours) {
     const auto scene =
         parse3("Texture \"a\" \"color\" \"constant\" \"rgb value\" [.5 .6 .7]\n"
