@@ -10,9 +10,8 @@
 //   sheen (0), sheen_tint (0)      retroreflective cloth at grazing angles, and its hue
 //   flatness (0)           share of fake subsurface scattering in the diffuse part
 //   clearcoat (0), clearcoat_gloss (0)   second, isotropic specular lobe, and its sharpness
-//   specular_weight (1), specular_color (1)   factors of the reflectance of what is not metal: at all angles, and at
-//                          normal incidence, where it is at most one; as in the glTF extension KHR_materials_specular.
-//                          With spec_trans, an index of refraction with this reflectance replaces eta.
+//   specular_weight (1), specular_color (1)   factors of the reflectance at normal incidence of what is not metal; of
+//                          the colour the luminance counts. An index of refraction with this reflectance replaces eta.
 // All of them may be textures, except eta and specular. From below, the surface is rough glass only.
 //
 // Reflection is reciprocal. Energy is not conserved: specular reflection is added to the diffuse part without reducing
@@ -284,7 +283,7 @@ public:
                             .flatness = scalar(flatness_),
                             .clearcoat = scalar(clearcoat_),
                             .clearcoat_gloss = scalar(clearcoat_gloss_)};
-        if (has_own_reflectance_) append_specular(point, frame, weight, lobe, list);
+        if (has_own_reflectance_) lobe.eta = own_eta(point, lobe.spec_trans > 0);
         list.add(frame, lobe, weight);
     }
     bool is_transmissive() const override {
@@ -314,35 +313,13 @@ private:
         return 2 / (1 - std::sqrt(0.08f * params.number("specular", 0.5f, 0, 1))) - 1;
     }
 
-    /// The dielectric reflection is that of a metal of its colour, with its weight; none is left in `lobe`.
-    void append_specular(const SurfacePoint& point, const Frame& frame, float weight,
-                         PrincipledLobe& lobe, ComponentList& list) const {
-        const float R0 = sqr((eta_ - 1) / (eta_ + 1));
-        const float factor = clamp(specular_weight_.eval_scalar(point.texture_point()), 0, 1);
-        const Rgb color = specular_color_.eval(point.texture_point());
-        if (lobe.spec_trans > 0) {
-            const float root = std::sqrt(std::min(R0 * factor * luminance(color), kLargestR0));
-            lobe.eta = std::max((1 + root) / (1 - root), kEtaOfClearGlass);
-            return;
-        }
-        const float lum = luminance(lobe.base_color);
-        const Rgb hue = lum > 0 ? lobe.base_color / lum : Rgb(1);
-        PrincipledLobe coloured{.base_color = color * lerp(lobe.spec_tint, Rgb(1), hue) * R0,
-                                .surface_roughness = lobe.surface_roughness,
-                                .anisotropic = lobe.anisotropic,
-                                .metallic = 1,
-                                .spec_trans = 0,
-                                .eta = eta_,
-                                .spec_tint = 0,
-                                .sheen = 0,
-                                .sheen_tint = 0,
-                                .flatness = 0,
-                                .clearcoat = 0,
-                                .clearcoat_gloss = 0};
-        for (int c = 0; c < 3; ++c) coloured.base_color[c] = std::min(coloured.base_color[c], 1.0f);
-        list.add(frame, coloured, weight * factor * (1 - lobe.metallic));
-        lobe.eta = 1;
-        lobe.spec_tint = 0;
+    /// The index of refraction with the reflectance at normal incidence that is given; 1 reflects nothing.
+    float own_eta(const SurfacePoint& point, bool transmits) const {
+        const float weight = clamp(specular_weight_.eval_scalar(point.texture_point()), 0, 1);
+        const float factor = weight * specular_color_.eval_scalar(point.texture_point());
+        const float root = std::sqrt(std::min(sqr((eta_ - 1) / (eta_ + 1)) * factor, kLargestR0));
+        const float eta = std::max((1 + root) / (1 - root), transmits ? kEtaOfClearGlass : 1.0f);
+        return eta_ < 1 ? 1 / eta : eta;
     }
 
     TextureRef base_color_, roughness_, anisotropic_, metallic_, spec_trans_, spec_tint_, sheen_,
@@ -383,9 +360,9 @@ MaterialEntry principled_entry() {
           {"clearcoat_gloss", ParamKind::Texture, "0",
            "Sharpness of the second specular lobe, in [0, 1]."},
           {"specular_weight", ParamKind::Texture, "1",
-           "Factor of the reflectance of what is not metal, in [0, 1]."},
+           "Factor of the reflectance at normal incidence of what is not metal, in [0, 1]."},
           {"specular_color", ParamKind::Texture, "1",
-           "Factor of this reflectance at normal incidence; may exceed 1."}}},
+           "Another factor of it, which may exceed 1; of colours the luminance."}}},
         make_material<Principled>};
 }
 

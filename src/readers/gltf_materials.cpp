@@ -135,36 +135,64 @@ void GltfReader::read_principled(const JsonValue& m, int principled, VertexColor
     if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
         set_scalar(principled, "specular_weight", specular["specularFactor"].number(1, 0, 1),
                    specular["specularTexture"], "opacity");
-        set_color(principled, "specular_color", colour(specular["specularColorFactor"], Rgb(1)),
-                  specular["specularColorTexture"]);
+        const Rgb tint = colour(specular["specularColorFactor"], Rgb(1));
+        set_color(principled, "specular_color", tint, specular["specularColorTexture"]);
+        if (!(tint == Rgb(tint.r)) || specular["specularColorTexture"])
+            warn(fmt::format("{}: of the specular colour the luminance is used", specular.path()));
     }
 }
 
-/// The older workflow: c_diff = diffuse (1 − max(specular)), F0 = specular, α = (1 − glossiness)².
+namespace {
+
+/// A material of metal and dielectric with F0 = 0.04 that has this diffuse and this specular colour.
+struct MetallicColor {
+    double metallic;
+    Rgb base;
+};
+MetallicColor metallic_color(const Rgb& diffuse, const Rgb& specular) {
+    constexpr double kF0 = 0.04, kLeast = 1e-6;
+    const auto brightness = [](const Rgb& c) { return double(luminance(c)); };
+    const double rest = 1 - double(specular.max()), s = brightness(specular),
+                 d = brightness(diffuse) * rest / (1 - kF0);
+    // With the base colour b: d = b (1 - m) and s = kF0 (1 - m) + b m, hence kF0 m² + (d + s - 2 kF0) m + kF0 - s = 0.
+    double m = 0;
+    if (s > kF0) {
+        const double p = d + s - 2 * kF0, discriminant = p * p - 4 * kF0 * (kF0 - s);
+        m = std::clamp((-p + std::sqrt(std::max(discriminant, 0.0))) / (2 * kF0), 0.0, 1.0);
+    }
+    const Rgb of_diffuse = diffuse * float(rest / (1 - kF0) / std::max(1 - m, kLeast)),
+              of_specular = (specular - Rgb(float(kF0 * (1 - m)))) * float(1 / std::max(m, kLeast));
+    return {m, clamped(lerp(float(m * m), of_diffuse, of_specular))};
+}
+
+}  // namespace
+
+/// The older workflow: diffuse and specular colours, and the glossiness 1 - √α.
 void GltfReader::read_specular_glossiness(const JsonValue& s, int principled, VertexColors colors) {
-    constexpr double kReflectsAll = 1e3;  // index of refraction with F0 ≈ 1, times specular_color
-    const Rgb specular = clamped(colour(s["specularFactor"], Rgb(1)));
     const JsonValue both = s["specularGlossinessTexture"];
-    const std::vector<double> diffuse = s["diffuseFactor"].numbers(4, {1, 1, 1, 1});
-    // The share that the specular reflection leaves to the diffuse one; with a texture unknown, and none is taken off.
-    const float rest = both ? 1 : 1 - specular.max();
-    const Rgb factor = clamped({float(diffuse[0]), float(diffuse[1]), float(diffuse[2])}) * rest;
+    const std::vector<double> d = s["diffuseFactor"].numbers(4, {1, 1, 1, 1});
+    const Rgb diffuse = clamped({float(d[0]), float(d[1]), float(d[2])});
+    MetallicColor made{0, diffuse};
+    if (both)
+        warn(fmt::format("{}: its colour has no effect, only its glossiness", both.path()));
+    else
+        made = metallic_color(diffuse, clamped(colour(s["specularFactor"], Rgb(1))));
     const int image = bitmap(s["diffuseTexture"], false);
     const int tint = colors == VertexColors::None ? -1 : vertex_attribute("vertex_color");
     const int texture = image >= 0 && tint >= 0 ? product(image, tint) : std::max(image, tint);
     if (texture >= 0)
-        add_child(principled, "base_color", factor == Rgb(1) ? texture : scaled(texture, factor));
+        add_child(principled, "base_color",
+                  made.base == Rgb(1) ? texture : scaled(texture, made.base));
     else
-        set(principled, "base_color", factor);
-    set(principled, "eta", kReflectsAll);
-    set_color(principled, "specular_color", specular, both);
+        set(principled, "base_color", made.base);
+    set(principled, "metallic", made.metallic);
     const double glossiness = s["glossinessFactor"].number(1, 0, 1);
-    if (both) {
-        warn(fmt::format("{}: the diffuse part is not reduced by it", both.path()));
+    const int gloss = bitmap(both, true, "opacity");
+    if (gloss >= 0) {
         const int rough = add("texture", "mix", s);
         set(rough, "value0", 1.0);
         set(rough, "value1", 1 - glossiness);
-        add_child(rough, "weight", bitmap(both, true, "opacity"));
+        add_child(rough, "weight", gloss);
         add_child(principled, "roughness", rough);
     } else {
         set(principled, "roughness", 1 - glossiness);

@@ -599,8 +599,8 @@ private:
         const double tau = number(o, "thickness", 0);
         if (!(tau > 0) || has_texture(o, "diffuse_reflectance")) return;
         const Params params{scene_, int(&o - scene_.objects.data())};
-        const float eta = read_ior(params, "int_ior", "polypropylene") /
-                          read_ior(params, "ext_ior", "air");
+        const float eta =
+            read_ior(params, "int_ior", "polypropylene") / read_ior(params, "ext_ior", "air");
         if (!(eta > 1)) return;
         // Mean of 1 / cos below the coat for diffuse light from above, which passes twice.
         const double eta2 = double(eta) * double(eta);

@@ -141,7 +141,7 @@ TEST(Principled, HasTheClosedFormValueAtNormalIncidence) {
 }
 
 // α along ∂p/∂u is the larger one [Burley 2012, §5.4].
-// As KHR_materials_specular: F0 = min(R0 · color, 1) · weight, and F90 = weight.
+// As in KHR_materials_specular: F0 = R0 · weight · color, of which the luminance counts.
 TEST(Principled, ReflectanceMayBeGiven) {
     const Vec3 n{0, 0, 1};
     TestMaterials m;
@@ -152,7 +152,7 @@ TEST(Principled, ReflectanceMayBeGiven) {
     };
     const float D_4 = 1 / (4 * kPi * sqr(sqr(0.5f)));
     const TestMaterials::Value base{"base_color", Rgb(0.8f, 0.4f, 0.2f)},
-        weight{"specular_weight", 0.5}, color{"specular_color", Rgb(0, 10, 50)},
+        weight{"specular_weight", 0.5}, color{"specular_color", Rgb(0, 10, 5)},
         black{"specular_color", Rgb(0)}, mirror{"eta", 1000.0};
     const Rgb diffuse = Rgb(0.8f, 0.4f, 0.2f) * kInvPi;
     const auto expect = [&](const Rgb& found, const Rgb& F0) {
@@ -160,7 +160,7 @@ TEST(Principled, ReflectanceMayBeGiven) {
     };
     expect(f({base}), Rgb(0.04f));
     expect(f({base, weight}), Rgb(0.02f));
-    expect(f({base, weight, color}), Rgb(0, 0.2f, 0.5f));
+    expect(f({base, weight, color}), Rgb(0.02f * luminance(Rgb(0, 10, 5))));
     // What converters write for a material without specular part.
     expect(f({base, mirror, black}), Rgb(0));
     expect(f({base, mirror}), Rgb(sqr(999.0f / 1001)));

@@ -264,18 +264,38 @@ TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
 }
 
 TEST(Gltf, SpecularGlossinessIsReadAsWell) {
-    const SceneDescription scene = with_material(
-        R"({"alphaMode":"BLEND","extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":
-            [0.5,0.25,1,0.75],"specularFactor":[0.1,0.2,0.04],"glossinessFactor":0.7}}})");
-    const SceneObject& m = find(scene, "principled");
-    const Rgb base = value<Rgb>(m, "base_color");  // diffuse (1 - 0.2)
-    EXPECT_FLOAT_EQ(base.r, 0.4f);
-    EXPECT_FLOAT_EQ(base.b, 0.8f);
-    EXPECT_EQ(value<Rgb>(m, "specular_color"), Rgb(0.1f, 0.2f, 0.04f));
-    EXPECT_GT(value<double>(m, "eta"), 500);
-    EXPECT_NEAR(value<double>(m, "roughness"), 0.3, 1e-9);
-    EXPECT_EQ(m.find("metallic"), nullptr);
-    EXPECT_EQ(value<double>(find(scene, "mask"), "opacity"), 0.75);
+    const auto read = [](const char* values) {
+        return with_material(std::string(R"({"alphaMode":"BLEND","extensions":
+            {"KHR_materials_pbrSpecularGlossiness":{"glossinessFactor":0.7,)") +
+                             values + "}}}");
+    };
+    // A dielectric as others are, half of it there.
+    const SceneDescription plastic =
+        read(R"("diffuseFactor":[0.5,0.25,1,0.75],"specularFactor":[0.04,0.04,0.04])");
+    const SceneObject& p = find(plastic, "principled");
+    const Rgb base = value<Rgb>(p, "base_color");
+    EXPECT_NEAR(base.r, 0.5f, 1e-5f);
+    EXPECT_NEAR(base.g, 0.25f, 1e-5f);
+    EXPECT_NEAR(base.b, 1, 1e-5f);
+    EXPECT_NEAR(value<double>(p, "metallic"), 0, 1e-5);
+    EXPECT_NEAR(value<double>(p, "roughness"), 0.3, 1e-9);
+    EXPECT_EQ(value<double>(find(plastic, "mask"), "opacity"), 0.75);
+    // Gold.
+    const SceneDescription gold =
+        read(R"("diffuseFactor":[0,0,0,1],"specularFactor":[1,0.75,0.3])");
+    const SceneObject& g = find(gold, "principled");
+    EXPECT_NEAR(value<double>(g, "metallic"), 1, 1e-5);
+    EXPECT_NEAR(value<Rgb>(g, "base_color").g, 0.75f, 1e-4f);
+    EXPECT_NEAR(value<Rgb>(g, "base_color").b, 0.3f, 1e-4f);
+    // Between them: the colours are those of the mixture.
+    const SceneDescription half =
+        read(R"("diffuseFactor":[0.4,0.4,0.4,1],"specularFactor":[0.3,0.3,0.3])");
+    const SceneObject& h = find(half, "principled");
+    const double m = value<double>(h, "metallic"), b = double(value<Rgb>(h, "base_color").r);
+    EXPECT_GT(m, 0.1);
+    EXPECT_LT(m, 0.9);
+    EXPECT_NEAR(0.96 * b * (1 - m), 0.4 * 0.7, 0.02);
+    EXPECT_NEAR(0.04 * (1 - m) + b * m, 0.3, 0.02);
 }
 
 // What older exporters write, though the format does not allow it.

@@ -330,8 +330,8 @@ Rgb diffuse_albedo(const SceneDescription& description, float cos_o) {
     const Scene scene = build_scene(description);
     const Vec3 wo{std::sqrt(1 - cos_o * cos_o), 0, cos_o}, n{0, 0, 1};
     ComponentArena arena;
-    const Bsdf bsdf = scene.shapes()[0].material->bsdf(
-        {{}, n, n, {1, 0, 0}, {0, 1, 0}, {0.5f, 0.5f}, wo}, arena);
+    const Bsdf bsdf =
+        scene.shapes()[0].material->bsdf({{}, n, n, {1, 0, 0}, {0, 1, 0}, {0.5f, 0.5f}, wo}, arena);
     constexpr int kSteps = 64;
     Rgb sum;
     for (int i = 0; i < kSteps * kSteps; ++i) {
