@@ -379,13 +379,17 @@ async function pathPart() {
         await browser.evaluate("document.querySelector('#editor input[type=checkbox]').click()");
         await idle(browser);
         check(JSON.parse(readFileSync(file)).length === 1 + picked.length && existsSync(join(folder, 'paths-off.json')), 'a path can be switched off');
-        // Also where the page was opened anew in the meantime.
+        // Switched on again in a page that was opened in the meantime.
         const all = await browser.evaluate(`${paths}.length`);
+        await other.open(studio.url);
+        await other.until('studio.state()?.scene', 'the scene in another page');
+        await other.evaluate("document.getElementById('tab-paths').click()");
+        await other.until(`studio.editor() && ${paths}.length === ${all} && !${paths}[${all - 1}].on`, 'it is in the second file');
+        await idle(other);
+        await other.evaluate("[...document.querySelectorAll('#editor input[type=checkbox]')].at(-1).click()");
+        await idle(other);
+        check(JSON.parse(readFileSync(file)).length === all && JSON.parse(readFileSync(join(folder, 'paths-off.json'))).length === 0, 'and then in one file only');
         await browser.evaluate("studio.editor().open('paths.json')");
-        check(await browser.evaluate(`${paths}.length === ${all} && !${paths}[${all - 1}].on`), 'it is in the second file');
-        await browser.evaluate("[...document.querySelectorAll('#editor input[type=checkbox]')].at(-1).click()");
-        await idle(browser);
-        check(JSON.parse(readFileSync(file)).length === all && JSON.parse(readFileSync(join(folder, 'paths-off.json'))).length === 0, 'and in one file only');
         await browser.evaluate("studio.editor().open('other.json')");
         await button('Undo');
         await idle(browser);
