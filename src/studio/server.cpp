@@ -94,7 +94,7 @@ std::string text_of(net::ip::address address) {
 }
 
 /// What the connections share. Threads of the workers may be the last to drop a connection.
-struct Shared {
+struct Common {
     Handler* handler = nullptr;
     std::atomic<int> known = 0, event_streams = 0;
 };
@@ -102,16 +102,16 @@ struct Shared {
 /// One connection: requests are answered one after the other.
 class Connection : public std::enable_shared_from_this<Connection> {
 public:
-    Connection(tcp::socket socket, Shared& shared)
-        : stream_(std::move(socket)), timer_(stream_.get_executor()), handler_(*shared.handler),
-          shared_(shared) {
+    Connection(tcp::socket socket, Common& common)
+        : stream_(std::move(socket)), timer_(stream_.get_executor()), handler_(*common.handler),
+          common_(common) {
         error_code ignored;
         stream_.socket().set_option(tcp::no_delay(true), ignored);
         local_address_ = text_of(stream_.socket().local_endpoint(ignored).address());
     }
     ~Connection() {
-        if (is_known_) --shared_.known;
-        if (is_event_stream_) --shared_.event_streams;
+        if (is_known_) --common_.known;
+        if (is_event_stream_) --common_.event_streams;
     }
 
     bool is_known() const { return is_known_; }
@@ -152,13 +152,13 @@ private:
         Admission admission = handler_.admit(request);
         if (admission.refusal) return write(std::move(*admission.refusal));
         if (admission.has_token && !is_known_) {
-            if (shared_.known >= Server::kMostConnections)
+            if (common_.known >= Server::kMostConnections)
                 return refuse(Reply::error(503, "there are too many connections"));
-            ++shared_.known;
+            ++common_.known;
             is_known_ = true;
         }
         if (admission.is_events) {
-            if (shared_.event_streams < Server::kMostEventStreams) return stream_events();
+            if (common_.event_streams < Server::kMostEventStreams) return stream_events();
             return write(Reply::error(429, fmt::format("{} pages are open already; close one",
                                                        Server::kMostEventStreams)));
         }
@@ -240,7 +240,7 @@ private:
 
     void stream_events() {
         is_event_stream_ = true;
-        ++shared_.event_streams;
+        ++common_.event_streams;
         header_ = {};
         header_.version(11);
         header_.result(http::status::ok);
@@ -288,7 +288,7 @@ private:
     beast::tcp_stream stream_;
     net::steady_timer timer_;
     Handler& handler_;
-    Shared& shared_;
+    Common& common_;
     std::string local_address_;
     beast::flat_buffer buffer_{kMostHeaderBytes + kMostBodyBytes};
     std::optional<Parser> parser_;
@@ -307,7 +307,7 @@ private:
 }  // namespace
 
 struct Server::Impl {
-    Shared shared;  // Outlives the connections, which `io` keeps.
+    Common common;  // Outlives the connections, which `io` keeps.
     std::string address;
     net::io_context io{1};
     tcp::acceptor acceptor{io};
@@ -355,7 +355,7 @@ void Server::Impl::take(tcp::socket socket) {
         if (const auto oldest = strangers.front().lock()) oldest->abort();
         strangers.pop_front();
     }
-    const auto connection = std::make_shared<Connection>(std::move(socket), shared);
+    const auto connection = std::make_shared<Connection>(std::move(socket), common);
     strangers.push_back(connection);
     connection->read();
 }
@@ -465,7 +465,7 @@ std::vector<std::string> Server::urls() const {
 }
 
 Server::Serving Server::start(Handler& handler) {
-    impl_->shared.handler = &handler;
+    impl_->common.handler = &handler;
     impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
     return Serving(*this);
 }
