@@ -42,8 +42,8 @@ void PathState::append(const Vertex& v) {
         x_.back().opacity = material.is_opaque() ? 1 : measure_.scene.opacity(added.location);
     } else {
         added.bsdf = {};
-        if (added.kind == Vertex::Kind::Emitter)
-            x_.back().opacity = added.emitter->opacity(added.uv);
+        // The vertex of an eye path that left the scene belongs to all emitters at infinity.
+        if (added.emitter) x_.back().opacity = added.emitter->opacity(added.uv);
     }
 }
 
