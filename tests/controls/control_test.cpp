@@ -92,10 +92,13 @@ std::vector<Planted> planted() {
                              "<translate x=\"-0.1\" y=\"-0.2\"/>",
                              diffuse("0.7,0.7,0.7"));
     const std::string softly_lit = front_camera(kSize) + room() + large_lamp();
-    const std::string two_lamps =
-        lit_room + sphere("0.5,-0.6,0.3", "0.2",
-                          diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
-                                                   "value=\"3,3,3\"/></emitter>");
+    // Lamps of one power, which a random guide chooses with different probabilities.
+    std::string lamps = front_camera(kSize) + room();
+    for (const char* at :
+         {"-0.6,-0.5,0.2", "0.6,0.1,0.3", "0,0.6,-0.2", "-0.5,0.4,0.4", "0.4,-0.7,0"})
+        lamps += sphere(at, "0.15",
+                        diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                                 "value=\"3,3,3\"/></emitter>");
     // A caustic of a glass ball on the floor, from a lamp that eye paths hit often enough.
     const std::string by_glass = softly_lit + sphere("0,-0.2,0.1", "0.45", kGlass);
     return {
@@ -128,8 +131,9 @@ std::vector<Planted> planted() {
         {"GuideCosineOfSampling", lit_room, "bdpt:roulette=0,guide=random", Lengths, 0},
         {"OriginNotInHits", front_camera(kSize) + room() + "<emitter type=\"constant\"/>",
          "bdpt:roulette=0,guide=random", Lengths, 0},
-        {"EmissionNotInHits", softly_lit, "bdpt:roulette=0,guide=random", Lengths, 0},
-        {"EmissionPmfNotInNextEvent", two_lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
+        {"EmissionNotInHits", front_camera(kSize) + room() + lamp_in_smooth_glass(),
+         "bdpt:roulette=0,guide=random", Lengths, 0},
+        {"EmissionPmfNotInNextEvent", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
         {"CachedGuideLost", lit_room, "bdpt:connections=cache,roulette=0,guide=random", Lengths, 0},
         {"TrialsWithoutGuide", lit_room, "upg+bdpt:radius=0.3,roulette=0,guide=random", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
