@@ -205,6 +205,35 @@ TEST(PiecewiseConstant1D, NoWeightIsUniform) {
     EXPECT_EQ(d.pdf(0.4f), 1);
 }
 
+// However small a value is beside the others, its cell is sampled; cells of zero never are. Positions are monotone in the
+// number, also where many cells share the smallest step of the distribution function.
+TEST(PiecewiseConstant1D, SmallValuesKeepTheirCells) {
+    constexpr int kCells = 5000;
+    std::vector<float> values(kCells, 1e-30f);
+    for (int i = 0; i < kCells; i += 7) values[size_t(i)] = 0;
+    values[4000] = 1;
+    const PiecewiseConstant1D d(values);
+    double sum = 0;
+    for (int i = 0; i < kCells; ++i) {
+        const float pdf = d.pdf((float(i) + 0.5f) / kCells);
+        EXPECT_EQ(pdf > 0, values[size_t(i)] > 0) << i;
+        sum += double(pdf) / kCells;
+    }
+    EXPECT_NEAR(sum, 1, 1e-6);
+    std::vector<bool> is_sampled(kCells);
+    PiecewiseConstant1D::Sample previous{};
+    const auto visit = [&](double u) {
+        const auto s = d.sample(u);
+        EXPECT_GE(s.x, previous.x);
+        EXPECT_EQ(d.pdf(s.x), s.pdf);
+        is_sampled[size_t(s.cell)] = true;
+        previous = s;
+    };
+    for (int i = 0; i < 2 * kCells; ++i) visit((i + 0.5) * 0x1p-32);  // cells before the large one
+    for (int i = 2 * kCells; i > 0; --i) visit(1 - (i - 0.5) * 0x1p-32);  // and behind it
+    for (int i = 0; i < kCells; ++i) EXPECT_EQ(is_sampled[size_t(i)], values[size_t(i)] > 0) << i;
+}
+
 std::vector<float> image(int width, int height) {
     std::vector<float> values;
     for (int y = 0; y < height; ++y)
