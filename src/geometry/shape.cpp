@@ -196,7 +196,8 @@ bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
 
 Vec2 Sphere::parameters(Vec3 local) const {
     const Vec3 n = to_local_.vector(local);
-    return {turns(n.x, n.y), std::acos(clamp(n.z, -1, 1)) / kPi};
+    // Near the poles of a large sphere, acos(n.z) would be far from the point.
+    return {turns(n.x, n.y), std::atan2(std::hypot(n.x, n.y), n.z) / kPi};
 }
 
 // ---- Disk

@@ -83,7 +83,7 @@ TEST_P(MediaOfEnds, LampAcrossTheSurface) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, MediaOfEnds,
-                         ::testing::Values("path", "light", "bdpt", "vcm", "upg", "mlt"),
+                         ::testing::Values("path", "light", "bdpt", "vcm", "upg+bdpt", "mlt"),
                          name_of_integrator);
 
 }  // namespace

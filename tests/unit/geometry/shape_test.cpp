@@ -123,6 +123,28 @@ TEST(AnalyticShapes, ParametersOfHits) {
         }
 }
 
+// Points near the poles and the equator of large spheres are those that the ray met.
+TEST(Sphere, HitsOfLargeSpheresStayInPlace) {
+    testing::Random random(5);
+    constexpr float kRadius = 1e5f;
+    const Vec3 sides[] = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
+    for (const Vec3 side : sides) {
+        const Sphere sphere(side * kRadius * -1.0f, kRadius, false);  // through the origin
+        Accelerator accelerator;
+        accelerator.add_shape(sphere);
+        accelerator.commit();
+        for (int i = 0; i < 1000; ++i) {
+            const Vec3 o = side * 50.0f + random.in_cube() * 30;
+            const Ray ray{o, normalize(random.in_cube() * 40 - o), kInf};
+            RayHit hit;
+            if (!accelerator.intersect(ray, hit)) continue;
+            const Vec3 p = sphere.surface(0, hit.u, hit.v, false).p;
+            // As exact as (u, v) in single precision allow.
+            EXPECT_LT(length(p - (ray.o + ray.d * hit.t)), 6e-7f * kRadius);
+        }
+    }
+}
+
 // The hierarchy may not take more memory than it is given, and says so.
 TEST(Accelerator, MemoryIsBounded) {
     TriangleMesh mesh;
