@@ -242,7 +242,7 @@ TEST_P(LastReplayOf, SumsToTheLastPass) {
         }
         paths += last.paths.size();
     }
-    EXPECT_GT(paths, before.size() / 2);
+    EXPECT_GT(paths, before.size() / 4) << "too few paths to say anything";
     const std::string name = settings.integrator.name;
     EXPECT_EQ(has_pairs, name == "vcm" || name == "sppm" || name.starts_with("upg"));
     // After a discarded pass, its light paths are not those of the last one.
