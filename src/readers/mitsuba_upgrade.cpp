@@ -77,12 +77,20 @@ void upgrade_bitmap(SceneObject& object) {
         if (auto* filter = std::get_if<std::string>(&p.value))
             if (p.name == "filter_type" && (*filter == "ewa" || *filter == "trilinear"))
                 *filter = "bilinear";
-    // Each direction has its own mode, which is `repeat` unless it is given.
-    const Param *u = object.find("wrap_mode_u"), *v = object.find("wrap_mode_v");
+    // Each direction may have its own mode instead of that of both.
+    const auto both = take(object, "wrap_mode"), along_u = take(object, "wrap_mode_u"),
+               along_v = take(object, "wrap_mode_v");
     const ParamValue repeat = std::string("repeat");
-    if (v && v->value == (u ? u->value : repeat)) take(object, "wrap_mode_v");
-    if (u && !v) object.params.push_back({"wrap_mode_v", repeat, u->where});
-    rename(object, "wrap_mode_u", "wrap_mode");
+    const auto value = [&](const std::optional<Param>& own) {
+        return own ? own->value : both ? both->value : repeat;
+    };
+    const SourceLocation where = both      ? both->where
+                                 : along_u ? along_u->where
+                                 : along_v ? along_v->where
+                                           : SourceLocation{};
+    if (both || along_u) object.params.push_back({"wrap_mode", value(along_u), where});
+    if (!(value(along_v) == value(along_u)))
+        object.params.push_back({"wrap_mode_v", value(along_v), where});
 }
 
 /// Rough diffuse: the α of Mitsuba 0.6 is an RMS slope, √2 times the standard deviation of the angle of [Oren & Nayar
