@@ -17,19 +17,26 @@ nb::object view(const Shared<Owner>& owner, const std::vector<T>& values) {
     constexpr size_t kColumns = sizeof(T) / sizeof(Number);
     nb::capsule kept(new Shared<Owner>(owner),
                      [](void* p) noexcept { delete static_cast<Shared<Owner>*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, const Number, nb::ndim<2>>(
-        reinterpret_cast<const Number*>(values.data()), {values.size(), kColumns}, kept));
+    const auto* data = reinterpret_cast<const Number*>(values.data());
+    using Array = nb::ndarray<nb::numpy, const Number>;
+    if (kColumns == 1) return nb::cast(Array(data, {values.size()}, kept));
+    return nb::cast(Array(data, {values.size(), kColumns}, kept));
 }
 
 nb::object to_python(const Shared<MeshData>& mesh) {
+    // All members are named, so that a new one does not compile until dicts have it, or it is left out here. The counts
+    // and notes are those of the reader.
+    const auto& [name, positions, normals, uvs, colors, alphas, triangles, face_normals,
+                 dropped_degenerate, replaced_normals, notes] = *mesh;
     nb::dict d;
-    if (!mesh->name.empty()) d["name"] = mesh->name;
-    d["positions"] = view<float>(mesh, mesh->positions);
-    d["triangles"] = view<uint32_t>(mesh, mesh->triangles);
-    if (!mesh->normals.empty()) d["normals"] = view<float>(mesh, mesh->normals);
-    if (!mesh->uvs.empty()) d["uvs"] = view<float>(mesh, mesh->uvs);
-    if (!mesh->colors.empty()) d["colors"] = view<float>(mesh, mesh->colors);
-    if (mesh->face_normals) d["face_normals"] = true;
+    if (!name.empty()) d["name"] = name;
+    d["positions"] = view<float>(mesh, positions);
+    d["triangles"] = view<uint32_t>(mesh, triangles);
+    if (!normals.empty()) d["normals"] = view<float>(mesh, normals);
+    if (!uvs.empty()) d["uvs"] = view<float>(mesh, uvs);
+    if (!colors.empty()) d["colors"] = view<float>(mesh, colors);
+    if (!alphas.empty()) d["alphas"] = view<float>(mesh, alphas);
+    if (face_normals) d["face_normals"] = true;
     return d;
 }
 
@@ -42,6 +49,7 @@ std::vector<T> rows_of(nb::handle value, const char* dtype, const SourceLocation
     nb::object converted;
     try {
         converted = nb::module_::import_("numpy").attr("ascontiguousarray")(value, dtype);
+        if (kColumns == 1) converted = converted.attr("reshape")(-1, 1);
         array = nb::cast<Array>(converted);
     } catch (const std::exception&) {
         throw SceneError(where,
@@ -66,8 +74,8 @@ bool has_unit_normals(const MeshData& mesh) {
 
 MeshData mesh_of(nb::dict d, const SourceLocation& where) {
     MeshData mesh;
-    const std::vector<std::string> known = {"name", "positions", "triangles",   "normals",
-                                            "uvs",  "colors",    "face_normals"};
+    const std::vector<std::string> known = {"name",   "positions", "triangles", "normals", "uvs",
+                                            "colors", "alphas",    "face_normals"};
     for (const auto& [key, value] : d) {
         const std::string name = nb::cast<std::string>(nb::str(key));
         const SourceLocation at{where.file.str() + "/" + name, 0};
@@ -79,6 +87,8 @@ MeshData mesh_of(nb::dict d, const SourceLocation& where) {
             mesh.normals = rows_of<float, Vec3>(value, "float32", at);
         else if (name == "colors")
             mesh.colors = rows_of<float, Vec3>(value, "float32", at);
+        else if (name == "alphas")
+            mesh.alphas = rows_of<float, float>(value, "float32", at);
         else if (name == "uvs")
             mesh.uvs = rows_of<float, Vec2>(value, "float32", at);
         else if (name == "face_normals")
@@ -98,7 +108,8 @@ MeshData mesh_of(nb::dict d, const SourceLocation& where) {
     }
     for (const auto& [name, count] : {std::pair{"normals", mesh.normals.size()},
                                       {"uvs", mesh.uvs.size()},
-                                      {"colors", mesh.colors.size()}})
+                                      {"colors", mesh.colors.size()},
+          {"alphas", mesh.alphas.size()}})
         if (count > 0 && count != mesh.positions.size())
             throw SceneError(where, fmt::format("there are {} {}, but {} positions", count, name,
                                                 mesh.positions.size()));
@@ -106,6 +117,7 @@ MeshData mesh_of(nb::dict d, const SourceLocation& where) {
     finish_mesh(finished, {}, where);
     // The mesh of a description is finished already, and stays the same to the last bit.
     const bool is_finished = finished.triangles.size() == mesh.triangles.size() &&
+                             finished.positions.size() == mesh.positions.size() &&
                              finished.normals.size() == mesh.normals.size() &&
                              has_unit_normals(mesh);
     return is_finished ? mesh : finished;
