@@ -186,15 +186,22 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer, 
                                                       const nlohmann::json& report) const {
     std::vector<std::string> failures;
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
-    // The image alone needs the least memory and space. The one with layers replaces it.
-    if (attempt(failures,
-                [&] {
-                    write_image_somewhere(image_with_layers(renderer, s, {}, false, report),
-                                          failures);
-                }) &&
-        failures.empty() && (has_variance || !layers.empty()) && !attempt(failures, [&] {
-            write_image(output, image_with_layers(renderer, s, layers, has_variance, report));
-        }))
+    const bool has_layers = has_variance || !layers.empty();
+    const auto write_layers = [&] {
+        write_image(output, image_with_layers(renderer, s, layers, has_variance, report));
+    };
+    // The image alone needs the least memory and space. The one with layers replaces it, except in devices and pipes.
+    std::error_code error;
+    const bool is_in_place =
+        std::filesystem::exists(output, error) && !std::filesystem::is_regular_file(output, error);
+    if (is_in_place && has_layers)
+        attempt(failures, write_layers);
+    else if (attempt(failures,
+                     [&] {
+                         write_image_somewhere(image_with_layers(renderer, s, {}, false, report),
+                                               failures);
+                     }) &&
+             failures.empty() && has_layers && !attempt(failures, write_layers))
         failures.back() += fmt::format("; {} has the image without further layers", output);
     if (!techniques.empty()) attempt(failures, [&] { write_techniques(renderer, s, techniques); });
     if (!stats.empty()) attempt(failures, [&] { write_file(stats, json_text(report)); });

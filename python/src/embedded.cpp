@@ -74,8 +74,8 @@ bool has_unit_normals(const MeshData& mesh) {
 
 MeshData mesh_of(nb::dict d, const SourceLocation& where) {
     MeshData mesh;
-    const std::vector<std::string> known = {"name",   "positions", "triangles", "normals", "uvs",
-                                            "colors", "alphas",    "face_normals"};
+    const std::vector<std::string> known = {"name", "positions", "triangles", "normals",
+                                            "uvs",  "colors",    "alphas",    "face_normals"};
     for (const auto& [key, value] : d) {
         const std::string name = nb::cast<std::string>(nb::str(key));
         const SourceLocation at{where.file.str() + "/" + name, 0};
@@ -109,7 +109,7 @@ MeshData mesh_of(nb::dict d, const SourceLocation& where) {
     for (const auto& [name, count] : {std::pair{"normals", mesh.normals.size()},
                                       {"uvs", mesh.uvs.size()},
                                       {"colors", mesh.colors.size()},
-          {"alphas", mesh.alphas.size()}})
+                                      {"alphas", mesh.alphas.size()}})
         if (count > 0 && count != mesh.positions.size())
             throw SceneError(where, fmt::format("there are {} {}, but {} positions", count, name,
                                                 mesh.positions.size()));

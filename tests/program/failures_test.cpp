@@ -193,9 +193,10 @@ TEST_F(FailuresTest, NamesThatAreNotUtf8LoseNothing) {
 }
 
 TEST_F(FailuresTest, InterruptedVerificationsKeepWhatTheyHave) {
-    const Arguments arguments = {
-        "verify", scene, "--resolution", "8x8",  "--methods", "path",  "bdpt",   "--spp", "4",
-        "--runs", "8",   "--lengths",    "1..2", "--detect",  "0.01%", "--json", stats};
+    const Arguments arguments = {"verify", scene,       "--resolution", "8x8",      "--methods",
+                                 "path",   "bdpt",      "--spp",        "4",        "--runs",
+                                 "8",      "--lengths", "1..2",         "--detect", "0.01%",
+                                 "--json", stats,       "--alpha",      "1e-6"};
     const Program early = start({"verify", scene, "--time", "600", "--json", stats}, "", "");
     wait_for_start(early);
     early.interrupt();

@@ -52,7 +52,8 @@ TEST(Verify, KeepsWhatWasCompleteWhenItIsInterrupted) {
     EXPECT_FALSE(whole.interrupted);
     ASSERT_EQ(whole.methods.size(), 2u);
     size_t most = 0;
-    for (int stop_at = 1; stop_at < lines; stop_at += 3) {
+    // Not the last runs, which may be over when the flag is set.
+    for (int stop_at = 1; stop_at < lines - 4; stop_at += 3) {
         std::atomic<bool> interrupted{false};
         options.interrupted = &interrupted;
         int line = 0;
