@@ -60,7 +60,10 @@ Source source_of(const std::string& path) {
 std::unique_ptr<OIIO::ImageInput> open_input(const Source& source) {
     OIIO::ImageSpec config;
     config["oiio:UnassociatedAlpha"] = 1;  // the file's own colours, not premultiplied
-    auto input = OIIO::ImageInput::open(source.file, &config, source.memory);
+    // As a parameter of open(), the readers of PNG and JPEG would not see it.
+    if (source.memory)
+        config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, static_cast<const void*>(&source.memory));
+    auto input = OIIO::ImageInput::open(source.file, &config);
     if (!input) fail_read(source.name, one_line(OIIO::geterror()));
     const OIIO::ImageSpec& spec = input->spec();
     if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep)
@@ -166,14 +169,14 @@ void write_exr(OutputFile& file, const Image& image, ExrPrecision precision) {
     FileProxy target(file);
     const auto output = OIIO::ImageOutput::create("openexr", &target);
     if (!output) file.fail(one_line(OIIO::geterror()));
-    if (!output->open("image.exr", spec)) file.fail(one_line(output->geterror()));
     const bool written =
+        output->open("image.exr", spec) &&
         output->write_image(OIIO::TypeFloat, half ? clamped.data() : image.data.data());
-    const std::string why = written ? "" : one_line(output->geterror());
+    std::string why = written ? "" : one_line(output->geterror());
     const bool closed = output->close();
+    if (written && !closed) why = one_line(output->geterror());
     // Where the file has the reason, its commit() says it better.
-    if ((!written || !closed) && file.is_good())
-        file.fail(written ? one_line(output->geterror()) : why);
+    if (!why.empty() && file.is_good()) file.fail(why);
 }
 
 Image read_image(const std::string& path) {
