@@ -21,7 +21,8 @@ struct Constant final : PrimarySource {
 /// A proposal is kept with the probability density / bound, also if it is less than 2^-24.
 TEST(Thinning, KeepsImprobableEventsAsRarelyAsItShould) {
     const Scene scene =
-        test::build(test::front_camera(1) + test::rectangle("", test::diffuse("0.5,0.5,0.5")));
+        test::build(test::front_camera(1) +
+                    test::rectangle("<scale value=\"5\"/>", test::diffuse("0.5,0.5,0.5")));
     const Film film(scene.film(), scene.filter());
     const TechniqueCounts counts;
     RenderStats stats;
