@@ -254,16 +254,15 @@ TEST_P(LastReplayOf, SumsToTheLastPass) {
     EXPECT_THROW(replay_last(renderer, 27, 1), std::runtime_error);
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, LastReplayOf,
-                         // Roulette has the thresholds of the pass.
-                         ::testing::Values("vcm:roulette=0,radius=0.3", "vcm:roulette=1,radius=0.3",
-                                           "upg:roulette=0,radius=0.3", "upg:roulette=1,radius=0.3",
-                                           "upg+bdpt:roulette=0,radius=0.3",
-                                           "upg+bdpt:roulette=1,radius=0.3", "pcbpt:roulette=0",
-                                           "pcbpt:roulette=1", "pcbpt:eorr=true",
-                                           "bdpt:connections=cache,roulette=0",
-                                           "bdpt:connections=cache,roulette=1", "path:guide=on",
-                                           "sppm:radius=0.3"));
+INSTANTIATE_TEST_SUITE_P(
+    Methods, LastReplayOf,
+    // Roulette has the thresholds of the pass.
+    ::testing::Values("vcm:roulette=0,radius=0.3", "vcm:roulette=0.3,radius=0.3",
+                      "upg:roulette=0,radius=0.3", "upg:roulette=0.3,radius=0.3",
+                      "upg+bdpt:roulette=0,radius=0.3", "upg+bdpt:roulette=0.3,radius=0.3",
+                      "pcbpt:roulette=0", "pcbpt:roulette=0.3", "pcbpt:eorr=true",
+                      "bdpt:connections=cache,roulette=0", "bdpt:connections=cache,roulette=0.3",
+                      "path:guide=on", "sppm:radius=0.3"));
 
 }  // namespace
 }  // namespace etendue::test
