@@ -137,7 +137,8 @@ void StudioCommand::print_urls(const Server& server, const std::string& token) c
     for (const std::string& host : hosts) urls.push_back(server.url(host));
     for (std::string& url : server.urls()) urls.push_back(std::move(url));
     for (const std::string& url : urls) fmt::print("{}/#token={}\n", url, token);
-    std::fflush(stdout);
+    if (std::fflush(stdout) != 0 || std::ferror(stdout))
+        throw std::runtime_error("the address of the page cannot be printed");
     if (!server.is_local())
         message("warning: {} can be reached from other machines, without encryption\n", listen);
 }
