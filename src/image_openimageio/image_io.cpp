@@ -62,7 +62,8 @@ std::unique_ptr<OIIO::ImageInput> open_input(const Source& source) {
     config["oiio:UnassociatedAlpha"] = 1;  // the file's own colours, not premultiplied
     // As a parameter of open(), the readers of PNG and JPEG would not see it.
     if (source.memory)
-        config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, static_cast<const void*>(&source.memory));
+        config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR,
+                         static_cast<const void*>(&source.memory));
     auto input = OIIO::ImageInput::open(source.file, &config);
     if (!input) fail_read(source.name, one_line(OIIO::geterror()));
     const OIIO::ImageSpec& spec = input->spec();
