@@ -17,6 +17,10 @@ void* operator new(size_t size) {
     if (void* p = std::malloc(size > 0 ? size : 1)) return p;
     throw std::bad_alloc();
 }
+// Also this one, as of std::stable_sort: sanitizers compare how a block was obtained and given back.
+void* operator new(size_t size, const std::nothrow_t&) noexcept {
+    return std::malloc(size > 0 ? size : 1);
+}
 void operator delete(void* p) noexcept {
     std::free(p);
 }
