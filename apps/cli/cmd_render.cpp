@@ -32,7 +32,7 @@ namespace {
 
 struct RenderCommand {
     SceneOptions scene;
-    std::string output = "out.exr", integrator, sampler, techniques, preview, stats;
+    std::string output = "out.exr", integrator, sampler, filter_mode = "sample", techniques, preview, stats;
     std::vector<std::string> aovs;
     uint64_t seed = 0, spp = 0;
     double seconds = 0, error = 0;
@@ -132,6 +132,11 @@ RenderSettings RenderCommand::settings_for(const Scene& s) const {
     RenderSettings settings;
     settings.integrator = choose_integrator(s, integrator);
     settings.sampler = parse_sampler(sampler);
+    const auto mode = etendue::filter_mode(filter_mode);
+    if (!mode)
+        throw std::runtime_error(
+            fmt::format("--filter-mode must be spread or sample, but is \"{}\"", filter_mode));
+    settings.filter_mode = *mode;
     settings.seed = seed;
     settings.threads = threads;
     if (spp > 0) settings.spp = spp;
@@ -296,6 +301,10 @@ void add_render_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
+    c.add_option("--filter-mode", command->filter_mode,
+                 "sample: an eye path contributes to its own pixel, with a film point drawn from the filter; "
+                 "spread: to all pixels that the filter reaches")
+        ->capture_default_str();
     add_sampler_option(c, command->sampler, "; with sobol the error estimate is an upper bound");
     c.add_option("--threads", command->threads, "Number of threads; 0: one per core")
         ->capture_default_str()

@@ -267,7 +267,8 @@ public:
     }
     std::pair<int, int> pixel() const {
         const int w = context().scene.film().crop_width;
-        return {int(context().pixel % uint64_t(w)), int(context().pixel / uint64_t(w))};
+        const uint64_t pixel = context().film.pixel_of(context().pixel);
+        return {int(pixel % uint64_t(w)), int(pixel / uint64_t(w))};
     }
     PathPtr eye_path(std::optional<int> max_vertices, std::optional<int> rr_depth) {
         const WalkContext walk{context().scene, counts_, work_->stats,
@@ -404,7 +405,7 @@ public:
     PathRecorder(const Scene& scene, size_t count, size_t most_vertices)
         : scene_(scene), count_(count), most_vertices_(most_vertices) {}
 
-    void observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
+    void observe(const Join& join, Rgb contribution, float share, const FilmTarget& target,
                  const Workspace& work) override {
         const Technique& q = join.technique;
         if (records.size() >= count_ || size_t(q.vertices()) > most_vertices_ ||
@@ -416,7 +417,7 @@ public:
         records.push_back({q.s,
                            q.t,
                            int32_t(q.strategy),
-                           q.t <= 1 ? int32_t(scene_.film().pixel_at(join.film)) : int32_t(pixel),
+                           int32_t(target.pixel.value_or(scene_.film().pixel_at(target.point))),
                            q.vertices(),
                            join.mis_weight,
                            {c.r, c.g, c.b},
@@ -772,7 +773,9 @@ void bind_core(nb::module_& m) {
         m, "Sample",
         "What an integrator has for one sample: the pixel, random numbers, walks, joins, "
         "and the film. Only valid during the call of sample().")
-        .def_prop_ro("pixel", &Sample::pixel, "Column and row of the eye path's pixel.")
+        .def_prop_ro("pixel", &Sample::pixel,
+                     "Column and row of the eye path's pixel; of the nearest pixel for an eye path "
+                     "beside the image, whose filter reaches into it.")
         .def("eye_path", &Sample::eye_path, "max_vertices"_a = nb::none(),
              "rr_depth"_a = nb::none(),
              "Walks from the lens through the pixel: z_0 on the lens, z_1 the first surface, ... "

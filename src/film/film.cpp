@@ -6,13 +6,15 @@
 namespace etendue {
 
 Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
-           double typical_radiance)
-    : geometry_(geometry), filter_(filter), pass_(geometry_, filter_, typical_radiance),
+           double typical_radiance, FilterMode mode)
+    : geometry_(geometry), filter_(filter), spreads_(mode == FilterMode::Spread && filter.is_wide()),
+      grid_(geometry, filter, {0.5f, 0.5f}), pass_(geometry_, filter_, typical_radiance),
       moments_(geometry.pixel_count()), expected_(geometry), expected_in_last_pass_(geometry),
       previous_(geometry.pixel_count()) {}
 
-void Film::begin_pass(uint64_t light_paths) {
-    pass_.begin(light_paths);
+void Film::begin_pass(uint64_t light_paths, Vec2 offset) {
+    if (spreads_) grid_ = SampleGrid(geometry_, filter_, offset);
+    pass_.begin(light_paths, spreads_ ? &grid_ : nullptr);
     if (!pass_.has_splats()) return;
     // This also allocates the blocks of the second one, into which the pass is folded.
     for (ExpectedLuminance* e : {&expected_, &expected_in_last_pass_})
@@ -40,17 +42,16 @@ void Film::set_groups(int count) {
 }
 
 void Film::end_pass(double splat_factor) {
-    if (has_groups()) keep_eye_values();
+    const std::span<const Rgb> eye = pass_.finish_eye();
+    if (has_groups()) keep_luminance(eye);
     fold(pass_.finish(), splat_factor);
     rejected_ += pass_.rejected();
     pass_.clear();
 }
 
-void Film::keep_eye_values() {
-    const std::span<const Rgb> eye = pass_.eye_values();
+void Film::keep_luminance(std::span<const Rgb> eye) {
     for_film_chunks(eye.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
-        for (uint64_t i = begin; i < end; ++i)
-            previous_[i] = is_finite(eye[i]) ? luminance(eye[i]) : 0.0f;
+        for (uint64_t i = begin; i < end; ++i) previous_[i] = luminance(eye[i]);
     });
 }
 

@@ -28,28 +28,37 @@ public:
     /// `typical_radiance`: an estimate of the scene's radiance within a factor of about 1000. The absolute precision of
     /// splats is 2^-40 of it.
     Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
-         double typical_radiance = 1);
+         double typical_radiance = 1, FilterMode mode = FilterMode::Sample);
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;
 
-    /// Memory of a film, by pixel. `groups`: see set_groups().
+    /// Memory of a film, by pixel, at most. `groups`: see set_groups().
     static uint64_t bytes_per_pixel(bool has_splats, int groups) {
-        return sizeof(Moments) + sizeof(Rgb) + (3 + uint64_t(groups)) * sizeof(float) +
+        return sizeof(Moments) + 2 * sizeof(Rgb) + (3 + uint64_t(groups)) * sizeof(float) +
                (has_splats ? 3 * sizeof(int64_t) : 0);
     }
 
     const FilmGeometry& geometry() const { return geometry_; }
     const ReconstructionFilter& filter() const { return filter_; }
 
-    /// Film point of the eye path of pixel `index`, and the factor of its contribution.
+    /// Whether the film points of a pass are a grid, and eye paths contribute to all pixels that the filter reaches.
+    bool spreads() const { return spreads_; }
+    /// Number of samples of a pass, each with one eye path: one per pixel, and those of the grid's margin.
+    uint64_t sample_count() const { return spreads_ ? grid_.count() : geometry_.pixel_count(); }
+    /// Film point of the eye path of sample `index`, and the factor of its contribution. Sample i is that of pixel i;
+    /// those from pixel_count() on lie outside the crop. `u` is not used if the film spreads().
     struct PixelSample {
         Vec2 point;
         float weight;
     };
     PixelSample sample_pixel(uint64_t index, Vec2 u) const {
+        if (spreads_) return {grid_.point(index), 1};
         const auto s = filter_.sample(u);
         return {geometry_.pixel_center(index) + s.offset, s.weight};
     }
+    /// Calls `use(index, h)` for the samples of the current pass that contribute to a pixel; h is their factor.
+    template <class Use>
+    void for_each_sample_of(uint64_t pixel, const Use& use) const;
 
     /// A film point, uniformly distributed in the crop enlarged by the filter's radius. The weight is the area of this
     /// region, in pixels. It applies to splats, which are distributed to all pixels whose filter reaches the point.
@@ -65,10 +74,11 @@ public:
 
     // -- The current pass.
 
-    /// `light_paths`: number of light paths of this pass, by which splats are divided; 0 if there are none.
-    void begin_pass(uint64_t light_paths);
-    /// Adds the eye path's value (already times PixelSample::weight) to its own pixel.
-    void add_eye(uint64_t pixel, Rgb value) { pass_.add_eye(pixel, value); }
+    /// `light_paths`: number of light paths of this pass, by which splats are divided; 0 if there are none. `offset`: of
+    /// the film points in their pixels if the film spreads(), uniformly distributed in [0, 1)².
+    void begin_pass(uint64_t light_paths, Vec2 offset = {0.5f, 0.5f});
+    /// Adds the eye path's value (already times PixelSample::weight) of a sample.
+    void add_eye(uint64_t index, Rgb value) { pass_.add_eye(index, value); }
     /// Adds the contribution of a light path at a film point, distributed to all pixels whose filter reaches it.
     /// `value` is for one light path; it is divided by the number of light paths.
     void add_splat(Vec2 point, Rgb value) { pass_.add_splat(point, value); }
@@ -87,6 +97,10 @@ public:
     const ExpectedLuminance& expected() const { return expected_; }
     /// What samples of the last finished pass knew.
     const ExpectedLuminance& expected_in_last_pass() const { return expected_in_last_pass_; }
+    /// The pixel of a sample; the nearest one for samples outside the crop.
+    uint64_t pixel_of(uint64_t index) const {
+        return index < geometry_.pixel_count() ? index : geometry_.pixel_at(grid_.point(index));
+    }
     /// Mean of all passes.
     std::vector<Rgb> image() const;
     /// Variance of that mean, per pixel and channel; zero with fewer than two passes.
@@ -119,7 +133,7 @@ private:
         return (passes_ + group_sums_.size() - 1 - group) / group_sums_.size();
     }
     /// Stores the luminance of the eye paths' contributions in previous_.
-    void keep_eye_values();
+    void keep_luminance(std::span<const Rgb> eye);
     /// Squared error of the mean luminance of a pixel, estimated from the groups 2·pair and 2·pair + 1.
     double group_error2(size_t pair, size_t pixel) const;
     ErrorEstimate group_error() const;
@@ -127,6 +141,8 @@ private:
 
     FilmGeometry geometry_;
     ReconstructionFilter filter_;
+    bool spreads_;
+    SampleGrid grid_;  ///< Of the current or last pass.
     PassImage pass_;
     std::vector<Moments> moments_;
     ExpectedLuminance expected_, expected_in_last_pass_;
@@ -139,5 +155,20 @@ private:
     std::vector<std::vector<float>> group_sums_;  ///< Sums of luminance, by group and pixel.
     uint64_t passes_ = 0, rejected_ = 0;
 };
+
+template <class Use>
+void Film::for_each_sample_of(uint64_t pixel, const Use& use) const {
+    if (!spreads_) {
+        use(pixel, 1.0f);
+        return;
+    }
+    const auto [column, row] = grid_.cell(pixel);
+    const ReconstructionFilter::Taps x = filter_.taps(grid_.offset().x),
+                                     y = filter_.taps(grid_.offset().y);
+    for (int j = 0; j < y.count; ++j)
+        for (int i = 0; i < x.count; ++i)
+            if (const float h = x.weight[size_t(i)] * y.weight[size_t(j)]; h != 0)
+                use(grid_.index(column - x.first - i, row - y.first - j), h);
+}
 
 }  // namespace etendue

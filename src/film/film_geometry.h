@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <utility>
 
 #include "film/filter.h"
@@ -61,24 +62,33 @@ inline FilmRegion reached_region(const FilmGeometry& g, const ReconstructionFilt
 template <class Use>
 void for_each_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point,
                     const Use& use) {
-    // Pixels i with |point - (i + 1/2)| ≤ r, clamped before the conversion, because an integer cannot represent every
-    // float.
-    const float r = filter.radius();
-    const auto first = [r](float at, int begin, int end) {
-        return int(std::min(std::max(float(begin), std::ceil(at - r - 0.5f)), float(end)));
-    };
-    const auto last = [r](float at, int begin, int end) {
-        return int(std::min(std::max(float(begin - 1), std::floor(at + r - 0.5f)), float(end - 1)));
-    };
-    const int left = g.crop_x, right = g.crop_x + g.crop_width;
-    const int top = g.crop_y, bottom = g.crop_y + g.crop_height;
-    const int x0 = first(point.x, left, right), x1 = last(point.x, left, right);
-    const int y0 = first(point.y, top, bottom), y1 = last(point.y, top, bottom);
-    for (int y = y0; y <= y1; ++y)
-        for (int x = x0; x <= x1; ++x) {
-            const float h = filter.eval({point.x - (float(x) + 0.5f), point.y - (float(y) + 0.5f)});
-            if (h != 0) use(g.pixel_index(x - g.crop_x, y - g.crop_y), h);
-        }
+    // Also false for what is not a number, and for what no integer can represent.
+    if (!reached_region(g, filter).contains(point)) return;
+    const ReconstructionFilter::Taps x = filter.taps(point.x - float(g.crop_x)),
+                                     y = filter.taps(point.y - float(g.crop_y));
+    const int left = std::max(0, -x.first), right = std::min(x.count, g.crop_width - x.first);
+    const int top = std::max(0, -y.first), bottom = std::min(y.count, g.crop_height - y.first);
+    for (int j = top; j < bottom; ++j) {
+        const float hy = y.weight[size_t(j)];
+        if (hy == 0) continue;
+        for (int i = left; i < right; ++i)
+            if (const float h = x.weight[size_t(i)] * hy; h != 0)
+                use(g.pixel_index(x.first + i, y.first + j), h);
+    }
+}
+
+/// What a contribution is added to: one pixel, or all pixels that the filter reaches from a film point.
+struct FilmTarget {
+    Vec2 point;
+    std::optional<uint64_t> pixel = {};
+};
+template <class Use>
+void for_each_pixel(const FilmGeometry& g, const ReconstructionFilter& filter,
+                    const FilmTarget& target, const Use& use) {
+    if (target.pixel)
+        use(*target.pixel, 1.0f);
+    else
+        for_each_pixel(g, filter, target.point, use);
 }
 
 }  // namespace etendue

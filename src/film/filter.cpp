@@ -44,16 +44,28 @@ double lanczos_shape(double x, double lobes, double) {
 ReconstructionFilter::ReconstructionFilter(const char* name, float radius,
                                            double (*shape)(double, double, double), double a,
                                            double b)
-    : name_(name), radius_(radius), shape_(shape), a_(a), b_(b), cdf_(kSteps + 1, 0.0) {
+    : name_(name), radius_(std::ceil(radius * kStepsPerPixel) / kStepsPerPixel),
+      reach_(int(std::ceil(radius))), cdf_(kSteps + 1, 0.0) {
+    const auto shape_at = [&](double x) {
+        return std::fabs(x) < double(radius) ? shape(x, a, b) : 0.0;
+    };
     // Midpoint rule; the shapes are smooth between the steps.
-    double signed_sum = 0;
-    const double step = 2.0 * radius / kSteps;
-    for (int i = 0; i < kSteps; ++i) {
-        const double h = shape(-double(radius) + (i + 0.5) * step, a, b);
-        signed_sum += h * step;
-        cdf_[i + 1] = cdf_[i] + std::fabs(h) * step;
+    double step = 2.0 * radius / kSteps;
+    double integral = 0;
+    for (int i = 0; i < kSteps; ++i) integral += shape_at(-double(radius) + (i + 0.5) * step) * step;
+
+    for (int i = 0; i <= kStepsPerPixel; ++i) {
+        const double f = double(i) / kStepsPerPixel;
+        double sum = 0;
+        for (int k = 1 - reach_; k <= reach_; ++k) sum += shape_at(f - k);
+        for (int k = 1 - reach_; k <= reach_; ++k)
+            table_.push_back(float(shape_at(f - k) / (is_wide() ? sum : integral)));
     }
-    scale_ = 1 / signed_sum;
+
+    step = 2.0 * radius_ / kSteps;
+    for (int i = 0; i < kSteps; ++i)
+        cdf_[i + 1] =
+            cdf_[i] + std::fabs(double(eval_1d(float(-double(radius_) + (i + 0.5) * step))));
     for (double& c : cdf_) c /= cdf_.back();
 }
 
@@ -64,7 +76,13 @@ ReconstructionFilter ReconstructionFilter::box() {
 }
 
 float ReconstructionFilter::eval_1d(float x) const {
-    return std::fabs(x) < radius_ ? float(shape_(x, a_, b_) * scale_) : 0.0f;
+    if (!(std::fabs(x) < radius_)) return 0;
+    const float floor = std::floor(x);
+    const float steps = (x - floor) * kStepsPerPixel;
+    const int step = std::min(int(steps), kStepsPerPixel - 1);
+    const int k = reach_ - 1 - int(floor);  // x = f - (k + 1 - reach)
+    const float a = row(step)[k];
+    return a + (steps - float(step)) * (row(step + 1)[k] - a);
 }
 
 float ReconstructionFilter::eval(Vec2 o) const {
@@ -72,17 +90,16 @@ float ReconstructionFilter::eval(Vec2 o) const {
     return eval_1d(o.x) * eval_1d(o.y);
 }
 
-/// The inverse of the tabulated CDF; `sign` becomes h/density over the absolute integral: exact for the true h, since
-/// the density is that of the table's cell.
+/// The inverse of the tabulated CDF. `factor` becomes h/density: exact, since the density is that of the table's cell.
 float ReconstructionFilter::sample_1d(float u, float& factor) const {
     const auto it = std::upper_bound(cdf_.begin() + 1, cdf_.end() - 1, double(u));
     const int i = int(it - cdf_.begin()) - 1;
     const double mass = cdf_[i + 1] - cdf_[i];
     const double f = mass > 0 ? std::min((u - cdf_[i]) / mass, 1.0) : 0.5;
     const double step = 2.0 * radius_ / kSteps;
-    const double x = -double(radius_) + (i + f) * step;
-    factor = mass > 0 ? float(shape_(x, a_, b_) * scale_ * step / mass) : 0.0f;
-    return float(x);
+    const float x = float(-double(radius_) + (i + f) * step);
+    factor = mass > 0 ? float(double(eval_1d(x)) * step / mass) : 0.0f;
+    return x;
 }
 
 ReconstructionFilter::Sample ReconstructionFilter::sample(Vec2 u) const {

@@ -1,13 +1,17 @@
 #include "film/pass_image.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include "film/parallel_chunks.h"
 
 namespace etendue {
 
-void PassImage::begin(uint64_t light_paths) {
+void PassImage::begin(uint64_t light_paths, const SampleGrid* grid) {
     if (light_paths > 0 && !splats_)
         splats_ = std::make_unique<SplatBuffer>(geometry_.pixel_count(), typical_radiance_);
     splat_scale_ = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
+    grid_ = grid;
+    if (grid_) samples_.resize(grid_->count());
 }
 
 void PassImage::add_splat(Vec2 point, Rgb value) {
@@ -20,23 +24,62 @@ void PassImage::add_splat(Vec2 point, Rgb value) {
                    [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); });
 }
 
+void PassImage::reject_if_not_finite(Rgb& value) {
+    if (is_finite(value)) return;
+    rejected_.fetch_add(1, std::memory_order_relaxed);
+    value = Rgb();
+}
+
+std::span<const Rgb> PassImage::finish_eye() {
+    std::vector<Rgb>& values = grid_ ? samples_ : pixels_;
+    for_film_chunks(values.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+        for (uint64_t i = begin; i < end; ++i) reject_if_not_finite(values[i]);
+    });
+    if (grid_) spread();
+    return pixels_;
+}
+
+void PassImage::spread() {
+    // All points have the same offset in their pixels, so all have the same weights: a separable convolution. Pixel
+    // (i, j) has the weights in reverse order on the points (i, j) … (i + taps - 1, j + taps - 1) of the grid.
+    const ReconstructionFilter::Taps x = filter_.taps(grid_->offset().x),
+                                     y = filter_.taps(grid_->offset().y);
+    const auto columns = size_t(grid_->columns()), width = size_t(geometry_.crop_width);
+    tbb::enumerable_thread_specific<std::vector<Rgb>> lines;
+    tbb::parallel_for(0, geometry_.crop_height, [&](int j) {
+        std::vector<Rgb>& line = lines.local();
+        line.assign(columns, Rgb());
+        for (int k = 0; k < y.count; ++k) {
+            const float h = y.weight[size_t(y.count - 1 - k)];
+            const Rgb* row = &samples_[size_t(j + k) * columns];
+            for (size_t i = 0; i < columns; ++i) line[i] += row[i] * h;
+        }
+        Rgb* pixels = &pixels_[size_t(j) * width];
+        for (int k = 0; k < x.count; ++k) {
+            const float h = x.weight[size_t(x.count - 1 - k)];
+            for (size_t i = 0; i < width; ++i) pixels[i] += line[i + size_t(k)] * h;
+        }
+    });
+}
+
 std::span<const Rgb> PassImage::finish() {
-    if (splats_) splats_->fold_into(pixels_);
+    if (!splats_) return pixels_;
+    splats_->fold_into(pixels_);
     for_film_chunks(pixels_.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
-        for (uint64_t i = begin; i < end; ++i)
-            if (!is_finite(pixels_[i])) {
-                rejected_.fetch_add(1, std::memory_order_relaxed);
-                pixels_[i] = Rgb();
-            }
+        for (uint64_t i = begin; i < end; ++i) reject_if_not_finite(pixels_[i]);
     });
     return pixels_;
 }
 
 void PassImage::clear() {
+    const auto clear = [](std::vector<Rgb>& values) {
+        for_film_chunks(values.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+            std::fill(values.begin() + ptrdiff_t(begin), values.begin() + ptrdiff_t(end), Rgb());
+        });
+    };
     if (splats_) splats_->clear();
-    for_film_chunks(pixels_.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
-        std::fill(pixels_.begin() + ptrdiff_t(begin), pixels_.begin() + ptrdiff_t(end), Rgb());
-    });
+    clear(samples_);
+    clear(pixels_);
     rejected_.store(0, std::memory_order_relaxed);
 }
 

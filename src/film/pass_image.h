@@ -6,13 +6,23 @@
 #include <span>
 #include <vector>
 
-#include "film/film_geometry.h"
+#include "film/sample_grid.h"
 #include "film/splat_buffer.h"
 
 namespace etendue {
 
+/// What the sample of an eye path contributes to.
+enum class FilterMode {
+    /// To all pixels that the filter reaches from its film point. The film points of a pass are a grid with one common
+    /// offset. The error of the image is smaller, and the errors of neighbouring pixels are correlated.
+    Spread,
+    /// To its own pixel alone: film points are drawn from the pixel's filter [Ernst et al. 2006]. The errors of pixels
+    /// are independent, which denoisers expect.
+    Sample,
+};
+
 /// The image of the current pass, separate from the film's totals, so that the pass can be discarded. The eye
-/// contributions of a pixel come from one thread at a time; splats may come from any thread. `geometry` and `filter`
+/// contributions of a sample come from one thread at a time; splats may come from any thread. `geometry` and `filter`
 /// must outlive it.
 class PassImage {
 public:
@@ -21,16 +31,20 @@ public:
         : geometry_(geometry), filter_(filter), typical_radiance_(typical_radiance),
           pixels_(geometry.pixel_count()) {}
 
-    /// `light_paths`: number of light paths of the pass; 0 if there are none.
-    void begin(uint64_t light_paths);
-    void add_eye(uint64_t pixel, Rgb value) { pixels_[pixel] += value; }
+    /// `light_paths`: number of light paths of the pass; 0 if there are none. `grid`: the film points of the eye paths,
+    /// if their contributions are spread by the filter.
+    void begin(uint64_t light_paths, const SampleGrid* grid);
+    /// Adds to the sample `index`: a point of the grid, or else a pixel.
+    void add_eye(uint64_t index, Rgb value) {
+        (grid_ ? samples_[grid_->place(index)] : pixels_[index]) += value;
+    }
     void add_splat(Vec2 point, Rgb value);
     void prefetch_splat(Vec2 point) const { splats_->prefetch(geometry_.pixel_at(point)); }
     bool has_splats() const { return splats_ != nullptr; }
 
-    /// The contributions of eye paths; valid until finish().
-    std::span<const Rgb> eye_values() const { return pixels_; }
-    /// The finished image. Pixels that are not finite become 0 and are counted as rejected.
+    /// The image of the eye paths alone. Values that are not finite become 0 and are counted as rejected.
+    std::span<const Rgb> finish_eye();
+    /// The finished image; after finish_eye().
     std::span<const Rgb> finish();
     /// Number of values that were not finite and were left out.
     uint64_t rejected() const { return rejected_.load(std::memory_order_relaxed); }
@@ -38,9 +52,15 @@ public:
     void clear();
 
 private:
+    void reject_if_not_finite(Rgb& value);
+    /// Adds the samples to the pixels.
+    void spread();
+
     const FilmGeometry& geometry_;
     const ReconstructionFilter& filter_;
     double typical_radiance_;
+    const SampleGrid* grid_ = nullptr;
+    std::vector<Rgb> samples_;  ///< Of the grid, row by row.
     std::vector<Rgb> pixels_;
     std::unique_ptr<SplatBuffer> splats_;  ///< Made by the first pass that has light paths.
     float splat_scale_ = 0;                ///< 1 / N_L

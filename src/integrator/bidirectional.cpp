@@ -48,8 +48,8 @@ void Bidirectional::trace_light_path(const SampleContext& c, const TechniqueCoun
 void Bidirectional::trace_further_light_paths(const SampleContext& c, const TechniqueCounts& counts,
                                               Workspace& work) const {
     if (c.is_of_whole_film) return;
-    const uint64_t pixels = c.scene.film().pixel_count();
-    for (uint64_t path = c.pixel + pixels; path < c.light_paths; path += pixels) {
+    const uint64_t samples = c.film.sample_count();
+    for (uint64_t path = c.pixel + samples; path < c.light_paths; path += samples) {
         Sampler sampler = c.sampler;
         sampler.start(path);
         trace_light_path(c.with(sampler, c.sink), counts, work);
@@ -60,7 +60,7 @@ namespace {
 
 void start_eye_path(const SampleContext& c, const WalkContext& walk, SubPath& z) {
     c.sampler.seek(Stream::Eye, 0);
-    const Film::PixelSample at = c.film_sample(c.sampler.next_2d());
+    const Film::PixelSample at = c.film_sample(c.sampler.next_2d_if(c.needs_film_number()));
     const Vec2 u_lens = c.sampler.next_2d_if(c.scene.sensor().has_finite_lens());
     etendue::start_eye_path(walk, at, u_lens, c.sampler, z);
 }
@@ -151,9 +151,9 @@ void Bidirectional::learn(const LearnContext& pass) {
 
 float Bidirectional::threshold(const SampleContext& c, const Vec2* film) const {
     if (!thresholds_.empty())
-        return thresholds_[film ? c.film.geometry().pixel_at(*film) : c.pixel];
+        return thresholds_[film ? c.film.geometry().pixel_at(*film) : c.film.pixel_of(c.pixel)];
     if (is_optimised_ || roulette_ == 0) return 0;
-    return roulette_ * (film ? c.expected.at(*film) : c.expected.at(c.pixel));
+    return roulette_ * (film ? c.expected.at(*film) : c.expected_of_pixel());
 }
 
 void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCounts& counts,

@@ -108,7 +108,7 @@ public:
                 t, [&](const GatherPair& pair) { gather(c, n, search, pair, work); });  // U(s,t)
         };
         const auto observe_next_events = [&](int t, std::span<const NextEventDraw> draws) {
-            const float pixel = c.expected.at(c.pixel);
+            const float pixel = c.expected_of_pixel();
             if (work.z[t - 1].sees_lens && pixel > 0)
                 NextEventCount::observe(draws, double(std::fabs(work.z.film_weight) / pixel),
                                         GatherSums::of(work));

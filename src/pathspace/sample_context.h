@@ -28,12 +28,13 @@ struct Workspace {
     std::unique_ptr<PassSums> sums;  ///< Of the type of the integrator.
 };
 
-/// One sample: the eye path of a pixel, a light path, or both.
+/// One sample: the eye path of a pixel, a light path, or both. Where eye paths contribute to several pixels, there are
+/// also samples outside the crop.
 struct SampleContext {
     const Scene& scene;
     const Film& film;
     const ExpectedLuminance& expected;  ///< What the samples of a pass know of earlier ones.
-    uint64_t pixel;                     ///< Index within the crop.
+    uint64_t pixel;  ///< Index of the sample, that of the pixel within the crop; see Film::sample_pixel().
     uint64_t chunk;  ///< Part of the pass, whose samples are processed in order by one thread.
     uint64_t light_paths;  ///< N_L of the pass.
     float splat_scale;     ///< 1 / N_L: factor of splats.
@@ -41,10 +42,14 @@ struct SampleContext {
     ContributionSink& sink;
     bool is_of_whole_film = false;  ///< The eye path belongs to no pixel.
 
+    /// Whether the film point depends on a number of the sample.
+    bool needs_film_number() const { return is_of_whole_film || !film.spreads(); }
     /// Film point of the eye path, and the factor of its contribution.
     Film::PixelSample film_sample(Vec2 u) const {
         return is_of_whole_film ? film.sample_anywhere(u) : film.sample_pixel(pixel, u);
     }
+    /// Expected luminance of the sample's pixel.
+    float expected_of_pixel() const { return expected.at(film.pixel_of(pixel)); }
     /// Index of the light path of this pixel; pixels share light paths where there are fewer paths than pixels.
     uint64_t own_light_path() const { return pixel % light_paths; }
 

@@ -8,9 +8,8 @@ namespace etendue {
 class ContributionObserver {
 public:
     virtual ~ContributionObserver() = default;
-    /// The film adds contribution · mis_weight · `share` to the eye path's `pixel` (t ≥ 2), or, spread by the filter, at
-    /// join.film (t ≤ 1). Called from all threads.
-    virtual void observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
+    /// The film adds contribution · mis_weight · `share` to `target`. Called from all threads.
+    virtual void observe(const Join& join, Rgb contribution, float share, const FilmTarget& target,
                          const Workspace& paths) = 0;
 };
 

@@ -59,4 +59,10 @@ std::optional<SamplerKind> sampler_kind(std::string_view name) {
     return {};
 }
 
+std::optional<FilterMode> filter_mode(std::string_view name) {
+    if (name == "spread") return FilterMode::Spread;
+    if (name == "sample") return FilterMode::Sample;
+    return {};
+}
+
 }  // namespace etendue

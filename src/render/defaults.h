@@ -22,5 +22,7 @@ void set_default_limit(RenderLimits& limits, const Scene& scene);
 
 /// "independent" or "sobol"; empty for other names.
 std::optional<SamplerKind> sampler_kind(std::string_view name);
+/// "spread" or "sample".
+std::optional<FilterMode> filter_mode(std::string_view name);
 
 }  // namespace etendue

@@ -57,11 +57,11 @@ class FilmSink final : public ContributionSink {
 public:
     explicit FilmSink(const Receivers& to) : to_(to) {}
 
-    void begin(uint64_t pixel) {
-        pixel_ = pixel;
+    void begin(uint64_t index) {
+        index_ = index;
         sum_ = Rgb();
     }
-    void end() { to_.film.add_eye(pixel_, sum_); }
+    void end() { to_.film.add_eye(index_, sum_); }
 
     void add(const Join& join, Rgb contribution) override {
         if (!to_.shown.contains(join.technique)) return;
@@ -71,29 +71,23 @@ public:
             ++to_.work.stats.rejected;
             return;
         }
+        const float share = is_splat ? to_.splat_scale : to_.work.z.film_weight;
         if (is_splat)
             to_.film.add_splat(join.film, value);
         else
-            sum_ += value * to_.work.z.film_weight;
-        if (to_.techniques) add_to_techniques(join, contribution);
-        if (to_.observer)
-            to_.observer->observe(join, contribution,
-                                  is_splat ? to_.splat_scale : to_.work.z.film_weight, pixel_,
-                                  to_.work);
+            sum_ += value * share;
+        if (!to_.techniques && !to_.observer) return;
+        const FilmTarget target = is_splat              ? FilmTarget{join.film}
+                                  : to_.film.spreads() ? FilmTarget{to_.work.z.film}
+                                                        : FilmTarget{to_.work.z.film, index_};
+        if (to_.techniques)
+            to_.techniques->add(target, join.technique, contribution, join.mis_weight, share);
+        if (to_.observer) to_.observer->observe(join, contribution, share, target, to_.work);
     }
 
 private:
-    void add_to_techniques(const Join& join, Rgb contribution) {
-        if (join.technique.t <= 1)
-            to_.techniques->add_splat(join.film, join.technique, contribution, join.mis_weight,
-                                      to_.splat_scale);
-        else
-            to_.techniques->add_eye(pixel_, join.technique, contribution * to_.work.z.film_weight,
-                                    join.mis_weight);
-    }
-
     Receivers to_;
-    uint64_t pixel_ = 0;
+    uint64_t index_ = 0;
     Rgb sum_;
 };
 
@@ -118,26 +112,14 @@ public:
             to_.film.add_splat(join.film, contribution * (join.mis_weight * factor));
         const float share = to_.splat_scale * factor;
         if (to_.techniques)
-            to_.techniques->add_splat(join.film, join.technique, contribution, join.mis_weight,
-                                      share);
-        if (to_.observer) observe(join, contribution, share);
+            to_.techniques->add({join.film}, join.technique, contribution, join.mis_weight, share);
+        // The eye path of a chain has no pixel of its own either.
+        if (to_.observer) to_.observer->observe(join, contribution, share, {join.film}, to_.work);
     }
     /// Whether tell() does anything.
     bool needs_joins() const { return to_.techniques || to_.observer || !to_.shown.contains_all(); }
 
 private:
-    void observe(const Join& join, Rgb contribution, float share) {
-        if (join.technique.t <= 1) {
-            to_.observer->observe(join, contribution, share, 0, to_.work);
-            return;
-        }
-        // The eye path of a chain has no pixel of its own. It contributes to all pixels whose filter reaches its film
-        // point.
-        for_each_pixel(to_.film.geometry(), to_.film.filter(), join.film,
-                       [&](uint64_t pixel, float h) {
-                           to_.observer->observe(join, contribution, share * h, pixel, to_.work);
-                       });
-    }
     void flush() {
         for (size_t i = 0; i < waiting_; ++i) to_.film.add_splat(queue_[i].film, queue_[i].value);
         waiting_ = 0;
@@ -252,7 +234,7 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
     : scene_(scene), settings_(settings), integrator_(std::move(integrator)),
       light_paths_(integrator_->light_paths(scene)),
       film_(fitting_film(scene, settings, *integrator_, light_paths_), scene.filter(),
-            typical_radiance(scene)),
+            typical_radiance(scene), settings.filter_mode),
       workers_(std::make_unique<Workers>(settings.threads)) {
     check_limits(settings);
     if (integrator_->error_groups() > 0) film_.set_groups(integrator_->error_groups());
@@ -290,6 +272,14 @@ Renderer::Numbers Renderer::numbers(uint32_t index) const {
             step.pass};
 }
 
+Vec2 film_offset(SamplerKind kind, uint64_t seed, uint32_t pass) {
+    constexpr uint64_t kPath = ~uint64_t(0);  // that of no eye or light path
+    Sampler sampler(kind, seed);
+    sampler.start(pass, kPath);
+    sampler.seek(Stream::Eye, 0);
+    return sampler.next_2d();
+}
+
 bool Renderer::sample_again(uint64_t pixel, Workspace& work, ContributionSink& sink) const {
     if (!has_last_pass_) return false;
     const Numbers place = numbers(uint32_t(film_.passes() - 1));
@@ -308,8 +298,8 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
     const auto index = uint32_t(film_.passes());
     const uint64_t pixels = scene_.film().pixel_count(), light_paths = light_paths_;
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
-    film_.begin_pass(light_paths);
     const Numbers place = numbers(index);
+    film_.begin_pass(light_paths, film_offset(settings_.sampler, place.seed, place.pass));
     const uint64_t seed = place.seed;
     const auto go_on = [&] {
         if (drop.load(std::memory_order_relaxed)) throw PassDropped();
@@ -382,7 +372,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
                      task(i, splats, work);
                  });
              }});
-    for_each_sample(pixels, [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
+    for_each_sample(film_.sample_count(), [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
         sink.begin(c.pixel);
         integrator_->sample(c, work);
         sink.end();

@@ -29,6 +29,7 @@ void check_limits(const RenderLimits& limits);
 struct RenderSettings : RenderLimits {
     IntegratorSpec integrator{"path", {}};
     SamplerKind sampler = SamplerKind::Independent;
+    FilterMode filter_mode = FilterMode::Sample;
     uint64_t seed = 0;
     int threads =
         0;  ///< Number of threads of this renderer; 0: one per core. Renderers share no threads.
@@ -68,6 +69,9 @@ enum class StopReason { Samples, Time, Error, Interrupted };
 const char* to_string(StopReason reason);
 const char* to_string(Estimator estimator);
 
+/// Offset of the film points of a pass in their pixels: a point of one sequence over the passes.
+Vec2 film_offset(SamplerKind kind, uint64_t seed, uint32_t pass);
+
 class Renderer {
 public:
     /// Throws std::runtime_error if the integrator's parameters are wrong. The scene must outlive the renderer.
@@ -93,10 +97,10 @@ public:
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop);
 
-    /// Traces the sample of a pixel in the last pass again, with the data that the integrator keeps of that pass, such as
+    /// Traces sample `index` of the last pass again (see Film::sample_pixel()), with the data that the integrator keeps of that pass, such as
     /// its light paths. Its contributions go to `sink`, its sub-paths to `work`. Must not run during run(). Returns false
     /// if no pass was made, or if the integrator has the data of a discarded pass.
-    bool sample_again(uint64_t pixel, Workspace& work, ContributionSink& sink) const;
+    bool sample_again(uint64_t index, Workspace& work, ContributionSink& sink) const;
 
     const Film& film() const { return film_; }
     uint64_t light_paths() const { return light_paths_; }  ///< Number of light paths in a pass.

@@ -51,19 +51,11 @@ TechniqueImages::Layer* TechniqueImages::layer(const Technique& q) {
     return place.load();
 }
 
-void TechniqueImages::add_eye(uint64_t pixel, const Technique& q, Rgb contribution,
-                              float mis_weight) {
+void TechniqueImages::add(const FilmTarget& target, const Technique& q, Rgb contribution,
+                          float mis_weight, float scale) {
     Layer* l = layer(q);
     if (!l) return;
-    l->pass_weighted.add(pixel, contribution * mis_weight);
-    l->pass_unweighted.add(pixel, contribution);
-}
-
-void TechniqueImages::add_splat(Vec2 film, const Technique& q, Rgb contribution, float mis_weight,
-                                float scale) {
-    Layer* l = layer(q);
-    if (!l) return;
-    for_each_pixel(geometry_, filter_, film, [&](uint64_t pixel, float h) {
+    for_each_pixel(geometry_, filter_, target, [&](uint64_t pixel, float h) {
         l->pass_weighted.add(pixel, contribution * (mis_weight * scale * h));
         l->pass_unweighted.add(pixel, contribution * (scale * h));
     });

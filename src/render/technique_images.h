@@ -18,9 +18,8 @@ public:
                     double typical_radiance = 1);
     ~TechniqueImages();
 
-    void add_eye(uint64_t pixel, const Technique& technique, Rgb contribution, float mis_weight);
-    void add_splat(Vec2 film, const Technique& technique, Rgb contribution, float mis_weight,
-                   float scale);
+    void add(const FilmTarget& target, const Technique& technique, Rgb contribution,
+             float mis_weight, float scale);
     void end_pass();
     /// Discards all contributions since the last end_pass().
     void drop_pass();

@@ -16,8 +16,10 @@ public:
                  Replay& result)
         : film_(film), pixel_(pixel), most_(most), work_(work), result_(result) {}
 
-    void begin(uint32_t pass, bool is_for_splats, float splat_share) {
+    /// `h`: the factor of the sample's eye path in the pixel.
+    void begin(uint32_t pass, bool is_for_splats, float splat_share, float h) {
         pass_ = pass;
+        h_ = h;
         is_for_splats_ = is_for_splats;
         splat_share_ = splat_share;
     }
@@ -34,7 +36,7 @@ public:
                            });
             share *= h;
         } else {
-            share = work_.z.film_weight;
+            share = work_.z.film_weight * h_;
         }
         const Rgb value = contribution * (join.mis_weight * share);
         if (!is_finite(value) || value.is_zero()) return;
@@ -83,7 +85,7 @@ private:
     Replay& result_;
     uint32_t pass_ = 0;
     bool is_for_splats_ = false;
-    float splat_share_ = 0;
+    float splat_share_ = 0, h_ = 0;
 };
 
 bool has_roulette_of_joins(const IntegratorSpec& spec) {
@@ -124,9 +126,8 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
     const std::unique_ptr<Integrator> integrator = make_integrator(spec);
     const uint64_t light_paths = integrator->light_paths(scene);
     const float splat_scale = light_paths > 0 ? float(1 / double(light_paths)) : 0.0f;
-    Film film(scene.film(), scene.filter());
     // Integrators read it, though nothing is added to it. As in a first pass, it knows of no earlier ones.
-    film.begin_pass(light_paths);
+    Film film(scene.film(), scene.filter(), 1, request.filter_mode);
     Workspace work;
     work.is_observed = true;
     Replay result;
@@ -137,21 +138,30 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
         const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
         return elapsed.count() < request.seconds;
     };
-    const auto trace = [&](uint32_t pass, uint64_t pixel, bool is_for_splats) {
-        recorder.begin(pass, is_for_splats, splat_scale);
-        sampler.start(pass, pixel);
+    const auto begin_pass = [&](uint32_t pass) {
+        film.begin_pass(light_paths, film_offset(request.sampler, request.seed, pass));
+    };
+    const auto trace = [&](uint32_t pass, uint64_t index, bool is_for_splats, float h) {
+        recorder.begin(pass, is_for_splats, splat_scale, h);
+        sampler.start(pass, index);
         // Chunks matter only to integrators that share light paths.
         integrator->sample(
-            {scene, film, film.expected(), pixel, 0, light_paths, splat_scale, sampler, recorder},
+            {scene, film, film.expected(), index, 0, light_paths, splat_scale, sampler, recorder},
             work);
     };
-    for (uint32_t i = 0; i < request.passes && has_time(); ++i, ++result.passes)
-        trace(request.first_pass + i, request.pixel, false);
+    for (uint32_t i = 0; i < request.passes && has_time(); ++i, ++result.passes) {
+        const uint32_t pass = request.first_pass + i;
+        begin_pass(pass);
+        film.for_each_sample_of(request.pixel, [&](uint64_t index, float h) {
+            trace(pass, index, false, h);
+        });
+    }
+    begin_pass(request.first_pass);
     if (request.splats)
-        // A sample traces the light paths of its pixel, which are several where there are more than pixels.
-        for (uint64_t i = 0, n = scene.film().pixel_count(); i < std::min(light_paths, n); ++i) {
+        // A sample traces the light paths of its own, which are several where there are more than samples.
+        for (uint64_t i = 0, n = film.sample_count(); i < std::min(light_paths, n); ++i) {
             if (!has_time()) break;
-            trace(request.first_pass, i, true);
+            trace(request.first_pass, i, true, 0);
             result.light_paths += (light_paths - i + n - 1) / n;
         }
     sort_by_luminance(result);
@@ -164,8 +174,12 @@ Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths) 
     Replay result;
     Workspace work;
     PathRecorder recorder(renderer.film(), pixel, most_paths, work, result);
-    recorder.begin(uint32_t(renderer.film().passes()) - 1, false, 0);
-    if (!renderer.sample_again(pixel, work, recorder))
+    bool has_pass = true;
+    renderer.film().for_each_sample_of(pixel, [&](uint64_t index, float h) {
+        recorder.begin(uint32_t(renderer.film().passes()) - 1, false, 0, h);
+        has_pass = has_pass && renderer.sample_again(index, work, recorder);
+    });
+    if (!has_pass)
         throw std::runtime_error(
             "the light paths of the last pass are gone, because the pass after "
             "it was discarded; continue the run for another pass");

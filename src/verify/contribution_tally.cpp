@@ -4,7 +4,7 @@
 
 namespace etendue {
 
-void ContributionTally::observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
+void ContributionTally::observe(const Join& join, Rgb contribution, float share, const FilmTarget& target,
                                 const Workspace& paths) {
     const size_t edges = size_t(join.technique.vertices() - 1);
     if (edges >= cut_offs_.size()) return;
@@ -23,16 +23,11 @@ void ContributionTally::observe(const Join& join, Rgb contribution, float share,
         for (int i = 0; i < 3; ++i) t.rgb[size_t(i)] += double(value[i]);
         t.luminance.add(double(luminance(value)));
     };
-    double reach = double(share);  // sum over the pixels of the crop for a contribution of 1
-    if (join.technique.t >= 2) {
-        add_to_tile(pixel, contribution * (join.mis_weight * share));
-    } else {
-        reach = 0;
-        for_each_pixel(grid_.film, scene_.filter(), join.film, [&](uint64_t at, float h) {
-            reach += double(share * h);
-            add_to_tile(at, contribution * (join.mis_weight * share * h));
-        });
-    }
+    double reach = 0;  // sum over the pixels of the crop for a contribution of 1
+    for_each_pixel(grid_.film, scene_.filter(), target, [&](uint64_t at, float h) {
+        reach += double(share * h);
+        add_to_tile(at, contribution * (join.mis_weight * share * h));
+    });
     const double alone = double(luminance(contribution)) * reach;
     sums.alone.add(alone);
     sums.weighted.add(alone * double(join.mis_weight));

@@ -89,7 +89,7 @@ public:
     ContributionTally(const Scene& scene, TileGrid grid, std::vector<float> cut_offs)
         : scene_(scene), grid_(grid), cut_offs_(std::move(cut_offs)) {}
 
-    void observe(const Join& join, Rgb contribution, float share, uint64_t pixel,
+    void observe(const Join& join, Rgb contribution, float share, const FilmTarget& target,
                  const Workspace& paths) override;
 
     /// All entries, sorted.

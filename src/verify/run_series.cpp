@@ -33,7 +33,7 @@ void render_all(Renderer& renderer, const std::atomic<bool>* interrupted) {
 class ShortestEdges final : public ContributionObserver {
 public:
     ShortestEdges(const Scene& scene, int longest) : scene_(scene), lengths_(size_t(longest) + 1) {}
-    void observe(const Join& join, Rgb contribution, float share, uint64_t,
+    void observe(const Join& join, Rgb contribution, float share, const FilmTarget&,
                  const Workspace& paths) override {
         const Technique& q = join.technique;
         const SubPath& y = is_pair(q.strategy) ? paths.pair : paths.y;

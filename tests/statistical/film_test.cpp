@@ -30,6 +30,13 @@ TEST_P(Filters, OfEyePathsAndSplatsAgree) {
     const Tiles path = render_tiles(scene, "path", {2048, 8, 1});
     expect_same_image(render_tiles(scene, "light", {4096, 8, 2}), path, 0.05, "light");
     expect_same_image(render_tiles(scene, "bdpt", {1024, 8, 3}), path, 0.05, "bdpt");
+    for (const char* integrator : {"path", "bdpt"})
+        expect_same_image(render_tiles(scene, integrator,
+                                       {.passes = 1024,
+                                        .tiles = 8,
+                                        .seed = 5,
+                                        .filter_mode = FilterMode::Spread}),
+                          path, 0.05, std::string(integrator) + ", spread");
 
     const Scene crop = build(lit_floor(
         "<integer name=\"crop_offset_x\" value=\"3\"/><integer name=\"crop_offset_y\" value=\"1\"/>"
@@ -48,6 +55,10 @@ TEST_P(Filters, OfEyePathsAndSplatsAgree) {
             part.values[48 + c] = cropped.values[48 + c];  // the whole has no mean of the part
         expect_same_image(cropped, part, 0.12, std::string(integrator) + " in a crop");
     }
+    const Tiles spread = render_tiles(
+        crop, "path", {.passes = 1024, .tiles = 4, .seed = 6, .filter_mode = FilterMode::Spread});
+    for (size_t c = 0; c < 3; ++c) part.values[48 + c] = spread.values[48 + c];
+    expect_same_image(spread, part, 0.12, "path in a crop, spread");
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Filters,

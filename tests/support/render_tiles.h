@@ -43,6 +43,7 @@ struct TileOptions {
     uint64_t seed = 1;
     int batches = 32;
     int shortest = 1;  ///< Paths of fewer edges are left out.
+    FilterMode filter_mode = FilterMode::Sample;
 };
 
 /// The integrator's image from `passes` passes; their spread is measured between batches of consecutive ones.
@@ -53,6 +54,7 @@ inline Tiles render_tiles(const Scene& scene, const std::string& integrator, con
     settings.threads = 1;
     settings.spp = o.passes;
     settings.shown.shortest = o.shortest;
+    settings.filter_mode = o.filter_mode;
     Renderer renderer(scene, settings);
     Tiles tiles(o.tiles);
     std::vector<double> before(tiles.values.size());

@@ -52,7 +52,7 @@ public:
         return n > 2 && pdfs.density(next_event) > 0 ? next_event : connection_technique(0, n);
     }
 
-    void observe(const Join& join, Rgb, float, uint64_t, const Workspace& paths) override {
+    void observe(const Join& join, Rgb, float, const FilmTarget&, const Workspace& paths) override {
         const Technique& q = join.technique;
         const int n = q.vertices();
         const FilmGeometry& g = scene_.film();

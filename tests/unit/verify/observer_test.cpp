@@ -13,7 +13,7 @@ namespace {
 
 class SilentObserver final : public ContributionObserver {
 public:
-    void observe(const Join&, Rgb, float, uint64_t, const Workspace&) override { ++seen; }
+    void observe(const Join&, Rgb, float, const FilmTarget&, const Workspace&) override { ++seen; }
     std::atomic<uint64_t> seen{0};
 };
 

@@ -17,7 +17,7 @@ namespace {
 class ClassObserver final : public ContributionObserver {
 public:
     explicit ClassObserver(const Scene& scene) : scene_(scene) {}
-    void observe(const Join& join, Rgb, float, uint64_t, const Workspace& paths) override {
+    void observe(const Join& join, Rgb, float, const FilmTarget&, const Workspace& paths) override {
         if (join.technique.vertices() > 5) return;
         const PathClass c = classify(scene_, join, paths.y, paths.z, 0);
         EXPECT_EQ(PathClass::from_key(c.key()), c);
