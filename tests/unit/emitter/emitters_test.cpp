@@ -299,6 +299,7 @@ protected:
             return is_constant ? TextureRef(fallback) : TextureRef(&texture_);
         }
         const Shape* shape() const override { return nullptr; }
+        std::function<float(Vec2)> opacity() const override { return nullptr; }
         bool is_constant = false;
 
     private:
