@@ -193,8 +193,10 @@ double stated_over_true_variance(const Scene& scene, const std::string& method,
         const std::vector<Rgb> image = renderer.film().image(),
                                variance = renderer.film().variance();
         for (uint64_t i = 0; i < pixels; ++i) {
-            values[i].add(double(image[i].g));
-            stated += double(variance[i].g) / kSeeds;
+            const double y = double(luminance(image[i]));
+            values[i].add(y);
+            // Channels have the relative variance of the luminance.
+            stated += double(variance[i].g) * sqr(y / double(image[i].g)) / kSeeds;
         }
     }
     for (const Moments& m : values) spread += m.variance();
