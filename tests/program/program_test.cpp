@@ -227,7 +227,7 @@ TEST_F(ProgramTest, RefusesBadCommandLines) {
     expect_refusal({"render", (folder.path() / "no_such.xml").string()}, "no_such.xml");
     expect_refusal({"render", folder.path().string()}, folder.path().string());
     expect_refusal({"render"}, "SCENE");
-    expect_refusal({"paint", s}, "subcommand");
+    expect_refusal({"paint", s}, "there is no command \"paint\"");
     expect_refusal({}, "subcommand");
 }
 
