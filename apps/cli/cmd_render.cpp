@@ -32,7 +32,8 @@ namespace {
 
 struct RenderCommand {
     SceneOptions scene;
-    std::string output = "out.exr", integrator, sampler, filter_mode = "sample", techniques, preview, stats;
+    std::string output = "out.exr", integrator, sampler, filter_mode = "sample", techniques,
+                preview, stats;
     std::vector<std::string> aovs;
     uint64_t seed = 0, spp = 0;
     double seconds = 0, error = 0;
@@ -302,7 +303,8 @@ void add_render_command(CLI::App& app) {
         ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
     c.add_option("--filter-mode", command->filter_mode,
-                 "sample: an eye path contributes to its own pixel, with a film point drawn from the filter; "
+                 "sample: an eye path contributes to its own pixel, with a film point drawn from "
+                 "the filter; "
                  "spread: to all pixels that the filter reaches")
         ->capture_default_str();
     add_sampler_option(c, command->sampler, "; with sobol the error estimate is an upper bound");

@@ -225,7 +225,7 @@ float Bsdf::roughness() const {
     for (const BsdfComponent* c = &first_; c; c = c->next)
         std::visit(
             [&](const auto& l) {
-                if (l.has_smooth()) sharpest = std::fmin(sharpest, l.roughness());
+                if (c->weight > 0 && l.has_smooth()) sharpest = std::fmin(sharpest, l.roughness());
             },
             c->lobe);
     return std::isfinite(sharpest) ? sharpest : 0;

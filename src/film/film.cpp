@@ -7,7 +7,8 @@ namespace etendue {
 
 Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
            double typical_radiance, FilterMode mode)
-    : geometry_(geometry), filter_(filter), spreads_(mode == FilterMode::Spread && filter.is_wide()),
+    : geometry_(geometry), filter_(filter),
+      spreads_(mode == FilterMode::Spread && filter.is_wide()),
       grid_(geometry, filter, {0.5f, 0.5f}), pass_(geometry_, filter_, typical_radiance),
       moments_(geometry.pixel_count()), expected_(geometry), expected_in_last_pass_(geometry),
       previous_(geometry.pixel_count()) {}

@@ -52,7 +52,8 @@ ReconstructionFilter::ReconstructionFilter(const char* name, float radius,
     // Midpoint rule; the shapes are smooth between the steps.
     double step = 2.0 * radius / kSteps;
     double integral = 0;
-    for (int i = 0; i < kSteps; ++i) integral += shape_at(-double(radius) + (i + 0.5) * step) * step;
+    for (int i = 0; i < kSteps; ++i)
+        integral += shape_at(-double(radius) + (i + 0.5) * step) * step;
 
     for (int i = 0; i <= kStepsPerPixel; ++i) {
         const double f = double(i) / kStepsPerPixel;

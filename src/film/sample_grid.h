@@ -39,7 +39,8 @@ public:
         const auto outside = uint64_t(rows_ - film_.crop_height), above = uint64_t(-first_row_);
         if (i < outside * columns) {
             const int row = int(i / columns), column = first_column_ + int(i % columns);
-            return {column, row < int(above) ? row + first_row_ : row - int(above) + film_.crop_height};
+            return {column,
+                    row < int(above) ? row + first_row_ : row - int(above) + film_.crop_height};
         }
         i -= outside * columns;
         const auto sides = uint64_t(columns_ - film_.crop_width);
@@ -52,14 +53,17 @@ public:
     uint64_t index(int column, int row) const {
         const uint64_t pixels = film_.pixel_count();
         const auto columns = uint64_t(columns_);
-        if (row < 0) return pixels + uint64_t(row - first_row_) * columns + uint64_t(column - first_column_);
+        if (row < 0)
+            return pixels + uint64_t(row - first_row_) * columns + uint64_t(column - first_column_);
         if (row >= film_.crop_height)
             return pixels + uint64_t(row - film_.crop_height - first_row_) * columns +
                    uint64_t(column - first_column_);
         if (column >= 0 && column < film_.crop_width) return film_.pixel_index(column, row);
         const auto sides = uint64_t(columns_ - film_.crop_width);
-        const int side = column < 0 ? column - first_column_ : column - first_column_ - film_.crop_width;
-        return pixels + uint64_t(rows_ - film_.crop_height) * columns + uint64_t(row) * sides + uint64_t(side);
+        const int side =
+            column < 0 ? column - first_column_ : column - first_column_ - film_.crop_width;
+        return pixels + uint64_t(rows_ - film_.crop_height) * columns + uint64_t(row) * sides +
+               uint64_t(side);
     }
     /// Place of a point in an array of rows of the grid.
     size_t place(uint64_t i) const {

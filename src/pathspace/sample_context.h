@@ -34,7 +34,8 @@ struct SampleContext {
     const Scene& scene;
     const Film& film;
     const ExpectedLuminance& expected;  ///< What the samples of a pass know of earlier ones.
-    uint64_t pixel;  ///< Index of the sample, that of the pixel within the crop; see Film::sample_pixel().
+    uint64_t
+        pixel;  ///< Index of the sample, that of the pixel within the crop; see Film::sample_pixel().
     uint64_t chunk;  ///< Part of the pass, whose samples are processed in order by one thread.
     uint64_t light_paths;  ///< N_L of the pass.
     float splat_scale;     ///< 1 / N_L: factor of splats.

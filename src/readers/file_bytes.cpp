@@ -1,5 +1,7 @@
 #include "readers/file_bytes.h"
 
+#include <sys/stat.h>
+
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -21,11 +23,10 @@ std::string read_file_bytes(const std::string& path) {
 
     std::string bytes;
     size_t used = 0;
-    // The size is only a hint: pipes and devices have none.
-    if (std::fseek(file.get(), 0, SEEK_END) == 0) {
-        if (const long size = std::ftell(file.get()); size > 0) bytes.resize(size_t(size) + 1);
-        std::rewind(file.get());
-    }
+    // The size is only a hint: pipes and devices have none, and folders fail when they are read.
+    struct stat status;
+    if (fstat(fileno(file.get()), &status) == 0 && S_ISREG(status.st_mode))
+        bytes.resize(size_t(status.st_size) + 1);
     for (;;) {
         if (used == bytes.size()) bytes.resize(bytes.size() + (size_t(1) << 16));
         const size_t got = std::fread(&bytes[used], 1, bytes.size() - used, file.get());

@@ -77,9 +77,9 @@ public:
         else
             sum_ += value * share;
         if (!to_.techniques && !to_.observer) return;
-        const FilmTarget target = is_splat              ? FilmTarget{join.film}
+        const FilmTarget target = is_splat             ? FilmTarget{join.film}
                                   : to_.film.spreads() ? FilmTarget{to_.work.z.film}
-                                                        : FilmTarget{to_.work.z.film, index_};
+                                                       : FilmTarget{to_.work.z.film, index_};
         if (to_.techniques)
             to_.techniques->add(target, join.technique, contribution, join.mis_weight, share);
         if (to_.observer) to_.observer->observe(join, contribution, share, target, to_.work);
@@ -372,11 +372,12 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
                      task(i, splats, work);
                  });
              }});
-    for_each_sample(film_.sample_count(), [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
-        sink.begin(c.pixel);
-        integrator_->sample(c, work);
-        sink.end();
-    });
+    for_each_sample(film_.sample_count(),
+                    [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
+                        sink.begin(c.pixel);
+                        integrator_->sample(c, work);
+                        sink.end();
+                    });
     film_.end_pass(integrator_->splat_error_factor());
     if (techniques_) techniques_->end_pass();
 }

@@ -152,9 +152,8 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
     for (uint32_t i = 0; i < request.passes && has_time(); ++i, ++result.passes) {
         const uint32_t pass = request.first_pass + i;
         begin_pass(pass);
-        film.for_each_sample_of(request.pixel, [&](uint64_t index, float h) {
-            trace(pass, index, false, h);
-        });
+        film.for_each_sample_of(request.pixel,
+                                [&](uint64_t index, float h) { trace(pass, index, false, h); });
     }
     begin_pass(request.first_pass);
     if (request.splats)

@@ -4,8 +4,8 @@
 
 namespace etendue {
 
-void ContributionTally::observe(const Join& join, Rgb contribution, float share, const FilmTarget& target,
-                                const Workspace& paths) {
+void ContributionTally::observe(const Join& join, Rgb contribution, float share,
+                                const FilmTarget& target, const Workspace& paths) {
     const size_t edges = size_t(join.technique.vertices() - 1);
     if (edges >= cut_offs_.size()) return;
     const Technique& q = join.technique;

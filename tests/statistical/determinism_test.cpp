@@ -38,8 +38,7 @@ Rendering render(const Scene& scene, const std::string& integrator, SamplerKind 
     settings.integrator = IntegratorSpec::parse(integrator);
     settings.sampler = sampler;
     // Each of both with one of the samplers.
-    settings.filter_mode =
-        sampler == SamplerKind::Sobol ? FilterMode::Spread : FilterMode::Sample;
+    settings.filter_mode = sampler == SamplerKind::Sobol ? FilterMode::Spread : FilterMode::Sample;
     settings.seed = seed;
     settings.threads = threads;
     // Guides of 8000 walks are fitted again before pass 40, after as many samples as eight times these walks.

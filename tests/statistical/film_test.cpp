@@ -31,12 +31,11 @@ TEST_P(Filters, OfEyePathsAndSplatsAgree) {
     expect_same_image(render_tiles(scene, "light", {4096, 8, 2}), path, 0.05, "light");
     expect_same_image(render_tiles(scene, "bdpt", {1024, 8, 3}), path, 0.05, "bdpt");
     for (const char* integrator : {"path", "bdpt"})
-        expect_same_image(render_tiles(scene, integrator,
-                                       {.passes = 1024,
-                                        .tiles = 8,
-                                        .seed = 5,
-                                        .filter_mode = FilterMode::Spread}),
-                          path, 0.05, std::string(integrator) + ", spread");
+        expect_same_image(
+            render_tiles(
+                scene, integrator,
+                {.passes = 1024, .tiles = 8, .seed = 5, .filter_mode = FilterMode::Spread}),
+            path, 0.05, std::string(integrator) + ", spread");
 
     const Scene crop = build(lit_floor(
         "<integer name=\"crop_offset_x\" value=\"3\"/><integer name=\"crop_offset_y\" value=\"1\"/>"

@@ -168,7 +168,8 @@ TEST(Principled, ReflectanceMayBeGiven) {
     ComponentArena arena;
     const Material& clear =
         m.make("principled", {{"spec_trans", 1.0}, {"eta", 1.5}, {"specular_weight", 0.25}});
-    const auto& lobe = std::get<PrincipledLobe>(clear.bsdf(plane_point(n), arena).front().lobe);
+    const Bsdf bsdf = clear.bsdf(plane_point(n), arena);
+    const auto& lobe = std::get<PrincipledLobe>(bsdf.front().lobe);
     EXPECT_NEAR(sqr((lobe.eta - 1) / (lobe.eta + 1)), 0.01f, 1e-6f);
 }
 

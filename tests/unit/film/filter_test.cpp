@@ -14,9 +14,10 @@ constexpr FilmGeometry kCrop{40, 30, 7, 5, 10, 8};
 ReconstructionFilter filter(const std::string& name, float radius = 0) {
     SceneDescription description;
     description.objects = {{"rfilter", name, "", {}, {}, {}}};
-    if (radius > 0) return ReconstructionFilter(name.c_str(), radius, [](double x, double r, double) {
-        return 1 - std::fabs(x) / r;
-    }, double(radius));
+    if (radius > 0)
+        return ReconstructionFilter(
+            name.c_str(), radius, [](double x, double r, double) { return 1 - std::fabs(x) / r; },
+            double(radius));
     for (const FilterEntry& e : filter_registry())
         if (e.info.name == name) return e.make({description, 0});
     ADD_FAILURE() << name;
@@ -57,7 +58,8 @@ TEST(Filter, WeightsAreItsValuesAtThePixels) {
             const ReconstructionFilter::Taps x = f.taps(p.x), y = f.taps(p.y);
             for (int i = -20; i < 20; ++i) {
                 const auto weight = [i](const ReconstructionFilter::Taps& t) {
-                    return i >= t.first && i < t.first + t.count ? t.weight[size_t(i - t.first)] : 0;
+                    return i >= t.first && i < t.first + t.count ? t.weight[size_t(i - t.first)]
+                                                                 : 0;
                 };
                 EXPECT_NEAR(weight(x) * weight(y),
                             f.eval({p.x - float(i) - 0.5f, p.y - float(i) - 0.5f}), 1e-5)
@@ -93,8 +95,8 @@ TEST(Filter, SamplesHaveItsShape) {
             const float at = (float(i) + 0.5f) / kSteps;
             const ReconstructionFilter::Taps t = f.taps(at);
             for (int k = 0; k < t.count; ++k)
-                expected += double(t.weight[size_t(k)]) *
-                            std::cos(double(at) - t.first - k - 0.5) / kSteps;
+                expected +=
+                    double(t.weight[size_t(k)]) * std::cos(double(at) - t.first - k - 0.5) / kSteps;
         }
         EXPECT_NEAR(sum, 1, 0.03) << f.name();
         EXPECT_NEAR(moment, expected, 0.03) << f.name();
