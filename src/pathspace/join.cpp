@@ -195,6 +195,8 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     const double count = counts.weighed_gathers(x_m.pair_level, sees_lens, s + t - 2);
     Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * probability, y, a, z, b);
     join.pair_probability = float(probability);
+    // A density that is too small for a float belongs to a contribution that is zero, too.
+    if (!(join.pair_probability > 0)) return {};
     return join;
 }
 
