@@ -62,7 +62,8 @@ std::vector<T> rows_of(nb::handle value, const char* dtype, const SourceLocation
                                      kColumns, array.shape(0), array.shape(1)));
     static_assert(std::is_trivially_copyable_v<T> && sizeof(T) == kColumns * sizeof(Number));
     std::vector<T> rows(array.shape(0));
-    if (!rows.empty()) std::memcpy(static_cast<void*>(rows.data()), array.data(), rows.size() * sizeof(T));
+    if (!rows.empty())
+        std::memcpy(static_cast<void*>(rows.data()), array.data(), rows.size() * sizeof(T));
     return rows;
 }
 

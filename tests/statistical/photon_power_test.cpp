@@ -165,8 +165,9 @@ TEST_P(PhotonPower, IsThatOfTracedPhotons) {
         EXPECT_GT(welch_p(sampled[i], traced[i], kRounding * traced[i].mean()), level) << what;
         if (i / 2 % PhotonTotals::kRegions + 1 == PhotonTotals::kRegions) {
             EXPECT_GT(traced[i].mean(), 0) << what;
-            EXPECT_LT(4 * std::sqrt(sampled[i].squared_error()),
-                      (is_caustic ? 0.15 : 0.05) * traced[i].mean())
+            // Steps of few long chains are correlated.
+            const double resolution = (is_caustic ? 0.15 : 0.05) * (GetParam().is_long ? 4 : 1);
+            EXPECT_LT(4 * std::sqrt(sampled[i].squared_error()), resolution * traced[i].mean())
                 << what;
         }
     }
