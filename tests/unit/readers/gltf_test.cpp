@@ -247,8 +247,9 @@ TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
     ASSERT_EQ(m.children.size(), 2u);
     for (const auto& [name, expected] :
          {std::pair("specular_weight", ParamValue(0.5)), {"specular_color", Rgb(2, 1, 0)}}) {
-        const auto c = std::find_if(m.children.begin(), m.children.end(),
-                                    [&](const auto& child) { return child.name == name; });
+        const auto c =
+            std::find_if(m.children.begin(), m.children.end(),
+                         [&, name = name](const auto& child) { return child.name == name; });
         ASSERT_NE(c, m.children.end()) << name;
         const SceneObject& product = scene.objects[size_t(c->object)];
         EXPECT_EQ(product.find("scale")->value, expected);

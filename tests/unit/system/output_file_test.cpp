@@ -230,8 +230,8 @@ TEST_F(OutputFiles, ReasonsAreSaid) {
              {"", "the name is empty"},
              {file(std::string(300, 'x')), "File name too long"}}) {
         for (const bool check : {false, true}) {
-            const std::string message =
-                error([&] { check ? OutputFile::check(name) : write_file(name, "x"); });
+            const std::string message = error(
+                [&, name = name] { check ? OutputFile::check(name) : write_file(name, "x"); });
             EXPECT_TRUE(message.starts_with("cannot write \"" + name + "\": ")) << message;
             EXPECT_NE(message.find(why), std::string::npos) << message;
         }
