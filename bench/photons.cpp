@@ -306,8 +306,8 @@ private:
                     [this, light_paths](uint64_t count, const PassContext::Use& use) {
                         for (uint64_t i = 0; i < count; ++i) {
                             sampler_.start(0, i);
-                            use({scene_, film_, i, i / kChunk, light_paths, 1 / float(light_paths),
-                                 sampler_, sink_},
+                            use({scene_, film_, film_.expected(), i, i / kChunk, light_paths,
+                                 1 / float(light_paths), sampler_, sink_},
                                 work_);
                         }
                     },
