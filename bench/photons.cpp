@@ -111,7 +111,7 @@ public:
         if (is_whole_) return whole_->sample(c, work);
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         const SubPath &y = work.y, &z = work.z;
-        cache_.restore(c.scene, c.pixel, work.y);
+        cache_.restore(c.scene, c.index, work.y);
         paths_.trace_eye_path(c, n, work);
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);

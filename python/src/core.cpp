@@ -267,14 +267,14 @@ public:
     }
     std::pair<int, int> pixel() const {
         const int w = context().scene.film().crop_width;
-        const uint64_t pixel = context().film.pixel_of(context().pixel);
+        const uint64_t pixel = context().film.pixel_of(context().index);
         return {int(pixel % uint64_t(w)), int(pixel / uint64_t(w))};
     }
     PathPtr eye_path(std::optional<int> max_vertices, std::optional<int> rr_depth) {
         const WalkContext walk{context().scene, counts_, work_->stats,
                                walk_options(max_vertices, rr_depth)};
         renew(z_, work_->z);
-        trace_eye_path(walk, context().film, context().pixel, context().sampler, work_->z);
+        trace_eye_path(walk, context().film, context().index, context().sampler, work_->z);
         return z_;
     }
     PathPtr light_path(std::optional<int> max_vertices, std::optional<int> rr_depth) {

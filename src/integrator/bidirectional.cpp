@@ -34,7 +34,7 @@ void Bidirectional::trace_light_path(const SampleContext& c, const TechniqueCoun
     const PhaseTimer timer(work.stats, &PhaseSeconds::light_paths);
     const WalkContext walk = light_walk(c.scene, counts, work.stats, learned);
     SubPath& y = work.y;
-    const bool adds = c.pixel < c.light_paths;
+    const bool adds = c.index < c.light_paths;
     Sampler sampler = c.sampler;
     if (!adds) sampler.start(c.own_light_path());
     if (!start_light_path(walk, sampler, y)) return;
@@ -49,7 +49,7 @@ void Bidirectional::trace_further_light_paths(const SampleContext& c, const Tech
                                               Workspace& work) const {
     if (c.is_of_whole_film) return;
     const uint64_t samples = c.film.sample_count();
-    for (uint64_t path = c.pixel + samples; path < c.light_paths; path += samples) {
+    for (uint64_t path = c.index + samples; path < c.light_paths; path += samples) {
         Sampler sampler = c.sampler;
         sampler.start(path);
         trace_light_path(c.with(sampler, c.sink), counts, work);
@@ -151,7 +151,7 @@ void Bidirectional::learn(const LearnContext& pass) {
 
 float Bidirectional::threshold(const SampleContext& c, const Vec2* film) const {
     if (!thresholds_.empty())
-        return thresholds_[film ? c.film.geometry().pixel_at(*film) : c.film.pixel_of(c.pixel)];
+        return thresholds_[film ? c.film.geometry().pixel_at(*film) : c.film.pixel_of(c.index)];
     if (is_optimised_ || roulette_ == 0) return 0;
     return roulette_ * (film ? c.expected.at(*film) : c.expected_of_pixel());
 }
@@ -161,7 +161,7 @@ void Bidirectional::trace_light_paths(const PassContext& pass, const TechniqueCo
                                       const LearnedPlaces* learned) const {
     pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
         trace_light_path(c, counts, work, learned);
-        if (c.pixel < kept) cache.add(c.chunk, work.y);
+        if (c.index < kept) cache.add(c.chunk, work.y);
     });
 }
 

@@ -61,10 +61,10 @@ public:
     }
 
     /// Traces the light sub-path work.y, which is the light path c.own_light_path(). Adds C(s,1) and C(s,0) if this
-    /// pixel is the first one that uses this light path.
+    /// sample is the first one that uses this light path.
     void trace_light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                           const LearnedPlaces* learned = nullptr) const;
-    /// Where there are more light paths than pixels: traces the others of this pixel, for C(s,1) and C(s,0) alone.
+    /// Where there are more light paths than samples: traces the others of this sample, for C(s,1) and C(s,0) alone.
     void trace_further_light_paths(const SampleContext& c, const TechniqueCounts& counts,
                                    Workspace& work) const;
     /// Traces the eye sub-path work.z.

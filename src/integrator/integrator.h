@@ -42,7 +42,7 @@ public:
     /// Takes the sums of all workers at the end of a pass.
     virtual void collect(std::span<const std::unique_ptr<PassSums>>) {}
 
-    /// Traces sample `context.pixel` and reports its contributions.
+    /// Traces sample `context.index` and reports its contributions.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
     /// Number of samples of each strategy per eye sub-path, as counted in the weights, for a pass with `light_paths`.
     virtual TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const = 0;

@@ -24,7 +24,7 @@ public:
         const TechniqueCounts counts = this->counts(c.scene, 0);
         const WalkContext walk{c.scene, counts, work.stats, depth_.walk()};
         SubPath& z = work.z;
-        start_eye_path(walk, c.film, c.pixel, c.sampler, z);
+        start_eye_path(walk, c.film, c.index, c.sampler, z);
         for (int t = 2; t <= z.size(); ++t) {
             for_each_hit(c.scene, z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution); });

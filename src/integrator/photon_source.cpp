@@ -24,7 +24,7 @@ MapPhotons TracedPhotons::trace(const PassContext& context, uint32_t pass,
     std::vector<std::vector<MapPhoton>> chunks(context.chunks(context.light_paths));
     PhotonMemory memory(max_bytes_);
     context.for_each_light_path([&](const SampleContext& c, Workspace& work) {
-        c.sampler.start(pass, c.pixel);
+        c.sampler.start(pass, c.index);
         mapping_.paths().trace_light_path(c, {}, work);
         memory.add(uint64_t(work.y.size()));
         for_each_photon(mapping_, work.y, [&](MapPhoton photon) {

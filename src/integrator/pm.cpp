@@ -89,7 +89,7 @@ public:
         Sampler of_walk = c.sampler;
 
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        start_eye_path(walk, c.film, c.pixel, of_walk, z);
+        start_eye_path(walk, c.film, c.index, of_walk, z);
         for (int t = 2; t <= z.size(); ++t) {
             mapping_.add_direct(c, t, work);  // C(0,t), C(1,t)
             const bool is_diffuse = mapping_.takes_photons(z, t);
@@ -208,7 +208,7 @@ private:
             // Each ray is a separate sample. The rays of all passes are successive points of one sequence.
             Sampler of_ray = c.sampler;
             of_ray.start(pass * uint32_t(gather_rays_) + uint32_t(ray),
-                         hash_combine(c.pixel, uint64_t(t)));
+                         hash_combine(c.index, uint64_t(t)));
             const SampleContext gather = c.with(of_ray, c.sink);
             if (extend<TransportMode::Radiance>(walk, of_ray, z) && !z[t - 1].is_delta)
                 end_gather_ray(gather, t + 1, work,
@@ -227,9 +227,9 @@ private:
                        step = std::max(uint64_t(1), rays / kFewest);
         std::vector<std::vector<Importon>> chunks(pass.chunks(pass.pixels));
         pass.for_each_sample(pass.pixels, [&](const SampleContext& c, Workspace& work) {
-            if (c.pixel % step != 0) return;
+            if (c.index % step != 0) return;
             for (uint32_t round = 0; round < rounds; ++round) {
-                c.sampler.start(round, hash_combine(c.pixel, kImportons));
+                c.sampler.start(round, hash_combine(c.index, kImportons));
                 add_importons(c, round, chunks[c.chunk], work);
             }
         });
@@ -244,7 +244,7 @@ private:
         const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
         SubPath& z = work.z;
         Sampler of_walk = c.sampler;
-        start_eye_path(walk, c.film, c.pixel, of_walk, z);
+        start_eye_path(walk, c.film, c.index, of_walk, z);
         for (int t = 2; t <= z.size(); ++t) {
             const bool is_diffuse = mapping_.takes_photons(z, t);
             if (mapping_.paths().is_joinable(z, t))
@@ -280,12 +280,12 @@ private:
         for (uint32_t spacing = kCoarsest; spacing >= kFinest; spacing /= 2) {
             for (auto& chunk : chunks) chunk.clear();
             pass.for_each_sample(pass.pixels, [&](const SampleContext& c, Workspace& work) {
-                c.sampler.start(maps_pass_, c.pixel);
-                if (c.pixel % width % spacing != 0 || c.pixel / width % spacing != 0) return;
+                c.sampler.start(maps_pass_, c.index);
+                if (c.index % width % spacing != 0 || c.index / width % spacing != 0) return;
                 const TechniqueCounts none;
                 const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
                 SubPath& z = work.z;
-                start_eye_path(walk, c.film, c.pixel, c.sampler, z);
+                start_eye_path(walk, c.film, c.index, c.sampler, z);
                 for (int t = 2; t <= z.size(); ++t) {
                     const bool is_diffuse = mapping_.takes_photons(z, t);
                     const auto n = is_diffuse ? irradiance_normal(z[t - 1]) : std::nullopt;
@@ -316,7 +316,7 @@ private:
             const Vertex& v = z[t - 1];
             if (!(dot(d, v.ng) * dot(v.wo, v.ng) > 0)) return {};
             RadianceSum sum;
-            of_ray.start(ray++, hash_combine(c.pixel, uint64_t(t)));
+            of_ray.start(ray++, hash_combine(c.index, uint64_t(t)));
             const SampleContext gather = c.with(of_ray, sum);
             of_ray.seek(Stream::Eye, uint64_t(t) - 1);
             const BsdfSample along{.wi = d, .weight = Rgb(1), .pdf = 1};

@@ -40,11 +40,11 @@ public:
         const TechniqueCounts n = mapping_.counts();
         const WalkContext walk = mapping_.paths().eye_walk(c.scene, n, work.stats);
         Sampler of_walk = c.sampler;
-        if (eye_paths_ > 0) of_walk.start(pass_ % eye_paths_, c.pixel);
+        if (eye_paths_ > 0) of_walk.start(pass_ % eye_paths_, c.index);
         SubPath& z = work.z;
 
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        start_eye_path(walk, c.film, c.pixel, of_walk, z);
+        start_eye_path(walk, c.film, c.index, of_walk, z);
         for (int t = 2; t <= z.size(); ++t) {
             mapping_.add_direct(c, t, work);  // C(0,t), C(1,t)
             const bool is_diffuse = mapping_.takes_photons(z, t);

@@ -11,7 +11,7 @@ public:
         : sample{.scene = pass.scene,
                  .film = pass.film,
                  .expected = pass.film.expected(),
-                 .pixel = 0,
+                 .index = 0,
                  .chunk = 0,
                  .light_paths = pass.light_paths,
                  .splat_scale = 1 / float(pass.light_paths),

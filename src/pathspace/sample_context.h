@@ -28,14 +28,14 @@ struct Workspace {
     std::unique_ptr<PassSums> sums;  ///< Of the type of the integrator.
 };
 
-/// One sample: the eye path of a pixel, a light path, or both. Where eye paths contribute to several pixels, there are
-/// also samples outside the crop.
+/// One sample: an eye path, a light path, or both.
 struct SampleContext {
     const Scene& scene;
     const Film& film;
     const ExpectedLuminance& expected;  ///< What the samples of a pass know of earlier ones.
-    uint64_t
-        pixel;  ///< Index of the sample, that of the pixel within the crop; see Film::sample_pixel().
+    /// Of the sample: its eye path belongs to the film point Film::sample_pixel(index). Sample i is that of pixel i of the
+    /// crop. There are further ones outside the crop if the film spreads().
+    uint64_t index;
     uint64_t chunk;  ///< Part of the pass, whose samples are processed in order by one thread.
     uint64_t light_paths;  ///< N_L of the pass.
     float splat_scale;     ///< 1 / N_L: factor of splats.
@@ -47,21 +47,21 @@ struct SampleContext {
     bool needs_film_number() const { return is_of_whole_film || !film.spreads(); }
     /// Film point of the eye path, and the factor of its contribution.
     Film::PixelSample film_sample(Vec2 u) const {
-        return is_of_whole_film ? film.sample_anywhere(u) : film.sample_pixel(pixel, u);
+        return is_of_whole_film ? film.sample_anywhere(u) : film.sample_pixel(index, u);
     }
     /// Expected luminance of the sample's pixel.
-    float expected_of_pixel() const { return expected.at(film.pixel_of(pixel)); }
-    /// Index of the light path of this pixel; pixels share light paths where there are fewer paths than pixels.
-    uint64_t own_light_path() const { return pixel % light_paths; }
+    float expected_of_pixel() const { return expected.at(film.pixel_of(index)); }
+    /// Index of the light path of this sample; samples share light paths where there are fewer of these.
+    uint64_t own_light_path() const { return index % light_paths; }
 
     /// The same sample with other random numbers and another sink.
     SampleContext with(Sampler& numbers, ContributionSink& to) const {
-        return {scene,       film,        expected, pixel, chunk,
+        return {scene,       film,        expected, index, chunk,
                 light_paths, splat_scale, numbers,  to,    is_of_whole_film};
     }
     /// The same sample where `n` light paths are stored.
     SampleContext with_light_paths(uint64_t n) const {
-        return {scene, film,         expected, pixel, chunk,
+        return {scene, film,         expected, index, chunk,
                 n,     1 / float(n), sampler,  sink,  is_of_whole_film};
     }
 };

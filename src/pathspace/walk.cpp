@@ -136,10 +136,10 @@ float next_event_ratio(const Vertex& y0, Vec3 w, const Guide* guide) {
     return pdf_y0 > 0 ? choices * e.pdf / pdf_y0 : choices;
 }
 
-void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, Sampler& sampler,
+void start_eye_path(const WalkContext& walk, const Film& film, uint64_t index, Sampler& sampler,
                     SubPath& z) {
     sampler.seek(Stream::Eye, 0);
-    const Film::PixelSample at = film.sample_pixel(pixel, sampler.next_2d_if(!film.spreads()));
+    const Film::PixelSample at = film.sample_pixel(index, sampler.next_2d_if(!film.spreads()));
     const Vec2 u_lens = sampler.next_2d_if(walk.scene.sensor().has_finite_lens());
     start_eye_path(walk, at, u_lens, sampler, z);
 }

@@ -32,9 +32,9 @@ struct WalkContext {
     const LearnedPlaces* learned = nullptr;
 };
 
-/// Makes z_0 on the lens and, if the ray hits a surface, z_1. The film point is sampled from the pixel's filter. If the
+/// Makes z_0 on the lens and, if the ray hits a surface, z_1. The film point is that of the sample `index`. If the
 /// ray leaves the scene, z_1 is a vertex at infinity if there are emitters at infinity; otherwise there is no z_1.
-void start_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel, Sampler& sampler,
+void start_eye_path(const WalkContext& walk, const Film& film, uint64_t index, Sampler& sampler,
                     SubPath& z);
 /// The same for a given film point; `u_lens` chooses the point on a finite lens. `sampler` must be positioned after the
 /// numbers used for these two.
@@ -82,9 +82,9 @@ inline void trace_light_path(const WalkContext& walk, Sampler& sampler, SubPath&
     while (extend<TransportMode::Importance>(walk, sampler, y)) {
     }
 }
-inline void trace_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel,
+inline void trace_eye_path(const WalkContext& walk, const Film& film, uint64_t index,
                            Sampler& sampler, SubPath& z) {
-    start_eye_path(walk, film, pixel, sampler, z);
+    start_eye_path(walk, film, index, sampler, z);
     while (extend<TransportMode::Radiance>(walk, sampler, z)) {
     }
 }

@@ -280,15 +280,15 @@ Vec2 film_offset(SamplerKind kind, uint64_t seed, uint32_t pass) {
     return sampler.next_2d();
 }
 
-bool Renderer::sample_again(uint64_t pixel, Workspace& work, ContributionSink& sink) const {
+bool Renderer::sample_again(uint64_t index, Workspace& work, ContributionSink& sink) const {
     if (!has_last_pass_) return false;
     const Numbers place = numbers(uint32_t(film_.passes() - 1));
     const float splat_scale = light_paths_ > 0 ? float(1.0 / double(light_paths_)) : 0.0f;
     work.is_observed = true;
     work.sums = integrator_->make_sums();
     Sampler sampler(settings_.sampler, place.seed);
-    sampler.start(place.pass, pixel);
-    integrator_->sample({scene_, film_, film_.expected_in_last_pass(), pixel, pixel / kChunk,
+    sampler.start(place.pass, index);
+    integrator_->sample({scene_, film_, film_.expected_in_last_pass(), index, index / kChunk,
                          light_paths_, splat_scale, sampler, sink},
                         work);
     return true;
@@ -318,11 +318,11 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
             Sampler sampler(settings_.sampler, seed);
             FilmSink sink({film_, techniques_.get(), settings_, splat_scale, work});
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
-            for (uint64_t pixel = chunk * kChunk; pixel < end; ++pixel) {
+            for (uint64_t i = chunk * kChunk; i < end; ++i) {
                 go_on();
-                sampler.start(place.pass, pixel);
-                work.stats.is_timed = pixel % RenderStats::kTimedSamples == 0;
-                use(SampleContext{scene_, film_, film_.expected(), pixel, chunk, light_paths,
+                sampler.start(place.pass, i);
+                work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
+                use(SampleContext{scene_, film_, film_.expected(), i, chunk, light_paths,
                                   splat_scale, sampler, sink},
                     work, sink);
             }
@@ -374,7 +374,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
              }});
     for_each_sample(film_.sample_count(),
                     [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
-                        sink.begin(c.pixel);
+                        sink.begin(c.index);
                         integrator_->sample(c, work);
                         sink.end();
                     });

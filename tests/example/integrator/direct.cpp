@@ -15,7 +15,7 @@ public:
     void sample(const SampleContext& c, Workspace& work) const override {
         const WalkContext walk{c.scene, counts_, work.stats, {.max_vertices = 3}};
         SubPath& z = work.z;
-        start_eye_path(walk, c.film, c.pixel, c.sampler, z);
+        start_eye_path(walk, c.film, c.index, c.sampler, z);
         if (z.size() < 2) return;
         add_hits(c, z, 2);
         if (counts_.next_event > 0)

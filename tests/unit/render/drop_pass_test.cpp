@@ -17,7 +17,7 @@ class Disturbed final : public Integrator {
 public:
     struct Hooks {
         std::function<void(uint32_t pass)> trace = [](uint32_t) {}, end_of_trace = [](uint32_t) {};
-        std::function<void(uint32_t pass, uint64_t pixel)> sample = [](uint32_t, uint64_t) {};
+        std::function<void(uint32_t pass, uint64_t index)> sample = [](uint32_t, uint64_t) {};
         /// Before each group of paths that trace() makes for no pixel.
         std::function<void(uint32_t pass)> other_paths = [](uint32_t) {};
     };
@@ -48,7 +48,7 @@ public:
         inner_->collect(sums);
     }
     void sample(const SampleContext& context, Workspace& work) const override {
-        hooks_.sample(pass_, context.pixel);
+        hooks_.sample(pass_, context.index);
         inner_->sample(context, work);
     }
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
@@ -117,8 +117,8 @@ protected:
 };
 
 TEST_P(DropPass, WhereASampleThrows) {
-    hooks.sample = [](uint32_t pass, uint64_t pixel) {
-        if (pass == 3 && pixel == 300) throw std::runtime_error("a bad sample");
+    hooks.sample = [](uint32_t pass, uint64_t index) {
+        if (pass == 3 && index == 300) throw std::runtime_error("a bad sample");
     };
     Renderer r = renderer();
     EXPECT_THROW(run(r), std::runtime_error);
@@ -145,8 +145,8 @@ TEST_P(DropPass, WhereAPassCannotBegin) {
 }
 
 TEST_P(DropPass, WhereTheFirstPassFails) {
-    hooks.sample = [](uint32_t, uint64_t pixel) {
-        if (pixel == 500) throw std::runtime_error("a bad sample");
+    hooks.sample = [](uint32_t, uint64_t index) {
+        if (index == 500) throw std::runtime_error("a bad sample");
     };
     Renderer r = renderer();
     EXPECT_THROW(run(r), std::runtime_error);
@@ -180,8 +180,8 @@ TEST_P(DropPass, WhereTheCallerAsksForIt) {
 }
 
 TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
-    hooks.sample = [](uint32_t pass, uint64_t pixel) {
-        if (pass == 4 && pixel == 300) throw std::runtime_error("a bad sample");
+    hooks.sample = [](uint32_t pass, uint64_t index) {
+        if (pass == 4 && index == 300) throw std::runtime_error("a bad sample");
     };
     auto integrator = std::make_unique<Disturbed>(GetParam(), hooks);
     const Disturbed& disturbed = *integrator;

@@ -43,7 +43,7 @@ class MeetingIntegrator final : public Integrator {
 public:
     explicit MeetingIntegrator(Meeting& meeting) : meeting_(meeting) {}
     void sample(const SampleContext& c, Workspace&) const override {
-        if (c.pixel % 256 == 0) meeting_.attend();  // once a chunk
+        if (c.index % 256 == 0) meeting_.attend();  // once a chunk
     }
     TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
     uint64_t light_paths(const Scene&) const override { return 0; }

@@ -34,8 +34,8 @@ public:
         Join join{};
         join.technique = {Strategy::Hit, 0, 2};
         join.mis_weight = 1;
-        if (c.pixel % 16 == 0) c.sink.add(join, Rgb(kInf));
-        if (c.pixel % 16 == 1)
+        if (c.index % 16 == 0) c.sink.add(join, Rgb(kInf));
+        if (c.index % 16 == 1)
             for (int i = 0; i < 2; ++i) c.sink.add(join, Rgb(3e38f));
     }
     TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
