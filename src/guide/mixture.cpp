@@ -116,8 +116,11 @@ float GuideMixture::max_pdf(const GuideView& view, const DirectionCone& cone) co
             const size_t k = size_t(first) + j;
             // 1 - cos(φ - γ) for the angle φ between mean and axis and the cone's angle γ, at least 0.
             const float dx = a.x - seen.x[j], dy = a.y - seen.y[j], dz = a.z - seen.z[j];
-            const float ver = 0.5f * (dx * dx + dy * dy + dz * dz);
-            const float sin = std::sqrt(ver < 2 ? ver * (2 - ver) : 0.0f);
+            const float sx = a.x + seen.x[j], sy = a.y + seen.y[j], sz = a.z + seen.z[j];
+            // 1 - cos φ and 1 + cos φ, neither by a difference.
+            const float ver = 0.5f * (dx * dx + dy * dy + dz * dz),
+                        beyond = 0.5f * (sx * sx + sy * sy + sz * sz);
+            const float sin = std::sqrt(ver * beyond);
             const float both = ver + ver_cone;
             // The slack covers rounding errors.
             const float nearest = both - ver * ver_cone - sin * sin_cone - 2e-6f * both;

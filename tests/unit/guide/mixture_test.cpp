@@ -103,6 +103,23 @@ INSTANTIATE_TEST_SUITE_P(Mixtures, Density,
                                            Case{16, 200, true}, Case{11, 1e3f, true},
                                            Case{16, 1e4f, true}, Case{3, 1e4f, false}));
 
+/// The bound holds also where a lobe is nearly opposite to the cone's axis.
+TEST(GuideMixture, IsBelowBoundOfOppositeCone) {
+    for (const float kappa : {1.0f, 10.0f, 30.0f}) {
+        GuideMixture m;
+        m.add({{0, 0, 1}, 0, kappa, 1});
+        for (float beside = 1e-5f; beside < 0.1f; beside *= 1.3f)
+            for (const double angle : {0.3, 1.0, 1.5}) {
+                const DirectionCone cone{normalize({beside, 0, -1}), float(angle)};
+                // The direction of the cone that is nearest to the lobe.
+                const double edge = M_PI - std::atan(double(beside)) - angle;
+                const float pdf = m.pdf({}, {float(std::sin(edge)), 0, float(std::cos(edge))});
+                EXPECT_LE(pdf, m.max_pdf({}, cone)) << kappa << ", " << beside << ", " << angle;
+                EXPECT_GT(pdf, 0.999f * m.max_pdf({}, cone)) << kappa << ", " << beside;
+            }
+    }
+}
+
 TEST(GuideMixture, LobesTurnTowardTheirOrigin) {
     GuideMixture m;
     m.add({{0, 0, 1}, 0.5f, 1e4f, 1});  // The origin is two units above the centre.
