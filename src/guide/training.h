@@ -55,7 +55,9 @@ struct GuideSample {
     Vec3 p;
     float inv_distance = 0;  ///< To the other end of the edge; 0 at infinity.
     float weight = 0;        ///< For the lobes, see set_flux().
-    float unguided_pdf = 0;  ///< Of the direction without guide, in solid angle; 0 where unknown.
+    /// Density of the direction without guide, in solid angle, under the condition that it is not that of a delta event, of
+    /// which a guide has no part; 0 where unknown.
+    float unguided_pdf = 0;
     PackedDirection direction;                  ///< From p.
     int8_t normal[3] = {};                      ///< As GuideView::normal, to about a degree.
     uint8_t mode : 4 = 0, gloss_class : 4 = 0;  ///< TransportMode of the walks; guide_class().

@@ -58,8 +58,11 @@ GuideSample sample_at(const SubPath& path, int i, TransportMode mode) {
     s.mode = uint8_t(mode == TransportMode::Radiance ? TransportMode::Importance
                                                      : TransportMode::Radiance);
     s.gloss_class = uint8_t(guide_class(v.gloss)) & 0xf;
-    if (i + 1 < path.size() && !v.is_delta)
-        s.unguided_pdf = v.eval_unguided(direction(v, path[i + 1]), mode).pdf_rev;
+    if (i + 1 < path.size() && !v.is_delta) {
+        const Vec3 on = direction(v, path[i + 1]);
+        s.unguided_pdf = v.eval_unguided(on, mode).pdf_rev /
+                         (1 - v.bsdf.delta_probability(on, TransportMode(s.mode)));
+    }
     return s;
 }
 

@@ -118,6 +118,30 @@ TEST(LearnedLobes, AreThoseOfDirectLightInTheOpen) {
     EXPECT_GT(learned.guide().surfaces.cells().size(), 4u);
 }
 
+/// Guided directions replace those of smooth lobes alone, so that delta events beside them make nothing of a guide better. In
+/// a cube of glowing walls, the light is the same from everywhere.
+TEST(LearnedShares, AreThoseOfDirectionsWithoutDeltaEvents) {
+    const auto learned = [](const std::string& bsdf) {
+        const Scene scene =
+            test::build(test::sensor("0,0,0.5", "0,0,-1", kSize, "70") +
+                        "<shape type=\"cube\"><boolean name=\"flip_normals\" value=\"true\"/>"
+                        "<bsdf type=\"twosided\">" +
+                        bsdf + "</bsdf><emitter type=\"area\"/></shape>");
+        const LearnedGuide guide = learn(scene, "path:guide_walks=40000");
+        return std::pair(guide.guide().surfaces.gain(TransportMode::Radiance),
+                         LearnedGuide::mean_shares(guide.shares())[0]);
+    };
+    const std::string diffuse = test::diffuse("0.5,0.5,0.5");
+    for (const std::string& bsdf :
+         {diffuse, test::kPlastic,
+          "<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.5\"/>" + diffuse +
+              "<bsdf type=\"conductor\"/></bsdf>"}) {
+        const auto [gain, share] = learned(bsdf);
+        EXPECT_LT(gain, 0.02f) << bsdf;
+        EXPECT_LT(share, 0.1) << bsdf;
+    }
+}
+
 /// A quarter of the light paths: each is joined to four eye paths, and its splats have four times the factor. Splats have
 /// smaller weights then.
 TEST(LearnedContributions, AreThoseOfTheLightPathsOfAPass) {
