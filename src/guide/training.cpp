@@ -132,6 +132,7 @@ struct Share {
     double share = 0, gain = 0;
     double training_share = 0;  ///< See GuideFit.
     double weight = 0;          ///< Of the samples.
+    bool is_known = false;      ///< Whether there are enough samples.
 };
 /// Of one direction. The weight is the flux, in proportion to which directions arrive: the unguided density has the cosine.
 struct Densities {
@@ -152,9 +153,9 @@ Share best_share(const std::vector<Densities>& samples, const GuideLearning& lea
     constexpr size_t kFewest = 16;
     constexpr int kSteps = 10;
     Share best;
-    if (samples.size() < kFewest) return best;
     for (const Densities& s : samples) best.weight += s.weight;
-    if (!(best.weight > 0)) return best;
+    best.is_known = samples.size() >= kFewest && best.weight > 0;
+    if (!best.is_known) return best;
     const double prior = 2 * best.weight / double(samples.size());
     double a = 0.5;
     for (int step = 0; step < kSteps; ++step) {
@@ -227,11 +228,11 @@ GuideFit fit_guide(const FitSamples& samples, Vec3 center, uint64_t number,
     const Share of_all = best_share(all, learning);
     double weight = 0, gain = 0;
     for (size_t c = 0; c < by_class.size(); ++c) {
-        Share s = best_share(by_class[c], learning);
-        if (!(s.weight > 0)) s = of_all;
+        const Share own = best_share(by_class[c], learning);
+        const Share& s = own.is_known ? own : of_all;
         fit.share[c] = float(s.share);
         fit.training_share[c] = float(s.training_share);
-        weight += s.weight, gain += s.weight * s.gain;
+        weight += own.weight, gain += own.weight * s.gain;
     }
     if (weight > 0) fit.gain = float(gain / weight);
     return fit;

@@ -129,6 +129,8 @@ struct GuideTree::Builder {
     void set_gains(const std::vector<std::array<GuideFit, 2>>& fits, const LeftOut& left_out) {
         // As in the fits, single samples must not decide.
         constexpr double kLargest = 10;
+        // With fewer samples of both modes, neither what a cell gains is known nor the area of its surfaces.
+        constexpr size_t kFewest = 16;
         /// In a cell, by mode and side.
         using Power = std::array<std::array<double, kSurfaceSides>, 2>;
         std::vector<Power> learned(leaves.size()), all;
@@ -158,6 +160,7 @@ struct GuideTree::Builder {
             const size_t other = 1 - m;
             double gain = 0, sum = 0;
             for (size_t k = 0; k < leaves.size(); ++k) {
+                if (leaves[k].own[0].size() + leaves[k].own[1].size() < kFewest) continue;
                 const double area = surface_area(leaves[k].box);
                 double weight = 0;
                 for (size_t side = 0; side < kSurfaceSides; ++side)

@@ -144,6 +144,42 @@ TEST(GuideTree, GainIsThatOfWhatWalksContribute) {
         << "one sample decides";
 }
 
+/// Two samples of a cell of their own, which lie close together, tell nothing about the power per area there.
+TEST(GuideTree, GainIsNotThatOfAFewSamples) {
+    std::vector<GuideSample> samples;
+    add_square(samples, 4000, 0, 1, kEye, true, 1, 5);
+    add_square(samples, 4000, 0, 1, kLight, false, 1, 6);
+    const float gain = GuideTree(samples, 1).gain(kEye);
+    add_square(samples, 1, 1e4f, 0, kEye, false, 1, 7);
+    add_square(samples, 1, 1e4f, 0, kLight, false, 1, 8);
+    samples.back().p = samples[samples.size() - 2].p + Vec3{0, 1e-4f, 1e-4f};
+    const GuideTree tree(samples, 1);
+    ASSERT_NEAR(tree.cell({1e4f, 0, 0}).center.x, 1e4f, 1) << "not a cell of its own";
+    EXPECT_NEAR(tree.gain(kEye), gain, 0.1f * gain);
+}
+
+/// Half of the light is at matte places, where nothing is gained, and half at glossy ones below a lamp. Whether the matte ones
+/// are of one class or of two does not matter.
+TEST(GuideTree, GainIsTheMeanOverClassesOfGloss) {
+    constexpr size_t kMatte = 1500;
+    const auto learned = [](bool has_two_classes) {
+        std::vector<GuideSample> samples;
+        add_square(samples, kMatte, 0, 1, kEye, false, 1, 5);
+        add_square(samples, kMatte, 0, 1, kEye, true, 1, 6);
+        for (size_t i = 0; i < samples.size(); ++i)
+            samples[i].gloss_class = i >= kMatte ? 2 : has_two_classes && i / 4 % 2 == 0 ? 1 : 0;
+        std::vector<GuideSample> shuffled;
+        for (size_t i = 0; i < samples.size(); ++i)
+            shuffled.push_back(samples[i * (kMatte + 1) % samples.size()]);
+        return GuideTree(shuffled, 1, {.least_gain = 0.05f});
+    };
+    const GuideTree one = learned(false), two = learned(true);
+    ASSERT_EQ(two.cell({}).field(kEye).share[0], 0);
+    ASSERT_EQ(two.cell({}).field(kEye).share[1], 0);
+    ASSERT_GT(two.cell({}).field(kEye).share[2], 0.8f);
+    EXPECT_NEAR(one.gain(kEye), two.gain(kEye), 0.01f * two.gain(kEye));
+}
+
 /// Importance that the lens gives directly makes places count, though light walks learn no direction from it.
 TEST(GuideTree, GainKnowsWhatTheLensSees) {
     std::vector<GuideSample> samples;
