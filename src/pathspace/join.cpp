@@ -32,8 +32,10 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
     const double p_NE = double(emitter.selection_pmf) * e.pdf / v.pdf_fwd;
-    const double p_L = double(emission_pmf(counts.guide, emitter)) *
-                       origin_pdf(counts.guide, emitter, v.p, e.pdf_y0) / v.pdf_fwd;
+    const double p_L = counts.uses_light_paths()
+                           ? double(emission_pmf(counts.guide, emitter)) *
+                                 origin_pdf(counts.guide, emitter, v.p, e.pdf_y0) / v.pdf_fwd
+                           : 0.0;
     double others = 0;
     if (const Vertex& prev = z[last - 1]; last >= 2 && !prev.is_delta)
         others += sqr(counts.next_events(prev.sees_lens) * p_NE) +
