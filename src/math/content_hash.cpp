@@ -13,9 +13,14 @@ ContentHash::ContentHash() : state_(std::make_unique<State>()) {
     XXH3_64bits_reset(&state_->xxh);
 }
 ContentHash::~ContentHash() = default;
+ContentHash::ContentHash(ContentHash&&) noexcept = default;
+ContentHash& ContentHash::operator=(ContentHash&&) noexcept = default;
 
 ContentHash& ContentHash::add(std::string_view bytes) {
-    add(uint64_t(bytes.size()));
+    return add(uint64_t(bytes.size())).add_piece(bytes);
+}
+
+ContentHash& ContentHash::add_piece(std::string_view bytes) {
     XXH3_64bits_update(&state_->xxh, bytes.data(), bytes.size());
     return *this;
 }

@@ -14,9 +14,13 @@ class ContentHash {
 public:
     ContentHash();
     ~ContentHash();
+    ContentHash(ContentHash&&) noexcept;
+    ContentHash& operator=(ContentHash&&) noexcept;
 
     ContentHash& add(std::string_view bytes);
     ContentHash& add(uint64_t number);
+    /// Adds a piece of a string; where the string is cut does not count.
+    ContentHash& add_piece(std::string_view bytes);
     uint64_t value() const;
 
 private:
