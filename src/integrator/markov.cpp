@@ -52,11 +52,6 @@ uint64_t MarkovIntegrator::whole_film_paths(const Scene& scene) {
                     uint64_t(std::llround(reached_region(scene.film(), scene.filter()).area())));
 }
 
-bool MarkovIntegrator::hits_emitters(const Scene& scene) {
-    return std::any_of(scene.emitters().begin(), scene.emitters().end(),
-                       [](const auto& e) { return !e->is_delta(); });
-}
-
 PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
                                                      const Bidirectional& paths) const {
     // The counts of bidirectional path tracing alone; those of derived classes may depend on an earlier begin().
@@ -135,11 +130,8 @@ void MarkovIntegrator::load(LearnedState& from) {
 }
 
 TechniqueCounts MarkovIntegrator::direct_counts(const Scene& scene, uint64_t light_paths) {
-    const auto& emitters = scene.emitters();
-    const bool has_points =
-        std::any_of(emitters.begin(), emitters.end(), [](const auto& e) { return e->is_delta(); });
-    return has_points ? Bidirectional::counts(scene, light_paths)
-                      : TechniqueCounts{.hit = 1, .next_event = 1};
+    return scene.has_delta_emitters() ? Bidirectional::counts(scene, light_paths)
+                                      : TechniqueCounts{.hit = 1, .next_event = 1};
 }
 
 void MarkovIntegrator::sample(const SampleContext& c, Workspace& work) const {

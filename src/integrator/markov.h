@@ -76,9 +76,6 @@ protected:
     /// N_L in the weights: the number of pixels over which the eye paths of the film are distributed.
     static uint64_t whole_film_paths(const Scene& scene);
 
-    /// Whether eye paths can hit an emitter of the scene.
-    static bool hits_emitters(const Scene& scene);
-
     ChainOptions options_;
     Bidirectional paths_;
 

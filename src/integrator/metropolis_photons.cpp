@@ -202,7 +202,7 @@ MetropolisPhotons::Pilot MetropolisPhotons::run_pilot(const PassContext& context
                              [&](uint64_t i, const ChainContext& c) {
                                  const auto state = space.make_state();
                                  space.draw(0, hash_combine(key, done + i), c, *state);
-                                 targets[done + i] = state->importance();
+                                 targets[done + i] = state->target;
                              });
         Moments m;
         for (const double t : targets) m.add(t);

@@ -23,16 +23,15 @@ public:
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
-        constexpr int kTabulated =
-            24;  // Number of lengths for which the pilot's techniques are used.
+        constexpr int kTabulated = 24;  // lengths for which the pilot's techniques are used
         const Scene& scene = pass.scene;
         const TechniqueCounts n = counts(scene, 0);
         const int longest = paths_.max_depth();
         PathTarget target{
             PathMeasure(scene, reached_region(scene.film(), scene.filter()), kShortest, longest),
-            weighted_luminance(pilot.map), LengthChoice(kShortest, longest, pilot),
-            TechniqueChoice(kShortest, std::min(kTabulated, longest - kShortest + 1),
-                            hits_emitters(scene), n.hit_lens > 0, pilot)};
+            weighted_luminance(pilot.map), LengthChoice(kShortest, longest, pilot.by_technique),
+            TechniqueChoice(scene, kShortest, std::min(kTabulated, longest - kShortest + 1),
+                            pilot.by_technique)};
         const ClassPlan plan{.chains = options_.chains,
                              .pool = pool_samples(4 * pilot.precise_samples, options_),
                              .c = pilot.constant()};

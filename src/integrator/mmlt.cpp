@@ -23,11 +23,11 @@ namespace {
 class PathChoice {
 public:
     /// The classes are the lengths from `shortest` on. The last class also contains all longer paths, up to `longest`.
-    PathChoice(int shortest, int classes, int longest, bool hits, bool hits_lens,
-               const Pilot& pilot)
+    PathChoice(const Scene& scene, int shortest, int classes, int longest,
+               const TechniqueLight& light)
         : shortest_(shortest), classes_(classes), longest_(longest),
-          longer_(shortest + classes - 1, longest, pilot),
-          technique_(shortest, classes + kTabulated, hits, hits_lens, pilot) {}
+          longer_(shortest + classes - 1, longest, light),
+          technique_(scene, shortest, classes + kTabulated, light) {}
 
     struct Chosen {
         int s, t;
@@ -64,8 +64,8 @@ protected:
         const TechniqueCounts n = counts(pass.scene, 0);
         const int longest = paths_.max_depth();
         const int classes = std::min(lengths_, longest - kShortest + 1);
-        const auto choice = std::make_shared<PathChoice>(
-            kShortest, classes, longest, hits_emitters(pass.scene), n.hit_lens > 0, pilot);
+        const auto choice = std::make_shared<PathChoice>(pass.scene, kShortest, classes, longest,
+                                                         pilot.by_technique);
         PrimarySample sample = [this, n, choice](int k, const SampleContext& c, Workspace& work) {
             c.sampler.seek(Stream::Selection, addresses::kKind);
             const double u_length = c.sampler.next_1d_fine_if(choice->has_length_choice(k));

@@ -67,11 +67,10 @@ public:
         const int k = x.last();
         const double f = luminance(x.contribution());
         if (!(f > 0)) return;
-        int D = k - 1;
-        while (D > 0 && !is_diffuse(x[D].v)) --D;
-        int first =
-            D - 1;  // The first vertex from which only vertices that are not diffuse lead to D.
-        while (first > 0 && !is_diffuse(x[first].v)) --first;
+        const auto diffuse = [this](const Vertex& v) { return is_diffuse(v); };
+        const int D = x.before(k, diffuse);
+        // The first vertex from which only vertices that are not diffuse lead to D.
+        const int first = x.before(D, diffuse);
         PhotonOrigins origins(mapping_, x[0].v);
         const auto add = [&](int i, MapPhoton::Origin origin, bool is_caustic, double q) {
             if (!(q > 0)) return;
@@ -228,8 +227,7 @@ public:
             mutations_.weights[PathMutations::UserPath] =
                 user_share / (1 - user_share) * mutations_.weights[PathMutations::Bidirectional];
         }
-        const Pilot none{.map = TargetMap(context.scene.film()), .by_technique = {}};
-        make_space(none);
+        make_space({});
         make_space(learn(context));
     }
 
@@ -241,12 +239,10 @@ public:
     }
 
 private:
-    void make_space(const Pilot& pilot) {
+    void make_space(const TechniqueLight& light) {
         constexpr int kTabulated = 24;
-        bool hits = false;
-        for (const auto& e : measure_.scene.emitters()) hits |= !e->is_delta();
-        techniques_.emplace(kShortest, std::min(kTabulated, measure_.longest - kShortest + 1), hits,
-                            measure_.scene.sensor().has_finite_lens(), pilot);
+        techniques_.emplace(measure_.scene, kShortest,
+                            std::min(kTabulated, measure_.longest - kShortest + 1), light);
         const auto importance = [this](const PathState& x, Rgb) {
             double sum = 0;
             rule_.for_each_deposit(
@@ -257,14 +253,14 @@ private:
             return v.kind == Vertex::Kind::Surface && v.is_connectible && rule_.is_diffuse(v);
         };
         space_.emplace(PathTarget{measure_, importance,
-                                  LengthChoice(kShortest, measure_.longest, pilot), *techniques_,
+                                  LengthChoice(kShortest, measure_.longest, light), *techniques_,
                                   user_, stores},
                        mutations_, TechniqueCounts{});
     }
 
     /// Sets h_0 to the medians of h over the remainders of photons, in proportion to flux, and returns the light of each
     /// length and technique.
-    Pilot learn(const PassContext& context) {
+    TechniqueLight learn(const PassContext& context) {
         constexpr uint64_t kSamples = 16384;
         struct Sample {
             std::vector<std::pair<Deposit, double>> deposits;  ///< With weights lum(f_map) q/T.
@@ -296,13 +292,12 @@ private:
                 responses[d.is_caustic].push_back({d.h, weight});
         rule_.h0 = {weighted_median(std::move(responses[0])),
                     weighted_median(std::move(responses[1]))};
-        Pilot pilot{.map = TargetMap(context.scene.film()), .by_technique = {}};
+        TechniqueLight light;
         for (const Sample& sample : samples)
             for (const auto& [d, weight] : sample.deposits)
                 for (int s = 0; s <= sample.k + 1; ++s)
-                    pilot.by_technique[{sample.k, s}] +=
-                        weight * rule_.clamped(d) * sample.shares[size_t(s)];
-        return pilot;
+                    light[{sample.k, s}] += weight * rule_.clamped(d) * sample.shares[size_t(s)];
+        return light;
     }
 
     PathMeasure measure_;

@@ -68,16 +68,6 @@ void Chain::load(LearnedState& from) {
     if (is_started_) x_->load(from);
 }
 
-void Chain::add(const ChainState& state, double chain_share, double large_share,
-                const ChainTerms& terms, double scale, StateSink& states, ChainStats& stats) const {
-    const double inverse = state.target + terms.c * terms.p_large * state.independent_density;
-    if (!(inverse > 0) || !(state.target > 0)) return;
-    stats.chain_light += chain_share * state.target / inverse;
-    stats.large_light += large_share * terms.c * state.target / inverse;
-    const double factor = scale * (chain_share + large_share * terms.c) / inverse;
-    if (factor != 0) states.add(state, factor);
-}
-
 void StateSpace::contribute(int chain_class, const ChainState& x, double factor,
                             const ChainContext& c, SplatSink& film) const {
     if (c.work.is_observed) {
@@ -87,33 +77,41 @@ void StateSpace::contribute(int chain_class, const ChainState& x, double factor,
     for (const Splat& s : x.splats) film.add(s.film, s.value * float(factor));
 }
 
+Proposal Chain::propose(bool is_large, uint64_t key, const ChainContext& c) {
+    if (!is_large) return space_.propose(class_, *x_, key, c, *y_);
+    space_.draw(class_, key, c, *y_);
+    return {};
+}
+
+double Chain::acceptance(const Proposal& proposal, RenderStats& stats) const {
+    if (!is_started_) return 0;
+    const double a = y_->target * proposal.Q_ratio / x_->target;
+    // Of a NaN, std::min(1.0, a) would make 1.
+    stats.rejected += std::isnan(a);
+    return std::isnan(a) ? 0.0 : std::min(1.0, a);
+}
+
 void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t first,
                     uint64_t count, const ChainContext& c, StateSink& states, ChainStats& stats) {
-    double x_share = 0;  // Sum of b·a of the present state that is not yet added.
-    double x_large = 0;  // 1 if it comes from a large step that is not yet added.
+    /// What a state is worth: the sum of its factors b·a, and 1 if it comes from a large step.
+    struct Shares {
+        double chain = 0, large = 0;
+    };
+    const auto add = [&](const ChainState& state, const Shares& shares) {
+        if (!(state.target > 0)) return;
+        const double sum = state.target + terms.c * terms.p_large;
+        stats.chain_light += shares.chain * state.target / sum;
+        stats.large_light += shares.large * terms.c * state.target / sum;
+        const double factor = scale * (shares.chain + shares.large * terms.c) / sum;
+        if (factor != 0) states.add(state, factor);
+    };
+    Shares of_x;  // Not yet added.
     for (uint64_t step = first; step < first + count; ++step) {
         const uint64_t step_key = hash_combine(key, step);
         const bool is_large = to_unit_double(hash_combine(step_key, 0)) < terms.p_large;
         if (!is_large && !is_started_) continue;
-        const uint64_t y_key = hash_combine(step_key, 1);
-
-        double accept = 0;
-        Proposal proposal;
-        if (is_large) {
-            space_.draw(class_, y_key, c, *y_);
-            ++stats.large_steps;
-            stats.large_sum += y_->importance();
-            if (is_started_) accept = y_->importance() / x_->importance();
-        } else {
-            proposal = space_.propose(class_, *x_, y_key, c, *y_);
-            if (!proposal.has_failed) accept = y_->target * proposal.Q_ratio / x_->target;
-        }
-        if (!std::isfinite(accept)) {
-            // Of a NaN, std::min(1.0, accept) would make 1.
-            c.work.stats.rejected += std::isnan(accept);
-            accept = std::isnan(accept) ? 0 : 1;
-        }
-        accept = std::min(1.0, accept);
+        const Proposal proposal = propose(is_large, hash_combine(step_key, 1), c);
+        const double a = acceptance(proposal, c.work.stats);
 
         StepCounts& counts = is_large
                                  ? stats.steps[0][length_index(*y_)]
@@ -121,22 +119,22 @@ void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t ke
         ++counts.proposed;
         counts.failed += proposal.has_failed;
         counts.zero += !proposal.has_failed && !(y_->target > 0);
-        counts.accepted += accept;
+        counts.accepted += a;
+        if (is_large) ++stats.large_steps, stats.large_sum += y_->target;
 
-        const double y_share = b * accept, y_large = is_large ? 1 : 0;
-        if (is_started_) x_share += b * (1 - accept);
-        if (is_started_ && to_unit_double(hash_combine(step_key, 2)) < accept) {
-            add(*x_, x_share, x_large, terms, scale, states, stats);
+        const Shares of_y{b * a, is_large ? 1.0 : 0.0};
+        if (is_started_) of_x.chain += b * (1 - a);
+        if (is_started_ && to_unit_double(hash_combine(step_key, 2)) < a) {
+            add(*x_, of_x);
             std::swap(x_, y_);
-            x_share = y_share, x_large = y_large;
+            of_x = of_y;
             stay_ = 0;
-            continue;
+        } else {
+            add(*y_, of_y);
+            if (is_started_) stats.longest_stay = std::max(stats.longest_stay, ++stay_);
         }
-        if (!proposal.has_failed && y_->target > 0)
-            add(*y_, y_share, y_large, terms, scale, states, stats);
-        if (is_started_) stats.longest_stay = std::max(stats.longest_stay, ++stay_);
     }
-    if (is_started_) add(*x_, x_share, x_large, terms, scale, states, stats);
+    if (is_started_) add(*x_, of_x);
 }
 
 }  // namespace etendue

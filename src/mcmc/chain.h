@@ -4,9 +4,9 @@
 //
 // The image is the mean over the steps of F times a factor, where F is the contribution of a state. As states of the chain,
 // the states of a step have the factors b·a/I, with a the probability of being in this state after the step. As independent
-// samples, large steps have density p_L T. The balance heuristic combines the two estimators, with a constant c in place of
-// b:
-//     w = I / (I + c p_L T),      chain: b·a·w/I,      large step: (1 - w)/(p_L T).
+// samples, large steps have density p_L; all densities are relative to that of independent states. The balance heuristic
+// combines the two estimators, with a constant c in place of b:
+//     w = I / (I + c p_L),      chain: b·a·w/I,      large step: (1 - w)/p_L.
 // The estimate is unbiased for any c that is fixed before the chain starts. A c from the chain's own run would be
 // correlated with its states.
 
@@ -35,7 +35,7 @@ struct ChainStats {
     std::array<std::array<StepCounts, kLengths>, kMutations> steps{};
     uint64_t longest_stay = 0;  ///< Largest number of successive steps without an accepted one.
     uint64_t large_steps = 0;
-    double large_sum = 0;                     ///< Sum of I/T over large steps.
+    double large_sum = 0;                     ///< Sum of I over large steps.
     double chain_light = 0, large_light = 0;  ///< Σ I·factor, of the two parts of the estimator.
 
     ChainStats& operator+=(const ChainStats& o);
@@ -66,8 +66,9 @@ public:
     void load(LearnedState& from);
 
 private:
-    void add(const ChainState& state, double chain_share, double large_share,
-             const ChainTerms& terms, double scale, StateSink& states, ChainStats& stats) const;
+    /// Sets y_ to the next state, if it is accepted.
+    Proposal propose(bool is_large, uint64_t key, const ChainContext& c);
+    double acceptance(const Proposal& proposal, RenderStats& stats) const;
 
     const StateSpace& space_;
     int class_;

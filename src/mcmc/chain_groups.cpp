@@ -97,7 +97,7 @@ void ChainGroups::start(const PassContext& pass, uint64_t key, Group& group) con
             const WholeFilm whole(pass);
             const auto state = space_.make_state();
             space_.draw(int(k), hash_combine(pool_key, i), {whole.sample, work}, *state);
-            importance[i] = state->importance();
+            importance[i] = state->target;
         });
         Normalisation& n = group.normalisation[k];
         n.pool = plan.pool;

@@ -133,7 +133,6 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
     y.finish(c.work.stats);
     if (!(y.target > 0)) return proposal;
     const double there = Q(kind, p, x, y, way), back = Q(kind, choices(y), y, x, way.back());
-    // Targets are relative to the densities of large steps, Q is not.
     proposal.Q_ratio =
         there > 0 ? back * y.large_step_density() / (there * x.large_step_density()) : 0.0;
     return proposal;

@@ -56,7 +56,6 @@ void PathState::copy(const PathState& from) {
     clear();
     for (const PathVertex& v : from.x_) append(v);
     target = from.target;
-    independent_density = from.independent_density;
     edges = from.edges;
     splats = from.splats;
     film = from.film;
@@ -236,7 +235,6 @@ PathProduct PathState::flux(int i) const {
 
 void PathState::set_black() {
     target = 0;
-    independent_density = 1;
     splats.clear();
 }
 

@@ -100,6 +100,13 @@ public:
     bool is_connected_at(int i) const {
         return !x_[size_t(i)].v.is_delta && !x_[size_t(i) + 1].v.is_delta;
     }
+    /// Index of the first vertex before x_i, toward the light, for which `is` holds; 0 if there is none (-1 for i = 0).
+    template <class Is>
+    int before(int i, const Is& is) const {
+        do --i;
+        while (i > 0 && !is(x_[size_t(i)].v));
+        return i;
+    }
     /// Density of x_i per unit_area, as a walk from the light samples it after x_{i-1}: the ray passes the masks of the
     /// edge, and meets the surface. That of x_0 is the density of emission; that of x_k belongs to a ray that hits the lens.
     double light(int i) const { return x_[size_t(i)].light_ * (i == 0 ? 1.0 : met_from_light(i)); }

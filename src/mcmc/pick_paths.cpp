@@ -13,8 +13,7 @@ namespace {
 
 /// x_0 … x_m, up to the first vertex from the eye that is not a delta event; empty if this cannot be a user path.
 std::vector<Vec3> light_points(const PathState& x) {
-    int m = x.last() - 1;
-    while (m > 0 && x[m].v.is_delta) --m;
+    const int m = x.before(x.last(), [](const Vertex& v) { return !v.is_delta; });
     std::vector<Vec3> points;
     if (x[0].v.is_infinite || m == 0) return points;
     for (int i = 0; i <= m; ++i) points.push_back(x[i].v.p);
@@ -29,13 +28,9 @@ std::vector<GivenPath> pick_paths(const Scene& scene, const PickOptions& o) {
         throw std::runtime_error(fmt::format("pixel {},{} lies outside the image of {} x {} pixels",
                                              o.x, o.y, g.width, g.height));
     const FilmRegion pixel{{float(o.x), float(o.y)}, {1, 1}};
-    const bool hits_lens = scene.sensor().has_finite_lens();
-    bool hits = false;
-    for (const auto& e : scene.emitters()) hits |= !e->is_delta();
-    const Pilot none{.map = TargetMap(g), .by_technique = {}};
     const PathSpace space({PathMeasure(scene, pixel, o.length, o.length),
-                           weighted_luminance(none.map), LengthChoice(o.length, o.length, none),
-                           TechniqueChoice(o.length, 1, hits, hits_lens, none)},
+                           weighted_luminance(TargetMap(g)), LengthChoice(o.length, o.length, {}),
+                           TechniqueChoice(scene, o.length, 1, {})},
                           {}, {});
     const Film film(g, scene.filter());
     const PassContext pass{.scene = scene,

@@ -2,10 +2,9 @@
 // A short run of independent samples that fixes the parameters of chains before they start: the weights W of the target,
 // the constant c, the sizes of pools, and the probabilities of path lengths and techniques. Its samples are then discarded.
 
-#include <map>
-
 #include "mcmc/chain_groups.h"
 #include "mcmc/primary_space.h"
+#include "mcmc/technique_choice.h"
 
 namespace etendue {
 
@@ -19,8 +18,7 @@ struct Pilot {
     double typical = 0;          ///< Median of the target over the states of a chain.
     uint64_t samples = 0;
     uint64_t precise_samples = 0;  ///< Those that sufficed for b; the others improve the map.
-    /// Mean of the target by length and number of light vertices.
-    std::map<std::pair<int, int>, double> by_technique;  ///< (edges, s)
+    TechniqueLight by_technique;   ///< Mean of the target.
 
     /// The constant c of chains (chain.h): b. If the pilot found nothing, large steps alone find light, and count as
     /// independent samples.
@@ -30,8 +28,9 @@ struct Pilot {
     void load(LearnedState& from);
 };
 
-/// Samples class 0 of `sample`, and twice as often `direct`, the paths that chains do not make. The number of samples is doubled until there is one for each pixel and the relative standard
-/// error of b is at most 2 %; at most two samples per pixel, and 2^18 in total.
+/// Samples class 0 of `sample`, and twice as often `direct`, the paths that chains do not make. The number of samples is
+/// doubled until there is one for each pixel and the relative standard error of b is at most 2 %; at most two samples per
+/// pixel, and 2^18 in total.
 Pilot run_pilot(const PassContext& pass, const PrimarySample& sample, const PrimarySample& direct);
 
 /// Number of samples in the pool of a group: a quarter of Pilot::precise_samples, and at least four for each chain.

@@ -18,28 +18,23 @@ struct Splat {
 };
 
 struct ChainState {
-    /// I: the stationary density of the chain times the normalisation b. Positive if the state has a splat.
+    /// I: the stationary density of the chain times the normalisation b, relative to the density of independent states, over
+    /// which its mean is b. Positive if the state has a splat.
     double target = 0;
-    /// T: density of independent states, in the measure of I; 1 in primary sample space.
-    double independent_density = 1;
     int edges = 0;  ///< Length of the path with the largest part of the target, for statistics.
     std::vector<Splat> splats;
 
     virtual ~ChainState() = default;
     virtual void save(LearnedState& to) const {
         to.put(target);
-        to.put(independent_density);
         to.put(edges);
         to.put(splats);
     }
     virtual void load(LearnedState& from) {
         from.get(target);
-        from.get(independent_density);
         from.get(edges);
         from.get(splats);
     }
-    /// I/T, whose mean over independent states is b.
-    double importance() const { return target / independent_density; }
 };
 
 /// Context of the steps of one chain.
@@ -51,8 +46,9 @@ struct ChainContext {
 /// A proposal y for a present state x.
 struct Proposal {
     int mutation = 0;         ///< Index into StateSpace::mutations().
-    bool has_failed = false;  ///< Nothing could be proposed; the chain stays at x.
-    double Q_ratio = 1;       ///< Q(y→x) / Q(x→y).
+    bool has_failed = false;  ///< Nothing could be proposed, and y has the target 0.
+    double Q_ratio =
+        1;  ///< Q(y→x) / Q(x→y), relative to the density of independent states like targets.
 };
 
 /// A space of states of one or more classes, each with its own chains. All random numbers are functions of a key.
@@ -64,7 +60,7 @@ public:
     virtual std::span<const char* const> mutations() const = 0;
     virtual std::unique_ptr<ChainState> make_state() const = 0;
     virtual void copy(const ChainState& from, ChainState& to) const = 0;
-    /// Sets y to an independent state with density T.
+    /// Sets y to an independent state.
     virtual void draw(int chain_class, uint64_t key, const ChainContext& c,
                       ChainState& y) const = 0;
     virtual Proposal propose(int chain_class, const ChainState& x, uint64_t key,

@@ -20,13 +20,19 @@ int pick(const std::vector<double>& shares, double u) {
 
 }  // namespace
 
-TechniqueChoice::TechniqueChoice(int shortest, int lengths, bool hits, bool hits_lens,
-                                 const Pilot& pilot)
-    : shortest_(shortest), hits_(hits), hits_lens_(hits_lens) {
+bool hits_emitters(const Scene& scene) {
+    return std::any_of(scene.emitters().begin(), scene.emitters().end(),
+                       [](const auto& e) { return !e->is_delta(); });
+}
+
+TechniqueChoice::TechniqueChoice(const Scene& scene, int shortest, int lengths,
+                                 const TechniqueLight& light)
+    : shortest_(shortest), hits_(hits_emitters(scene)),
+      hits_lens_(scene.sensor().has_finite_lens()) {
     for (int k = shortest; k < shortest + lengths; ++k) {
         const auto energy_of = [&](int s) {
-            const auto found = pilot.by_technique.find({k, s});
-            return found == pilot.by_technique.end() || !is_allowed(k, s) ? 0.0 : found->second;
+            const auto found = light.find({k, s});
+            return found == light.end() || !is_allowed(k, s) ? 0.0 : found->second;
         };
         std::vector<double> p(size_t(k) + 2);
         double energy = 0;
@@ -53,10 +59,10 @@ int TechniqueChoice::choose(int k, double u) const {
     return hits_ ? i : i + 1;
 }
 
-LengthChoice::LengthChoice(int shortest, int longest, const Pilot& pilot)
+LengthChoice::LengthChoice(int shortest, int longest, const TechniqueLight& light)
     : shortest_(shortest), longest_(longest) {
     double sum = 0;
-    for (const auto& [technique, value] : pilot.by_technique) {
+    for (const auto& [technique, value] : light) {
         const int k = technique.first;
         if (k < shortest || k > longest) continue;
         if (size_t(k - shortest) >= energy_.size()) energy_.resize(size_t(k - shortest) + 1);

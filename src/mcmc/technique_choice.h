@@ -2,18 +2,26 @@
 // Probabilities with which independent samples of single paths choose the length and the technique: four fifths in
 // proportion to the light that a pilot run found, and one fifth by a fixed distribution.
 
+#include <map>
+#include <utility>
 #include <vector>
 
-#include "mcmc/pilot.h"
+#include "scene/scene.h"
 
 namespace etendue {
+
+/// Light by length and technique: (edges, s). Empty if nothing is known of it.
+using TechniqueLight = std::map<std::pair<int, int>, double>;
+
+/// Whether eye paths can hit an emitter.
+bool hits_emitters(const Scene& scene);
 
 /// p(s|k) of C(s, k+1-s): four fifths in proportion to the light of each technique, one fifth uniform over the techniques.
 class TechniqueChoice {
 public:
-    /// Tabulates `lengths` path lengths from `shortest` on; at longer paths all techniques are equally likely. `hits` and
-    /// `hits_lens` tell whether C(0,k+1) and C(k+1,0) exist.
-    TechniqueChoice(int shortest, int lengths, bool hits, bool hits_lens, const Pilot& pilot);
+    /// Tabulates `lengths` path lengths from `shortest` on; at longer paths all techniques are equally likely. C(0,k+1) and
+    /// C(k+1,0) exist where eye paths can hit an emitter, and light paths the lens.
+    TechniqueChoice(const Scene& scene, int shortest, int lengths, const TechniqueLight& light);
     double pmf(int k, int s) const;
     int choose(int k, double u) const;
 
@@ -31,7 +39,7 @@ private:
 /// longest paths would have arbitrarily large weights.
 class LengthChoice {
 public:
-    LengthChoice(int shortest, int longest, const Pilot& pilot);
+    LengthChoice(int shortest, int longest, const TechniqueLight& light);
     double pmf(int k) const;
     int choose(double u) const;
 

@@ -53,11 +53,9 @@ double deletion_pmf(int deleted, int edges) {
 }  // namespace
 
 BidirectionalMutation::BidirectionalMutation(const PathMeasure& measure)
-    : measure_(measure), hits_(false), hits_lens_(measure.scene.sensor().has_finite_lens()) {
-    const auto& emitters = measure.scene.emitters();
-    for (const auto& e : emitters) hits_ |= !e->is_delta();
-    has_one_origin_ = emitters.size() == 1 && !hits_;
-}
+    : measure_(measure), hits_(hits_emitters(measure.scene)),
+      hits_lens_(measure.scene.sensor().has_finite_lens()),
+      has_one_origin_(measure.scene.emitters().size() == 1 && !hits_) {}
 
 bool BidirectionalMutation::is_possible(const Gap& gap, int inserted) const {
     const int k = gap.edges - gap.deleted() + inserted;

@@ -1,7 +1,7 @@
 #pragma once
 // Caustic perturbation [Veach 1997, §11.4.3]: the direction from the emitter, or from the last vertex before a chain of
-// delta events (or of glossy reflections), is turned by a small angle. The light sub-path follows the same events as before, to the vertex that the
-// lens sees.
+// delta events (or of glossy reflections), is turned by a small angle. The light sub-path follows the same events as before,
+// to the vertex that the lens sees.
 
 #include "mcmc/mutation/perturbation.h"
 

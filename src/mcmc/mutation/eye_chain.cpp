@@ -18,22 +18,25 @@ EyeChainMutation::EyeChainMutation(Kind kind, const PathMeasure& measure)
     : kind_(kind), events_(kind == Kind::Glossy ? Followed::Glossy : Followed::Delta),
       range_(film_range(measure)) {}
 
+EyeChainMutation::Role EyeChainMutation::role(const PathState& x, int i, bool is_glossy) const {
+    // A glossy reflection of the emitter is connected to it, since few such rays would hit it.
+    if (is_followed(x, i, events_))
+        return i > 1 || x[i].v.is_delta ? Role::RepeatsEvent : Role::IsJoined;
+    // Beyond the first glossy reflection, others need not be followed.
+    const bool goes_on =
+        x[i - 1].v.is_delta || (!is_glossy && i > 1 && is_followed(x, i - 1, events_));
+    return goes_on ? Role::TurnsDirection : Role::IsJoined;
+}
+
 EyeChainMutation::Chains EyeChainMutation::chains(const PathState& x) const {
     Chains c{x.last() - 1, 0, false};
-    while (true) {
-        for (; c.end > 0 && is_followed(x, c.end, events_); --c.end) {
-            // A glossy reflection of the emitter is connected to it, since few such rays would hit it.
-            if (c.end == 1 && !x[c.end].v.is_delta) return c;
-            c.is_glossy |= !x[c.end].v.is_delta;
-        }
-        if (c.end == 0) return c;
-        // Beyond the first glossy reflection, others need not be followed.
-        const bool goes_on = x[c.end - 1].v.is_delta ||
-                             (!c.is_glossy && c.end > 1 && is_followed(x, c.end - 1, events_));
-        if (!goes_on) return c;
-        ++c.turns;
-        --c.end;
+    for (; c.end > 0; --c.end) {
+        const Role at_end = role(x, c.end, c.is_glossy);
+        if (at_end == Role::IsJoined) break;
+        c.turns += at_end == Role::TurnsDirection;
+        c.is_glossy |= at_end == Role::RepeatsEvent && !x[c.end].v.is_delta;
     }
+    return c;
 }
 
 bool EyeChainMutation::suits(const PathState& x) const {

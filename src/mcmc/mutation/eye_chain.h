@@ -22,9 +22,19 @@ public:
     double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
 
 private:
+    /// What happens at a vertex of the eye sub-path.
+    enum class Role {
+        RepeatsEvent,
+        TurnsDirection,  ///< Between two chains.
+        IsJoined         ///< To the kept part; the last vertex that is replaced.
+    };
+    /// Role of x_i, if none of those between it and the lens is joined; `is_glossy`: whether one of them repeats a glossy
+    /// reflection.
+    Role role(const PathState& x, int i, bool is_glossy) const;
+
     struct Chains {
-        int end;         ///< x_end … x_{k-1} are replaced.
-        int turns;       ///< Vertices among them whose direction is turned.
+        int end;    ///< x_end … x_{k-1} are replaced; 0: up to the emitter, which the chain hits.
+        int turns;  ///< Vertices among them whose direction is turned.
         bool is_glossy;  ///< Whether glossy reflections are among them.
     };
     Chains chains(const PathState& x) const;

@@ -3,9 +3,7 @@
 namespace etendue {
 
 int LensSubpathMutation::end(const PathState& x) {
-    int i = x.last() - 1;
-    while (i > 0 && !x[i].v.is_connectible) --i;
-    return i;
+    return x.before(x.last(), [](const Vertex& v) { return v.is_connectible; });
 }
 
 bool LensSubpathMutation::suits(const PathState& x) const {

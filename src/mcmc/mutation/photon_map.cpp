@@ -12,22 +12,16 @@ constexpr float kCone = 30 * kPi / 180;  ///< Half-angle [Fan et al. 2005, §5.3
 
 }  // namespace
 
-int PhotonMapMutation::next(const PathState& x, int i) const {
-    do --i;
-    while (i > 0 && !stores_(x[i].v));
-    return i;
-}
-
 bool PhotonMapMutation::suits(const PathState& x) const {
     const int m = seen(x);
     if (m == 0 || x[m].v.is_delta) return false;
-    const int stored = next(x, m);
+    const int stored = x.before(m, stores_);
     return stored > 0 && x.is_connected_at(stored - 1);
 }
 
 bool PhotonMapMutation::propose(const PathState& x, const MutationContext& c, PathState& y,
                                 MutationWay& way) const {
-    const int m = seen(x), l = next(x, m) - 1;
+    const int m = seen(x), l = x.before(m, stores_) - 1;
     c.sampler.seek(Stream::Selection, addresses::kPart);
     const float versine = 2 * float(std::pow(std::sin(kCone / 2), 2)) * c.sampler.next_1d();
     const float u = c.sampler.next_1d();

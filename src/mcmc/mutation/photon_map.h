@@ -20,10 +20,8 @@ public:
     double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
 
 private:
-    /// Index of the next vertex before x_i, toward the light, that stores photons; 0 if there is none.
-    int next(const PathState& x, int i) const;
-    /// Index of the first such vertex from the eye; 0 if there is none.
-    int seen(const PathState& x) const { return next(x, x.last()); }
+    /// Index of the first vertex from the eye that stores photons; 0 if there is none.
+    int seen(const PathState& x) const { return x.before(x.last(), stores_); }
 
     std::function<bool(const Vertex&)> stores_;
 };

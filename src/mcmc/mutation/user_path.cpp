@@ -3,9 +3,7 @@
 namespace etendue {
 
 int UserPathMutation::kept(const PathState& x) {
-    int m = x.last() - 1;
-    while (m > 0 && x[m].v.is_delta) --m;
-    return m;
+    return x.before(x.last(), [](const Vertex& v) { return !v.is_delta; });
 }
 
 bool UserPathMutation::propose(const PathState& x, const MutationContext& c, PathState& y,

@@ -21,17 +21,20 @@ public:
     /// With uniform choices of length and technique, and W = 1.
     std::unique_ptr<PathSpace> space(const PathMutations& mutations,
                                      const UserSteps& user = {}) const {
-        const bool hits_lens = scene_.sensor().has_finite_lens();
-        bool hits = false;
-        for (const auto& e : scene_.emitters()) hits |= !e->is_delta();
-        const Pilot pilot{.map = TargetMap(scene_.film()), .by_technique = {}};
+        return space(mutations, weighted_luminance(TargetMap(scene_.film())), user);
+    }
+    std::unique_ptr<PathSpace> space(const PathMutations& mutations,
+                                     const PathImportance& importance,
+                                     const UserSteps& user = {}) const {
         const float N = float(scene_.film().pixel_count());
-        const TechniqueCounts counts{
-            .hit = 1, .next_event = 1, .connect = 1, .splat = N, .hit_lens = hits_lens ? N : 0.0f};
+        const TechniqueCounts counts{.hit = 1,
+                                     .next_event = 1,
+                                     .connect = 1,
+                                     .splat = N,
+                                     .hit_lens = scene_.sensor().has_finite_lens() ? N : 0.0f};
         return std::make_unique<PathSpace>(
-            PathTarget{measure(), weighted_luminance(pilot.map),
-                       LengthChoice(kShortest, kLongest, pilot),
-                       TechniqueChoice(kShortest, 8, hits, hits_lens, pilot), user},
+            PathTarget{measure(), importance, LengthChoice(kShortest, kLongest, {}),
+                       TechniqueChoice(scene_, kShortest, 8, {}), user},
             mutations, counts);
     }
     PassContext pass() const {

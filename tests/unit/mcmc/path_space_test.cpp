@@ -229,7 +229,7 @@ TEST_P(Paths, LargeStepsThatFollowUserPathsHaveTheirDensity) {
             // The value of paths with arbitrarily short edges has no finite variance.
             const auto& path = static_cast<const PathState&>(*x);
             if (x->target > 0 && has_no_edge_below(path, 0.4)) {
-                const double I = x->importance();
+                const double I = x->target;
                 value[0] = I;
                 if (path.density(*given, 2) > 0) {
                     value[1] = I, value[2] = I * path.last();
@@ -398,6 +398,124 @@ TEST_P(Paths, AllMutationsTogetherKeepDetailedBalance) {
         flows.add(static_cast<const PathState&>(*x), static_cast<const PathState&>(*y), p);
     }
     flows.expect_balance("all mutations");
+}
+
+/// The choice of the mutation, exactly: Q is that of the mutation alone, times the probability with which it is chosen
+/// among those that suit the path. Flows see little of it, since most steps are of mutations that suit both paths.
+TEST_P(Paths, MutationsAreChosenAmongThoseThatSuit) {
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    PathMutations all;
+    all.weights[PathMutations::PhotonMap] = 2;
+    const auto space = passes.space(all);
+    std::array<std::unique_ptr<PathSpace>, PathMutations::kCount> alone;
+    for (int kind = 0; kind < PathMutations::kCount; ++kind) {
+        PathMutations one;
+        one.weights.fill(0);
+        one.weights[size_t(kind)] = all.weights[size_t(kind)];
+        alone[size_t(kind)] = passes.space(one);
+    }
+    const auto x = space->make_state(), y = space->make_state(), again = space->make_state();
+    using Pmf = std::array<double, PathMutations::kCount>;
+    const auto pmf_at = [&](const ChainState& at) {
+        Pmf pmf{};
+        double sum = 0;
+        for (int kind = 0; kind < PathMutations::kCount; ++kind) {
+            // Where its only mutation does not suit, a space proposes nothing, under the name of the first one.
+            const Proposal p = alone[size_t(kind)]->propose(0, at, 1, c, *again);
+            if (p.mutation == kind) sum += pmf[size_t(kind)] = all.weights[size_t(kind)];
+        }
+        for (double& p : pmf) p /= sum;
+        return pmf;
+    };
+    std::array<Moments, PathMutations::kCount>
+        excess;  // Of proposals of a kind, over the expected number.
+    int moves = 0, between_choices = 0;
+    for (uint64_t i = 0; i < 20000; ++i) {
+        space->draw(0, hash_combine(10, i), c, *x);
+        if (!(x->target > 0)) continue;
+        const Pmf at_x = pmf_at(*x);
+        const uint64_t key = hash_combine(11, i);
+        const Proposal p = space->propose(0, *x, key, c, *y);
+        for (size_t kind = 0; kind < at_x.size(); ++kind)
+            excess[kind].add(double(p.mutation == int(kind)) - at_x[kind]);
+        if (p.has_failed || !(y->target > 0)) continue;
+        const auto kind = size_t(p.mutation);
+        const Proposal of_kind = alone[kind]->propose(0, *x, key, c, *again);
+        ASSERT_EQ(again->target, y->target);
+        const double choice = pmf_at(*y)[kind] / at_x[kind];
+        ASSERT_NEAR(p.Q_ratio, of_kind.Q_ratio * choice, 1e-9 * p.Q_ratio)
+            << PathMutations::kNames[kind];
+        ++moves;
+        between_choices += of_kind.Q_ratio > 0 && std::fabs(choice - 1) > 1e-3;
+    }
+    EXPECT_GT(moves, 300);
+    EXPECT_GT(between_choices, 10);
+    for (size_t kind = 0; kind < excess.size(); ++kind) {
+        if (!(excess[kind].variance() > 0)) continue;
+        EXPECT_GT(welch_p(excess[kind], Moments::exact(0), 0), sidak(1e-4, excess.size()))
+            << PathMutations::kNames[kind];
+    }
+    RecordProperty("moves", moves);
+    RecordProperty("between_choices", between_choices);
+}
+
+/// States whose target is not finite contribute nothing, and are counted.
+TEST_P(Paths, ThatAreNotFiniteAreCounted) {
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    for (const double value : {HUGE_VAL, -HUGE_VAL, std::nan("")}) {
+        const auto usual = passes.space({});
+        const auto space = passes.space({}, [value](const PathState&, Rgb) { return value; });
+        const auto x = usual->make_state(), next = usual->make_state(), y = space->make_state();
+        uint64_t expected = 0;
+        const uint64_t before = passes.work().stats.rejected;
+        for (uint64_t i = 0; i < 2000; ++i) {
+            usual->draw(0, hash_combine(12, i), c, *x);
+            space->draw(0, hash_combine(12, i), c, *y);
+            expected += x->target > 0;
+            ASSERT_EQ(y->target, 0);
+            ASSERT_TRUE(y->splats.empty());
+            if (!(x->target > 0)) continue;
+            const Proposal p = usual->propose(0, *x, hash_combine(13, i), c, *next);
+            expected += next->target > 0;
+            EXPECT_EQ(space->propose(0, *x, hash_combine(13, i), c, *y).has_failed, p.has_failed);
+            ASSERT_EQ(y->target, 0);
+        }
+        EXPECT_GT(expected, 100u);
+        EXPECT_EQ(passes.work().stats.rejected - before, expected) << value;
+    }
+}
+
+/// A light path that ends without a direction does not hit the lens along its last ray.
+TEST(PathBuilder, HitsTheLensByNewDirections) {
+    // From a lamp through rough glass, whose sampling sometimes fails, to a wide lens.
+    const Scene scene = build(
+        sensor("0,0,2", "0,0,0", kPixels, "60",
+               "<float name=\"aperture_radius\" value=\"1\"/><float name=\"focus_distance\" "
+               "value=\"2\"/>",
+               "thinlens") +
+        rectangle("<translate z=\"-1\"/>", diffuse("0.5,0.5,0.5") +
+                                               "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                               "value=\"2,2,2\"/></emitter>") +
+        rectangle("<scale value=\"3\"/>", "<bsdf type=\"roughdielectric\"><float name=\"alpha\" "
+                                          "value=\"0.8\"/></bsdf>"));
+    const PathMeasure measure(scene, reached_region(scene.film(), scene.filter()), 2, 2);
+    const PathTarget target{measure, weighted_luminance(TargetMap(scene.film())),
+                            LengthChoice(2, 2, {}), TechniqueChoice(scene, 2, 1, {})};
+    PathState y(target);
+    Workspace work;
+    int hits = 0;
+    for (uint64_t i = 0; i < 200000; ++i) {
+        Sampler sampler(SamplerKind::Independent, hash_combine(14, i));
+        sampler.start(0, 0);
+        PathBuilder builder(measure, sampler, work, nullptr, -1, 0);
+        if (!builder.sample(3, 0) || !builder.finish(y)) continue;
+        ++hits;
+        const Vec3 before = direction(y[0].v, y[1].v), after = direction(y[1].v, y[2].v);
+        ASSERT_GT(length(after - before), 1e-5f) << "sample " << i;
+    }
+    EXPECT_GT(hits, 1000);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Paths, ::testing::ValuesIn(cases()),

@@ -10,16 +10,17 @@ namespace etendue::test {
 namespace {
 
 /// What a pilot finds of light that decreases by `albedo` with each edge, up to some length.
-Pilot pilot_of(double albedo, int first, int last) {
-    Pilot pilot;
-    for (int k = first; k <= last; ++k) pilot.by_technique[{k, 1}] = std::pow(albedo, k);
-    return pilot;
+TechniqueLight light_of(double albedo, int first, int last) {
+    TechniqueLight light;
+    for (int k = first; k <= last; ++k) light[{k, 1}] = std::pow(albedo, k);
+    return light;
 }
 
 TEST(LengthChoice, IsMadeWithItsProbability) {
     for (const int longest : {3, 4, 9, 1000000}) {
-        for (const Pilot& pilot : {pilot_of(0, 1, 1), pilot_of(0.95, 3, 40), pilot_of(0.3, 3, 9)}) {
-            const LengthChoice choice(3, longest, pilot);
+        for (const TechniqueLight& light :
+             {light_of(0, 1, 1), light_of(0.95, 3, 40), light_of(0.3, 3, 9)}) {
+            const LengthChoice choice(3, longest, light);
             double sum = 0;
             for (int k = 3; k <= std::min(longest, 2000); ++k) sum += choice.pmf(k);
             EXPECT_NEAR(sum, 1, 1e-9);
@@ -44,7 +45,7 @@ TEST(LengthChoice, LongPathsHaveBoundedWeights) {
     for (const double albedo : {0.5, 0.9, 0.95})
         for (const double missed : {0.1, 0.01}) {
             const int seen = int(std::log(missed) / std::log(albedo));
-            const LengthChoice choice(12, 1000000, pilot_of(albedo, 12, 12 + seen));
+            const LengthChoice choice(12, 1000000, light_of(albedo, 12, 12 + seen));
             double first = 0, second = 0, largest = 0;
             for (int k = 12; k < 900; ++k) {
                 const double light = std::pow(albedo, k - 12);
