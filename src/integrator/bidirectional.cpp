@@ -121,7 +121,7 @@ void Bidirectional::add_technique(const SampleContext& c, const TechniqueCounts&
             work, factor);
 }
 
-void Bidirectional::learn(const LearnContext& pass) {
+void Bidirectional::learn(const LearnContext& pass, uint64_t rays) {
     if (!is_optimised_ || pass.film.passes() < 2) return;
     // With a survival probability q = C/δ, the expected number of rays of a join is q, and its variance increases by
     // C²(1/q - 1). The product of the number of rays T and the variance V of a sample is minimal for δ² = V/T
@@ -134,7 +134,7 @@ void Bidirectional::learn(const LearnContext& pass) {
     // Factor from film.variance() to the variance of one pass divided by the number of rays of a sample.
     const double passes = double(pass.film.passes());
     const double samples = passes * double(g.pixel_count());
-    const double scale = passes / (double(pass.so_far.rays()) / samples);
+    const double scale = passes / (double(rays) / samples);
     for (int y = 0; y < g.crop_height; ++y)
         for (int x = 0; x < g.crop_width; ++x) {
             double sum = 0;

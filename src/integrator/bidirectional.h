@@ -34,8 +34,10 @@ public:
         guiding_.train(pass, depth_, walks);
     }
 
-    /// Sets the thresholds of efficiency-optimised roulette from the statistics of earlier passes.
-    void learn(const LearnContext& pass);
+    /// Sets the thresholds of efficiency-optimised roulette from the statistics of earlier passes, in which all samples
+    /// together traced `rays` rays.
+    void learn(const LearnContext& pass, uint64_t rays);
+    void learn(const LearnContext& pass) { learn(pass, pass.so_far.rays()); }
     void save(LearnedState& to) const {
         to.put(thresholds_);
         guiding_.save(to);

@@ -19,6 +19,7 @@ public:
     PhotonMapping(const IntegratorParams& params, bool next_event);
 
     void learn(const LearnContext& pass) { paths_.learn(pass); }
+    void learn(const LearnContext& pass, uint64_t rays) { paths_.learn(pass, rays); }
     void load(LearnedState& from) { paths_.load(from); }
 
     /// Sample counts of the techniques that use no photons.

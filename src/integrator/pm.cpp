@@ -34,6 +34,11 @@ private:
     Rgb sum_;
 };
 
+/// Rays of the samples of a pass, without those that made the photons.
+struct RaySums final : PassSums {
+    uint64_t rays = 0;
+};
+
 /// Purpose of a density estimate, which determines the photons that it uses.
 enum class Look {
     Gathered,      ///< All light at the end of a gather ray.
@@ -62,10 +67,21 @@ public:
             refuse("an irradiance cache requires gather_rays of at least 1");
     }
 
-    void learn(const LearnContext& pass) override { mapping_.learn(pass); }
+    /// Photons do not count, since they are traced again where a rendering is resumed.
+    void learn(const LearnContext& pass) override { mapping_.learn(pass, rays_); }
+    std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<RaySums>(); }
+    void collect(std::span<const std::unique_ptr<PassSums>> workers) override {
+        for (const auto& w : workers) rays_ += static_cast<const RaySums&>(*w).rays;
+    }
     /// The maps are not saved, since they are functions of the seed.
-    void save(LearnedState& to) const override { mapping_.paths().save(to); }
-    void load(LearnedState& from) override { mapping_.load(from); }
+    void save(LearnedState& to) const override {
+        mapping_.paths().save(to);
+        to.put(rays_);
+    }
+    void load(LearnedState& from) override {
+        mapping_.load(from);
+        from.get(rays_);
+    }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         maps_pass_ = retrace_ ? pass.index : 0;
@@ -89,6 +105,7 @@ public:
         Sampler of_walk = c.sampler;
 
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        const uint64_t rays_before = work.stats.rays();
         start_eye_path(walk, c.film, c.index, of_walk, z);
         for (int t = 2; t <= z.size(); ++t) {
             mapping_.add_direct(c, t, work);  // C(0,t), C(1,t)
@@ -99,6 +116,7 @@ public:
                     [&](Look look, int u, float scale) { add_photons(c, look, u, scale, z); });
             if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
         }
+        static_cast<RaySums&>(*work.sums).rays += work.stats.rays() - rays_before;
     }
 
     TechniqueCounts counts(const Scene&, uint64_t light_paths) const override {
@@ -376,6 +394,7 @@ private:
     float cache_error_;
     int cache_rays_;
     uint32_t pass_ = 0, maps_pass_ = 0;
+    uint64_t rays_ = 0;  ///< Of all samples of finished passes.
     IrradianceCache cache_;
     PhotonMap global_, caustic_;
     PhotonIrradiance irradiances_;

@@ -194,6 +194,32 @@ TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
     EXPECT_EQ(disturbed.learned(), (std::vector<uint32_t>{0, 1, 4}));
 }
 
+/// Photons that are kept where their pass is dropped do not count in its statistics, on which later passes depend.
+TEST(DropPassOfPhotons, ChangesNothing) {
+    const Scene scene = build(mixed_room(front_camera(24)));
+    RenderSettings settings;
+    settings.threads = 2;
+    settings.spp = 6;
+    Disturbed::Hooks hooks;
+    const auto image = [&](bool is_dropped) {
+        Renderer r(scene, settings,
+                   std::make_unique<Disturbed>("pm:eorr=true,light_paths=2000", hooks));
+        const auto run = [&] { r.run([](const Progress&) {}, std::atomic<bool>{false}); };
+        if (is_dropped) {
+            hooks.sample = [](uint32_t, uint64_t index) {
+                if (index == 300) throw std::runtime_error("a bad sample");
+            };
+            EXPECT_THROW(run(), std::runtime_error);
+            hooks.sample = [](uint32_t, uint64_t) {};
+        }
+        run();
+        return r.film().image();
+    };
+    const std::vector<Rgb> whole = image(false), dropped = image(true);
+    for (size_t i = 0; i < whole.size(); ++i)
+        for (int c = 0; c < 3; ++c) ASSERT_EQ(dropped[i][c], whole[i][c]) << i;
+}
+
 /// Guides, whose training takes seconds. Nothing of it may be left where it is dropped.
 class DropTraining : public DropPass {
 protected:

@@ -92,18 +92,18 @@ TEST_P(Resume, GivesTheSameBits) {
 
 INSTANTIATE_TEST_SUITE_P(
     Integrators, Resume,
-    ::testing::Values("path:guide=on,guide_roulette=false,guide_walks=8000", "bdpt:eorr=true",
-                      "bdpt:connections=cache", "upg+bdpt:guide=on,guide_walks=8000",
-                      "vcm:radius=0.3", "vcm:exact=true", "vcm:eorr=true,radius=0.3", "upg",
-                      "upg:eorr=true", "upg+bdpt", "sppm", "sppm:eorr=true",
-                      "ppm:eorr=true,eye_paths=3", "pcbpt", "pcbpt:eorr=true",
-                      "pssmlt:groups=2,chains=16", "mmlt:groups=4,chains=48",
-                      "mlt:groups=4,chains=48", "upg+pssmlt:groups=2,chains=16",
-                      "pm:light_paths=2000", "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
-                      "mps:mutations=2000,precision=0.2",
-                      "mps:mutations=500,precision=0.2,retrace=true",
-                      "mps:target=path,mutations=500,precision=0.2",
-                      "mps:target=path,mutations=500,precision=0.2,retrace=true"),
+    ::testing::Values(
+        "path:guide=on,guide_roulette=false,guide_walks=8000", "bdpt:eorr=true",
+        "bdpt:connections=cache", "upg+bdpt:guide=on,guide_walks=8000", "vcm:radius=0.3",
+        "vcm:exact=true", "vcm:eorr=true,radius=0.3", "upg", "upg:eorr=true", "upg+bdpt", "sppm",
+        "sppm:eorr=true", "ppm:eorr=true,eye_paths=3", "pcbpt", "pcbpt:eorr=true",
+        "pssmlt:groups=2,chains=16", "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
+        "upg+pssmlt:groups=2,chains=16", "pm:light_paths=2000", "pm:eorr=true,light_paths=2000",
+        "mps:eorr=true,mutations=2000,precision=0.2",
+        "pm:light_paths=2000,cache_error=0.3,cache_rays=32", "mps:mutations=2000,precision=0.2",
+        "mps:mutations=500,precision=0.2,retrace=true",
+        "mps:target=path,mutations=500,precision=0.2",
+        "mps:target=path,mutations=500,precision=0.2,retrace=true"),
     [](const auto& p) {
         std::string name = p.param;
         std::replace_if(
