@@ -170,9 +170,14 @@ float importance_floor(const PassContext& context, const PhotonMapping& mapping,
         space.draw_light_path(hash_combine(pilot_seed(context.seed, PilotUse::PhotonScale), i), c);
         sums[i] = {};
         for_each_photon(mapping, c.work.y, [&](const MapPhoton& photon) {
-            const double flux = double(luminance(photon.power));
+            const double flux = double(luminance(photon.power)),
+                         important = flux * double(density(photon));
+            if (!std::isfinite(important)) {
+                ++c.work.stats.rejected;
+                return;
+            }
             sums[i][0] += flux;
-            sums[i][1] += flux * double(density(photon));
+            sums[i][1] += important;
         });
     });
     double flux = 0, important = 0;

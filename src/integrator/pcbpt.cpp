@@ -19,6 +19,7 @@
 #include <fmt/format.h>
 
 #include "integrator/bidirectional.h"
+#include "math/rotated.h"
 #include "reuse/importance_records.h"
 
 namespace etendue {
@@ -171,14 +172,15 @@ private:
                 what, vertices_.size(), memory_ >> 20));
     }
 
-    /// R2 sequence: multiples of the powers of the plastic number's inverse, modulo 1 [Roberts 2018].
+    /// Pixels that are evenly distributed over the image.
     static uint64_t low_discrepancy_pixel(const FilmGeometry& g, uint64_t i) {
-        const uint64_t x = (i * 0xc13fa9a902a6328full) >> 32, y = (i * 0x91e10da5c79e7b1dull) >> 32;
-        return (y * uint64_t(g.crop_height) >> 32) * uint64_t(g.crop_width) +
-               (x * uint64_t(g.crop_width) >> 32);
+        const FinePoint at = rotated(FinePoint{}, uint32_t(i));
+        return uint64_t(at.y * g.crop_height) * uint64_t(g.crop_width) +
+               uint64_t(at.x * g.crop_width);
     }
 
-    /// Sets work.masses to the contribution of every stored vertex to z_{t-1}.
+    /// Sets work.masses to the contribution of every stored vertex to z_{t-1}. Those that are not finite are counted, and left
+    /// to the uniform part of the distribution.
     void evaluate(const Scene& scene, const TechniqueCounts& n, int t, Workspace& work) const {
         work.masses.clear();
         for (const StoredVertex& v : vertices_) {
@@ -188,7 +190,11 @@ private:
                 mass = luminance(j->contribution) * visibility(scene, *j, work.stats);
                 if (is_weighted_) mass *= j->mis_weight;
             }
-            work.masses.push_back(std::isfinite(mass) ? mass : 0);
+            if (!std::isfinite(mass)) {
+                ++work.stats.rejected;
+                mass = 0;
+            }
+            work.masses.push_back(mass);
         }
     }
 

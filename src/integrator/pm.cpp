@@ -268,7 +268,11 @@ private:
             if (mapping_.paths().is_joinable(z, t))
                 for_each_look(c, round, t, is_diffuse, false, work,
                               [&](Look look, int u, float scale) {
-                                  importons.push_back(importon(look, z, u, scale));
+                                  const Importon i = importon(look, z, u, scale);
+                                  if (std::isfinite(i.importance))
+                                      importons.push_back(i);
+                                  else
+                                      ++work.stats.rejected;
                               });
             if (!mapping_.walk_on(walk, of_walk, z, is_diffuse)) break;
         }

@@ -56,5 +56,24 @@ TEST(Warnings, CountWhatTheFilmRefusesToo) {
     EXPECT_EQ(renderer.film().rejected(), 3u * 4);
 }
 
+/// The contributions that importance records measure, not only those that reach the film.
+TEST(Warnings, CountWhatRecordsLeaveOut) {
+    const Scene scene = build(
+        front_camera(8) + room() +
+        rectangle("<scale value=\"0.4\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.9\"/>",
+                  diffuse("0.5,0.5,0.5") +
+                      "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3e38\"/></emitter>"));
+    const auto rejected = [&](const char* record_fraction) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse(
+            std::string("pcbpt:connections=1e-6,record_fraction=") + record_fraction);
+        settings.spp = 1;
+        Renderer renderer(scene, settings);
+        renderer.run([](const Progress&) {}, std::atomic<bool>{false});
+        return renderer.stats().rejected;
+    };
+    EXPECT_GT(rejected("1"), rejected("0") + 10);
+}
+
 }  // namespace
 }  // namespace etendue::test
