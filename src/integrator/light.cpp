@@ -22,6 +22,7 @@ public:
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {
+        if (c.index >= c.light_paths) return;  // outside the crop
         const TechniqueCounts counts = this->counts(c.scene, c.light_paths);
         // The last vertex of the longest path is the lens. A splat connects to it; a ray may hit it if it is finite.
         const WalkContext walk{

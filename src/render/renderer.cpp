@@ -57,8 +57,11 @@ class FilmSink final : public ContributionSink {
 public:
     explicit FilmSink(const Receivers& to) : to_(to) {}
 
-    void begin(uint64_t index) {
+    /// Begins the sample `index`. There are `light_paths` light paths: the samples of a film's margin have none, since all
+    /// splats are divided by this number.
+    void begin(uint64_t index, uint64_t light_paths) {
         index_ = index;
+        adds_splats_ = index < light_paths;
         sum_ = Rgb();
     }
     void end() { to_.film.add_eye(index_, sum_); }
@@ -66,6 +69,7 @@ public:
     void add(const Join& join, Rgb contribution) override {
         if (!to_.shown.contains(join.technique)) return;
         const bool is_splat = join.technique.t <= 1;
+        if (is_splat && !adds_splats_) return;
         const Rgb value = contribution * join.mis_weight;
         if (!is_finite(value)) {
             ++to_.work.stats.rejected;
@@ -88,6 +92,7 @@ public:
 private:
     Receivers to_;
     uint64_t index_ = 0;
+    bool adds_splats_ = true;
     Rgb sum_;
 };
 
@@ -374,7 +379,7 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
              }});
     for_each_sample(film_.sample_count(),
                     [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
-                        sink.begin(c.index);
+                        sink.begin(c.index, c.light_paths);
                         integrator_->sample(c, work);
                         sink.end();
                     });

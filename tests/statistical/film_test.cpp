@@ -30,11 +30,13 @@ TEST_P(Filters, OfEyePathsAndSplatsAgree) {
     const Tiles path = render_tiles(scene, "path", {2048, 8, 1});
     expect_same_image(render_tiles(scene, "light", {4096, 8, 2}), path, 0.05, "light");
     expect_same_image(render_tiles(scene, "bdpt", {1024, 8, 3}), path, 0.05, "bdpt");
-    for (const char* integrator : {"path", "bdpt"})
+    for (const char* integrator : {"path", "light", "bdpt"})
         expect_same_image(
-            render_tiles(
-                scene, integrator,
-                {.passes = 1024, .tiles = 8, .seed = 5, .filter_mode = FilterMode::Spread}),
+            render_tiles(scene, integrator,
+                         {.passes = std::string(integrator) == "light" ? 4096u : 1024u,
+                          .tiles = 8,
+                          .seed = 5,
+                          .filter_mode = FilterMode::Spread}),
             path, 0.05, std::string(integrator) + ", spread");
 
     const Scene crop = build(lit_floor(
