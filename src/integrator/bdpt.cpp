@@ -66,7 +66,8 @@ public:
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
-        return light_.count(scene, paths_.depth(), uses_cache_ ? kVertexBytes : 0);
+        return light_.count(scene, paths_.depth(),
+                            uses_cache_ ? paths_.vertex_bytes(kVertexBytes) : 0);
     }
     bool samples_alone() const override { return !uses_cache_ && !paths_.guiding().is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }

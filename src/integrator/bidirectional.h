@@ -47,6 +47,10 @@ public:
         guiding_.load(from);
     }
     const Guiding& guiding() const { return guiding_; }
+    /// Memory of a stored light vertex that needs `bytes` where nothing is guided.
+    uint64_t vertex_bytes(uint64_t bytes) const {
+        return bytes + (guiding_.is_on() ? LightVertexCache::kGuideBytes : 0);
+    }
 
     WalkContext eye_walk(const Scene& scene, const TechniqueCounts& counts, RenderStats& stats,
                          const LearnedPlaces* learned = nullptr) const {

@@ -1,7 +1,9 @@
 #include "integrator/light_path_options.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "math/statistics.h"
 #include "sampler/pilot_seed.h"
 
 namespace etendue {
@@ -28,19 +30,26 @@ uint64_t LightPathOptions::count(const Scene& scene, const DepthOptions& depth,
     if (pixels * kManyVertices * vertex_bytes <= memory) return pixels;
     constexpr uint64_t kPilotPaths = 4096;
     constexpr double kReserve = 1.1;
+    // Of the spread of the sum over the paths of a pass: that of none of thousands of passes is so large.
+    constexpr double kSpread = 6;
     const TechniqueCounts none;
     RenderStats stats;
-    const WalkContext walk{scene, none, stats, depth.walk()};
+    const WalkContext walk{
+        scene, none, stats, {depth.max_depth + scene.sensor().has_finite_lens(), depth.rr_depth}};
     Sampler sampler(SamplerKind::Independent, pilot_seed(0, PilotUse::LightPathCount));
     SubPath y;
-    uint64_t vertices = 0;
+    Moments vertices;
     for (uint64_t i = 0; i < kPilotPaths; ++i) {
         sampler.start(0, i);
         trace_light_path(walk, sampler, y);
-        vertices += uint64_t(y.size());
+        vertices.add(double(y.size()));
     }
-    const double bytes = kReserve * double(vertices * vertex_bytes) / double(kPilotPaths);
-    return std::clamp(uint64_t(double(memory) / std::max(bytes, 1.0)), uint64_t(1), pixels);
+    // N paths have m N ± s √N vertices.
+    const double most = double(memory) / std::max(double(vertex_bytes), 1.0),
+                 m = std::max(kReserve * vertices.mean(), 1.0),
+                 s = kSpread * std::sqrt(vertices.variance());
+    const double root = (std::sqrt(sqr(s) + 4 * m * most) - s) / (2 * m);
+    return std::clamp(uint64_t(sqr(root)), uint64_t(1), pixels);
 }
 
 }  // namespace etendue

@@ -134,7 +134,7 @@ public:
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
-        return light_.count(scene, paths_.depth(), kVertexBytes);
+        return light_.count(scene, paths_.depth(), paths_.vertex_bytes(kVertexBytes));
     }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {

@@ -104,7 +104,7 @@ public:
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
-        return light_.count(scene, paths_.depth(), kVertexBytes);
+        return light_.count(scene, paths_.depth(), paths_.vertex_bytes(kVertexBytes));
     }
     std::vector<std::pair<std::string, double>> figures() const override {
         std::vector<std::pair<std::string, double>> figures;

@@ -14,7 +14,7 @@ namespace etendue {
 void LightVertexCache::begin(uint64_t chunks, uint64_t vertex_bytes, uint64_t max_bytes,
                              const Guide* guide) {
     is_guided_ = guide && guide->guides_surfaces();
-    vertex_bytes_ = vertex_bytes + (is_guided_ ? 3 * sizeof(LightVertexGuide) : 0);
+    vertex_bytes_ = vertex_bytes + (is_guided_ ? kGuideBytes : 0);
     max_bytes_ = max_bytes;
     taken_bytes_ = 0;
     chunks_.resize(chunks);

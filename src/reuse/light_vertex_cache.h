@@ -91,6 +91,8 @@ public:
 
     /// Memory per vertex: in a chunk, whose capacity may be twice its size, and in the assembled cache.
     static constexpr uint64_t kVertexBytes = 3 * (sizeof(LightVertex) + sizeof(LightVertexPlace));
+    /// The same for the guide of a vertex, where there is one.
+    static constexpr uint64_t kGuideBytes = 3 * sizeof(LightVertexGuide);
 
 private:
     /// y_0, and the range of the other vertices.

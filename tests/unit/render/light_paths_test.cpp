@@ -1,5 +1,7 @@
 // Light paths of a pass: their memory, and methods that are one another with some options.
 
+#include <regex>
+
 #include <gtest/gtest.h>
 
 #include "render/renderer.h"
@@ -60,6 +62,30 @@ TEST(LightPaths, PcbptStaysWithinItsMemory) {
     const int mebibytes = int(needed / (1 << 20));
     EXPECT_THROW(bytes("light_paths=4000,memory=" + std::to_string(mebibytes)), std::runtime_error);
 }
+
+class LightPathMemory : public ::testing::TestWithParam<const char*> {};
+
+/// Where the number of light paths is not given, those of every pass fit into the memory, also where walks are guided or may
+/// end on the lens.
+TEST_P(LightPathMemory, SufficesForTheirNumber) {
+    const Scene scene = build(mixed_room(lens_camera(64)));
+    RenderSettings settings = settings_of(GetParam() + std::string(",memory=1"), 60);
+    settings.threads = 2;
+    Renderer renderer(scene, settings);
+    EXPECT_LT(renderer.integrator().light_paths(scene), 2000u);
+    renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+    EXPECT_EQ(renderer.film().passes(), 60u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, LightPathMemory,
+                         ::testing::Values("vcm:alpha=1", "vcm:guide=on,guide_walks=8000",
+                                           "upg:max_depth=8", "upg+bdpt:guide=on,guide_walks=8000",
+                                           "bdpt:connections=cache,guide=on,guide_walks=8000",
+                                           "sppm:max_depth=2", "ppm:max_depth=8"),
+                         [](const auto& p) {
+                             const std::string name = p.param;
+                             return std::regex_replace(name, std::regex("[^a-z0-9]+"), "_");
+                         });
 
 }  // namespace
 }  // namespace etendue::test
