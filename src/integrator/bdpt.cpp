@@ -1,5 +1,6 @@
 // Bidirectional path tracing [Veach & Guibas 1994; Lafortune & Willems 1993]: all techniques C(s,t), combined by the power
-// heuristic. Unbiased. Joins with a small contribution pass Russian roulette before their shadow ray.
+// heuristic. Unbiased. Joins with a small contribution pass Russian roulette before their shadow ray. The loop over s and t
+// is that of Bidirectional::add_sample(), which methods with chains use, too.
 //
 // An eye vertex is connected to the light path of its own pixel, or to C random vertices of the light vertex cache,
 // which holds the V connectible vertices y_i, i ≥ 1, of all light paths of the pass [Davidovič et al. 2014]. In the
@@ -52,11 +53,15 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
-        if (uses_cache_)
-            paths_.add_eye_path(c, n, work, nullptr,
-                                [&](int t) { connect_to_cache(c, n, t, work); });
-        else
-            paths_.add_sample(c, n, work);
+        if (!uses_cache_) return paths_.add_sample(c, n, work);
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        paths_.trace_eye_path(c, n, work);
+        for (int t = 2; t <= work.z.size(); ++t) {
+            paths_.add_hits(c, n, t, work);  // C(0,t)
+            if (!paths_.is_joinable(work.z, t)) continue;
+            paths_.add_next_events(c, n, t, work);  // C(1,t)
+            connect_to_cache(c, n, t, work);        // C(s,t), s ≥ 2
+        }
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {

@@ -46,13 +46,13 @@ void Bidirectional::trace_light_path(const SampleContext& c, const TechniqueCoun
 }
 
 void Bidirectional::trace_further_light_paths(const SampleContext& c, const TechniqueCounts& counts,
-                                              Workspace& work) const {
+                                              Workspace& work, const LearnedPlaces* learned) const {
     if (c.is_of_whole_film) return;
     const uint64_t samples = c.film.sample_count();
     for (uint64_t path = c.index + samples; path < c.light_paths; path += samples) {
         Sampler sampler = c.sampler;
         sampler.start(path);
-        trace_light_path(c.with(sampler, c.sink), counts, work);
+        trace_light_path(c.with(sampler, c.sink), counts, work, learned);
     }
 }
 
@@ -76,15 +76,43 @@ void Bidirectional::trace_eye_path(const SampleContext& c, const TechniqueCounts
 }
 
 void Bidirectional::add_sample(const SampleContext& c, const TechniqueCounts& counts,
-                               Workspace& work) const {
+                               Workspace& work, const LearnedPlaces* learned) const {
     const bool has_light_path = counts.uses_light_paths();
     if (has_light_path) {
-        trace_further_light_paths(c, counts, work);  // C(s,1), C(s,0)
-        trace_light_path(c, counts, work);           // C(s,1), C(s,0)
+        trace_further_light_paths(c, counts, work, learned);  // C(s,1), C(s,0)
+        trace_light_path(c, counts, work, learned);           // C(s,1), C(s,0)
     }
-    add_eye_path(c, counts, work, nullptr, [&](int t) {
-        if (has_light_path) add_connections(c, counts, t, work);
-    });
+    const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+    trace_eye_path(c, counts, work, learned);
+    for (int t = 2; t <= work.z.size(); ++t) {
+        add_hits(c, counts, t, work);  // C(0,t)
+        if (!is_joinable(work.z, t)) continue;
+        add_next_events(c, counts, t, work);                      // C(1,t)
+        if (has_light_path) add_connections(c, counts, t, work);  // C(s,t), s ≥ 2
+    }
+}
+
+NextEventDraws Bidirectional::add_next_events(const SampleContext& c, const TechniqueCounts& counts,
+                                              int t, Workspace& work) const {
+    NextEventDraws draws;
+    if (counts.next_event == 0) return draws;
+    draws.count = work.z[t - 1].sees_lens ? uint32_t(counts.repeated_next_event) : 1;
+    for (uint32_t i = 0; i < draws.count; ++i) {
+        const auto join = join_next_event(c.scene, work.z, t, c.sampler, counts, i);
+        const auto value = add(c, join, work, 1 / float(draws.count), i);
+        if (!join) continue;
+        NextEventDraw& draw = draws.draws[i];
+        draw = {.contribution = luminance(join->contribution), .weight = join->mis_weight};
+        if (value && draw.contribution > 0) draw.passed = luminance(*value) / draw.contribution;
+    }
+    return draws;
+}
+
+void Bidirectional::add_connections(const SampleContext& c, const TechniqueCounts& counts, int t,
+                                    Workspace& work) const {
+    const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
+    for (int s = 2; s <= work.y.size() && s + t - 1 <= max_depth(); ++s)
+        add(c, join_connect(c.scene, work.y, s, work.z, t, counts), work);
 }
 
 void Bidirectional::add_technique(const SampleContext& c, const TechniqueCounts& counts, int s,

@@ -72,7 +72,7 @@ public:
                           const LearnedPlaces* learned = nullptr) const;
     /// Where there are more light paths than samples: traces the others of this sample, for C(s,1) and C(s,0) alone.
     void trace_further_light_paths(const SampleContext& c, const TechniqueCounts& counts,
-                                   Workspace& work) const;
+                                   Workspace& work, const LearnedPlaces* learned) const;
     /// Traces the eye sub-path work.z.
     void trace_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                         const LearnedPlaces* learned = nullptr) const;
@@ -87,55 +87,8 @@ public:
                            LightVertexCache& cache, const LearnedPlaces* learned = nullptr) const;
 
     /// Adds all techniques of one sample of bidirectional path tracing.
-    void add_sample(const SampleContext& c, const TechniqueCounts& counts, Workspace& work) const;
-    /// Traces the eye sub-path and adds C(0,t) and C(1,t). `join(t)` adds all other joins of z_{t-1}, and
-    /// `observe(t, draws)` is told about its next events.
-    template <class JoinMore, class Observe>
-    void add_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                      const LearnedPlaces* learned, const JoinMore& join,
-                      const Observe& observe) const {
-        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        trace_eye_path(c, counts, work, learned);
-        const SubPath& z = work.z;
-        for (int t = 2; t <= z.size(); ++t) {
-            add_hits(c, counts, t, work);
-            if (!is_joinable(z, t)) continue;
-            if (counts.next_event > 0) add_next_events(c, counts, t, work, observe);
-            join(t);
-        }
-    }
-    template <class JoinMore>
-    void add_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                      const LearnedPlaces* learned, const JoinMore& join) const {
-        add_eye_path(c, counts, work, learned, join, [](int, std::span<const NextEventDraw>) {});
-    }
-    /// Adds C(1,t).
-    template <class Observe>
-    void add_next_events(const SampleContext& c, const TechniqueCounts& counts, int t,
-                         Workspace& work, const Observe& observe) const {
-        std::array<NextEventDraw, kMostNextEvents> draws{};
-        const uint32_t n = work.z[t - 1].sees_lens ? uint32_t(counts.repeated_next_event) : 1;
-        for (uint32_t i = 0; i < n; ++i) {
-            const auto join = join_next_event(c.scene, work.z, t, c.sampler, counts, i);
-            const auto value = add(c, join, work, 1 / float(n), i);
-            if (!join) continue;
-            draws[i] = {.contribution = luminance(join->contribution), .weight = join->mis_weight};
-            if (value && draws[i].contribution > 0)
-                draws[i].seen = luminance(*value) / draws[i].contribution;
-        }
-        observe(t, std::span<const NextEventDraw>(draws.data(), n));
-    }
-    /// Adds C(s,t), s ≥ 2, with the light sub-path work.y.
-    void add_connections(const SampleContext& c, const TechniqueCounts& counts, int t,
-                         Workspace& work) const {
-        const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
-        for (int s = 2; s <= work.y.size() && s + t - 1 <= max_depth(); ++s)
-            add(c, join_connect(c.scene, work.y, s, work.z, t, counts), work);
-    }
-    /// Adds only C(s,t), times `factor`. Traces sub-paths of s and t vertices.
-    void add_technique(const SampleContext& c, const TechniqueCounts& counts, int s, int t,
-                       float factor, Workspace& work) const;
-
+    void add_sample(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
+                    const LearnedPlaces* learned = nullptr) const;
     /// Adds C(0,t).
     void add_hits(const SampleContext& c, const TechniqueCounts& counts, int t,
                   const Workspace& work, float factor = 1) const {
@@ -143,6 +96,16 @@ public:
             for_each_hit(c.scene, work.z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution * factor); });
     }
+    /// Adds C(1,t), and returns its next events.
+    NextEventDraws add_next_events(const SampleContext& c, const TechniqueCounts& counts, int t,
+                                   Workspace& work) const;
+    /// Adds C(s,t), s ≥ 2, with the light sub-path work.y.
+    void add_connections(const SampleContext& c, const TechniqueCounts& counts, int t,
+                         Workspace& work) const;
+    /// Adds only C(s,t), times `factor`. Traces sub-paths of s and t vertices.
+    void add_technique(const SampleContext& c, const TechniqueCounts& counts, int s, int t,
+                       float factor, Workspace& work) const;
+
     /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several
     /// joins of the same technique, `draw` distinguishes them.
     std::optional<Rgb> add(const SampleContext& c, const std::optional<Join>& join, Workspace& work,

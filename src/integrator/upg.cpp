@@ -90,30 +90,30 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
-        const GatherSearch search{c,
-                                  n,
-                                  cache_,
-                                  has_two_grids() ? seen_grid_ : inner_grid_,
-                                  inner_grid_,
-                                  density_,
-                                  learned_.roulette,
-                                  paths_.max_depth(),
-                                  flatness_,
-                                  paths_.threshold(c),
-                                  work};
+        const GatherSearch search{.c = c,
+                                  .n = n,
+                                  .cache = cache_,
+                                  .seen_grid = has_two_grids() ? seen_grid_ : inner_grid_,
+                                  .inner_grid = inner_grid_,
+                                  .density = density_,
+                                  .roulette = learned_.roulette,
+                                  .max_depth = paths_.max_depth(),
+                                  .flatness = flatness_,
+                                  .threshold = paths_.threshold(c),
+                                  .work = work};
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
-        const auto join = [&](int t) {
-            if (connects_) paths_.add_connections(c, n, t, work);  // C(s,t)
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        paths_.trace_eye_path(c, n, work, &density_);
+        for (int t = 2; t <= work.z.size(); ++t) {
+            paths_.add_hits(c, n, t, work);  // C(0,t)
+            if (!paths_.is_joinable(work.z, t)) continue;
+            if (connects_) {
+                observe(c, t, paths_.add_next_events(c, n, t, work), work);  // C(1,t)
+                paths_.add_connections(c, n, t, work);                       // C(s,t), s ≥ 2
+            }
             search.for_each_pair(
                 t, [&](const GatherPair& pair) { gather(c, n, search, pair, work); });  // U(s,t)
-        };
-        const auto observe_next_events = [&](int t, std::span<const NextEventDraw> draws) {
-            const float pixel = c.expected_of_pixel();
-            if (work.z[t - 1].sees_lens && pixel > 0)
-                NextEventCount::observe(draws, double(std::fabs(work.z.film_weight) / pixel),
-                                        GatherSums::of(work));
-        };
-        paths_.add_eye_path(c, n, work, &density_, join, observe_next_events);  // C(0,t), C(1,t)
+        }
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
@@ -178,6 +178,15 @@ private:
             observe(c, pair, *join, work.stats.trials - trials, r, seen, search, work);
         }
         c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.rate));
+    }
+
+    /// Records the next events of z_{t-1} for later passes.
+    static void observe(const SampleContext& c, int t, const NextEventDraws& draws,
+                        Workspace& work) {
+        const float pixel = c.expected_of_pixel();
+        if (work.z[t - 1].sees_lens && pixel > 0)
+            NextEventCount::observe(draws.span(), double(std::fabs(work.z.film_weight) / pixel),
+                                    GatherSums::of(work));
     }
 
     /// Records a visible pair for later passes. `seen`: the transmittance of the join, divided by its survival probability

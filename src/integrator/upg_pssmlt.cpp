@@ -56,17 +56,17 @@ struct Gathering {
 
     /// `c` must have the number of light paths of the map.
     GatherSearch search(const SampleContext& c, const LightMap& map, Workspace& work) const {
-        return {c,
-                counts,
-                map.cache,
-                map.grid,
-                map.grid,
-                density,
-                roulette,
-                paths.max_depth(),
-                kGatherConstants.flatness,
-                0,
-                work};
+        return {.c = c,
+                .n = counts,
+                .cache = map.cache,
+                .seen_grid = map.grid,
+                .inner_grid = map.grid,
+                .density = density,
+                .roulette = roulette,
+                .max_depth = paths.max_depth(),
+                .flatness = kGatherConstants.flatness,
+                .threshold = 0,
+                .work = work};
     }
     /// Calls use(t) for each eye vertex z_{t-1} that may belong to a pair.
     template <class Use>
@@ -79,9 +79,7 @@ struct Gathering {
     }
     /// Joins of bidirectional path tracing.
     void add_sample(const SampleContext& c, Workspace& work) const {
-        paths.trace_light_path(c, counts, work, &density);
-        paths.add_eye_path(c, counts, work, &density,
-                           [&](int t) { paths.add_connections(c, counts, t, work); });
+        paths.add_sample(c, counts, work, &density);
     }
 
     /// Traces N_L light paths, whose random numbers are functions of `key`.

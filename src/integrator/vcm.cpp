@@ -82,10 +82,20 @@ public:
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
-        paths_.add_eye_path(c, n, work, &density_, [&](int t) {    // C(0,t), C(1,t)
-            if (connects_) paths_.add_connections(c, n, t, work);  // C(s,t)
-            if (merges_) (is_exact_ ? gather(c, n, t, work) : merge(c, n, t, work));
-        });
+        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        paths_.trace_eye_path(c, n, work, &density_);
+        for (int t = 2; t <= work.z.size(); ++t) {
+            paths_.add_hits(c, n, t, work);  // C(0,t)
+            if (!paths_.is_joinable(work.z, t)) continue;
+            if (connects_) {
+                paths_.add_next_events(c, n, t, work);  // C(1,t)
+                paths_.add_connections(c, n, t, work);  // C(s,t), s ≥ 2
+            }
+            if (is_exact_)
+                gather(c, n, t, work);  // U(s,t)
+            else if (merges_)
+                merge(c, n, t, work);  // M(s,t)
+        }
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
@@ -149,12 +159,17 @@ private:
     /// Adds U(s,t), with the approximation q π d² p̃ of p_c. q is the survival probability of the Russian roulette
     /// before the dropped vertex [Qin et al. 2015, eq. 7].
     void gather(const SampleContext& c, const TechniqueCounts& n, int t, Workspace& work) const {
-        const GatherSearch search{c,         n,
-                                  cache_,    grid_,
-                                  grid_,     density_,
-                                  roulette_, paths_.max_depth(),
-                                  1,         paths_.threshold(c),
-                                  work};
+        const GatherSearch search{.c = c,
+                                  .n = n,
+                                  .cache = cache_,
+                                  .seen_grid = grid_,
+                                  .inner_grid = grid_,
+                                  .density = density_,
+                                  .roulette = roulette_,
+                                  .max_depth = paths_.max_depth(),
+                                  .flatness = 1,  // a ball
+                                  .threshold = paths_.threshold(c),
+                                  .work = work};
         search.for_each_pair(t, [&](const GatherPair& pair) {
             const auto& [strategy, s, t_, drops_eye] = pair.technique;
             const auto join = join_gather(c.scene, work.pair, s, work.z, t_, drops_eye, n);

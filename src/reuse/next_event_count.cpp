@@ -19,11 +19,11 @@ double moment(std::span<const NextEventDraw> draws, double scale, uint32_t count
     for (const NextEventDraw& d : draws) {
         const double odds = double(d.weight) / (1 - double(d.weight)),
                      w = weight_of_odds(odds, factor), value = double(d.contribution) * scale,
-                     x = w * value * double(d.seen);
+                     x = w * value * double(d.passed);
         sum += x;
         squares += sqr(x);
         // f/(n_S p_S) = f/(n p) √odds
-        if (w < 1) others += sqr((1 - w) * value / n) * double(d.seen) * std::sqrt(odds);
+        if (w < 1) others += sqr((1 - w) * value / n) * double(d.passed) * std::sqrt(odds);
     }
     return std::max(0.0, (squares - sqr(sum) / n) / (n - 1)) / std::pow(count, 1.5) + others;
 }

@@ -14,7 +14,15 @@ struct NextEventDraw {
     float contribution = 0;  ///< Luminance for weight 1; 0 where there is none.
     float weight = 0;        ///< MIS weight.
     /// Transmittance, divided by the probability of surviving Russian roulette; 0 where either has ended it.
-    float seen = 0;
+    float passed = 0;
+};
+
+/// The next events of an eye vertex.
+struct NextEventDraws {
+    std::array<NextEventDraw, kMostNextEvents> draws{};
+    uint32_t count = 0;
+
+    std::span<const NextEventDraw> span() const { return {draws.data(), count}; }
 };
 
 /// A vertex that sees the lens (Vertex) is not a random choice, and its sample is costly where it also gathers. Several
