@@ -1,5 +1,5 @@
 #pragma once
-// The file formats of image_io.h that need a library. There are two implementations: over OpenImageIO, and a small one.
+// The file formats of image_io.h that need a library.
 
 #include "image/image_io.h"
 #include "system/output_file.h"

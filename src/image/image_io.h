@@ -11,8 +11,8 @@
 
 namespace etendue {
 
-/// Reads any format supported by OpenImageIO, or, in the Python package, .exr, .png, .jpg, .hdr and .pfm. Integer formats are decoded from sRGB, except alpha and files declared
-/// linear.
+/// Reads .exr (flat, its first part), .png, .jpg, .hdr, .pfm, .tga, .bmp, and binary .pgm and .ppm. The content decides, not
+/// the name. Integer formats are decoded from sRGB, except alpha and files declared linear.
 Image read_image(const std::string& path);
 
 /// The colours of one layer; see rgb_pixels().

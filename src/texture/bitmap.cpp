@@ -1,6 +1,6 @@
 // Image texture. (u, v) = (0, 0) is the upper left corner of the image, (1, 1) its lower right one, and texel centres
 // lie at half-integers, as in Mitsuba 3 (which flips v in some mesh readers, not in textures).
-//   filename (required)       any format OpenImageIO reads
+//   filename (required)       .exr, .png, .jpg, .hdr, .pfm, .tga, .bmp, .pgm or .ppm
 //   filter_type (bilinear)    or nearest
 //   wrap_mode (repeat)        or mirror, clamp, zero, one; the last two: this constant outside the unit square
 //   wrap_mode_v (wrap_mode)   the same along v, if it differs from that along u
@@ -18,6 +18,7 @@
 
 #include "color/srgb.h"
 #include "description/resolve_file.h"
+#include "system/huge_pages.h"
 #include "texture/texture_cache.h"
 
 namespace etendue {
@@ -96,7 +97,12 @@ BitmapTexture::BitmapTexture(const PixelBuffer& image, const Options& options)
       first_channel_(std::max(options.channel, 0)),
       is_bounded_(is_bounded(options.wrap) || is_bounded(options.wrap_v.value_or(options.wrap))),
       decode_(decoding(!options.raw && !(is_grey_ && first_channel_ == image.alpha_channel))) {
-    mean_ = std::visit([&](const auto& texels) { return image_mean(texels); }, image.data);
+    std::visit(
+        [&](const auto& texels) {
+            mean_ = image_mean(texels);
+            prefer_huge_pages(texels);
+        },
+        image.data);
 }
 
 BitmapTexture::Footprint BitmapTexture::footprint(Vec2 uv) const {
@@ -266,7 +272,8 @@ TextureEntry bitmap_entry() {
         {"texture",
          "bitmap",
          "An image; (0, 0) is its upper left corner.",
-         {{"filename", ParamKind::String, "", "Image file of any format that OpenImageIO reads."},
+         {{"filename", ParamKind::String, "",
+           "Image file: .exr, .png, .jpg, .hdr, .pfm, .tga, .bmp, .pgm or .ppm."},
           {"filter_type", ParamKind::String, "bilinear", "Interpolation: bilinear or nearest."},
           {"wrap_mode", ParamKind::String, "repeat",
            "Outside the unit square: repeat, mirror, clamp, zero or one."},

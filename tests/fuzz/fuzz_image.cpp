@@ -1,5 +1,4 @@
-// Any bytes as an image: pixels or a std::runtime_error. The small implementation of image_io.h is used; with OpenImageIO
-// little but its own code would be tested.
+// Any bytes as an image: pixels or a std::runtime_error.
 
 #include <unistd.h>
 
@@ -71,6 +70,15 @@ std::vector<std::string> seeds() {
         files.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
     }
     std::filesystem::remove_all(folder);
+    const std::string zeros(16 * 5 * 3, '\0');
+    files.push_back(std::string("\0\0\2\0\0\0\0\0\0\0\0\0\20\0\5\0\30\0", 18) + zeros);  // TGA
+    files.push_back(std::string("\0\0\12\0\0\0\0\0\0\0\0\0\20\0\5\0\40\10", 18) +
+                    zeros);  // with runs
+    files.push_back(
+        std::string("BM\46\1\0\0\0\0\0\0\66\0\0\0\50\0\0\0\20\0\0\0\5\0\0\0\1\0\30\0", 30) +
+        std::string(24, '\0') + zeros);  // BMP
+    files.push_back("P6\n16 5\n255\n" + zeros);
+    files.push_back("P5\n16 5\n65535\n" + zeros);
     return files;
 }
 

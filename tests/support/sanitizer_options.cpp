@@ -16,11 +16,9 @@ const char* __tsan_default_suppressions() {
            "race_top:/oneapi/tbb/\n";
 }
 
-/// For a truncated file OpenImageIO 2.4 passes the error text to libpng, which leaves by longjmp(), so that the text is
-/// never freed. The stack of this leak ends in the standard library unless ASAN_OPTIONS has fast_unwind_on_malloc=0. The
-/// name of the library is known without a symbolizer. Embree frees not everything of a build that runs out of its memory.
+/// Embree frees not everything of a build that runs out of its memory. The name of the library is known without a
+/// symbolizer.
 const char* __lsan_default_suppressions() {
-    return "leak:libOpenImageIO.so\n"
-           "leak:libembree3.so\n";
+    return "leak:libembree3.so\n";
 }
 }

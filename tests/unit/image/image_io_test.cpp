@@ -202,6 +202,60 @@ TEST_F(ImageIo, SixteenBitsBecomeFloats) {
     EXPECT_EQ(decoded[1], 1);
 }
 
+/// Two rows of two pixels: red and green above, blue and half grey below.
+const std::vector<uint8_t> kFourColours = {255, 0, 0, 0, 255, 0, 0, 0, 255, 128, 128, 128};
+
+TEST_F(ImageIo, ReadsTargaWithAndWithoutRuns) {
+    const std::string size = {2, 0, 2, 0, 24, 0x20};  // rows from the top
+    const std::string header = {0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    const std::string bgr = {0, 0, -1, 0, -1, 0, -1, 0, 0, -128, -128, -128};
+    const PixelBuffer plain = read_pixels(write_bytes("a.tga", header + size + bgr), false);
+    EXPECT_EQ(plain.channels, 3);
+    EXPECT_EQ(std::get<std::vector<uint8_t>>(plain.data), kFourColours);
+    std::string with_runs = header;
+    with_runs[2] = 10;
+    // A run of two pixels of one colour, and a packet of two.
+    with_runs += size + std::string{-127, 0, 0, -1, 1, -1, 0, 0, -128, -128, -128};
+    const PixelBuffer runs = read_pixels(write_bytes("b.tga", with_runs), false);
+    EXPECT_EQ(std::get<std::vector<uint8_t>>(runs.data),
+              (std::vector<uint8_t>{255, 0, 0, 255, 0, 0, 0, 0, 255, 128, 128, 128}));
+}
+
+TEST_F(ImageIo, ReadsBitmaps) {
+    const auto word = [](uint32_t v) {
+        return std::string{char(v), char(v >> 8), char(v >> 16), char(v >> 24)};
+    };
+    const std::string size_planes_bits = word(2) + word(2) + std::string{1, 0, 24, 0};
+    // Rows from the bottom, each a multiple of four bytes.
+    const std::string pixels = {-1, 0, 0, -128, -128, -128, 0, 0, 0, 0, -1, 0, -1, 0, 0, 0};
+    const std::string file = "BM" + word(54 + 16) + word(0) + word(54) + word(40) +
+                             size_planes_bits + word(0) + word(16) + word(0) + word(0) + word(0) +
+                             word(0) + pixels;
+    const PixelBuffer buffer = read_pixels(write_bytes("a.bmp", file), false);
+    EXPECT_EQ(buffer.width, 2);
+    EXPECT_EQ(std::get<std::vector<uint8_t>>(buffer.data), kFourColours);
+}
+
+TEST_F(ImageIo, ReadsPortableMaps) {
+    const std::string colours(kFourColours.begin(), kFourColours.end());
+    const Image image = read_image(write_bytes("a.ppm", "P6\n2 2\n255\n" + colours));
+    EXPECT_EQ(image.channels, (std::vector<std::string>{"R", "G", "B"}));
+    EXPECT_EQ(image.at(0, 0, 0), 1);
+    EXPECT_NEAR(image.at(1, 1, 0), std::pow((128 / 255.0 + 0.055) / 1.055, 2.4), 1e-6);
+    const std::string deep = "P5\n2 1\n65535\n" + std::string{-128, 0, -1, -1};
+    const auto raw =
+        std::get<std::vector<float>>(read_pixels(write_bytes("b.pgm", deep), true).data);
+    EXPECT_NEAR(raw[0], 32768 / 65535.0, 1e-7);
+    EXPECT_EQ(raw[1], 1);
+}
+
+TEST_F(ImageIo, OtherFormatsAreRefusedByName) {
+    const std::string why = error([&] { read_image(write_bytes("a.tif", "II*\0 and so on")); });
+    EXPECT_NE(why.find("its format is none of EXR, PNG, JPEG, HDR, PFM, TGA, BMP, PGM and PPM"),
+              std::string::npos)
+        << why;
+}
+
 TEST_F(ImageIo, ReadErrorsNameTheFile) {
     const std::string missing = file("missing.exr");
     EXPECT_EQ(error([&] { read_image(missing); }),

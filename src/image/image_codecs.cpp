@@ -1,16 +1,18 @@
-// image_io.h over OpenEXR, libpng and libjpeg: .exr, .png, .jpg, .hdr and .pfm. It loads in a fraction of the time of
-// OpenImageIO, and needs few other libraries.
+// The file formats of image_io.h: .exr over OpenEXR, .png over libpng, .jpg over libjpeg, .tga and .bmp over stb_image;
+// .hdr, .pfm, .pgm and .ppm.
 
 #include "image/image_io.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <climits>
 #include <cmath>
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <stdexcept>
 #include <system_error>
 
@@ -27,6 +29,7 @@
 #include <fmt/format.h>
 #include <jpeglib.h>
 #include <png.h>
+#include <stb_image.h>
 
 #include "color/srgb.h"
 #include "image/image_codecs.h"
@@ -80,6 +83,29 @@ std::vector<std::string> channel_names(int count) {
     case 3: return {"R", "G", "B"};
     default: return {"R", "G", "B", "A"};
     }
+}
+
+/// sRGB codes of 8 bits.
+Contents coded(int width, int height, int channels, std::vector<uint8_t> codes) {
+    Contents c;
+    PixelBuffer& p = c.pixels;
+    p.width = width, p.height = height, p.channels = channels;
+    p.data = std::move(codes);
+    if (channels == 2 || channels == 4) p.alpha_channel = channels - 1;
+    c.channels = channel_names(channels);
+    c.is_linear = false;
+    c.largest_code = 255;
+    return c;
+}
+
+/// The same for codes of 16 bits, which become numbers in [0, 1].
+Contents deeply_coded(int width, int height, int channels, const uint16_t* codes) {
+    Contents c = coded(width, height, channels, {});
+    std::vector<float> values(size_t(width) * size_t(height) * size_t(channels));
+    for (size_t i = 0; i < values.size(); ++i) values[i] = float(codes[i]) * (1.0f / 65535.0f);
+    c.pixels.data = std::move(values);
+    c.largest_code = 1;
+    return c;
 }
 
 // ------------------------------------------------------------------------------------------------------- OpenEXR
@@ -151,6 +177,11 @@ private:
     OutputFile& file_;
 };
 
+/// Whether every file has the attribute, which says nothing about the image.
+bool describes_encoding(std::string_view attribute) {
+    return attribute == "pixelAspectRatio" || attribute == "screenWindowWidth";
+}
+
 Contents read_exr(const Source& source, bool as_floats) {
     const std::string& path = source.name;
     ExrInput input(source);
@@ -179,6 +210,7 @@ Contents read_exr(const Source& source, bool as_floats) {
     else
         p.data = read_exr_pixels<float>(file, c.channels, Imf::FLOAT);
     for (auto it = header.begin(); it != header.end(); ++it) {
+        if (describes_encoding(it.name())) continue;
         const Imf::Attribute& a = it.attribute();
         if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&a))
             c.attributes[it.name()] = text->value();
@@ -270,32 +302,20 @@ Contents read_png(const Source& source) {
     PngReader reader(escape);
     PngHeader header{};
     if (!read_png_header(reader, rest, escape, header)) fail_read(path, escape.message);
-    const size_t samples = size_t(header.width) * size_t(header.channels);
-    check_size(source, header.width, header.height, size_t(header.channels * header.depth / 8));
-    Contents c;
-    PixelBuffer& p = c.pixels;
-    p.width = int(header.width), p.height = int(header.height), p.channels = header.channels;
-    c.channels = channel_names(p.channels);
-    if (p.channels == 2 || p.channels == 4) p.alpha_channel = p.channels - 1;
-    c.is_linear = header.is_linear;
+    const size_t pixel = size_t(header.channels * header.depth / 8), row = header.width * pixel;
+    check_size(source, header.width, header.height, pixel);
+    // Codes of 16 bits are read in the order of this machine.
     const bool is_deep = header.depth == 16;
-    std::vector<uint8_t> bytes(samples * header.height * (is_deep ? 2 : 1));
+    std::vector<uint8_t> bytes(is_deep ? 0 : row * header.height);
+    std::vector<uint16_t> deep(is_deep ? row * header.height / 2 : 0);
+    auto* const first = is_deep ? reinterpret_cast<uint8_t*>(deep.data()) : bytes.data();
     std::vector<png_bytep> rows(header.height);
-    for (size_t y = 0; y < rows.size(); ++y)
-        rows[y] = bytes.data() + y * samples * (is_deep ? 2 : 1);
+    for (size_t y = 0; y < rows.size(); ++y) rows[y] = first + y * row;
     if (!read_png_rows(reader, escape, rows.data())) fail_read(path, escape.message);
-    if (!is_deep) {
-        c.largest_code = 255;
-        p.data = std::move(bytes);
-        return c;
-    }
-    std::vector<float> values(samples * header.height);
-    for (size_t i = 0; i < values.size(); ++i) {
-        uint16_t code = 0;
-        std::memcpy(&code, bytes.data() + 2 * i, 2);
-        values[i] = float(code) * (1.0f / 65535.0f);
-    }
-    p.data = std::move(values);
+    const int width = int(header.width), height = int(header.height);
+    Contents c = is_deep ? deeply_coded(width, height, header.channels, deep.data())
+                         : coded(width, height, header.channels, std::move(bytes));
+    c.is_linear = header.is_linear;
     return c;
 }
 
@@ -362,6 +382,17 @@ bool read_jpeg_rows(jpeg_decompress_struct& jpeg, JpegErrors& errors, uint8_t* t
     return true;
 }
 
+/// Adobe's files store how much light the inks let through.
+std::vector<uint8_t> rgb_of_cmyk(const std::vector<uint8_t>& inks, bool is_inverted) {
+    std::vector<uint8_t> colours;
+    colours.reserve(inks.size() / 4 * 3);
+    const auto passed = [&](uint8_t code) { return is_inverted ? code : 255 - code; };
+    for (size_t i = 0; i < inks.size(); i += 4)
+        for (size_t c = 0; c < 3; ++c)
+            colours.push_back(uint8_t((passed(inks[i + c]) * passed(inks[i + 3]) + 127) / 255));
+    return colours;
+}
+
 Contents read_jpeg(const Source& source) {
     const std::string& path = source.name;
     JpegErrors errors;
@@ -374,20 +405,16 @@ Contents read_jpeg(const Source& source) {
         ~Cleanup() { jpeg_destroy_decompress(&of); }
     } cleanup{jpeg};
     if (!read_jpeg_header(jpeg, source.bytes, errors)) fail_read(path, errors.escape.message);
-    const int channels = jpeg.output_components;
-    if (channels != 1 && channels != 3) fail_read(path, "a JPEG must be grey or RGB");
-    check_size(source, jpeg.output_width, jpeg.output_height, size_t(channels));
-    Contents c;
-    c.pixels.width = int(jpeg.output_width), c.pixels.height = int(jpeg.output_height);
-    c.pixels.channels = channels;
-    c.channels = channel_names(channels);
-    c.is_linear = false;
-    c.largest_code = 255;
-    const size_t row = size_t(jpeg.output_width) * size_t(channels);
+    const int components = jpeg.output_components;
+    if (components != 1 && components != 3 && components != 4)
+        fail_read(path, "a JPEG must be grey, RGB or CMYK");
+    check_size(source, jpeg.output_width, jpeg.output_height, size_t(components));
+    const size_t row = size_t(jpeg.output_width) * size_t(components);
     std::vector<uint8_t> bytes(row * jpeg.output_height);
     if (!read_jpeg_rows(jpeg, errors, bytes.data(), row)) fail_read(path, errors.escape.message);
-    c.pixels.data = std::move(bytes);
-    return c;
+    if (components == 4) bytes = rgb_of_cmyk(bytes, jpeg.saw_Adobe_marker);
+    return coded(int(jpeg.output_width), int(jpeg.output_height), components == 1 ? 1 : 3,
+                 std::move(bytes));
 }
 
 // ------------------------------------------------------------------------------------------------------- HDR, PFM
@@ -407,9 +434,12 @@ public:
         at_ = end + 1;
         return text;
     }
+    void skip_blanks() {
+        while (at_ < bytes_.size() && std::isspace(static_cast<unsigned char>(bytes_[at_]))) ++at_;
+    }
     /// The next word of a header; exactly one blank follows it.
     std::string word() {
-        while (at_ < bytes_.size() && std::isspace(static_cast<unsigned char>(bytes_[at_]))) ++at_;
+        skip_blanks();
         std::string text;
         while (!std::isspace(next())) text += bytes_[at_ - 1];
         return text;
@@ -521,6 +551,55 @@ Contents read_pfm(const Source& source) {
     return radiance_of(width, height, channels, std::move(values));
 }
 
+/// Binary portable grey maps and pixmaps; numbers of 16 bits begin with the higher byte.
+Contents read_pnm(const Source& source) {
+    const std::string& path = source.name;
+    Bytes bytes(source);
+    const int channels = bytes.word() == "P5" ? 1 : 3;
+    const auto number = [&] {
+        for (bytes.skip_blanks(); bytes.left() > 0 && *bytes.here() == '#'; bytes.skip_blanks())
+            bytes.line();
+        return bytes.number<int>();
+    };
+    const int width = number(), height = number(), largest = number();
+    if (width < 1 || height < 1 || largest < 1 || largest > 65535)
+        fail_read(path, "its header is invalid");
+    const size_t code_bytes = largest > 255 ? 2 : 1;
+    check_size(source, uint64_t(width), uint64_t(height), size_t(channels) * code_bytes);
+    const size_t count = size_t(width) * size_t(height) * size_t(channels);
+    if (bytes.left() < count * code_bytes) fail_read(path, "the file ends too early");
+    const auto* const codes = reinterpret_cast<const uint8_t*>(bytes.here());
+    if (largest == 255) return coded(width, height, channels, {codes, codes + count});
+    Contents c = coded(width, height, channels, {});
+    std::vector<float> values(count);
+    for (size_t i = 0; i < count; ++i) {
+        const int code = code_bytes == 1 ? codes[i] : codes[2 * i] << 8 | codes[2 * i + 1];
+        values[i] = std::min(float(code) / float(largest), 1.0f);
+    }
+    c.pixels.data = std::move(values);
+    c.largest_code = 1;
+    return c;
+}
+
+// ------------------------------------------------------------------------------------------------------- TGA, BMP
+
+Contents read_by_stb(const Source& source) {
+    const std::string& path = source.name;
+    const auto* const bytes = reinterpret_cast<const stbi_uc*>(source.bytes.data());
+    if (source.bytes.size() > size_t(INT_MAX)) fail_read(path, "the file is too large");
+    const int size = int(source.bytes.size());
+    int width = 0, height = 0, channels = 0;
+    if (!stbi_info_from_memory(bytes, size, &width, &height, &channels))
+        fail_read(path, "its format is none of EXR, PNG, JPEG, HDR, PFM, TGA, BMP, PGM and PPM");
+    check_size(source, uint64_t(width), uint64_t(height), size_t(channels));
+    const std::unique_ptr<stbi_uc, void (*)(void*)> codes(
+        stbi_load_from_memory(bytes, size, &width, &height, &channels, 0), stbi_image_free);
+    if (!codes)
+        fail_read(path, fmt::format("it is damaged or of a rare kind ({})", stbi_failure_reason()));
+    const size_t count = size_t(width) * size_t(height) * size_t(channels);
+    return coded(width, height, channels, {codes.get(), codes.get() + count});
+}
+
 // -------------------------------------------------------------------------------------------------------
 
 std::string bytes_of(const std::string& path) {
@@ -543,13 +622,13 @@ Contents contents_of(const Source& source, bool as_floats) {
         if (magic.starts_with("\xff\xd8\xff")) return read_jpeg(source);
         if (magic.starts_with("#?")) return read_rgbe(source);
         if (magic.starts_with("PF") || magic.starts_with("Pf")) return read_pfm(source);
+        if (magic.starts_with("P5") || magic.starts_with("P6")) return read_pnm(source);
+        return read_by_stb(source);
     } catch (const std::bad_alloc&) {
         fail_read(source.name, "its pixels do not fit into memory");
     } catch (const Iex::BaseExc& e) {
         fail_read(source.name, e.what());
     }
-    fail_read(source.name,
-              "its format is none of EXR, PNG, JPEG, HDR and PFM, which this build reads");
 }
 
 Contents read_contents(const std::string& path, bool as_floats) {
