@@ -28,7 +28,7 @@ TriangleMesh make_room() {
             mesh.triangles.push_back({a, b, a + kColumns});
             mesh.triangles.push_back({b, b + kColumns, a + kColumns});
         }
-    mesh.compute_face_normals();
+    mesh.finish();
     return mesh;
 }
 

@@ -8,6 +8,7 @@
 #include "description/resolve_file.h"
 #include "image/image_io.h"
 #include "math/distribution.h"
+#include "system/huge_pages.h"
 
 namespace etendue {
 namespace {
@@ -35,6 +36,8 @@ public:
             }
         }
         distribution_ = PiecewiseConstant2D(weights, width, height + 1);
+        prefer_huge_pages(pixels_);
+        distribution_.for_each_large_array([](const auto& a) { prefer_huge_pages(a); });
     }
 
     double power() const override {

@@ -7,6 +7,7 @@
 #include "emitter/environment.h"
 #include "math/distribution.h"
 #include "math/warp.h"
+#include "system/huge_pages.h"
 
 namespace etendue {
 namespace {
@@ -22,6 +23,8 @@ public:
             mean_ += weights[i] / double(weights.size());
         }
         distribution_ = PiecewiseConstant2D(weights, size, size);
+        prefer_huge_pages(pixels_);
+        distribution_.for_each_large_array([](const auto& a) { prefer_huge_pages(a); });
     }
 
     double power() const override {

@@ -4,6 +4,7 @@
 
 #include "math/frame.h"
 #include "math/warp.h"
+#include "system/huge_pages.h"
 
 namespace etendue {
 
@@ -26,13 +27,18 @@ double TriangleMesh::area() const {
     return sum;
 }
 
-void TriangleMesh::compute_face_normals() {
+void TriangleMesh::finish() {
     face_normals.resize(triangles.size());
     for (size_t i = 0; i < triangles.size(); ++i) {
         const auto& [a, b, c] = triangles[i];
         face_normals[i] =
             normalize(cross(positions[b] - positions[a], positions[c] - positions[a]));
     }
+    prefer_huge_pages(positions);
+    prefer_huge_pages(normals);
+    prefer_huge_pages(uvs);
+    prefer_huge_pages(triangles);
+    prefer_huge_pages(face_normals);
 }
 
 namespace {

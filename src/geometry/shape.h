@@ -59,10 +59,10 @@ public:
     std::vector<Vec3> colors;   ///< Empty, or one per vertex.
     std::vector<float> alphas;  ///< Of the colours; empty, or one per vertex.
     std::vector<std::array<uint32_t, 3>> triangles;
-    std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see compute_face_normals().
+    std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see finish().
 
-    /// To be called once positions and triangles are final.
-    void compute_face_normals();
+    /// Computes face_normals; to be called once the other arrays are final.
+    void finish();
 
     Bounds3 bounds() const override;
     double area() const override;

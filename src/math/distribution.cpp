@@ -104,18 +104,27 @@ void PiecewiseConstant1D::Steps::add(std::span<const float> values, double sum) 
     for (int g = 0; g < guides; ++g) {
         const auto at = uint32_t(uint64_t(kOne) * uint64_t(g) / uint64_t(guides));
         while (upper(row, cell) <= at) ++cell;
-        guide.push_back(uint32_t(cell));
+        Guide& made = guide.emplace_back(Guide{uint32_t(cell), {}});
+        for (int k = 0; k <= kCellsInGuide; ++k)
+            made.edge[k] = cell + k < cells ? row[cell + k] : kOne;
     }
 }
 
 PiecewiseConstant1D::Sample PiecewiseConstant1D::Steps::sample(double u, size_t r) const {
-    const uint32_t* row = &lower[r * size_t(cells)];
     const double scaled = u * kOne;
     const uint32_t at = uint32_t(scaled);
-    const auto g = size_t(uint64_t(at) * uint64_t(guides) >> 31);
-    int cell = int(guide[r * size_t(guides) + g]);
-    while (upper(row, cell) <= at) ++cell;
-    const uint32_t begin = row[cell], width = upper(row, cell) - begin;
+    const Guide& start = guide[r * size_t(guides) + size_t(uint64_t(at) * uint64_t(guides) >> 31)];
+    int k = 0;
+    while (k < kCellsInGuide && start.edge[k + 1] <= at) ++k;
+    int cell = int(start.first) + k;
+    uint32_t begin = start.edge[k], end = 0;
+    if (k < kCellsInGuide) {
+        end = start.edge[k + 1];
+    } else {
+        const uint32_t* row = &lower[r * size_t(cells)];
+        while ((end = upper(row, cell)) <= at) ++cell, begin = end;
+    }
+    const uint32_t width = end - begin;
     const float f = std::min(float((scaled - begin) / width), kOneMinusEpsilon);
     return {point_in_cell(cell, f, cells), float(width) * (float(cells) / float(kOne)), cell};
 }

@@ -88,7 +88,7 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
             params.fail(
                 "to_world",
                 "\"to_world\" moves a vertex of the mesh out of the range of single precision");
-    mesh->compute_face_normals();
+    mesh->finish();
     return mesh;
 }
 
@@ -132,7 +132,7 @@ std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quad
         }
     }
     if (!(mesh->area() > 0)) params.fail("to_world", "\"to_world\" gives the shape zero area");
-    mesh->compute_face_normals();
+    mesh->finish();
     return mesh;
 }
 

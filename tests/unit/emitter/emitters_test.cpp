@@ -381,7 +381,7 @@ TEST(AreaEmitter, CanBeChosenThoughItsTextureIsNearlyBlack) {
     TriangleMesh mesh;
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     mesh.triangles = {{0, 1, 2}};
-    mesh.compute_face_normals();
+    mesh.finish();
     const auto emitter = make_area_emitter(mesh, TextureRef(&needle), false, 0);
     EXPECT_GT(emitter->power(), 0);
 }

@@ -34,7 +34,7 @@ TriangleMesh closed_mesh(int rows, int columns, float radius) {
             if (i + 1 < rows)
                 mesh.triangles.push_back({at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)});
         }
-    mesh.compute_face_normals();
+    mesh.finish();
     return mesh;
 }
 

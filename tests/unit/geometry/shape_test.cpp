@@ -69,7 +69,7 @@ TEST(TriangleMesh, PointsLieOnTheSurface) {
             TriangleMesh mesh;
             for (int i = 0; i < 3; ++i) mesh.positions.push_back(random.in_cube() * size);
             mesh.triangles = {{0, 1, 2}};
-            mesh.compute_face_normals();
+            mesh.finish();
             const Vec3 a = mesh.positions[0], b = mesh.positions[1], c = mesh.positions[2];
             const double e[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z},
                          f[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
@@ -155,7 +155,7 @@ TEST(Accelerator, MemoryIsBounded) {
             mesh.triangles.push_back({i * 300 + j, i * 300 + j + 1, i * 300 + j + 300});
             mesh.triangles.push_back({i * 300 + j + 1, i * 300 + j + 301, i * 300 + j + 300});
         }
-    mesh.compute_face_normals();
+    mesh.finish();
     const auto make = [&](size_t most) {
         Accelerator accelerator({.most_bytes = most});
         accelerator.add_shape(mesh);
