@@ -32,7 +32,8 @@ namespace {
 
 struct RenderCommand {
     SceneOptions scene;
-    std::string output = "out.exr", integrator, sampler, filter_mode = "sample", techniques,
+    std::string output = "out.exr", integrator, sampler,
+                filter_mode = etendue::to_string(etendue::RenderSettings().filter_mode), techniques,
                 preview, stats;
     std::vector<std::string> aovs;
     uint64_t seed = 0, spp = 0;
@@ -302,10 +303,10 @@ void add_render_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
-    c.add_option("--filter-mode", command->filter_mode,
-                 "sample: an eye path contributes to its own pixel, with a film point drawn from "
-                 "the filter; "
-                 "spread: to all pixels that the filter reaches")
+    c.add_option(
+         "--filter-mode", command->filter_mode,
+         "spread: an eye path contributes to all pixels that the filter reaches; sample: to "
+         "its own pixel, with a film point drawn from the filter")
         ->capture_default_str();
     add_sampler_option(c, command->sampler, "; with sobol the error estimate is an upper bound");
     c.add_option("--threads", command->threads, "Number of threads; 0: one per core")

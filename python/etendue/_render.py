@@ -264,6 +264,7 @@ def render(
     error: float | None = None,
     seed: int = 0,
     sampler: str = "sobol",
+    filter_mode: str = "spread",
     threads: int = 0,
     aovs: Sequence[str] = (),
     techniques: bool | int = False,
@@ -279,6 +280,8 @@ def render(
         that is reached ends the rendering. Without a limit, the samples per pixel of the scene, or 64.
     seed: seed of all random numbers.
     sampler: "sobol" or "independent". With "sobol", errors and variances are upper bounds.
+    filter_mode: "spread": an eye path contributes to all pixels that the filter of the film reaches, and the errors of
+        neighbouring pixels are correlated; "sample": to its own pixel alone, and errors are independent.
     threads: number of threads; 0 for one per core.
     aovs: auxiliary images to render: albedo, normal, depth, position, uv, variance.
     techniques: makes an image of each technique, for paths of at most this many edges; True: 6.
@@ -291,11 +294,12 @@ def render(
     pass is complete yet, it raises KeyboardInterrupt. Other Python threads continue during the rendering.
 
     Raises RuntimeError for an unknown integrator, parameter or layer, and in a process forked from one that had built or
-    rendered a scene (use the start method "spawn"); ValueError for limits that are not above 0.
+    rendered a scene (use the start method "spawn"); ValueError for another sampler or filter mode, and for limits that
+    are not above 0.
     """
     _etendue.check_aovs(list(aovs))
     depth = 6 if techniques is True else int(techniques)
-    rendering = _etendue.Rendering(scene, integrator, spp, time, error, seed, sampler, threads, depth)
+    rendering = _etendue.Rendering(scene, integrator, spp, time, error, seed, sampler, filter_mode, threads, depth)
 
     widget: Any = None
     if live:

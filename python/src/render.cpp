@@ -36,6 +36,12 @@ SamplerKind to_sampler(const std::string& name) {
 
 namespace {
 
+FilterMode to_filter_mode(const std::string& name) {
+    if (const auto mode = filter_mode(name)) return *mode;
+    throw nb::value_error(
+        fmt::format("filter_mode must be \"spread\" or \"sample\", but is \"{}\"", name).c_str());
+}
+
 const char* technique_kind(const Technique& q) {
     switch (q.strategy) {
     case Strategy::Hit: return "hit";
@@ -52,10 +58,11 @@ const char* technique_kind(const Technique& q) {
 RenderSettings settings_for(const SceneHandle& scene, nb::handle integrator,
                             std::optional<uint64_t> spp, std::optional<double> seconds,
                             std::optional<double> error, uint64_t seed, const std::string& sampler,
-                            int threads, int technique_depth) {
+                            const std::string& filter, int threads, int technique_depth) {
     RenderSettings s;
     s.integrator = to_spec(scene.scene, integrator);
     s.sampler = to_sampler(sampler);
+    s.filter_mode = to_filter_mode(filter);
     s.seed = seed;
     // Objects of Python work on one thread.
     s.threads = s.integrator.make ? 1 : threads;
@@ -81,10 +88,11 @@ class Rendering {
 public:
     Rendering(ScenePtr scene, nb::handle integrator, std::optional<uint64_t> spp,
               std::optional<double> seconds, std::optional<double> error, uint64_t seed,
-              const std::string& sampler, int threads, int technique_depth)
+              const std::string& sampler, const std::string& filter, int threads,
+              int technique_depth)
         : scene_(std::move(scene)),
-          settings_(settings_for(*scene_, integrator, spp, seconds, error, seed, sampler, threads,
-                                 technique_depth)),
+          settings_(settings_for(*scene_, integrator, spp, seconds, error, seed, sampler, filter,
+                                 threads, technique_depth)),
           renderer_(make_renderer(scene_->scene, settings_)) {}
 
     /// `tick()` is called every 50 ms, `callback()` between passes, at least `interval` seconds apart; it returns False to
@@ -250,12 +258,13 @@ void bind_render(nb::module_& m) {
             "__init__",
             [](Rendering* self, ScenePtr scene, nb::handle integrator, std::optional<uint64_t> spp,
                std::optional<double> time, std::optional<double> error, uint64_t seed,
-               const std::string& sampler, int threads, int technique_depth) {
+               const std::string& sampler, const std::string& filter, int threads,
+               int technique_depth) {
                 new (self) Rendering(std::move(scene), integrator, spp, time, error, seed, sampler,
-                                     threads, technique_depth);
+                                     filter, threads, technique_depth);
             },
             "scene"_a, "integrator"_a, "spp"_a.none(), "time"_a.none(), "error"_a.none(), "seed"_a,
-            "sampler"_a, "threads"_a, "technique_depth"_a)
+            "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a)
         .def("run", &Rendering::run, "tick"_a.none(), "callback"_a.none(), "interval"_a)
         .def("now", &Rendering::now)
         .def_prop_ro("scene", &Rendering::scene_pointer)

@@ -32,9 +32,9 @@ public:
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;
 
-    /// Memory of a film, by pixel, at most. `groups`: see set_groups().
+    /// Memory of a film, by pixel, at most, without the samples of a grid's margin. `groups`: see set_groups().
     static uint64_t bytes_per_pixel(bool has_splats, int groups) {
-        return sizeof(Moments) + 2 * sizeof(Rgb) + (3 + uint64_t(groups)) * sizeof(float) +
+        return sizeof(Moments) + 3 * sizeof(Rgb) + (3 + uint64_t(groups)) * sizeof(float) +
                (has_splats ? 3 * sizeof(int64_t) : 0);
     }
 

@@ -65,4 +65,12 @@ std::optional<FilterMode> filter_mode(std::string_view name) {
     return {};
 }
 
+const char* to_string(FilterMode mode) {
+    switch (mode) {
+    case FilterMode::Spread: return "spread";
+    case FilterMode::Sample: return "sample";
+    }
+    return "";
+}
+
 }  // namespace etendue

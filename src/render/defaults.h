@@ -22,7 +22,8 @@ void set_default_limit(RenderLimits& limits, const Scene& scene);
 
 /// "independent" or "sobol"; empty for other names.
 std::optional<SamplerKind> sampler_kind(std::string_view name);
-/// "spread" or "sample".
+/// "spread" or "sample"; empty for other names.
 std::optional<FilterMode> filter_mode(std::string_view name);
+const char* to_string(FilterMode mode);
 
 }  // namespace etendue

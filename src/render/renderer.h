@@ -29,7 +29,7 @@ void check_limits(const RenderLimits& limits);
 struct RenderSettings : RenderLimits {
     IntegratorSpec integrator{"path", {}};
     SamplerKind sampler = SamplerKind::Independent;
-    FilterMode filter_mode = FilterMode::Sample;
+    FilterMode filter_mode = FilterMode::Spread;
     uint64_t seed = 0;
     int threads =
         0;  ///< Number of threads of this renderer; 0: one per core. Renderers share no threads.

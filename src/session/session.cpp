@@ -423,6 +423,7 @@ int Session::start(const RunRequest& request) {
     settings.integrator = choose_integrator(*scene, request.integrator);
     if (!request.user_paths.empty()) settings.integrator.params["user_paths"] = request.user_paths;
     settings.sampler = request.sampler;
+    settings.filter_mode = request.filter_mode;
     settings.seed = request.seed;
     settings.threads = threads_;
     settings.technique_depth =
@@ -431,6 +432,7 @@ int Session::start(const RunRequest& request) {
     RunStatus& s = run->status;
     s.integrator = settings.integrator.to_string();
     s.sampler = settings.sampler;
+    s.filter_mode = settings.filter_mode;
     s.seed = settings.seed;
     s.limits = settings;
     s.technique_depth = settings.technique_depth;

@@ -26,6 +26,7 @@ struct RunRequest {
     std::string
         user_paths;  ///< Value of the integrator's parameter `user_paths`; empty: not given.
     SamplerKind sampler = SamplerKind::Sobol;
+    FilterMode filter_mode = RenderSettings().filter_mode;
     uint64_t seed = 0;
     RenderLimits limits;      ///< Without any, the run ends when it is stopped.
     int technique_depth = 0;  ///< In edges; reduced until the images fit into kTechniqueBytes.
@@ -57,6 +58,7 @@ struct RunStatus {
     int id = 0;
     std::string integrator;
     SamplerKind sampler = SamplerKind::Sobol;
+    FilterMode filter_mode = RenderSettings().filter_mode;
     uint64_t seed = 0;
     RenderLimits limits;
     int technique_depth = 0;

@@ -242,6 +242,12 @@ RunRequest Api::run_request(const json& body) const {
         throw ApiError(
             422, fmt::format("\"sampler\" must be independent or sobol, but is \"{}\"", sampler));
     request.sampler = *kind;
+    const std::string filter = text_of(body, "filter_mode", to_string(request.filter_mode));
+    const auto mode = filter_mode(filter);
+    if (!mode)
+        throw ApiError(
+            422, fmt::format("\"filter_mode\" must be spread or sample, but is \"{}\"", filter));
+    request.filter_mode = *mode;
     request.seed = uint64_t(integer(body, "seed", 0, INT64_MAX, 0));
     request.limits = limits_of(body);
     constexpr int kMostDepth = 64;
@@ -437,6 +443,7 @@ void Api::replay_pixel(const json& body, const Done& done) {
     ReplayRequest request;
     request.integrator = integrator;
     request.sampler = status.sampler;
+    request.filter_mode = status.filter_mode;
     request.seed = status.seed;
     request.pixel = pixel;
     request.first_pass = uint32_t(integer(body, "pass", 0, INT32_MAX, 0));

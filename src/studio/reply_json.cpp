@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "render/defaults.h"
+
 namespace etendue {
 namespace {
 
@@ -68,6 +70,7 @@ json to_json(const RunStatus& s) {
     json j = progress_of(s);
     j["integrator"] = s.integrator;
     j["sampler"] = s.sampler == SamplerKind::Sobol ? "sobol" : "independent";
+    j["filter_mode"] = to_string(s.filter_mode);
     j["seed"] = s.seed;
     j["techniques"] = s.technique_depth;
     j["estimator"] = to_string(s.estimator);

@@ -303,7 +303,8 @@ TEST_F(StudioTest, RunsAreStartedAndRefusedInWords) {
          {json{{"action", "fly"}, {"run", 1}}, json{{"action", "stop"}, {"run", 9}},
           json{{"action", "stop"}}, json{{"action", "start"}, {"spp", -1}},
           json{{"action", "start"}, {"spp", 1e300}}, json{{"action", 3}},
-          json{{"action", "start"}, {"sampler", "halton"}}})
+          json{{"action", "start"}, {"sampler", "halton"}},
+          json{{"action", "start"}, {"filter_mode", "box"}}})
         EXPECT_EQ(post("/v1/run", wrong).status, 422) << wrong;
     EXPECT_EQ(ask("POST", "/v1/run", {{"Authorization", bearer()}}, "[[[").status, 400);
     const Answer started =

@@ -46,7 +46,6 @@ def test_bits_are_those_of_the_command_line(program: str, scenes: Path, tmp_path
 
 
 def test_textures_have_the_bits_of_the_command_line(program: str, tmp_path: Path) -> None:
-    """The package reads images without OpenImageIO."""
     rng = np.random.default_rng(1)
     et.write_image(tmp_path / "a.png", rng.random((8, 16, 3), dtype=np.float32))
     et.write_image(tmp_path / "b.exr", rng.random((8, 16, 3), dtype=np.float32) * 10)
@@ -80,9 +79,29 @@ def test_textures_have_the_bits_of_the_command_line(program: str, tmp_path: Path
         np.testing.assert_array_equal(image, et.read_image(out), err_msg=file.name)
 
 
+@pytest.mark.parametrize("mode", ["spread", "sample"])
+def test_filter_modes_are_those_of_the_command_line(program: str, scenes: Path, tmp_path: Path, mode: str) -> None:
+    subprocess.run([program, "render", str(scenes / "demo.xml"), "-D", "width=40", "-D", "height=30", "--spp", "2",
+                    "--filter-mode", mode, "-o", str(tmp_path / "a.pfm"), "--quiet"], check=True)
+    scene = et.load(scenes / "demo.xml", {"width": 40, "height": 30}).build()
+    ours = et.render(scene, spp=2, filter_mode=mode).image
+    np.testing.assert_array_equal(ours, et.read_image(tmp_path / "a.pfm"))
+    np.testing.assert_equal(np.array_equal(ours, et.render(scene, spp=2).image), mode == "spread")
+
+
+def test_inks_of_a_jpeg_become_colours(tmp_path: Path) -> None:
+    from PIL import Image
+
+    gradient = np.linspace(0, 255, 32 * 32 * 4).reshape(32, 32, 4).astype(np.uint8)
+    Image.fromarray(gradient, "CMYK").save(tmp_path / "inks.jpg", quality=95)
+    expected = np.asarray(Image.open(tmp_path / "inks.jpg").convert("RGB")).astype(float) / 255
+    linear = np.where(expected <= 0.04045, expected / 12.92, ((expected + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(et.read_image(tmp_path / "inks.jpg"), linear, atol=0.01)
+
+
 def test_an_image_of_another_format_is_refused_with_one_message(tmp_path: Path) -> None:
     (tmp_path / "a.tif").write_bytes(b"II*\0" + bytes(100))
-    with pytest.raises(RuntimeError, match="its format is none of EXR, PNG, JPEG, HDR and PFM"):
+    with pytest.raises(RuntimeError, match="its format is none of EXR, PNG, JPEG"):
         et.read_image(tmp_path / "a.tif")
     for name, start in [("b.png", b"\x89PNG\r\n\x1a\n"), ("c.jpg", b"\xff\xd8\xff\xe0"), ("d.exr", b"\x76\x2f\x31\x01")]:
         (tmp_path / name).write_bytes(start + bytes(50))
@@ -170,6 +189,7 @@ def test_what_a_callback_raises_ends_the_rendering(cornell: et.Scene) -> None:
         ({"integrator": "bdpt:max_dept=3"}, 'has no parameter "max_dept" .did you mean "max_depth"'),
         ({"aovs": ["albdo"]}, 'unknown layer "albdo" .known: albedo'),
         ({"sampler": "halton"}, 'sampler must be "independent" or "sobol", but is "halton"'),
+        ({"filter_mode": "box"}, 'filter_mode must be "spread" or "sample", but is "box"'),
         ({"spp": 0}, "spp, time and error must be above 0"),
         ({"integrator": 3}, "an integrator is a text"),
     ])

@@ -43,7 +43,7 @@ struct TileOptions {
     uint64_t seed = 1;
     int batches = 32;
     int shortest = 1;  ///< Paths of fewer edges are left out.
-    FilterMode filter_mode = FilterMode::Sample;
+    FilterMode filter_mode = RenderSettings().filter_mode;
 };
 
 /// The integrator's image from `passes` passes; their spread is measured between batches of consecutive ones.

@@ -100,6 +100,8 @@ export class RunForm {
         this.name = element('select', {id: 'method'}, integrators.map(i => element('option', {value: i.name, textContent: i.name})));
         this.name.onchange = () => this.fill();
         this.sampler = element('select', {id: 'sampler'}, ['sobol', 'independent'].map(s => element('option', {value: s, textContent: s})));
+        this.filterMode = element('select', {id: 'filter_mode', title: 'spread: an eye path contributes to all pixels that the filter reaches; sample: to its own pixel'},
+            ['spread', 'sample'].map(m => element('option', {value: m, textContent: m})));
         this.seed = element('input', {id: 'seed', type: 'number', value: '0', min: '0'});
         this.spp = element('input', {id: 'spp', type: 'number', min: '1', placeholder: 'no limit'});
         this.techniques = element('input', {id: 'techniques', type: 'number', value: '0', min: '0', max: '64'});
@@ -110,7 +112,7 @@ export class RunForm {
             element('form', {onsubmit: (/** @type {Event} */ e) => { e.preventDefault(); this.start(tell.start); }}, [
                 element('div', {className: 'parameters'}, field('method', this.name)), this.doc, this.parameters,
                 element('label', {}, [experimental, ' experimental parameters']),
-                element('div', {className: 'parameters'}, [field('sampler', this.sampler), field('seed', this.seed),
+                element('div', {className: 'parameters'}, [field('sampler', this.sampler), field('filter mode', this.filterMode), field('seed', this.seed),
                     field('samples per pixel', this.spp), field('technique images, edges', this.techniques)].flat()),
                 element('button', {type: 'submit', textContent: 'Start'}), this.message])]));
         this.fill();
@@ -142,7 +144,7 @@ export class RunForm {
             .filter(i => i.value.trim()).map(i => `${i.name}=${i.value.trim()}`);
         /** @type {any} */
         const request = {action: 'start', integrator: this.name.value + (given.length ? `:${given.join(',')}` : ''),
-            sampler: this.sampler.value, seed: Number(this.seed.value), techniques: Number(this.techniques.value)};
+            sampler: this.sampler.value, filter_mode: this.filterMode.value, seed: Number(this.seed.value), techniques: Number(this.techniques.value)};
         if (this.spp.value) request.spp = Number(this.spp.value);
         this.message.textContent = '';
         await start(request).catch(e => { this.message.textContent = e.message; });
