@@ -1,4 +1,4 @@
-// ꟻLIP [Andersson et al. 2020: "FLIP: A Difference Evaluator for Alternating Images"; Andersson et al. 2021:
+// FLIP [Andersson et al. 2020: "FLIP: A Difference Evaluator for Alternating Images"; Andersson et al. 2021:
 // "Visualizing and Communicating Errors in Rendered Images"]. Both images are filtered by the contrast sensitivity of
 // the eye. The error of a pixel is its colour difference to the power of 1 − (difference of edges and points).
 // Constants are those of the papers.
@@ -182,7 +182,7 @@ Features features(const Plane& lightness, double ppd) {
     return {strength(first), strength(second)};
 }
 
-// ---------------------------------------------------------------------------------------------------------- ꟻLIP
+// ---------------------------------------------------------------------------------------------------------- FLIP
 
 /// What one image contributes: colours as perceived, and features.
 struct Perceived {

@@ -1,5 +1,5 @@
 #pragma once
-// ꟻLIP: the difference a viewer sees who flips between two images [Andersson et al. 2020, 2021].
+// FLIP: the difference a viewer sees who flips between two images [Andersson et al. 2020, 2021].
 
 #include <span>
 #include <vector>
@@ -16,15 +16,15 @@ struct FlipResult {
     double mean = 0;
 };
 
-/// LDR-ꟻLIP of displayed images, linear colours that are clamped to [0, 1].
+/// LDR-FLIP of displayed images, linear colours that are clamped to [0, 1].
 FlipResult ldr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
                     int height, float pixels_per_degree = kFlipPixelsPerDegree);
 
-/// HDR-ꟻLIP: per pixel the largest LDR-ꟻLIP over flip_exposures(reference), tone-mapped by the ACES curve.
+/// HDR-FLIP: per pixel the largest LDR-FLIP over flip_exposures(reference), tone-mapped by the ACES curve.
 FlipResult hdr_flip(std::span<const Rgb> image, std::span<const Rgb> reference, int width,
                     int height, float pixels_per_degree = kFlipPixelsPerDegree);
 
-/// Exposures of HDR-ꟻLIP for a reference, in stops and ascending [Andersson et al. 2021, §3.2].
+/// Exposures of HDR-FLIP for a reference, in stops and ascending [Andersson et al. 2021, §3.2].
 std::vector<float> flip_exposures(std::span<const Rgb> reference);
 
 }  // namespace etendue

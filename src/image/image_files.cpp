@@ -51,7 +51,7 @@ void to_rgbe(const Rgb& c, uint8_t* code) {
     if (!(largest > 1e-32f)) return;
     int exponent = 0;
     const float scale = std::frexp(largest, &exponent) * 256 / largest;
-    for (int i = 0; i < 3; ++i) code[i] = uint8_t(std::max(c[i], 0.0f) * scale);
+    for (int i = 0; i < 3; ++i) code[i] = uint8_t(c[i] > 0 ? c[i] * scale : 0);  // 0 for NaN, too
     code[3] = uint8_t(exponent + 128);
 }
 

@@ -14,6 +14,8 @@
 
 #include <fmt/format.h>
 
+#include "system/descriptor.h"
+
 namespace etendue {
 namespace {
 
@@ -40,22 +42,6 @@ std::string host_name(std::string_view host) {
     }
     return lower_case(name);
 }
-
-/// A file descriptor that is closed with the object.
-class Descriptor {
-public:
-    explicit Descriptor(int fd) : fd_(fd) {}
-    ~Descriptor() {
-        if (fd_ >= 0) ::close(fd_);
-    }
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    int get() const { return fd_; }
-    bool is_open() const { return fd_ >= 0; }
-
-private:
-    int fd_;
-};
 
 [[noreturn]] void fail(const std::string& name, const std::string& why) {
     throw std::runtime_error(fmt::format("{}: {}", name, why));

@@ -1,6 +1,7 @@
 #include "system/output_file.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -15,8 +16,11 @@
 #include <optional>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
+
+#include "system/descriptor.h"
 
 namespace etendue {
 namespace {
@@ -57,14 +61,6 @@ void free_slot(int& slot) {
 
 // -- Names and descriptors.
 
-/// A name that nobody can predict and that is not longer than others in the folder may be.
-std::string temporary_name(const fs::path& folder) {
-    uint64_t random = 0;
-    if (::getrandom(&random, sizeof random, 0) != sizeof random)
-        throw std::runtime_error("the system has no random numbers");
-    return (folder / fmt::format(".etendue-{:016x}.part", random)).string();
-}
-
 /// The open descriptor that a name such as /dev/stdout or /proc/self/fd/1 means.
 std::optional<int> open_descriptor(const fs::path& path) {
     const fs::path own = fmt::format("/proc/{}/fd", ::getpid());
@@ -80,9 +76,15 @@ bool is_writable(const fs::path& path) {
     return ::faccessat(AT_FDCWD, path.c_str(), W_OK, AT_EACCESS) == 0;
 }
 
+/// Also where the descriptor is one that does not wait, as a pipe may be that several programs share.
 bool write_all(int file, const char* data, size_t size) {
     while (size > 0) {
         const ssize_t n = ::write(file, data, size);
+        if (n < 0 && errno == EAGAIN) {
+            pollfd waiting{file, POLLOUT, 0};
+            if (::poll(&waiting, 1, -1) < 0 && errno != EINTR) return false;
+            continue;
+        }
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0) return false;
         data += n, size -= size_t(n);
@@ -92,7 +94,34 @@ bool write_all(int file, const char* data, size_t size) {
 
 /// Some file systems cannot do this.
 bool sync(int file) {
-    return ::fsync(file) == 0 || errno == EINVAL || errno == ENOTSUP || errno == EROFS;
+    while (::fsync(file) != 0)
+        if (errno != EINTR) return errno == EINVAL || errno == ENOTSUP || errno == EROFS;
+    return true;
+}
+
+/// Writes the rest of one file to another.
+bool copy(int from, int to) {
+    char buffer[1 << 16];
+    while (true) {
+        const ssize_t n = ::read(from, buffer, sizeof buffer);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return n == 0;
+        if (!write_all(to, buffer, size_t(n))) return false;
+    }
+}
+
+/// Gives a new file the owner and the permissions of the one that it replaces. Returns an error (errno), or 0.
+int keep_permissions(int file, const struct stat& old) {
+    struct stat own;
+    if (::fstat(file, &own) != 0) return errno;
+    // Owner and group first, since a change of these may clear bits of the mode. Only root can keep every owner.
+    mode_t mode = old.st_mode & 07777;
+    if (own.st_gid != old.st_gid && ::fchown(file, uid_t(-1), old.st_gid) != 0)
+        // Another group has no more rights than everybody.
+        mode = (mode & ~mode_t(S_ISGID | S_IRWXG)) | ((mode & S_IRWXO) << 3);
+    if (own.st_uid != old.st_uid && ::fchown(file, old.st_uid, gid_t(-1)) != 0)
+        mode &= ~mode_t(S_ISUID);
+    return ::fchmod(file, mode) == 0 || errno == EPERM ? 0 : errno;
 }
 
 constexpr int kMostLinks = 40;
@@ -101,7 +130,6 @@ constexpr int kMostLinks = 40;
 
 OutputFile::OutputFile(const std::string& path, Links links) : path_(path) {
     if (path.empty()) fail("the name is empty");
-    if (path.back() == '/') fail("the name is that of a folder");
     fs::path target = path;
     std::error_code error;
     struct stat found;
@@ -130,8 +158,10 @@ OutputFile::OutputFile(const std::string& path, Links links) : path_(path) {
     }
     if (exists) {
         if (!is_writable(target)) fail(reason(errno));
-        mode_ = int(found.st_mode & 07777);
+        replaces_ = true;
     }
+    if (const fs::path name = target.filename(); name.empty() || name == "." || name == "..")
+        fail("the name is that of a folder");
     const fs::path folder = target.parent_path();
     if (!folder.empty() && !fs::is_directory(folder, error)) {
         fs::create_directories(folder, error);
@@ -140,12 +170,7 @@ OutputFile::OutputFile(const std::string& path, Links links) : path_(path) {
     target_ = fs::absolute(target, error).string();
     if (error) fail(error.message());
     open_temporary();
-    if (mode_ >= 0) {
-        // The owner first, since a change of the owner may clear bits of the mode. Only root can keep every owner.
-        if (found.st_uid != ::geteuid() || found.st_gid != ::getegid())
-            if (::fchown(file_, found.st_uid, found.st_gid) != 0) mode_ &= 0777;
-        if (::fchmod(file_, mode_t(mode_)) != 0 && errno != EPERM) error_ = errno;
-    }
+    if (exists) error_ = keep_permissions(file_, found);
 }
 
 OutputFile::~OutputFile() {
@@ -162,7 +187,11 @@ void OutputFile::open_temporary() {
     const fs::path folder = fs::path(target_).parent_path();
     // With the permissions of a new file, as the user's mask sets them; mkostemp() would make a private one.
     for (int attempt = 0; file_ < 0; ++attempt) {
-        temporary_ = temporary_name(folder);
+        // A name that nobody can predict and that is not longer than others in the folder may be.
+        uint64_t random = 0;
+        if (::getrandom(&random, sizeof random, 0) != sizeof random)
+            fail("the system has no random numbers");
+        temporary_ = (folder / fmt::format(".etendue-{:016x}.part", random)).string();
         slot_ = claim_slot(temporary_);
         file_ =
             ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
@@ -230,15 +259,30 @@ void OutputFile::commit() {
     if (is_in_place()) return write_in_place();
     if (!sync(file_)) fail(reason(errno));
     close();
-    if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(reason(errno));
-    is_committed_ = true;
-    free_slot(slot_);
+    if (::rename(temporary_.c_str(), target_.c_str()) == 0) {
+        is_committed_ = true;
+        free_slot(slot_);
+    } else if (replaces_ && (errno == EBUSY || errno == EPERM || errno == EACCES)) {
+        overwrite();
+    } else {
+        fail(reason(errno));
+    }
     // The new name is durable when its folder is. The file is complete, so an error here is none of its own.
     const std::string folder = fs::path(target_).parent_path().string();
-    if (const int f = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); f >= 0) {
-        sync(f);
-        ::close(f);
-    }
+    if (const Descriptor f(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)); f.is_open())
+        sync(f.get());
+}
+
+// What is mounted, or belongs to another user in a folder such as /tmp, can be written but not replaced.
+void OutputFile::overwrite() {
+    const Descriptor from(::open(temporary_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+    const Descriptor to(
+        from.is_open() ? ::open(target_.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC) : -1);
+    if (to.is_open() && copy(from.get(), to.get()) && sync(to.get())) return;
+    const int error = errno;
+    free_slot(slot_);
+    const std::string kept = std::exchange(temporary_, {});
+    fail(fmt::format("{}; its contents are in \"{}\"", reason(error), kept));
 }
 
 void OutputFile::check(const std::string& path) {

@@ -19,6 +19,9 @@ enum class Links {
 /// the machine. Without commit() the temporary file is removed. Missing folders are created. A file that is replaced
 /// leaves its permissions to the new one.
 ///
+/// A file that may be written but not replaced, such as one that is mounted, is overwritten when the temporary file is
+/// complete. If that fails, the temporary file stays, and the error names it.
+///
 /// What is no regular file, such as /dev/null, /dev/stdout and named pipes, is written in place by commit().
 ///
 /// All errors are std::runtime_error and name the file. An error of write() or seek() is reported by commit(), so these
@@ -50,6 +53,7 @@ private:
     bool is_in_place() const { return temporary_.empty(); }
     void check_in_place(const std::string& target);
     void open_temporary();
+    void overwrite();
     void write_in_place();
     void close();
 
@@ -58,8 +62,8 @@ private:
     std::string temporary_;  ///< In the same folder; empty if the target is written in place.
     int slot_ = -1;          ///< In the table of temporary files.
     int file_ = -1;
-    int mode_ = -1;       ///< Permissions of the file that is replaced; -1: there is none.
-    std::string memory_;  ///< Everything written, if the target is written in place.
+    bool replaces_ = false;  ///< Whether there is a file of that name.
+    std::string memory_;     ///< Everything written, if the target is written in place.
     uint64_t position_ = 0;
     bool is_committed_ = false;
     int error_ = 0;  ///< The first error (errno).

@@ -1,20 +1,23 @@
 #include "image/image_io.h"
 
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <limits>
-
-#include <csignal>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "error_of.h"
 #include "math/hash.h"
 #include "math/vec.h"
+#include "run_program.h"
 
-namespace etendue {
+namespace etendue::test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -23,14 +26,6 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 class ImageIo : public testing::Test {
 protected:
-    void SetUp() override {
-        const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-        folder_ = fs::path(testing::TempDir()) / (std::string("etendue-image-") + test->name());
-        fs::remove_all(folder_);
-        fs::create_directories(folder_);
-    }
-    void TearDown() override { fs::remove_all(folder_); }
-
     std::string file(const std::string& name) const { return (folder_ / name).string(); }
     std::string write_bytes(const std::string& name, const std::string& bytes) const {
         std::ofstream(file(name), std::ios::binary) << bytes;
@@ -40,19 +35,9 @@ protected:
         return size_t(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
     }
 
-    fs::path folder_;
+    const TemporaryFolder temporary_;
+    const fs::path folder_ = temporary_.path();
 };
-
-/// What a call complains about, or "".
-template <class F>
-std::string error(F&& call) {
-    try {
-        call();
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-    return "";
-}
 
 /// Values that halves hold exactly.
 Image sample_image(std::vector<std::string> channels) {
@@ -258,16 +243,16 @@ TEST_F(ImageIo, OtherFormatsAreRefusedByName) {
 
 TEST_F(ImageIo, ReadErrorsNameTheFile) {
     const std::string missing = file("missing.exr");
-    EXPECT_EQ(error([&] { read_image(missing); }),
+    EXPECT_EQ(error_of([&] { read_image(missing); }),
               "cannot read \"" + missing + "\": there is no such file");
-    EXPECT_NE(error([&] { read_image(folder_.string()); }).find("it is not a regular file"),
+    EXPECT_NE(error_of([&] { read_image(folder_.string()); }).find("it is not a regular file"),
               std::string::npos);
     const std::string text = write_bytes("text.exr", "not an image");
-    EXPECT_NE(error([&] { read_pixels(text, false); }).find(text), std::string::npos);
-    EXPECT_NE(error([&] { read_image(write_bytes("empty.png", "")); }).find("empty.png"),
+    EXPECT_NE(error_of([&] { read_pixels(text, false); }).find(text), std::string::npos);
+    EXPECT_NE(error_of([&] { read_image(write_bytes("empty.png", "")); }).find("empty.png"),
               std::string::npos);
     // A header that claims far more pixels than the file can hold.
-    EXPECT_NE(error([&] {
+    EXPECT_NE(error_of([&] {
                   read_image(write_bytes("huge.pfm", "PF\n60000 60000\n-1.0\nxxxx"));
               }).find("60000"),
               std::string::npos);
@@ -281,7 +266,8 @@ TEST_F(ImageIo, UnreadableFilesAreNamedSo) {
     if (child == 0) {
         // Root may read everything.
         if (geteuid() == 0 && seteuid(65534) != 0) _exit(2);
-        _exit(error([&] { read_image(path); }) == "cannot read \"" + path + "\": Permission denied"
+        _exit(error_of([&] { read_image(path); }) ==
+                      "cannot read \"" + path + "\": Permission denied"
                   ? 0
                   : 1);
     }
@@ -304,9 +290,10 @@ TEST_F(ImageIo, ImagesInMemoryNeedNoFiles) {
     const auto handler = std::signal(SIGXFSZ, SIG_IGN);
     ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &none), 0);
     PixelBuffer found;
-    const std::string complaint = error([&] { found = decode_pixels(bytes, "the picture", true); });
+    const std::string complaint =
+        error_of([&] { found = decode_pixels(bytes, "the picture", true); });
     const std::string damaged =
-        error([&] { decode_pixels(bytes.substr(0, bytes.size() / 2), "the picture", true); });
+        error_of([&] { decode_pixels(bytes.substr(0, bytes.size() / 2), "the picture", true); });
     setrlimit(RLIMIT_FSIZE, &limit);
     std::signal(SIGXFSZ, handler);
     old ? setenv("TMPDIR", old, 1) : unsetenv("TMPDIR");
@@ -320,7 +307,7 @@ TEST_F(ImageIo, EncodesPngsOfCompletePixelsOnly) {
     EXPECT_NO_THROW(encode_png(2, 2, codes));
     EXPECT_NO_THROW(encode_png(4, 3, codes));  // grey
     for (const auto& [w, h] : {std::pair{0, 0}, {0, 4}, {4, 0}, {2, 3}, {1, 3}, {-2, -2}, {5, 5}})
-        EXPECT_NE(error([&, width = w, height = h] { encode_png(width, height, codes); }), "")
+        EXPECT_NE(error_of([&, width = w, height = h] { encode_png(width, height, codes); }), "")
             << w << " x " << h;
 }
 
@@ -331,7 +318,7 @@ TEST_F(ImageIo, TruncatedFilesAreErrors) {
     for (const char* name : {"a.exr", "a.pfm", "a.hdr", "a.png"}) {
         write_image(file(name), image);
         fs::resize_file(file(name), fs::file_size(file(name)) / 2);
-        EXPECT_NE(error([&] { read_image(file(name)); }).find(name), std::string::npos) << name;
+        EXPECT_NE(error_of([&] { read_image(file(name)); }).find(name), std::string::npos) << name;
     }
 }
 
@@ -342,21 +329,22 @@ TEST_F(ImageIo, WritingMakesFolders) {
 
 TEST_F(ImageIo, WriteErrorsNameTheFileAndLeaveNothing) {
     const Image image = sample_image({"R", "G", "B"});
-    EXPECT_NE(error([&] { write_image(file("a.jpg"), image); }).find("must end in .exr"),
+    EXPECT_NE(error_of([&] { write_image(file("a.jpg"), image); }).find("must end in .exr"),
               std::string::npos);
-    EXPECT_NE(error([&] { check_image_extension("noextension"); }).find("noextension"),
+    EXPECT_NE(error_of([&] { check_image_extension("noextension"); }).find("noextension"),
               std::string::npos);
     EXPECT_NO_THROW(check_image_extension("UPPER.EXR"));
-    EXPECT_NE(error([&] { write_image(file("a.exr"), Image()); }).find("empty"), std::string::npos);
-    EXPECT_NE(error([&] {
+    EXPECT_NE(error_of([&] { write_image(file("a.exr"), Image()); }).find("empty"),
+              std::string::npos);
+    EXPECT_NE(error_of([&] {
                   write_image(file("a.png"), sample_image({"u", "v"}));
               }).find("a.png"),
               std::string::npos);
     fs::create_directory(file("folder.exr"));
-    EXPECT_NE(error([&] { write_image(file("folder.exr"), image); }).find("there is a folder"),
+    EXPECT_NE(error_of([&] { write_image(file("folder.exr"), image); }).find("there is a folder"),
               std::string::npos);
     write_bytes("plain", "");
-    EXPECT_NE(error([&] { write_image(file("plain/a.exr"), image); }).find("plain/a.exr"),
+    EXPECT_NE(error_of([&] { write_image(file("plain/a.exr"), image); }).find("plain/a.exr"),
               std::string::npos);
     EXPECT_EQ(file_count(), 2u);
 }
@@ -374,7 +362,7 @@ TEST_F(ImageIo, FailedWritesKeepTheOldFile) {
         const rlimit small = {16384, limit.rlim_max};
         const auto handler = std::signal(SIGXFSZ, SIG_IGN);
         ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-        const std::string message = error([&] { write_image(file(name), big); });
+        const std::string message = error_of([&] { write_image(file(name), big); });
         setrlimit(RLIMIT_FSIZE, &limit);
         std::signal(SIGXFSZ, handler);
         EXPECT_NE(message.find(file(name)), std::string::npos) << name << ": " << message;
@@ -400,4 +388,4 @@ TEST(Images, LayersAndColours) {
 }
 
 }  // namespace
-}  // namespace etendue
+}  // namespace etendue::test

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "error_of.h"
 #include "limited_memory.h"
 #include "render/renderer.h"
 #include "render/warnings.h"
@@ -12,16 +13,6 @@
 
 namespace etendue::test {
 namespace {
-
-template <class F>
-std::string error_of(F&& f) {
-    try {
-        f();
-    } catch (const std::exception& e) {
-        return e.what();
-    }
-    return "no error";
-}
 
 Scene small_scene(int width = 8) {
     BuildOptions options;

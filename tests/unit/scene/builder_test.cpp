@@ -2,20 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "error_of.h"
 #include "test_scenes.h"
 
 namespace etendue::test {
 namespace {
-
-template <class F>
-std::string error_of(F&& f) {
-    try {
-        f();
-    } catch (const std::exception& e) {
-        return e.what();
-    }
-    return "no error";
-}
 
 // Ids of media have 16 bits.
 TEST(SceneBuilder, RefusesMoreMediaThanThereAreIds) {

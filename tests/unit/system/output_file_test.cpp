@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -18,7 +19,10 @@
 
 #include <gtest/gtest.h>
 
-namespace etendue {
+#include "error_of.h"
+#include "run_program.h"
+
+namespace etendue::test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,25 +32,8 @@ std::string text_of(const std::string& path) {
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// What a call complains about, or "".
-template <class F>
-std::string error(F&& call) {
-    try {
-        call();
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-    return "";
-}
-
 class OutputFiles : public testing::Test {
 protected:
-    void SetUp() override {
-        std::string name = (fs::path(testing::TempDir()) / "etendue-files-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
-    }
-    void TearDown() override { fs::remove_all(folder_); }
-
     std::string file(const std::string& name) const { return (folder_ / name).string(); }
     void put(const std::string& name, const std::string& text) const {
         std::ofstream(file(name)) << text;
@@ -66,7 +53,8 @@ protected:
     }
     using Names = std::vector<std::string>;
 
-    fs::path folder_;
+    const TemporaryFolder temporary_;
+    const fs::path folder_ = temporary_.path();
 };
 
 TEST_F(OutputFiles, AppearWhenTheyAreComplete) {
@@ -135,7 +123,7 @@ TEST_F(OutputFiles, DevicesStayDevices) {
     write_file("/dev/null", "text");
     OutputFile::check("/dev/null");
     EXPECT_TRUE(fs::is_character_file("/dev/null"));
-    const std::string message = error([] { write_file("/dev/full", "text"); });
+    const std::string message = error_of([] { write_file("/dev/full", "text"); });
     EXPECT_NE(message.find("cannot write \"/dev/full\": No space left"), std::string::npos)
         << message;
     EXPECT_TRUE(fs::is_character_file("/dev/full"));
@@ -193,7 +181,7 @@ TEST_F(OutputFiles, LinksAreWrittenThroughOrReplaced) {
     EXPECT_EQ(text_of(file("null")), "own");
 
     fs::create_symlink("loop", file("loop"));
-    EXPECT_NE(error([&] { write_file(file("loop"), "x"); }).find("loop\": Too many"),
+    EXPECT_NE(error_of([&] { write_file(file("loop"), "x"); }).find("loop\": Too many"),
               std::string::npos);
 }
 
@@ -205,7 +193,7 @@ TEST_F(OutputFiles, FullDisksDamageNothing) {
     const rlimit small = {4096, limit.rlim_max};
     const auto handler = std::signal(SIGXFSZ, SIG_IGN);
     ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-    const std::string message = error([&] {
+    const std::string message = error_of([&] {
         OutputFile out(file("a"));
         EXPECT_FALSE(out.write(std::string(10000, 'x')));
         EXPECT_FALSE(out.write("more"));
@@ -225,12 +213,15 @@ TEST_F(OutputFiles, ReasonsAreSaid) {
     for (const auto& [name, why] : std::vector<std::pair<std::string, std::string>>{
              {file("folder"), "there is a folder of that name"},
              {file("folder/"), "folder"},
+             {file("new/"), "the name is that of a folder"},
+             {file("new/."), "the name is that of a folder"},
+             {file("new/.."), "the name is that of a folder"},
              {file("plain/a"), "Not a directory"},
              {"/proc/a", "No such file"},
              {"", "the name is empty"},
              {file(std::string(300, 'x')), "File name too long"}}) {
         for (const bool check : {false, true}) {
-            const std::string message = error(
+            const std::string message = error_of(
                 [&, name = name] { check ? OutputFile::check(name) : write_file(name, "x"); });
             EXPECT_TRUE(message.starts_with("cannot write \"" + name + "\": ")) << message;
             EXPECT_NE(message.find(why), std::string::npos) << message;
@@ -264,10 +255,11 @@ TEST_F(OutputFiles, ProtectedFoldersAndFilesStay) {
     fs::permissions(file("protected"), fs::perms(0444));
     EXPECT_EQ(in_child(true,
                        [&] {
-                           const std::string a = error([&] { write_file(file("folder/a"), "x"); });
+                           const std::string a =
+                               error_of([&] { write_file(file("folder/a"), "x"); });
                            if (a.find("in its folder: Permission denied") == a.npos) return 1;
                            const std::string b =
-                               error([&] { OutputFile::check(file("protected")); });
+                               error_of([&] { OutputFile::check(file("protected")); });
                            if (b.find("Permission denied") == b.npos) return 2;
                            return 0;
                        }),
@@ -275,6 +267,76 @@ TEST_F(OutputFiles, ProtectedFoldersAndFilesStay) {
     EXPECT_EQ(text_of(file("folder/a")), "old");
     EXPECT_EQ(text_of(file("protected")), "old");
     fs::permissions(folder_ / "folder", fs::perms(0755));
+}
+
+/// In a folder such as /tmp, files of others can be written but not replaced.
+TEST_F(OutputFiles, FilesThatCannotBeReplacedAreOverwritten) {
+    put("a", "a longer text");
+    fs::permissions(folder_, fs::perms(01777));
+    fs::permissions(file("a"), fs::perms(0666));
+    struct stat before, after;
+    ASSERT_EQ(::stat(file("a").c_str(), &before), 0);
+    EXPECT_EQ(
+        in_child(true,
+                 [&] { return int(!error_of([&] { write_file(file("a"), "new"); }).empty()); }),
+        0);
+    ASSERT_EQ(::stat(file("a").c_str(), &after), 0);
+    EXPECT_EQ(text_of(file("a")), "new");
+    EXPECT_EQ(before.st_uid, after.st_uid);
+    EXPECT_EQ(names(), Names{"a"});
+    // The temporary file has what does not fit.
+    EXPECT_EQ(in_child(true,
+                       [&] {
+                           const std::string text(10000, 'x');
+                           OutputFile out(file("a"));
+                           out.write(text);
+                           std::signal(SIGXFSZ, SIG_IGN);
+                           const rlimit small = {4096, 4096};
+                           if (setrlimit(RLIMIT_FSIZE, &small) != 0) return 1;
+                           const std::string why = error_of([&] { out.commit(); });
+                           if (::geteuid() != before.st_uid) {
+                               if (why.find("File too large; its contents are in") == why.npos)
+                                   return 2;
+                               const size_t at = why.find(folder_.string() + "/.etendue-");
+                               if (text_of(why.substr(at, why.rfind('"') - at)) != text) return 3;
+                           }
+                           return 0;
+                       }),
+              0);
+}
+
+/// A file of another owner or group, which only root can give to them.
+TEST_F(OutputFiles, RightsOfAGroupAreNotGivenToAnother) {
+    put("a", "old");
+    fs::permissions(folder_, fs::perms(0777));
+    fs::permissions(file("a"), fs::perms(06676));
+    EXPECT_EQ(
+        in_child(true,
+                 [&] { return int(!error_of([&] { write_file(file("a"), "new"); }).empty()); }),
+        0);
+    EXPECT_EQ(text_of(file("a")), "new");
+    EXPECT_EQ(mode("a"), ::geteuid() == 0 ? 0666u : 06676u);
+}
+
+TEST_F(OutputFiles, PipesThatDoNotWaitAreWrittenWhole) {
+    int ends[2];
+    ASSERT_EQ(::pipe2(ends, O_NONBLOCK | O_CLOEXEC), 0);
+    std::string read;
+    std::thread reader([&] {
+        char buffer[4096];
+        for (ssize_t n; (n = ::read(ends[0], buffer, sizeof buffer)) != 0;) {
+            if (n > 0)
+                read.append(buffer, size_t(n));
+            else
+                std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+    });
+    const std::string text(1 << 20, 'x');
+    EXPECT_EQ(error_of([&] { write_file("/proc/self/fd/" + std::to_string(ends[1]), text); }), "");
+    ::close(ends[1]);
+    reader.join();
+    ::close(ends[0]);
+    EXPECT_EQ(read.size(), text.size());
 }
 
 TEST_F(OutputFiles, KilledWritersDoNoHarm) {
@@ -330,4 +392,4 @@ TEST_F(OutputFiles, TemporaryNamesCannotBePredicted) {
 }
 
 }  // namespace
-}  // namespace etendue
+}  // namespace etendue::test
