@@ -94,14 +94,23 @@ struct Session::Run {
 
 Session::Session(Load load, int threads) : load_(std::move(load)), threads_(threads) {
     thread_ = std::thread([this] { work(); });
-    loader_ = std::thread([this] { load_scenes(); });
+    try {
+        loader_ = std::thread([this] { load_scenes(); });
+    } catch (...) {
+        end();
+        throw;
+    }
 }
 
 Session::~Session() {
+    end();
+}
+
+void Session::end() {
     close(true);
     post([this] { is_ended_ = true; });
     thread_.join();
-    loader_.join();
+    if (loader_.joinable()) loader_.join();
 }
 
 void Session::post(std::function<void()> command) {

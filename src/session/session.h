@@ -23,8 +23,8 @@ namespace etendue {
 
 struct RunRequest {
     std::string integrator;  ///< As text; empty for the scene's.
-    std::string
-        user_paths;  ///< Value of the integrator's parameter `user_paths`; empty: not given.
+    /// Value of the integrator's parameter `user_paths`; empty: not given.
+    std::string user_paths;
     SamplerKind sampler = SamplerKind::Sobol;
     FilterMode filter_mode = RenderSettings().filter_mode;
     uint64_t seed = 0;
@@ -156,6 +156,7 @@ public:
 
 private:
     struct Run;
+    void end();
     void work();
     void load_scenes();
     void load_scene();

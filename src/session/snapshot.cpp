@@ -52,7 +52,7 @@ void save(const Snapshot& snapshot, const std::string& file, bool replaces) {
     }
     Image image = rgb_image(snapshot.width, snapshot.height, snapshot.mean);
     if (snapshot.report) add_attributes(*snapshot.report, image);
-    write_image(file, image);
+    write_image(file, image, ExrPrecision::Float, Links::Replace);
 }
 
 std::shared_ptr<Snapshot> SnapshotPool::take() {

@@ -25,8 +25,8 @@ struct ApiOptions {
     std::string scene_file;
     std::string output_folder;          ///< Where images and paths are saved.
     std::optional<RgbImage> reference;  ///< Shown while it has the size of the image.
-    std::vector<std::string>
-        hosts;  ///< By which the page may be asked for, beside localhost and addresses.
+    /// By which the page may be asked for, beside localhost and addresses.
+    std::vector<std::string> hosts;
 };
 
 class Api final : public Handler {

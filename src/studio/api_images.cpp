@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cstdio>
 
 #include <fmt/format.h>
 
@@ -47,9 +45,7 @@ const std::vector<Rgb>& technique_image(const TechniqueSnapshot& shown, const st
 
 /// The sum of the images of techniques whose paths have so many edges.
 std::vector<Rgb> length_image(const TechniqueSnapshot& shown, const std::string& view) {
-    const std::string number = view.substr(view.find(':') + 1);
-    int edges = -1;
-    std::from_chars(number.data(), number.data() + number.size(), edges);
+    const int edges = integer_of(view.substr(view.find(':') + 1), "length");
     std::vector<Rgb> sum(size_t(shown.width) * size_t(shown.height));
     for (const TechniqueImages::Entry& e : shown.images)
         if (e.technique.vertices() - 1 == edges)
@@ -91,10 +87,8 @@ void Api::image(const Request& request, const Done& done) {
     ImagePart part;
     part.level = query_integer(request, "level", 0);
     if (const auto rect = request.query("rect")) {
-        ImageRect& r = part.rect.emplace();
-        if (std::sscanf(rect->c_str(), "%9d,%9d,%9d,%9d", &r.x, &r.y, &r.width, &r.height) != 4)
-            throw ApiError(400, "\"rect\" must be x,y,width,height");
-        check(r, g.crop_width, g.crop_height);
+        part.rect = rect_of(*rect);
+        check(*part.rect, g.crop_width, g.crop_height);
     }
     const std::string view = request.query("view").value_or("image");
     if (view == "first")

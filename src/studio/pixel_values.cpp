@@ -10,7 +10,8 @@ namespace etendue {
 std::vector<float> relative_errors(const Snapshot& s) {
     std::vector<float> errors(s.mean.size());
     double mean = 0;
-    for (const Rgb c : s.mean) mean += double(luminance(c)) / double(s.mean.size());
+    for (const Rgb c : s.mean)
+        if (is_finite(c)) mean += double(luminance(c)) / double(s.mean.size());
     for (size_t i = 0; i < errors.size(); ++i) {
         const float y = luminance(s.mean[i]), scale = std::max(std::abs(y), float(0.1 * mean));
         const Rgb v = s.variance[i];

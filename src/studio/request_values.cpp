@@ -1,5 +1,7 @@
 #include "studio/request_values.h"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -80,14 +82,28 @@ std::string text_of(const json& body, const char* name, const std::string& fallb
     return at->get<std::string>();
 }
 
-int query_integer(const Request& request, const char* name, int fallback) {
-    const std::optional<std::string> text = request.query(name);
-    if (!text) return fallback;
+int integer_of(std::string_view text, const char* name) {
     int value = 0;
-    const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
-    if (error != std::errc() || end != text->data() + text->size())
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size())
         throw ApiError(400, fmt::format("\"{}\" must be an integer", name));
     return value;
+}
+
+int query_integer(const Request& request, const char* name, int fallback) {
+    const std::optional<std::string> text = request.query(name);
+    return text ? integer_of(*text, name) : fallback;
+}
+
+ImageRect rect_of(std::string_view text) {
+    std::array<int, 4> v{};
+    for (size_t i = 0; i < v.size(); ++i) {
+        const size_t end = i + 1 < v.size() ? text.find(',') : text.size();
+        if (end == std::string_view::npos) throw ApiError(400, "\"rect\" must be x,y,width,height");
+        v[i] = integer_of(text.substr(0, end), "rect");
+        text.remove_prefix(std::min(end + 1, text.size()));
+    }
+    return {v[0], v[1], v[2], v[3]};
 }
 
 RenderLimits limits_of(const json& body) {

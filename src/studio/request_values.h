@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -13,6 +14,7 @@
 #include "mcmc/user_paths.h"
 #include "render/renderer.h"
 #include "studio/http.h"
+#include "studio/image_reply.h"
 
 namespace etendue {
 
@@ -30,5 +32,9 @@ RenderLimits limits_of(const nlohmann::json& body);
 /// The paths of a list, within the limits of the protocol; `file` is for messages.
 std::vector<GivenPath> paths_of(const nlohmann::json& list, const std::string& file);
 int query_integer(const Request& request, const char* name, int fallback);
+/// A whole text as an integer; `name` is for messages.
+int integer_of(std::string_view text, const char* name);
+/// A rectangle as x,y,width,height.
+ImageRect rect_of(std::string_view text);
 
 }  // namespace etendue

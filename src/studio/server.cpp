@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <deque>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -373,12 +375,12 @@ void Server::Impl::accept() {
 }
 
 void Server::Impl::accept_later() {
-    is_accepting = true;
     pause.expires_after(kEventInterval);
     pause.async_wait([this](const error_code& error) {
         is_accepting = false;
         if (!error) accept();
     });
+    is_accepting = true;
 }
 
 void Server::Impl::run() {

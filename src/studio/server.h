@@ -2,7 +2,9 @@
 // An HTTP/1.1 server with one thread; the only file that knows sockets.
 
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "studio/http.h"
@@ -17,8 +19,8 @@ public:
     /// or takes all of the program's file descriptors.
     static constexpr int kMostStrangers = 32;
     static constexpr int kMostEventStreams = 4;
-    static constexpr double kTimeout =
-        10;  ///< Seconds without progress after which a connection is closed.
+    /// Seconds without progress after which a connection is closed.
+    static constexpr double kTimeout = 10;
 
     /// Listens at an address, or that of a host name; port 0 means any free one. Throws std::runtime_error where that is
     /// impossible.

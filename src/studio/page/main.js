@@ -198,7 +198,7 @@ async function measure() {
     try {
         const d = await server.get(`/v1/difference?run=${a.run}&against=${b.view === 'reference' ? 'reference' : b.run}`);
         const other = b.view === 'reference' ? 'the reference' : `run ${b.run}, ${d.against_passes} spp`;
-        tools.measured.textContent = `relMSE ${significant(d.rel_mse)}, ꟻLIP ${significant(d.flip)}: run ${a.run}, ${d.passes} spp, against ${other}`
+        tools.measured.textContent = `relMSE ${significant(d.rel_mse)}, FLIP ${significant(d.flip)}: run ${a.run}, ${d.passes} spp, against ${other}`
             + (d.not_finite ? `; ${d.not_finite} pixels that are not finite are left out of relMSE` : '');
     } catch (e) {
         tools.measured.textContent = /** @type {Error} */ (e).message;
@@ -218,7 +218,7 @@ function makeTools() {
         else showIn(1, Number(value), 'image');
     }});
     tools.wipe = number({id: 'wipe', min: 0, max: 1, step: 0.01, value: 0.5, oninput: () => { view.wipe = Number(tools.wipe.value); view.redraw(); }});
-    tools.measure = element('button', {type: 'button', textContent: 'Measure', title: 'relMSE and ꟻLIP of the two images', disabled: true, onclick: measure});
+    tools.measure = element('button', {type: 'button', textContent: 'Measure', title: 'relMSE and FLIP of the two images', disabled: true, onclick: measure});
     tools.measured = element('output', {});
     const field = (/** @type {string} */ text, /** @type {any} */ input, /** @type {any[]} */ ...more) => element('label', {}, [`${text} `, input, ...more]);
     at('view-tools').append(field('show', tools.view), field('exposure', tools.exposure, ' ', tools.exposureText), field('as', tools.mode),

@@ -15,19 +15,43 @@ Scene small_room() {
                  sphere("0.3,-0.5,0.1", "0.4", "<bsdf type=\"conductor\"/>"));
 }
 
+/// All samples of a pixel, without a limit of time that matters.
+ReplayRequest request_of(const RenderSettings& settings, uint64_t pixel) {
+    ReplayRequest request;
+    request.integrator = settings.integrator;
+    request.sampler = settings.sampler;
+    request.filter_mode = settings.filter_mode;
+    request.seed = settings.seed;
+    request.pixel = pixel;
+    request.seconds = 100;
+    return request;
+}
+
+Rgb sum_of(const std::vector<ReplayedPath>& paths) {
+    Rgb sum;
+    for (const ReplayedPath& p : paths) sum += p.value;
+    return sum;
+}
+
+/// What one thread renders, with technique images of all paths that there can be.
+RenderSettings settings_of(const std::string& integrator) {
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(integrator);
+    settings.integrator.params["max_depth"] = "10";
+    settings.seed = 4;
+    settings.threads = 1;
+    settings.technique_depth = 12;
+    return settings;
+}
+
 class ReplayOf : public ::testing::TestWithParam<std::string> {};
 
 /// Contributions with t ≥ 2 sum to what the pixel has of them; the film's other part are splats.
 TEST_P(ReplayOf, SumsToThePixel) {
     const Scene scene = small_room();
     constexpr uint32_t kPasses = 16;
-    RenderSettings settings;
-    settings.integrator = IntegratorSpec::parse(GetParam());
-    settings.seed = 4;
-    settings.threads = 1;
+    RenderSettings settings = settings_of(GetParam());
     settings.spp = kPasses;
-    settings.technique_depth = 12;
-    settings.integrator.params["max_depth"] = "10";
     Renderer renderer(scene, settings);
     renderer.run([](const Progress&) {}, std::atomic<bool>(false));
     std::vector<Rgb> eye(scene.film().pixel_count()), splats(eye.size());
@@ -35,20 +59,14 @@ TEST_P(ReplayOf, SumsToThePixel) {
         for (size_t i = 0; i < eye.size(); ++i)
             (e.technique.t >= 2 ? eye : splats)[i] += e.weighted[i];
     for (const uint64_t pixel : {9u, 27u, 36u, 58u}) {
-        ReplayRequest request;
-        request.integrator = settings.integrator;
-        request.sampler = settings.sampler;
-        request.seed = settings.seed;
-        request.pixel = pixel;
+        ReplayRequest request = request_of(settings, pixel);
         request.passes = kPasses;
-        request.seconds = 100;
         const Replay all = replay(scene, request);
         EXPECT_EQ(all.passes, kPasses);
         for (int c = 0; c < 3; ++c)
             EXPECT_NEAR(all.sum[c] / kPasses, eye[pixel][c], 1e-4f * (1 + eye[pixel][c])) << pixel;
-        Rgb listed;
+        const Rgb listed = sum_of(all.paths);
         for (const ReplayedPath& p : all.paths) {
-            listed += p.value;
             ASSERT_EQ(int(p.points.size()), p.technique.vertices());
             EXPECT_EQ(p.points.front().event, 'L');
             EXPECT_EQ(p.points.back().event, 'E');
@@ -120,17 +138,11 @@ TEST(Replay, SplatsAreThoseOfOnePass) {
     settings.spp = 1;
     Renderer renderer(scene, settings);
     renderer.run([](const Progress&) {}, std::atomic<bool>(false));
-    ReplayRequest request;
-    request.integrator = settings.integrator;
-    request.sampler = settings.sampler;
-    request.seed = settings.seed;
-    request.pixel = 60;
+    ReplayRequest request = request_of(settings, 60);
     request.splats = true;
-    request.seconds = 100;
     const Replay r = replay(scene, request);
     EXPECT_EQ(r.light_paths, scene.film().pixel_count());
-    Rgb sum;
-    for (const ReplayedPath& p : r.paths) sum += p.value;
+    const Rgb sum = sum_of(r.paths);
     for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(sum[c], renderer.film().image()[60][c], 1e-5f + 1e-4f * sum[c]);
 }
@@ -139,27 +151,19 @@ TEST(Replay, SplatsAreThoseOfOnePass) {
 TEST(Replay, TracesAllLightPaths) {
     const Scene scene = small_room();
     for (const int light_paths : {40, 64, 150}) {
-        RenderSettings settings;
-        settings.integrator =
-            IntegratorSpec::parse("bdpt:roulette=0,light_paths=" + std::to_string(light_paths));
-        settings.threads = 1;
+        RenderSettings settings =
+            settings_of("bdpt:roulette=0,light_paths=" + std::to_string(light_paths));
+        settings.seed = 0;
         settings.spp = 1;
-        settings.technique_depth = 12;
-        settings.integrator.params["max_depth"] = "10";
         Renderer renderer(scene, settings);
         renderer.run([](const Progress&) {}, std::atomic<bool>(false));
-        ReplayRequest request;
-        request.integrator = settings.integrator;
-        request.sampler = settings.sampler;
-        request.seed = settings.seed;
-        request.pixel = 60;
+        ReplayRequest request = request_of(settings, 60);
         request.splats = true;
         request.passes = 0;
-        request.seconds = 100;
         const Replay r = replay(scene, request);
         EXPECT_EQ(r.light_paths, uint64_t(light_paths));
-        Rgb sum, expected;
-        for (const ReplayedPath& p : r.paths) sum += p.value;
+        const Rgb sum = sum_of(r.paths);
+        Rgb expected;
         for (const auto& e : renderer.techniques()->images())
             if (e.technique.t <= 1) expected += e.weighted[60];
         EXPECT_GT(expected.g, 0);
@@ -202,12 +206,7 @@ class LastReplayOf : public ::testing::TestWithParam<const char*> {};
 TEST_P(LastReplayOf, SumsToTheLastPass) {
     const Scene scene = small_room();
     constexpr int kPasses = 6;
-    RenderSettings settings;
-    settings.integrator = IntegratorSpec::parse(GetParam());
-    settings.integrator.params["max_depth"] = "10";
-    settings.seed = 4;
-    settings.threads = 1;
-    settings.technique_depth = 12;
+    const RenderSettings settings = settings_of(GetParam());
     Renderer renderer(scene, settings);
     EXPECT_THROW(replay_last(renderer, 0, 10), std::runtime_error);
     const auto sums = [&](uint64_t passes) {

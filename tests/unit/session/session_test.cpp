@@ -2,8 +2,6 @@
 
 #include "session/session.h"
 
-#include <unistd.h>
-
 #include <atomic>
 #include <cstring>
 #include <filesystem>
@@ -14,8 +12,10 @@
 #include <gtest/gtest.h>
 
 #include "no_memory.h"
+#include "run_program.h"
 #include "session/workers.h"
 #include "test_scenes.h"
+#include "wait_for.h"
 
 namespace etendue::test {
 namespace {
@@ -24,15 +24,6 @@ using namespace std::chrono_literals;
 
 Scene small_room() {
     return build(sensor("0,0,3.5", "0,0,0", 24) + room() + area_lamp());
-}
-
-template <class Condition>
-bool wait_for(const Condition& condition) {
-    for (int i = 0; i < 6000; ++i) {
-        if (condition()) return true;
-        std::this_thread::sleep_for(5ms);
-    }
-    return false;
 }
 
 bool wait_for_scene(const Session& session) {
@@ -57,6 +48,26 @@ std::vector<Rgb> plain_image(const Scene& scene, const RunRequest& r) {
     Renderer renderer(scene, settings);
     renderer.run([](const Progress&) {}, std::atomic<bool>(false));
     return renderer.film().image();
+}
+
+/// A run of three passes with technique images that nobody has asked for yet.
+int run_with_techniques(Session& session) {
+    RunRequest r = request("bdpt", 3);
+    r.technique_depth = 3;
+    const int run = session.start(r);
+    EXPECT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    return run;
+}
+
+/// What becomes of an image that is saved.
+Saved saved(Session& session, int run) {
+    const TemporaryFolder folder;
+    const std::filesystem::path file = folder.path() / "image.pfm";
+    std::promise<Saved> answer;
+    session.save(run, file.string(), false, [&](const Saved& s) { answer.set_value(s); });
+    const Saved result = answer.get_future().get();
+    EXPECT_EQ(std::filesystem::exists(file), result.error.empty());
+    return result;
 }
 
 class SessionBits : public ::testing::TestWithParam<std::tuple<const char*, int>> {};
@@ -159,26 +170,13 @@ TEST(Session, SavesBetweenPasses) {
     ASSERT_TRUE(wait_for_scene(session));
     const int run = session.start(request("path", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).passes > 2; }));
-    const std::string file =
-        (std::filesystem::temp_directory_path() / "etendue-session-test.pfm").string();
-    std::atomic<bool> is_done{false};
-    std::string error;
-    session.save(run, file, false, [&](const Saved& s) {
-        error = s.error;
-        is_done = true;
-    });
-    ASSERT_TRUE(wait_for([&] { return is_done.load(); }));
-    EXPECT_EQ(error, "");
-    EXPECT_TRUE(std::filesystem::remove(file));
+    EXPECT_EQ(saved(session, run).error, "");
 }
 
 TEST(Session, TechniqueImagesAreMadeOnDemand) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    RunRequest r = request("bdpt", 3);
-    r.technique_depth = 3;
-    const int run = session.start(r);
-    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    const int run = run_with_techniques(session);
     ASSERT_TRUE(wait_for([&] { return session.techniques(run) != nullptr; }));
     EXPECT_EQ(session.techniques(run)->passes, 3u);
     EXPECT_FALSE(session.techniques(run)->images.empty());
@@ -400,10 +398,7 @@ TEST(SessionFailures, ARunOutlivesAPictureWithoutMemory) {
 TEST(SessionFailures, TechniqueImagesWithoutMemoryComeLater) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    RunRequest r = request("bdpt", 3);
-    r.technique_depth = 3;
-    const int run = session.start(r);
-    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    const int run = run_with_techniques(session);
     session.settle();
     {
         const NoMemoryFor images(size_t(24 * 24) * sizeof(Rgb));
@@ -436,8 +431,8 @@ TEST(SessionFailures, ARunWithoutMemoryCanBeContinued) {
 /// with the file.
 TEST(SessionFailures, AFailedSeedCanBeRepeated) {
     const char* paths = R"([{"points": [[0, 0.98, 0], [0.3, -1, 0.2]]}])";
-    const std::filesystem::path file = std::filesystem::temp_directory_path() /
-                                       ("etendue-session-" + std::to_string(::getpid()) + ".json");
+    const TemporaryFolder folder;
+    const std::filesystem::path file = folder.path() / "paths.json";
     std::ofstream(file) << paths;
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
@@ -460,7 +455,6 @@ TEST(SessionFailures, AFailedSeedCanBeRepeated) {
     std::ofstream(file) << paths;
     session.resume(run, {});
     EXPECT_TRUE(wait_for([&] { return session.status(run).finished_seeds == 4; }));
-    std::filesystem::remove(file);
 }
 
 // -- Long passes.
@@ -476,15 +470,10 @@ TEST(Session, SavesDuringAPass) {
     ASSERT_TRUE(wait_for_scene(session));
     const int run = session.start(request("bdpt:max_depth=12", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).passes == 1; }));
-    const std::string file =
-        (std::filesystem::temp_directory_path() / "etendue-session-slow.pfm").string();
-    std::promise<Saved> answer;
-    session.save(run, file, true, [&](const Saved& s) { answer.set_value(s); });
-    const Saved saved = answer.get_future().get();
-    EXPECT_EQ(saved.error, "");
-    EXPECT_EQ(saved.passes, 1u);
+    const Saved answer = saved(session, run);
+    EXPECT_EQ(answer.error, "");
+    EXPECT_EQ(answer.passes, 1u);
     EXPECT_EQ(session.status(run).passes, 1u);
-    EXPECT_TRUE(std::filesystem::remove(file));
     session.stop_all(true);
 }
 

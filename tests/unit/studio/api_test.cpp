@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <fstream>
 #include <future>
-#include <thread>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -19,13 +18,13 @@
 #include "run_program.h"
 #include "studio/api.h"
 #include "test_scenes.h"
+#include "wait_for.h"
 
 namespace etendue::test {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-using namespace std::chrono_literals;
 
 /// A session and its protocol; the size of the image can be changed before the scene is loaded again.
 class ApiTest : public ::testing::Test {
@@ -47,14 +46,6 @@ protected:
         const uint64_t before = session->scene_version();
         EXPECT_EQ(post("/v1/run", {{"action", "reload"}}).status, 200);
         ASSERT_TRUE(wait_for([&] { return session->scene_version() > before; }));
-    }
-    template <class Condition>
-    static bool wait_for(const Condition& condition) {
-        for (int i = 0; i < 6000; ++i) {
-            if (condition()) return true;
-            std::this_thread::sleep_for(5ms);
-        }
-        return false;
     }
     Reply ask(const std::string& method, const std::string& target, const std::string& body = {},
               const std::string& version = {}) {
@@ -167,6 +158,20 @@ TEST_F(ApiTest, ImagesOfARunOfASceneOfAnotherSizeAreNotShown) {
     reload(16);
     for (const std::string& view : views)
         EXPECT_EQ(get("/v1/image?view=" + view + of_run).status, 200) << view;
+}
+
+TEST_F(ApiTest, NumbersOfQueriesAreReadWhole) {
+    open();
+    const int run = finished_run({{"integrator", "bdpt"}, {"techniques", 3}});
+    const auto status = [&](const std::string& query) {
+        return get("/v1/image?run=" + std::to_string(run) + "&" + query).status;
+    };
+    ASSERT_TRUE(wait_for([&] { return status("view=length:2") == 200; }));
+    EXPECT_EQ(status("rect=1,2,3,4"), 200);
+    for (const char* wrong :
+         {"rect=", "rect=1,2,3", "rect=1,2,3,", "rect=1,2,3,4x", "rect=1,2,3,4,5", "rect=1, 2,3,4",
+          "rect=1,2,3,99999999999", "view=length:", "view=length:2x", "view=length:two"})
+        EXPECT_EQ(status(wrong), 400) << wrong;
 }
 
 /// A view is of the same technique, whichever others are found later.

@@ -188,6 +188,15 @@ TEST(RelativeErrors, OfOneChannelAndOfThree) {
     const std::vector<float> errors = relative_errors(s);
     EXPECT_NEAR(errors[0], 0.2f, 1e-6f);
     EXPECT_NEAR(errors[1], luminance(Rgb(0.2f, 0, 0)), 1e-6f);
+    // A pixel that is not finite changes no other.
+    for (const float bad : {std::numeric_limits<float>::infinity(), std::nanf("")}) {
+        s.width = 3;
+        s.mean = {Rgb(1), Rgb(0), Rgb(bad)};
+        s.variance.assign(3, Rgb(0.04f));
+        const std::vector<float> others = relative_errors(s);
+        EXPECT_NEAR(others[0], 0.2f, 1e-6f);
+        EXPECT_NEAR(others[1], 0.2f / (0.1f / 3), 1e-4f);
+    }
 }
 
 }  // namespace
