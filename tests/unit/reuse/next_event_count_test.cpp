@@ -28,8 +28,8 @@ void expect_near(const Moments& a, const Moments& b) {
 /// No other technique makes the path, and one of two points is hidden: the variance of one is 2, that of N is less by
 /// N^1.5.
 TEST(NextEventCount, KnowsTheVarianceOfOneFromTheDifferences) {
-    const NextEventDraw seen{.contribution = 2, .weight = 1, .seen = 1},
-        hidden{.contribution = 2, .weight = 1, .seen = 0};
+    const NextEventDraw seen{.contribution = 2, .weight = 1, .passed = 1},
+        hidden{.contribution = 2, .weight = 1, .passed = 0};
     expect_near(moments_of({seen, hidden}),
                 {2, 2 / std::pow(2, 1.5), 2 / std::pow(4, 1.5), 2 / std::pow(8, 1.5)});
     expect_near(moments_of({seen, hidden}, 3),
@@ -42,7 +42,7 @@ TEST(NextEventCount, KnowsTheVarianceOfOneFromTheDifferences) {
 
 /// Of two next events with the weight 1/2, odds are (N/2)² with N instead, and (n_S p_S)/p is 2.
 TEST(NextEventCount, KnowsThatOthersGiveTheirWeight) {
-    const NextEventDraw d{.contribution = 1, .weight = 0.5f, .seen = 1};
+    const NextEventDraw d{.contribution = 1, .weight = 0.5f, .passed = 1};
     Moments expected;
     for (size_t i = 0; i < kNextEventCounts; ++i) {
         const double n = std::pow(2.0, double(i)), w = n * n / (n * n + 4);
@@ -50,8 +50,8 @@ TEST(NextEventCount, KnowsThatOthersGiveTheirWeight) {
     }
     expect_near(moments_of({d, d}), expected);
     // Roulette leaves half of them with twice the value.
-    const NextEventDraw twice{.contribution = 1, .weight = 0.5f, .seen = 2},
-        none{.contribution = 1, .weight = 0.5f, .seen = 0};
+    const NextEventDraw twice{.contribution = 1, .weight = 0.5f, .passed = 2},
+        none{.contribution = 1, .weight = 0.5f, .passed = 0};
     const Moments with_roulette = moments_of({twice, none});
     for (size_t i = 0; i < kNextEventCounts; ++i) {
         const double n = std::pow(2.0, double(i)), w = n * n / (n * n + 4);
