@@ -235,7 +235,7 @@ TEST_F(ImageIo, ReadsPortableMaps) {
 }
 
 TEST_F(ImageIo, OtherFormatsAreRefusedByName) {
-    const std::string why = error([&] { read_image(write_bytes("a.tif", "II*\0 and so on")); });
+    const std::string why = error_of([&] { read_image(write_bytes("a.tif", "II*\0 and so on")); });
     EXPECT_NE(why.find("its format is none of EXR, PNG, JPEG, HDR, PFM, TGA, BMP, PGM and PPM"),
               std::string::npos)
         << why;
