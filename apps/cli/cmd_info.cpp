@@ -25,7 +25,9 @@ std::string integrator_text(const Scene& s) try {
 
 void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
     guide.check();
-    const Scene s = load_scene(options);
+    SceneOptions loading = options;
+    loading.threads = guide.threads;
+    const Scene s = load_scene(loading);
     const nlohmann::json learned = guide.is_wanted ? guide.run(s) : nlohmann::json();
     const Scene::Statistics& st = s.statistics();
     const Bounds3& b = s.bounds();

@@ -87,6 +87,7 @@ void StudioCommand::save_all(Session& session) const {
     std::string errors;
     const auto save_one = [&](const RunStatus& s) {
         for (const std::string& folder : {output, other}) {
+            if (folder.empty()) continue;  // There is none for temporary files.
             const std::string file = free_name(folder, stem);
             const Saved saved = save_and_wait(session, s.id, file);
             if (saved.error.empty()) {

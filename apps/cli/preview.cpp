@@ -2,8 +2,10 @@
 
 #include <netdb.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdint>
 #include <stdexcept>
 
@@ -64,6 +66,9 @@ Preview::Preview(const std::string& address, const std::string& image_name, int 
             fmt::format("--preview: {}:{}: {}", host, port, gai_strerror(error)));
     for (const addrinfo* a = found; a && socket_ < 0; a = a->ai_next) {
         socket_ = ::socket(a->ai_family, a->ai_socktype, a->ai_protocol);
+        // Also of the connection. A viewer that does not read must not keep the rendering waiting.
+        constexpr timeval kPatience{5, 0};
+        ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &kPatience, sizeof kPatience);
         if (socket_ >= 0 && ::connect(socket_, a->ai_addr, a->ai_addrlen) != 0) {
             ::close(socket_);
             socket_ = -1;
@@ -92,9 +97,11 @@ void Preview::send(const std::string& payload) {
         const ssize_t n =
             ::send(socket_, payload.data() + sent, payload.size() - sent, MSG_NOSIGNAL);
         if (n <= 0) {
+            const bool is_late = n < 0 && errno == EAGAIN;
             ::close(socket_);
             socket_ = -1;
-            message("warning: the preview's viewer closed the connection\n");
+            message("warning: the preview's viewer {}\n",
+                    is_late ? "does not read what is sent; no more is" : "closed the connection");
             return;
         }
         sent += size_t(n);

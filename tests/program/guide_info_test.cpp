@@ -1,5 +1,6 @@
 // etendue info --guide: what a guide has learned, as text, JSON and images.
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -33,6 +34,26 @@ protected:
 
     TemporaryFolder folder;
 };
+
+/// Also while the scene is loaded. Libraries have threads of their own.
+TEST_F(GuideInfoTest, OneThreadIsFewerThanTwo) {
+    const auto most_threads = [&](const char* threads) {
+        const Program program(
+            ETENDUE_PROGRAM,
+            {"info", kScene, "--resolution", "64x48", "--guide", "--threads", threads},
+            folder.path());
+        int most = 0, now = 0;
+        while ((now = program.threads()) > 0) {
+            most = std::max(most, now);
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        EXPECT_EQ(program.wait().status, 0);
+        return most;
+    };
+    if (std::thread::hardware_concurrency() > 1) {
+        EXPECT_LT(most_threads("1"), most_threads("2"));
+    }
+}
 
 TEST_F(GuideInfoTest, ImagesAgreeWithTheFigures) {
     const ProgramResult r = run({"--json", "--threads", "3", "--shares", file("shares.exr"),

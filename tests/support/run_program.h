@@ -60,6 +60,14 @@ public:
         const std::filesystem::directory_iterator all("/proc/" + std::to_string(pid_) + "/fd");
         return int(std::distance(begin(all), end(all)));
     }
+    /// Number of its threads; 0 after its end.
+    int threads() const {
+        const std::string status = read_text("/proc/" + std::to_string(pid_) + "/status");
+        const size_t at = status.find("Threads:");
+        return at == std::string::npos || status.find("State:\tZ") != std::string::npos
+                   ? 0
+                   : std::stoi(status.substr(at + sizeof("Threads:")));
+    }
     /// Its output on standard error so far.
     std::string errors() const { return read_text(err_); }
 
