@@ -1,9 +1,13 @@
 // What guides learn in small rooms: behind mirrors and panes, from lamps in shades, and where nothing can be gained.
 
+#include <atomic>
+#include <map>
+
 #include <gtest/gtest.h>
 
 #include "pathspace/walk.h"
 #include "render/learned_guide.h"
+#include "render/renderer.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -150,6 +154,36 @@ TEST(LearnedContributions, AreThoseOfTheLightPathsOfAPass) {
                 quarter = learn(scene, "bdpt:light_paths=1024").guide().light_contribution;
     EXPECT_GT(quarter, 1.5f * all);
     EXPECT_LT(quarter, 4 * all);
+}
+
+/// What is shown of a guide is what a rendering learns before its first pass.
+TEST(LearnedGuides, AreThoseOfARendering) {
+    constexpr uint64_t kSeed = 3;
+    // With a filter that is wider than a pixel, the film points depend on the film's mode.
+    std::string camera = test::front_camera(kSize);
+    const std::string box = "<rfilter type=\"box\"/>";
+    camera.replace(camera.find(box), box.size(), "<rfilter type=\"gaussian\"/>");
+    const Scene scene = test::build(camera + test::room() + test::area_lamp());
+    for (const char* method :
+         {"bdpt:guide=on,guide_walks=20000", "path:guide=on,guide_walks=20000"}) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse(method);
+        settings.sampler = SamplerKind::Sobol;
+        settings.seed = kSeed;
+        settings.spp = 1;
+        Renderer renderer(scene, settings);
+        renderer.run([](const Progress&) {}, std::atomic<bool>{false});
+        std::map<std::string, double> figures;
+        for (const auto& [name, value] : renderer.integrator().figures()) figures[name] = value;
+        const LearnedGuide learned(scene, settings.integrator, kSeed, 2);
+        const GuideTree& surfaces = learned.guide().surfaces;
+        EXPECT_EQ(figures["guide_cells"], double(surfaces.cells().size())) << method;
+        EXPECT_EQ(figures["guide_gain_eye"], double(surfaces.gain(TransportMode::Radiance)))
+            << method;
+        EXPECT_EQ(figures["guide_gain_light"], double(surfaces.gain(TransportMode::Importance)))
+            << method;
+        EXPECT_EQ(figures["guide_gain_emission"], double(learned.guide().emission_gain)) << method;
+    }
 }
 
 /// Where emission alone gains, a method that joins both walks has no guide at surfaces.
