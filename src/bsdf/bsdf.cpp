@@ -54,6 +54,7 @@ std::optional<BsdfSample> sample_lobe(const Lobe& lobe, Vec3 wo, float u_lobe, V
     return std::visit([&](const auto& l) { return l.sample(wo, u_lobe, u); }, lobe);
 }
 
+/// Value and densities of `c`, both times its weight.
 BsdfEval eval_component(Vec3 ng, bool strict, const BsdfComponent& c, Vec3 wo, Vec3 wi,
                         TransportMode mode) {
     const Side side(ng, strict, c, wo);
@@ -66,7 +67,7 @@ BsdfEval eval_component(Vec3 ng, bool strict, const BsdfComponent& c, Vec3 wo, V
     return e;
 }
 
-/// eval_component() of a diffuse lobe without its frame: the most frequent case.
+/// Value of a BSDF of one diffuse lobe without its frame: the most frequent case.
 BsdfEval eval_diffuse(Vec3 ng, bool strict, const BsdfComponent& c, const DiffuseLobe& lobe,
                       Vec3 wo, Vec3 wi, TransportMode mode) {
     const Vec3 ns = c.frame.n;
@@ -76,11 +77,10 @@ BsdfEval eval_diffuse(Vec3 ng, bool strict, const BsdfComponent& c, const Diffus
     if (!(cos_o > 0 && cos_i > 0)) return {};
     if (strict ? !(cos_og > 0 && cos_ig > 0) : !(cos_og * cos_ig > 0)) return {};
     const float factor = mode == TransportMode::Radiance ? cos_i : cos_o * cos_ig / cos_og;
-    return {lobe.reflectance * (factor * c.weight * kInvPi), cos_i * c.weight * kInvPi,
-            cos_o * c.weight * kInvPi};
+    return {lobe.reflectance * (factor * c.weight * kInvPi), cos_i * kInvPi, cos_o * kInvPi};
 }
 
-/// Samples eval_diffuse() of a component with weight 1.
+/// Samples eval_diffuse().
 std::optional<BsdfSample> sample_diffuse(Vec3 ng, bool strict, const BsdfComponent& c,
                                          const DiffuseLobe& lobe, Vec3 wo, Vec2 u,
                                          TransportMode mode) {
@@ -94,13 +94,13 @@ std::optional<BsdfSample> sample_diffuse(Vec3 ng, bool strict, const BsdfCompone
     const float correction =
         mode == TransportMode::Radiance ? 1.0f : cos_o * cos_ig / (cos_og * local.z);
     return BsdfSample{.wi = wi,
-                      .weight = lobe.reflectance * correction,
+                      .weight = lobe.reflectance * (correction * c.weight),
                       .pdf = local.z * kInvPi,
                       .pdf_rev = cos_o * kInvPi};
 }
 
-/// The sample that `local_sample(wo)` returns in the frame of `c`, with weight and densities in world space. The
-/// densities include the probability c.weight of the component; the weight does not.
+/// The sample that `local_sample(wo)` returns in the frame of `c`, in world space, with densities times the weight of
+/// `c`. BsdfSample::weight is that of the lobe alone.
 template <class LocalSample>
 std::optional<BsdfSample> sample_component(Vec3 ng, bool strict, const BsdfComponent& c, Vec3 wo,
                                            TransportMode mode, const LocalSample& local_sample) {
@@ -139,32 +139,33 @@ BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
     BsdfEval sum = eval_component(ng_, has_strict_normals_, first_, wo, wi, mode);
     for (const BsdfComponent* c = first_.next; c; c = c->next)
         add(sum, eval_component(ng_, has_strict_normals_, *c, wo, wi, mode));
+    sum.pdf /= total_weight_;
+    sum.pdf_rev /= total_weight_;
     return sum;
 }
 
 std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const {
-    if (!first_.next && first_.weight == 1)
+    if (!first_.next)
         if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe))
             return sample_diffuse(ng_, has_strict_normals_, first_, *diffuse, wo, u, mode);
+    if (!has_smooth_ && !has_delta_) return {};
     // Walks pass no number then. Others are not read either, so that every caller samples as walks do.
     if (!uses_lobe_choice_) u_lobe = 0;
     const BsdfComponent* chosen = &first_;
-    while (chosen && u_lobe >= chosen->weight) {
+    u_lobe *= total_weight_;
+    for (; chosen->next && u_lobe >= chosen->weight; chosen = chosen->next)
         u_lobe -= chosen->weight;
-        chosen = chosen->next;
-    }
-    if (!chosen) return {};  // rounding: u_lobe exceeds the sum of the weights
     u_lobe = std::fmin(u_lobe / chosen->weight, kOneMinusEpsilon);
     std::optional<BsdfSample> s =
         sample_component(ng_, has_strict_normals_, *chosen, wo, mode, [&](Vec3 local_wo) {
             return sample_lobe(chosen->lobe, local_wo, u_lobe, u);
         });
-    const bool is_mixture = first_.next != nullptr;
-    if (!s || !is_mixture) return s;
+    if (!s) return {};
     if (s->is_delta) {
         for (const BsdfComponent* c = &first_; c != chosen; c = c->next) s->event += 2;
-        return s;
+        return normalized(*s);
     }
+    if (!first_.next) return normalized(*s);
 
     // The other components may sample the same direction: weight = Σ f / Σ pdf.
     BsdfEval sum{s->weight * s->pdf, s->pdf, s->pdf_rev, s->eta};
@@ -173,6 +174,13 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     s->weight = sum.f / sum.pdf;
     s->pdf = sum.pdf;
     s->pdf_rev = sum.pdf_rev;
+    return normalized(*s);
+}
+
+BsdfSample Bsdf::normalized(BsdfSample s) const {
+    s.weight *= total_weight_;
+    s.pdf /= total_weight_;
+    s.pdf_rev /= total_weight_;
     return s;
 }
 
@@ -190,8 +198,9 @@ std::optional<BsdfSample> Bsdf::sample_delta(Vec3 wo, uint8_t event, TransportMo
                 },
                 c->lobe);
         });
-    if (s) s->event = event;
-    return s;
+    if (!s) return {};
+    s->event = event;
+    return normalized(*s);
 }
 
 float Bsdf::max_pdf(Vec3 wo, const DirectionCone& cone) const {
@@ -202,12 +211,11 @@ float Bsdf::max_pdf(Vec3 wo, const DirectionCone& cone) const {
         sum += c->weight *
                std::visit([&](const auto& l) { return l.max_pdf(local_wo, local); }, c->lobe);
     }
-    return sum;
+    return sum / total_weight_;
 }
 
 std::optional<Vec3> Bsdf::diffuse_normal() const {
-    if (first_.next || first_.weight != 1 || !std::holds_alternative<DiffuseLobe>(first_.lobe))
-        return {};
+    if (first_.next || !std::holds_alternative<DiffuseLobe>(first_.lobe)) return {};
     return first_.frame.n;
 }
 

@@ -28,10 +28,11 @@ using Lobe = std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, Dielec
                           PhongLobe, PrincipledLobe, OrenNayarLobe, FresnelBlendLobe,
                           DiffuseTransmissionLobe, CoatedMirrorLobe, CoatedConductorLobe>;
 
-/// One lobe in its shading frame; a mixture is a list of them whose weights sum to one.
+/// One lobe in its shading frame; a mixture is a list of them.
 struct BsdfComponent {
     Frame frame;
     Lobe lobe;
+    /// Factor of the lobe's value. The probability that sample() chooses the lobe is its share of the sum of all weights.
     float weight = 1;
     /// In the arena of the walk that made it; nullptr for the last one.
     const BsdfComponent* next = nullptr;
@@ -80,11 +81,14 @@ private:
     friend class ComponentList;
     friend class ComponentArena;
     float sum_delta_probabilities(Vec3 wo, TransportMode mode) const;
+    /// A sample of sample_component(), with the probabilities of the components.
+    BsdfSample normalized(BsdfSample s) const;
 
     Vec3 ng_;
     bool has_strict_normals_ = true;
     bool has_smooth_ = false, has_delta_ = false;
     bool uses_lobe_choice_ = false;
+    float total_weight_ = 1;
     BsdfComponent first_;
 };
 

@@ -1,7 +1,6 @@
 // Sum of materials with constant weights, as in Mitsuba 0.6.
 //   weights (required)  one number per material, separated by blanks or commas
-//   ensure_energy_conservation (true)   whether weights are divided by their sum if it exceeds one; if not, such a sum
-//                       is an error
+//   ensure_energy_conservation (true)   whether weights are divided by their sum if it exceeds one
 //   nested: as many bsdfs, none of them masked
 
 #include <charconv>
@@ -23,13 +22,9 @@ public:
                 params.fail(
                     "bsdf \"mixturebsdf\" cannot hold a masked material (to mask it, put the "
                     "\"mixturebsdf\" into a \"mask\")");
+        if (!params.flag("ensure_energy_conservation", true)) return;
         float sum = 0;
         for (float w : weights_) sum += w;
-        if (sum > 1 && !params.flag("ensure_energy_conservation", true))
-            params.fail("weights",
-                        fmt::format("the sum of the weights is {}, which is supported only with "
-                                    "\"ensure_energy_conservation\": they are divided by it then",
-                                    sum));
         for (float& w : weights_) w /= std::max(sum, 1.0f);
     }
 
@@ -82,15 +77,16 @@ private:
 }  // namespace
 
 MaterialEntry mixturebsdf_entry() {
-    return {
-        {"bsdf",
-         "mixturebsdf",
-         "Sum of materials with constant weights.",
-         {{"weights", ParamKind::String, "", "One number for each material."},
-          {"ensure_energy_conservation", ParamKind::Bool, "true",
-           "Whether weights are divided by their sum if it exceeds 1; if not, that is an error."},
-          {"bsdf", ParamKind::Object, "", "The nested materials."}}},
-        make_material<MixtureBsdf>};
+    return {{"bsdf",
+             "mixturebsdf",
+             "Sum of materials with constant weights.",
+             {{"weights", ParamKind::String, "", "One number for each material."},
+              {"ensure_energy_conservation", ParamKind::Bool, "true",
+               "Whether weights are divided by their sum if it exceeds 1. Without it, such a "
+               "mixture may "
+               "reflect more light than it receives."},
+              {"bsdf", ParamKind::Object, "", "The nested materials."}}},
+            make_material<MixtureBsdf>};
 }
 
 }  // namespace etendue

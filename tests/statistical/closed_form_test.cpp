@@ -69,11 +69,18 @@ std::string furnace(const std::string& shape, const std::string& sensor_type = "
            "<shape type=\"" + shape + "\"><boolean name=\"flip_normals\" value=\"true\"/>" + bsdf +
            "<emitter type=\"area\">" + rgb("radiance", kEmitted) + "</emitter></shape>";
 }
-/// A Lambert surface of albedo ρ as the only part of a mixture that is not black.
-std::string part_of_mixture(float weight, const std::string& other) {
-    return fmt::format("<bsdf type=\"mixturebsdf\"><string name=\"weights\" value=\"{}\"/>",
-                       weight) +
-           lambert(kAlbedo / Rgb(weight)) + other + "</bsdf>";
+/// A mixture with the albedo kAlbedo in all, of Lambert surfaces of one colour with these weights.
+std::string mixture(const std::vector<float>& weights) {
+    float sum = 0;
+    std::string text, parts;
+    for (const float w : weights) sum += w;
+    for (const float w : weights) {
+        text += fmt::format("{} ", w);
+        parts += lambert(kAlbedo / Rgb(sum));
+    }
+    return "<bsdf type=\"mixturebsdf\"><boolean name=\"ensure_energy_conservation\" "
+           "value=\"false\"/><string name=\"weights\" value=\"" +
+           text + "\"/>" + parts + "</bsdf>";
 }
 
 /// Σ_{i<depth} ρ^i L_e: paths of at most `depth` edges.
@@ -124,8 +131,9 @@ INSTANTIATE_TEST_SUITE_P(
                     furnace("cube") +
                         rectangle("<translate z=\"0.3\"/>", "<bsdf type=\"thindielectric\"/>"),
                     false},
-        FurnaceCase{"part_of_mixture",
-                    furnace("sphere", "perspective", "", part_of_mixture(0.75f, ""))},
+        FurnaceCase{"part_of_mixture", furnace("sphere", "perspective", "", mixture({0.75f}))},
+        FurnaceCase{"mixture_above_one",
+                    furnace("sphere", "perspective", "", mixture({0.9f, 0.7f}))},
         FurnaceCase{"white", furnace("sphere") + sphere("-0.4,0,0.2", "0.3", lambert(Rgb(1)))},
         FurnaceCase{
             "masked_white",

@@ -86,8 +86,9 @@ const std::string kBlack =
     "<bsdf type=\"lobesum\"><rgb name=\"diffuse_reflectance\" value=\"0\"/><rgb "
     "name=\"glossy_reflectance\" value=\"0\"/></bsdf>";
 std::string mixed(const std::string& weights, const std::string& parts) {
-    return "<bsdf type=\"mixturebsdf\"><string name=\"weights\" value=\"" + weights + "\"/>" +
-           parts + "</bsdf>";
+    return "<bsdf type=\"mixturebsdf\"><boolean name=\"ensure_energy_conservation\" "
+           "value=\"false\"/><string name=\"weights\" value=\"" +
+           weights + "\"/>" + parts + "</bsdf>";
 }
 
 template <TransportMode mode>
@@ -128,7 +129,8 @@ TEST_P(ScatteringOfWalks, HasTheMeanOfItsValues) {
     const std::string part = GetParam(), diffuse = test::diffuse("0.8,0.6,0.4");
     for (const std::string& bsdf :
          {part, mixed("0.5", part), mixed("0.5, 0", part + diffuse),
-          mixed("0.3, 0.5", part + diffuse), mixed("0.6, 0.4", kBlack + part),
+          mixed("0.3, 0.5", part + diffuse), mixed("1.4", part), mixed("0.9, 0.7", part + diffuse),
+          mixed("0.6, 0.4", kBlack + part),
           "<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.3\"/>" + kBlack + part +
               "</bsdf>"}) {
         expect_albedo<TransportMode::Radiance>(bsdf);
