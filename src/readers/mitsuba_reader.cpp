@@ -9,6 +9,8 @@
 
 #include "description/resolve_file.h"
 #include "readers/file_bytes.h"
+#include "readers/line_ends.h"
+#include "readers/mitsuba_old_versions.h"
 #include "readers/mitsuba_upgrade.h"
 #include "readers/mitsuba_values.h"
 #include "readers/nesting.h"
@@ -25,6 +27,9 @@ constexpr size_t kDeepestInclude = 32;
 constexpr int kMostIncludes = 10'000;
 constexpr int kMostElements = 20'000'000;
 constexpr size_t kLongestName = 1024;
+
+/// Of scenes without a version.
+constexpr std::array kNewest{3, 0, 0};
 
 std::vector<std::string> words(std::string_view list) {
     std::vector<std::string> found;
@@ -43,10 +48,12 @@ std::string join(const std::string& directory, const std::string& name) {
 
 }  // namespace
 
-MitsubaReader::Source::Source(const std::string& name, std::string_view contents, bool old)
-    : file(name), directory(directory_of(name)), text(contents), old_dialect(old) {
+MitsubaReader::Source::Source(const std::string& name, std::string_view contents,
+                              std::array<int, 3> version_)
+    : file(name), directory(directory_of(name)), text(contents), version(version_) {
+    const char* const end = text.data() + text.size();
     for (size_t i = 0; i < text.size(); ++i)
-        if (text[i] == '\n') line_ends.push_back(i);
+        if (ends_line(text.data() + i, end)) line_ends.push_back(i);
 }
 
 int MitsubaReader::Source::line(ptrdiff_t offset) const {
@@ -78,7 +85,10 @@ void MitsubaReader::reject(const SourceLocation& where, const std::string& what,
 }
 
 SourceLocation MitsubaReader::locate(const pugi::xml_node& node) const {
-    return {source_->file, source_->line(node.offset_debug())};
+    // Elements that upgrade_old_version() adds are not in the text.
+    pugi::xml_node written = node;
+    while (written && written.offset_debug() < 0) written = written.parent();
+    return {source_->file, source_->line(written.offset_debug())};
 }
 
 void MitsubaReader::fail_text(const pugi::xml_node& text) const {
@@ -102,11 +112,10 @@ void MitsubaReader::check_leaf(const pugi::xml_node& node) const {
 
 void MitsubaReader::read_document(std::string_view text, const std::string& file, Scope& scope,
                                   const Element* include) {
-    const std::optional<std::string> expanded = expand_entities(text, file, [&](size_t offset) {
-        return 1 + int(std::count(text.begin(), text.begin() + ptrdiff_t(offset), '\n'));
-    });
+    const std::optional<std::string> expanded =
+        expand_entities(text, file, [&](size_t offset) { return line_of(text, offset); });
     if (expanded) text = *expanded;
-    Source source(file, text, source_ && source_->old_dialect);
+    Source source(file, text, source_ ? source_->version : kNewest);
     plain_text(text, file);  // refuses UTF-16; the parser knows the mark of UTF-8
     if (const size_t zero = text.find('\0'); zero != text.npos)
         throw SceneError({file, source.line(ptrdiff_t(zero))},
@@ -131,12 +140,12 @@ void MitsubaReader::read_document(std::string_view text, const std::string& file
     if (!include) scene_.search_paths.push_back(source.directory);
 
     const pugi::xml_node root = find_root(document);
+    read_version(root);
+    upgrade_old_version(root, source.version);
     if (std::string_view(root.name()) == "scene") {
-        read_version(root);
         open(root, include ? "" : "version", include ? "version" : "");
         read_children(root, scope);
     } else if (include && is_category(root.name())) {
-        read_version(root);
         Element e = open(root, "type", "id version");
         if (const std::string* name = include->find("name"))
             e.attributes.emplace_back("name", *name);
@@ -181,10 +190,10 @@ void MitsubaReader::read_version(const pugi::xml_node& root) {
     if (!valid || part != 2)
         throw SceneError(locate(root), fmt::format("expected a version such as \"3.0.0\", found {}",
                                                    quote(text)));
-    if (version < std::array{0, 4, 0} || version[0] > 3)
+    if (version[0] > 3)
         throw SceneError(locate(root),
-                         fmt::format("unknown version {} (known: 0.4.0 to 3.x)", quote(text)));
-    source_->old_dialect = version[0] < 2;
+                         fmt::format("unknown version {} (known: up to 3.x)", quote(text)));
+    source_->version = version;
 }
 
 // ---- Elements
@@ -255,7 +264,7 @@ Element MitsubaReader::open(const pugi::xml_node& node, std::string_view require
 std::string MitsubaReader::claim_name(const Element& e, Scope& scope) {
     const std::string* given = e.find("name");
     if (!given) return {};
-    const std::string name = source_->old_dialect ? snake_case(*given) : *given;
+    const std::string name = source_->is_old() ? snake_case(*given) : *given;
     if (scope.object >= 0 && !scope.names.insert(name).second)
         throw SceneError(e.where, fmt::format("parameter {} is given twice", quote(name)));
     return name;
@@ -279,7 +288,7 @@ void MitsubaReader::read_object(const Element& e, const pugi::xml_node& node, Sc
     add_child(scope, claim_name(e, scope), index, e.where);
     Scope inner{index, e.name, scope.depth + 1, scope.in_emitter || e.name == "emitter", {}};
     read_children(node, inner);
-    if (!source_->old_dialect) return;
+    if (!source_->is_old()) return;
     upgrade_object(scene_.objects[index]);
     if (e.name == "shape") old_shapes_.push_back(index);
 }

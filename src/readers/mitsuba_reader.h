@@ -1,6 +1,7 @@
 #pragma once
 // Implementation of mitsuba_xml.h: one object reads one scene.
 
+#include <array>
 #include <map>
 #include <set>
 #include <string>
@@ -26,14 +27,15 @@ public:
 private:
     /// One XML file being read.
     struct Source {
-        Source(const std::string& name, std::string_view contents, bool old);
+        Source(const std::string& name, std::string_view contents, std::array<int, 3> version);
+        bool is_old() const { return version[0] < 2; }  ///< The dialect of Mitsuba 0.
         int line(ptrdiff_t offset) const;
 
         FileName file;
         std::string directory;
         std::string_view text;
         std::vector<size_t> line_ends;
-        bool old_dialect;  ///< Mitsuba 0.4 to 0.6.
+        std::array<int, 3> version;  ///< Of Mitsuba.
     };
     /// The object, or the scene itself, whose children are being read.
     struct Scope {

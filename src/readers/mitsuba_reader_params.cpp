@@ -97,7 +97,7 @@ void MitsubaReader::read_rgb(const Element& e, const pugi::xml_node& node, Scope
     Rgb colour;
     if (hex.empty())
         colour = to_rgb(parse_triple(e["value"], e.where), e.where);
-    else if (source_->old_dialect)
+    else if (source_->is_old())
         colour = to_rgb(hex, e.where);  // linear in Mitsuba 0.6, which decodes sRGB in <srgb> only
     else
         colour = parse_srgb(e["value"], e.where);
@@ -137,7 +137,7 @@ void MitsubaReader::read_spectrum(const Element& e, const pugi::xml_node& node, 
         texture.name = "texture";
         return read_object(texture, node, scope);
     }
-    const std::string name = source_->old_dialect ? snake_case(e["name"]) : e["name"];
+    const std::string name = source_->is_old() ? snake_case(e["name"]) : e["name"];
     const SpectrumRole role = spectrum_role(scope.category, name, scope.in_emitter);
     if (type) {
         add_param(e, scope, spectrum_from_plugin(e, node, scope, role));
@@ -160,7 +160,7 @@ Rgb MitsubaReader::spectrum_from_value(const Element& e, SpectrumRole role) cons
     const std::vector<double> numbers = parse_floats(value, e.where);
     // A constant is grey in emitters too, a scaled D65, as in Mitsuba 0.6. Builds of Mitsuba 0.6 with three spectral
     // samples take three numbers as a colour.
-    if (numbers.size() == 1 || (numbers.size() == 3 && source_->old_dialect))
+    if (numbers.size() == 1 || (numbers.size() == 3 && source_->is_old()))
         return to_rgb(parse_triple(value, e.where), e.where);
     throw SceneError(
         e.where,

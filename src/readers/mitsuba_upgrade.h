@@ -1,5 +1,6 @@
 #pragma once
-// From the dialect of Mitsuba 0.4–0.6 to that of Mitsuba 3.
+// From the dialect of Mitsuba 0.4–0.6 to that of Mitsuba 3; older ones are made this dialect first, by
+// mitsuba_old_versions.h.
 
 #include <string>
 #include <string_view>

@@ -42,7 +42,6 @@ constexpr BrokenScene kBrokenScenes[] = {
     {"text_in_object.xml", 3, "unexpected text \"radius 3"},
     {"missing_version.xml", 1, "<scene> needs the attribute \"version\""},
     {"version_without_numbers.xml", 1, "expected a version such as \"3.0.0\", found \"three\""},
-    {"version_too_old.xml", 1, "unknown version \"0.3.0\" (known: 0.4.0 to 3.x)"},
     {"version_of_the_future.xml", 1, "unknown version \"12.0.0\""},
     {"unknown_element.xml", 2, "unknown element <shap> (did you mean \"shape\"?)"},
     {"unknown_attribute.xml", 2, "<shape> has no attribute \"idd\" (did you mean \"id\"?)"},
