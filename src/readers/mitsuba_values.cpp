@@ -9,6 +9,7 @@
 
 #include "color/srgb.h"
 #include "readers/file_bytes.h"
+#include "readers/line_ends.h"
 
 namespace etendue {
 namespace {
@@ -167,10 +168,8 @@ SpectrumSamples parse_spectrum_file(std::string_view text, const std::string& fi
     text = plain_text(text, file);
     while (!text.empty()) {
         ++where.line;
-        const size_t end = std::min(text.find('\n'), text.size());
-        const std::string_view line = text.substr(0, end);
+        const std::string_view line = take_line(text);
         const std::vector<double> numbers = parse_floats(line.substr(0, line.find('#')), where);
-        text.remove_prefix(std::min(end + 1, text.size()));
         if (numbers.empty()) continue;
         if (numbers.size() != 2)
             throw SceneError(

@@ -38,7 +38,7 @@ std::string_view PbrtTokenizer::string() {
     const int first_line = line_;
     for (; at_ != end_ && *at_ != '"'; ++at_) {
         if (*at_ == '\\' && at_ + 1 != end_) ++at_;
-        if (*at_ == '\n') ++line_;
+        if (ends_line(at_, end_)) ++line_;
     }
     if (at_ == end_) {
         line_ = first_line;
@@ -48,7 +48,7 @@ std::string_view PbrtTokenizer::string() {
 }
 
 void PbrtTokenizer::skip_comment() {
-    at_ = std::find(at_, end_, '\n');
+    while (at_ != end_ && !ends_line(at_, end_)) ++at_;
     if (at_ != end_) ++line_;
 }
 
@@ -77,7 +77,8 @@ std::string unescape(std::string_view text) {
 bool ends_with_world_end(std::string_view text) {
     constexpr std::string_view kWord = "WorldEnd";
     while (!text.empty()) {
-        const size_t begin = text.rfind('\n') == text.npos ? 0 : text.rfind('\n') + 1;
+        const size_t last_end = text.find_last_of("\r\n"),
+                     begin = last_end == text.npos ? 0 : last_end + 1;
         std::string_view line = text.substr(begin);
         line = line.substr(0, line.find('#'));
         const size_t last = line.find_last_not_of(" \t\r");

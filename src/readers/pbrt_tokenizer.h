@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "description/source_location.h"
+#include "readers/line_ends.h"
 
 namespace etendue {
 
@@ -70,7 +71,7 @@ public:
 private:
     void skip_blanks() {
         for (; at_ != end_; ++at_) {
-            if (*at_ == '\n')
+            if (ends_line(at_, end_))
                 ++line_;
             else if (*at_ == '#')
                 skip_comment();

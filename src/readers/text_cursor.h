@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "description/scene_description.h"
+#include "readers/line_ends.h"
 
 namespace etendue {
 
@@ -30,7 +31,7 @@ public:
         for (; at_ != end_; ++at_) {
             if (*at_ == '\\' && joins_next_line()) {
                 ++line_;
-            } else if (*at_ == '\n') {
+            } else if (at_line_end()) {
                 return false;
             } else if (!is_blank(*at_)) {
                 return true;
@@ -48,11 +49,16 @@ public:
     }
     /// Moves to the beginning of the next line.
     void next_line() {
-        while (at_ != end_ && *at_ != '\n') ++at_;
+        while (at_ != end_ && !at_line_end()) ++at_;
         if (at_ != end_) {
             ++at_;
             ++line_;
         }
+    }
+    /// The same where lines end with `end`, whatever follows it.
+    void next_line(char end) {
+        while (at_ != end_ && *at_ != end) ++at_;
+        if (skip_char(end)) ++line_;
     }
     /// The characters up to the next blank.
     std::string_view word() {
@@ -64,7 +70,7 @@ public:
     std::string_view rest_of_line() {
         skip_blanks();
         const char* begin = at_;
-        while (at_ != end_ && *at_ != '\n') ++at_;
+        while (at_ != end_ && !at_line_end()) ++at_;
         const char* last = at_;
         while (last != begin && is_blank(last[-1])) --last;
         return {begin, size_t(last - begin)};
@@ -96,11 +102,12 @@ public:
     [[noreturn]] void fail(const std::string& message) const { throw SceneError(where(), message); }
 
 private:
+    bool at_line_end() const { return ends_line(at_, end_); }
     static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
     bool joins_next_line() {
         const char* next = at_ + 1;
-        if (next != end_ && *next == '\r') ++next;
-        if (next == end_ || *next != '\n') return false;
+        if (end_ - next >= 2 && next[0] == '\r' && next[1] == '\n') ++next;
+        if (next == end_ || !ends_line(next, end_)) return false;
         at_ = next;
         return true;
     }
