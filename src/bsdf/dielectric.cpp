@@ -4,43 +4,15 @@
 
 #include "bsdf/dielectric.h"
 
-#include "bsdf/ior.h"
+#include "bsdf/clear_dielectric.h"
 
 namespace etendue {
-namespace {
-
-class Dielectric final : public Material {
-public:
-    Dielectric(const Params& params, MaterialContext& context)
-        : eta_(read_relative_ior(params)),
-          reflectance_(context.texture(params, "specular_reflectance", Rgb(1))),
-          transmittance_(context.texture(params, "specular_transmittance", Rgb(1))) {}
-
-    void append(const SurfacePoint& point, const Frame& frame, float weight,
-                ComponentList& list) const override {
-        list.add(frame,
-                 DielectricLobe{eta_, reflectance_.eval(point.texture_point()),
-                                transmittance_.eval(point.texture_point())},
-                 weight);
-    }
-    bool is_transmissive() const override { return true; }
-    bool may_be_smooth() const override { return false; }
-    Rgb mean_albedo() const override {
-        return DielectricLobe{eta_, reflectance_.mean(), transmittance_.mean()}.albedo_estimate();
-    }
-
-private:
-    float eta_;
-    TextureRef reflectance_, transmittance_;
-};
-
-}  // namespace
 
 MaterialEntry dielectric_entry() {
     return {{"bsdf", "dielectric",
              "Smooth boundary between two dielectrics, such as glass and air.",
              dielectric_params()},
-            make_material<Dielectric>};
+            make_material<ClearDielectric<DielectricLobe>>};
 }
 
 }  // namespace etendue

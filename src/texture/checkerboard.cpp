@@ -3,7 +3,6 @@
 //   color1 (0.2)       the others
 //   to_uv (identity)   affine map of (u, v); nested textures take the coordinates before it, as in Mitsuba 3
 
-#include <algorithm>
 #include <cmath>
 
 #include "texture/texture.h"
@@ -30,12 +29,7 @@ public:
     void resolution(int& width, int& height) const override {
         width = height = 2;
         to_uv_.resolution(width, height);
-        for (const TextureRef* color : {&color0_, &color1_}) {
-            int w, h;
-            color->resolution(w, h);
-            width = std::max(width, w);
-            height = std::max(height, h);
-        }
+        refine(width, height, {&color0_, &color1_});
     }
 
 private:

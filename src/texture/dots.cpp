@@ -2,7 +2,6 @@
 //   inside (1), outside (0)   colours or textures
 //   to_uv (identity)          affine map of (u, v); a dot lies in the unit square around a point of integers
 
-#include <algorithm>
 #include <cmath>
 
 #include "texture/noise.h"
@@ -31,12 +30,7 @@ public:
     void resolution(int& width, int& height) const override {
         width = height = 8;
         to_uv_.resolution(width, height);
-        for (const TextureRef* part : {&inside_, &outside_}) {
-            int w, h;
-            part->resolution(w, h);
-            width = std::max(width, w);
-            height = std::max(height, h);
-        }
+        refine(width, height, {&inside_, &outside_});
     }
 
 private:

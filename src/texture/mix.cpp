@@ -2,8 +2,6 @@
 //   value0 (0), value1 (1)   colours or textures
 //   weight (0.5)             number or texture
 
-#include <algorithm>
-
 #include "texture/texture.h"
 
 namespace etendue {
@@ -27,12 +25,7 @@ public:
     }
     void resolution(int& width, int& height) const override {
         width = height = 1;
-        for (const TextureRef* part : {&value0_, &value1_, &weight_}) {
-            int w, h;
-            part->resolution(w, h);
-            width = std::max(width, w);
-            height = std::max(height, h);
-        }
+        refine(width, height, {&value0_, &value1_, &weight_});
     }
 
 private:

@@ -2,8 +2,6 @@
 //   value (required)   texture; its name may be left out
 //   scale (1)          factor: number, colour or texture
 
-#include <algorithm>
-
 #include "texture/texture.h"
 
 namespace etendue {
@@ -28,11 +26,8 @@ public:
         return value_.mean() * scale_.mean();
     }
     void resolution(int& width, int& height) const override {
-        int w, h;
         value_.resolution(width, height);
-        scale_.resolution(w, h);
-        width = std::max(width, w);
-        height = std::max(height, h);
+        refine(width, height, {&scale_});
     }
 
 private:

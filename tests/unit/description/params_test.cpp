@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "error_of.h"
+
 namespace etendue {
 namespace {
 
@@ -25,16 +27,6 @@ SceneDescription example() {
     scene.objects = {o, texture};
     scene.roots = {0};
     return scene;
-}
-
-template <class F>
-std::string error_of(F&& f) {
-    try {
-        f();
-    } catch (const SceneError& e) {
-        return e.what();
-    }
-    return "no error";
 }
 
 TEST(Params, GivesValuesAndDefaults) {

@@ -2,16 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "error_of.h"
+
 namespace etendue {
 namespace {
 
 std::string error_of(const std::string& spec) {
-    try {
-        make_integrator(IntegratorSpec::parse(spec));
-    } catch (const std::exception& e) {
-        return e.what();
-    }
-    return "no error";
+    return test::error_of([&] { make_integrator(IntegratorSpec::parse(spec)); });
 }
 
 TEST(IntegratorParams, NumbersAreFinite) {

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "error_of.h"
 #include "scene/settings.h"
 #include "test_scenes.h"
 
@@ -39,12 +40,7 @@ Scene read(const std::string& contents, bool lenient = false, const char* versio
 }
 
 std::string error_of(const std::string& contents) {
-    try {
-        read(contents);
-    } catch (const std::exception& e) {
-        return e.what();
-    }
-    return "no error";
+    return test::error_of([&] { read(contents); });
 }
 
 bool has(const std::vector<std::string>& lines, const std::string& text) {
