@@ -227,6 +227,21 @@ TEST_F(TextureRegistry, MixTakesItsWeightFromTheSecond) {
     EXPECT_EQ(mix.mean(), Rgb(0.75f, 0.25f, 0));
 }
 
+TEST_F(TextureRegistry, SpecularColoursBecomeMetal) {
+    const auto make = [&](const char* output) -> const Texture& {
+        return build(object("specular_to_metallic", {{"diffuse", Rgb(0.4f, 0.2f, 0)},
+                                                     {"specular", Rgb(0.02f)},
+                                                     {"output", std::string(output)}}));
+    };
+    EXPECT_EQ(make("metallic").eval_scalar({}), 0);
+    EXPECT_FLOAT_EQ(make("specular_weight").eval_scalar({}), 0.5f);
+    EXPECT_NEAR(make("base_color").eval({}).g, 0.2f, 1e-6);
+    EXPECT_EQ(make("base_color").mean(), make("base_color").eval({}));
+    EXPECT_EQ(build(object("specular_to_metallic", {{"output", std::string("metallic")}}))
+                  .eval_scalar({}),
+              1);
+}
+
 TEST_F(TextureRegistry, BilerpMeetsItsCorners) {
     const Texture& t = build(object("bilerp", {{"v00", Rgb(1, 0, 0)},
                                                {"v01", Rgb(0, 1, 0)},
