@@ -266,6 +266,8 @@ std::string write_ply(const MeshData& mesh) {
     declare(!mesh.normals.empty(), {"nx", "ny", "nz"});
     declare(!mesh.uvs.empty(), {"u", "v"});
     declare(!mesh.colors.empty(), {"r", "g", "b"});
+    declare(!mesh.alphas.empty(), {"a"});
+    declare(!mesh.second_uvs.empty(), {"second_u", "second_v"});
     out += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n",
                        mesh.triangles.size());
     for (size_t i = 0; i < mesh.positions.size(); ++i) {
@@ -273,6 +275,8 @@ std::string write_ply(const MeshData& mesh) {
         if (!mesh.normals.empty()) append_floats(out, &mesh.normals[i].x, 3);
         if (!mesh.uvs.empty()) append_floats(out, &mesh.uvs[i].x, 2);
         if (!mesh.colors.empty()) append_floats(out, &mesh.colors[i].x, 3);
+        if (!mesh.alphas.empty()) append_floats(out, &mesh.alphas[i], 1);
+        if (!mesh.second_uvs.empty()) append_floats(out, &mesh.second_uvs[i].x, 2);
     }
     for (const auto& triangle : mesh.triangles) {
         out += char(3);

@@ -5,6 +5,7 @@
 
 #include "math/hash.h"
 #include "readers/file_bytes.h"
+#include "readers/key_table.h"
 #include "readers/text_cursor.h"
 
 namespace etendue {
@@ -19,34 +20,10 @@ struct Corner {
     bool operator==(const Corner&) const = default;
 };
 
-/// Numbers distinct corners in the order of first use; open addressing, at most half full.
-class CornerTable {
-public:
-    uint32_t index_of(const Corner& c) {
-        if (2 * corners_.size() >= slots_.size()) grow();
-        uint32_t& slot = find(c);
-        if (slot == kNone) {
-            slot = uint32_t(corners_.size());
-            corners_.push_back(c);
-        }
-        return slot;
+struct CornerHash {
+    uint64_t operator()(const Corner& c) const {
+        return hash_combine(uint64_t(c.position) << 32 | c.uv, c.normal);
     }
-    const std::vector<Corner>& corners() const { return corners_; }
-
-private:
-    uint32_t& find(const Corner& c) {
-        const size_t mask = slots_.size() - 1;
-        const uint64_t key = hash_combine(uint64_t(c.position) << 32 | c.uv, c.normal);
-        for (size_t i = key & mask;; i = (i + 1) & mask)
-            if (slots_[i] == kNone || corners_[slots_[i]] == c) return slots_[i];
-    }
-    void grow() {
-        slots_.assign(std::max<size_t>(1024, 4 * slots_.size()), kNone);
-        for (uint32_t i = 0; i < corners_.size(); ++i) find(corners_[i]) = i;
-    }
-
-    std::vector<uint32_t> slots_;
-    std::vector<Corner> corners_;
 };
 
 class ObjParser {
@@ -150,7 +127,7 @@ private:
         check(largest_normal_, normals_.size(), "normal");
         MeshData mesh;
         mesh.triangles = std::move(triangles_);
-        const auto& corners = table_.corners();
+        const auto& corners = table_.keys();
         for (const Corner& c : corners) mesh.positions.push_back(positions_[c.position]);
         // Where only some corners have an attribute, the others get texture coordinates (0, 0), and normals from
         // finish_mesh().
@@ -166,7 +143,7 @@ private:
     std::vector<Vec3> positions_, normals_;
     std::vector<Vec2> uvs_;
     std::vector<MeshData::Triangle> triangles_;
-    CornerTable table_;
+    KeyTable<Corner, CornerHash> table_;
     std::vector<uint32_t> polygon_;
     Largest largest_position_, largest_uv_, largest_normal_;
 };

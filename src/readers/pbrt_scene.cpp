@@ -165,6 +165,10 @@ void PbrtScene::place_shape(int shape, const PbrtArguments& args) {
     const bool is_interface = object(material).type == "null";
     const int alpha = texture(args, "alpha", true);
     const std::optional<float> constant_alpha = constant(args, "alpha", 1.0f);
+    if (args.has("shadowalpha") && (texture(args, "shadowalpha", true) != alpha ||
+                                    constant(args, "shadowalpha", 1.0f) != constant_alpha))
+        warn(args.find("shadowalpha")->where,
+             "parameter \"shadowalpha\" has no effect: shadows are those of \"alpha\"");
     // In pbrt a light with the constant alpha 0 shines, though no ray meets it.
     const bool is_invisible_light = state.area_light && constant_alpha && *constant_alpha == 0;
     if (is_invisible_light)

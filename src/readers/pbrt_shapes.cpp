@@ -220,7 +220,8 @@ std::vector<PbrtParamInfo> with_alpha(std::vector<PbrtParamInfo> params) {
     params.push_back(
         {"alpha", ParamKind::Texture, "1",
          "Opacity: becomes a mask. v3: where it is not exactly 0 the shape would be opaque."});
-    params.push_back({"shadowalpha", ParamKind::Texture, "", "Accepted; shadows use alpha.", kV3});
+    params.push_back({"shadowalpha", ParamKind::Texture, "",
+                      "Without effect, with a warning where it differs: shadows use alpha.", kV3});
     return params;
 }
 

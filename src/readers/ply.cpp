@@ -7,12 +7,15 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "math/hash.h"
 #include "readers/file_bytes.h"
 #include "readers/gzip.h"
+#include "readers/key_table.h"
 #include "readers/text_cursor.h"
 
 namespace etendue {
@@ -75,6 +78,8 @@ public:
     /// Leaves the cursor at the first byte after the header.
     Header parse() {
         if (word() != "ply") in_.fail("not a PLY file: it does not begin with \"ply\"");
+        TextCursor of_line_feeds = in_;
+        const bool has_line_feeds = !of_line_feeds.skip_char('\r') || of_line_feeds.at_char('\n');
         end_line();
         bool has_format = false;
         for (;;) {
@@ -95,7 +100,8 @@ public:
             end_line();
         }
         if (!has_format) in_.fail("the header has no \"format\" line");
-        end_line();
+        // Binary data may begin with either of the two characters.
+        in_.next_line(has_line_feeds ? '\n' : '\r');
         return std::move(header_);
     }
 
@@ -266,18 +272,18 @@ private:
 
 /// What a property of the element "vertex" is, as the index of a float within VertexRecord.
 struct VertexRecord {
-    float values[12];  // x y z, nx ny nz, u v, r g b a
+    float values[14];  // x y z, nx ny nz, u v, r g b a, second u v
 };
 constexpr int kPositionSlot = 0, kNormalSlot = 3, kUvSlot = 6, kColorSlot = 8, kAlphaSlot = 11,
-              kNoSlot = -1;
+              kSecondUvSlot = 12, kNoSlot = -1;
 
 int vertex_slot(std::string_view name) {
-    constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz",
-                                      "u", "v", "r", "g",  "b",  "a"};
+    constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz",       "u",
+                                      "v", "r", "g", "b",  "a",  "second_u", "second_v"};
     constexpr const char* kColorNames[] = {"red", "green", "blue"};
     constexpr const char* kUvNames[][2] = {
         {"s", "t"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}};
-    for (int i = 0; i < 12; ++i)
+    for (int i = 0; i < int(std::size(kNames)); ++i)
         if (name == kNames[i]) return i;
     if (name == "alpha") return kAlphaSlot;
     for (int i = 0; i < 3; ++i)
@@ -314,41 +320,34 @@ struct CornerData {
 /// Gives each distinct pair of a vertex and the data of a corner a vertex of its own. `corners`: three per triangle.
 void split_vertices(MeshData& mesh, const std::vector<CornerData>& corners, bool has_uvs,
                     bool has_colors) {
-    constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
-    const size_t original = mesh.positions.size();
-    std::vector<uint32_t> next(original, kNone);  // the next vertex split from the same one
-    std::vector<CornerData> data(original);
-    std::vector<bool> is_used(original);
-    const auto copy = [](auto& list, uint32_t from) {
-        if (list.empty()) return;
-        const auto value = list[from];
-        list.push_back(value);
+    struct Key {
+        uint32_t vertex;
+        CornerData data;
+        bool operator==(const Key&) const = default;
     };
+    struct Hash {
+        uint64_t operator()(const Key& k) const {
+            uint64_t hash = k.vertex;
+            for (const float x :
+                 {k.data.uv.x, k.data.uv.y, k.data.color.x, k.data.color.y, k.data.color.z})
+                hash = hash_combine(hash, std::bit_cast<uint32_t>(x));
+            return hash;
+        }
+    };
+    KeyTable<Key, Hash> table;
     size_t corner = 0;
     for (MeshData::Triangle& t : mesh.triangles)
-        for (uint32_t& v : t) {
-            const CornerData& own = corners[corner++];
-            if (!is_used[v]) {
-                is_used[v] = true;
-                data[v] = own;
-                continue;
-            }
-            uint32_t at = v;
-            while (!(data[at] == own) && next[at] != kNone) at = next[at];
-            if (!(data[at] == own)) {
-                const auto added = uint32_t(data.size());
-                copy(mesh.positions, v), copy(mesh.normals, v), copy(mesh.uvs, v);
-                copy(mesh.colors, v), copy(mesh.alphas, v);
-                data.push_back(own);
-                next.push_back(kNone);
-                next[at] = added;
-                at = added;
-            }
-            v = at;
-        }
+        for (uint32_t& v : t) v = table.index_of({v, corners[corner++]});
+    for_each_vertex_array(mesh, [&](const char*, auto& values) {
+        if (values.empty()) return;
+        std::remove_reference_t<decltype(values)> split;
+        split.reserve(table.keys().size());
+        for (const Key& k : table.keys()) split.push_back(values[k.vertex]);
+        values = std::move(split);
+    });
     const auto take = [&](auto& list, auto member) {
         list.clear();
-        for (const CornerData& d : data) list.push_back(d.*member);
+        for (const Key& k : table.keys()) list.push_back(k.data.*member);
     };
     if (has_uvs) take(mesh.uvs, &CornerData::uv);
     if (has_colors) take(mesh.colors, &CornerData::color);
@@ -411,7 +410,8 @@ private:
         };
         if (!has(kPositionSlot, 3)) in_.fail("the vertices have no x, y and z");
         const bool has_normals = has(kNormalSlot, 3), has_uvs = has(kUvSlot, 2),
-                   has_colors = has(kColorSlot, 3), has_alphas = has(kAlphaSlot, 1);
+                   has_colors = has(kColorSlot, 3), has_alphas = has(kAlphaSlot, 1),
+                   has_second_uvs = has(kSecondUvSlot, 2);
         // Integers are fractions of their largest value.
         float color_scale = 1, alpha_scale = 1;
         for (size_t k = 0; k < slots.size(); ++k) {
@@ -425,6 +425,7 @@ private:
         if (has_uvs) mesh_.uvs.resize(e.count);
         if (has_colors) mesh_.colors.resize(e.count);
         if (has_alphas) mesh_.alphas.resize(e.count);
+        if (has_second_uvs) mesh_.second_uvs.resize(e.count);
         for_records(e, slots, [&](uint64_t i, const VertexRecord& r) {
             const float* v = r.values;
             if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2]))
@@ -434,6 +435,7 @@ private:
             if (has_uvs) mesh_.uvs[i] = {v[6], v[7]};
             if (has_colors) mesh_.colors[i] = Vec3{v[8], v[9], v[10]} * color_scale;
             if (has_alphas) mesh_.alphas[i] = v[11] * alpha_scale;
+            if (has_second_uvs) mesh_.second_uvs[i] = {v[12], v[13]};
         });
     }
     /// Calls `use(i, record)` for each vertex.

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "error_of.h"
+
 namespace etendue {
 namespace {
 
@@ -55,12 +57,7 @@ SceneDescription read(const std::string& json, const Bytes& bytes = {}, bool len
 }
 
 std::string error_of(const std::string& json, const Bytes& bytes = {}) {
-    try {
-        read(json, bytes);
-    } catch (const SceneError& e) {
-        return e.what();
-    }
-    return "no error";
+    return etendue::error_of([&] { read(json, bytes); });
 }
 
 /// A square with this material.
@@ -298,6 +295,86 @@ TEST(Gltf, SpecularGlossinessIsReadAsWell) {
     EXPECT_LT(m, 0.9);
     EXPECT_NEAR(0.96 * b * (1 - m), 0.4 * 0.7, 0.02);
     EXPECT_NEAR(0.04 * (1 - m) + b * m, 0.3, 0.02);
+}
+
+/// The texture of a parameter.
+const SceneObject& texture_of(const SceneDescription& scene, const SceneObject& o,
+                              const char* name) {
+    for (const auto& c : o.children)
+        if (c.name == name) return scene.objects[size_t(c.object)];
+    throw std::logic_error(std::string("no texture ") + name);
+}
+
+/// That of a product with this factor.
+const SceneObject& scaled_texture(const SceneDescription& scene, const SceneObject& o,
+                                  const char* name, Rgb factor) {
+    const SceneObject& product = texture_of(scene, o, name);
+    EXPECT_EQ(product.type, "scale") << name;
+    EXPECT_EQ(value<Rgb>(product, "scale"), factor) << name;
+    return texture_of(scene, product, "value");
+}
+
+void expect_no_warning_of_materials(const SceneDescription& scene) {
+    for (const std::string& w : scene.warnings) EXPECT_EQ(w.find("/materials"), w.npos) << w;
+}
+
+TEST(Gltf, SpecularGlossinessHasTextures) {
+    const char* const kImages =
+        R"(,"textures":[{"source":0},{"source":1}],"images":[{"uri":"a.png"},{"uri":"b.png"}])";
+    const auto read = [&](const std::string& values) {
+        return with_material(
+            R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{)" + values + "}}}", kImages);
+    };
+    const SceneDescription both =
+        read(R"("diffuseFactor":[0.5,1,1,1],"specularFactor":[1,0.5,0.5],"glossinessFactor":0.8,
+                "diffuseTexture":{"index":0},"specularGlossinessTexture":{"index":1})");
+    expect_no_warning_of_materials(both);
+    const SceneObject& p = find(both, "principled");
+    for (const char* name : {"base_color", "metallic", "specular_weight"}) {
+        const SceneObject& made = texture_of(both, p, name);
+        EXPECT_EQ(made.type, "specular_to_metallic");
+        EXPECT_EQ(value<std::string>(made, "output"), name);
+        const SceneObject &diffuse = scaled_texture(both, made, "diffuse", {0.5f, 1, 1}),
+                          &specular = scaled_texture(both, made, "specular", {1, 0.5f, 0.5f});
+        EXPECT_EQ(value<std::string>(diffuse, "filename"), "a.png");
+        EXPECT_EQ(value<std::string>(specular, "filename"), "b.png");
+        EXPECT_FALSE(specular.find("raw") || specular.find("channel"));  // colours of sRGB
+    }
+    const SceneObject& rough = texture_of(both, p, "roughness");
+    EXPECT_NEAR(value<double>(rough, "value1"), 0.2, 1e-9);
+    EXPECT_EQ(value<std::string>(texture_of(both, rough, "weight"), "channel"), "opacity");
+
+    // The share of metal depends on the diffuse colour where the specular one is brighter than a dielectric's.
+    const SceneDescription metal =
+        read(R"("specularFactor":[0.5,0.5,0.5],"diffuseTexture":{"index":0})");
+    EXPECT_EQ(texture_of(metal, find(metal, "principled"), "metallic").type,
+              "specular_to_metallic");
+    // Without specular reflection there is none of the dielectric, either.
+    const SceneDescription matt = read(
+        R"("specularFactor":[0,0,0],"diffuseTexture":{"index":0},"specularGlossinessTexture":{"index":1})");
+    const SceneObject& m = find(matt, "principled");
+    EXPECT_EQ(value<double>(m, "metallic"), 0);
+    EXPECT_EQ(value<double>(m, "specular_weight"), 0);
+    EXPECT_EQ(value<std::string>(texture_of(matt, m, "base_color"), "filename"), "a.png");
+}
+
+TEST(Gltf, SpecularColoursOfDielectricsAreThoseOfMetal) {
+    const auto read = [](const char* values) {
+        return with_material(
+            std::string(R"({"pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1],"metallicFactor":0},
+            "extensions":{"KHR_materials_ior":{"ior":0},"KHR_materials_specular":{)") +
+                values + "}}}",
+            R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])");
+    };
+    const SceneDescription gold = read(R"("specularColorFactor":[1,0.75,0.3])");
+    expect_no_warning_of_materials(gold);
+    const SceneObject& g = find(gold, "principled");
+    EXPECT_NEAR(value<double>(g, "metallic"), 1, 1e-2);
+    EXPECT_NEAR(value<Rgb>(g, "base_color").g, 0.75f, 1e-2f);
+    EXPECT_NEAR(value<Rgb>(g, "base_color").b, 0.3f, 1e-2f);
+    const SceneDescription textured = read(R"("specularColorTexture":{"index":0})");
+    EXPECT_EQ(texture_of(textured, find(textured, "principled"), "metallic").type,
+              "specular_to_metallic");
 }
 
 // What older exporters write, though the format does not allow it.

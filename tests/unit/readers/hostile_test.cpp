@@ -17,6 +17,7 @@
 #include "readers/mitsuba_xml.h"
 #include "readers/obj.h"
 #include "readers/pbrt.h"
+#include "readers/ply.h"
 #include "readers/scene_file.h"
 #include "readers/serialized.h"
 
@@ -30,6 +31,23 @@ std::string repeated(const std::string& text, size_t count) {
     all.reserve(text.size() * count);
     for (size_t i = 0; i < count; ++i) all += text;
     return all;
+}
+
+// -- Meshes.
+
+/// Faces around one vertex, at which each has a texture coordinate of its own.
+TEST(HostilePly, CornersOfOneVertexAreSplitInLinearTime) {
+    constexpr int kFaces = 200'000;
+    std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property float z\nelement face " +
+        std::to_string(kFaces) +
+        "\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n"
+        "end_header\n0 0 0\n1 0 0\n0 1 0\n";
+    for (int i = 0; i < kFaces; ++i) text += "3 0 1 2 6 " + std::to_string(i) + " 0 0 0 0 1\n";
+    const MeshData mesh = parse_ply(text, "fan.ply");
+    EXPECT_EQ(mesh.positions.size(), size_t(kFaces) + 2);
+    EXPECT_EQ(mesh.uvs[mesh.triangles.back()[0]].x, kFaces - 1);
 }
 
 // -- Objects that name another one several times.

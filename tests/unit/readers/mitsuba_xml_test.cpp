@@ -5,22 +5,14 @@
 
 #include "color/spectrum.h"
 #include "color/srgb.h"
+#include "error_of.h"
+#include "files_in_memory.h"
 #include "shared_scenes.h"
 
 namespace etendue {
 namespace {
 
 using Files = std::map<std::string, std::string>;
-
-ReadOptions with_files(const Files& files) {
-    ReadOptions options;
-    options.read_file = [files](const std::string& path) -> std::optional<std::string> {
-        const auto it = files.find(path);
-        if (it == files.end()) return {};
-        return it->second;
-    };
-    return options;
-}
 
 SceneDescription parse(const std::string& text, const ReadOptions& options = {}) {
     return parse_mitsuba_xml(text, "s.xml", options);
@@ -35,12 +27,7 @@ SceneDescription parse06(const std::string& body, const ReadOptions& options = {
 }
 
 std::string error3(const std::string& body, const ReadOptions& options = {}) {
-    try {
-        parse3(body, options);
-    } catch (const SceneError& e) {
-        return e.what();
-    }
-    return "no error";
+    return error_of([&] { parse3(body, options); });
 }
 
 template <class T>
@@ -195,6 +182,131 @@ TEST(MitsubaXml, TranslatesValuesOfOldScenes) {
     EXPECT_NEAR(uv.point({1, 0, 0}).x, 2.3f, 1e-6f);
 }
 
+// Words of Mitsuba before 0.4, and before 0.3.
+
+constexpr const char* kBefore04 = R"(<scene version="0.3.0">
+    <default name="gain" value="2"/>
+    <integrator type="direct"><integer name="luminaireSamples" value="4"/></integrator>
+    <camera type="perspective">
+        <float name="fov" value="40"/>
+        <boolean name="mapSmallerSide" value="false"/>
+        <float name="focusDepth" value="3"/>
+        <transform name="toWorld"><lookAt origin="1,2,5" target="0 0 0" up="0, 1, 0"/></transform>
+        <film type="exrfilm"><integer name="width" value="64"/><boolean name="alpha" value="false"/></film>
+        <sampler type="ldsampler"><integer name="depth" value="6"/></sampler>
+    </camera>
+    <camera type="thinlens"/>
+    <luminaire type="constant"><spectrum name="intensity" value="3"/></luminaire>
+    <luminaire type="envmap"><float name="intensityScale" value="$gain"/></luminaire>
+    <luminaire type="directional"><rgb name="intensity" value="1 2 3"/></luminaire>
+    <luminaire type="point"><rgb name="intensity" value="1 2 3"/></luminaire>
+    <shape type="sphere">
+        <bsdf type="bump"><texture type="checkerboard"/><bsdf type="diffuse"/></bsdf>
+        <luminaire type="area"><blackbody name="intensity" temperature="5000K" multiplier="2"/></luminaire>
+    </shape>
+    <medium type="homogeneous" name="m"><float name="densityMultiplier" value="4"/></medium>
+</scene>)";
+
+constexpr const char* kAfter04 = R"(<scene version="0.6.0">
+    <integrator type="direct"><integer name="emitterSamples" value="4"/></integrator>
+    <sensor type="perspective">
+        <float name="fov" value="40"/>
+        <string name="fovAxis" value="larger"/>
+        <float name="focusDistance" value="3"/>
+        <transform name="toWorld"><scale x="-1"/><lookAt origin="1,2,5" target="0 0 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="64"/><string name="pixelFormat" value="rgb"/></film>
+        <sampler type="ldsampler"><integer name="dimension" value="6"/></sampler>
+    </sensor>
+    <sensor type="thinlens"/>
+    <emitter type="constant"><spectrum name="radiance" value="3"/></emitter>
+    <emitter type="envmap"><float name="scale" value="2"/></emitter>
+    <emitter type="directional"><rgb name="irradiance" value="1 2 3"/></emitter>
+    <emitter type="point"><rgb name="intensity" value="1 2 3"/></emitter>
+    <shape type="sphere">
+        <bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="diffuse"/></bsdf>
+        <emitter type="area"><blackbody name="radiance" temperature="5000K" scale="2"/></emitter>
+    </shape>
+    <medium type="homogeneous" name="m"><float name="scale" value="4"/></medium>
+</scene>)";
+
+constexpr const char* kBefore03 = R"(<scene version="0.2.1">
+    <camera type="orthographic">
+        <transform name="toWorld"><lookAt ox="1" oy="2" oz="5" tx="0" ty="0" tz="0" ux="0" uy="1" uz="0"/></transform>
+    </camera>
+    <bsdf type="lambertian" id="grey"><spectrum name="reflectance" value="0.5"/></bsdf>
+    <bsdf type="mirror"/>
+    <bsdf type="roughmetal"><float name="alphaB" value="0.2"/><spectrum name="ior" value="2"/></bsdf>
+    <bsdf type="roughglass"><float name="alphaB" value="0.2"/></bsdf>
+    <bsdf type="microfacet"><float name="alphaB" value="0.2"/><float name="diffuseAmount" value="0.8"/>
+        <texture type="ldrtexture" name="diffuseReflectance"><string name="filename" value="a.png"/></texture></bsdf>
+    <bsdf type="phong"><float name="specularAmount" value="0.5"/></bsdf>
+    <bsdf type="composite"><string name="weights" value="0.3 0.7"/><ref id="grey"/><ref id="grey"/></bsdf>
+    <shape type="sphere"><boolean name="inverted" value="true"/><ref id="grey"/></shape>
+    <shape type="cylinder"><point name="p1" x="1" y="2" z="3"/><point name="p2" x="4" y="5" z="6"/></shape>
+    <texture type="gridtexture"><rgb name="brightColor" value="1"/><spectrum name="darkColor" value="0"/></texture>
+    <texture type="exrtexture"><string name="filename" value="a.exr"/></texture>
+    <medium type="homogeneous"><float name="sizeMultiplier" value="4"/></medium>
+</scene>)";
+
+constexpr const char* kAfter03 = R"(<scene version="0.6.0">
+    <sensor type="orthographic">
+        <transform name="toWorld"><lookAt origin="1,2,5" target="0 0 0" up="0, 1, 0"/></transform>
+    </sensor>
+    <bsdf type="diffuse" id="grey"><spectrum name="reflectance" value="0.5"/></bsdf>
+    <bsdf type="conductor"><string name="material" value="Cr"/></bsdf>
+    <bsdf type="roughconductor"><float name="alpha" value="0.2"/><spectrum name="eta" value="2"/></bsdf>
+    <bsdf type="roughdielectric"><float name="alpha" value="0.2"/></bsdf>
+    <bsdf type="roughplastic"><float name="alpha" value="0.2"/>
+        <spectrum name="specularReflectance" value="1"/>
+        <texture type="scale" name="diffuseReflectance"><texture type="bitmap" name="value">
+            <string name="filename" value="a.png"/></texture><float name="scale" value="0.8"/></texture></bsdf>
+    <bsdf type="phong"><spectrum name="diffuseReflectance" value="0.5"/>
+        <texture type="scale" name="specularReflectance">
+            <spectrum name="value" value="0.2"/><float name="scale" value="0.5"/></texture></bsdf>
+    <bsdf type="mixturebsdf"><string name="weights" value="0.3 0.7"/><ref id="grey"/><ref id="grey"/></bsdf>
+    <shape type="sphere"><boolean name="flipNormals" value="true"/><ref id="grey"/></shape>
+    <shape type="cylinder"><point name="p0" x="1" y="2" z="3"/><point name="p1" x="4" y="5" z="6"/></shape>
+    <texture type="gridtexture"><rgb name="color0" value="1"/><spectrum name="color1" value="0"/></texture>
+    <texture type="bitmap"><string name="filename" value="a.exr"/></texture>
+    <medium type="homogeneous"><float name="scale" value="4"/></medium>
+</scene>)";
+
+TEST(MitsubaXml, OldestDialectsGiveTheSameDescription) {
+    EXPECT_EQ(dump(parse(kBefore04)), dump(parse(kAfter04)));
+    EXPECT_EQ(dump(parse(kBefore03)), dump(parse(kAfter03)));
+    // These words are those of their versions alone.
+    EXPECT_NE(error3(R"(<luminaire type="point"/>)").find("unknown element <luminaire>"),
+              std::string::npos);
+    EXPECT_EQ(parse06(R"(<bsdf type="mirror"/>)").objects[0].type, "mirror");
+}
+
+TEST(MitsubaXml, OldestDialectsOfIncludedFiles) {
+    const auto options =
+        with_files({{"a.xml", R"(<luminaire type="point"/>)"},
+                    {"b.xml", R"(<scene version="0.6.0"><emitter type="sky"/></scene>)"}});
+    EXPECT_EQ(
+        dump(parse(R"(<scene version="0.3.1"><include filename="a.xml"/><include filename="b.xml"/>
+                            <luminaire type="spot"/></scene>)",
+                   options)),
+        dump(parse06("<emitter type=\"point\"/><emitter type=\"sky\"/><emitter type=\"spot\"/>")));
+}
+
+TEST(MitsubaXml, ErrorsInOldestDialectsHaveTheirLines) {
+    const auto error = [](const std::string& text) { return error_of([&] { parse(text); }); };
+    EXPECT_EQ(
+        error("<scene version=\"0.2.0\">\n<bsdf type=\"phong\">\n<float name=\"specularAmount\" "
+              "value=\"a\"/></bsdf>\n</scene>"),
+        "s.xml:3: expected a number, found \"a\"");
+    EXPECT_EQ(
+        error("<scene version=\"0.2.0\">\n<bsdf type=\"phong\">\n<rgb name=\"specularReflectance\" "
+              "value=\"1\"/>\n<texture type=\"a\" name=\"specularReflectance\"/></bsdf></scene>"),
+        "s.xml:4: parameter \"specular_reflectance\" is given twice");
+    EXPECT_EQ(
+        error("<scene version=\"0.3.0\">\r<camera type=\"a\">\r<float name=\"x\" value=\"b\"/>"
+              "</camera></scene>"),
+        "s.xml:3: expected a number, found \"b\"");
+}
+
 // ---- Values
 
 TEST(MitsubaXml, ReadsNumbersStrictly) {
@@ -274,6 +386,11 @@ TEST(MitsubaXml, ReadsSpectrumFilesAndPlugins) {
     const auto from_list =
         parse3(R"(<bsdf type="b"><spectrum name="eta" value="400:0.1 500:0.4 700:0.2"/></bsdf>)");
     EXPECT_EQ(value<Rgb>(from_file, "eta"), value<Rgb>(from_list, "eta"));
+    const auto old_lines = with_files({{"a.spd", "# silver\r400 0.1\r\r500 0.4\r700 0.2\r"}});
+    EXPECT_EQ(value<Rgb>(parse3(R"(<bsdf type="b"><spectrum name="eta" filename="a.spd"/></bsdf>)",
+                                old_lines),
+                         "eta"),
+              value<Rgb>(from_list, "eta"));
     const auto plugins = parse3(R"(<bsdf type="b">
         <spectrum name="eta" type="irregular"><string name="wavelengths" value="400 500 700"/>
             <string name="values" value="0.1 0.4 0.2"/></spectrum>

@@ -100,6 +100,8 @@ TEST(Obj, OtherStatementsAreIgnored) {
 TEST(Obj, LineEndings) {
     EXPECT_EQ(parse("v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n").positions.size(), 3u);
     EXPECT_EQ(parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").positions.size(), 3u);
+    EXPECT_EQ(parse("# old\rv 0 0 \\\r0\rv 1 0 0\r\rv 0 1 0\rf 1 2 3\r").positions.size(), 3u);
+    expect_scene_error(4, "coordinate expected", [] { parse("v 0 0 0\r\r\nv 1 0 0\rv 1 x 0\r"); });
     EXPECT_EQ(parse("v 0 0 \\\n0\nv 1 0 0\nv 0 1 0\nf 1 \\\r\n2 3\n").positions.size(), 3u);
     expect_scene_error(4, "coordinate expected", [] { parse("v 0 \\\n 0 0\n\nv 1 x 0\n"); });
 }

@@ -6,21 +6,12 @@
 #include <gtest/gtest.h>
 
 #include "expect_scene_error.h"
+#include "files_in_memory.h"
 #include "readers/pbrt_tokenizer.h"
 #include "shared_scenes.h"
 
 namespace etendue {
 namespace {
-
-ReadOptions with_files(const std::map<std::string, std::string>& files) {
-    ReadOptions options;
-    options.read_file = [files](const std::string& path) -> std::optional<std::string> {
-        const auto it = files.find(path);
-        if (it == files.end()) return {};
-        return it->second;
-    };
-    return options;
-}
 
 /// A scene of pbrt-v4 with `world` from line 2 on, one of v3 with WorldEnd behind it.
 SceneDescription parse4(const std::string& world, const ReadOptions& options = {}) {
@@ -85,6 +76,21 @@ TEST(PbrtTokenizer, TellsWordsStringsNumbersAndBracketsApart) {
     EXPECT_TRUE(in.skip(']'));
     EXPECT_EQ(in.number<int>("an integer"), 7);
     EXPECT_EQ(in.peek(), '\0');
+}
+
+TEST(PbrtTokenizer, LinesEndWithCarriageReturnsAsWell) {
+    const FileName file = "f";
+    for (const std::string end : {"\n", "\r\n", "\r"}) {
+        const std::string text =
+            "# comment" + end + end + "A # comment" + end + "\"b" + end + "\" C";
+        PbrtTokenizer in(text, file);
+        EXPECT_EQ(in.word(), "A");
+        EXPECT_EQ(in.where().line, 3);
+        EXPECT_EQ(in.string(), "b" + end);
+        EXPECT_EQ(in.where().line, 5);
+        EXPECT_EQ(in.word(), "C");
+        EXPECT_TRUE(ends_with_world_end("a" + end + "WorldEnd # b" + end + "# c" + end));
+    }
 }
 
 TEST(PbrtTokenizer, NamesWhatIsNoNumber) {
@@ -260,6 +266,24 @@ TEST(Pbrt, AlphaBecomesAMask) {
 }
 
 // ---- Materials and spectra
+
+TEST(Pbrt, ShadowsOfTheirOwnAreReported) {
+    const auto warnings = [](const std::string& params) {
+        return parse3("Texture \"t\" \"float\" \"checkerboard\"\nShape \"sphere\" " + params)
+            .warnings;
+    };
+    EXPECT_TRUE(warnings("\"float alpha\" 0.5 \"float shadowalpha\" 0.5").empty());
+    EXPECT_TRUE(warnings("\"texture alpha\" \"t\" \"texture shadowalpha\" \"t\"").empty());
+    EXPECT_TRUE(warnings("\"float shadowalpha\" 1").empty());
+    for (const char* params :
+         {"\"float shadowalpha\" 0", "\"float alpha\" 0.5 \"float shadowalpha\" 1",
+          "\"texture shadowalpha\" \"t\""}) {
+        ASSERT_EQ(warnings(params).size(), 1u) << params;
+        EXPECT_EQ(
+            warnings(params)[0],
+            "s.pbrt:3: parameter \"shadowalpha\" has no effect: shadows are those of \"alpha\"");
+    }
+}
 
 TEST(Pbrt, RoughnessIsRemappedByVersion) {
     const auto alpha = [](const SceneDescription& scene) {

@@ -11,6 +11,7 @@
 #include "expect_mesh.h"
 #include "expect_scene_error.h"
 #include "readers/gzip.h"
+#include "readers/mitsuba_writer.h"
 #include "shared_scenes.h"
 
 namespace etendue {
@@ -208,12 +209,63 @@ TEST(Ply, FacesMayComeBeforeTheirVertices) {
     expect_scene_error(0, "triangle 0 refers to vertex 3", [&] { parse(wrong); });
 }
 
-TEST(Ply, LineEndingsOfWindows) {
-    std::string text = std::string("ply\nformat ascii 1.0\nelement vertex 3\n") + kXyz +
-                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-                       "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-    for (size_t i = 0; (i = text.find('\n', i)) != std::string::npos; i += 2) text.insert(i, "\r");
-    EXPECT_EQ(parse(text).triangles.size(), 1u);
+TEST(Ply, LineEndings) {
+    const std::string text = std::string("ply\nformat ascii 1.0\nelement vertex 3\n") + kXyz +
+                             "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                             "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    std::string windows = text, old = text;
+    for (size_t i = 0; (i = windows.find('\n', i)) != std::string::npos; i += 2)
+        windows.insert(i, "\r");
+    std::replace(old.begin(), old.end(), '\n', '\r');
+    EXPECT_EQ(parse(windows).triangles.size(), 1u);
+    EXPECT_EQ(parse(old).triangles.size(), 1u);
+}
+
+// Binary data may begin with the characters that end lines.
+TEST(Ply, LineEndingsBeforeBinaryData) {
+    for (const std::string end : {"\n", "\r\n", "\r"})
+        for (const std::string first : {"\n", "\r", "\r\n", "x"}) {
+            std::string bytes;
+            for (const char* line :
+                 {"ply", "format binary_little_endian 1.0", "element vertex 3", "property float x",
+                  "property float y", "property float z", "element face 1",
+                  "property list uchar int vertex_indices", "end_header"})
+                bytes += line + end;
+            const size_t body = bytes.size();
+            for (const float x : {0, 0, 0, 1, 0, 0, 0, 1, 0}) put(bytes, x, false);
+            put<uint8_t>(bytes, 3, false);
+            for (const int32_t i : {0, 1, 2}) put(bytes, i, false);
+            bytes.replace(body, first.size(), first);
+            const MeshData m = parse(bytes);
+            EXPECT_EQ(m.positions[1], (Vec3{1, 0, 0})) << end << first;
+            EXPECT_EQ(m.triangles.size(), 1u) << end << first;
+        }
+}
+
+TEST(Ply, WrittenMeshesAreReadAgain) {
+    MeshData mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.normals = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
+    mesh.uvs = {{0.5f, 1}, {2, 3}, {4, 5}};
+    mesh.second_uvs = {{6, 7}, {8, 9}, {10, 11}};
+    mesh.colors = {{0.25f, 0.5f, 1}, {1, 0, 0}, {0, 1, 0}};
+    mesh.alphas = {0, 0.5f, 1};
+    mesh.triangles = {{0, 1, 2}};
+    const MeshData read = parse(write_ply(mesh));
+    std::vector<std::string> arrays;
+    for_each_vertex_array(mesh, [&](const char* name, const auto& values) {
+        EXPECT_FALSE(values.empty()) << name;
+        arrays.push_back(std::string(reinterpret_cast<const char*>(values.data()),
+                                     values.size() * sizeof(values[0])));
+    });
+    size_t i = 0;
+    for_each_vertex_array(read, [&](const char* name, const auto& values) {
+        EXPECT_EQ(std::string(reinterpret_cast<const char*>(values.data()),
+                              values.size() * sizeof(values[0])),
+                  arrays[i++])
+            << name;
+    });
+    EXPECT_EQ(read.triangles, mesh.triangles);
 }
 
 TEST(Ply, SharedScenesLoad) {
