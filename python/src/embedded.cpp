@@ -26,7 +26,7 @@ nb::object view(const Shared<Owner>& owner, const std::vector<T>& values) {
 nb::object to_python(const Shared<MeshData>& mesh) {
     // All members are named, so that a new one does not compile until dicts have it, or it is left out here. The counts
     // and notes are those of the reader.
-    const auto& [name, positions, normals, uvs, colors, alphas, triangles, face_normals,
+    const auto& [name, positions, normals, uvs, second_uvs, colors, alphas, triangles, face_normals,
                  dropped_degenerate, replaced_normals, notes] = *mesh;
     nb::dict d;
     if (!name.empty()) d["name"] = name;
@@ -34,6 +34,7 @@ nb::object to_python(const Shared<MeshData>& mesh) {
     d["triangles"] = view<uint32_t>(mesh, triangles);
     if (!normals.empty()) d["normals"] = view<float>(mesh, normals);
     if (!uvs.empty()) d["uvs"] = view<float>(mesh, uvs);
+    if (!second_uvs.empty()) d["second_uvs"] = view<float>(mesh, second_uvs);
     if (!colors.empty()) d["colors"] = view<float>(mesh, colors);
     if (!alphas.empty()) d["alphas"] = view<float>(mesh, alphas);
     if (face_normals) d["face_normals"] = true;
@@ -75,8 +76,9 @@ bool has_unit_normals(const MeshData& mesh) {
 
 MeshData mesh_of(nb::dict d, const SourceLocation& where) {
     MeshData mesh;
-    const std::vector<std::string> known = {"name", "positions", "triangles", "normals",
-                                            "uvs",  "colors",    "alphas",    "face_normals"};
+    const std::vector<std::string> known = {"name",    "positions", "triangles",
+                                            "normals", "uvs",       "second_uvs",
+                                            "colors",  "alphas",    "face_normals"};
     for (const auto& [key, value] : d) {
         const std::string name = nb::cast<std::string>(nb::str(key));
         const SourceLocation at{where.file.str() + "/" + name, 0};
@@ -92,6 +94,8 @@ MeshData mesh_of(nb::dict d, const SourceLocation& where) {
             mesh.alphas = rows_of<float, float>(value, "float32", at);
         else if (name == "uvs")
             mesh.uvs = rows_of<float, Vec2>(value, "float32", at);
+        else if (name == "second_uvs")
+            mesh.second_uvs = rows_of<float, Vec2>(value, "float32", at);
         else if (name == "face_normals")
             mesh.face_normals = nb::cast<bool>(nb::bool_(value));
         else if (name == "triangles") {
@@ -109,6 +113,7 @@ MeshData mesh_of(nb::dict d, const SourceLocation& where) {
     }
     for (const auto& [name, count] : {std::pair{"normals", mesh.normals.size()},
                                       {"uvs", mesh.uvs.size()},
+                                      {"second_uvs", mesh.second_uvs.size()},
                                       {"colors", mesh.colors.size()},
                                       {"alphas", mesh.alphas.size()}})
         if (count > 0 && count != mesh.positions.size())

@@ -22,8 +22,9 @@ struct SurfacePoint {
     Vec3 wo;              ///< Toward the predecessor.
     Vec3 color{1, 1, 1};  ///< Vertex colour.
     float alpha = 1;      ///< Of the vertex colour.
+    Vec2 second_uv = {};  ///< As in SurfaceGeometry.
 
-    TexturePoint texture_point() const { return {uv, color, p, dpdu, dpdv, alpha}; }
+    TexturePoint texture_point() const { return {uv, color, p, dpdu, dpdv, alpha, second_uv}; }
 };
 
 /// Storage for the second and further components of mixtures during a walk. reset() keeps the memory for reuse.
@@ -58,7 +59,7 @@ private:
 class Material {
 public:
     virtual ~Material() = default;
-    /// Appends this material's lobes at `point` to `list`, scaled by `weight`, in the shading frame `frame` (which a
+    /// Appends this material's lobes at `point` to `list`, scaled by `weight` (which may exceed 1), in the shading frame `frame` (which a
     /// two-sided material turns toward wo).
     virtual void append(const SurfacePoint& point, const Frame& frame, float weight,
                         class ComponentList& list) const = 0;
@@ -109,14 +110,15 @@ public:
         out.has_strict_normals_ = strict_normals;
         out.has_smooth_ = out.has_delta_ = false;
         out.uses_lobe_choice_ = false;
-        out.first_.weight = 0;
+        out.total_weight_ = 0;
         out.first_.next = nullptr;
     }
-    /// Without components, the BSDF is a black one: nothing is left of what it was before.
+    /// Without components, the BSDF is a black one, with a lobe that has no value: nothing is left of what it was before.
     ~ComponentList() {
         if (!is_empty_) return;
         out_->first_.frame = *frame_;
-        out_->first_.lobe.emplace<DiffuseLobe>();
+        out_->first_.lobe.emplace<ConductorLobe>(Rgb(1), Rgb(0), Rgb(0));
+        out_->total_weight_ = 1;
     }
     ComponentList(const ComponentList&) = delete;
     ComponentList& operator=(const ComponentList&) = delete;
@@ -125,13 +127,13 @@ public:
         if (!(weight > 0)) return;
         out_->has_smooth_ |= lobe.has_smooth();
         out_->has_delta_ |= lobe.has_delta();
+        out_->total_weight_ += weight;
         BsdfComponent& first = out_->first_;
         if (is_empty_) {
             first.frame = frame;
             first.lobe.template emplace<L>(lobe);
             first.weight = weight;
-            // A component whose weight is below 1 may not be chosen at all.
-            out_->uses_lobe_choice_ = L::kUsesLobeChoice || weight < 1;
+            out_->uses_lobe_choice_ = L::kUsesLobeChoice;
             is_empty_ = false;
         } else {
             out_->uses_lobe_choice_ = true;

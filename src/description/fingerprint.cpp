@@ -53,11 +53,12 @@ private:
     }
     void add(const MeshData& mesh) {
         // The name, the counts of what was mended and the notes are for messages.
-        const auto& [name, positions, normals, uvs, colors, alphas, triangles, face_normals,
-                     dropped_degenerate, replaced_normals, notes] = mesh;
+        const auto& [name, positions, normals, uvs, second_uvs, colors, alphas, triangles,
+                     face_normals, dropped_degenerate, replaced_normals, notes] = mesh;
         add_array(positions);
         add_array(normals);
         add_array(uvs);
+        add_array(second_uvs);
         add_array(colors);
         add_array(alphas);
         add_array(triangles);

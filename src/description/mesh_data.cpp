@@ -53,10 +53,11 @@ void check_vertices(const MeshData& mesh, const SourceLocation& where) {
     for (size_t i = 0; i < mesh.positions.size(); ++i)
         if (!is_finite(mesh.positions[i]))
             throw SceneError(where, "position of vertex " + std::to_string(i) + " is not finite");
-    for (size_t i = 0; i < mesh.uvs.size(); ++i)
-        if (!std::isfinite(mesh.uvs[i].x) || !std::isfinite(mesh.uvs[i].y))
-            throw SceneError(where, "texture coordinate of vertex " + std::to_string(i) +
-                                        " is not finite");
+    for (const auto* uvs : {&mesh.uvs, &mesh.second_uvs})
+        for (size_t i = 0; i < uvs->size(); ++i)
+            if (!std::isfinite((*uvs)[i].x) || !std::isfinite((*uvs)[i].y))
+                throw SceneError(where, "texture coordinate of vertex " + std::to_string(i) +
+                                            " is not finite");
     for (size_t i = 0; i < mesh.colors.size(); ++i)
         if (!is_finite(mesh.colors[i]))
             throw SceneError(where, "colour of vertex " + std::to_string(i) + " is not finite");
@@ -162,7 +163,8 @@ void finish_mesh(MeshData& mesh, const MeshOptions& options, const SourceLocatio
     if (mesh.face_normals) mesh.normals.clear();
     repair_normals(mesh);
     if (options.flip_tex_coords)
-        for (Vec2& uv : mesh.uvs) uv.y = 1 - uv.y;
+        for (auto* uvs : {&mesh.uvs, &mesh.second_uvs})
+            for (Vec2& uv : *uvs) uv.y = 1 - uv.y;
 }
 
 }  // namespace etendue

@@ -18,6 +18,8 @@ struct MeshData {
     std::vector<Vec3> positions;
     std::vector<Vec3> normals;  ///< Unit vectors, one per vertex, or empty.
     std::vector<Vec2> uvs;      ///< One per vertex, or empty.
+    std::vector<Vec2>
+        second_uvs;             ///< Another set of texture coordinates, one per vertex, or empty.
     std::vector<Vec3> colors;   ///< Linear colours, one per vertex, or empty.
     std::vector<float> alphas;  ///< Alpha of the colours, one per vertex, or empty.
     std::vector<Triangle> triangles;
@@ -33,6 +35,7 @@ void for_each_vertex_array(Mesh& mesh, const Use& use) {
     use("positions", mesh.positions);
     use("normals", mesh.normals);
     use("texture coordinates", mesh.uvs);
+    use("second texture coordinates", mesh.second_uvs);
     use("colours", mesh.colors);
     use("alphas", mesh.alphas);
 }

@@ -1,4 +1,4 @@
-// Area emitter: radiance L_e(uv) from the front of a shape, or from both sides, the same in all directions. Sampling
+// Area emitter: radiance L_e from the front of a shape, or from both sides, the same in all directions. Sampling
 // chooses a primitive with probability proportional to area times mean radiance, a point uniform in area, and a
 // direction with density cos θ / π, or |cos θ| / 2π. Where the shape is masked, a ray meets it, and sees L_e, with a
 // probability equal to the opacity, so that the light it emits has this factor.
@@ -17,7 +17,7 @@ namespace {
 class AreaEmitter final : public Emitter {
 public:
     AreaEmitter(const Shape& shape, TextureRef radiance, bool two_sided,
-                std::function<float(Vec2 uv)> opacity)
+                std::function<float(const TexturePoint& at)> opacity)
         : shape_(shape), radiance_(radiance), two_sided_(two_sided), opacity_(std::move(opacity)) {
         const size_t n = shape.primitive_count();
         std::vector<double> weights(n), areas(n);
@@ -38,7 +38,7 @@ public:
                                         .sample(i, {(float(k % grid) + 0.5f) / float(grid),
                                                     (float(k / grid) + 0.5f) / float(grid)})
                                         .uv;
-                    sum += double(luminance(radiance.eval(uv)) * this->opacity(uv));
+                    sum += double(luminance(emitted(uv, i)));
                 }
                 L = sum / (grid * grid);
                 flux += areas[i] * L;
@@ -61,8 +61,14 @@ public:
     EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const override {
         const ShapeSample s = sample_point(u_y0);
         const Vec3 d = sample_direction(s.ng, u_d);
-        return {s.p,  s.ng,  d, emitted(s.uv), pdf_[s.prim], pdf_direction(emitted_cos(s.ng, d)),
-                s.uv, s.prim};
+        return {s.p,
+                s.ng,
+                d,
+                emitted(s.uv, s.prim),
+                pdf_[s.prim],
+                pdf_direction(emitted_cos(s.ng, d)),
+                s.uv,
+                s.prim};
     }
     Vec3 sample_direction(Vec3 ng, Vec2 u) const override {
         if (!two_sided_) return Frame::from_normal(ng).to_world(sample_cosine_hemisphere(u));
@@ -81,7 +87,7 @@ public:
         const float cos = emitted_cos(s.ng, -wi);
         if (!(cos > 0)) return false;
         const float pdf = pdf_[s.prim];
-        out = {s.p,  s.ng,   wi,     dist, emitted(s.uv), pdf, pdf, pdf_direction(cos),
+        out = {s.p,  s.ng,   wi,     dist, emitted(s.uv, s.prim), pdf, pdf, pdf_direction(cos),
                s.uv, s.prim, s.slack};
         return true;
     }
@@ -89,13 +95,13 @@ public:
     EmitterHit eval_surface(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const override {
         const float cos = emitted_cos(ng, w);
         if (!(cos > 0)) return {};
-        return {radiance(uv), pdf_[prim], pdf_[prim], pdf_direction(cos)};
+        return {radiance_at(uv, prim), pdf_[prim], pdf_[prim], pdf_direction(cos)};
     }
 
-    Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const override {
+    Emission eval_emission(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const override {
         const float cos = emitted_cos(ng, w);
         if (!(cos > 0)) return {Rgb(), 0};
-        return {emitted(uv) * cos, pdf_direction(cos)};
+        return {emitted(uv, prim) * cos, pdf_direction(cos)};
     }
 
     void set_power(double power) {
@@ -104,7 +110,9 @@ public:
         power_ = power;
     }
     double power() const override { return power_; }
-    float opacity(Vec2 uv) const override { return opacity_ ? opacity_(uv) : 1.0f; }
+    float opacity(Vec2 uv, uint32_t prim) const override {
+        return opacity_ ? opacity_(texture_point(uv, prim)) : 1.0f;
+    }
     bool is_area() const override { return true; }
     float slack(uint32_t prim) const override { return shape_.slack(prim); }
     float max_pdf_d() const override { return pdf_direction(1); }
@@ -117,8 +125,17 @@ private:
         return two_sided_ ? std::fabs(cos) : cos;
     }
     float pdf_direction(float cos) const { return cos * kInvPi * (two_sided_ ? 0.5f : 1.0f); }
-    Rgb radiance(Vec2 uv) const { return radiance_.eval(uv) * factor_; }
-    Rgb emitted(Vec2 uv) const { return opacity_ ? radiance(uv) * opacity_(uv) : radiance(uv); }
+    TexturePoint texture_point(Vec2 uv, uint32_t prim) const {
+        const SurfaceGeometry g = shape_.surface(prim, uv.x, uv.y, false);
+        return {g.uv, g.color, g.p, {}, {}, g.alpha, g.second_uv};
+    }
+    Rgb radiance_at(Vec2 uv, uint32_t prim) const {
+        if (radiance_.is_constant()) return radiance_.mean() * factor_;
+        return radiance_.eval(texture_point(uv, prim)) * factor_;
+    }
+    Rgb emitted(Vec2 uv, uint32_t prim) const {
+        return opacity_ ? radiance_at(uv, prim) * opacity(uv, prim) : radiance_at(uv, prim);
+    }
     ShapeSample sample_point(FinePoint u) const {
         const auto choice = choice_.sample(u.x);
         return shape_.sample(choice.index, {to_float(choice.u), to_float(u.y)});
@@ -127,8 +144,8 @@ private:
     const Shape& shape_;
     TextureRef radiance_;
     bool two_sided_;
-    std::function<float(Vec2 uv)> opacity_;  ///< Empty where the shape is opaque.
-    float factor_ = 1;                       ///< Of the radiance.
+    std::function<float(const TexturePoint& at)> opacity_;  ///< Empty where the shape is opaque.
+    float factor_ = 1;                                      ///< Of the radiance.
     AliasTable choice_;
     std::vector<float> pdf_;  ///< Area density of points, by primitive.
     double power_;
@@ -137,7 +154,8 @@ private:
 }  // namespace
 
 std::unique_ptr<Emitter> make_area_emitter(const Shape& shape, TextureRef radiance, bool two_sided,
-                                           double power, std::function<float(Vec2 uv)> opacity) {
+                                           double power,
+                                           std::function<float(const TexturePoint& at)> opacity) {
     auto emitter = std::make_unique<AreaEmitter>(shape, radiance, two_sided, std::move(opacity));
     if (power > 0) emitter->set_power(power);
     return emitter;

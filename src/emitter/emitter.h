@@ -26,7 +26,7 @@ struct EmissionSample {
     float pdf_y0;
     /// Density of d at y_0: solid angle; for infinite emitters density of p on the bounding disc.
     float pdf_d;
-    Vec2 uv;  ///< Texture coordinates of y_0 on a surface.
+    Vec2 uv;  ///< Parameters of y_0 within its primitive, as in RayHit.
     uint32_t prim = 0;
 };
 
@@ -40,7 +40,7 @@ struct DirectSample {
     float pdf;     ///< p_NE(y_0), in the measure of EmissionSample::pdf_y0.
     float pdf_y0;  ///< p_L(y_0): density of y_0 for sample_emission().
     float pdf_d;   ///< Density of the direction to the scene point for sample_emission().
-    Vec2 uv;
+    Vec2 uv;       ///< As EmissionSample.
     uint32_t prim = 0;
     float slack = 0;  ///< As Emitter::slack().
 };
@@ -64,6 +64,8 @@ public:
     /// Emitted power in W, weighted by luminance; emitters are chosen proportionally to it.
     virtual double power() const = 0;
 
+    // Points of a surface are given by their primitive and the parameters (u, v) within it, as in RayHit.
+
     /// Finite emitters: radiance from a surface point along the unit vector `w`, and densities; zero from behind. The
     /// radiance is what a ray sees that meets the surface there. All other functions include the factor opacity(),
     /// which is the probability that a ray meets it.
@@ -75,12 +77,12 @@ public:
         Rgb Le_cos;
         float pdf_d;
     };
-    virtual Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const = 0;
+    virtual Emission eval_emission(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const = 0;
     /// Finite emitters: a direction of emission from a point with normal `ng`, with density eval_emission().pdf_d.
     virtual Vec3 sample_direction(Vec3 ng, Vec2 u) const = 0;
 
     /// Of a masked surface that emits.
-    virtual float opacity(Vec2 /*uv*/) const { return 1; }
+    virtual float opacity(Vec2 /*uv*/, uint32_t /*prim*/) const { return 1; }
 
     /// Infinite emitters: emission of light that arrives from direction `d`, however that was chosen; `pdf_y0` is that
     /// of sample_emission().
@@ -122,8 +124,8 @@ public:
                                float hi = kInf) = 0;
     /// The shape of an area emitter; nullptr for emitters that are not nested in a shape.
     virtual const Shape* shape() const = 0;
-    /// Opacity of that shape by (u, v); empty where it is opaque.
-    virtual std::function<float(Vec2 uv)> opacity() const = 0;
+    /// Opacity of that shape; empty where it is opaque.
+    virtual std::function<float(const TexturePoint& at)> opacity() const = 0;
 };
 
 struct EmitterEntry {

@@ -24,7 +24,7 @@ public:
         DirectSample s;
         return directions_->sample_direct({}, {u.x, u.y}, s) ? s.wi : Vec3{0, 0, 1};
     }
-    Emission eval_emission(Vec3, Vec2, Vec3 w) const override {
+    Emission eval_emission(Vec3, Vec2, uint32_t, Vec3 w) const override {
         const EmitterHit hit = directions_->eval_infinite(w);
         return {hit.Le, hit.pdf};
     }

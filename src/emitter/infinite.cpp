@@ -36,7 +36,7 @@ EmitterHit InfiniteEmitter::eval_infinite(Vec3 d) const {
     return {a.L, a.pdf, a.pdf, pdf_disk_};
 }
 
-Emitter::Emission InfiniteEmitter::eval_emission(Vec3, Vec2, Vec3 w) const {
+Emitter::Emission InfiniteEmitter::eval_emission(Vec3, Vec2, uint32_t, Vec3 w) const {
     return {radiance(-w), pdf_disk_};
 }
 

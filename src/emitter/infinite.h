@@ -12,7 +12,7 @@ public:
     EmissionSample sample_emission_from(Vec3 d, Vec2 u_d) const final;
     bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const final;
     EmitterHit eval_infinite(Vec3 d) const final;
-    Emission eval_emission(Vec3 ng, Vec2 uv, Vec3 w) const final;
+    Emission eval_emission(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const final;
     /// Always the direction of y_0; only the point on the bounding disc varies.
     Vec3 sample_direction(Vec3 ng, Vec2) const final { return ng; }
     bool is_infinite() const final { return true; }

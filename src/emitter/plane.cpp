@@ -24,7 +24,7 @@ Vec3 PlaneEmitter::sample_direction(Vec3, Vec2 u) const {
                                        (2 * uv.y - 1) * float(rectangle_.half_height), 1}));
 }
 
-Emitter::Emission PlaneEmitter::eval_emission(Vec3, Vec2, Vec3 w) const {
+Emitter::Emission PlaneEmitter::eval_emission(Vec3, Vec2, uint32_t, Vec3 w) const {
     Vec2 uv;
     float cos_theta;
     if (!to_rectangle(w, uv, cos_theta)) return {Rgb(), 0};

@@ -15,7 +15,7 @@ namespace etendue {
 class PlaneEmitter : public PointEmitter {
 public:
     Vec3 sample_direction(Vec3, Vec2 u) const override;
-    Emission eval_emission(Vec3, Vec2, Vec3 w) const override;
+    Emission eval_emission(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const override;
     float max_pdf_d() const override { return max_pdf_d_; }
     double power() const override { return power_; }
 

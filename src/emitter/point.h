@@ -32,7 +32,7 @@ public:
         return true;
     }
 
-    Emission eval_emission(Vec3, Vec2, Vec3 w) const override {
+    Emission eval_emission(Vec3, Vec2, uint32_t, Vec3 w) const override {
         return {intensity(w), pdf_direction(w)};
     }
     Vec3 sample_direction(Vec3, Vec2 u) const override { return sample_uniform_sphere(u); }

@@ -83,14 +83,19 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
     }
     if (!colors.empty()) g.color = colors[ia] * w + colors[ib] * u + colors[ic] * v;
     if (!alphas.empty()) g.alpha = alphas[ia] * w + alphas[ib] * u + alphas[ic] * v;
+    const auto mean = [&](const std::vector<Vec2>& of) -> Vec2 {
+        const Vec2 a2 = of[ia], b2 = of[ib], c2 = of[ic];
+        return {a2.x * w + b2.x * u + c2.x * v, a2.y * w + b2.y * u + c2.y * v};
+    };
+    if (!second_uvs.empty()) g.second_uv = mean(second_uvs);
     if (uvs.empty()) {
         g.uv = {u, v};
         if (tangents) g.dpdu = e1, g.dpdv = e2;
         return g;
     }
-    const Vec2 ta = uvs[ia], tb = uvs[ib], tc = uvs[ic];
-    g.uv = {ta.x * w + tb.x * u + tc.x * v, ta.y * w + tb.y * u + tc.y * v};
+    g.uv = mean(uvs);
     if (tangents) {
+        const Vec2 ta = uvs[ia], tb = uvs[ib], tc = uvs[ic];
         const Vec2 d1 = tb - ta, d2 = tc - ta;
         const float det = d1.x * d2.y - d1.y * d2.x;
         if (det != 0) {
@@ -105,12 +110,12 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
 ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
     const Vec2 b = sample_uniform_triangle(u);
     const SurfaceGeometry g = surface(prim, b.x, b.y, false);
-    return {g.p, g.ng, g.ns, g.uv, prim, g.slack};
+    return {g.p, g.ng, g.ns, b, prim, g.slack};
 }
 
 size_t TriangleMesh::memory_bytes() const {
     return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) +
-           uvs.size() * sizeof(Vec2) + colors.size() * sizeof(Vec3) +
+           (uvs.size() + second_uvs.size()) * sizeof(Vec2) + colors.size() * sizeof(Vec3) +
            alphas.size() * sizeof(float) +
            triangles.size() * (sizeof(triangles[0]) + sizeof(face_normals[0]));
 }

@@ -20,6 +20,7 @@ struct SurfaceGeometry {
     Vec3 ns;          ///< Unit interpolated normal.
     Vec3 dpdu, dpdv;  ///< Zero unless requested.
     Vec2 uv;
+    Vec2 second_uv;       ///< Another set of texture coordinates; zero where the shape has one.
     Vec3 color{1, 1, 1};  ///< Interpolated vertex colour; white where the shape has none.
     float alpha = 1;      ///< Of the vertex colour.
     /// Bound of the distance from p, along the normal, at which a ray from p may meet the same primitive again because
@@ -30,7 +31,7 @@ struct SurfaceGeometry {
 /// A point drawn from a shape's surface.
 struct ShapeSample {
     Vec3 p, ng, ns;
-    Vec2 uv;
+    Vec2 uv;  ///< Parameters within the primitive, as in RayHit.
     uint32_t prim;
     float slack = 0;  ///< As SurfaceGeometry::slack.
 };
@@ -54,10 +55,11 @@ public:
 class TriangleMesh final : public Shape {
 public:
     std::vector<Vec3> positions;
-    std::vector<Vec3> normals;  ///< Empty, or one unit vector per vertex.
-    std::vector<Vec2> uvs;      ///< Empty, or one per vertex.
-    std::vector<Vec3> colors;   ///< Empty, or one per vertex.
-    std::vector<float> alphas;  ///< Of the colours; empty, or one per vertex.
+    std::vector<Vec3> normals;     ///< Empty, or one unit vector per vertex.
+    std::vector<Vec2> uvs;         ///< Empty, or one per vertex.
+    std::vector<Vec2> second_uvs;  ///< The same.
+    std::vector<Vec3> colors;      ///< Empty, or one per vertex.
+    std::vector<float> alphas;     ///< Of the colours; empty, or one per vertex.
     std::vector<std::array<uint32_t, 3>> triangles;
     std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see finish().
 

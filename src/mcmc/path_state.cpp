@@ -43,7 +43,8 @@ void PathState::append(const Vertex& v) {
     } else {
         added.bsdf = {};
         // The vertex of an eye path that left the scene belongs to all emitters at infinity.
-        if (added.emitter) x_.back().opacity = added.emitter->opacity(added.uv);
+        if (added.emitter)
+            x_.back().opacity = added.emitter->opacity(added.uv, added.location.prim);
     }
 }
 
@@ -112,7 +113,7 @@ bool PathState::evaluate(int first, int last) {
         PathVertex& x0 = x_[0];
         const Emitter& e = emitter();
         const Vec3 w = direction(x0.v, x_[1].v);
-        const Emitter::Emission emission = e.eval_emission(x0.v.ng, x0.v.uv, w);
+        const Emitter::Emission emission = e.eval_emission(x0.v.ng, x0.v.uv, x0.v.location.prim, w);
         x0.value = emission.Le_cos;
         if (x0.value.is_zero()) return false;
         x0.light_ = x0.next_event_ = measure_.unit_area * double(e.selection_pmf);

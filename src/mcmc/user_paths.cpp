@@ -224,7 +224,7 @@ private:
         if (!shape.emitter)
             return refuse(0, fmt::format("is on {}, which emits nothing", name_of(scene_, shape)));
         path_.emitter = shape.emitter;
-        path_.uv = g.uv;
+        path_.uv = {at.hit.location.u, at.hit.location.v};
         path_.prim = at.hit.location.prim;
     }
 
@@ -265,7 +265,8 @@ private:
         UserPath::Point& point = path_.points[i];
         const bool is_last = i + 1 == path_.points.size();
         if (i == 0) {
-            if (path_.emitter->eval_emission(point.ng, path_.uv, toward(0, 1)).Le_cos.is_zero())
+            if (path_.emitter->eval_emission(point.ng, path_.uv, path_.prim, toward(0, 1))
+                    .Le_cos.is_zero())
                 refuse(0, "its emitter emits nothing toward the next point");
             return;
         }
@@ -395,12 +396,13 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
         SurfaceHit hit;
         if (!find_on_emitter(path, points[0].p + frame.s * disc.x + frame.t * disc.y, hit))
             return false;
-        e.p = hit.geometry.p, e.ng = hit.geometry.ng, e.uv = hit.geometry.uv;
+        e.p = hit.geometry.p, e.ng = hit.geometry.ng;
+        e.uv = {hit.location.u, hit.location.v};
         e.prim = hit.location.prim;
     }
     e.d = sample_cone(normalize(points[1].p - e.p), points[0].versine, sampler.next_2d());
     if (!emitter.is_area()) e.ng = e.d;
-    const Emitter::Emission emission = emitter.eval_emission(e.ng, e.uv, e.d);
+    const Emitter::Emission emission = emitter.eval_emission(e.ng, e.uv, e.prim, e.d);
     e.Le = emission.Le_cos, e.pdf_d = emission.pdf_d;
     if (emitter.is_area()) {
         e.Le *= 1 / abs_dot(e.ng, e.d);

@@ -114,7 +114,8 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     // Emission: x_0 and the direction to x_1.
     const Emitter& emitter = *x[0]->emitter;
     const Vec3 w0 = direction(*x[0], *x[1]);
-    const Emitter::Emission emission = emitter.eval_emission(x[0]->ng, x[0]->uv, w0);
+    const Emitter::Emission emission =
+        emitter.eval_emission(x[0]->ng, x[0]->uv, x[0]->location.prim, w0);
     const EmitterHit hit = emitter.is_infinite()
                                ? emitter.eval_infinite(x[0]->p)
                                : emitter.eval_surface(x[0]->ng, x[0]->uv, x[0]->location.prim, w0);

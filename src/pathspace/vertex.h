@@ -74,8 +74,8 @@ struct Vertex {
     const SceneShape* shape = nullptr;
     const Emitter* emitter = nullptr;  ///< Of an emitter vertex, or of the surface.
     SurfaceLocation location;          ///< On a surface; for y_0 only `prim` is set.
-    Vec2 uv;
-    float slack = 0;  ///< Of a surface vertex, see SurfaceGeometry.
+    Vec2 uv;                           ///< Parameters within the primitive, as those of `location`.
+    float slack = 0;                   ///< Of a surface vertex, see SurfaceGeometry.
     const GuideCell* guide =
         nullptr;  ///< Learned directions here; nullptr if the walk is not guided.
     float guide_rev =
@@ -92,10 +92,11 @@ struct Vertex {
         shape = &on;
         emitter = on.emitter;
         location = at;
-        uv = g.uv;
+        uv = {at.u, at.v};
         slack = g.slack;
-        on.material->make_bsdf({g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo, g.color, g.alpha}, arena,
-                               bsdf);
+        on.material->make_bsdf(
+            {g.p, g.ng, g.ns, g.dpdu, g.dpdv, g.uv, wo, g.color, g.alpha, g.second_uv}, arena,
+            bsdf);
         is_connectible = bsdf.has_smooth();
         gloss = gloss_of_roughness(bsdf.roughness());
     }
@@ -115,7 +116,7 @@ struct Vertex {
     std::optional<BsdfSample> sample_unguided(float u_lobe, Vec2 u, TransportMode mode) const {
         if (kind != Kind::Emitter) return bsdf.sample(wo, u_lobe, u, mode);
         const Vec3 w = emitter->sample_direction(ng, u);
-        const Emitter::Emission e = emitter->eval_emission(ng, uv, w);
+        const Emitter::Emission e = emitter->eval_emission(ng, uv, location.prim, w);
         if (!(e.pdf_d > 0)) return {};
         return BsdfSample{.wi = w, .weight = e.Le_cos * (1 / e.pdf_d), .pdf = e.pdf_d};
     }
@@ -127,7 +128,7 @@ struct Vertex {
     }
     BsdfEval eval_unguided(Vec3 w, TransportMode mode) const {
         if (kind != Kind::Emitter) return bsdf.eval(wo, w, mode);
-        const Emitter::Emission e = emitter->eval_emission(ng, uv, w);
+        const Emitter::Emission e = emitter->eval_emission(ng, uv, location.prim, w);
         return {.f = e.Le_cos, .pdf = e.pdf_d};
     }
     /// Upper bound of eval(w).pdf over the directions of a cone; kInf where none is known.

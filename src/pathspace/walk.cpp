@@ -182,7 +182,7 @@ void guide_emission(Vertex& y0, Vec2 u_d, float u_guide, EmissionSample& e) {
     if (!s) return;
     e.d = s->wi;
     if (!y0.has_cosine) y0.ng = e.d;
-    e.Le = y0.emitter->eval_emission(y0.ng, y0.uv, e.d).Le_cos;
+    e.Le = y0.emitter->eval_emission(y0.ng, y0.uv, y0.location.prim, e.d).Le_cos;
     if (y0.has_cosine) e.Le *= 1 / abs_dot(y0.ng, e.d);
 }
 

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "color/metallic_color.h"
 #include "readers/gltf_reader.h"
 
 namespace etendue {
@@ -42,6 +43,12 @@ double ior(const JsonValue& m) {
     return eta == 0 ? 1e3 : std::max(eta, 1.0001);
 }
 
+bool has_specular_colour(const JsonValue& m) {
+    const JsonValue specular = extension(m, "KHR_materials_specular");
+    const Rgb tint = colour(specular["specularColorFactor"], Rgb(1));
+    return tint.max() > 0 && (!(tint == Rgb(tint.r)) || specular["specularColorTexture"]);
+}
+
 }  // namespace
 
 const GltfReader::Material& GltfReader::material(size_t index, VertexColors colors) {
@@ -54,17 +61,14 @@ const GltfReader::Material& GltfReader::material(size_t index, VertexColors colo
 }
 
 GltfReader::Material GltfReader::read_material(const JsonValue& m, VertexColors colors) {
-    uv_set_.reset();
+    uv_sets_.clear();
+    // Tangents are those of the first set.
+    if (m["normalTexture"]) uv_set(m["normalTexture"]);
     Material made;
     if (extension(m, "KHR_materials_unlit")) {
         warn(fmt::format("{}: an unlit material is rendered as a diffuse one", m.path()));
         made.bsdf = add("bsdf", "diffuse", m);
-        Rgb factor;
-        const int texture = base_color(m, colors, factor);
-        if (texture >= 0)
-            add_child(made.bsdf, "reflectance", texture);
-        else
-            set(made.bsdf, "reflectance", clamped(factor));
+        set_color(made.bsdf, "reflectance", base_color(m, colors));
     } else {
         made.bsdf = add("bsdf", "principled", m);
         read_principled(m, made.bsdf, colors);
@@ -90,7 +94,8 @@ GltfReader::Material GltfReader::read_material(const JsonValue& m, VertexColors 
     }
     read_emission(m, made);
     apply_opacity(m, made, colors);
-    made.uv_set = uv_set_.value_or(0);
+    if (uv_sets_.empty()) uv_sets_.push_back(0);
+    made.uv_sets = uv_sets_;
     return made;
 }
 
@@ -98,17 +103,29 @@ void GltfReader::read_principled(const JsonValue& m, int principled, VertexColor
     if (const JsonValue old = extension(m, "KHR_materials_pbrSpecularGlossiness"))
         return read_specular_glossiness(old, principled, colors);
     const JsonValue pbr = m["pbrMetallicRoughness"];
-    Rgb factor;
-    const int texture = base_color(m, colors, factor);
-    if (texture >= 0)
-        add_child(principled, "base_color", texture);
-    else
-        set(principled, "base_color", clamped(factor));
     const JsonValue metal_and_rough = pbr["metallicRoughnessTexture"];
-    set_scalar(principled, "metallic", pbr["metallicFactor"].number(1, 0, 1), metal_and_rough, "b");
+    const double metallic = pbr["metallicFactor"].number(1, 0, 1);
+    const Color base = base_color(m, colors);
+    if (metallic == 0 && transmission(m) == 0 && has_specular_colour(m)) {
+        set_diffuse_and_specular(principled, base, specular_colour(m), m);
+    } else {
+        set_color(principled, "base_color", base);
+        set_scalar(principled, "metallic", metallic, metal_and_rough, "b");
+        set(principled, "eta", ior(m));
+        if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
+            set_scalar(principled, "specular_weight", specular["specularFactor"].number(1, 0, 1),
+                       specular["specularTexture"], "opacity");
+            Color tint{colour(specular["specularColorFactor"], Rgb(1))};
+            if (tint.factor.max() > 0)
+                tint.texture = bitmap(specular["specularColorTexture"], false);
+            set_color(principled, "specular_color", tint);
+            if (has_specular_colour(m))
+                warn(fmt::format("{}: of the specular colour the luminance is used",
+                                 specular.path()));
+        }
+    }
     set_scalar(principled, "roughness", pbr["roughnessFactor"].number(1, 0, 1), metal_and_rough,
                "g");
-    set(principled, "eta", ior(m));
     if (const double t = transmission(m); t > 0 && has_volume(m))
         set_scalar(principled, "spec_trans", t,
                    extension(m, "KHR_materials_transmission")["transmissionTexture"], "r");
@@ -132,60 +149,47 @@ void GltfReader::read_principled(const JsonValue& m, int principled, VertexColor
         if (brushed["anisotropyRotation"].number(0) != 0 || brushed["anisotropyTexture"])
             warn(fmt::format("{}: the direction has no effect", brushed.path()));
     }
-    if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
-        set_scalar(principled, "specular_weight", specular["specularFactor"].number(1, 0, 1),
-                   specular["specularTexture"], "opacity");
-        const Rgb tint = colour(specular["specularColorFactor"], Rgb(1));
-        set_color(principled, "specular_color", tint, specular["specularColorTexture"]);
-        if (!(tint == Rgb(tint.r)) || specular["specularColorTexture"])
-            warn(fmt::format("{}: of the specular colour the luminance is used", specular.path()));
-    }
 }
 
-namespace {
-
-/// A material of metal and dielectric with F0 = 0.04 that has this diffuse and this specular colour.
-struct MetallicColor {
-    double metallic;
-    Rgb base;
-};
-MetallicColor metallic_color(const Rgb& diffuse, const Rgb& specular) {
-    constexpr double kF0 = 0.04, kLeast = 1e-6;
-    const auto brightness = [](const Rgb& c) { return double(luminance(c)); };
-    const double rest = 1 - double(specular.max()), s = brightness(specular),
-                 d = brightness(diffuse) * rest / (1 - kF0);
-    // With the base colour b: d = b (1 - m) and s = kF0 (1 - m) + b m, hence kF0 m² + (d + s - 2 kF0) m + kF0 - s = 0.
-    double m = 0;
-    if (s > kF0) {
-        const double p = d + s - 2 * kF0, discriminant = p * p - 4 * kF0 * (kF0 - s);
-        m = std::clamp((-p + std::sqrt(std::max(discriminant, 0.0))) / (2 * kF0), 0.0, 1.0);
-    }
-    const Rgb of_diffuse = diffuse * float(rest / (1 - kF0) / std::max(1 - m, kLeast)),
-              of_specular = (specular - Rgb(float(kF0 * (1 - m)))) * float(1 / std::max(m, kLeast));
-    return {m, clamped(lerp(float(m * m), of_diffuse, of_specular))};
+/// The reflectance at normal incidence.
+GltfReader::Color GltfReader::specular_colour(const JsonValue& m) {
+    const JsonValue specular = extension(m, "KHR_materials_specular");
+    const double n = ior(m), F0 = (n - 1) * (n - 1) / ((n + 1) * (n + 1)),
+                 weight = specular["specularFactor"].number(1, 0, 1);
+    Color made{colour(specular["specularColorFactor"], Rgb(1)) * float(F0 * weight)};
+    if (made.factor.max() == 0) return made;
+    const int tint = bitmap(specular["specularColorTexture"], false),
+              share = bitmap(specular["specularTexture"], true, "opacity");
+    made.texture = tint >= 0 && share >= 0 ? product(tint, share) : std::max(tint, share);
+    return made;
 }
 
-}  // namespace
+/// Sets the parameters with which `principled` comes near to these colours.
+void GltfReader::set_diffuse_and_specular(int principled, const Color& diffuse,
+                                          const Color& specular, const JsonValue& where) {
+    const MetallicColor made = metallic_color(diffuse.factor, specular.factor);
+    if (specular.texture >= 0 || (diffuse.texture >= 0 && made.metallic > 0)) {
+        for (const char* output : {"base_color", "metallic", "specular_weight"}) {
+            const int part = add("texture", "specular_to_metallic", where);
+            set(part, "output", std::string(output));
+            set_color(part, "diffuse", diffuse);
+            set_color(part, "specular", specular);
+            add_child(principled, output, part);
+        }
+        return;
+    }
+    set_color(principled, "base_color", {made.base, diffuse.texture});
+    set(principled, "metallic", double(made.metallic));
+    if (made.specular_weight < 1) set(principled, "specular_weight", double(made.specular_weight));
+}
 
 /// The older workflow: diffuse and specular colours, and the glossiness 1 - √α.
 void GltfReader::read_specular_glossiness(const JsonValue& s, int principled, VertexColors colors) {
     const JsonValue both = s["specularGlossinessTexture"];
-    const std::vector<double> d = s["diffuseFactor"].numbers(4, {1, 1, 1, 1});
-    const Rgb diffuse = clamped({float(d[0]), float(d[1]), float(d[2])});
-    MetallicColor made{0, diffuse};
-    if (both)
-        warn(fmt::format("{}: its colour has no effect, only its glossiness", both.path()));
-    else
-        made = metallic_color(diffuse, clamped(colour(s["specularFactor"], Rgb(1))));
-    const int image = bitmap(s["diffuseTexture"], false);
-    const int tint = colors == VertexColors::None ? -1 : vertex_attribute("vertex_color");
-    const int texture = image >= 0 && tint >= 0 ? product(image, tint) : std::max(image, tint);
-    if (texture >= 0)
-        add_child(principled, "base_color",
-                  made.base == Rgb(1) ? texture : scaled(texture, made.base));
-    else
-        set(principled, "base_color", made.base);
-    set(principled, "metallic", made.metallic);
+    const Color diffuse = with_vertex_colors(s["diffuseFactor"], s["diffuseTexture"], colors);
+    Color specular{clamped(colour(s["specularFactor"], Rgb(1)))};
+    if (specular.factor.max() > 0) specular.texture = bitmap(both, false);
+    set_diffuse_and_specular(principled, diffuse, specular, s);
     const double glossiness = s["glossinessFactor"].number(1, 0, 1);
     const int gloss = bitmap(both, true, "opacity");
     if (gloss >= 0) {
@@ -199,17 +203,21 @@ void GltfReader::read_specular_glossiness(const JsonValue& s, int principled, Ve
     }
 }
 
-/// The texture of the base colour, with vertex colours and factor; -1 where it is constant, namely `factor`.
-int GltfReader::base_color(const JsonValue& m, VertexColors colors, Rgb& factor) {
+/// The base colour of metallic-roughness materials, with vertex colours.
+GltfReader::Color GltfReader::base_color(const JsonValue& m, VertexColors colors) {
     const JsonValue pbr = m["pbrMetallicRoughness"];
-    const std::vector<double> f = pbr["baseColorFactor"].numbers(4, {1, 1, 1, 1});
-    factor = clamped({float(f[0]), float(f[1]), float(f[2])});
-    int texture = bitmap(pbr["baseColorTexture"], false);
+    return with_vertex_colors(pbr["baseColorFactor"], pbr["baseColorTexture"], colors);
+}
+
+GltfReader::Color GltfReader::with_vertex_colors(const JsonValue& factor, const JsonValue& texture,
+                                                 VertexColors colors) {
+    const std::vector<double> f = factor.numbers(4, {1, 1, 1, 1});
+    Color made{clamped({float(f[0]), float(f[1]), float(f[2])}), bitmap(texture, false)};
     if (colors != VertexColors::None) {
         const int tint = vertex_attribute("vertex_color");
-        texture = texture >= 0 ? product(texture, tint) : tint;
+        made.texture = made.texture >= 0 ? product(made.texture, tint) : tint;
     }
-    return texture >= 0 && !(factor == Rgb(1)) ? scaled(texture, factor) : texture;
+    return made;
 }
 
 int GltfReader::vertex_attribute(const char* name) {
@@ -242,12 +250,7 @@ int GltfReader::thin_glass(const JsonValue& m, int principled, VertexColors colo
             if (specular[name])
                 warn(fmt::format("{}: has no effect on the pane", specular[name].path()));
     }
-    Rgb factor;
-    const int tint = base_color(m, colors, factor);
-    if (tint >= 0)
-        add_child(pane, "specular_transmittance", tint);
-    else
-        set(pane, "specular_transmittance", factor);
+    set_color(pane, "specular_transmittance", base_color(m, colors));
     const int opaque = add("bsdf", "twosided", m);
     add_child(opaque, "", principled);
     const int blend = add("bsdf", "blendbsdf", m);
@@ -279,10 +282,7 @@ void GltfReader::read_emission(const JsonValue& m, Material& made) {
     if (factor.max() == 0) return;
     made.emitter = add("emitter", "area", m);
     const int texture = bitmap(m["emissiveTexture"], false);
-    if (texture < 0)
-        set(made.emitter, "radiance", factor);
-    else
-        add_child(made.emitter, "radiance", factor == Rgb(1) ? texture : scaled(texture, factor));
+    set_color(made.emitter, "radiance", {factor, texture});
     if (m["doubleSided"].flag(false)) set(made.emitter, "two_sided", true);
 }
 
@@ -304,12 +304,6 @@ void GltfReader::apply_opacity(const JsonValue& m, Material& made, VertexColors 
     if (mode == "OPAQUE") return;
     if (mode != "MASK" && mode != "BLEND")
         m["alphaMode"].fail(fmt::format("is \"{}\", but must be OPAQUE, MASK or BLEND", mode));
-    if (made.emitter >= 0 && colors == VertexColors::Rgba) {
-        warn(fmt::format("{}: the alpha of vertex colours has no effect, since the material emits "
-                         "light",
-                         m.path()));
-        colors = VertexColors::Rgb;
-    }
     const double cutoff = m["alphaCutoff"].number(0.5, 0);
     const auto [texture, factor] = alpha(m, colors);
     int opacity = -1;
@@ -353,24 +347,28 @@ std::string wrapping(const JsonValue& mode) {
 
 }  // namespace
 
-/// A mesh has one set of texture coordinates in the description.
-void GltfReader::check_uv_set(const JsonValue& info) {
+int GltfReader::uv_set(const JsonValue& info) {
     const JsonValue transform = info["extensions"]["KHR_texture_transform"];
     const auto own = info["texCoord"].integer(0, 0, 1000);
     const auto set = size_t(transform["texCoord"].integer(own, 0, 1000));
-    if (!uv_set_) uv_set_ = set;
-    if (*uv_set_ != set)
-        reject(info,
-               fmt::format("a material whose textures use different texture coordinates ({} and "
-                           "{}) is not supported",
-                           *uv_set_, set));
+    const auto it = std::find(uv_sets_.begin(), uv_sets_.end(), set);
+    if (it != uv_sets_.end()) return int(it - uv_sets_.begin());
+    constexpr size_t kMost = 2;
+    if (uv_sets_.size() == kMost) {
+        reject(info, fmt::format("a material whose textures use more than {} sets of texture "
+                                 "coordinates ({}, {} and {}) is not supported",
+                                 kMost, uv_sets_[0], uv_sets_[1], set));
+        return 0;
+    }
+    uv_sets_.push_back(set);
+    return int(uv_sets_.size()) - 1;
 }
 
 int GltfReader::bitmap(const JsonValue& info, bool raw, const char* channel) {
     if (!info) return -1;
     const auto index = info["index"].index(textures_.size());
     if (!index) info["index"].fail("is missing");
-    check_uv_set(info);
+    const int set_of_uvs = uv_set(info);
     const JsonValue& t = textures_[*index];
     const auto source = t["source"].index(images_.size());
     if (!source) {
@@ -395,6 +393,7 @@ int GltfReader::bitmap(const JsonValue& info, bool raw, const char* channel) {
         }
         set(made, "image", at->second);
     }
+    if (set_of_uvs != 0) set(made, "uv_set", int64_t(set_of_uvs));
     if (raw) set(made, "raw", true);
     if (channel && std::string_view(channel) != "all") set(made, "channel", std::string(channel));
     if (const auto sampler = t["sampler"].index(samplers_.size())) {
@@ -427,12 +426,12 @@ int GltfReader::scaled(int texture, ParamValue factor) {
     return product;
 }
 
-void GltfReader::set_color(int object, const char* name, Rgb factor, const JsonValue& texture) {
-    const int image = factor.max() > 0 ? bitmap(texture, false) : -1;
-    if (image < 0)
-        set(object, name, factor);
+void GltfReader::set_color(int object, const char* name, const Color& color) {
+    if (color.texture < 0)
+        set(object, name, color.factor);
     else
-        add_child(object, name, factor == Rgb(1) ? image : scaled(image, factor));
+        add_child(object, name,
+                  color.factor == Rgb(1) ? color.texture : scaled(color.texture, color.factor));
 }
 
 void GltfReader::set_scalar(int object, const char* name, double factor, const JsonValue& texture,

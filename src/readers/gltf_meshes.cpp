@@ -142,11 +142,13 @@ std::optional<GltfReader::Primitive> GltfReader::read_primitive(const JsonValue&
         made.colors = mesh.alphas.empty() ? VertexColors::Rgb : VertexColors::Rgba;
     }
     const Material& m = material(material_index, made.colors);
-    if (const JsonValue uvs = attributes[fmt::format("TEXCOORD_{}", m.uv_set)]) {
-        const GltfBuffers::Values v = read(uvs, "VEC2");
-        for (size_t i = 0; i < v.count; ++i)
-            mesh.uvs.push_back({v.numbers[2 * i], v.numbers[2 * i + 1]});
-    }
+    for (size_t set = 0; set < m.uv_sets.size(); ++set)
+        if (const JsonValue uvs = attributes[fmt::format("TEXCOORD_{}", m.uv_sets[set])]) {
+            const GltfBuffers::Values v = read(uvs, "VEC2");
+            auto& to = set == 0 ? mesh.uvs : mesh.second_uvs;
+            for (size_t i = 0; i < v.count; ++i)
+                to.push_back({v.numbers[2 * i], v.numbers[2 * i + 1]});
+        }
     if (!primitive["indices"])
         for (size_t i = 0; i < count; ++i) vertices.push_back(uint32_t(i));
     mesh.triangles = triangles(vertices, mode);

@@ -28,7 +28,8 @@ private:
         int bsdf = -1;
         int emitter = -1;  ///< Emitter, of which each shape has its own copy; -1: none.
         int interior = -1;
-        size_t uv_set = 0;
+        /// Numbers of the sets of texture coordinates that are used: at most two.
+        std::vector<size_t> uv_sets;
     };
     /// What COLOR_0 of a primitive has; an alpha of one everywhere counts as none.
     enum class VertexColors { None, Rgb, Rgba };
@@ -66,10 +67,20 @@ private:
     const Material& material(size_t index, VertexColors colors);
     Material read_material(const JsonValue& m, VertexColors colors);
     void read_principled(const JsonValue& m, int principled, VertexColors colors);
-    int base_color(const JsonValue& m, VertexColors colors, Rgb& factor);
     int vertex_attribute(const char* name);
     int product(int a, int b);
-    void set_color(int object, const char* name, Rgb factor, const JsonValue& texture);
+    /// A factor, times a texture unless that is -1.
+    struct Color {
+        Rgb factor;
+        int texture = -1;
+    };
+    Color base_color(const JsonValue& m, VertexColors colors);
+    Color with_vertex_colors(const JsonValue& factor, const JsonValue& texture,
+                             VertexColors colors);
+    void set_color(int object, const char* name, const Color& color);
+    Color specular_colour(const JsonValue& m);
+    void set_diffuse_and_specular(int principled, const Color& diffuse, const Color& specular,
+                                  const JsonValue& where);
     void read_specular_glossiness(const JsonValue& s, int principled, VertexColors colors);
     void apply_opacity(const JsonValue& m, Material& made, VertexColors colors);
     /// The product of the factors of alpha; a constant where there is no texture.
@@ -87,7 +98,8 @@ private:
     void set_scalar(int object, const char* name, double factor, const JsonValue& texture,
                     const char* channel);
     int scaled(int texture, ParamValue factor);
-    void check_uv_set(const JsonValue& info);
+    /// Which of the mesh's two sets of texture coordinates a texture is a function of.
+    int uv_set(const JsonValue& info);
 
     int add(const char* category, const char* type, const JsonValue& where);
     void set(int object, const char* name, ParamValue value);
@@ -110,7 +122,7 @@ private:
     std::map<size_t, std::vector<Primitive>> primitives_;
     std::map<std::pair<size_t, VertexColors>, Material> made_materials_;
     std::map<size_t, int64_t> loaded_images_;  ///< Index into SceneDescription::images.
-    std::optional<size_t> uv_set_;             ///< Of the material that is being read.
+    std::vector<size_t> uv_sets_;              ///< Of the material that is being read.
     Bounds3 bounds_;
     MemoryWatch watch_;
     bool has_light_ = false, has_camera_ = false;

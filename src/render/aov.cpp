@@ -17,12 +17,15 @@ Rgb to_rgb(Vec3 v) {
     return {v.x, v.y, v.z};
 }
 
-Rgb value(const std::string& name, const Vertex& v, const SubPath& z) {
+Rgb value(const std::string& name, const Vertex& v, const SubPath& z, const Scene& scene) {
     if (name == "albedo") return v.bsdf.albedo_estimate();
     if (name == "normal") return to_rgb(v.bsdf.shading_normal());
     if (name == "depth") return Rgb(z.flight.length);
     if (name == "position") return to_rgb(v.p);
-    if (name == "uv") return {v.uv.x, v.uv.y, 0};
+    if (name == "uv") {
+        const Vec2 uv = scene.surface(v.location).uv;
+        return {uv.x, uv.y, 0};
+    }
     return Rgb();
 }
 
@@ -85,7 +88,7 @@ std::vector<AovImage> render_aovs(const Scene& scene, const std::vector<std::str
     if (images.empty()) return images;
     auto pixels = average_first_hits(
         scene, images.size(), samples, seed, threads,
-        [&](const SubPath& z, size_t i) { return value(images[i].name, z[1], z); });
+        [&](const SubPath& z, size_t i) { return value(images[i].name, z[1], z, scene); });
     for (size_t i = 0; i < images.size(); ++i) images[i].pixels = std::move(pixels[i]);
     return images;
 }

@@ -194,10 +194,6 @@ private:
         if (!materials.empty() && is_invisible(materials[0].object))
             plugins_.problem(where, "an emitter on a shape with bsdf \"null\" is not supported: "
                                     "what no ray meets emits nothing");
-        else if (!materials.empty() && !models_.has_plain_opacity(materials[0].object))
-            plugins_.problem(where,
-                             "the opacity of a shape that emits must be a function of (u, v) "
-                             "alone, not of space or vertex colours");
         else if (in_group)
             plugins_.problem(where, "an emitter in a shapegroup is not supported (add the shape to "
                                     "the scene instead)");

@@ -12,9 +12,6 @@ namespace etendue {
 TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fallback, float hi) {
     for (const auto& c : p.object().children)
         if (c.name == name && plugins_.object(c.object).category == "texture") {
-            if (emitting_shape_ && is_of_space(c.object))
-                p.fail(name, "an emitter cannot have a texture of space or of vertex colours: only "
-                             "one of (u, v)");
             const Texture* texture = make_texture(c.object);
             return texture ? TextureRef(texture) : TextureRef(fallback);
         }
@@ -27,31 +24,10 @@ TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fal
     return TextureRef(c);
 }
 
-bool ModelBuilder::is_of_space(int texture) const {
-    const SceneObject& object = plugins_.object(texture);
-    if (object.type == "mesh_attribute") return true;
-    for (const TextureEntry& e : texture_registry())
-        if (object.type == e.info.name && e.is_solid) return true;
-    for (const auto& c : object.children)
-        if (is_of_space(c.object)) return true;
-    return false;
-}
-
-bool ModelBuilder::has_plain_opacity(int bsdf) const {
-    const SceneObject& object = plugins_.object(bsdf);
-    for (const auto& c : object.children) {
-        const std::string& category = plugins_.object(c.object).category;
-        const bool is_opacity =
-            category == "texture" && (object.type == "mask" || object.type == "blendbsdf");
-        if (is_opacity && is_of_space(c.object)) return false;
-        if (category == "bsdf" && !has_plain_opacity(c.object)) return false;
-    }
-    return true;
-}
-
-std::function<float(Vec2 uv)> ModelBuilder::opacity() const {
+std::function<float(const TexturePoint&)> ModelBuilder::opacity() const {
     if (!emitting_material_ || emitting_material_->is_opaque()) return {};
-    return [material = emitting_material_](Vec2 uv) { return material->opacity(uv); };
+    return
+        [material = emitting_material_](const TexturePoint& at) { return material->opacity(at); };
 }
 
 std::vector<const Material*> ModelBuilder::nested(const Params& p) {

@@ -36,8 +36,6 @@ public:
     /// `material` is that of the shape.
     const Emitter* make_emitters(int index, const Shape* on_shape = nullptr,
                                  const Material* material = nullptr);
-    /// Whether the opacity of a material is a function of (u, v) alone, as emitters need it.
-    bool has_plain_opacity(int bsdf) const;
     TextureCache& images() override { return *models_.images; }
     /// The material of shapes without one: diffuse.
     const Material* default_material(Rgb reflectance);
@@ -50,11 +48,9 @@ public:
 private:
     TextureRef texture(const Params& p, std::string_view name, Rgb fallback, float hi) override;
     std::vector<const Material*> nested(const Params& p) override;
-    /// Whether a texture, or one nested in it, is a function of more than (u, v).
-    bool is_of_space(int texture) const;
     const Material* stand_in(int index);
     const Shape* shape() const override { return emitting_shape_; }
-    std::function<float(Vec2 uv)> opacity() const override;
+    std::function<float(const TexturePoint&)> opacity() const override;
 
     PluginLookup& plugins_;
     Models models_;

@@ -54,7 +54,7 @@ RayEnd ray_end(const SurfaceGeometry& g) {
 
 float opacity_of(const SceneShape& shape, const SurfaceGeometry& g) {
     if (shape.material->is_opaque()) return 1;
-    return shape.material->opacity({g.uv, g.color, g.p, {}, {}, g.alpha});
+    return shape.material->opacity({g.uv, g.color, g.p, {}, {}, g.alpha, g.second_uv});
 }
 
 /// The medium beyond a surface that a ray along `d` passes.

@@ -80,6 +80,7 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     mesh->positions = std::move(data.positions);
     mesh->normals = std::move(data.normals);
     mesh->uvs = std::move(data.uvs);
+    mesh->second_uvs = std::move(data.second_uvs);
     mesh->colors = std::move(data.colors);
     mesh->alphas = std::move(data.alphas);
     mesh->triangles = std::move(data.triangles);

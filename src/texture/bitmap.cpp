@@ -6,6 +6,7 @@
 //   wrap_mode_v (wrap_mode)   the same along v, if it differs from that along u
 //   raw (false)               whether integer formats contain linear data, not sRGB; floating-point ones always do
 //   channel (all)             r, g, b or a: one channel as grey (alpha is linear); all: the colours without alpha
+//   uv_set (0)                or 1: the second texture coordinates of a mesh
 //   to_uv (identity)          affine map of (u, v) before the look-up; the upper 2D part of a 4×4 matrix
 // eval_scalar() of colours is their luminance, as in Mitsuba 3 for opacity and roughness.
 
@@ -160,7 +161,7 @@ inline Rgb BitmapTexture::filtered(const Texels& texels, const Footprint& f) con
 }
 
 Rgb BitmapTexture::eval(const TexturePoint& at) const {
-    return std::visit([&](const auto& texels) { return filtered(texels, footprint(at.uv)); },
+    return std::visit([&](const auto& texels) { return filtered(texels, footprint(uv(at))); },
                       image_->data);
 }
 
@@ -170,7 +171,7 @@ float BitmapTexture::eval_scalar(const TexturePoint& at) const {
 }
 
 Vec2 BitmapTexture::gradient(const TexturePoint& at) const {
-    const Footprint f = footprint(at.uv);
+    const Footprint f = footprint(uv(at));
     const auto slopes = [&](const auto& texels) -> Vec2 {
         const auto scalar = [&](int x, int y) {
             const Rgb c = is_bounded_ ? texel_or_outside(texels, x, y) : texel(texels, x, y);
@@ -247,6 +248,7 @@ std::unique_ptr<Texture> make_bitmap(const Params& params, TextureContext& conte
     if (params.has("wrap_mode_v")) options.wrap_v = wrapping("wrap_mode_v");
     options.raw = params.flag("raw", false);
     options.to_uv = UvTransform(params.transform("to_uv"));
+    options.is_of_second_uv = params.integer("uv_set", 0, 0, 1) == 1;
     const int channel = params.choice("channel", {"all", "r", "g", "b", "a", "opacity"}, 0);
     try {
         const PixelBuffer& image = load_image(params, context, options.raw);
@@ -286,6 +288,7 @@ TextureEntry bitmap_entry() {
            "image has no a)."},
           {"image", ParamKind::Int, "",
            "Index of the image among those of the scene file, from 0, instead of filename."},
+          {"uv_set", ParamKind::Int, "0", "0, or 1: the second texture coordinates of a mesh."},
           {"to_uv", ParamKind::Transform, "identity", "Affine map of (u, v) before the look-up."}}},
         make_bitmap};
 }

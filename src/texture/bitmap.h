@@ -32,6 +32,7 @@ public:
         int channel =
             -1;  ///< The one channel to use; -1: the colours, or the first channel of grey images.
         UvTransform to_uv = {};
+        bool is_of_second_uv = false;  ///< Whether it is a function of TexturePoint::second_uv.
     };
 
     BitmapTexture(const PixelBuffer& image,
@@ -47,6 +48,9 @@ public:
 private:
     struct Footprint;
 
+    Vec2 uv(const TexturePoint& at) const {
+        return options_.is_of_second_uv ? at.second_uv : at.uv;
+    }
     Footprint footprint(Vec2 uv) const;
     template <class Texels>
     Rgb texel(const Texels& texels, int x, int y) const;

@@ -2,6 +2,7 @@
 // Textures: functions of the surface's (u, v), of its vertex colours, or of the position ("solid" textures). Materials
 // and emitters store `TextureRef`s: a constant or a texture.
 
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -16,13 +17,20 @@ namespace etendue {
 /// What a texture knows of the point at which it is evaluated.
 struct TexturePoint {
     TexturePoint(Vec2 uv_ = Vec2(), Vec3 color_ = Vec3{1, 1, 1}, Vec3 p_ = {}, Vec3 dpdu_ = {},
-                 Vec3 dpdv_ = {}, float alpha_ = 1)
-        : uv(uv_), color(color_), p(p_), dpdu(dpdu_), dpdv(dpdv_), alpha(alpha_) {}
+                 Vec3 dpdv_ = {}, float alpha_ = 1, Vec2 second_uv_ = Vec2())
+        : uv(uv_), color(color_), p(p_), dpdu(dpdu_), dpdv(dpdv_), alpha(alpha_),
+          second_uv(second_uv_) {}
     TexturePoint(float u, float v) : TexturePoint(Vec2{u, v}) {}
 
     /// The point at (u, v) + `d` on the tangent plane.
     TexturePoint moved(Vec2 d) const {
-        return {{uv.x + d.x, uv.y + d.y}, color, p + dpdu * d.x + dpdv * d.y, dpdu, dpdv, alpha};
+        return {{uv.x + d.x, uv.y + d.y},
+                color,
+                p + dpdu * d.x + dpdv * d.y,
+                dpdu,
+                dpdv,
+                alpha,
+                second_uv};
     }
 
     Vec2 uv;
@@ -30,6 +38,7 @@ struct TexturePoint {
     Vec3 p;           ///< Position in the world.
     Vec3 dpdu, dpdv;  ///< Its derivatives; needed for gradients only.
     float alpha;      ///< Of the vertex colour; one where the shape has none.
+    Vec2 second_uv;   ///< Another set of texture coordinates.
 };
 
 class Texture {
@@ -87,6 +96,9 @@ private:
     const Texture* texture_ = nullptr;
 };
 
+/// Enlarges a grid so that it resolves all of these textures.
+void refine(int& width, int& height, std::initializer_list<const TextureRef*> textures);
+
 class TextureCache;
 
 /// Services of the scene builder for the construction of textures.
@@ -104,7 +116,7 @@ public:
 struct TextureEntry {
     PluginInfo info;
     std::unique_ptr<Texture> (*make)(const Params& params, TextureContext& context);
-    bool is_solid = false;  ///< A function of the position, which emitters do not know.
+    bool is_solid = false;  ///< Whether it is a function of the position.
 };
 /// All texture plug-ins, in the order of `etendue list`.
 const std::vector<TextureEntry>& texture_registry();

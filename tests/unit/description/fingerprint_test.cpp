@@ -44,6 +44,7 @@ struct Parts {
         mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
         mesh.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
         mesh.uvs = {{0, 0}, {1, 0}, {0, 1}};
+        mesh.second_uvs = {{0, 1}, {1, 1}, {0, 2}};
         mesh.colors = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
         mesh.alphas = {0.5f, 1, 0.25f};
         mesh.triangles = {{0, 1, 2}};
@@ -110,6 +111,8 @@ TEST(Fingerprint, CountsEveryBitOfTheContents) {
             "normal", +[](Parts& p) -> Vec3& { return p.mesh.normals[2]; }),
         flip(
             "uv", +[](Parts& p) -> Vec2& { return p.mesh.uvs[2]; }),
+        flip(
+            "second uv", +[](Parts& p) -> Vec2& { return p.mesh.second_uvs[2]; }),
         flip(
             "colour of a vertex", +[](Parts& p) -> Vec3& { return p.mesh.colors[2]; }),
         flip(

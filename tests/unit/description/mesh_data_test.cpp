@@ -90,6 +90,7 @@ TEST(FinishMesh, DropsVerticesOfNoTriangle) {
             m.uvs.push_back({x, x});
             m.colors.push_back({x, x, x});
             m.alphas.push_back(x);
+            m.second_uvs.push_back({x, 2 * x});
         }
     }
     for (auto& t : m.triangles)
@@ -105,6 +106,7 @@ TEST(FinishMesh, DropsVerticesOfNoTriangle) {
         EXPECT_EQ(m.uvs[i].x, float(i));
         EXPECT_EQ(m.colors[i].x, float(i));
         EXPECT_EQ(m.alphas[i], float(i));
+        EXPECT_EQ(m.second_uvs[i], (Vec2{float(i), 2 * float(i)}));
     }
 }
 

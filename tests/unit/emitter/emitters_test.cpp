@@ -24,7 +24,7 @@ class NoContext final : public EmitterContext {
         return TextureRef(fallback);
     }
     const Shape* shape() const override { return nullptr; }
-    std::function<float(Vec2)> opacity() const override { return {}; }
+    std::function<float(const TexturePoint&)> opacity() const override { return {}; }
 };
 
 std::unique_ptr<Emitter> spot(const char* falloff) {
@@ -61,7 +61,7 @@ TEST(Spot, FallsOffAsItSays) {
     const auto at = [](const char* falloff, double degrees) {
         const double radians = degrees * M_PI / 180;
         return spot(falloff)
-            ->eval_emission({}, {}, {float(std::sin(radians)), 0, float(std::cos(radians))})
+            ->eval_emission({}, {}, 0, {float(std::sin(radians)), 0, float(std::cos(radians))})
             .Le_cos.g;
     };
     const double x = (std::cos(35 * M_PI / 180) - std::cos(50 * M_PI / 180)) /
@@ -92,7 +92,7 @@ TEST(AreaEmitter, TwoSidedShinesTheSameFromTheBack) {
         const EmissionSample s = two->sample_emission(u, random.next_2d());
         sum += luminance(s.Le) * std::fabs(dot(s.d, s.ng)) / (s.pdf_y0 * s.pdf_d);
         front += dot(s.d, s.ng) > 0;
-        EXPECT_NEAR(two->eval_emission(s.ng, s.uv, s.d).pdf_d, s.pdf_d, 1e-5);
+        EXPECT_NEAR(two->eval_emission(s.ng, s.uv, s.prim, s.d).pdf_d, s.pdf_d, 1e-5);
     }
     EXPECT_NEAR(sum / kSamples / two->power(), 1, 1e-3);
     EXPECT_NEAR(double(front) / kSamples, 0.5, 4 * 0.5 / std::sqrt(double(kSamples)));
@@ -171,7 +171,7 @@ protected:
             if (!(s.pdf_d > 0)) continue;  // rounded across the edge of a black pixel
             flux += double(luminance(s.Le) / s.pdf_d);
             ASSERT_LE(s.pdf_d, light.max_pdf_d());
-            const Emitter::Emission e = light.eval_emission(s.ng, s.uv, s.d);
+            const Emitter::Emission e = light.eval_emission(s.ng, s.uv, s.prim, s.d);
             ASSERT_EQ(e.pdf_d, s.pdf_d);
             ASSERT_EQ(e.Le_cos, s.Le);
             // Next event from a point in this direction.
@@ -187,7 +187,7 @@ protected:
             const double r = std::sin(theta);
             const Vec3 d{float(r * std::cos(phi)), float(r * std::sin(phi)),
                          float(std::cos(theta))};
-            return r * double(light.eval_emission({}, {}, d).pdf_d);
+            return r * double(light.eval_emission({}, {}, 0, d).pdf_d);
         };
         const testing::Chi2Result result = grid.test(density, 3);
         EXPECT_GT(result.p_value, 1e-3);
@@ -195,7 +195,7 @@ protected:
     }
 
     static Emitter::Emission along(const Emitter& light, Vec3 d) {
-        return light.eval_emission({}, {}, normalize(d));
+        return light.eval_emission({}, {}, 0, normalize(d));
     }
 
     SceneDescription scene_;
@@ -299,7 +299,7 @@ protected:
             return is_constant ? TextureRef(fallback) : TextureRef(&texture_);
         }
         const Shape* shape() const override { return nullptr; }
-        std::function<float(Vec2)> opacity() const override { return nullptr; }
+        std::function<float(const TexturePoint&)> opacity() const override { return nullptr; }
         bool is_constant = false;
 
     private:

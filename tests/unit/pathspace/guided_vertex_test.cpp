@@ -296,7 +296,7 @@ TEST_P(GuidedEmission, IsSampledByItsDensity) {
             const double sin = std::sqrt(1 - cos * cos);
             const Vec3 w{float(sin * std::cos(phi)), float(sin * std::sin(phi)), float(cos)};
             const Vec3 n = emitter().is_area() ? ng : w;
-            const float unguided = emitter().eval_emission(n, uv, w).pdf_d;
+            const float unguided = emitter().eval_emission(n, uv, 0, w).pdf_d;
             return double(emission_pdf(&guide, emitter(), p, n, w, unguided));
         },
         3);

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "error_of.h"
 #include "gltf_document.h"
 #include "image/image_io.h"
 #include "readers/gltf.h"
@@ -21,16 +22,6 @@ using Json = GltfDocument::Json;
 
 constexpr Rgb kRed{1, 0, 0}, kGreen{0, 1, 0}, kBlue{0, 0, 1}, kWhite{1, 1, 1}, kBlack{0, 0, 0};
 
-template <class Action>
-std::string scene_error(const Action& action) {
-    try {
-        action();
-    } catch (const SceneError& e) {
-        return e.what();
-    }
-    return "no error";
-}
-
 /// Radiance along the ray of a film point, given in fractions of the film; the mean over the decisions of masks.
 Rgb seen(const Scene& scene, float x, float y) {
     const FilmGeometry& film = scene.film();
@@ -43,8 +34,9 @@ Rgb seen(const Scene& scene, float x, float y) {
         const float u = (float(i) + 0.5f) / kMasks;
         if (scene.intersect({eye.p, eye.d, kInf}, u, hit)) {
             if (const Emitter* e = hit.shape->emitter)
-                sum +=
-                    e->eval_surface(hit.geometry.ng, hit.geometry.uv, hit.location.prim, -eye.d).Le;
+                sum += e->eval_surface(hit.geometry.ng, {hit.location.u, hit.location.v},
+                                       hit.location.prim, -eye.d)
+                           .Le;
         } else {
             for (const Emitter* e : scene.infinite_emitters()) sum += e->eval_infinite(eye.d).Le;
         }
@@ -213,7 +205,7 @@ TEST(ExportedMeshes, PlyRejectsCoordinatesThatDoNotFit) {
                                  "element face 1\nproperty list uchar int vertex_indices\n"
                                  "property list uchar float texcoord\n",
                                  std::string(kCorners) + "3 0 1 2 4 0 0 1 1\n");
-    EXPECT_EQ(scene_error([&] { parse_ply(text, "s.ply"); }),
+    EXPECT_EQ(error_of([&] { parse_ply(text, "s.ply"); }),
               "s.ply:16: a face of 3 corners has 4 texture coordinates, but needs 6");
 }
 
@@ -245,7 +237,7 @@ TEST_F(ExportedScenes, FoldersOfWindowsAreFound) {
 TEST_F(ExportedScenes, MissingFilesNameWhatIsNear) {
     write("maps/Wood.PNG", four_colours());
     const auto error = [&](const std::string& file) {
-        return scene_error([&] {
+        return error_of([&] {
             xml(flat_camera() +
                 fmt::format("<shape type=\"rectangle\"><bsdf type=\"diffuse\"><texture "
                             "type=\"bitmap\" name=\"reflectance\"><string name=\"filename\" "
@@ -270,7 +262,7 @@ TEST_F(ExportedScenes, GltfDataNeedNoFiles) {
     const Scene scene = build_scene(parse_gltf(d.text(uri), "s.gltf"));
     expect_colour(seen(scene, 0.5f, 0.5f), kGreen, "centre");
     // "=" may be written as %3D, and the "+" and "/" of base64 too.
-    const std::string bad = scene_error([&] {
+    const std::string bad = error_of([&] {
         parse_gltf(R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":
             [{"attributes":{"POSITION":0}}]}],"accessors":[{"bufferView":0,"componentType":5126,
             "type":"VEC3","count":1}],"bufferViews":[{"buffer":0,"byteLength":2}],
@@ -480,7 +472,7 @@ TEST_F(ExportedScenes, PbrtDirectivesGoOnBehindAnInclude) {
                             "Include \"lights/begin.pbrt\"\nInclude \"value.pbrt\" .6 ]\n"
                             "Include \"shape.pbrt\" \"sphere\" \"float radius\" 1\n");
     // The next directive of the outer file ends the one of the included file.
-    EXPECT_EQ(scene_error([&] { read_scene_file(path("scene.pbrt")); }),
+    EXPECT_EQ(error_of([&] { read_scene_file(path("scene.pbrt")); }),
               path("value.pbrt") + ":1: expected a directive, found the string \"rgb L\"");
     write("scene.pbrt", std::string(kLamp) +
                             "Include \"lights/begin.pbrt\" \"rgb L\" [ .2 .4 .6 ]\n"
@@ -492,7 +484,7 @@ TEST_F(ExportedScenes, PbrtDirectivesGoOnBehindAnInclude) {
 TEST_F(ExportedScenes, PbrtErrorsNameTheFileOfTheToken) {
     write("begin.pbrt", "AreaLightSource \"diffuse\"\n\"rgb L\"\n");
     write("scene.pbrt", std::string(kLamp) + "Include \"begin.pbrt\"\n[ .2 x ]\n");
-    const std::string message = scene_error([&] { read_scene_file(path("scene.pbrt")); });
+    const std::string message = error_of([&] { read_scene_file(path("scene.pbrt")); });
     EXPECT_EQ(message.rfind(path("scene.pbrt") + ":6: ", 0), 0u) << message;
     // A file that was left may be included again, one that is open may not.
     write("twice.pbrt", "Shape \"sphere\"\n");
@@ -501,7 +493,7 @@ TEST_F(ExportedScenes, PbrtErrorsNameTheFileOfTheToken) {
                                              "\"twice.pbrt\"\n");
     EXPECT_EQ(build_scene(read_scene_file(path("scene.pbrt"))).shapes().size(), 3u);
     write("twice.pbrt", "Include \"twice.pbrt\"\n");
-    EXPECT_NE(scene_error([&] { read_scene_file(path("scene.pbrt")); }).find("includes itself"),
+    EXPECT_NE(error_of([&] { read_scene_file(path("scene.pbrt")); }).find("includes itself"),
               std::string::npos);
 }
 
@@ -510,7 +502,7 @@ TEST_F(ExportedScenes, PbrtImportsAreComplete) {
     write("begin.pbrt", "Shape \"sphere\"\n");
     write("scene.pbrt", std::string(kLamp) + "AreaLightSource \"diffuse\"\nImport "
                                              "\"begin.pbrt\"\n\"float radius\" 1\n");
-    EXPECT_EQ(scene_error([&] { read_scene_file(path("scene.pbrt")); }),
+    EXPECT_EQ(error_of([&] { read_scene_file(path("scene.pbrt")); }),
               path("scene.pbrt") + ":7: expected a directive, found the string \"float radius\"");
 }
 
@@ -558,7 +550,7 @@ TEST_F(ExportedScenes, EntitiesAreReplaced) {
 
 TEST(ExportedXml, EntitiesHaveLimits) {
     const auto error = [](const std::string& declared, const std::string& body) {
-        return scene_error([&] {
+        return error_of([&] {
             parse_mitsuba_xml("<!DOCTYPE scene [" + declared + "]>\n<scene version=\"3.0.0\">\n" +
                                   body + "</scene>",
                               "s.xml");
@@ -628,12 +620,13 @@ TEST_F(ExportedScenes, MasksHideEmissionFromAllSides) {
         const EmissionSample e = lamp.sample_emission({a, b}, {0.3f, 0.7f});
         DirectSample d;
         ASSERT_TRUE(lamp.sample_direct({0, 0, 3}, {a, b}, d));
-        dark += lamp.opacity(e.uv) == 0;
-        EXPECT_EQ(e.Le, Rgb(4 * lamp.opacity(e.uv)));
-        EXPECT_EQ(d.Le, Rgb(4 * lamp.opacity(d.uv)));
+        const float opacity = lamp.opacity(e.uv, e.prim);
+        dark += opacity == 0;
+        EXPECT_EQ(e.Le, Rgb(4 * opacity));
+        EXPECT_EQ(d.Le, Rgb(4 * lamp.opacity(d.uv, d.prim)));
         const float cosine = 0.5f;
-        EXPECT_EQ(lamp.eval_emission({0, 0, 1}, e.uv, {std::sqrt(0.75f), 0, cosine}).Le_cos,
-                  Rgb(4 * lamp.opacity(e.uv) * cosine));
+        EXPECT_EQ(lamp.eval_emission({0, 0, 1}, e.uv, e.prim, {std::sqrt(0.75f), 0, cosine}).Le_cos,
+                  Rgb(4 * opacity * cosine));
         // A ray that meets the surface sees all of it.
         EXPECT_EQ(lamp.eval_surface({0, 0, 1}, e.uv, e.prim, {0, 0, 1}).Le, Rgb(4));
     }
@@ -648,19 +641,125 @@ TEST_F(ExportedScenes, MasksReducePower) {
     EXPECT_NEAR(scene.emitter(0).power(), double(kPi) * 4 * 4 * 0.25, 1e-4);
 }
 
-TEST_F(ExportedScenes, EmittersNeedOpacityOfTheirSurface) {
-    const auto error = [&](const std::string& bsdf) {
-        return scene_error([&] {
-            xml(flat_camera() + "<shape type=\"rectangle\">" + bsdf +
-                "<emitter type=\"area\"/></shape>");
-        });
-    };
-    EXPECT_NE(error(R"(<bsdf type="null"/>)").find("an emitter on a shape with bsdf \"null\""),
-              std::string::npos);
-    EXPECT_NE(error(R"(<bsdf type="mask"><texture type="mesh_attribute" name="opacity"/>
-        <bsdf type="diffuse"/></bsdf>)")
-                  .find("must be a function of (u, v) alone"),
-              std::string::npos);
+TEST_F(ExportedScenes, InvisibleShapesDoNotEmit) {
+    EXPECT_NE(
+        error_of([&] {
+            xml(flat_camera() +
+                R"(<shape type="rectangle"><bsdf type="null"/><emitter type="area"/></shape>)");
+        }).find("an emitter on a shape with bsdf \"null\""),
+        std::string::npos);
+}
+
+/// The square with the vertex colours 2, 1, 1, 2 of red and the alphas 0, 1, 1, 0, which are linear in x.
+const char* const kShadedSquare =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+    "z\n"
+    "property float u\nproperty float v\nproperty float r\nproperty float g\nproperty float b\n"
+    "property float a\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    "-1 -1 0 0 0 2 0 0 0\n1 -1 0 1 0 1 0 0 1\n1 1 0 1 1 1 0 0 1\n-1 1 0 0 1 2 0 0 0\n"
+    "3 0 1 2\n3 0 2 3\n";
+
+/// What emitters sample, and what rays see, of an emission and an opacity that are functions of x.
+void expect_emission(const Emitter& lamp, const std::function<Rgb(Vec3)>& radiance,
+                     const std::function<float(Vec3)>& opacity, double power) {
+    EXPECT_NEAR(lamp.power(), power, 0.01 * power);
+    for (int i = 0; i < 64; ++i) {
+        const double a = (i % 8 + 0.5) / 8, b = (i / 8 + 0.5) / 8;
+        const EmissionSample e = lamp.sample_emission({a, b}, {0.3f, 0.7f});
+        DirectSample d;
+        ASSERT_TRUE(lamp.sample_direct({0, 0, 3}, {a, b}, d));
+        const Vec3 up{0, 0, 1};
+        expect_colour(e.Le, radiance(e.p) * opacity(e.p), "emission");
+        expect_colour(d.Le, radiance(d.p) * opacity(d.p), "next event");
+        expect_colour(lamp.eval_emission(up, e.uv, e.prim, up).Le_cos, radiance(e.p) * opacity(e.p),
+                      "evaluation");
+        expect_colour(lamp.eval_surface(up, e.uv, e.prim, up).Le, radiance(e.p), "hit");
+        EXPECT_NEAR(lamp.opacity(e.uv, e.prim), opacity(e.p), 1e-5);
+    }
+}
+
+TEST_F(ExportedScenes, VertexColoursEmitAndHideEmission) {
+    write("square.ply", kShadedSquare);
+    const Scene scene =
+        xml(flat_camera() +
+            fmt::format(R"(<shape type="ply"><string name="filename" value="{}"/><bsdf type="mask">
+            <texture type="mesh_attribute" name="opacity"><string name="name" value="vertex_alpha"/></texture>
+            <bsdf type="diffuse"/></bsdf><emitter type="area">
+            <texture type="mesh_attribute" name="radiance"/></emitter></shape>)",
+                        path("square.ply")));
+    const auto red = [](Vec3 p) { return Rgb(1.5f - 0.5f * p.x, 0, 0); };
+    const auto alpha = [](Vec3 p) { return 0.5f + 0.5f * p.x; };
+    // ∫ (1.5 - x/2) (1 + x)/2 dx dy = 2 (1.5 - 1/6) over the square.
+    expect_emission(scene.emitter(0), red, alpha,
+                    double(kPi * luminance({1, 0, 0})) * 2 * (1.5 - 1.0 / 6));
+    for (const float x : {0.1f, 0.4f, 0.8f}) {
+        const Vec3 p{2 * x - 1, 0, 0};
+        // The mean over twenty decisions.
+        EXPECT_NEAR(seen(scene, x, 0.5f).r, red(p).r * alpha(p), 0.026 * double(red(p).r));
+    }
+}
+
+TEST_F(ExportedScenes, TexturesOfSpaceEmit) {
+    const Scene scene = xml(flat_camera() + R"(<shape type="rectangle"><emitter type="area">
+        <texture type="checkerboard3d" name="radiance"><rgb name="color0" value="1"/><rgb name="color1" value="3"/>
+        <transform name="to_texture"><translate x="2" y="2" z="0.5"/></transform></texture></emitter></shape>)");
+    const float left = seen(scene, 0.25f, 0.25f).r;
+    EXPECT_TRUE(left == 1 || left == 3);
+    expect_emission(
+        scene.emitter(0), [&](Vec3 p) { return Rgb((p.x < 0) == (p.y > 0) ? left : 4 - left); },
+        [](Vec3) { return 1.0f; }, double(kPi) * 4 * 2);
+}
+
+// ---- glTF: several sets of texture coordinates
+
+/// A glowing square with an image of two by two in one set of coordinates and an opacity in another.
+TEST_F(ExportedScenes, GltfTexturesHaveSetsOfTheirOwn) {
+    Image left(2, 1, {"R", "G", "B", "A"});
+    for (int c = 0; c < 4; ++c) left.at(0, 0, c) = 1;
+    write("four.png", four_colours());
+    write_image(path("left.exr"), left);
+    for (const int set_of_image : {0, 1}) {
+        GltfDocument d;
+        d.add("samplers", {{"magFilter", 9728}});
+        for (const char* name : {"four.png", "left.exr"}) {
+            d.add("images", {{"uri", name}});
+            d.add("textures", {{"source", d.json["images"].size() - 1}, {"sampler", 0}});
+        }
+        Json material = GltfDocument::glow({1, 1, 1});
+        material["emissiveTexture"] = {{"index", 0}, {"texCoord", set_of_image}};
+        material["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 1},
+                                                                {"texCoord", 1 - set_of_image}};
+        material["alphaMode"] = "MASK";
+        // In the other set the square is turned by a quarter, so that the opaque half of the image is the lower one.
+        const std::vector<float> plain = {0, 1, 1, 1, 1, 0, 0, 0},
+                                 turned = {0, 0, 0, 1, 1, 1, 1, 0};
+        d.node(
+            {{"mesh", d.square(d.add("materials", material), set_of_image == 0 ? plain : turned,
+                               {{"TEXCOORD_1", d.accessor("VEC2", 2, GltfDocument::kFloat,
+                                                          set_of_image == 0 ? turned : plain)}})}});
+        d.camera();
+        expect_quarters(gltf(d), {kBlack, kBlack, kBlue, kWhite});
+        d.json["materials"][0]["normalTexture"] = {{"index", 0}, {"texCoord", 2}};
+        EXPECT_NE(error_of([&] { gltf(d); }).find("more than 2 sets of texture coordinates"),
+                  std::string::npos);
+    }
+}
+
+// The alpha of vertex colours hides emission as that of the material does.
+TEST_F(ExportedScenes, GltfVertexAlphaHidesEmission) {
+    GltfDocument d;
+    Json glow = GltfDocument::glow({1, 1, 1});
+    glow["alphaMode"] = "BLEND";
+    const std::vector<float> rgba = {1, 1, 1, 0.25f, 1, 1, 1, 0.75f,
+                                     1, 1, 1, 0.75f, 1, 1, 1, 0.25f};
+    const Json colors = {{"COLOR_0", d.accessor("VEC4", 4, GltfDocument::kFloat, rgba)}};
+    d.node({{"mesh", d.square(d.add("materials", glow), {0, 1, 1, 1, 1, 0, 0, 0}, colors)}});
+    d.camera();
+    const Scene scene = gltf(d);
+    EXPECT_TRUE(scene.warnings().empty());
+    expect_emission(
+        scene.emitter(0), [](Vec3) { return Rgb(1); }, [](Vec3 p) { return 0.5f + 0.25f * p.x; },
+        double(kPi) * 4 * 0.5);
 }
 
 }  // namespace
