@@ -117,7 +117,7 @@ public:
     ~ComponentList() {
         if (!is_empty_) return;
         out_->first_.frame = *frame_;
-        out_->first_.lobe.emplace<ConductorLobe>(Rgb(1), Rgb(0), Rgb(0));
+        out_->first_.lobe = ConductorLobe{Rgb(1), Rgb(0), Rgb(0)};
         out_->total_weight_ = 1;
     }
     ComponentList(const ComponentList&) = delete;
