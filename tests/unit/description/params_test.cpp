@@ -7,6 +7,8 @@
 namespace etendue {
 namespace {
 
+using test::error_of;
+
 /// One object with a parameter of each type and a nested texture.
 SceneDescription example() {
     SceneDescription scene;

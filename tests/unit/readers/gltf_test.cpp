@@ -57,7 +57,7 @@ SceneDescription read(const std::string& json, const Bytes& bytes = {}, bool len
 }
 
 std::string error_of(const std::string& json, const Bytes& bytes = {}) {
-    return etendue::error_of([&] { read(json, bytes); });
+    return test::error_of([&] { read(json, bytes); });
 }
 
 /// A square with this material.

@@ -18,7 +18,7 @@ TEST(IntegratorParams, NumbersAreFinite) {
                       "integrator \"" + std::string(name) +
                           "\": parameter \"radius\" must be a finite number, but is \"" + value +
                           "\"");
-    EXPECT_EQ(error_of("vcm:radius=0.1"), "no error");
+    EXPECT_EQ(error_of("vcm:radius=0.1"), "");
 }
 
 TEST(IntegratorParams, RouletteMustEndWalks) {
@@ -27,8 +27,8 @@ TEST(IntegratorParams, RouletteMustEndWalks) {
         EXPECT_EQ(error_of(spec),
                   "rr_depth is 1000000, but must be at most 1000, unless max_depth is: paths in a "
                   "closed room would not end");
-        EXPECT_EQ(error_of(spec + ",max_depth=1000"), "no error");
-        EXPECT_EQ(error_of(std::string(name) + ":rr_depth=1000"), "no error");
+        EXPECT_EQ(error_of(spec + ",max_depth=1000"), "");
+        EXPECT_EQ(error_of(std::string(name) + ":rr_depth=1000"), "");
     }
 }
 
