@@ -22,12 +22,10 @@ Method = str | Integrator
 Image = NDArray[np.float32]
 
 
-def _scene(scene: SceneLike) -> Scene:
+def _scene(scene: SceneLike, threads: int) -> Scene:
     if isinstance(scene, Scene):
         return scene
-    if isinstance(scene, Description):
-        return scene.build()
-    return load(scene).build()
+    return (scene if isinstance(scene, Description) else load(scene)).build(threads=threads)
 
 
 def _methods(methods: Method | Sequence[Method]) -> list[Method]:
@@ -237,8 +235,8 @@ def compare(
     listener, end = _status(progress)
     try:
         comparisons, text = _etendue.compare(
-            [_scene(s) for s in wanted], _methods(methods), time, spp, runs, seed, sampler, threads, techniques, paths,
-            lengths[0], lengths[1], reference_method, reference_time, reference_spp, [fspath(i) for i in images],
+            [_scene(s, threads) for s in wanted], _methods(methods), time, spp, runs, seed, sampler, threads, techniques,
+            paths, lengths[0], lengths[1], reference_method, reference_time, reference_spp, [fspath(i) for i in images],
             fspath(references), listener,
         )
     finally:
@@ -293,8 +291,8 @@ def verify(
     listener, end = _status(progress)
     try:
         text = _etendue.verify(
-            _scene(scene), _methods(methods), spp, time, detect, lengths[0], lengths[1], runs, alpha, list(against), tiles,
-            seed, sampler, threads, listener,
+            _scene(scene, threads), _methods(methods), spp, time, detect, lengths[0], lengths[1], runs, alpha,
+            list(against), tiles, seed, sampler, threads, listener,
         )
     finally:
         end()

@@ -17,6 +17,7 @@
 #include "pathspace/sample_context.h"
 #include "render/defaults.h"
 #include "render/renderer.h"
+#include "values.h"
 
 namespace etendue::python {
 namespace {
@@ -445,7 +446,8 @@ private:
 nb::tuple sample_paths(const ScenePtr& scene, size_t n, nb::handle integrator, uint64_t seed,
                        int most_vertices, const std::string& sampler) {
     use_threads();
-    PathRecorder recorder(scene->scene, n, size_t(most_vertices));
+    PathRecorder recorder(scene->scene, n,
+                          size_t(checked("max_vertices", most_vertices, 2, kMostVertices)));
     RenderSettings settings;
     settings.integrator = to_spec(scene->scene, integrator);
     settings.sampler = to_sampler(sampler);

@@ -467,8 +467,10 @@ std::vector<std::string> paths(const SceneDescription& scene) {
 
 ScenePtr build(const SceneDescription& description,
                const std::optional<std::pair<int, int>>& resolution,
-               const std::optional<std::array<int, 4>>& crop, bool lenient, bool watertight) {
+               const std::optional<std::array<int, 4>>& crop, bool lenient, bool watertight,
+               int threads) {
     BuildOptions options;
+    options.threads = checked_threads(threads);
     options.lenient = lenient;
     options.accelerator.is_watertight = watertight;
     if (resolution) {
@@ -572,13 +574,14 @@ void bind_description(nb::module_& m) {
             "warnings", [](const SceneDescription& d) { return d.warnings; },
             "What was left out under lenient=True, one sentence each.")
         .def("build", &build, "resolution"_a.none() = nb::none(), "crop"_a.none() = nb::none(),
-             "lenient"_a = false, "watertight"_a = false,
+             "lenient"_a = false, "watertight"_a = false, "threads"_a = 0,
              "Builds a Scene, which later edits do not change.\n\n"
              "resolution: (width, height) of the image in pixels, instead of the scene's.\n"
              "crop: (x, y, width, height) of the part to render, in pixels from the upper left "
              "corner.\n"
              "lenient: turns unknown plug-ins and parameters into warnings.\n"
-             "watertight: lets no ray pass between adjacent triangles; slower.");
+             "watertight: lets no ray pass between adjacent triangles; slower.\n"
+             "threads: number of threads; 0 for one per core.");
 
     nb::class_<SceneHandle>(
         m, "Scene",

@@ -25,6 +25,7 @@
 #include "render/render_report.h"
 #include "render/renderer.h"
 #include "render/warnings.h"
+#include "values.h"
 
 namespace etendue::python {
 
@@ -65,14 +66,13 @@ RenderSettings settings_for(const SceneHandle& scene, nb::handle integrator,
     s.filter_mode = to_filter_mode(filter);
     s.seed = seed;
     // Objects of Python work on one thread.
-    s.threads = s.integrator.make ? 1 : threads;
+    s.threads = s.integrator.make ? 1 : checked_threads(threads);
     s.spp = spp;
     s.seconds = seconds;
     s.error = error;
-    if ((spp && *spp == 0) || (seconds && !(*seconds > 0)) || (error && !(*error > 0)))
-        throw nb::value_error("spp, time and error must be above 0");
+    check_above_0("spp, time and error", {spp, seconds, error});
     set_default_limit(s, scene.scene);
-    s.technique_depth = technique_depth;
+    s.technique_depth = checked("techniques", technique_depth, 0, 64);
     return s;
 }
 

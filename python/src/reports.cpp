@@ -18,6 +18,7 @@
 #include "compare/default_reference.h"
 #include "compare/report.h"
 #include "render/defaults.h"
+#include "values.h"
 #include "verify/report_json.h"
 #include "verify/verify.h"
 
@@ -89,6 +90,8 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
                         const nb::object& listener) {
     if (time.has_value() == spp.has_value())
         throw nb::value_error("give either time, in seconds, or spp: how long each method renders");
+    check_above_0("time, spp, reference_time and reference_spp",
+                  {time, spp, reference_time, reference_spp});
     if (paths != "all" && paths != "inner")
         throw nb::value_error("paths must be \"all\" or \"inner\"");
     if (!references.empty() && references.size() != scenes.size())
@@ -111,20 +114,20 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
         }
         s.sampler = to_sampler(sampler);
         s.seed = seed;
-        s.threads = threads;
+        s.threads = checked_threads(threads);
         for (const MethodSpec& m : s.methods)
             if (m.integrator.make) s.threads = 1;
         s.limits.seconds = time;
         s.limits.spp = spp;
-        s.runs = runs;
+        s.runs = checked("runs", runs, 1, 10000);
         s.shown = selection(shortest, longest, paths == "inner");
-        s.technique_depth = technique_depth;
+        s.technique_depth = checked("techniques", technique_depth, 0, 16);
         check_methods(s.methods);
         RenderSettings& r = job.reference;
         r.integrator = reference_method.is_none() ? reference_integrator(scene->scene, s.methods)
                                                   : to_spec(scene->scene, reference_method);
         r.sampler = s.sampler;
-        r.threads = threads;
+        r.threads = r.integrator.make ? 1 : threads;
         r.shown = s.shown;
         r.seconds = reference_time;
         r.spp = reference_spp;
@@ -257,8 +260,7 @@ void bind_reports(nb::module_& m) {
             VerifyOptions o;
             if (shortest < 1 || longest < shortest || longest > PathClass::kMostEdges)
                 throw nb::value_error("lengths must be (shortest, longest), within 1 to 24 edges");
-            if (runs < 8 || runs > 4096) throw nb::value_error("runs must be from 8 to 4096");
-            if (tiles < 1 || tiles > 64) throw nb::value_error("tiles must be from 1 to 64");
+            check_above_0("time and spp", {time, spp});
             if (!(alpha >= 1e-9 && alpha <= 0.5))
                 throw nb::value_error("alpha must lie between 1e-9 and 0.5");
             if (detect && !(*detect >= 1e-4 && *detect < 1))
@@ -268,15 +270,15 @@ void bind_reports(nb::module_& m) {
                 throw nb::value_error("time and spp exclude each other, except with detect");
             o.shortest = shortest;
             o.longest = longest;
-            o.runs = runs;
+            o.runs = checked("runs", runs, 8, 4096);
             o.alpha = alpha;
             o.sampler = to_sampler(sampler);
             o.spp = spp;
             o.seconds = time;
             o.detect = detect;
             o.seed = seed;
-            o.threads = threads;
-            o.tiles = tiles;
+            o.threads = checked_threads(threads);
+            o.tiles = checked("tiles", tiles, 1, 64);
             o.against.clear();
             for (const std::string& a : against) o.against.push_back(IntegratorSpec::parse(a));
             if (o.against.empty()) throw nb::value_error("against must name a method");

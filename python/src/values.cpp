@@ -228,4 +228,15 @@ nb::object to_python(const ParamValue& value) {
     return std::visit(Printer{}, value);
 }
 
+void check_above_0(const char* names, std::initializer_list<std::optional<double>> values) {
+    for (const std::optional<double>& v : values)
+        if (v && !(*v > 0)) throw nb::value_error(fmt::format("{} must be above 0", names).c_str());
+}
+
+int checked(const char* name, int value, int low, int high) {
+    if (value >= low && value <= high) return value;
+    throw nb::value_error(
+        fmt::format("{} must lie between {} and {}, but is {}", name, low, high, value).c_str());
+}
+
 }  // namespace etendue::python

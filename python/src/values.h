@@ -1,6 +1,7 @@
 #pragma once
 // Values of scene parameters as Python objects, and back.
 
+#include <initializer_list>
 #include <optional>
 #include <string>
 
@@ -27,5 +28,14 @@ struct ValueContext {
 /// Numbers, texts, colours (3 numbers, {"type": "rgb"}, {"type": "spectrum"}), vectors and 4×4 matrices. Throws SceneError.
 ParamValue to_value(nb::handle value, const ValueContext& context);
 nb::object to_python(const ParamValue& value);
+
+/// Raises ValueError unless all values that are given are above 0. `names`: of the arguments, for the message.
+void check_above_0(const char* names, std::initializer_list<std::optional<double>> values);
+/// The value of an argument. Raises ValueError unless it lies in [low, high].
+int checked(const char* name, int value, int low, int high);
+/// The same for a number of threads, where 0 stands for one per core.
+inline int checked_threads(int threads) {
+    return checked("threads", threads, 0, 4096);
+}
 
 }  // namespace etendue::python

@@ -149,6 +149,9 @@ def test_sampled_paths(small: et.Scene) -> None:
     lens = core.eye_path(small, (0, 0)).p[0]
     np.testing.assert_allclose(last, np.broadcast_to(lens, (500, 3)), atol=1e-4)
     assert np.isnan(paths["x"][0, paths["vertices"][0]:]).all()
+    for wrong in (-1, 1, 10**6):
+        with pytest.raises(ValueError, match="max_vertices must lie between 2 and"):
+            core.sample_paths(small, 1, max_vertices=wrong)
 
 
 def test_counts(small: et.Scene) -> None:

@@ -192,6 +192,8 @@ def test_what_a_callback_raises_ends_the_rendering(cornell: et.Scene) -> None:
         ({"filter_mode": "box"}, 'filter_mode must be "spread" or "sample", but is "box"'),
         ({"spp": 0}, "spp, time and error must be above 0"),
         ({"integrator": 3}, "an integrator is a text"),
+        ({"threads": -1}, "threads must lie between 0 and 4096, but is -1"),
+        ({"techniques": 65}, "techniques must lie between 0 and 64, but is 65"),
     ])
 def test_wrong_arguments(cornell: et.Scene, arguments: dict[str, object], message: str) -> None:
     with pytest.raises((RuntimeError, ValueError, TypeError), match=message):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,6 +54,9 @@ def test_compare_takes_integrators_in_python(scenes: Path, tmp_path: Path) -> No
     scene = et.load(scenes / "cornell.xml").build(resolution=(8, 8))
     report = et.compare(scene, ["path:max_depth=3", Hits()], spp=2, references=tmp_path, reference_spp=64)
     assert [m["name"] for m in report.data[0]["methods"]] == ["path:max_depth=3", "Hits"]
+    report = et.compare(scene, ["path:max_depth=3"], spp=2, references=tmp_path, reference_spp=64,
+                        reference_method=Hits())
+    np.testing.assert_allclose(report.reference().mean(), report.image(0).mean(), rtol=0.3)
 
 
 def test_verify_has_the_figures_of_the_command_line(program: str, scenes: Path, tmp_path: Path) -> None:
@@ -70,9 +74,10 @@ def test_verify_has_the_figures_of_the_command_line(program: str, scenes: Path, 
 
 @pytest.mark.parametrize(
     "arguments, message",
-    [({"runs": 2}, "runs must be from 8"), ({"tiles": 0}, "tiles must be"), ({"alpha": 2.0}, "alpha must lie"),
+    [({"runs": 2}, "runs must lie between 8"), ({"tiles": 0}, "tiles must lie"), ({"alpha": 2.0}, "alpha must lie"),
      ({"detect": 2.0}, "detect must be a share"), ({"lengths": (3, 2)}, "lengths must be"),
-     ({"methods": "bdp"}, 'there is no integrator "bdp"'), ({"spp": 1, "time": 1.0}, "exclude each other")])
+     ({"methods": "bdp"}, 'there is no integrator "bdp"'), ({"spp": 1, "time": 1.0}, "exclude each other"),
+     ({"spp": 0}, "time and spp must be above 0"), ({"threads": -1}, "threads must lie between 0 and 4096, but is -1")])
 def test_wrong_arguments_of_verify(cornell: et.Scene, arguments: dict[str, object], message: str) -> None:
     with pytest.raises((RuntimeError, ValueError), match=message):
         et.verify(cornell, **{"methods": "path", **arguments})  # type: ignore[arg-type]
@@ -83,6 +88,14 @@ def test_wrong_arguments_of_compare(cornell: et.Scene) -> None:
         et.compare(cornell, ["path"])
     with pytest.raises(RuntimeError, match="given twice"):
         et.compare(cornell, ["path", "path"], spp=1)
+    wrong: list[tuple[dict[str, Any], str]] = [
+        ({"spp": 0}, "must be above 0"), ({"spp": 1, "reference_spp": 0}, "must be above 0"),
+        ({"spp": 1, "runs": 0}, "runs must lie between 1 and 10000, but is 0"),
+        ({"spp": 1, "techniques": 17}, "techniques must lie between 0 and 16, but is 17"),
+        ({"spp": 1, "threads": 5000}, "threads must lie between 0 and 4096, but is 5000")]
+    for arguments, message in wrong:
+        with pytest.raises(ValueError, match=message):
+            et.compare(cornell, ["path"], **arguments)
 
 
 def test_diff_has_the_figures_of_the_command_line(program: str, tmp_path: Path) -> None:

@@ -241,6 +241,30 @@ def _child(code: str) -> str:
     return result.stdout
 
 
+THREADS = """
+import re
+import etendue as et
+
+def threads():
+    return int(re.search(r"Threads:\\s+(\\d+)", open("/proc/self/status").read()).group(1))
+
+before = threads()
+et.load({scene!r}).build({arguments})
+print(threads() - before)
+"""
+
+
+@pytest.mark.skipif(os.cpu_count() == 1, reason="one core")
+def test_scenes_are_built_with_few_threads_if_asked(scenes: Path) -> None:
+    def added(arguments: str) -> int:
+        return int(_child(THREADS.format(scene=str(scenes / "cornell.xml"), arguments=arguments)))
+
+    assert added("threads=1") == 0
+    assert added("") > 0
+    with pytest.raises(ValueError, match="threads must lie between 0 and 4096, but is -1"):
+        et.load(scenes / "cornell.xml").build(threads=-1)
+
+
 FORK = """
 import os, sys
 import etendue as et
