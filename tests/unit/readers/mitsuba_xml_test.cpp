@@ -536,8 +536,7 @@ TEST(MitsubaXml, LenientDropsUnknownElements) {
     EXPECT_EQ(scene.warnings[1], "s.xml:3: unknown element <animation>; dropped");
     EXPECT_EQ(scene.warnings[2], "s.xml:4: a <transform> cannot contain a <shear>; dropped");
     // Malformed input remains an error.
-    EXPECT_NE(error3(R"(<shape type="cube"><float name="x" value="1a"/></shape>)", options),
-              "");
+    EXPECT_NE(error3(R"(<shape type="cube"><float name="x" value="1a"/></shape>)", options), "");
 }
 
 // ---- Hostile files
