@@ -64,7 +64,9 @@ float TriangleMesh::slack(uint32_t prim) const {
 }
 
 SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tangents) const {
-    const auto [ia, ib, ic] = triangles[prim];
+    // Clang 14 cannot capture structured bindings.
+    const std::array<uint32_t, 3>& corners = triangles[prim];
+    const uint32_t ia = corners[0], ib = corners[1], ic = corners[2];
     const Vec3 a = positions[ia], b = positions[ib], c = positions[ic], e1 = b - a, e2 = c - a;
     const float w = 1 - u - v;
     SurfaceGeometry g;
