@@ -440,8 +440,9 @@ public:
     /// The next word of a header; exactly one blank follows it.
     std::string word() {
         skip_blanks();
+        if (at_ >= bytes_.size()) fail_read(path_, "the file ends too early");
         std::string text;
-        while (!std::isspace(next())) text += bytes_[at_ - 1];
+        while (at_ < bytes_.size() && !std::isspace(next())) text += bytes_[at_ - 1];
         return text;
     }
     size_t left() const { return bytes_.size() - at_; }
@@ -551,11 +552,13 @@ Contents read_pfm(const Source& source) {
     return radiance_of(width, height, channels, std::move(values));
 }
 
-/// Binary portable grey maps and pixmaps; numbers of 16 bits begin with the higher byte.
+/// Portable grey maps and pixmaps, as text or binary; binary numbers of 16 bits begin with the higher byte.
 Contents read_pnm(const Source& source) {
     const std::string& path = source.name;
     Bytes bytes(source);
-    const int channels = bytes.word() == "P5" ? 1 : 3;
+    const std::string kind = bytes.word();
+    const bool is_text = kind == "P2" || kind == "P3";
+    const int channels = kind == "P2" || kind == "P5" ? 1 : 3;
     const auto number = [&] {
         for (bytes.skip_blanks(); bytes.left() > 0 && *bytes.here() == '#'; bytes.skip_blanks())
             bytes.line();
@@ -567,8 +570,20 @@ Contents read_pnm(const Source& source) {
     const size_t code_bytes = largest > 255 ? 2 : 1;
     check_size(source, uint64_t(width), uint64_t(height), size_t(channels) * code_bytes);
     const size_t count = size_t(width) * size_t(height) * size_t(channels);
-    if (bytes.left() < count * code_bytes) fail_read(path, "the file ends too early");
-    const auto* const codes = reinterpret_cast<const uint8_t*>(bytes.here());
+    std::string written;  // the numbers of a text, as a binary file has them
+    if (is_text) {
+        for (size_t i = 0; i < count; ++i) {
+            const int code = number();
+            if (code < 0 || code > largest)
+                fail_read(path, fmt::format("the number {} is not in [0, {}]", code, largest));
+            if (code_bytes == 2) written += char(code >> 8);
+            written += char(code & 255);
+        }
+    } else if (bytes.left() < count * code_bytes) {
+        fail_read(path, "the file ends too early");
+    }
+    const auto* const codes =
+        reinterpret_cast<const uint8_t*>(is_text ? written.data() : bytes.here());
     if (largest == 255) return coded(width, height, channels, {codes, codes + count});
     Contents c = coded(width, height, channels, {});
     std::vector<float> values(count);
@@ -622,7 +637,9 @@ Contents contents_of(const Source& source, bool as_floats) {
         if (magic.starts_with("\xff\xd8\xff")) return read_jpeg(source);
         if (magic.starts_with("#?")) return read_rgbe(source);
         if (magic.starts_with("PF") || magic.starts_with("Pf")) return read_pfm(source);
-        if (magic.starts_with("P5") || magic.starts_with("P6")) return read_pnm(source);
+        if (magic.size() > 2 && magic[0] == 'P' &&
+            std::string_view("2356").find(magic[1]) != std::string_view::npos)
+            return read_pnm(source);
         return read_by_stb(source);
     } catch (const std::bad_alloc&) {
         fail_read(source.name, "its pixels do not fit into memory");

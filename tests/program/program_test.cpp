@@ -288,8 +288,9 @@ TEST_F(ProgramTest, WritesImageWithLayersAndMetadataAndStatistics) {
     EXPECT_EQ(j["estimator"], "unbiased");
     EXPECT_EQ(j["stopped_by"], "samples");
     EXPECT_EQ(j["rejected_contributions"], 0);
-    EXPECT_EQ(j["eye_paths"], 8 * 12 * 12);
-    EXPECT_EQ(j["light_paths"], 8 * 12 * 12);
+    // The default filter reaches three columns and rows of the grid beside the image.
+    EXPECT_EQ(j["eye_paths"], 8 * 15 * 15);
+    EXPECT_EQ(j["light_paths"], 8 * 15 * 15);
     double seconds = 0;
     for (const nlohmann::json& pass : j["pass_seconds"]) {
         EXPECT_GT(pass.get<double>(), 0);

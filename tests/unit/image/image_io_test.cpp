@@ -232,6 +232,14 @@ TEST_F(ImageIo, ReadsPortableMaps) {
         std::get<std::vector<float>>(read_pixels(write_bytes("b.pgm", deep), true).data);
     EXPECT_NEAR(raw[0], 32768 / 65535.0, 1e-7);
     EXPECT_EQ(raw[1], 1);
+    const PixelBuffer text = read_pixels(
+        write_bytes("c.ppm", "P3 # colours\n2 2\n255\n255 0 0  0 255 0\n0 0 255 128 128 128"),
+        false);
+    EXPECT_EQ(std::get<std::vector<uint8_t>>(text.data), kFourColours);
+    EXPECT_NE(error_of([&] {
+                  read_pixels(write_bytes("d.pgm", "P2\n2 1\n15\n3 16\n"), false);
+              }).find("the number 16 is not in [0, 15]"),
+              std::string::npos);
 }
 
 TEST_F(ImageIo, OtherFormatsAreRefusedByName) {
