@@ -54,7 +54,7 @@ def test_compare_takes_integrators_in_python(scenes: Path, tmp_path: Path) -> No
     scene = et.load(scenes / "cornell.xml").build(resolution=(8, 8))
     report = et.compare(scene, ["path:max_depth=3", Hits()], spp=2, references=tmp_path, reference_spp=64)
     assert [m["name"] for m in report.data[0]["methods"]] == ["path:max_depth=3", "Hits"]
-    report = et.compare(scene, ["path:max_depth=3"], spp=2, references=tmp_path, reference_spp=64,
+    report = et.compare(scene, ["path:max_depth=3"], spp=64, references=tmp_path, reference_spp=64,
                         reference_method=Hits())
     np.testing.assert_allclose(report.reference().mean(), report.image(0).mean(), rtol=0.3)
 
