@@ -1,5 +1,6 @@
 #include "system/huge_pages.h"
 
+#include <cerrno>
 #include <cstdint>
 
 #ifdef __linux__
@@ -18,10 +19,11 @@ void prefer_huge_pages(std::span<const std::byte> array) {
     const uintptr_t begin = (address + kHugePage - 1) / kHugePage * kHugePage,
                     end = (address + array.size()) / kHugePage * kHugePage;
     if (begin >= end) return;
-    // Both are advice: where the system refuses them, nothing changes. The first one holds for pages that are touched
-    // later; older systems know only this one.
+    // Advice: where the system refuses it, nothing changes. MADV_HUGEPAGE, which older systems know instead, also holds for
+    // what is allocated there later.
     auto* const pages = reinterpret_cast<void*>(begin);
-    if (madvise(pages, end - begin, MADV_HUGEPAGE) == 0) madvise(pages, end - begin, MADV_COLLAPSE);
+    if (madvise(pages, end - begin, MADV_COLLAPSE) != 0 && errno == EINVAL)
+        madvise(pages, end - begin, MADV_HUGEPAGE);
 #else
     (void)array;
 #endif
