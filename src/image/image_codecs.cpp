@@ -1,11 +1,10 @@
-// The file formats of image_io.h: .exr over OpenEXR, .png over libpng, .jpg over libjpeg, .tga and .bmp over stb_image;
-// .hdr, .pfm, .pgm and .ppm.
+// The file formats that need a library: .exr over OpenEXR, .png over libpng, .jpg over libjpeg, .tga and .bmp over
+// stb_image; and what is common to the reading of all formats.
 
-#include "image/image_io.h"
+#include "image/image_codecs.h"
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <climits>
 #include <cmath>
 #include <csetjmp>
@@ -32,81 +31,13 @@
 #include <stb_image.h>
 
 #include "color/srgb.h"
-#include "image/image_codecs.h"
-#include "system/available_memory.h"
+#include "image/image_contents.h"
+#include "image/plain_formats.h"
 
 namespace etendue {
 namespace {
 
 namespace fs = std::filesystem;
-
-[[noreturn]] void fail_read(const std::string& path, const std::string& why) {
-    throw std::runtime_error(fmt::format("cannot read \"{}\": {}", path, why));
-}
-
-/// The bytes of a file, and its name for messages.
-struct Source {
-    std::string name;
-    std::string_view bytes;
-};
-
-/// No codec compresses better than this. A header with a larger size is damaged, and would exhaust the memory.
-void check_size(const Source& source, uint64_t width, uint64_t height, uint64_t pixel_bytes) {
-    constexpr uint64_t kBestRatio = 4096, kAlwaysFine = 256u << 20;
-    constexpr uint64_t kLargestSide = 1 << 20;
-    if (width < 1 || height < 1) fail_read(source.name, "it has no pixels");
-    const uint64_t bytes = width * height * pixel_bytes;
-    if (width > kLargestSide || height > kLargestSide || pixel_bytes > kLargestSide ||
-        (bytes > kAlwaysFine && bytes / kBestRatio > source.bytes.size()))
-        fail_read(source.name,
-                  fmt::format("its header claims {} x {} pixels, too many for the file's size",
-                              width, height));
-    if (const auto free = available_memory(); free && bytes > *free)
-        fail_read(source.name,
-                  fmt::format("its {} x {} pixels need {} of memory, but only {} are free", width,
-                              height, format_bytes(bytes), format_bytes(*free)));
-}
-
-/// What a file holds, before any conversion of colours.
-struct Contents {
-    PixelBuffer pixels;
-    std::vector<std::string> channels;
-    bool is_linear = true;    ///< Whether the values are linear, or sRGB codes.
-    double largest_code = 1;  ///< Of integer formats.
-    std::map<std::string, std::variant<std::string, double>> attributes;
-};
-
-std::vector<std::string> channel_names(int count) {
-    switch (count) {
-    case 1: return {"Y"};
-    case 2: return {"Y", "A"};
-    case 3: return {"R", "G", "B"};
-    default: return {"R", "G", "B", "A"};
-    }
-}
-
-/// sRGB codes of 8 bits.
-Contents coded(int width, int height, int channels, std::vector<uint8_t> codes) {
-    Contents c;
-    PixelBuffer& p = c.pixels;
-    p.width = width, p.height = height, p.channels = channels;
-    p.data = std::move(codes);
-    if (channels == 2 || channels == 4) p.alpha_channel = channels - 1;
-    c.channels = channel_names(channels);
-    c.is_linear = false;
-    c.largest_code = 255;
-    return c;
-}
-
-/// The same for codes of 16 bits, which become numbers in [0, 1].
-Contents deeply_coded(int width, int height, int channels, const uint16_t* codes) {
-    Contents c = coded(width, height, channels, {});
-    std::vector<float> values(size_t(width) * size_t(height) * size_t(channels));
-    for (size_t i = 0; i < values.size(); ++i) values[i] = float(codes[i]) * (1.0f / 65535.0f);
-    c.pixels.data = std::move(values);
-    c.largest_code = 1;
-    return c;
-}
 
 // ------------------------------------------------------------------------------------------------------- OpenEXR
 
@@ -146,7 +77,8 @@ std::vector<T> read_exr_pixels(Imf::InputFile& file, const std::vector<std::stri
 /// The bytes of a file, for OpenEXR.
 class ExrInput final : public Imf::IStream {
 public:
-    explicit ExrInput(const Source& source) : IStream(source.name.c_str()), bytes_(source.bytes) {}
+    explicit ExrInput(const ImageSource& source)
+        : IStream(source.name.c_str()), bytes_(source.bytes) {}
     bool read(char to[], int size) override {
         if (size < 0 || uint64_t(size) > bytes_.size() - at_)
             throw Iex::InputExc("the file ends too early");
@@ -182,13 +114,13 @@ bool describes_encoding(std::string_view attribute) {
     return attribute == "pixelAspectRatio" || attribute == "screenWindowWidth";
 }
 
-Contents read_exr(const Source& source, bool as_floats) {
+ImageContents read_exr(const ImageSource& source, bool as_floats) {
     const std::string& path = source.name;
     ExrInput input(source);
     Imf::InputFile file(input);
     const Imf::Header& header = file.header();
     const Imath::Box2i window = header.dataWindow();
-    Contents c;
+    ImageContents c;
     c.channels = ordered_channels(header.channels());
     if (c.channels.empty()) fail_read(path, "it has no channels");
     bool is_half = !as_floats;
@@ -200,7 +132,7 @@ Contents read_exr(const Source& source, bool as_floats) {
     PixelBuffer& p = c.pixels;
     const int64_t width = int64_t(window.max.x) - window.min.x + 1,
                   height = int64_t(window.max.y) - window.min.y + 1;
-    check_size(source, uint64_t(width), uint64_t(height), c.channels.size() * 4);
+    check_image_size(source, uint64_t(width), uint64_t(height), c.channels.size() * 4);
     p.width = int(width), p.height = int(height);
     p.channels = int(c.channels.size());
     const auto alpha = std::find(c.channels.begin(), c.channels.end(), "A");
@@ -295,7 +227,13 @@ bool read_png_rows(PngReader& reader, Escape& escape, png_bytepp rows) {
     return true;
 }
 
-Contents read_png(const Source& source) {
+std::vector<float> fractions_of(const std::vector<uint16_t>& codes) {
+    std::vector<float> values(codes.size());
+    for (size_t i = 0; i < values.size(); ++i) values[i] = float(codes[i]) * (1.0f / 65535.0f);
+    return values;
+}
+
+ImageContents read_png(const ImageSource& source) {
     const std::string& path = source.name;
     std::string_view rest = source.bytes;
     Escape escape;
@@ -303,7 +241,7 @@ Contents read_png(const Source& source) {
     PngHeader header{};
     if (!read_png_header(reader, rest, escape, header)) fail_read(path, escape.message);
     const size_t pixel = size_t(header.channels * header.depth / 8), row = header.width * pixel;
-    check_size(source, header.width, header.height, pixel);
+    check_image_size(source, header.width, header.height, pixel);
     // Codes of 16 bits are read in the order of this machine.
     const bool is_deep = header.depth == 16;
     std::vector<uint8_t> bytes(is_deep ? 0 : row * header.height);
@@ -313,8 +251,8 @@ Contents read_png(const Source& source) {
     for (size_t y = 0; y < rows.size(); ++y) rows[y] = first + y * row;
     if (!read_png_rows(reader, escape, rows.data())) fail_read(path, escape.message);
     const int width = int(header.width), height = int(header.height);
-    Contents c = is_deep ? deeply_coded(width, height, header.channels, deep.data())
-                         : coded(width, height, header.channels, std::move(bytes));
+    ImageContents c = is_deep ? deeply_coded(width, height, header.channels, fractions_of(deep))
+                              : coded(width, height, header.channels, std::move(bytes));
     c.is_linear = header.is_linear;
     return c;
 }
@@ -393,7 +331,7 @@ std::vector<uint8_t> rgb_of_cmyk(const std::vector<uint8_t>& inks, bool is_inver
     return colours;
 }
 
-Contents read_jpeg(const Source& source) {
+ImageContents read_jpeg(const ImageSource& source) {
     const std::string& path = source.name;
     JpegErrors errors;
     jpeg_decompress_struct jpeg{};
@@ -408,7 +346,7 @@ Contents read_jpeg(const Source& source) {
     const int components = jpeg.output_components;
     if (components != 1 && components != 3 && components != 4)
         fail_read(path, "a JPEG must be grey, RGB or CMYK");
-    check_size(source, jpeg.output_width, jpeg.output_height, size_t(components));
+    check_image_size(source, jpeg.output_width, jpeg.output_height, size_t(components));
     const size_t row = size_t(jpeg.output_width) * size_t(components);
     std::vector<uint8_t> bytes(row * jpeg.output_height);
     if (!read_jpeg_rows(jpeg, errors, bytes.data(), row)) fail_read(path, errors.escape.message);
@@ -417,188 +355,9 @@ Contents read_jpeg(const Source& source) {
                  std::move(bytes));
 }
 
-// ------------------------------------------------------------------------------------------------------- HDR, PFM
-
-/// The bytes of a file, read in order.
-class Bytes {
-public:
-    explicit Bytes(const Source& source) : path_(source.name), bytes_(source.bytes) {}
-    uint8_t next() {
-        if (at_ >= bytes_.size()) fail_read(path_, "the file ends too early");
-        return uint8_t(bytes_[at_++]);
-    }
-    std::string line() {
-        const size_t end = bytes_.find('\n', at_);
-        if (end == std::string::npos) fail_read(path_, "the header is incomplete");
-        std::string text(bytes_.substr(at_, end - at_));
-        at_ = end + 1;
-        return text;
-    }
-    void skip_blanks() {
-        while (at_ < bytes_.size() && std::isspace(static_cast<unsigned char>(bytes_[at_]))) ++at_;
-    }
-    /// The next word of a header; exactly one blank follows it.
-    std::string word() {
-        skip_blanks();
-        if (at_ >= bytes_.size()) fail_read(path_, "the file ends too early");
-        std::string text;
-        while (at_ < bytes_.size() && !std::isspace(next())) text += bytes_[at_ - 1];
-        return text;
-    }
-    size_t left() const { return bytes_.size() - at_; }
-    const char* here() const { return bytes_.data() + at_; }
-
-    /// A word that is a number.
-    template <class T>
-    T number() {
-        std::string text = word();
-        if (text.starts_with('+')) text.erase(0, 1);
-        T value{};
-        const char* const end = text.data() + text.size();
-        const auto [rest, error] = std::from_chars(text.data(), end, value);
-        if (error != std::errc() || rest != end)
-            fail_read(path_, fmt::format("\"{}\" in its header is no number", text.substr(0, 40)));
-        return value;
-    }
-
-private:
-    std::string path_;
-    std::string_view bytes_;
-    size_t at_ = 0;
-};
-
-Contents radiance_of(int width, int height, int channels, std::vector<float> values) {
-    Contents c;
-    c.pixels.width = width, c.pixels.height = height, c.pixels.channels = channels;
-    c.channels = channel_names(channels);
-    c.pixels.data = std::move(values);
-    return c;
-}
-
-/// One row of Radiance's format, with or without run lengths [Ward 1991].
-void read_rgbe_row(Bytes& bytes, const std::string& path, size_t width, std::vector<uint8_t>& row) {
-    row.resize(4 * width);
-    uint8_t start[4];
-    for (uint8_t& b : start) b = bytes.next();
-    const bool has_runs = start[0] == 2 && start[1] == 2 && start[2] < 128;
-    if (!has_runs) {
-        std::copy(start, start + 4, row.begin());
-        for (size_t i = 4; i < row.size(); ++i) row[i] = bytes.next();
-        return;
-    }
-    if (size_t(start[2]) << 8 != width - start[3])
-        fail_read(path, "a row has another length than the image");
-    for (size_t c = 0; c < 4; ++c)
-        for (size_t x = 0; x < width;) {
-            const uint8_t count = bytes.next();
-            const size_t run = count > 128 ? count - 128u : count;
-            if (run == 0 || x + run > width) fail_read(path, "a run is longer than its row");
-            uint8_t value = count > 128 ? bytes.next() : uint8_t(0);
-            for (size_t i = 0; i < run; ++i, ++x) {
-                if (count <= 128) value = bytes.next();
-                row[4 * x + c] = value;
-            }
-        }
-}
-
-Contents read_rgbe(const Source& source) {
-    const std::string& path = source.name;
-    Bytes bytes(source);
-    if (!bytes.line().starts_with("#?")) fail_read(path, "it does not begin with \"#?\"");
-    while (!bytes.line().empty()) {
-    }
-    int width = 0, height = 0;
-    const std::string size = bytes.line();
-    if (std::sscanf(size.c_str(), "-Y %d +X %d", &height, &width) != 2 || width < 1 || height < 1)
-        fail_read(path, "expected a size of the form \"-Y HEIGHT +X WIDTH\"");
-    check_size(source, uint64_t(width), uint64_t(height), 12);
-    std::vector<float> values;
-    values.reserve(size_t(width) * size_t(height) * 3);
-    std::vector<uint8_t> row;
-    for (int y = 0; y < height; ++y) {
-        read_rgbe_row(bytes, path, size_t(width), row);
-        for (size_t x = 0; x < size_t(width); ++x) {
-            const uint8_t* c = &row[4 * x];
-            const float scale = c[3] > 0 ? std::ldexp(1.0f, int(c[3]) - 136) : 0.0f;
-            for (int i = 0; i < 3; ++i) values.push_back(float(c[i]) * scale);
-        }
-    }
-    return radiance_of(width, height, 3, std::move(values));
-}
-
-Contents read_pfm(const Source& source) {
-    const std::string& path = source.name;
-    Bytes bytes(source);
-    const std::string kind = bytes.word();
-    if (kind != "PF" && kind != "Pf") fail_read(path, "it does not begin with \"PF\" or \"Pf\"");
-    const int channels = kind == "PF" ? 3 : 1;
-    const int width = bytes.number<int>(), height = bytes.number<int>();
-    const double scale = bytes.number<double>();
-    if (width < 1 || height < 1 || !std::isfinite(scale) || scale == 0)
-        fail_read(path, "its header is invalid");
-    check_size(source, uint64_t(width), uint64_t(height), 4 * size_t(channels));
-    const size_t row = size_t(width) * size_t(channels);
-    if (bytes.left() < row * size_t(height) * 4) fail_read(path, "the file ends too early");
-    std::vector<float> values(row * size_t(height));
-    for (size_t y = 0; y < size_t(height); ++y)
-        std::memcpy(&values[(size_t(height) - 1 - y) * row], bytes.here() + y * row * 4, row * 4);
-    if (scale > 0)  // big-endian
-        for (float& v : values) {
-            uint32_t b = 0;
-            std::memcpy(&b, &v, 4);
-            b = __builtin_bswap32(b);
-            std::memcpy(&v, &b, 4);
-        }
-    return radiance_of(width, height, channels, std::move(values));
-}
-
-/// Portable grey maps and pixmaps, as text or binary; binary numbers of 16 bits begin with the higher byte.
-Contents read_pnm(const Source& source) {
-    const std::string& path = source.name;
-    Bytes bytes(source);
-    const std::string kind = bytes.word();
-    const bool is_text = kind == "P2" || kind == "P3";
-    const int channels = kind == "P2" || kind == "P5" ? 1 : 3;
-    const auto number = [&] {
-        for (bytes.skip_blanks(); bytes.left() > 0 && *bytes.here() == '#'; bytes.skip_blanks())
-            bytes.line();
-        return bytes.number<int>();
-    };
-    const int width = number(), height = number(), largest = number();
-    if (width < 1 || height < 1 || largest < 1 || largest > 65535)
-        fail_read(path, "its header is invalid");
-    const size_t code_bytes = largest > 255 ? 2 : 1;
-    check_size(source, uint64_t(width), uint64_t(height), size_t(channels) * code_bytes);
-    const size_t count = size_t(width) * size_t(height) * size_t(channels);
-    std::string written;  // the numbers of a text, as a binary file has them
-    if (is_text) {
-        for (size_t i = 0; i < count; ++i) {
-            const int code = number();
-            if (code < 0 || code > largest)
-                fail_read(path, fmt::format("the number {} is not in [0, {}]", code, largest));
-            if (code_bytes == 2) written += char(code >> 8);
-            written += char(code & 255);
-        }
-    } else if (bytes.left() < count * code_bytes) {
-        fail_read(path, "the file ends too early");
-    }
-    const auto* const codes =
-        reinterpret_cast<const uint8_t*>(is_text ? written.data() : bytes.here());
-    if (largest == 255) return coded(width, height, channels, {codes, codes + count});
-    Contents c = coded(width, height, channels, {});
-    std::vector<float> values(count);
-    for (size_t i = 0; i < count; ++i) {
-        const int code = code_bytes == 1 ? codes[i] : codes[2 * i] << 8 | codes[2 * i + 1];
-        values[i] = std::min(float(code) / float(largest), 1.0f);
-    }
-    c.pixels.data = std::move(values);
-    c.largest_code = 1;
-    return c;
-}
-
 // ------------------------------------------------------------------------------------------------------- TGA, BMP
 
-Contents read_by_stb(const Source& source) {
+ImageContents read_by_stb(const ImageSource& source) {
     const std::string& path = source.name;
     const auto* const bytes = reinterpret_cast<const stbi_uc*>(source.bytes.data());
     if (source.bytes.size() > size_t(INT_MAX)) fail_read(path, "the file is too large");
@@ -606,7 +365,7 @@ Contents read_by_stb(const Source& source) {
     int width = 0, height = 0, channels = 0;
     if (!stbi_info_from_memory(bytes, size, &width, &height, &channels))
         fail_read(path, "its format is none of EXR, PNG, JPEG, HDR, PFM, TGA, BMP, PGM and PPM");
-    check_size(source, uint64_t(width), uint64_t(height), size_t(channels));
+    check_image_size(source, uint64_t(width), uint64_t(height), size_t(channels));
     const std::unique_ptr<stbi_uc, void (*)(void*)> codes(
         stbi_load_from_memory(bytes, size, &width, &height, &channels, 0), stbi_image_free);
     if (!codes)
@@ -629,7 +388,7 @@ std::string bytes_of(const std::string& path) {
 }
 
 /// By the first bytes, as a name may be wrong.
-Contents contents_of(const Source& source, bool as_floats) {
+ImageContents contents_of(const ImageSource& source, bool as_floats) {
     const std::string_view magic = source.bytes;
     try {
         if (magic.starts_with("\x76\x2f\x31\x01")) return read_exr(source, as_floats);
@@ -637,9 +396,8 @@ Contents contents_of(const Source& source, bool as_floats) {
         if (magic.starts_with("\xff\xd8\xff")) return read_jpeg(source);
         if (magic.starts_with("#?")) return read_rgbe(source);
         if (magic.starts_with("PF") || magic.starts_with("Pf")) return read_pfm(source);
-        if (magic.size() > 2 && magic[0] == 'P' &&
-            std::string_view("2356").find(magic[1]) != std::string_view::npos)
-            return read_pnm(source);
+        if (magic.starts_with("P2") || magic.starts_with("P3")) return read_pnm_text(source);
+        if (magic.starts_with("P5") || magic.starts_with("P6")) return read_pnm(source);
         return read_by_stb(source);
     } catch (const std::bad_alloc&) {
         fail_read(source.name, "its pixels do not fit into memory");
@@ -648,7 +406,7 @@ Contents contents_of(const Source& source, bool as_floats) {
     }
 }
 
-Contents read_contents(const std::string& path, bool as_floats) {
+ImageContents read_contents(const std::string& path, bool as_floats) {
     std::error_code error;
     const fs::file_status status = fs::status(path, error);
     if (!fs::exists(status)) fail_read(path, "there is no such file");
@@ -658,7 +416,7 @@ Contents read_contents(const std::string& path, bool as_floats) {
 }
 
 /// Codes become numbers in [0, 1], and those of colours linear.
-std::vector<float> to_floats(const Contents& c, bool keep_codes) {
+std::vector<float> to_floats(const ImageContents& c, bool keep_codes) {
     std::vector<float> out;
     std::visit(
         [&](const auto& values) {
@@ -678,7 +436,7 @@ std::vector<float> to_floats(const Contents& c, bool keep_codes) {
 }  // namespace
 
 Image read_image(const std::string& path) {
-    Contents c = read_contents(path, true);
+    ImageContents c = read_contents(path, true);
     Image image;
     image.width = c.pixels.width, image.height = c.pixels.height;
     image.data = to_floats(c, false);
@@ -687,7 +445,7 @@ Image read_image(const std::string& path) {
     return image;
 }
 
-static PixelBuffer to_pixels(Contents c, bool raw) {
+static PixelBuffer to_pixels(ImageContents c, bool raw) {
     const bool is_deep = std::holds_alternative<std::vector<float>>(c.pixels.data);
     if (is_deep && !c.is_linear && !raw) c.pixels.data = to_floats(c, false);
     return std::move(c.pixels);

@@ -11,8 +11,8 @@
 
 namespace etendue {
 
-/// Reads .exr (flat, its first part), .png, .jpg, .hdr, .pfm, .tga, .bmp, and binary .pgm and .ppm. The content decides, not
-/// the name. Integer formats are decoded from sRGB, except alpha and files declared linear.
+/// Reads .exr (flat, its first part), .png, .jpg, .hdr, .pfm, .tga, .bmp, .pgm and .ppm. The content decides, not the name.
+/// Integer formats are decoded from sRGB, except alpha and files declared linear.
 Image read_image(const std::string& path);
 
 /// The colours of one layer; see rgb_pixels().
@@ -31,8 +31,8 @@ PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, boo
 enum class ExrPrecision { Float, Half };
 
 /// Writes the format given by the name's extension: .exr stores all channels and attributes; .pfm, .hdr and .png (sRGB,
-/// clamped, NaN as magenta) store the colours of the unnamed layer. The file is an OutputFile. With ExrPrecision::Half finite values are clamped to the range of half
-/// floats.
+/// clamped, NaN as magenta) store the colours of the unnamed layer. The file is an OutputFile. With ExrPrecision::Half
+/// finite values are clamped to the range of half floats.
 void write_image(const std::string& path, const Image& image,
                  ExrPrecision precision = ExrPrecision::Float, Links links = Links::Follow);
 
