@@ -47,7 +47,9 @@ public:
     /// The finished image; after finish_eye().
     std::span<const Rgb> finish();
     /// Number of values that were not finite and were left out.
-    uint64_t rejected() const { return rejected_.load(std::memory_order_relaxed); }
+    uint64_t rejected() const {
+        return rejected_.load(std::memory_order_relaxed) + (splats_ ? splats_->rejected() : 0);
+    }
     /// Resets the image to black.
     void clear();
 

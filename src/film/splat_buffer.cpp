@@ -27,11 +27,21 @@ SplatBuffer::SplatBuffer(uint64_t pixels, double typical_radiance)
     : unit_(std::ldexp(1.0, unit_exponent(typical_radiance))), units_per_radiance_(1 / unit_),
       lowest_(pixels * 3) {}
 
-void SplatBuffer::add_large(uint64_t cell, double units) {
-    if (!std::isfinite(units)) return;
-    // A float has 24 bits. The lowest of them is 2^(26·digit) units or more.
-    const int digit = (std::ilogb(units) - 23) / kDigitBits;
-    add(size_t(digit), cell, int64_t(std::ldexp(units, -kDigitBits * digit)));
+void SplatBuffer::add_large(uint64_t pixel, const double (&units)[3]) {
+    if (!std::all_of(units, units + 3, [](double u) { return std::isfinite(u); })) {
+        rejected_.fetch_add(1, std::memory_order_relaxed);
+        return;
+    }
+    for (uint64_t c = 0; c < 3; ++c) {
+        const uint64_t cell = pixel * 3 + c;
+        if (is_small(units[c])) {
+            add_small(cell, units[c]);
+            continue;
+        }
+        // A float has 24 bits. The lowest of them is 2^(26·digit) units or more.
+        const int digit = (std::ilogb(units[c]) - 23) / kDigitBits;
+        add(size_t(digit), cell, int64_t(std::ldexp(units[c], -kDigitBits * digit)));
+    }
 }
 
 void SplatBuffer::carry(size_t digit, uint64_t cell, Cell& from) {
@@ -90,6 +100,7 @@ void SplatBuffer::clear() {
     clear(lowest_.data());
     for (const auto& cells : owned_)
         if (cells) clear(cells.get());
+    rejected_.store(0, std::memory_order_relaxed);
 }
 
 }  // namespace etendue

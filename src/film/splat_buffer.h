@@ -26,16 +26,17 @@ public:
     /// Values may have any magnitude; the precision of small ones is relative to `typical_radiance`.
     SplatBuffer(uint64_t pixels, double typical_radiance);
 
-    /// Thread-safe. A value that is not finite is left out; the caller reports it.
+    /// Thread-safe. A value that is not finite is left out and counted as rejected.
     void add(uint64_t pixel, Rgb value) {
-        for (int c = 0; c < 3; ++c) {
-            const double units = double(value[c]) * units_per_radiance_;
-            if (!(std::fabs(units) < kLarge)) [[unlikely]]
-                add_large(pixel * 3 + uint64_t(c), units);
-            else if (const int64_t n = std::llrint(units))
-                add(0, pixel * 3 + uint64_t(c), n);
-        }
+        const double units[] = {double(value.r) * units_per_radiance_,
+                                double(value.g) * units_per_radiance_,
+                                double(value.b) * units_per_radiance_};
+        if (!(is_small(units[0]) && is_small(units[1]) && is_small(units[2]))) [[unlikely]]
+            return add_large(pixel, units);
+        for (uint64_t c = 0; c < 3; ++c) add_small(pixel * 3 + c, units[c]);
     }
+    /// Number of values that were left out since the buffer was made or cleared.
+    uint64_t rejected() const { return rejected_.load(std::memory_order_relaxed); }
     void prefetch(uint64_t pixel) const { __builtin_prefetch(&lowest_[pixel * 3], 1); }
     /// Adds every sum to `sums`, rounded once, and clears the buffer.
     void fold_into(std::span<Rgb> sums);
@@ -52,13 +53,18 @@ private:
     static constexpr double kLarge = 0x1p50;
     static constexpr int64_t kFull = int64_t(1) << 61;
 
+    static bool is_small(double units) { return std::fabs(units) < kLarge; }
+    void add_small(uint64_t cell, double units) {
+        if (const int64_t n = std::llrint(units)) add(0, cell, n);
+    }
     void add(size_t digit, uint64_t cell, int64_t n) {
         Cell& at = digit == 0 ? lowest_[cell] : higher(digit)[cell];
         const int64_t sum = at.fetch_add(n, std::memory_order_relaxed) + n;
         if (sum >= kFull || sum <= -kFull) [[unlikely]]
             carry(digit, cell, at);
     }
-    void add_large(uint64_t cell, double units);
+    /// A value with a channel that is large or not finite.
+    void add_large(uint64_t pixel, const double (&units)[3]);
     void carry(size_t digit, uint64_t cell, Cell& from);
     /// The cells of a digit above 0; allocated on first use.
     Cell* higher(size_t digit);
@@ -70,6 +76,7 @@ private:
     std::array<std::unique_ptr<Cell[]>, kDigits> owned_;
     std::array<std::atomic<Cell*>, kDigits> higher_{};
     std::mutex making_;
+    std::atomic<uint64_t> rejected_{0};
 };
 
 }  // namespace etendue

@@ -146,6 +146,20 @@ TEST(SplatBuffer, ForgetsWhatIsCleared) {
 TEST(SplatBuffer, LeavesOutWhatIsNotFinite) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     EXPECT_EQ(sum_of({1, kInfinity, -kInfinity, std::nanf("")}), 1);
+    // The whole value, which is counted once.
+    SplatBuffer buffer(1, 1);
+    for (const float v : {kInfinity, -kInfinity, std::nanf("")}) {
+        buffer.add(0, {1, v, 1e20f});
+        buffer.add(0, Rgb(v));
+    }
+    EXPECT_EQ(buffer.rejected(), 6u);
+    buffer.add(0, {2, 1e20f, -0.5f});
+    EXPECT_EQ(buffer.rejected(), 6u);
+    std::vector<Rgb> sum(1);
+    buffer.fold_into(sum);
+    EXPECT_EQ(sum[0], Rgb(2, 1e20f, -0.5f));
+    buffer.clear();
+    EXPECT_EQ(buffer.rejected(), 0u);
 }
 
 }  // namespace
