@@ -322,21 +322,7 @@ def main():
     agreement.add_arguments(parser)
     parser.add_argument("--runs", type=int, default=8)
     parser.add_argument("--spp", type=int, default=128, help="samples per pixel of each run")
-    parser.add_argument(
-        "--json", default="compare-conventions.json", help="JSON report; cases of earlier runs are kept"
-    )
-    parser.add_argument("--pictures", help="existing folder for the mean image of each renderer")
-    parser.add_argument("--table", action="store_true", help="only print the JSON file as a table")
-    args = parser.parse_args()
-    if args.table:
-        print(markdown_table(json.loads(pathlib.Path(args.json).read_text())))
-        return
-    agreement.ensure_packages()
-
-    mitsuba = agreement.Mitsuba(args)
-    output = pathlib.Path(args.json)
-    report = json.loads(output.read_text()) if output.exists() else {"cases": {}}
-    report["mitsuba"] = mitsuba.version
+    args, mitsuba, output, report = agreement.start(parser, "cases", markdown_table)
     surprises = 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)

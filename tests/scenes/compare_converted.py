@@ -154,21 +154,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1, help="of the first run")
     parser.add_argument("--spp", type=int, default=1024, help="samples per pixel of each run of small images")
     parser.add_argument("--mitsuba-spp", type=int, default=128, help="the same of Mitsuba, which is slower")
-    parser.add_argument(
-        "--json", default="compare-converted.json", help="JSON report; scenes of earlier runs are kept"
-    )
-    parser.add_argument("--pictures", help="existing folder for the mean image of each renderer")
-    parser.add_argument("--table", action="store_true", help="only print the JSON file as a table")
-    args = parser.parse_args()
-    if args.table:
-        print(markdown_table(json.loads(pathlib.Path(args.json).read_text())))
-        return
-    agreement.ensure_packages()
-
-    mitsuba = agreement.Mitsuba(args)
-    output = pathlib.Path(args.json)
-    report = json.loads(output.read_text()) if output.exists() else {"scenes": {}}
-    report["mitsuba"] = mitsuba.version
+    args, mitsuba, output, report = agreement.start(parser, "scenes", markdown_table)
     root = agreement.ROOT
     files = sorted([*root.glob("tests/scenes/formats/[gmp]*/*"), *root.glob("scenes/*.xml")])
     scenes = {f"{file.parent.name}/{file.stem}": file for file in files}
