@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <climits>
 #include <cmath>
 #include <csetjmp>
 #include <cstdio>
@@ -27,6 +26,8 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <fmt/format.h>
 #include <jpeglib.h>
+
+#include <jerror.h>
 #include <png.h>
 #include <stb_image.h>
 
@@ -291,14 +292,28 @@ struct JpegErrors {
     Escape escape;
 };
 
-void jpeg_fails(j_common_ptr info) {
+[[noreturn]] void leave_jpeg(j_common_ptr info, const char* message) {
     auto& errors = *reinterpret_cast<JpegErrors*>(info->err);
-    char message[JMSG_LENGTH_MAX];
-    info->err->format_message(info, message);
     std::snprintf(errors.escape.message, sizeof errors.escape.message, "%.199s", message);
     std::longjmp(errors.escape.place, 1);
 }
-void jpeg_warns(j_common_ptr, int) {}
+void jpeg_fails(j_common_ptr info) {
+    char message[JMSG_LENGTH_MAX];
+    info->err->format_message(info, message);
+    leave_jpeg(info, message);
+}
+/// Most damages are small, but where data are missing, a part of the image is grey.
+void jpeg_warns(j_common_ptr info, int) {
+    if (info->err->msg_code == JWRN_HIT_MARKER) leave_jpeg(info, "its data end too early");
+}
+/// Every scan passes over all pixels, however short it is in the file.
+void jpeg_goes_on(j_common_ptr info) {
+    constexpr int kMostScans = 1000;
+    if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number <= kMostScans) return;
+    char message[64];
+    std::snprintf(message, sizeof message, "it has more than %d scans", kMostScans);
+    leave_jpeg(info, message);
+}
 
 bool read_jpeg_header(jpeg_decompress_struct& jpeg, std::string_view bytes, JpegErrors& errors) {
     if (setjmp(errors.escape.place)) return false;
@@ -306,12 +321,13 @@ bool read_jpeg_header(jpeg_decompress_struct& jpeg, std::string_view bytes, Jpeg
     jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(bytes.data()),
                  static_cast<unsigned long>(bytes.size()));
     jpeg_read_header(&jpeg, TRUE);
-    jpeg_start_decompress(&jpeg);
+    jpeg_calc_output_dimensions(&jpeg);
     return true;
 }
 
 bool read_jpeg_rows(jpeg_decompress_struct& jpeg, JpegErrors& errors, uint8_t* to, size_t row) {
     if (setjmp(errors.escape.place)) return false;
+    jpeg_start_decompress(&jpeg);  // allocates memory
     while (jpeg.output_scanline < jpeg.output_height) {
         JSAMPROW at = to + size_t(jpeg.output_scanline) * row;
         jpeg_read_scanlines(&jpeg, &at, 1);
@@ -338,15 +354,21 @@ ImageContents read_jpeg(const ImageSource& source) {
     jpeg.err = jpeg_std_error(&errors.manager);
     errors.manager.error_exit = jpeg_fails;
     errors.manager.emit_message = jpeg_warns;
+    jpeg_progress_mgr progress{};
+    progress.progress_monitor = jpeg_goes_on;
     struct Cleanup {
         jpeg_decompress_struct& of;
         ~Cleanup() { jpeg_destroy_decompress(&of); }
     } cleanup{jpeg};
     if (!read_jpeg_header(jpeg, source.bytes, errors)) fail_read(path, errors.escape.message);
+    jpeg.progress = &progress;
     const int components = jpeg.output_components;
     if (components != 1 && components != 3 && components != 4)
         fail_read(path, "a JPEG must be grey, RGB or CMYK");
-    check_image_size(source, jpeg.output_width, jpeg.output_height, size_t(components));
+    // Several scans add to coefficients of 16 bits.
+    const size_t coefficient_bytes = jpeg_has_multiple_scans(&jpeg) ? sizeof(JCOEF) : 0;
+    check_image_size(source, jpeg.output_width, jpeg.output_height,
+                     size_t(components) * (1 + coefficient_bytes));
     const size_t row = size_t(jpeg.output_width) * size_t(components);
     std::vector<uint8_t> bytes(row * jpeg.output_height);
     if (!read_jpeg_rows(jpeg, errors, bytes.data(), row)) fail_read(path, errors.escape.message);
@@ -357,17 +379,42 @@ ImageContents read_jpeg(const ImageSource& source) {
 
 // ------------------------------------------------------------------------------------------------------- TGA, BMP
 
+/// The bytes of a file for one call of stb_image, to which what follows the end is zero or undefined.
+struct StbInput {
+    std::string_view rest;
+    /// The place where stb_image reads ahead: that of its first read.
+    const char* buffer = nullptr;
+    bool is_short = false;  ///< Whether it needed more bytes than there are.
+};
+
+int read_for_stb(void* user, char* to, int size) {
+    auto& in = *static_cast<StbInput*>(user);
+    if (!in.buffer) in.buffer = to;
+    const size_t count = std::min(in.rest.size(), size_t(size));
+    in.is_short |= count == 0 || (count < size_t(size) && to != in.buffer);
+    std::memcpy(to, in.rest.data(), count);
+    in.rest.remove_prefix(count);
+    return int(count);
+}
+void skip_for_stb(void* user, int size) {
+    auto& in = *static_cast<StbInput*>(user);
+    in.rest.remove_prefix(std::min(in.rest.size(), size_t(size)));
+}
+int is_at_end_for_stb(void* user) {
+    return static_cast<const StbInput*>(user)->rest.empty();
+}
+
 ImageContents read_by_stb(const ImageSource& source) {
+    constexpr stbi_io_callbacks kInput{read_for_stb, skip_for_stb, is_at_end_for_stb};
     const std::string& path = source.name;
-    const auto* const bytes = reinterpret_cast<const stbi_uc*>(source.bytes.data());
-    if (source.bytes.size() > size_t(INT_MAX)) fail_read(path, "the file is too large");
-    const int size = int(source.bytes.size());
+    StbInput header{source.bytes}, all{source.bytes};
     int width = 0, height = 0, channels = 0;
-    if (!stbi_info_from_memory(bytes, size, &width, &height, &channels))
+    if (!stbi_info_from_callbacks(&kInput, &header, &width, &height, &channels))
         fail_read(path, "its format is none of EXR, PNG, JPEG, HDR, PFM, TGA, BMP, PGM and PPM");
     check_image_size(source, uint64_t(width), uint64_t(height), size_t(channels));
     const std::unique_ptr<stbi_uc, void (*)(void*)> codes(
-        stbi_load_from_memory(bytes, size, &width, &height, &channels, 0), stbi_image_free);
+        stbi_load_from_callbacks(&kInput, &all, &width, &height, &channels, 0), stbi_image_free);
+    if (all.is_short) fail_read(path, "the file ends too early");
     if (!codes)
         fail_read(path, fmt::format("it is damaged or of a rare kind ({})", stbi_failure_reason()));
     const size_t count = size_t(width) * size_t(height) * size_t(channels);

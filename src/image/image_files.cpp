@@ -46,12 +46,14 @@ void write_pfm(OutputFile& file, const Image& image, ExrPrecision) {
 
 // Radiance's format: a common exponent for each pixel [Ward 1991].
 void to_rgbe(const Rgb& c, uint8_t* code) {
-    const float largest = std::isfinite(c.max()) ? std::max(c.max(), 0.0f) : 0.0f;
+    constexpr float kMost = 0x1.fep126f;  // 255/256 of 2^127
+    const float largest = std::min(c.max(), kMost);
     std::fill(code, code + 4, uint8_t(0));
     if (!(largest > 1e-32f)) return;
     int exponent = 0;
     const float scale = std::frexp(largest, &exponent) * 256 / largest;
-    for (int i = 0; i < 3; ++i) code[i] = uint8_t(c[i] > 0 ? c[i] * scale : 0);  // 0 for NaN, too
+    for (int i = 0; i < 3; ++i)  // 0 for NaN, too
+        code[i] = c[i] > 0 ? uint8_t(std::min(c[i] * scale + 0.5f, 255.0f)) : uint8_t(0);
     code[3] = uint8_t(exponent + 128);
 }
 

@@ -24,6 +24,7 @@ public:
         const size_t end = bytes_.find('\n', at_);
         if (end == std::string::npos) fail_read(path_, "the header is incomplete");
         std::string text(bytes_.substr(at_, end - at_));
+        if (text.ends_with('\r')) text.pop_back();
         at_ = end + 1;
         return text;
     }
@@ -65,7 +66,8 @@ void read_rgbe_row(Bytes& bytes, const std::string& path, size_t width, std::vec
     row.resize(4 * width);
     uint8_t start[4];
     for (uint8_t& b : start) b = bytes.next();
-    const bool has_runs = start[0] == 2 && start[1] == 2 && start[2] < 128;
+    const bool has_runs =
+        width >= 8 && width < 32768 && start[0] == 2 && start[1] == 2 && start[2] < 128;
     if (!has_runs) {
         std::copy(start, start + 4, row.begin());
         for (size_t i = 4; i < row.size(); ++i) row[i] = bytes.next();
@@ -103,6 +105,8 @@ int pnm_number(Bytes& bytes) {
 
 PnmHeader read_pnm_header(const ImageSource& source, Bytes& bytes) {
     const std::string kind = bytes.word();
+    if (kind.size() != 2)  // whoever called has seen the first two characters
+        fail_read(source.name, "it does not begin with \"P2\", \"P3\", \"P5\" or \"P6\"");
     PnmHeader h{};
     h.channels = kind == "P2" || kind == "P5" ? 1 : 3;
     h.width = pnm_number(bytes), h.height = pnm_number(bytes), h.largest = pnm_number(bytes);
@@ -132,8 +136,11 @@ ImageContents read_rgbe(const ImageSource& source) {
     const std::string& path = source.name;
     Bytes bytes(source);
     if (!bytes.line().starts_with("#?")) fail_read(path, "it does not begin with \"#?\"");
-    while (!bytes.line().empty()) {
-    }
+    constexpr std::string_view kFormat = "FORMAT=", kColours = "32-bit_rle_rgbe";
+    for (std::string line; !(line = bytes.line()).empty();)
+        if (line.starts_with(kFormat) && !line.substr(kFormat.size()).starts_with(kColours))
+            fail_read(path, fmt::format("its format is \"{}\", but must be \"{}\"",
+                                        line.substr(kFormat.size(), 40), kColours));
     int width = 0, height = 0;
     const std::string size = bytes.line();
     if (std::sscanf(size.c_str(), "-Y %d +X %d", &height, &width) != 2 || width < 1 || height < 1)
