@@ -14,6 +14,7 @@ namespace {
 constexpr size_t kMostCharacters = size_t(16) << 20;
 constexpr size_t kCostOfReference = 16;  // in characters, since empty ones take time as well
 constexpr int kDeepest = 32;
+constexpr size_t kLongestReference = 1024;  // as other names of a scene
 
 struct Entity {
     std::string value;
@@ -48,7 +49,10 @@ public:
             if (rest_.starts_with("PUBLIC")) word(), quoted();
             if (rest_.starts_with("SYSTEM")) word();
             entity.value = quoted();
-            std::replace(entity.value.begin(), entity.value.end(), '\n', ' ');
+            // The places where it stands keep their lines.
+            std::replace_if(
+                entity.value.begin(), entity.value.end(),
+                [](char c) { return c == '\n' || c == '\r'; }, ' ');
             found.try_emplace(std::string(name), std::move(entity));  // the first one is valid
         }
         return found;
@@ -128,7 +132,8 @@ private:
     }
     /// Characters of a reference to an entity that is declared, after its text was appended; 0 for other text.
     size_t reference(std::string_view text, const Where& where, size_t at, int depth) {
-        const size_t end = text.find(';');
+        // Ampersands that begin no reference must not each be followed to the end of the text.
+        const size_t end = text.substr(0, kLongestReference).find(';');
         if (end == text.npos) return 0;
         const auto it = entities_.find(text.substr(1, end - 1));
         if (it == entities_.end()) return 0;
