@@ -15,6 +15,7 @@
 #include "scene/preload.h"
 #include "scene/settings.h"
 #include "scene/shape_registry.h"
+#include "system/threads.h"
 
 namespace etendue {
 
@@ -545,9 +546,9 @@ private:
 };
 
 Scene build_scene(const SceneDescription& description, const BuildOptions& options) {
-    const auto build = [&] { return SceneBuilder(description, options).build(); };
     // Embree, too, uses the threads of the arena that calls it.
-    return options.threads > 0 ? tbb::task_arena(options.threads).execute(build) : build();
+    tbb::task_arena arena(thread_count(options.threads));
+    return arena.execute([&] { return SceneBuilder(description, options).build(); });
 }
 
 std::vector<PluginInfo> scene_plugins() {

@@ -16,7 +16,7 @@ struct BuildOptions {
     std::optional<std::array<int, 4>> crop;  ///< x, y, width, height
     std::string sensor;                      ///< Number (from 0) or id; empty: the first.
     AcceleratorOptions accelerator;
-    /// Threads that read files and build the hierarchy of rays; 0: those of the caller's arena.
+    /// Threads that read files and build the hierarchy of rays; 0: available_threads().
     int threads = 0;
 };
 

@@ -1,14 +1,18 @@
 // Shapes and images are loaded by several threads: scenes, warnings and errors do not depend on them.
 
-#include <gtest/gtest.h>
+#include <sched.h>
+#include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <thread>
+#include <utility>
 
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 #include <tbb/global_control.h>
-#include <tbb/task_arena.h>
-#include <unistd.h>
 
 #include "scene/builder.h"
 #include "test_scenes.h"
@@ -45,13 +49,15 @@ protected:
                                      "<emitter type=\"constant\"/>" + contents + "</scene>",
                                  (folder_ / "scene.xml").string());
     }
-    /// Builds the scene with 1 thread and with 8, several times.
+    /// Calls `use` with options of 1 thread and of 8, several times.
     template <class Use>
     void for_threads(const Use& use) const {
-        for (const size_t threads : {1, 8, 8, 8, 8}) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 8);
+        for (const int threads : {1, 8, 8, 8, 8}) {
             SCOPED_TRACE(fmt::format("{} threads", threads));
-            const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-            tbb::task_arena(int(threads)).execute(use);
+            BuildOptions options;
+            options.threads = threads;
+            use(options);
         }
     }
 };
@@ -77,8 +83,8 @@ TEST_F(Preloading, ShapesAndImagesKeepTheirOrder) {
         contents += mesh(name, picture(image));
     }
     const SceneDescription scene = parse(contents);
-    for_threads([&] {
-        const Scene built = build_scene(scene);
+    for_threads([&](const BuildOptions& options) {
+        const Scene built = build_scene(scene, options);
         ASSERT_EQ(built.shapes().size(), 40u);
         ASSERT_EQ(built.warnings().size(), 40u);
         for (size_t i = 0; i < 40; ++i) {
@@ -95,9 +101,9 @@ TEST_F(Preloading, TheFirstErrorOfTheFileIsReported) {
     write_mesh("good.obj", 1000);
     write("bad.obj", "v 0 0 0\nf 1 2 3\n");
     write("bad.png", "not an image");
-    const auto error_of = [&](const std::string& contents) {
+    const auto error_of = [&](const std::string& contents, const BuildOptions& options) {
         try {
-            build_scene(parse(contents));
+            build_scene(parse(contents), options);
             return std::string("no error");
         } catch (const std::exception& e) {
             return std::string(e.what());
@@ -112,9 +118,9 @@ TEST_F(Preloading, TheFirstErrorOfTheFileIsReported) {
         {mesh("bad.obj", picture("bad.png")), "bad.obj:2: "},
         {mesh("good.obj", wrong_bsdf) + mesh("bad.obj"), "unknown bsdf \"no_such\""},
     };
-    for_threads([&] {
+    for_threads([&](const BuildOptions& options) {
         for (const auto& [contents, expected] : cases) {
-            const std::string error = error_of(contents);
+            const std::string error = error_of(contents, options);
             EXPECT_NE(error.find(expected), std::string::npos) << error;
         }
     });
@@ -127,9 +133,8 @@ TEST_F(Preloading, LenientReportsEverythingInTheOrderOfTheFile) {
     const SceneDescription scene =
         parse(mesh("missing.obj") + mesh("good.obj", picture("bad.png")) + mesh("bad.obj") +
               mesh("good.obj", picture("bad.png")));
-    BuildOptions options;
-    options.lenient = true;
-    for_threads([&] {
+    for_threads([&](BuildOptions options) {
+        options.lenient = true;
         const Scene built = build_scene(scene, options);
         const char* expected[] = {"missing.obj", "3 triangles of zero area", "bad.png",
                                   "bad.obj:2: ", "3 triangles of zero area", "bad.png"};
@@ -138,6 +143,56 @@ TEST_F(Preloading, LenientReportsEverythingInTheOrderOfTheFile) {
         for (size_t i = 0; i < std::size(expected); ++i)
             EXPECT_NE(warnings[i].find(expected[i]), std::string::npos) << i << ": " << warnings[i];
     });
+}
+
+/// How often the scheduler has taken the processor from each other thread of this process, once all of them are idle.
+std::map<std::string, std::string> switches_of_idle_threads() {
+    std::map<std::string, std::string> switches, before;
+    do {
+        before = std::exchange(switches, {});
+        std::this_thread::sleep_for(std::chrono::milliseconds(200));
+        for (const auto& task : fs::directory_iterator("/proc/self/task")) {
+            std::ifstream in(task.path() / "status");
+            for (std::string line; std::getline(in, line);)
+                if (line.find("ctxt_switches") != line.npos)
+                    switches[task.path().filename()] += line;
+        }
+        switches.erase(fs::read_symlink("/proc/thread-self").filename());
+    } while (switches != before);
+    return switches;
+}
+
+/// Without a number, as many threads as the process may use: its affinity, which changes here after TBB has begun, or the
+/// quota of a control group.
+TEST_F(Preloading, HasTheThreadsThatTheProcessMayUse) {
+    std::string contents;
+    for (int i = 0; i < 60; ++i) {
+        write_mesh(fmt::format("{}.obj", i), 2000);
+        contents += mesh(fmt::format("{}.obj", i));
+    }
+    const SceneDescription scene = parse(contents);
+    const auto helpers_of_build = [&] {
+        const auto before = switches_of_idle_threads();
+        build_scene(scene);
+        int helpers = 0;
+        for (const auto& [thread, switches] : switches_of_idle_threads()) {
+            const auto old = before.find(thread);
+            helpers += old == before.end() || old->second != switches;
+        }
+        return helpers;
+    };
+    cpu_set_t all, one;
+    ASSERT_EQ(sched_getaffinity(0, sizeof all, &all), 0);
+    CPU_ZERO(&one);
+    for (int i = 0; i < CPU_SETSIZE && CPU_COUNT(&one) == 0; ++i)
+        if (CPU_ISSET(i, &all)) CPU_SET(i, &one);
+    if (CPU_COUNT(&all) > 1) {
+        EXPECT_GT(helpers_of_build(), 0);
+    }
+    ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+    const int helpers = helpers_of_build();
+    sched_setaffinity(0, sizeof all, &all);
+    EXPECT_EQ(helpers, 0);
 }
 
 // The second reference to a shape makes it again.
