@@ -147,6 +147,8 @@ void print_summary(const Comparison& c) {
             s.mean_ratio.value,
             s.efficiency ? fmt::format("{:.3g}", s.efficiency->value) : "unknown"));
     }
+    // The program may end while the next scene is loaded.
+    std::fflush(stdout);
 }
 
 void print_warnings_of(const Comparison& c) {
@@ -167,6 +169,8 @@ struct CompareCommand::Job {
 };
 
 CompareCommand::Job CompareCommand::load(size_t i) const {
+    // The comparisons before this one are written.
+    const EndsAtOnce ends_at_once;
     SceneOptions options = reading;
     options.file = scenes[i];
     options.threads = threads;

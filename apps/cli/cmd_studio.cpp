@@ -44,6 +44,7 @@ private:
     void start_first_run(Session& session) const;
     void watch(Session& session, const Api& api, const std::atomic<bool>& stop) const;
     void save_all(Session& session) const;
+    void finish(Session& session, const std::atomic<bool>& drop) const;
 };
 
 /// A name in the folder that no file has yet.
@@ -112,6 +113,26 @@ void StudioCommand::save_all(Session& session) const {
             message("run {}: {}\n", s.id, e.what());
         }
     if (!errors.empty()) throw std::runtime_error(errors);
+}
+
+/// Saves all images. `drop`, of a second signal or at the end of the time of grace, discards the pass in flight.
+void StudioCommand::finish(Session& session, const std::atomic<bool>& drop) const {
+    std::atomic<bool> is_saved{false};
+    std::thread dropper([&] {
+        while (!is_saved) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+            if (drop) session.stop_all(true);
+        }
+    });
+    std::exception_ptr failure;
+    try {
+        save_all(session);
+    } catch (...) {
+        failure = std::current_exception();
+    }
+    is_saved = true;
+    dropper.join();
+    if (failure) std::rethrow_exception(failure);
 }
 
 ApiOptions StudioCommand::api_options() const {
@@ -186,27 +207,19 @@ void StudioCommand::run() const {
     Session session([loading] { return load_scene(loading); }, threads);
     Api api(session, options);
     const Server::Serving serving = server.start(api);
-    print_urls(server, options.token);
-
-    watch(session, api, interrupts.stop);
-    session.close(false);
-    // A second signal, or the end of the time of grace, discards the pass in flight.
-    std::atomic<bool> is_saved{false};
-    std::thread dropper([&] {
-        while (!is_saved) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(50));
-            if (interrupts.drop) session.stop_all(true);
-        }
-    });
-    std::exception_ptr failure;
     try {
-        save_all(session);
-    } catch (...) {
-        failure = std::current_exception();
+        print_urls(server, options.token);
+        watch(session, api, interrupts.stop);
+        session.close(false);
+        finish(session, interrupts.drop);
+    } catch (const std::exception&) {
+        session.close(true);
+        if (!session.is_loading()) throw;
+        print_failure();
+        end_at_once(1);
     }
-    is_saved = true;
-    dropper.join();
-    if (failure) std::rethrow_exception(failure);
+    // The session would wait until the scene is loaded, which nobody needs any longer.
+    if (session.is_loading()) end_at_once(session.scene() ? 0 : 130);
 }
 
 }  // namespace

@@ -11,10 +11,11 @@ namespace etendue {
 namespace {
 
 // Globals, since a signal handler has no argument through which to reach them.
-std::atomic<bool> stop{false}, drop{false}, is_graceful{false};
+std::atomic<bool> stop{false}, drop{false}, is_graceful{false}, ends_at_once{false};
 std::atomic<unsigned> grace_seconds{0};
 
 extern "C" void on_interrupt(int) {
+    if (ends_at_once) end_at_once(130);
     if (!stop.exchange(true)) {
         if (!is_graceful) return;
         if (grace_seconds > 0)
@@ -22,13 +23,12 @@ extern "C" void on_interrupt(int) {
         else
             drop = true;
     } else if (!is_graceful || drop.exchange(true)) {
-        remove_temporary_files();
-        std::_Exit(130);
+        end_at_once(130);
     }
 }
 extern "C" void on_end(int signal) {
+    if (signal == SIGINT) end_at_once(130);
     remove_temporary_files();
-    if (signal == SIGINT) std::_Exit(130);
     std::signal(signal, SIG_DFL);
     std::raise(signal);
 }
@@ -48,6 +48,21 @@ void handle_all(void (*handler)(int)) {
 void end_by_signals() {
     handle_all(on_end);
     std::signal(SIGXFSZ, SIG_IGN);
+}
+
+void end_at_once(int status) {
+    remove_temporary_files();
+    std::_Exit(status);
+}
+
+EndsAtOnce::EndsAtOnce() {
+    ends_at_once = true;
+    // A signal that came just before.
+    if (stop) end_at_once(130);
+}
+
+EndsAtOnce::~EndsAtOnce() {
+    ends_at_once = false;
 }
 
 const std::atomic<bool>& catch_interrupts() {

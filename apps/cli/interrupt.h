@@ -13,6 +13,19 @@ void end_by_signals();
 /// that nobody reads any longer does not end it.
 const std::atomic<bool>& catch_interrupts();
 
+/// While one exists, a signal ends the program at once, as before catch_interrupts(). For work that has no result of its
+/// own and cannot be stopped, such as loading a scene.
+class EndsAtOnce {
+public:
+    EndsAtOnce();
+    ~EndsAtOnce();
+    EndsAtOnce(const EndsAtOnce&) = delete;
+    EndsAtOnce& operator=(const EndsAtOnce&) = delete;
+};
+
+/// Ends the program without waiting for its other threads. No temporary files stay.
+[[noreturn]] void end_at_once(int status);
+
 /// Flags set by the three signals.
 struct Interrupts {
     const std::atomic<bool>& stop;  ///< Set by the first signal: finish the current work, then end.

@@ -3,7 +3,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <iostream>
-#include <new>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -35,11 +34,8 @@ int run(CLI::App& app, const std::vector<std::string>& arguments) {
         // One line that points to --help, instead of printing all of it.
         message("etendue: {}\n", refusal(app, arguments, e.what()));
         return 2;
-    } catch (const std::bad_alloc&) {
-        message("etendue: not enough memory\n");
-        return 1;
-    } catch (const std::exception& e) {
-        message("etendue: {}\n", e.what());
+    } catch (const std::exception&) {
+        print_failure();
         return 1;
     }
     return 0;

@@ -2,6 +2,8 @@
 // What the program prints to standard error.
 
 #include <cstdio>
+#include <exception>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -18,6 +20,17 @@ void message(fmt::format_string<T...> format, T&&... arguments) noexcept {
         std::fwrite(text.data(), 1, text.size(), stderr);
         std::fflush(stderr);
     } catch (const std::exception&) {
+    }
+}
+
+/// Prints what the exception says that is being handled, as the reason why the program ends.
+inline void print_failure() noexcept {
+    try {
+        throw;
+    } catch (const std::bad_alloc&) {
+        message("etendue: not enough memory\n");
+    } catch (const std::exception& e) {
+        message("etendue: {}\n", e.what());
     }
 }
 

@@ -148,8 +148,11 @@ void Session::load_scenes() {
             wake_.wait(lock, [&] { return must_load_ || is_closed_; });
             if (is_closed_) return;
             must_load_ = false;
+            is_loading_ = true;
         }
         load_scene();
+        const std::lock_guard lock(mutex_);
+        is_loading_ = false;
     }
 }
 
@@ -406,6 +409,11 @@ void Session::show(Run& run) noexcept {
 std::string Session::load_error() const {
     const std::lock_guard lock(mutex_);
     return load_error_;
+}
+
+bool Session::is_loading() const {
+    const std::lock_guard lock(mutex_);
+    return is_loading_;
 }
 
 void Session::reload() {

@@ -110,6 +110,8 @@ public:
     uint64_t scene_version() const { return scene_version_.load(); }
     /// The reason why the scene could not be loaded; empty otherwise.
     std::string load_error() const;
+    /// Whether a scene is being loaded. After close(), no more are.
+    bool is_loading() const;
     /// Loads the scene again. Runs of the earlier version are stopped; they keep their scene.
     void reload();
 
@@ -206,7 +208,7 @@ private:
     std::vector<std::shared_ptr<Run>> runs_;
     SnapshotBudget budget_;
     int last_id_ = 0;
-    bool must_load_ = true;
+    bool must_load_ = true, is_loading_ = false;
     bool is_closed_ = false;  ///< No run is started or continued.
     bool is_ended_ = false;
 

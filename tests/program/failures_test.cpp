@@ -229,6 +229,64 @@ TEST_F(FailuresTest, InterruptedVerificationsKeepWhatTheyHave) {
     EXPECT_TRUE(j["methods"][0]["image"][0]["tested"]);
 }
 
+/// No command waits until a scene is loaded, of which nothing would be kept.
+TEST_F(FailuresTest, InterruptsEndTheLoadingOfAScene) {
+    const std::string large = folder.path() / "large.xml", other = folder.path() / "other.xml";
+    {
+        std::ofstream out(large);
+        out << "<scene version=\"3.0.0\"><sensor type=\"perspective\"/>\n";
+        for (int i = 0; i < 200000; ++i)
+            out << "<shape type=\"sphere\"><bsdf type=\"diffuse\"/></shape>\n";
+        out << "</scene>\n";
+    }
+    const auto seconds_of = [](const auto& task) {
+        const auto begin = std::chrono::steady_clock::now();
+        task();
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    };
+    const double loading = seconds_of([&] { EXPECT_EQ(run({"info", large}).status, 0); });
+    const std::string report = folder.path() / "report", kept = folder.path() / "kept";
+    const Arguments comparison = {"--methods",    "path", "--spp",        "1",  "--report", report,
+                                  "--references", kept,   "--resolution", "8x8"};
+    const auto with = [](Arguments all, const Arguments& more) {
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    };
+    const Arguments commands[] = {
+        {"render", large, "-o", image},
+        {"verify", large},
+        {"convert", large, other},
+        {"info", large},
+        {"studio", large, "-o", folder.path()},
+        with({"compare", large}, comparison),
+    };
+    for (const Arguments& c : commands) {
+        SCOPED_TRACE(c[0]);
+        const Program program = start(c, "", "");
+        const bool is_caught = c[0] == "studio" || c[0] == "compare";
+        for (int i = 0;
+             i < 3000 && !(is_caught ? program.catches_interrupts() : program.handles_interrupts());
+             ++i)
+            wait(0.01);
+        wait(loading / 10);
+        program.interrupt();
+        ProgramResult r;
+        EXPECT_LT(seconds_of([&] { r = program.wait(); }), loading / 2);
+        EXPECT_EQ(r.status, 130) << r.errors;
+        EXPECT_EQ(r.errors, "");
+    }
+    // What was compared before is written.
+    const Program program = start(with({"compare", scene, large}, comparison), "", "");
+    for (int i = 0; i < 3000 && !fs::exists(report + "/report.html"); ++i) wait(0.01);
+    wait(loading / 10);
+    program.interrupt();
+    ProgramResult r;
+    EXPECT_LT(seconds_of([&] { r = program.wait(); }), loading / 2);
+    EXPECT_EQ(r.status, 130) << r.errors;
+    EXPECT_NE(r.output.find("path"), std::string::npos) << r.output;
+    EXPECT_EQ(nlohmann::json::parse(read_text(report + "/report.json"))["scenes"].size(), 1u);
+}
+
 TEST_F(FailuresTest, VerificationsOutliveAMethodThatFails) {
     const ProgramResult r = run({"verify", scene, "--resolution", "64x64", "--methods", "path",
                                  "vcm:memory=1,light_paths=65536", "--spp", "1", "--runs", "8",
