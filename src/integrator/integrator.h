@@ -28,6 +28,8 @@ public:
     virtual void learn(const LearnContext&) {}
     /// Whether learn() changes the sampling or the weights of later passes.
     virtual bool is_learning() const { return false; }
+    /// Number of the eye paths of a pass. Passes with the same number have the same film points.
+    virtual uint32_t eye_paths_of(uint32_t pass) const { return pass; }
     /// Writes the state that later passes need, if there is any. Called between passes. After load(), an integrator with
     /// the same parameters continues as this one would. The state includes neither the film and the statistics nor the
     /// data of a single pass. load() throws std::runtime_error if the state is that of another integrator.

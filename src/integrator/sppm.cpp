@@ -40,7 +40,7 @@ public:
         const TechniqueCounts n = mapping_.counts();
         const WalkContext walk = mapping_.paths().eye_walk(c.scene, n, work.stats);
         Sampler of_walk = c.sampler;
-        if (eye_paths_ > 0) of_walk.start(pass_ % eye_paths_, c.index);
+        if (eye_paths_ > 0) of_walk.start(eye_paths_of(pass_), c.index);
         SubPath& z = work.z;
 
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
@@ -53,6 +53,9 @@ public:
         }
     }
 
+    uint32_t eye_paths_of(uint32_t pass) const override {
+        return eye_paths_ > 0 ? pass % eye_paths_ : pass;
+    }
     TechniqueCounts counts(const Scene&, uint64_t light_paths) const override {
         TechniqueCounts n = mapping_.counts();
         n.merge = float(light_paths);

@@ -304,7 +304,8 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
     const uint64_t pixels = scene_.film().pixel_count(), light_paths = light_paths_;
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     const Numbers place = numbers(index);
-    film_.begin_pass(light_paths, film_offset(settings_.sampler, place.seed, place.pass));
+    film_.begin_pass(light_paths, film_offset(settings_.sampler, place.seed,
+                                              integrator_->eye_paths_of(place.pass)));
     const uint64_t seed = place.seed;
     const auto go_on = [&] {
         if (drop.load(std::memory_order_relaxed)) throw PassDropped();

@@ -234,9 +234,15 @@ TEST(ProgressivePhotonMapping, RepeatsItsEyePaths) {
     const Scene room_scene = build(front_camera(16) + room() + area_lamp());
     EXPECT_EQ(image(room_scene, "ppm:eye_paths=5", 5), image(room_scene, "sppm", 5));
     EXPECT_NE(image(room_scene, "ppm:eye_paths=4", 5), image(room_scene, "sppm", 5));
-    const Scene edge = build(front_camera(16) + area_lamp());
-    EXPECT_EQ(image(edge, "ppm:eye_paths=2", 2), image(edge, "ppm:eye_paths=2", 6));
-    EXPECT_NE(image(edge, "sppm", 2), image(edge, "sppm", 6));
+    // A wide filter spreads the contributions from film points that all pixels share.
+    for (const char* filter : {"box", "gaussian"}) {
+        SCOPED_TRACE(filter);
+        std::string camera = front_camera(16);
+        camera.replace(camera.find("box"), 3, filter);
+        const Scene edge = build(camera + area_lamp());
+        EXPECT_EQ(image(edge, "ppm:eye_paths=2", 2), image(edge, "ppm:eye_paths=2", 6));
+        EXPECT_NE(image(edge, "sppm", 2), image(edge, "sppm", 6));
+    }
 }
 
 }  // namespace
