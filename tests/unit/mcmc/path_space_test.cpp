@@ -489,13 +489,14 @@ TEST_P(Paths, ThatAreNotFiniteAreCounted) {
 
 /// A light path that ends without a direction does not hit the lens along its last ray.
 TEST(PathBuilder, HitsTheLensByNewDirections) {
-    // From a lamp through rough glass, whose sampling sometimes fails, to a wide lens.
+    // From a lamp through rough glass, whose sampling sometimes fails, to a wide lens. The lens is nearer to the glass than
+    // the lamp, so that a ray as long as the last one reaches it.
     const Scene scene = build(
         sensor("0,0,2", "0,0,0", kPixels, "60",
                "<float name=\"aperture_radius\" value=\"1\"/><float name=\"focus_distance\" "
                "value=\"2\"/>",
                "thinlens") +
-        rectangle("<translate z=\"-1\"/>", diffuse("0.5,0.5,0.5") +
+        rectangle("<translate z=\"-4\"/>", diffuse("0.5,0.5,0.5") +
                                                "<emitter type=\"area\"><rgb name=\"radiance\" "
                                                "value=\"2,2,2\"/></emitter>") +
         rectangle("<scale value=\"3\"/>", "<bsdf type=\"roughdielectric\"><float name=\"alpha\" "
