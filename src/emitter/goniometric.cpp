@@ -7,8 +7,9 @@
 
 #include "emitter/environment.h"
 
-#include "emitter/point.h"
 #include <numbers>
+
+#include "emitter/point.h"
 
 namespace etendue {
 namespace {
@@ -45,6 +46,12 @@ std::unique_ptr<Emitter> make(const Params& p, RgbImage image, const Transform& 
 
 }  // namespace
 
+std::unique_ptr<Emitter> read_goniometric(const Params& p) {
+    const Transform to_world = similarity(p, "to_world");
+    return scaled_to_power(p, read_emission_image(p, p.rgb("intensity", Rgb(1))),
+                           [&](RgbImage image) { return make(p, std::move(image), to_world); });
+}
+
 EmitterEntry goniometric_entry() {
     return {{"emitter",
              "goniometric",
@@ -60,12 +67,7 @@ EmitterEntry goniometric_entry() {
                "projection, +z up."},
               {"to_world", ParamKind::Transform, "identity",
                "Similarity: its origin is the light's position."}}},
-            [](const Params& p, EmitterContext&) {
-                const Transform to_world = similarity(p, "to_world");
-                return one_emitter(scaled_to_power(
-                    p, read_emission_image(p, p.rgb("intensity", Rgb(1))),
-                    [&](RgbImage image) { return make(p, std::move(image), to_world); }));
-            }};
+            [](const Params& p, EmitterContext&) { return one_emitter(read_goniometric(p)); }};
 }
 
 }  // namespace etendue

@@ -14,44 +14,6 @@
 namespace etendue {
 namespace {
 
-/// Intensity between cut-off and beam: linear in the angle (Mitsuba); or of x, the cosine's way from the one to the
-/// other, x²(3 − 2x) (pbrt-v4), x⁴ (pbrt-v3) or x² (glTF).
-enum class Falloff { Angle, Smooth, Quartic, Quadratic };
-
-/// Share of a spot light's intensity by direction.
-class Beam {
-public:
-    Beam(float cutoff_degrees, float beam_degrees, Falloff falloff)
-        : falloff_(falloff), cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
-          cos_cutoff_(std::cos(cutoff_)), cos_beam_(std::cos(beam_)) {}
-
-    float share(float cos_theta) const {
-        if (cos_theta <= cos_cutoff_) return 0;
-        if (cos_theta >= cos_beam_) return 1;
-        const float x = (cos_theta - cos_cutoff_) / (cos_beam_ - cos_cutoff_);
-        switch (falloff_) {
-        case Falloff::Smooth: return sqr(x) * (3 - 2 * x);
-        case Falloff::Quadratic: return sqr(x);
-        case Falloff::Quartic: return sqr(sqr(x));
-        default: return (cutoff_ - std::acos(cos_theta)) / (cutoff_ - beam_);
-        }
-    }
-    /// Integral of share() over all directions.
-    double integral() const {
-        const double mean = falloff_ == Falloff::Quartic     ? 0.2
-                            : falloff_ == Falloff::Quadratic ? 1.0 / 3
-                                                             : 0.5;  // of the ring
-        return 2 * std::numbers::pi *
-               ((1 - double(cos_beam_)) + mean * (double(cos_beam_) - double(cos_cutoff_)));
-    }
-    float cos_cutoff() const { return cos_cutoff_; }
-    float tan_cutoff() const { return std::tan(cutoff_); }
-
-private:
-    Falloff falloff_;
-    float cutoff_, beam_, cos_cutoff_, cos_beam_;
-};
-
 class SpotEmitter final : public PointEmitter {
 public:
     SpotEmitter(Vec3 p, Vec3 axis, Rgb intensity, const Beam& beam)
@@ -131,6 +93,38 @@ private:
 
 }  // namespace
 
+float Beam::share(float cos_theta) const {
+    if (cos_theta <= cos_cutoff_) return 0;
+    if (cos_theta >= cos_beam_) return 1;
+    const float x = (cos_theta - cos_cutoff_) / (cos_beam_ - cos_cutoff_);
+    switch (falloff_) {
+    case Falloff::Smooth: return sqr(x) * (3 - 2 * x);
+    case Falloff::Quadratic: return sqr(x);
+    case Falloff::Quartic: return sqr(sqr(x));
+    default: return (cutoff_ - std::acos(cos_theta)) / (cutoff_ - beam_);
+    }
+}
+
+double Beam::integral() const {
+    const double mean = falloff_ == Falloff::Quartic     ? 0.2
+                        : falloff_ == Falloff::Quadratic ? 1.0 / 3
+                                                         : 0.5;  // of the ring
+    return 2 * std::numbers::pi *
+           ((1 - double(cos_beam_)) + mean * (double(cos_beam_) - double(cos_cutoff_)));
+}
+
+Beam read_beam(const Params& p) {
+    const float cutoff = p.number("cutoff_angle", 20, 0.01f, 179.9f);
+    const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
+    if (beam > cutoff)
+        p.fail(
+            "beam_width",
+            fmt::format("\"beam_width\" is {}, but must not exceed \"cutoff_angle\", which is {}",
+                        beam, cutoff));
+    return {cutoff, beam,
+            Beam::Falloff(p.choice("falloff", {"angle", "smooth", "quartic", "quadratic"}, 0))};
+}
+
 Transform similarity(const Params& params, const char* name) {
     const Transform t = params.transform(name);
     const Vec3 x = t.vector({1, 0, 0}), y = t.vector({0, 1, 0}), z = t.vector({0, 0, 1});
@@ -180,28 +174,21 @@ EmitterEntry spot_entry() {
                "Its origin is the light's position, and its +z axis is that of the beam."}}},
             [](const Params& p, EmitterContext& c) {
                 const Transform t = p.transform("to_world");
-                const float cutoff = p.number("cutoff_angle", 20, 0.01f, 179.9f);
-                const float beam = p.number("beam_width", cutoff * 0.75f, 0, 179.9f);
-                if (beam > cutoff)
-                    p.fail("beam_width", fmt::format("\"beam_width\" is {}, but must not exceed "
-                                                     "\"cutoff_angle\", which is {}",
-                                                     beam, cutoff));
+                const Beam beam = read_beam(p);
                 const Rgb intensity = p.rgb("intensity", Rgb(1));
-                const Beam shape(
-                    cutoff, beam,
-                    Falloff(p.choice("falloff", {"angle", "smooth", "quartic", "quadratic"}, 0)));
                 const TextureRef texture = c.texture(p, "texture", Rgb(1));
                 if (texture.is_constant())
                     return one_emitter(std::make_unique<SpotEmitter>(
                         t.point({0, 0, 0}), normalize(t.vector({0, 0, 1})),
-                        intensity * texture.mean(), shape));
+                        intensity * texture.mean(), beam));
                 constexpr float kWidest = 89;
+                const float cutoff = p.number("cutoff_angle", 20);
                 if (cutoff > kWidest)
                     p.fail("texture", fmt::format("a spot light with a texture needs a "
                                                   "\"cutoff_angle\" of at most {}, but it is {}",
                                                   kWidest, cutoff));
-                return one_emitter(std::make_unique<TexturedSpotEmitter>(
-                    similarity(p, "to_world"), intensity, shape, texture));
+                return one_emitter(std::make_unique<TexturedSpotEmitter>(similarity(p, "to_world"),
+                                                                         intensity, beam, texture));
             }};
 }
 

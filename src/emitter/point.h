@@ -48,6 +48,31 @@ protected:
     Rgb intensity_;
 };
 
+/// Share of a spot light's intensity by direction, a function of the angle to its axis.
+class Beam {
+public:
+    /// Intensity between cut-off and beam: linear in the angle (Mitsuba); or of x, the cosine's way from the one to the
+    /// other, x²(3 − 2x) (pbrt-v4), x⁴ (pbrt-v3) or x² (glTF).
+    enum class Falloff { Angle, Smooth, Quartic, Quadratic };
+
+    Beam(float cutoff_degrees, float beam_degrees, Falloff falloff)
+        : falloff_(falloff), cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
+          cos_cutoff_(std::cos(cutoff_)), cos_beam_(std::cos(beam_)) {}
+
+    float share(float cos_theta) const;
+    /// Integral of share() over all directions.
+    double integral() const;
+    float cos_cutoff() const { return cos_cutoff_; }
+    float tan_cutoff() const { return std::tan(cutoff_); }
+
+private:
+    Falloff falloff_;
+    float cutoff_, beam_, cos_cutoff_, cos_beam_;
+};
+
+/// The beam of a `spot`.
+Beam read_beam(const Params& params);
+
 /// The emitter that `make` makes of an image, of the power that parameter "power" asks for, if any.
 template <class Make>
 std::unique_ptr<Emitter> scaled_to_power(const Params& params, RgbImage image, const Make& make) {
@@ -68,6 +93,8 @@ struct ProjectionLight {
     double half_width = 0, half_height = 0;
 };
 ProjectionLight read_projection(const Params& params);
+/// The emitter `goniometric`.
+std::unique_ptr<Emitter> read_goniometric(const Params& params);
 
 EmitterEntry point_entry();
 EmitterEntry spot_entry();

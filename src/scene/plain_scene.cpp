@@ -36,8 +36,10 @@ int PlainScene::add(SceneObject&& o) {
 }
 
 void PlainScene::set_image(SceneObject& o, std::string bytes) {
-    set(o, "image", int64_t(scene_.images.size()));
-    scene_.images.push_back(EncodedImage{"texture", std::move(bytes)});
+    const size_t index = scene_.images.size();
+    set(o, "image", int64_t(index));
+    // Images of the same name are one in the cache of textures.
+    scene_.images.push_back(EncodedImage{fmt::format("texture {}", index), std::move(bytes)});
 }
 
 void PlainScene::warn(const SceneObject& o, const std::string& message) {

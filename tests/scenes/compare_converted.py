@@ -92,6 +92,8 @@ def compare_scene(file, mitsuba, ours, folder, args):
     mitsuba.open(scene.theirs, optimize=False)
     spp, their_spp = (max(4, round(n * scene.share)) for n in (args.spp, args.mitsuba_spp))
     theirs = images_of(mitsuba, their_spp, args)
+    if not theirs.mean() > 0:
+        raise RuntimeError("Mitsuba's image is black: there is nothing to compare")
     ours.more = scene.resolution
     ours.open(file, *options)
     images = images_of(ours, spp, args)

@@ -8,6 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "bsdf/material.h"
+#include "emitter/emitter.h"
+#include "math/frame.h"
+#include "math/warp.h"
+#include "random.h"
 #include "readers/mitsuba_writer.h"
 #include "readers/mitsuba_xml.h"
 #include "readers/scene_file.h"
@@ -181,7 +185,10 @@ TEST(PlainMitsuba, EveryIntegratorBecomesOneOfMitsuba) {
 TEST(PlainMitsuba, SkyIsSunAndSkyWithoutSun) {
     SceneDescription scene = parse(R"(<emitter type="sky"><float name="scale" value="3"/>
         <integer name="resolution" value="64"/></emitter>)");
-    EXPECT_TRUE(make_plain_mitsuba(scene).empty());
+    const std::vector<std::string> warnings = make_plain_mitsuba(scene);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("no parameter \"resolution\" of emitter \"sky\""), std::string::npos)
+        << warnings[0];
     const SceneObject& sky = only(scene, "emitter");
     EXPECT_EQ(sky.type, "sunsky");
     EXPECT_EQ(number(sky, "sky_scale"), 3);
@@ -241,6 +248,104 @@ TEST(PlainMitsuba, SquareEnvironmentsAreFine) {
     make_plain_mitsuba(scene);
     ASSERT_EQ(scene.images.size(), 1u);
     EXPECT_TRUE(scene.images[0]->bytes.starts_with("PF\n1024 512\n"));
+}
+
+/// The intensity of the only emitter at an angle to its beam, which is turned by half a radian about +x from +z; `around`
+/// says in which plane.
+float intensity_at(const Scene& scene, float degrees, float around) {
+    const Frame frame = Frame::from_normal({0, -std::sin(0.5f), std::cos(0.5f)});
+    const float radians = degrees * kPi / 180;
+    const Vec3 d = frame.to_world({std::sin(radians) * std::cos(around),
+                                   std::sin(radians) * std::sin(around), std::cos(radians)});
+    return scene.emitters().front()->eval_emission({}, {}, 0, d).Le_cos.g;
+}
+
+// Mitsuba's spots fall off linearly in the angle alone.
+TEST(PlainMitsuba, FalloffOfSpotsBecomesAnImage) {
+    const auto spot = [](const std::string& falloff, int cutoff, const char* scale) {
+        return parse(fmt::format(
+            R"(<sensor type="perspective"/><shape type="rectangle"/><emitter type="spot">
+            <rgb name="intensity" value="3"/><float name="cutoff_angle" value="{}"/>
+            <float name="beam_width" value="15"/><string name="falloff" value="{}"/>
+            <transform name="to_world"><scale value="{}"/><rotate x="1" angle="28.647890"/>
+            </transform></emitter>)",
+            cutoff, falloff, scale));
+    };
+    for (const char* falloff : {"smooth", "quartic", "quadratic"})
+        for (const int cutoff : {20, 40, 70}) {
+            SCOPED_TRACE(fmt::format("{} {}", falloff, cutoff));
+            SceneDescription plain = spot(falloff, cutoff, "1");
+            const Scene original = build_scene(plain);
+            const std::vector<std::string> warnings = make_plain_mitsuba(plain);
+            ASSERT_EQ(warnings.size(), 1u);
+            EXPECT_NE(warnings[0].find(fmt::format("no falloff \"{}\"", falloff)),
+                      std::string::npos)
+                << warnings[0];
+            EXPECT_FALSE(only(plain, "emitter").find("falloff"));
+            const Scene scene = build_scene(plain);
+            for (const float share : {0.0f, 0.3f, 0.5f, 0.7f, 0.9f, 1.1f})
+                for (const float around : {0.0f, 0.8f, 2.0f})
+                    EXPECT_NEAR(intensity_at(scene, share * float(cutoff), around),
+                                intensity_at(original, share * float(cutoff), around), 0.012)
+                        << share << " " << around;
+        }
+
+    // Lights with an image cannot be distorted.
+    SceneDescription distorted = spot("smooth", 30, "1 2 1");
+    make_plain_mitsuba(distorted);
+    EXPECT_NO_THROW(build_scene(distorted));
+
+    SceneDescription linear = spot("angle", 30, "1");
+    EXPECT_TRUE(make_plain_mitsuba(linear).empty());
+    EXPECT_FALSE(only(linear, "emitter").find("falloff"));
+
+    SceneDescription wide = spot("smooth", 88, "1");
+    const std::vector<std::string> left_out = make_plain_mitsuba(wide);
+    ASSERT_EQ(left_out.size(), 1u);
+    EXPECT_NE(left_out[0].find("no parameter \"falloff\""), std::string::npos) << left_out[0];
+}
+
+// Mitsuba has no point light whose intensity in all directions is an image.
+TEST(PlainMitsuba, GoniometricLightsBecomeProjectors) {
+    for (const char* projection : {"latlong", "equalarea"})
+        for (const char* amount : {"<rgb name=\"intensity\" value=\"1 2 3\"/>",
+                                   "<float name=\"power\" value=\"20\"/>"}) {
+            SCOPED_TRACE(fmt::format("{} {}", projection, amount));
+            SceneDescription plain = parse(fmt::format(
+                R"(<sensor type="perspective"/><shape type="rectangle"/>
+                <emitter type="goniometric"><string name="filename" value="{}"/>
+                <string name="projection" value="{}"/>{}<transform name="to_world">
+                <rotate x="1" y="2" angle="40"/><translate x="1" y="2" z="3"/></transform>
+                </emitter>)",
+                ETENDUE_SOURCE_DIR "/tests/scenes/formats/data/image.ppm", projection, amount));
+            const Scene original = build_scene(plain);
+            const std::vector<std::string> warnings = make_plain_mitsuba(plain);
+            ASSERT_EQ(warnings.size(), 1u);
+            EXPECT_NE(warnings[0].find("six of \"projector\""), std::string::npos) << warnings[0];
+            const Scene scene = build_scene(plain);
+            ASSERT_EQ(scene.emitters().size(), 6u);
+
+            constexpr int kDirections = 2000;
+            testing::Random random(1);
+            int edges = 0;
+            for (int i = 0; i < kDirections; ++i) {
+                const Vec3 d = sample_uniform_sphere(random.next_2d());
+                DirectSample from_original, s;
+                const Vec3 at = Vec3{1, 2, 3} + d;
+                ASSERT_TRUE(original.emitters().front()->sample_direct(at, {}, from_original));
+                Rgb sum;
+                for (const auto& face : scene.emitters())
+                    if (face->sample_direct(at, {}, s)) sum += s.Le;
+                for (int c = 0; c < 3; ++c)
+                    if (!(std::fabs(sum[c] - from_original.Le[c]) <
+                          0.03f * from_original.Le[c] + 0.01f)) {
+                        ++edges;
+                        break;
+                    }
+            }
+            // Of the few pixels of the image.
+            EXPECT_LT(edges, kDirections / 20);
+        }
 }
 
 // Mitsuba 3 renders no bump map of another texture: it has no gradient of it.
