@@ -49,11 +49,10 @@ ReconstructionFilter::ReconstructionFilter(const char* name, float radius,
     const auto shape_at = [&](double x) {
         return std::fabs(x) < double(radius) ? shape(x, a, b) : 0.0;
     };
-    // Midpoint rule; the shapes are smooth between the steps.
-    double step = 2.0 * radius / kSteps;
+    // Of what is tabulated, which is linear between the points of the grid.
     double integral = 0;
-    for (int i = 0; i < kSteps; ++i)
-        integral += shape_at(-double(radius) + (i + 0.5) * step) * step;
+    for (int i = 1 - kStepsPerPixel * reach_; i < kStepsPerPixel * reach_; ++i)
+        integral += shape_at(double(i) / kStepsPerPixel) / kStepsPerPixel;
 
     for (int i = 0; i <= kStepsPerPixel; ++i) {
         const double f = double(i) / kStepsPerPixel;
@@ -63,7 +62,7 @@ ReconstructionFilter::ReconstructionFilter(const char* name, float radius,
             table_.push_back(float(shape_at(f - k) / (is_wide() ? sum : integral)));
     }
 
-    step = 2.0 * radius_ / kSteps;
+    const double step = 2.0 * radius_ / kSteps;
     for (int i = 0; i < kSteps; ++i)
         cdf_[i + 1] =
             cdf_[i] + std::fabs(double(eval_1d(float(-double(radius_) + (i + 0.5) * step))));
