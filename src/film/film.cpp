@@ -186,6 +186,17 @@ ErrorEstimate Film::group_error() const {
     return e;
 }
 
+double Film::variance_of_pixels() const {
+    if (!spreads_) return 1;
+    constexpr int kSteps = 1024;
+    double squares = 0;  // Σ h² of one axis
+    for (int i = 0; i < kSteps; ++i) {
+        const ReconstructionFilter::Taps t = filter_.taps((float(i) + 0.5f) / kSteps);
+        for (int k = 0; k < t.count; ++k) squares += sqr(double(t.weight[size_t(k)])) / kSteps;
+    }
+    return sqr(squares);
+}
+
 ErrorEstimate Film::error() const {
     if (has_groups()) return group_error();
     ErrorEstimate e;

@@ -52,10 +52,15 @@ public:
         float weight;
     };
     PixelSample sample_pixel(uint64_t index, Vec2 u) const {
-        if (spreads_) return {grid_.point(index), 1};
-        const auto s = filter_.sample(u);
-        return {geometry_.pixel_center(index) + s.offset, s.weight};
+        return spreads_ ? PixelSample{grid_.point(index), 1} : sample_alone(index, u);
     }
+    /// Film point of an eye path that contributes to a pixel alone.
+    PixelSample sample_alone(uint64_t pixel, Vec2 u) const {
+        const auto s = filter_.sample(u);
+        return {geometry_.pixel_center(pixel) + s.offset, s.weight};
+    }
+    /// The variance of a pixel of a pass, on average over the film points, if all samples have the variance 1.
+    double variance_of_pixels() const;
     /// Calls `use(index, h)` for the samples of the current pass that contribute to a pixel; h is their factor.
     template <class Use>
     void for_each_sample_of(uint64_t pixel, const Use& use) const;

@@ -154,15 +154,15 @@ void Bidirectional::learn(const LearnContext& pass, uint64_t rays) {
     // With a survival probability q = C/δ, the expected number of rays of a join is q, and its variance increases by
     // C²(1/q - 1). The product of the number of rays T and the variance V of a sample is minimal for δ² = V/T
     // [Veach 1997, §10.4.2].
-    // The variance of one pass, averaged over a window, because few passes give a poor estimate for a single pixel.
+    // The variance of one sample, averaged over a window, because few passes give a poor estimate for a single pixel.
     constexpr int kReach = 3;
     const FilmGeometry& g = pass.film.geometry();
     const std::vector<Rgb> variance = pass.film.variance();
     thresholds_.resize(variance.size());
-    // Factor from film.variance() to the variance of one pass divided by the number of rays of a sample.
+    // Factor from film.variance() to the variance of one sample divided by its number of rays.
     const double passes = double(pass.film.passes());
     const double samples = passes * double(g.pixel_count());
-    const double scale = passes / (double(rays) / samples);
+    const double scale = passes / (pass.film.variance_of_pixels() * double(rays) / samples);
     for (int y = 0; y < g.crop_height; ++y)
         for (int x = 0; x < g.crop_width; ++x) {
             double sum = 0;

@@ -142,6 +142,27 @@ TEST(FilterModeSpread, AConstantImageHasNoNoise) {
     }
 }
 
+/// Where samples are spread over pixels, the variance of a pixel is smaller than that of a sample.
+TEST(FilterModeSpread, TellsTheVarianceOfAPixelFromThatOfASample) {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> value(0, 1);
+    for (const FilterMode mode : {FilterMode::Spread, FilterMode::Sample})
+        for (const ReconstructionFilter& f : all_filters()) {
+            constexpr int kPasses = 600;
+            Film film(kCrop, f, 1, mode);
+            for (int pass = 0; pass < kPasses; ++pass) {
+                film.begin_pass(0, {value(random), value(random)});
+                for (uint64_t i = 0; i < film.sample_count(); ++i)
+                    film.add_eye(i, Rgb(value(random)));
+                film.end_pass();
+            }
+            double mean = 0;
+            for (const Rgb& v : film.variance()) mean += double(v.g) / double(kCrop.pixel_count());
+            EXPECT_NEAR(12 * mean * kPasses / film.variance_of_pixels(), 1, 0.05)
+                << f.name() << " " << f.radius() << " " << film.spreads();
+        }
+}
+
 /// The convolution equals the sum over all samples, each added to the pixels that the filter reaches from its point.
 TEST(FilterModeSpread, AddsEverySampleToAllPixelsAround) {
     std::mt19937 random(3);
