@@ -262,7 +262,7 @@ private:
         const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
         SubPath& z = work.z;
         Sampler of_walk = c.sampler;
-        start_eye_path(walk, c.film, c.index, of_walk, z);
+        start_eye_path_of_pixel(walk, c.film, c.index, of_walk, z);
         for (int t = 2; t <= z.size(); ++t) {
             const bool is_diffuse = mapping_.takes_photons(z, t);
             if (mapping_.paths().is_joinable(z, t))
@@ -307,7 +307,7 @@ private:
                 const TechniqueCounts none;
                 const WalkContext walk = mapping_.paths().eye_walk(c.scene, none, work.stats);
                 SubPath& z = work.z;
-                start_eye_path(walk, c.film, c.index, c.sampler, z);
+                start_eye_path_of_pixel(walk, c.film, c.index, c.sampler, z);
                 for (int t = 2; t <= z.size(); ++t) {
                     const bool is_diffuse = mapping_.takes_photons(z, t);
                     const auto n = is_diffuse ? irradiance_normal(z[t - 1]) : std::nullopt;

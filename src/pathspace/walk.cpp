@@ -144,6 +144,14 @@ void start_eye_path(const WalkContext& walk, const Film& film, uint64_t index, S
     start_eye_path(walk, at, u_lens, sampler, z);
 }
 
+void start_eye_path_of_pixel(const WalkContext& walk, const Film& film, uint64_t pixel,
+                             Sampler& sampler, SubPath& z) {
+    sampler.seek(Stream::Eye, 0);
+    const Film::PixelSample at = film.sample_alone(pixel, sampler.next_2d());
+    const Vec2 u_lens = sampler.next_2d_if(walk.scene.sensor().has_finite_lens());
+    start_eye_path(walk, at, u_lens, sampler, z);
+}
+
 void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
                     Sampler& sampler, SubPath& z) {
     start_eye_path(walk, at, walk.scene.sensor().sample_ray(at.point, u_lens), sampler, z);

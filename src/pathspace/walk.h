@@ -36,6 +36,10 @@ struct WalkContext {
 /// ray leaves the scene, z_1 is a vertex at infinity if there are emitters at infinity; otherwise there is no z_1.
 void start_eye_path(const WalkContext& walk, const Film& film, uint64_t index, Sampler& sampler,
                     SubPath& z);
+/// The same for a film point that is drawn from the filter of a pixel. For walks that contribute nothing to the film:
+/// they depend on their own random numbers alone, whatever the film points of the pass are.
+void start_eye_path_of_pixel(const WalkContext& walk, const Film& film, uint64_t pixel,
+                             Sampler& sampler, SubPath& z);
 /// The same for a given film point; `u_lens` chooses the point on a finite lens. `sampler` must be positioned after the
 /// numbers used for these two.
 void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
@@ -82,9 +86,10 @@ inline void trace_light_path(const WalkContext& walk, Sampler& sampler, SubPath&
     while (extend<TransportMode::Importance>(walk, sampler, y)) {
     }
 }
-inline void trace_eye_path(const WalkContext& walk, const Film& film, uint64_t index,
+/// By start_eye_path_of_pixel().
+inline void trace_eye_path(const WalkContext& walk, const Film& film, uint64_t pixel,
                            Sampler& sampler, SubPath& z) {
-    start_eye_path(walk, film, index, sampler, z);
+    start_eye_path_of_pixel(walk, film, pixel, sampler, z);
     while (extend<TransportMode::Radiance>(walk, sampler, z)) {
     }
 }

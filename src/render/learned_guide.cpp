@@ -46,9 +46,7 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
     const IntegratorParams params = guided_params(spec);
     Guiding guiding(params);
     const DepthOptions depth = DepthOptions::from(params);
-    // Film points of the first pass, as a rendering has them by default.
-    Film film(scene.film(), scene.filter(), 1, RenderSettings{}.filter_mode);
-    film.begin_pass(0, film_offset(SamplerKind::Sobol, seed, 0));
+    const Film film(scene.film(), scene.filter());
     tbb::task_arena arena(thread_count(threads));
     const auto for_each = [&](uint64_t count, const PassContext::Task& task) {
         tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {

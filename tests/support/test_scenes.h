@@ -23,6 +23,12 @@ inline std::string sensor(const std::string& origin, const std::string& target, 
            "\"/><rfilter type=\"box\"/></film></sensor>";
 }
 
+/// The same sensor with another filter.
+inline std::string with_filter(std::string sensor, const std::string& type) {
+    const std::string box = "type=\"box\"";
+    return sensor.replace(sensor.find(box), box.size(), "type=\"" + type + "\"");
+}
+
 inline std::string diffuse(const std::string& rgb) {
     return "<bsdf type=\"twosided\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"" +
            rgb + "\"/></bsdf></bsdf>";

@@ -159,14 +159,15 @@ TEST(LearnedContributions, AreThoseOfTheLightPathsOfAPass) {
 /// What is shown of a guide is what a rendering learns before its first pass.
 TEST(LearnedGuides, AreThoseOfARendering) {
     constexpr uint64_t kSeed = 3;
-    // With a filter that is wider than a pixel, the film points depend on the film's mode.
-    std::string camera = test::front_camera(kSize);
-    const std::string box = "<rfilter type=\"box\"/>";
-    camera.replace(camera.find(box), box.size(), "<rfilter type=\"gaussian\"/>");
-    const Scene scene = test::build(camera + test::room() + test::area_lamp());
-    for (const char* method :
-         {"bdpt:guide=on,guide_walks=20000", "path:guide=on,guide_walks=20000"}) {
+    // With a filter that is wider than a pixel, the film points of a pass depend on the film's mode.
+    const Scene scene = test::build(test::with_filter(test::front_camera(kSize), "gaussian") +
+                                    test::room() + test::area_lamp());
+    for (const auto& [method, mode] :
+         {std::pair("bdpt:guide=on,guide_walks=20000", FilterMode::Spread),
+          {"bdpt:guide=on,guide_walks=20000", FilterMode::Sample},
+          {"path:guide=on,guide_walks=20000", FilterMode::Spread}}) {
         RenderSettings settings;
+        settings.filter_mode = mode;
         settings.integrator = IntegratorSpec::parse(method);
         settings.sampler = SamplerKind::Sobol;
         settings.seed = kSeed;
