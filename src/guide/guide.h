@@ -16,7 +16,7 @@ public:
     };
 
     GuideTree surfaces;
-    bool uses_surfaces = true;  ///< Whether walks are guided by `surfaces`.
+    bool uses_surfaces = true;  ///< Whether walks take directions from `surfaces`.
     GuideTree emission;  ///< Of the directions from y_0, as TransportMode::Importance and class 0.
     /// Whether walks use adjoint-driven Russian roulette [Vorba & Křivánek 2016], by GuideCell::Field::contribution.
     bool has_roulette = false;
@@ -25,8 +25,10 @@ public:
     float emission_gain =
         0;  ///< Mean gain of all light paths by the directions from y_0, or of y_0 at infinity.
 
-    /// Whether walks have directions, densities and roulette of a cell at each surface.
+    /// Whether walks have directions and densities of a cell at each surface.
     bool guides_surfaces() const { return uses_surfaces && !surfaces.is_empty(); }
+    /// Whether walks look up a cell at each surface, for its directions or for its roulette.
+    bool has_cells() const { return (uses_surfaces || has_roulette) && !surfaces.is_empty(); }
 
     void add_at_infinity(const AtInfinity& learned) { at_infinity_.push_back(learned); }
     /// The learned directions of an emitter at infinity; nullptr where their share is 0.

@@ -340,9 +340,8 @@ bool Guiding::gains_little(const Guide& guide, GuidedWalks walks) {
 }
 
 bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
-    // Adjoint-driven roulette keeps more vertices, and a method that joins both walks joins each of them. What emission
-    // gains does not depend on it. In the scenes of docs/guiding.md, one of the two gains 2.9 nats, or both at most 0.3: on
-    // veach-bidir, where the guide at surfaces makes a sample worse.
+    // Neither what emission gains nor adjoint-driven roulette depends on them. In the scenes of docs/guiding.md, one of the
+    // two gains 2.9 nats, or both at most 0.3: on veach-bidir, where guided directions make a sample worse.
     constexpr float kLeastGain = 0.5f;
     const bool has_gains = mode_ == Mode::On || mode_ == Mode::Auto;
     return joins_both(walks) && has_gains &&

@@ -41,7 +41,7 @@ private:
                                    GuidedWalks guided, const Guide* teacher, uint64_t walks,
                                    uint64_t seed, bool for_roulette) const;
 
-    /// Whether walks are better off without a guide at surfaces.
+    /// Whether walks are better off without guided directions at surfaces.
     bool gains_nothing(const Guide& guide, GuidedWalks walks) const;
 
     Mode mode_ = Mode::Off;

@@ -92,9 +92,9 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, Tra
     Vertex& v = path.append();
     v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
     v.medium = passage.medium;
-    if (const Guide* guide = walk.counts.guide; guide && guide->guides_surfaces()) {
+    if (const Guide* guide = walk.counts.guide; guide && guide->has_cells()) {
         path.cell = &guide->surfaces.cell(v.p);
-        v.set_guide(*path.cell, mode, walk.counts.uses_light_paths());
+        if (guide->guides_surfaces()) v.set_guide(*path.cell, mode, walk.counts.uses_light_paths());
     }
     v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
     v.beta = beta;

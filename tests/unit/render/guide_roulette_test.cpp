@@ -25,6 +25,12 @@ struct LearnedRoulette : ::testing::Test {
         learned.uses_surfaces = true;  // although directions gain little here
         return learned;
     }();
+    /// The same without guided directions.
+    const Guide roulette_alone = [&] {
+        Guide learned = guide;
+        learned.uses_surfaces = false;
+        return learned;
+    }();
 
     /// Means over vertices from the third on whose contribution is known.
     struct Walks {
@@ -49,6 +55,8 @@ struct LearnedRoulette : ::testing::Test {
             const auto expected = [&](int i) {
                 return expected_contribution(path[i], guide.surfaces.cell(path[i].p), mode);
             };
+            for (int i = 1; i < path.size() && !of_walks.uses_surfaces; ++i)
+                EXPECT_EQ(path[i].guide, nullptr);
             for (int i = 2; i + 1 < path.size(); ++i) {
                 const WalkContribution at = expected(i);
                 if (!(at.beyond >= 0)) continue;
@@ -64,10 +72,10 @@ struct LearnedRoulette : ::testing::Test {
         return all;
     }
     template <TransportMode mode>
-    void expect_fewer_weak_walks() {
-        Guide without = guide;
+    void expect_fewer_weak_walks(const Guide& with) {
+        Guide without = with;
         without.has_roulette = false;
-        const Walks plain = trace<mode>(without), chosen = trace<mode>(guide);
+        const Walks plain = trace<mode>(without), chosen = trace<mode>(with);
         ASSERT_GT(plain.vertices, 1000);
         EXPECT_EQ(plain.survival, 1);
         EXPECT_GT(chosen.survival, 0.5);
@@ -90,11 +98,16 @@ TEST_F(LearnedRoulette, TellsTheSidesOfAWallApart) {
 }
 
 TEST_F(LearnedRoulette, EndsWeakEyeWalks) {
-    expect_fewer_weak_walks<kEye>();
+    expect_fewer_weak_walks<kEye>(guide);
 }
 
 TEST_F(LearnedRoulette, EndsWeakLightWalks) {
-    expect_fewer_weak_walks<kLight>();
+    expect_fewer_weak_walks<kLight>(guide);
+}
+
+TEST_F(LearnedRoulette, NeedsNoGuidedDirections) {
+    expect_fewer_weak_walks<kEye>(roulette_alone);
+    expect_fewer_weak_walks<kLight>(roulette_alone);
 }
 
 }  // namespace
