@@ -3,8 +3,6 @@
 #include <filesystem>
 #include <mutex>
 
-#include <dlfcn.h>
-
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -24,12 +22,6 @@
 
 namespace etendue::python {
 namespace {
-
-/// The file of this module.
-std::string module_file() {
-    Dl_info info{};
-    return dladdr(reinterpret_cast<void*>(&module_file), &info) ? info.dli_fname : "";
-}
 
 /// The latest line of text about work in progress, handed from its thread to the caller's.
 class StatusLine {
@@ -143,7 +135,7 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
     const auto fail = [&](size_t i, const std::string& reason) {
         failures.push_back({{"file", scenes[i]->scene.file()}, {"reason", reason}});
     };
-    const uint64_t program = program_fingerprint(module_file());
+    const uint64_t program = program_fingerprint();
     const bool interrupted = run(
         [&](StatusLine& status, std::atomic<bool>& stop) {
             // Scenes that fail do not lose those that were compared.

@@ -40,6 +40,11 @@ void ExpectedLuminance::average_blocks() {
 
 void Film::set_groups(int count) {
     group_sums_.assign(size_t(count), std::vector<float>(geometry_.pixel_count()));
+    group_passes_.assign(size_t(count), 0);
+}
+
+bool Film::has_all_groups() const {
+    return std::find(group_passes_.begin(), group_passes_.end(), 0) == group_passes_.end();
 }
 
 void Film::end_pass(double splat_factor) {
@@ -59,12 +64,14 @@ void Film::keep_luminance(std::span<const Rgb> eye) {
 void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     const uint64_t n = geometry_.pixel_count(), chunks = film_chunks(n);
     const bool second = !has_groups() && passes_ % 2 == 1;
-    float* const group = has_groups() ? group_sums_[passes_ % group_sums_.size()].data() : nullptr;
+    const size_t g = has_groups() ? passes_ % group_sums_.size() : 0;
+    float* const group = has_groups() ? group_sums_[g].data() : nullptr;
     // All memory is allocated before anything changes, so that a failure leaves the totals unchanged.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks);
     for (std::vector<double>* list : {&pass_means_, &pair_errors_})
         if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);
     ++passes_;
+    if (group) ++group_passes_[g];
     std::swap(expected_, expected_in_last_pass_);
     std::vector<float>& expected = expected_.pixels_;
     for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
@@ -143,8 +150,8 @@ std::vector<Rgb> Film::variance() const {
 
 double Film::group_error2(size_t pair, size_t pixel) const {
     const size_t a = 2 * pair, b = a + 1;
-    const double difference = double(group_sums_[a][pixel]) / double(passes_of_group(a)) -
-                              double(group_sums_[b][pixel]) / double(passes_of_group(b));
+    const double difference = double(group_sums_[a][pixel]) / double(group_passes_[a]) -
+                              double(group_sums_[b][pixel]) / double(group_passes_[b]);
     // Half the squared difference estimates the variance of one group; the image is the mean of all groups.
     return 0.5 * sqr(difference) / double(group_sums_.size());
 }
@@ -177,12 +184,13 @@ ErrorEstimate Film::group_error() const {
         for (uint64_t c = 0; c < chunks; ++c) sum += error_sum[c * pairs + pair];
         errors.add(sum / double(n));
     }
+    if (errors.count() < 2) return e;
     const double half =
         student_quantile(0.05, double(errors.count() - 1)) * std::sqrt(errors.squared_error());
     e.relative_rms = std::sqrt(errors.mean());
     e.low = std::sqrt(std::max(0.0, errors.mean() - half));
     e.high = std::sqrt(errors.mean() + half);
-    e.valid = errors.count() >= 2;
+    e.valid = true;
     return e;
 }
 
@@ -197,12 +205,14 @@ double Film::variance_of_pixels() const {
     return sqr(squares);
 }
 
+size_t Film::noisy_pairs() const {
+    return is_merged_ ? 0 : std::min<size_t>(pair_errors_.size() / 4, 8);
+}
+
 ErrorEstimate Film::error() const {
     if (has_groups()) return group_error();
     ErrorEstimate e;
-    // The errors of the first pairs are relative to a mean that was still noisy. They are left out when there are
-    // others.
-    const size_t skip = std::min<size_t>(pair_errors_.size() / 4, 8);
+    const size_t skip = noisy_pairs();
     const size_t count = pair_errors_.size() - skip;
     if (count < 4) return e;
     double mean = 0, square = 0;
@@ -233,7 +243,7 @@ Film::MeanEstimate Film::mean_luminance() const {
         for (size_t g = 0; g < group_sums_.size(); ++g) {
             double sum = 0;
             for (const float y : group_sums_[g]) sum += double(y);
-            means.add(sum / (double(passes_of_group(g)) * double(moments_.size())));
+            means.add(sum / (double(group_passes_[g]) * double(moments_.size())));
         }
         m.standard_error = std::sqrt(means.squared_error());
         return m;

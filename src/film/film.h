@@ -12,6 +12,9 @@
 
 namespace etendue {
 
+class SectionReader;
+class SectionWriter;
+
 /// The image's error, estimated from the differences between passes.
 struct ErrorEstimate {
     double relative_rms =
@@ -113,6 +116,7 @@ public:
     /// Reads the sums of all groups if there are any, and otherwise only one number for each pair of passes.
     ErrorEstimate error() const;
     bool has_groups() const { return !group_sums_.empty(); }
+    int groups() const { return int(group_sums_.size()); }
     /// Mean luminance of the crop, and its standard error.
     struct MeanEstimate {
         double mean = 0, standard_error = 0;
@@ -132,16 +136,27 @@ public:
     /// The sums of all pixels, row by row.
     std::span<const Moments> moments() const { return moments_; }
 
+    // -- Between passes.
+
+    /// Writes the totals, and what later passes need, as a section "film".
+    void save(SectionWriter& to) const;
+    /// Replaces them with saved ones of a film of the same size, which throws std::runtime_error if it is none. Then the
+    /// film cannot be used.
+    void load(SectionReader& from);
+    /// Adds the totals of an independent film of the same size and number of groups; otherwise throws std::runtime_error.
+    /// No passes may follow.
+    void merge(const Film& other);
+
 private:
-    bool has_all_groups() const { return passes_ >= group_sums_.size(); }
-    uint64_t passes_of_group(size_t group) const {
-        return (passes_ + group_sums_.size() - 1 - group) / group_sums_.size();
-    }
+    bool has_all_groups() const;
     /// Stores the luminance of the eye paths' contributions in previous_.
     void keep_luminance(std::span<const Rgb> eye);
     /// Squared error of the mean luminance of a pixel, estimated from the groups 2·pair and 2·pair + 1.
     double group_error2(size_t pair, size_t pixel) const;
     ErrorEstimate group_error() const;
+    /// Number of pairs of passes at the beginning whose errors are relative to a mean that was still noisy. They are left
+    /// out when there are others.
+    size_t noisy_pairs() const;
     void fold(std::span<const Rgb> pass, double splat_factor);
 
     FilmGeometry geometry_;
@@ -158,7 +173,9 @@ private:
         pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.
     std::vector<double> pass_means_;
     std::vector<std::vector<float>> group_sums_;  ///< Sums of luminance, by group and pixel.
+    std::vector<uint64_t> group_passes_;
     uint64_t passes_ = 0, rejected_ = 0;
+    bool is_merged_ = false;  ///< Whether it is a sum of several films.
 };
 
 template <class Use>

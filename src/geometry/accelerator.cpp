@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "geometry/ray_tracer.h"
 #include "system/available_memory.h"
 
 #if __has_include(<embree4/rtcore.h>)
@@ -94,6 +95,18 @@ constexpr const char* kDevice = "ignore_config_files=1";
 #endif
 
 }  // namespace
+
+std::string ray_tracer() {
+    // That of the library which was loaded.
+    static const std::string version = [] {
+        const RTCDevice device = rtcNewDevice(kDevice);
+        const ssize_t v = rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION);
+        rtcReleaseDevice(device);
+        return std::to_string(v / 10000) + '.' + std::to_string(v / 100 % 100) + '.' +
+               std::to_string(v % 100);
+    }();
+    return "Embree " + version + ", " + kDevice;
+}
 
 size_t memory_of_machine() {
     return size_t(available_memory().value_or(UINT64_MAX));

@@ -352,19 +352,20 @@ bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
 void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks) {
     constexpr int kRounds = 4;  // Each has twice the walks of the last.
     constexpr uint64_t kFirstPart = (1 << kRounds) - 1;
+    const auto passes = uint32_t(pass.film.passes());
     // A pass that was dropped and is traced again is trained for once.
-    if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > pass.index) return;
+    if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > passes) return;
     if (!pass.scene.has_emitters()) return;
     // Logarithm to base 8, rounded down, of the samples of pixels before a pass over the walks.
-    const auto refits = [&](uint64_t index) {
-        return (std::bit_width(index * pass.pixels / walks_) - 1) / 3;
+    const auto refits = [&](uint64_t before) {
+        return (std::bit_width(before * pass.pixels / walks_) - 1) / 3;
     };
     // As many walks would not gain more where a guide gains nothing.
     const bool is_due =
-        pass.index == 0 || (guide_->uses_surfaces && refits(pass.index) > refits(pass.index - 1));
+        passes == 0 || (guide_->uses_surfaces && refits(passes) > refits(passes - 1));
     if (!is_due) return;
     const auto begin = Clock::now();
-    const uint64_t seed = pilot_seed(pass.seed, PilotUse::Guide, pass.index);
+    const uint64_t seed = pilot_seed(pass.seed, PilotUse::Guide, passes);
     // The pass may be dropped at any time, and traced again: nothing may be left of this training then.
     std::unique_ptr<Guide> next;
     if (mode_ == Mode::Random) {
@@ -378,7 +379,7 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
         }
         next = std::make_unique<Guide>(random_guide(bounds.center(), bounds.radius(),
                                                     std::move(pmf), at_infinity, kKappa, seed));
-    } else if (pass.index == 0) {
+    } else if (passes == 0) {
         for (int round = 0; round < kRounds; ++round) {
             if (next) next->make_teacher();
             next =
@@ -390,14 +391,14 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
         teacher.make_teacher();
         next = trained(pass, depth, walks, &teacher, walks_, seed, has_roulette_);
     }
-    is_given_up_ = pass.index == 0 && mode_ == Mode::Auto && gains_little(*next, walks);
+    is_given_up_ = passes == 0 && mode_ == Mode::Auto && gains_little(*next, walks);
     if (is_given_up_) next = nullptr;
     if (next) {
         next->has_roulette = has_roulette_;
         next->uses_surfaces = !gains_nothing(*next, walks);
     }
     guide_ = std::move(next);
-    trained_passes_ = pass.index + 1;
+    trained_passes_ = passes + 1;
     seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
@@ -456,6 +457,7 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
 void Guiding::save(LearnedState& to) const {
     to.put(trained_passes_);
     to.put(is_given_up_);
+    to.put(seconds_);
     to.put(guide_ != nullptr);
     if (guide_) guide_->save(to);
 }
@@ -463,6 +465,7 @@ void Guiding::save(LearnedState& to) const {
 void Guiding::load(LearnedState& from) {
     from.get(trained_passes_);
     from.get(is_given_up_);
+    from.get(seconds_);
     bool has_guide = false;
     from.get(has_guide);
     guide_ = has_guide ? std::make_unique<Guide>() : nullptr;

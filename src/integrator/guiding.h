@@ -50,7 +50,7 @@ private:
     std::unique_ptr<Guide> guide_;
     uint32_t trained_passes_ = 0;  ///< That train() was called for.
     bool is_given_up_ = false;     ///< By Mode::Auto.
-    double seconds_ = 0;           ///< Spent in train() by this process.
+    double seconds_ = 0;           ///< Spent in train().
 };
 
 }  // namespace etendue

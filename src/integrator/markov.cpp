@@ -92,6 +92,7 @@ void MarkovIntegrator::trace(const PassContext& pass) {
         LearnedState state(std::exchange(loaded_, {}));
         groups_->load(state);
         has_begun_ = true;
+        pass.forget_statistics();
     }
     advance(pass, *space_, *groups_);
 }

@@ -246,7 +246,10 @@ MapPhotons MetropolisPhotons::trace(const PassContext& context, uint32_t pass,
     if (!context.scene.has_emitters()) return photons;
     if (!options_.user_paths.empty() && !user_paths_)
         user_paths_ = UserPaths::load(context.scene, options_.user_paths);
-    if (!states_) states_ = make_states(context, importons);
+    if (!states_) {
+        states_ = make_states(context, importons);
+        if (context.film.passes() > 0) context.forget_statistics();
+    }
     if (!states_) return photons;
     const StateSpace& space = states_->space();
     pilot_ = run_pilot(context, space);

@@ -95,6 +95,7 @@ public:
             irradiances_.begin(global_, irradiance_, nearest_, max_radius_,
                                mapping_.paths().max_depth() + 2 - kGathered);
         if (cache_error_ > 0) fill_cache(pass);
+        if (!has_maps_ && !retrace_ && pass.film.passes() > 0) pass.forget_statistics();
         has_maps_ = true;
     }
 

@@ -53,7 +53,7 @@ public:
         paths_.learn(pass);
         if (connects_) learned_.weight_scale.learn(learned_.gathers);
         learned_.roulette.learn(learned_.gathers);
-        if (pass.index == 0) return;  // see start()
+        if (pass.film.passes() == 0) return;  // see start()
         learned_.radius.learn(pass.film, pass.so_far, learned_.gathers);
         if (connects_) learned_.next_events.learn(learned_.radius.observed(), learned_.gathers);
         density_ = PairDensity(cells(), learned_.radius.of(false), kGatherConstants.correlation);
@@ -78,7 +78,7 @@ public:
 
     void trace(const PassContext& pass) override {
         paths_.train(pass, GuidedWalks::BothWithPairs);
-        if (pass.index == 0) start(pass);
+        if (pass.film.passes() == 0) start(pass);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,

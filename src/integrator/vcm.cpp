@@ -42,7 +42,7 @@ public:
     void learn(const LearnContext& pass) override {
         paths_.learn(pass);
         roulette_.learn(gathers_);
-        if (merges_ && pass.index > 0)
+        if (merges_ && pass.film.passes() > 0)
             density_ = PairDensity(cells(),
                                    radius_params_.radius(pass.scene, pass.index) *
                                        (is_exact_ ? 1 : kInnerRadius),

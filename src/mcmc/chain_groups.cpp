@@ -203,6 +203,8 @@ void ChainGroups::save(LearnedState& to) const {
         to.put(g.steps);
         for (size_t i = 0; i < kept; ++i) g.chains[i].save(to);
     }
+    to.put(stats_);
+    to.put(own_scale_);
 }
 
 void ChainGroups::load(LearnedState& from) {
@@ -217,6 +219,8 @@ void ChainGroups::load(LearnedState& from) {
         for (uint64_t i = 0; i < chains; ++i)
             g.chains.emplace_back(space_, class_of_chain_[i]).load(from);
     }
+    from.get(stats_);
+    from.get(own_scale_);
 }
 
 double ChainGroups::later_b(const Group& group) const {

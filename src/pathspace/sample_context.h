@@ -96,6 +96,8 @@ struct PassContext {
     /// work.is_observed is set, the task must report the joins to splats.tell().
     using ChainTask = std::function<void(uint64_t, SplatSink&, Workspace&)>;
     std::function<void(uint64_t count, const ChainTask& task)> for_each_chain;
+    /// Forgets the statistics of this pass so far; after a resumed rendering has made data of an earlier pass again.
+    std::function<void()> forget_statistics = [] {};
 
     void for_each_light_path(const Use& use) const { for_each_sample(light_paths, use); }
 };

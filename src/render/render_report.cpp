@@ -9,25 +9,17 @@
 
 namespace etendue {
 
-nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
-                       const std::string& stopped_by, const PassLog& log,
-                       const ErrorEstimate* error) {
-    const RenderStats& s = r.stats();
-    const ErrorEstimate e = error ? *error : r.film().error();
-    const Film::MeanEstimate mean = r.film().mean_luminance();
+nlohmann::json statistics(const Film& film, const RenderStats& s, double seconds,
+                          const ErrorEstimate& e) {
+    const Film::MeanEstimate mean = film.mean_luminance();
+    const FilmGeometry& g = film.geometry();
     nlohmann::json j{
-        {"scene", scene.file()},
-        {"integrator", settings.integrator.to_string()},
-        {"estimator", to_string(r.integrator().estimator())},
-        {"seed", settings.seed},
-        {"width", scene.film().crop_width},
-        {"height", scene.film().crop_height},
-        {"spp", r.film().passes()},
-        {"seconds", r.seconds()},
-        {"stopped_by", stopped_by},
-        {"samples_per_second",
-         double(r.film().passes()) * double(scene.film().pixel_count()) / r.seconds()},
-        {"rays_per_second", double(s.rays()) / r.seconds()},
+        {"width", g.crop_width},
+        {"height", g.crop_height},
+        {"spp", film.passes()},
+        {"seconds", seconds},
+        {"samples_per_second", double(film.passes()) * double(g.pixel_count()) / seconds},
+        {"rays_per_second", double(s.rays()) / seconds},
         {"walk_rays", s.walk_rays},
         {"shadow_rays", s.shadow_rays},
         {"visible_shadow_rays", s.visible},
@@ -45,18 +37,32 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
         {"warnings", warnings(s)},
         {"mean_luminance", mean.mean},
         {"mean_luminance_standard_error", mean.standard_error},
-        {"pass_seconds", log.seconds},
-        {"pass_pairs", log.pairs},
     };
     const PhaseSeconds& p = s.phases;
     j["phase_seconds"] = {{"light_paths", p.light_paths},
                           {"records", p.records},
                           {"eye_paths", p.eye_paths - p.connections},
                           {"connections", p.connections}};
-    for (const auto& [name, value] : r.integrator().figures()) j[name] = value;
     if (e.valid)
         j["relative_error"] = {
             {"estimate", e.relative_rms}, {"low_95", e.low}, {"high_95", e.high}};
+    return j;
+}
+
+nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
+                       const std::string& stopped_by, const PassLog& log,
+                       const ErrorEstimate* error) {
+    nlohmann::json j =
+        statistics(r.film(), r.stats(), r.seconds(), error ? *error : r.film().error());
+    j["scene"] = scene.file();
+    j["integrator"] = settings.integrator.to_string();
+    j["estimator"] = to_string(r.integrator().estimator());
+    j["seed"] = settings.seed;
+    if (settings.first_pass > 0) j["first_pass"] = settings.first_pass;
+    j["stopped_by"] = stopped_by;
+    j["pass_seconds"] = log.seconds;
+    j["pass_pairs"] = log.pairs;
+    for (const auto& [name, value] : r.integrator().figures()) j[name] = value;
     return j;
 }
 
@@ -71,23 +77,21 @@ void add_attributes(const nlohmann::json& report, Image& image) {
     image.attributes["etendue.version"] = std::string(ETENDUE_VERSION);
 }
 
-Image image_with_layers(const Renderer& renderer, const Scene& scene,
-                        const std::vector<AovImage>& layers, bool has_variance,
+Image image_with_layers(const Film& film, const std::vector<AovImage>& layers, bool has_variance,
                         const nlohmann::json& report) {
-    const std::vector<Rgb> pixels = renderer.film().image();
-    const std::vector<Rgb> variance =
-        has_variance ? renderer.film().variance() : std::vector<Rgb>();
+    const std::vector<Rgb> pixels = film.image();
+    const std::vector<Rgb> variance = has_variance ? film.variance() : std::vector<Rgb>();
     std::vector<RgbLayer> all{{"", pixels}};
     for (const AovImage& a : layers) all.push_back({a.name, a.pixels});
     if (has_variance) all.push_back({"variance", variance});
-    Image image = layered_image(scene.film().crop_width, scene.film().crop_height, all);
+    Image image = layered_image(film.geometry().crop_width, film.geometry().crop_height, all);
     add_attributes(report, image);
     return image;
 }
 
 Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
                         const std::vector<std::string>& aovs, const nlohmann::json& report) {
-    return image_with_layers(renderer, scene, render_aovs(scene, aovs, kAovSamples, seed, threads),
+    return image_with_layers(renderer.film(), render_aovs(scene, aovs, kAovSamples, seed, threads),
                              std::find(aovs.begin(), aovs.end(), "variance") != aovs.end(), report);
 }
 

@@ -17,6 +17,11 @@ struct PassLog {
     std::vector<double> seconds;
     std::vector<uint64_t> pairs;
 
+    /// Appends those of other passes.
+    void append(const std::vector<double>& more_seconds, const std::vector<uint64_t>& more_pairs) {
+        for (const double s : more_seconds) seconds.push_back(s), seconds_before_ += s;
+        for (const uint64_t p : more_pairs) pairs.push_back(p), pairs_before_ += p;
+    }
     void add(double seconds_so_far, uint64_t pairs_so_far) {
         seconds.push_back(seconds_so_far - seconds_before_);
         pairs.push_back(pairs_so_far - pairs_before_);
@@ -29,6 +34,10 @@ private:
     uint64_t pairs_before_ = 0;
 };
 
+/// Statistics of passes by name.
+nlohmann::json statistics(const Film& film, const RenderStats& stats, double seconds,
+                          const ErrorEstimate& error);
+
 /// Statistics of a rendering by name. `stopped_by`: a StopReason, or "failure". `error`: that of the film, where it is
 /// known already; it takes a while with groups.
 nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
@@ -39,8 +48,7 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
 void add_attributes(const nlohmann::json& report, Image& image);
 /// The image with `layers`, with a layer of its variance if `has_variance`, and with the texts and numbers of `report` as
 /// metadata.
-Image image_with_layers(const Renderer& renderer, const Scene& scene,
-                        const std::vector<AovImage>& layers, bool has_variance,
+Image image_with_layers(const Film& film, const std::vector<AovImage>& layers, bool has_variance,
                         const nlohmann::json& report);
 /// The same with the layers of aov_registry() that `aovs` names, which are rendered here.
 Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,

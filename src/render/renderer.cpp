@@ -15,6 +15,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "render/statistics_section.h"
 #include "sampler/pilot_seed.h"
 #include "system/available_memory.h"
 
@@ -141,12 +142,12 @@ private:
 
 }  // namespace
 
-void check_limits(const RenderLimits& limits) {
-    if (limits.spp && *limits.spp > kMostPasses)
+void check_limits(const RenderLimits& limits, uint64_t first_pass) {
+    if (first_pass >= kMostPasses || limits.spp.value_or(1) > kMostPasses - first_pass)
         throw std::runtime_error(fmt::format(
             "{} samples per pixel are too many: there are random numbers for 2^32; render with "
             "several seeds instead, and average the images",
-            *limits.spp));
+            first_pass + limits.spp.value_or(1)));
 }
 
 const char* to_string(StopReason reason) {
@@ -241,7 +242,7 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
       film_(fitting_film(scene, settings, *integrator_, light_paths_), scene.filter(),
             typical_radiance(scene), settings.filter_mode),
       workers_(std::make_unique<Workers>(settings.threads)) {
-    check_limits(settings);
+    check_limits(settings, settings.first_pass);
     if (integrator_->error_groups() > 0) film_.set_groups(integrator_->error_groups());
     if (settings.technique_depth > 0)
         techniques_ = std::make_unique<TechniqueImages>(
@@ -270,11 +271,18 @@ void Renderer::pass(const std::atomic<bool>& drop) {
     has_last_pass_ = true;
 }
 
-Renderer::Numbers Renderer::numbers(uint32_t index) const {
-    if (!integrator_->is_learning()) return {settings_.seed, index};
-    const LearningStep step = LearningStep::of(index);
-    return {step.number > 0 ? hash_combine(settings_.seed, step.number) : settings_.seed,
-            step.pass};
+Renderer::Numbers Renderer::numbers(uint32_t passes) const {
+    const bool is_learning = integrator_->is_learning();
+    if (!is_learning && integrator_->error_groups() == 0)
+        return {settings_.seed, uint32_t(settings_.first_pass) + passes};
+    // Passes that depend on those before them start anew in each rendering, and not with the same numbers.
+    const uint64_t seed =
+        settings_.first_pass == 0
+            ? settings_.seed
+            : hash_combine(hash_combine(settings_.seed, 0x6672616d65), settings_.first_pass);
+    if (!is_learning) return {seed, passes};
+    const LearningStep step = LearningStep::of(passes);
+    return {step.number > 0 ? hash_combine(seed, step.number) : seed, step.pass};
 }
 
 Vec2 film_offset(SamplerKind kind, uint64_t seed, uint32_t pass) {
@@ -300,10 +308,11 @@ bool Renderer::sample_again(uint64_t index, Workspace& work, ContributionSink& s
 }
 
 void Renderer::trace_pass(const std::atomic<bool>& drop) {
-    const auto index = uint32_t(film_.passes());
+    const auto passes = uint32_t(film_.passes());
+    const uint32_t index = uint32_t(settings_.first_pass) + passes;
     const uint64_t pixels = scene_.film().pixel_count(), light_paths = light_paths_;
     const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
-    const Numbers place = numbers(index);
+    const Numbers place = numbers(passes);
     film_.begin_pass(light_paths, film_offset(settings_.sampler, place.seed,
                                               integrator_->eye_paths_of(place.pass)));
     const uint64_t seed = place.seed;
@@ -335,8 +344,8 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
         });
     };
     // If a discarded pass is traced again, its learning step is not repeated.
-    if (learned_passes_ == index) {
-        if (LearningStep::of(index).pass == 0)
+    if (learned_passes_ == passes) {
+        if (LearningStep::of(passes).pass == 0)
             integrator_->learn({.scene = scene_,
                                 .film = film_,
                                 .index = index,
@@ -377,7 +386,8 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
                      work.is_observed = splats.needs_joins();
                      task(i, splats, work);
                  });
-             }});
+             },
+         .forget_statistics = [&] { workers_->take_stats(); }});
     for_each_sample(film_.sample_count(),
                     [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
                         sink.begin(c.index, c.light_paths);
@@ -386,6 +396,38 @@ void Renderer::trace_pass(const std::atomic<bool>& drop) {
                     });
     film_.end_pass(integrator_->splat_error_factor());
     if (techniques_) techniques_->end_pass();
+}
+
+void Renderer::save_sums(SectionWriter& to) const {
+    save_statistics(stats_, seconds_, to);
+    film_.save(to);
+    if (techniques_) techniques_->save(to);
+}
+
+void Renderer::save(SectionWriter& to) const {
+    save_sums(to);
+    LearnedState learned;
+    integrator_->save(learned);
+    to.begin("learned");
+    to.put(learned_passes_);
+    to.put(learned.bytes());
+}
+
+void Renderer::load(SectionReader& from) {
+    load_statistics(from, stats_, seconds_);
+    workers_->arena.execute([&] { film_.load(from); });
+    if (techniques_) techniques_->add_saved(from);
+    from.open("learned");
+    from.get(learned_passes_);
+    std::vector<std::byte> bytes;
+    from.get(bytes);
+    from.finish();
+    LearnedState learned(std::move(bytes));
+    try {
+        integrator_->load(learned);
+    } catch (const std::runtime_error& e) {
+        from.fail(e.what());
+    }
 }
 
 ErrorEstimate Renderer::error() const {
@@ -410,7 +452,8 @@ const ErrorEstimate& RecentError::update(const Progress& progress) {
 std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
                                             const std::optional<ErrorEstimate>& error) const {
     if (film_.passes() == 0) return {};
-    if (film_.passes() >= limits.spp.value_or(kMostPasses)) return StopReason::Samples;
+    if (film_.passes() >= limits.spp.value_or(kMostPasses - settings_.first_pass))
+        return StopReason::Samples;
     // A pass is begun only if at least half of it is expected to fit.
     if (limits.seconds && seconds_ + 0.5 * seconds_ / double(film_.passes()) > *limits.seconds)
         return StopReason::Time;
@@ -425,7 +468,7 @@ StopReason Renderer::run(const RenderLimits& limits,
     using Clock = std::chrono::steady_clock;
     const auto begin = Clock::now();
     const double before = seconds_;
-    check_limits(limits);
+    check_limits(limits, settings_.first_pass);
     // Computed only where it matters, since it may take as long as a pass.
     const auto error_of_image = [&] {
         return limits.error ? std::optional(error()) : std::nullopt;

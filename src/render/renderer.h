@@ -24,13 +24,16 @@ struct RenderLimits {
 /// Random numbers are addressed by the index of the pass, which has 32 bits.
 constexpr uint64_t kMostPasses = uint64_t(1) << 32;
 /// Throws std::runtime_error if a limit is beyond what can be rendered.
-void check_limits(const RenderLimits& limits);
+void check_limits(const RenderLimits& limits, uint64_t first_pass = 0);
 
 struct RenderSettings : RenderLimits {
     IntegratorSpec integrator{"path", {}};
     SamplerKind sampler = SamplerKind::Independent;
     FilterMode filter_mode = FilterMode::Spread;
     uint64_t seed = 0;
+    /// Index of the first pass, so that several renderings can share the passes of a seed. Methods that learn from earlier
+    /// passes, and chains, then start anew with other random numbers.
+    uint64_t first_pass = 0;
     int threads =
         0;  ///< Number of threads of this renderer; 0: one per core. Renderers share no threads.
     /// Technique images up to this many edges; 0 for none.
@@ -110,6 +113,15 @@ public:
     ErrorEstimate error() const;  ///< Of the film, computed by the threads of this renderer.
     const TechniqueImages* techniques() const { return techniques_.get(); }
 
+    /// Between calls of run(): writes everything that later passes and the results depend on, as sections. load() reads it
+    /// into a renderer of the same scene with the same settings, without passes, which then goes on with the same bits. It
+    /// throws std::runtime_error if this is impossible; then the renderer cannot be used. The file must be trusted: its
+    /// learned state is used as it is.
+    void save(SectionWriter& to) const;
+    void load(SectionReader& from);
+    /// The part of save() that the results depend on.
+    void save_sums(SectionWriter& to) const;
+
 private:
     static inline const std::atomic<bool> kNeverDrop{false};
 
@@ -118,7 +130,8 @@ private:
         uint64_t seed;
         uint32_t pass;
     };
-    Numbers numbers(uint32_t index) const;
+    /// Of the pass that follows `passes` others of this rendering.
+    Numbers numbers(uint32_t passes) const;
     void pass(const std::atomic<bool>& drop);
     void trace_pass(const std::atomic<bool>& drop);
     /// `error`: empty if there is no limit of the error.

@@ -1,5 +1,9 @@
 #include "render/technique_images.h"
 
+#include <fmt/format.h>
+
+#include "system/section_file.h"
+
 namespace etendue {
 namespace {
 
@@ -75,6 +79,47 @@ void TechniqueImages::drop_pass() {
         l->pass_weighted.clear();
         l->pass_unweighted.clear();
     }
+}
+
+void TechniqueImages::save(SectionWriter& to) const {
+    to.begin("techniques");
+    to.put(passes_);
+    const auto is_kept = [](const Layer* l) { return l && l->is_folded; };
+    to.put(uint64_t(std::count_if(layers_.begin(), layers_.end(), is_kept)));
+    for (const Layer* l : layers_) {
+        if (!is_kept(l)) continue;
+        to.put(uint32_t(l->technique.strategy));
+        to.put(l->technique.s);
+        to.put(l->technique.t);
+        to.put(l->weighted);
+        to.put(l->unweighted);
+    }
+}
+
+void TechniqueImages::add_saved(SectionReader& from) {
+    from.open("techniques");
+    const auto passes = from.get<uint64_t>(), count = from.get<uint64_t>();
+    std::vector<Rgb> saved;
+    std::vector<const Layer*> known;
+    for (uint64_t i = 0; i < count; ++i) {
+        const auto strategy = from.get<uint32_t>();
+        const auto s = from.get<int>(), t = from.get<int>();
+        const bool is_one = strategy <= uint32_t(Strategy::Gather) && s >= 0 && t >= 0 &&
+                            s <= max_edges_ + 2 && t <= max_edges_ + 2;
+        const Technique q{is_one ? Strategy(strategy) : Strategy::Hit, s, t};
+        Layer* const l = is_one && q.vertices() >= 2 && s <= q.vertices() ? layer(q) : nullptr;
+        if (!l || l->technique != q || std::find(known.begin(), known.end(), l) != known.end())
+            from.fail(fmt::format("({}, {}) is no technique for paths of up to {} edges", s, t,
+                                  max_edges_));
+        known.push_back(l);
+        l->is_folded = true;
+        for (std::vector<Rgb>* sums : {&l->weighted, &l->unweighted}) {
+            from.get(saved, geometry_.pixel_count(), "pixels");
+            for (size_t p = 0; p < saved.size(); ++p) (*sums)[p] += saved[p];
+        }
+    }
+    from.finish();
+    passes_ += passes;
 }
 
 std::vector<TechniqueImages::Entry> TechniqueImages::images() const {

@@ -11,6 +11,9 @@
 
 namespace etendue {
 
+class SectionReader;
+class SectionWriter;
+
 class TechniqueImages {
 public:
     /// Images for paths of at most `max_edges` edges. See Film for `typical_radiance`.
@@ -23,6 +26,11 @@ public:
     void end_pass();
     /// Discards all contributions since the last end_pass().
     void drop_pass();
+
+    /// Writes the sums as a section "techniques".
+    void save(SectionWriter& to) const;
+    /// Adds saved sums. Throws std::runtime_error if they are of an image of another size or of longer paths.
+    void add_saved(SectionReader& from);
 
     struct Entry {
         Technique technique;

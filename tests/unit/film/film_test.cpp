@@ -194,6 +194,37 @@ TEST(Film, ErrorIsThatOfGroups) {
     EXPECT_NEAR(mean_error2.mean(), expected / 2000, 0.25 * expected / 2000);
 }
 
+/// A sum of films has the groups of all: with itself, a film has the same error; with one whose pairs of groups are exchanged,
+/// none.
+TEST(Film, MergedGroupsAddUp) {
+    constexpr int kGroups = 4, kPasses = 8;
+    const auto render = [](int exchange) {
+        auto film =
+            std::make_unique<Film>(FilmGeometry{8, 4, 0, 0, 8, 4}, ReconstructionFilter::box());
+        film->set_groups(kGroups);
+        for (int pass = 0; pass < kPasses; ++pass) {
+            film->begin_pass(0);
+            std::mt19937 random(unsigned(pass ^ exchange));
+            std::uniform_int_distribution<int> value(1, 9);
+            for (uint64_t i = 0; i < 32; ++i) film->add_eye(i, Rgb(float(value(random))));
+            film->end_pass();
+        }
+        return film;
+    };
+    const auto one = render(0), same = render(0), exchanged = render(1);
+    const ErrorEstimate alone = one->error();
+    ASSERT_TRUE(alone.valid);
+    same->merge(*one);
+    EXPECT_EQ(same->passes(), 2u * kPasses);
+    EXPECT_EQ(same->image(), one->image());
+    EXPECT_NEAR(same->error().relative_rms, alone.relative_rms, 1e-6 * alone.relative_rms);
+    EXPECT_EQ(same->groups(), kGroups);
+    exchanged->merge(*one);
+    EXPECT_NEAR(exchanged->error().relative_rms, 0, 1e-6);
+    Film other({8, 4, 0, 0, 8, 4}, ReconstructionFilter::box());
+    EXPECT_THROW(other.merge(*one), std::runtime_error);
+}
+
 /// Splats count in the errors by a factor of their own, eye paths do not.
 TEST(Film, ErrorByGroupsScalesSplats) {
     const auto error = [](double splat_factor) {

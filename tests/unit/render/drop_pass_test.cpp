@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "render/renderer.h"
+#include "system/section_file.h"
 #include "test_scenes.h"
 
 namespace etendue::test {
@@ -192,6 +193,28 @@ TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
     hooks.sample = [](uint32_t, uint64_t) {};
     run(r);
     EXPECT_EQ(disturbed.learned(), (std::vector<uint32_t>{0, 1, 4}));
+}
+
+TEST_P(DropPass, WhereItsStateIsSavedAfterwards) {
+    settings.spp = 6;
+    // Integrators learn before pass 4.
+    for (const uint32_t dropped : {0u, 3u, 4u}) {
+        SCOPED_TRACE(dropped);
+        hooks.sample = [=](uint32_t pass, uint64_t index) {
+            if (pass == dropped && index == 300) throw std::runtime_error("a bad sample");
+        };
+        Renderer first = renderer();
+        EXPECT_THROW(run(first), std::runtime_error);
+        SectionWriter saved;
+        first.save(saved);
+        hooks.sample = [](uint32_t, uint64_t) {};
+        Renderer second = renderer();
+        SectionReader reader(saved.take(), "state");
+        second.load(reader);
+        EXPECT_EQ(second.film().passes(), dropped);
+        run(second);
+        expect_as_undisturbed(second, 6);
+    }
 }
 
 /// Photons that are kept where their pass is dropped do not count in its statistics, on which later passes depend.

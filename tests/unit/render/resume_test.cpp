@@ -1,12 +1,9 @@
 // What an integrator has learned can be saved and loaded: the rendering goes on with the same bits.
 
-#include <algorithm>
-#include <cctype>
-#include <string_view>
-
 #include <gtest/gtest.h>
 
 #include "render/renderer.h"
+#include "resumable.h"
 #include "test_scenes.h"
 
 namespace etendue::test {
@@ -68,17 +65,17 @@ private:
 class Resume : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(Resume, GivesTheSameBits) {
-    const bool is_guided = std::string_view(GetParam()).find("guide") != std::string_view::npos;
     // With a filter that is wider than a pixel, the film points of a pass have a common place within their pixels, which
     // differs from pass to pass.
-    const std::string camera = with_filter(lens_camera(24), "gaussian");
-    const Scene scene = build(is_guided ? lantern_room(camera) : mixed_room(camera));
+    constexpr int kSize = 24;
+    const uint32_t refit = refit_pass(GetParam(), kSize * kSize);
+    const std::string camera = with_filter(lens_camera(kSize), "gaussian");
+    const Scene scene = build(refit > 0 ? lantern_room(camera) : mixed_room(camera));
     RenderSettings settings;
     settings.sampler = SamplerKind::Sobol;
     settings.threads = 2;
-    // Integrators learn before pass 4. Guides of 8000 walks do before pass 112, after as many samples as eight times these
-    // walks. Neither do before the pass before.
-    const uint32_t learning_pass = is_guided ? 112 : 4;
+    // Integrators learn before pass 4.
+    const uint32_t learning_pass = refit > 0 ? refit : 4;
     settings.spp = learning_pass + 2;
     const auto image = [&](std::unique_ptr<Integrator> integrator) {
         Renderer r(scene, settings, std::move(integrator));
@@ -93,26 +90,8 @@ TEST_P(Resume, GivesTheSameBits) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Integrators, Resume,
-    ::testing::Values(
-        "path:guide=on,guide_roulette=false,guide_walks=8000", "bdpt:eorr=true",
-        "bdpt:connections=cache", "upg+bdpt:guide=on,guide_walks=8000", "vcm:radius=0.3",
-        "vcm:exact=true", "vcm:eorr=true,radius=0.3", "upg", "upg:eorr=true", "upg+bdpt", "sppm",
-        "sppm:eorr=true", "ppm:eorr=true,eye_paths=3", "pcbpt", "pcbpt:eorr=true",
-        "pssmlt:groups=2,chains=16", "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
-        "upg+pssmlt:groups=2,chains=16", "pm:light_paths=2000", "pm:eorr=true,light_paths=2000",
-        "mps:eorr=true,mutations=2000,precision=0.2",
-        "pm:light_paths=2000,cache_error=0.3,cache_rays=32", "mps:mutations=2000,precision=0.2",
-        "mps:mutations=500,precision=0.2,retrace=true",
-        "mps:target=path,mutations=500,precision=0.2",
-        "mps:target=path,mutations=500,precision=0.2,retrace=true"),
-    [](const auto& p) {
-        std::string name = p.param;
-        std::replace_if(
-            name.begin(), name.end(), [](char c) { return !std::isalnum(c); }, '_');
-        return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Integrators, Resume, ::testing::ValuesIn(resumable_methods()),
+                         name_of_method);
 
 TEST(LearnedState, OfAnotherIntegratorIsRefused) {
     LearnedState state;

@@ -1,0 +1,75 @@
+#pragma once
+// Methods with all kinds of state that later passes depend on.
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace etendue::test {
+
+inline const std::vector<const char*>& resumable_methods() {
+    static const std::vector<const char*> methods{
+        "path",
+        "path:guide=on,guide_roulette=false,guide_walks=8000",
+        "light",
+        "light:guide=on,guide_walks=2000",
+        "bdpt",
+        "bdpt:eorr=true",
+        "bdpt:connections=cache",
+        "bdpt:guide=on,guide_walks=2000",
+        "vcm:radius=0.3",
+        "vcm:exact=true",
+        "vcm:eorr=true,radius=0.3",
+        "vcm:guide=on,guide_walks=2000",
+        "upg",
+        "upg:eorr=true",
+        "upg:guide=on,guide_walks=2000",
+        "upg+bdpt",
+        "upg+bdpt:guide=on,guide_walks=8000",
+        "sppm",
+        "sppm:eorr=true",
+        "ppm:eorr=true,eye_paths=3",
+        "pcbpt",
+        "pcbpt:eorr=true",
+        "pcbpt:guide=on,guide_walks=2000",
+        "pssmlt:groups=2,chains=16",
+        "mmlt:groups=4,chains=48",
+        "mlt:groups=4,chains=48",
+        "upg+pssmlt:groups=2,chains=16",
+        "pm:light_paths=2000",
+        "pm:eorr=true,light_paths=2000",
+        "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
+        "mps:mutations=2000,precision=0.2",
+        "mps:eorr=true,mutations=2000,precision=0.2",
+        "mps:mutations=500,precision=0.2,retrace=true",
+        "mps:target=path,mutations=500,precision=0.2",
+        "mps:target=path,mutations=500,precision=0.2,retrace=true",
+    };
+    return methods;
+}
+
+/// The first pass before which a method refits its guide, for images with this many pixels: there are eight times as many
+/// samples as walks. 0 if it has no guide.
+inline uint32_t refit_pass(std::string_view method, uint32_t pixels) {
+    constexpr std::string_view kWalks = "guide_walks=";
+    const size_t at = method.find(kWalks);
+    if (at == std::string_view::npos) return 0;
+    const auto walks = uint32_t(std::atoi(method.data() + at + kWalks.size()));
+    return (8 * walks + pixels - 1) / pixels;
+}
+
+/// Name of a test of one of them.
+inline std::string name_of_method(const ::testing::TestParamInfo<const char*>& p) {
+    std::string name = p.param;
+    std::replace_if(
+        name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
+    return name;
+}
+
+}  // namespace etendue::test
