@@ -5,6 +5,8 @@
 #include "commands.h"
 #include "guide_info.h"
 #include "json_text.h"
+#include "math/content_hash.h"
+#include "render/checkpoint.h"
 #include "render/defaults.h"
 #include "render/scene_integrator.h"
 #include "scene_options.h"
@@ -23,7 +25,54 @@ std::string integrator_text(const Scene& s) try {
     return e.what();
 }
 
+/// Of a checkpoint, all of which is verified.
+void checkpoint_info(const std::string& file, bool as_json) {
+    CheckpointFile c(file);
+    c.check();
+    const RenderTotals totals = c.totals(false);
+    const std::span<const Film::Moments> moments = totals.film->moments();
+    const std::string bits = fmt::format(
+        "{:016x}", ContentHash()
+                       .add({reinterpret_cast<const char*>(moments.data()), moments.size_bytes()})
+                       .value());
+    const ErrorEstimate e = totals.film->error();
+    const double mean = totals.film->mean_luminance().mean;
+    if (as_json) {
+        nlohmann::json j{{"checkpoint", file},
+                         {"scene", c.scene()},
+                         {"integrator", c.integrator()},
+                         {"estimator", c.estimator()},
+                         {"width", c.width()},
+                         {"height", c.height()},
+                         {"spp", c.passes()},
+                         {"seconds", totals.seconds},
+                         {"merged", c.is_merged()},
+                         {"mean_luminance", mean},
+                         {"bits", bits}};
+        if (e.valid) j["relative_error"] = e.relative_rms;
+        for (const PassRange& r : c.ranges())
+            j["passes"].push_back(
+                {{"seed", r.seed}, {"first_pass", r.first}, {"passes", r.passes}});
+        for (const auto& [name, value] : c.conditions()) j["conditions"][name] = value;
+        fmt::print("{}", json_text(j));
+        return;
+    }
+    const auto line = [](const std::string& name, const std::string& value) {
+        fmt::print("  {:<24} {}\n", name, value);
+    };
+    fmt::print("{}: {}\n", file, c.is_merged() ? "sum of renderings" : "state of a rendering");
+    line("scene", c.scene());
+    for (const PassRange& r : c.ranges()) line("contains", to_string(r));
+    line("time", fmt::format("{:.1f} s", totals.seconds));
+    line("mean luminance", fmt::format("{:.6g}", mean));
+    if (e.valid) line("relative error", fmt::format("{:.4f}", e.relative_rms));
+    line("estimator", c.estimator());
+    for (const auto& [name, value] : c.conditions()) line(name, value);
+    line("bits of the sums", bits);
+}
+
 void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
+    if (SectionReader::is_one(options.file)) return checkpoint_info(options.file, as_json);
     guide.check();
     SceneOptions loading = options;
     loading.threads = guide.threads;
@@ -96,7 +145,7 @@ void add_info_command(CLI::App& app) {
         bool json = false;
     };
     auto options = std::make_shared<Options>();
-    CLI::App& c = *app.add_subcommand("info", "Summarise a scene");
+    CLI::App& c = *app.add_subcommand("info", "Summarise a scene or a checkpoint");
     options->scene.add_to(c);
     options->guide.add_to(c);
     c.add_flag("--json", options->json, "Print JSON");

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <new>
@@ -11,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "description/fingerprint.h"
 #include "image/image_io.h"
 #include "interrupt.h"
 #include "json_text.h"
@@ -18,6 +21,7 @@
 #include "number_checks.h"
 #include "preview.h"
 #include "render/aov.h"
+#include "render/checkpoint.h"
 #include "render/defaults.h"
 #include "render/render_report.h"
 #include "render/renderer.h"
@@ -26,6 +30,7 @@
 #include "scene_options.h"
 #include "system/available_memory.h"
 #include "system/output_file.h"
+#include "technique_files.h"
 
 namespace etendue {
 namespace {
@@ -34,10 +39,10 @@ struct RenderCommand {
     SceneOptions scene;
     std::string output = "out.exr", integrator, sampler,
                 filter_mode = etendue::to_string(etendue::RenderSettings().filter_mode), techniques,
-                preview, stats;
+                preview, stats, checkpoint, resume, passes;
     std::vector<std::string> aovs;
     uint64_t seed = 0, spp = 0;
-    double seconds = 0, error = 0;
+    double seconds = 0, error = 0, checkpoint_every = 60, write_every = 60;
     unsigned grace = 20;
     int threads = 0, technique_depth = 6;
     bool quiet = false;
@@ -46,16 +51,53 @@ struct RenderCommand {
 
 private:
     RenderSettings settings_for(const Scene& scene) const;
+    /// First and number of the passes of --passes; the number is 0 if they are not given.
+    std::pair<uint64_t, uint64_t> pass_range() const;
+    /// The file in which checkpoints are written; empty if there is none.
+    const std::string& checkpoint_file() const {
+        return checkpoint.empty() && resume != kAuto ? resume : checkpoint;
+    }
+    /// The checkpoint from which the rendering goes on, if there is one.
+    std::optional<CheckpointFile> earlier_checkpoint() const;
+    static constexpr const char* kAuto = "auto";
     /// Checks that need no scene.
     void check_options() const;
     /// Checks before rendering that all outputs can be written; creates missing folders.
     void check_outputs() const;
     /// Writes as much as possible. Returns what could not be written, in words.
-    std::vector<std::string> write_outputs(const Renderer& renderer, const Scene& scene,
+    std::vector<std::string> write_outputs(const Renderer& renderer,
                                            const std::vector<AovImage>& layers,
                                            const nlohmann::json& report) const;
     /// Writes the image elsewhere if it cannot be written to `output`.
     void write_image_somewhere(const Image& image, std::vector<std::string>& failures) const;
+    /// Whether the image goes to a device or a pipe, which take it once.
+    bool is_in_place() const {
+        std::error_code error;
+        return std::filesystem::exists(output, error) &&
+               !std::filesystem::is_regular_file(output, error);
+    }
+};
+
+/// Something that is done every so many seconds, or less often if it would take a larger share of the time.
+class Timer {
+public:
+    explicit Timer(double interval, double most = 1) : interval_(interval), most_(most) {}
+    template <class Task>
+    void call_if_due(const Task& task) {
+        if (interval_ <= 0 || seconds_since(last_) < wait_) return;
+        const Clock::time_point begin = Clock::now();
+        task();
+        last_ = Clock::now();
+        wait_ = std::max(interval_, seconds_since(begin) / most_);
+    }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    static double seconds_since(Clock::time_point t) {
+        return std::chrono::duration<double>(Clock::now() - t).count();
+    }
+    double interval_, most_, wait_ = interval_;
+    Clock::time_point last_ = Clock::now();
 };
 
 std::string format_seconds(double s) {
@@ -98,20 +140,17 @@ private:
     RecentError error_;
 };
 
-void write_techniques(const Renderer& r, const Scene& scene, const std::string& folder) {
-    for (const auto& t : r.techniques()->images()) {
-        const bool is_stored = t.technique.strategy == Strategy::Connect && t.technique.s == 1;
-        const std::string stem =
-            fmt::format("{}/length{:02}_s{:02}_t{:02}{}", folder, t.technique.vertices() - 1,
-                        t.technique.s, t.technique.t, is_stored ? "_stored" : "");
-        const auto [w, h] = std::pair{scene.film().crop_width, scene.film().crop_height};
-        write_image(stem + "_weighted.exr", rgb_image(w, h, t.weighted));
-        write_image(stem + "_unweighted.exr", rgb_image(w, h, t.unweighted));
-    }
-}
-
 void RenderCommand::check_options() const {
-    check_limits({.spp = spp, .seconds = {}, .error = {}});
+    const auto [first_pass, count] = pass_range();
+    if (count > 0 && spp > 0)
+        throw std::runtime_error(
+            "--passes and --spp exclude each other: --passes says how many passes there are");
+    check_limits({.spp = count > 0 ? count : spp, .seconds = {}, .error = {}}, first_pass);
+    if (resume == kAuto && checkpoint.empty())
+        throw std::runtime_error("--resume auto requires --checkpoint, the file to resume from");
+    if (checkpoint_file() == output)
+        throw std::runtime_error(
+            fmt::format("the image and the checkpoint cannot be the same file: {}", output));
     check_image_extension(output);
     const auto folder = std::filesystem::path(output).parent_path();
     if (!folder.empty() && std::filesystem::exists(folder) &&
@@ -127,7 +166,28 @@ void RenderCommand::check_options() const {
 void RenderCommand::check_outputs() const {
     OutputFile::check(output);
     if (!stats.empty()) OutputFile::check(stats);
+    if (!checkpoint_file().empty()) OutputFile::check(checkpoint_file());
     if (!techniques.empty()) OutputFile::check(techniques + "/length01_s00_t02_weighted.exr");
+}
+
+std::pair<uint64_t, uint64_t> RenderCommand::pass_range() const {
+    if (passes.empty()) return {0, 0};
+    uint64_t first = 0, end = 0;
+    const char* const last = passes.data() + passes.size();
+    const auto a = std::from_chars(passes.data(), last, first);
+    const bool has_colon = a.ec == std::errc() && a.ptr != last && *a.ptr == ':';
+    const auto b = has_colon ? std::from_chars(a.ptr + 1, last, end) : a;
+    if (!has_colon || b.ec != std::errc() || b.ptr != last || end <= first)
+        throw std::runtime_error(fmt::format(
+            "--passes must have the form A:B, for the passes A to B-1, but is \"{}\"", passes));
+    return {first, end - first};
+}
+
+std::optional<CheckpointFile> RenderCommand::earlier_checkpoint() const {
+    std::error_code error;
+    if (resume.empty() || (resume == kAuto && !std::filesystem::exists(checkpoint, error)))
+        return {};
+    return CheckpointFile(resume == kAuto ? checkpoint : resume);
 }
 
 RenderSettings RenderCommand::settings_for(const Scene& s) const {
@@ -141,6 +201,9 @@ RenderSettings RenderCommand::settings_for(const Scene& s) const {
     settings.filter_mode = *mode;
     settings.seed = seed;
     settings.threads = threads;
+    const auto [first_pass, count] = pass_range();
+    settings.first_pass = first_pass;
+    if (count > 0) settings.spp = count;
     if (spp > 0) settings.spp = spp;
     if (seconds > 0) settings.seconds = seconds;
     if (error > 0) settings.error = error;
@@ -188,29 +251,29 @@ void RenderCommand::write_image_somewhere(const Image& image,
     }
 }
 
-std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer, const Scene& s,
+std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
                                                       const std::vector<AovImage>& layers,
                                                       const nlohmann::json& report) const {
     std::vector<std::string> failures;
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
     const bool has_layers = has_variance || !layers.empty();
     const auto write_layers = [&] {
-        write_image(output, image_with_layers(renderer, s, layers, has_variance, report));
+        write_image(output, image_with_layers(renderer.film(), layers, has_variance, report));
     };
     // The image alone needs the least memory and space. The one with layers replaces it, except in devices and pipes.
-    std::error_code error;
-    const bool is_in_place =
-        std::filesystem::exists(output, error) && !std::filesystem::is_regular_file(output, error);
-    if (is_in_place && has_layers)
+    if (is_in_place() && has_layers)
         attempt(failures, write_layers);
     else if (attempt(failures,
                      [&] {
-                         write_image_somewhere(image_with_layers(renderer, s, {}, false, report),
-                                               failures);
+                         write_image_somewhere(
+                             image_with_layers(renderer.film(), {}, false, report), failures);
                      }) &&
              failures.empty() && has_layers && !attempt(failures, write_layers))
         failures.back() += fmt::format("; {} has the image without further layers", output);
-    if (!techniques.empty()) attempt(failures, [&] { write_techniques(renderer, s, techniques); });
+    if (renderer.techniques())
+        attempt(failures, [&] {
+            write_techniques(*renderer.techniques(), renderer.film().geometry(), techniques);
+        });
     if (!stats.empty()) attempt(failures, [&] { write_file(stats, json_text(report)); });
     return failures;
 }
@@ -219,7 +282,14 @@ void RenderCommand::run() const {
     check_options();
     SceneOptions loading = scene;
     loading.threads = threads;
-    const Scene s = load_scene(loading);
+    std::optional<CheckpointFile> earlier = earlier_checkpoint();
+    const std::string& saved = checkpoint_file();
+    uint64_t fingerprint = 0;
+    const Scene s = [&] {
+        const SceneDescription description = read_scene(loading);
+        if (!saved.empty()) fingerprint = scene_fingerprint(description);
+        return build_scene(description, loading);
+    }();
     print_warnings(warnings_of(s, integrator));
     const RenderSettings settings = settings_for(s);
     if (settings.technique_depth > 0 && !quiet)
@@ -231,6 +301,18 @@ void RenderCommand::run() const {
     print_warnings(
         memory_warnings(s, settings.integrator, renderer.light_paths(), available_memory()));
     check_outputs();
+    PassLog log;
+    Conditions conditions;
+    if (!saved.empty())
+        conditions =
+            conditions_of(renderer, s, {fingerprint, scene.lenient, scene.watertight}, settings);
+    if (earlier) {
+        earlier->resume(renderer, conditions, log);
+        if (!quiet)
+            message("{}: resumed after {} passes, {}\n", earlier->name(), renderer.film().passes(),
+                    format_seconds(renderer.seconds()));
+        earlier.reset();
+    }
     // Before the passes, so that nothing that can fail stands between them and their image.
     const std::vector<AovImage> layers = render_aovs(s, aovs, kAovSamples, seed, threads);
 
@@ -240,7 +322,17 @@ void RenderCommand::run() const {
         viewer =
             std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
 
-    PassLog log;
+    const auto save = [&] { write_checkpoint(saved, renderer, s, conditions, settings, log); };
+    const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
+    constexpr double kMostForImages = 0.01;
+    Timer checkpoints(saved.empty() ? 0 : checkpoint_every),
+        images(is_in_place() ? 0 : write_every, kMostForImages);
+    // What fails now may succeed later, and is no reason to end.
+    const auto try_to = [&](const auto& task) {
+        std::vector<std::string> problems;
+        attempt(problems, task);
+        print_warnings(problems);
+    };
     std::string stopped_by, failure;
     try {
         ProgressLine line(quiet);
@@ -249,6 +341,15 @@ void RenderCommand::run() const {
                 line.show(p);
                 log.add(p.seconds, renderer.stats().pairs);
                 if (viewer && !viewer->update(renderer.film(), p.seconds)) viewer.reset();
+                if (interrupts.stop || p.fraction.value_or(0) >= 1) return;
+                checkpoints.call_if_due([&] { try_to(save); });
+                images.call_if_due([&] {
+                    try_to([&] {
+                        write_image(output, image_with_layers(
+                                                renderer.film(), layers, has_variance,
+                                                to_json(renderer, s, settings, "unfinished", log)));
+                    });
+                });
             },
             interrupts.stop, interrupts.drop));
     } catch (const std::exception& e) {
@@ -262,7 +363,9 @@ void RenderCommand::run() const {
 
     nlohmann::json report = to_json(renderer, s, settings, stopped_by, log);
     if (!failure.empty()) report["failure"] = failure;
-    std::vector<std::string> failures = write_outputs(renderer, s, layers, report);
+    std::vector<std::string> failures;
+    if (!saved.empty()) attempt(failures, save);
+    for (std::string& f : write_outputs(renderer, layers, report)) failures.push_back(std::move(f));
 
     print_warnings(warnings(renderer.stats()));
     if (!failure.empty())
@@ -298,8 +401,26 @@ void add_render_command(CLI::App& app) {
     c.add_option("--error", command->error,
                  "Stop at this estimated relative RMS error of the image, e.g. 0.01")
         ->check(must_be_above_0);
+    c.add_option("--passes", command->passes,
+                 "Render the passes A to B-1 of the seed, A:B, for etendue merge");
+    c.add_option(
+        "--checkpoint", command->checkpoint,
+        "File in which the state of the rendering is saved, to go on from it (--resume) or "
+        "to merge it with others (etendue merge)");
+    c.add_option("--checkpoint-every", command->checkpoint_every,
+                 "Seconds between two checkpoints; 0: only at the end")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1e9));
+    c.add_option(
+        "--resume", command->resume,
+        "Go on from this checkpoint, and save further ones in the same file if there is no "
+        "--checkpoint; auto: from the one of --checkpoint, if that file exists");
+    c.add_option("--write-every", command->write_every,
+                 "Seconds after which the image so far is written; 0: only at the end")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1e9));
     c.add_option("--grace", command->grace,
-                 "Seconds that the current pass may continue after Ctrl-C or SIGTERM")
+                 "Seconds that the current pass may continue after Ctrl-C, SIGTERM or SIGHUP")
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();

@@ -58,6 +58,7 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", ETENDUE_VERSION);
     app.require_subcommand(1);
     add_render_command(app);
+    add_merge_command(app);
     add_info_command(app);
     add_convert_command(app);
     add_compare_command(app);

@@ -1,0 +1,77 @@
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "image/image_io.h"
+#include "json_text.h"
+#include "messages.h"
+#include "render/checkpoint.h"
+#include "system/output_file.h"
+#include "technique_files.h"
+
+namespace etendue {
+namespace {
+
+struct MergeCommand {
+    std::vector<std::string> files;
+    std::string output = "out.exr", techniques, stats;
+    bool has_variance = false, quiet = false;
+
+    void run() const {
+        const bool is_image = std::filesystem::path(output).extension() != ".etd";
+        if (is_image) check_image_extension(output);
+        OutputFile::check(output);
+        if (!stats.empty()) OutputFile::check(stats);
+        std::vector<CheckpointFile> parts;
+        for (const std::string& file : files) parts.emplace_back(file);
+        Merging merging(std::move(parts));
+        print_warnings(merging.warnings());
+        const RenderTotals totals = merging.totals();
+        const nlohmann::json report = merging.report(totals);
+        if (is_image)
+            write_image(output, image_with_layers(*totals.film, {}, has_variance, report));
+        else
+            merging.write(output, totals);
+        if (!techniques.empty()) {
+            if (!totals.techniques)
+                throw std::runtime_error(fmt::format(
+                    "--techniques: {} has no technique images; render with --techniques",
+                    merging.first().name()));
+            write_techniques(*totals.techniques, totals.film->geometry(), techniques);
+        }
+        if (!stats.empty()) write_file(stats, json_text(report));
+        if (quiet) return;
+        const ErrorEstimate e = totals.film->error();
+        message("{}: {} spp of {} file{}{}\n", output, totals.film->passes(), files.size(),
+                files.size() == 1 ? "" : "s",
+                e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})",
+                                      e.relative_rms, e.low, e.high)
+                        : "");
+    }
+};
+
+}  // namespace
+
+void add_merge_command(CLI::App& app) {
+    auto command = std::make_shared<MergeCommand>();
+    CLI::App& c = *app.add_subcommand("merge", "Add up renderings of one scene by one method");
+    c.add_option("FILES", command->files,
+                 "Checkpoints (render --checkpoint) with other seeds or passes, or sums of them")
+        ->required();
+    c.add_option("-o,--output", command->output,
+                 "Image to write (.exr, .pfm, .hdr or .png), or .etd: a file to merge again")
+        ->capture_default_str();
+    c.add_flag("--variance", command->has_variance, "Add the layer \"variance\" to the image");
+    c.add_option("--techniques", command->techniques,
+                 "Folder for the images of each technique (s,t), weighted and unweighted");
+    c.add_option("--stats", command->stats, "Write statistics to this JSON file");
+    c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
+    c.callback([command] { command->run(); });
+}
+
+}  // namespace etendue

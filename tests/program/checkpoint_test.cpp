@@ -1,0 +1,427 @@
+// Renderings that are interrupted, killed, resumed, split and merged.
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "image/image_io.h"
+#include "run_program.h"
+
+namespace etendue::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Arguments = std::vector<std::string>;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+void wait(double seconds) {
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+class CheckpointTest : public ::testing::Test {
+protected:
+    std::string path(const std::string& name) const { return folder.path() / name; }
+    Program start(const Arguments& arguments) const {
+        return Program(ETENDUE_PROGRAM, arguments, folder.path());
+    }
+    ProgramResult run(const Arguments& arguments) const { return start(arguments).wait(); }
+    Arguments render(const std::string& image, const Arguments& more) const {
+        Arguments all = {"render", scene, "-o", path(image), "--quiet", "--resolution", "48x36"};
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    }
+    void expect_run(const Arguments& arguments) const {
+        const ProgramResult r = run(arguments);
+        ASSERT_EQ(r.status, 0) << r.errors;
+    }
+    std::vector<float> pixels(const std::string& image) const {
+        return read_image(path(image)).data;
+    }
+    /// The hash that `info` prints of the sums in a checkpoint.
+    std::string bits(const std::string& checkpoint) const { return info(checkpoint)["bits"]; }
+    nlohmann::json info(const std::string& checkpoint) const {
+        const ProgramResult r = run({"info", "--json", path(checkpoint)});
+        EXPECT_EQ(r.status, 0) << r.errors;
+        return nlohmann::json::parse(r.output);
+    }
+    void wait_for_start(const Program& program) const {
+        for (int i = 0; i < 3000 && !program.catches_interrupts(); ++i) wait(0.01);
+    }
+    void wait_for_file(const std::string& name) const {
+        for (int i = 0; i < 3000 && !fs::exists(path(name)); ++i) wait(0.01);
+    }
+
+    TemporaryFolder folder;
+    const std::string scene = fs::path(ETENDUE_SOURCE_DIR) / "scenes/cornell.xml";
+};
+
+// -- Kills.
+
+class Killed : public CheckpointTest, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(Killed, ResumesWithTheSameBits) {
+    // ETENDUE_KILLS: another number of kills; ETENDUE_SEED: the seed of the moments at which they happen.
+    const char *wanted = std::getenv("ETENDUE_KILLS"), *seed_text = std::getenv("ETENDUE_SEED");
+    const int kills = wanted ? std::atoi(wanted) : 5;
+    const unsigned seed = seed_text ? unsigned(std::atoi(seed_text)) : std::random_device()();
+    SCOPED_TRACE(fmt::format("ETENDUE_SEED={}", seed));
+    fmt::print("{}: ETENDUE_SEED={}\n", GetParam(), seed);
+    const Arguments how = {
+        "-i", GetParam(), "--spp", "12", "--aov", "albedo,variance", "--techniques-max-depth", "3"};
+    const auto arguments = [&](const std::string& name, const Arguments& more) {
+        Arguments all = render(name + ".exr", how);
+        all.insert(all.end(), {"--checkpoint", path(name + ".etd"), "--techniques", path(name)});
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    };
+    const auto begin = Clock::now();
+    expect_run(arguments("whole", {}));
+    const double longest = seconds_since(begin);
+
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> moment(0, longest);
+    const Arguments resumed = arguments(
+        "killed", {"--checkpoint-every", "1e-6", "--resume", "auto", "--write-every", "0.01"});
+    int killed = 0, resumes = 0;
+    for (int i = 0; i < kills; ++i) {
+        resumes += fs::exists(path("killed.etd"));
+        const Program program = start(resumed);
+        wait(moment(random));
+        program.send(SIGKILL);
+        const ProgramResult r = program.wait();
+        killed += r.signal == SIGKILL;
+        ASSERT_TRUE(r.signal == SIGKILL || r.status == 0) << r.errors;
+        // What is there is whole.
+        if (fs::exists(path("killed.exr"))) pixels("killed.exr");
+        if (!fs::exists(path("killed.etd"))) continue;
+        const auto saved = info("killed.etd");
+        if (saved["spp"] != 12 || i + 1 == kills) continue;
+        // It is complete. The next kill is to meet a rendering.
+        EXPECT_EQ(saved["bits"], bits("whole.etd"));
+        fs::remove(path("killed.etd"));
+    }
+    expect_run(resumed);
+    fmt::print("{}: {} kills, {} resumes\n", GetParam(), killed, resumes);
+    EXPECT_EQ(pixels("killed.exr"), pixels("whole.exr"));
+    EXPECT_EQ(bits("killed.etd"), bits("whole.etd"));
+    int techniques = 0;
+    for (const auto& file : fs::directory_iterator(path("whole"))) {
+        const std::string name = file.path().filename();
+        EXPECT_EQ(pixels("killed/" + name), pixels("whole/" + name)) << name;
+        ++techniques;
+    }
+    EXPECT_GT(techniques, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Methods, Killed,
+    ::testing::Values("path", "path:guide=on,guide_walks=4000", "light", "bdpt", "vcm", "sppm",
+                      "ppm", "upg", "upg+bdpt", "upg+bdpt:guide=on,guide_walks=4000", "pcbpt",
+                      "pm:light_paths=20000,gather_rays=2",
+                      "mps:mutations=4000,precision=0.2,gather_rays=2", "pssmlt:groups=4,chains=32",
+                      "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
+                      "upg+pssmlt:groups=4,chains=32"),
+    [](const auto& p) {
+        std::string name = p.param;
+        std::replace_if(
+            name.begin(), name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
+        return name;
+    });
+
+// -- Signals.
+
+TEST_F(CheckpointTest, SignalsLeaveACheckpointAndAnImage) {
+    expect_run(
+        render("whole.exr", {"-i", "upg+bdpt", "--spp", "40", "--checkpoint", path("whole.etd")}));
+    int number = 0;
+    for (const int signal : {SIGTERM, SIGHUP, SIGINT})
+        for (const char* grace : {"0", "20"}) {
+            const std::string name = std::to_string(++number);
+            const Arguments arguments =
+                render(name + ".exr",
+                       {"-i", "upg+bdpt", "--spp", "40", "--checkpoint", path(name + ".etd"),
+                        "--checkpoint-every", "1e-6", "--resume", "auto", "--grace", grace});
+            const Program program = start(arguments);
+            wait_for_file(name + ".etd");
+            program.send(signal);
+            const ProgramResult r = program.wait();
+            ASSERT_EQ(r.status, 0) << r.errors;
+            const uint64_t passes = info(name + ".etd")["spp"];
+            EXPECT_LT(passes, 40u) << "it was finished before the signal";
+            EXPECT_NE(pixels(name + ".exr"), pixels("whole.exr"));
+            expect_run(arguments);
+            EXPECT_EQ(pixels(name + ".exr"), pixels("whole.exr")) << signal << ", " << grace;
+            EXPECT_EQ(bits(name + ".etd"), bits("whole.etd"));
+        }
+}
+
+TEST_F(CheckpointTest, TheImageIsWrittenWhileItRenders) {
+    const Program program =
+        start(render("a.exr", {"-i", "path", "--time", "600", "--write-every", "0.1"}));
+    wait_for_file("a.exr");
+    EXPECT_EQ(pixels("a.exr").size(), 48u * 36 * 3);
+    program.send(SIGKILL);
+    EXPECT_EQ(program.wait().signal, SIGKILL);
+    EXPECT_EQ(pixels("a.exr").size(), 48u * 36 * 3);
+}
+
+// -- Limits that are raised.
+
+TEST_F(CheckpointTest, AFinishedRenderingGoesOn) {
+    for (const char* mode : {"sample", "spread"}) {
+        const Arguments how = {"-i", "bdpt", "--filter-mode", mode, "--spp"};
+        const auto with = [&](const char* spp, const Arguments& more) {
+            Arguments all = how;
+            all.push_back(spp);
+            all.insert(all.end(), more.begin(), more.end());
+            return all;
+        };
+        expect_run(render("whole.exr", with("7", {})));
+        expect_run(render("a.exr", with("3", {"--checkpoint", path("a.etd")})));
+        EXPECT_EQ(info("a.etd")["spp"], 3);
+        // --resume alone goes on in the same file; the number of threads does not matter.
+        expect_run(render("a.exr", with("7", {"--resume", path("a.etd"), "--threads", "3",
+                                              "--stats", path("a.json")})));
+        EXPECT_EQ(info("a.etd")["spp"], 7);
+        EXPECT_EQ(pixels("a.exr"), pixels("whole.exr"));
+        const auto stats = nlohmann::json::parse(read_text(path("a.json")));
+        EXPECT_EQ(stats["spp"], 7);
+        EXPECT_EQ(stats["pass_seconds"].size(), 7u);
+        // Nothing is left to do.
+        expect_run(render("b.exr", with("5", {"--resume", path("a.etd")})));
+        EXPECT_EQ(pixels("b.exr"), pixels("whole.exr"));
+    }
+}
+
+TEST_F(CheckpointTest, CropsGoOn) {
+    const Arguments crop = {"-i", "upg+bdpt", "--crop", "5,6,20,11", "--spp"};
+    Arguments whole = crop, a = crop, b = crop;
+    whole.push_back("6");
+    a.insert(a.end(), {"4", "--checkpoint", path("a.etd")});
+    b.insert(b.end(), {"6", "--resume", path("a.etd")});
+    expect_run(render("whole.exr", whole));
+    expect_run(render("a.exr", a));
+    expect_run(render("a.exr", b));
+    EXPECT_EQ(pixels("a.exr"), pixels("whole.exr"));
+}
+
+// -- Refusals.
+
+TEST_F(CheckpointTest, RefusalsSayWhatDiffers) {
+    expect_run(render("a.exr", {"-i", "bdpt", "--spp", "1", "--checkpoint", path("a.etd")}));
+    const std::string a = path("a.etd");
+    const auto expect_refused = [&](const Arguments& more, const Arguments& parts) {
+        Arguments all = render("b.exr", {"--spp", "2", "--resume", a});
+        for (size_t i = 0; i < more.size(); i += 2) {
+            const auto given = std::find(all.begin(), all.end(), more[i]);
+            if (given != all.end()) all.erase(given, given + 2);
+        }
+        all.insert(all.end(), more.begin(), more.end());
+        const ProgramResult r = run(all);
+        EXPECT_EQ(r.status, 1) << r.errors;
+        EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
+        for (const std::string& part : parts)
+            EXPECT_NE(r.errors.find(part), std::string::npos) << part << ": " << r.errors;
+        EXPECT_EQ(info("a.etd")["spp"], 1);
+    };
+    expect_refused({"-i", "path"}, {"a.etd cannot be resumed", "\"bdpt:", "\"path:"});
+    expect_refused({"-i", "bdpt:rr_depth=7"}, {"rr_depth=7"});
+    expect_refused({"-i", "bdpt", "--seed", "5"}, {"seed: \"0\" there, but \"5\" here"});
+    expect_refused({"-i", "bdpt", "--sampler", "independent"}, {"sobol", "independent"});
+    expect_refused({"-i", "bdpt", "--resolution", "48x35"}, {"48 x 36", "48 x 35"});
+    expect_refused({"-i", "bdpt", "--crop", "0,0,8,8"}, {"crop 0,0,8,8"});
+    expect_refused({"-i", "bdpt", "--techniques", path("t")},
+                   {"technique images", "up to 6 edges"});
+    expect_refused({"-i", "bdpt", "--resume", path("missing.etd")}, {"missing.etd"});
+    expect_refused({"-i", "bdpt", "--resume", scene}, {"cornell.xml", "no state of a rendering"});
+    expect_refused({"-i", "bdpt", "--resume", "auto"}, {"--checkpoint"});
+    expect_refused({"-i", "bdpt", "--passes", "0:2"}, {"--passes and --spp"});
+    expect_refused({"-i", "bdpt", "--checkpoint", path("b.exr")}, {"same file"});
+
+    // Another scene under the same name.
+    const std::string own = path("own.xml");
+    std::string text = read_text(scene);
+    std::ofstream(own) << text;
+    expect_run({"render", own, "-o", path("c.exr"), "--spp", "1", "--quiet", "--resolution",
+                "48x36", "--checkpoint", path("c.etd")});
+    const size_t at = text.find("reflectance\" value=\"") + 22;
+    text[at] = text[at] == '1' ? '2' : '1';
+    std::ofstream(own) << text;
+    const ProgramResult r = run({"render", own, "-o", path("c.exr"), "--spp", "2", "--quiet",
+                                 "--resolution", "48x36", "--resume", path("c.etd")});
+    EXPECT_EQ(r.status, 1);
+    EXPECT_NE(r.errors.find("scene contents"), std::string::npos) << r.errors;
+}
+
+TEST_F(CheckpointTest, DamagedFilesAreNamed) {
+    expect_run(render("a.exr", {"-i", "bdpt", "--spp", "1", "--checkpoint", path("a.etd")}));
+    const std::string whole = read_text(path("a.etd"));
+    const auto expect_refused = [&](const std::string& contents, const std::string& part) {
+        std::ofstream(path("b.etd"), std::ios::binary) << contents;
+        for (const Arguments& arguments :
+             {render("b.exr", {"-i", "bdpt", "--spp", "2", "--resume", path("b.etd")}),
+              Arguments{"info", path("b.etd")},
+              Arguments{"merge", path("b.etd"), "-o", path("b.exr")}}) {
+            const ProgramResult r = run(arguments);
+            EXPECT_EQ(r.status, 1);
+            EXPECT_NE(r.errors.find("b.etd"), std::string::npos) << r.errors;
+            EXPECT_NE(r.errors.find(part), std::string::npos) << r.errors;
+        }
+    };
+    expect_refused(whole.substr(0, whole.size() / 2), "ends too early");
+    std::string flipped = whole;
+    flipped[whole.size() / 2] = char(flipped[whole.size() / 2] ^ 4);
+    expect_refused(flipped, "\"film\" is damaged");
+    EXPECT_FALSE(fs::exists(path("b.exr")));
+}
+
+TEST_F(CheckpointTest, AFullDiskLeavesTheOldOneAndTheRenderingGoesOn) {
+    const std::string a = path("a.etd");
+    expect_run(render("a.exr", {"-i", "bdpt", "--spp", "1", "--checkpoint", a}));
+    const std::string before = read_text(a);
+    Arguments all = {"-c", "ulimit -f 40; exec \"$0\" \"$@\"", ETENDUE_PROGRAM};
+    const Arguments more =
+        render("a.pfm", {"-i", "bdpt", "--spp", "6", "--resume", a, "--checkpoint-every", "1e-6"});
+    all.insert(all.end(), more.begin(), more.end());
+    const ProgramResult r = Program("/bin/bash", all, folder.path()).wait();
+    EXPECT_EQ(r.status, 1);
+    EXPECT_NE(r.errors.find("warning: cannot write \"" + a), std::string::npos) << r.errors;
+    EXPECT_EQ(read_text(a), before);
+    EXPECT_EQ(pixels("a.pfm").size(), 48u * 36 * 3);
+}
+
+/// Where a system call fails, or the machine does: the file is the old one or the new one.
+TEST_F(CheckpointTest, IsWholeWhateverCallFails) {
+    const auto arguments = [&](const std::string& name, const std::string& spp) {
+        return render(name + ".exr",
+                      {"-i", "path", "--spp", spp, "--checkpoint", path("faulty/" + name + ".etd"),
+                       "--checkpoint-every", "0", "--resume", "auto"});
+    };
+    expect_run(arguments("one", "1"));
+    expect_run(arguments("whole", "3"));
+    const std::string expected = bits("faulty/whole.etd");
+    for (const char* fault : {"fail", "kill"}) {
+        int n = 0, old_ones = 0, images = 0;
+        for (bool is_reached = true; is_reached;) {
+            SCOPED_TRACE(fmt::format("{}:{}", fault, ++n));
+            ASSERT_LT(n, 100);
+            fs::copy_file(path("faulty/one.etd"), path("faulty/a.etd"),
+                          fs::copy_options::overwrite_existing);
+            fs::remove(path("a.exr"));
+            Arguments shell = {"-c",
+                               fmt::format("LD_PRELOAD='{}' ETENDUE_FAULT={}:{} exec \"$0\" \"$@\"",
+                                           ETENDUE_IO_FAULTS, fault, n),
+                               ETENDUE_PROGRAM};
+            const Arguments rest = arguments("a", "3");
+            shell.insert(shell.end(), rest.begin(), rest.end());
+            const ProgramResult r = Program("/bin/bash", shell, folder.path()).wait();
+            const uint64_t passes = info("faulty/a.etd")["spp"];
+            EXPECT_TRUE(passes == 1 || passes == 3) << passes;
+            old_ones += passes == 1;
+            is_reached = r.signal == SIGKILL || r.status != 0;
+            if (r.signal != SIGKILL) {
+                EXPECT_EQ(r.status, passes == 3 ? 0 : 1) << r.errors;
+                const bool is_told =
+                    r.errors.find("cannot write \"" + path("faulty/a.etd")) != std::string::npos;
+                EXPECT_EQ(is_told, r.status == 1) << r.errors;
+            }
+            if (fs::exists(path("a.exr"))) {
+                EXPECT_EQ(pixels("a.exr"), pixels("whole.exr"));
+                ++images;
+            }
+            expect_run(arguments("a", "3"));
+            EXPECT_EQ(bits("faulty/a.etd"), expected);
+        }
+        EXPECT_GT(old_ones, 3);
+        // All but that where the file cannot be made, which is found before the first pass.
+        if (std::string(fault) == "fail") {
+            EXPECT_EQ(images, n - 1);
+        }
+    }
+}
+
+// -- Merging.
+
+TEST_F(CheckpointTest, RangesMakeUpOneRendering) {
+    expect_run(render("whole.exr", {"-i", "path", "--spp", "12", "--checkpoint", path("w.etd"),
+                                    "--techniques", path("w")}));
+    for (const auto& [name, range] :
+         {std::pair{"a", "0:4"}, std::pair{"b", "4:5"}, std::pair{"c", "5:12"}})
+        expect_run(
+            render("part.exr", {"-i", "path", "--passes", range, "--checkpoint",
+                                path(std::string(name) + ".etd"), "--techniques", path("part")}));
+    expect_run({"merge", path("c.etd"), path("a.etd"), path("b.etd"), "-o", path("m.exr"),
+                "--techniques", path("m"), "--stats", path("m.json"), "--quiet"});
+    expect_run(
+        {"merge", path("a.etd"), path("b.etd"), path("c.etd"), "-o", path("n.exr"), "--quiet"});
+    EXPECT_EQ(pixels("m.exr"), pixels("n.exr"));
+    const std::vector<float> merged = pixels("m.exr"), whole = pixels("whole.exr");
+    for (size_t i = 0; i < whole.size(); ++i) ASSERT_NEAR(merged[i], whole[i], 1e-6f * whole[i]);
+    const auto stats = nlohmann::json::parse(read_text(path("m.json")));
+    EXPECT_EQ(stats["spp"], 12);
+    EXPECT_EQ(stats["merged"].size(), 3u);
+    for (const auto& file : fs::directory_iterator(path("w")))
+        EXPECT_TRUE(fs::exists(path("m") / file.path().filename()));
+
+    // A sum is a file like its parts, but nothing goes on from it.
+    expect_run({"merge", path("c.etd"), path("a.etd"), "-o", path("ac.etd"), "--quiet"});
+    expect_run(
+        {"merge", path("ac.etd"), path("b.etd"), "-o", path("o.exr"), "--variance", "--quiet"});
+    const std::vector<float> staged = pixels("o.exr");
+    EXPECT_EQ(staged.size(), 2 * whole.size());
+    const ProgramResult again = run({"merge", path("ac.etd"), path("c.etd"), "-o", path("p.exr")});
+    EXPECT_EQ(again.status, 1);
+    EXPECT_NE(again.errors.find("share passes"), std::string::npos) << again.errors;
+    const ProgramResult resumed =
+        run(render("p.exr", {"-i", "path", "--spp", "20", "--resume", path("ac.etd")}));
+    EXPECT_EQ(resumed.status, 1);
+    EXPECT_NE(resumed.errors.find("sum of several"), std::string::npos) << resumed.errors;
+}
+
+TEST_F(CheckpointTest, TheScriptForSlurmRunsWithoutIt) {
+    const std::string script = fs::path(ETENDUE_SOURCE_DIR) / "examples/slurm_array.sh";
+    const auto tasks = [&](const char* spp) {
+        const ProgramResult r =
+            Program("/bin/bash",
+                    {"-c", "cd '" + folder.path().string() +
+                               "' && export ETENDUE='" ETENDUE_PROGRAM "' SCENE='" + scene +
+                               "' METHOD=light SPP=" + spp +
+                               " && seq 0 3 | xargs -P 2 -I N env SLURM_ARRAY_TASK_ID=N bash '" +
+                               script + "'"},
+                    folder.path())
+                .wait();
+        EXPECT_EQ(r.status, 0) << r.errors;
+    };
+    // The second time, the tasks go on.
+    tasks("1");
+    tasks("2");
+    Arguments merge = {"merge", "-o", path("image.exr"), "--quiet", "--stats", path("s.json")};
+    for (const char* task : {"3", "1", "0", "2"})
+        merge.push_back(path(std::string("task-") + task + ".etd"));
+    expect_run(merge);
+    EXPECT_EQ(nlohmann::json::parse(read_text(path("s.json")))["spp"], 8);
+}
+
+TEST_F(CheckpointTest, PassesMustBeARange) {
+    for (const char* range :
+         {"3", "3:", ":3", "3:3", "4:3", "a:b", "-1:3", "1:2:3", "0:5000000000"}) {
+        const ProgramResult r = run(render("a.exr", {"--passes", range}));
+        EXPECT_EQ(r.status, 1) << range;
+        EXPECT_FALSE(fs::exists(path("a.exr"))) << range;
+    }
+}
+
+}  // namespace
+}  // namespace etendue::test
