@@ -24,7 +24,7 @@ from . import core
 from ._etendue import Description, Scene, SceneError, __version__
 from ._images import Diff, diff, read_image, tonemap, write_image
 from ._integrator import Integrator
-from ._render import FilmView, Progress, Result, render
+from ._render import FilmView, Progress, Result, merge, render, resume
 from ._reports import CompareReport, VerifyReport, compare, verify
 from ._scenes import (load, load_dict, load_string, look_at, plugins, rotate, scale, translate)
 from ._show import show
@@ -33,6 +33,6 @@ SceneError.__module__ = "etendue"
 
 __all__ = [
     "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Progress", "Result", "Scene", "SceneError",
-    "VerifyReport", "compare", "core", "diff", "load", "load_dict", "load_string", "look_at", "plugins", "read_image",
-    "render", "rotate", "scale", "show", "tonemap", "translate", "verify", "write_image",
+    "VerifyReport", "compare", "core", "diff", "load", "load_dict", "load_string", "look_at", "merge", "plugins", "read_image",
+    "render", "resume", "rotate", "scale", "show", "tonemap", "translate", "verify", "write_image",
 ]

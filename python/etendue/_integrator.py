@@ -1,5 +1,10 @@
 """Integrators written in Python."""
 
+import hashlib
+import inspect
+import pickle
+from typing import Any
+
 from . import core
 
 
@@ -16,6 +21,9 @@ class Integrator:
                 for t in range(2, len(z) + 1):
                     for x in c.join(0, t):
                         c.add(x)
+
+    Two further methods are for objects whose attributes change while they render: save(self) -> bytes and
+    load(self, state: bytes) -> None, with which a checkpoint keeps them. Without these, such a rendering cannot be resumed.
     """
 
     traces_light_paths: bool = False
@@ -35,3 +43,44 @@ class Integrator:
     def sample(self, c: core.Sample) -> None:
         """Makes and adds the paths of one sample, which may trace one eye path of a pixel and one light path."""
         raise NotImplementedError(f"{type(self).__name__} needs a method sample(self, c)")
+
+
+def attributes_of(integrator: Integrator) -> dict[str, bytes]:
+    """The attributes of an object in a form that can be compared; of those that cannot be pickled, their types."""
+
+    def comparable(value: Any) -> bytes:
+        try:
+            return pickle.dumps(value)
+        except Exception:
+            return repr(type(value)).encode()
+
+    return {name: comparable(value) for name, value in vars(integrator).items()}
+
+
+def changed_attributes(integrator: Integrator, before: dict[str, bytes]) -> list[str]:
+    """The names of attributes that are not as attributes_of() gave them."""
+    now = attributes_of(integrator)
+    return sorted(name for name in now.keys() | before.keys() if now.get(name) != before.get(name))
+
+
+def identity(integrator: Integrator) -> str:
+    """The name of an integrator, and a hash of what decides its samples: the source of its classes, and its attributes if it
+    has no method save().
+    """
+    seen = hashlib.blake2b(digest_size=8)
+    for cls in type(integrator).__mro__:
+        if cls is Integrator:
+            break
+        seen.update(_source(cls))
+    if not hasattr(integrator, "save"):
+        for name, value in sorted(attributes_of(integrator).items()):
+            seen.update(name.encode() + b"\0" + value)
+    return f"{integrator.name} in Python, {seen.hexdigest()}"
+
+
+def _source(cls: type) -> bytes:
+    try:
+        return inspect.getsource(cls).encode()
+    except (OSError, TypeError):  # made without a file
+        codes = [getattr(value, "__code__", None) for _, value in sorted(vars(cls).items())]
+        return b"".join(code.co_code + repr(code.co_consts).encode() for code in codes if code)

@@ -2,7 +2,8 @@
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
@@ -23,7 +24,7 @@ class FilmView:
     that later passes do not change. In other threads they cannot be read while it runs (RuntimeError).
     """
 
-    def __init__(self, rendering: _etendue.Rendering):
+    def __init__(self, rendering: _etendue.Rendering | _etendue.Merged):
         self._rendering = rendering
 
     @property
@@ -65,6 +66,11 @@ class Progress:
         """The image so far: radiance, linear RGB, shape (H, W, 3)."""
         return self._rendering.image()
 
+    def save(self, file: str | PathLike[str]) -> None:
+        """Writes the state of the rendering so far, an .etd file, from which resume() goes on."""
+        _check_checkpoint_name(file)
+        self._rendering.save_checkpoint(fspath(file))
+
 
 @dataclass(frozen=True)
 class TechniqueImage:
@@ -83,14 +89,17 @@ class TechniqueImage:
 
 
 class Result:
-    """The result of a rendering. Arrays are created when they are first needed, and own their memory."""
+    """The result of a rendering. Arrays are created when they are first needed, and own their memory. A result that was
+    pickled has all but the scene and the auxiliary images.
+    """
 
-    def __init__(self, rendering: _etendue.Rendering, stopped_by: str, aovs: Sequence[str]):
+    def __init__(self, rendering: _etendue.Rendering | _etendue.Merged, stopped_by: str, aovs: Sequence[str]):
         self._rendering = rendering
         self._aov_names = tuple(aovs)
         self._cache: dict[str, Any] = {}
         self.stopped_by = stopped_by
-        """Why the rendering ended: "samples", "time", "error", "interrupted" (Ctrl-C), "callback" (it returned False)."""
+        """Why the rendering ended: "samples", "time", "error", "interrupted" (Ctrl-C), "callback" (it returned False); of
+        merge(): "merged"."""
 
     def _cached(self, name: str, make: Callable[[], Any]) -> Any:
         if name not in self._cache:
@@ -99,8 +108,13 @@ class Result:
 
     @property
     def scene(self) -> Scene:
-        """The scene, which the result keeps alive."""
-        return self._rendering.scene
+        """The scene, which the result keeps alive. Results of merge() have none (RuntimeError)."""
+        return self._own("scene").scene
+
+    def _own(self, what: str) -> _etendue.Rendering:
+        if isinstance(self._rendering, _etendue.Merged):
+            raise RuntimeError(f"merged results have no {what}")
+        return self._rendering
 
     @property
     def image(self) -> Image:
@@ -136,7 +150,8 @@ class Result:
         """
 
         def make() -> dict[str, Image]:
-            images: dict[str, Image] = self._rendering.aovs([n for n in self._aov_names if n != "variance"])
+            names = [n for n in self._aov_names if n != "variance"]
+            images: dict[str, Image] = self._own("auxiliary images").aovs(names) if names else {}
             if "variance" in self._aov_names:
                 images["variance"] = self.variance
             return images
@@ -207,8 +222,20 @@ class Result:
         return stats
 
     def save(self, file: str | PathLike[str]) -> None:
-        """Writes the image, like `etendue render -o`. An .exr file also contains the auxiliary images and statistics."""
-        self._rendering.save(fspath(file), list(self._aov_names))
+        """Writes the image, like `etendue render -o`. An .exr file also contains the auxiliary images and statistics. An
+        .etd file is a checkpoint: resume() goes on from it, and merge() adds it to others.
+        """
+        if fspath(file).endswith(".etd"):
+            self._rendering.save_checkpoint(fspath(file))
+        else:
+            self._rendering.save(fspath(file), list(self._aov_names))
+
+    def partial(self) -> bytes:
+        """The sums over the passes, for merge(): with them errors, statistics and technique images."""
+        return self._rendering.partial()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled, (self.partial(), self.stopped_by)
 
     def __repr__(self) -> str:
         height, width = self.image.shape[:2]
@@ -263,6 +290,7 @@ def render(
     time: float | None = None,
     error: float | None = None,
     seed: int = 0,
+    passes: tuple[int, int] | None = None,
     sampler: str = "sobol",
     filter_mode: str = "spread",
     threads: int = 0,
@@ -279,6 +307,7 @@ def render(
     spp, time, error: limits: samples per pixel, seconds, relative error of the image (see Result.error). The first limit
         that is reached ends the rendering. Without a limit, the samples per pixel of the scene, or 64.
     seed: seed of all random numbers.
+    passes: renders the passes from the first number up to the second one, excluding it, for merge(); instead of spp.
     sampler: "sobol" or "independent". With "sobol", errors and variances are upper bounds.
     filter_mode: "spread": an eye path contributes to all pixels that the filter of the film reaches, and the errors of
         neighbouring pixels are correlated; "sample": to its own pixel alone, and errors are independent.
@@ -299,8 +328,83 @@ def render(
     """
     _etendue.check_aovs(list(aovs))
     depth = 6 if techniques is True else int(techniques)
-    rendering = _etendue.Rendering(scene, integrator, spp, time, error, seed, sampler, filter_mode, threads, depth)
+    first = 0
+    if passes is not None:
+        first, end = passes
+        if spp is not None or not 0 <= first < end:
+            raise ValueError("passes must be two numbers with 0 <= first < second, without spp")
+        spp = end - first
+    rendering = _etendue.Rendering(scene, integrator, spp, time, error, seed, sampler, filter_mode, threads, depth, first)
+    return _run(rendering, aovs, callback, progress, live)
 
+
+def resume(
+    file: str | PathLike[str],
+    scene: Scene,
+    integrator: Integrator | None = None,
+    *,
+    spp: int | None = None,
+    time: float | None = None,
+    error: float | None = None,
+    threads: int = 0,
+    aovs: Sequence[str] = (),
+    callback: Callable[[Progress], object] | None = None,
+    progress: bool | None = None,
+    live: bool = False,
+) -> Result:
+    """Goes on from a checkpoint (Result.save, Progress.save) with the same bits as if the rendering had not been interrupted.
+
+    file: an .etd file. It must be your own: what it has learned is used as it is.
+    scene: the same scene.
+    integrator: if it was one in Python, an object that is equal to what it was at the start.
+    spp, time, error: limits, which count from the first pass. The others are those of render().
+
+    Raises RuntimeError, with all differences, if the bits would not be the same: another scene, another build of this
+    package.
+    """
+    _etendue.check_aovs(list(aovs))
+    of = _etendue.read_checkpoint(fspath(file))
+    if integrator is None and " in Python, " in of["condition"]:
+        raise ValueError(f"{fspath(file)}: expected integrator, an object like the {of['integrator']} that it was rendered by")
+    rendering = _etendue.Rendering(
+        scene, of["integrator"] if integrator is None else integrator, spp, time, error, of["seed"], of["sampler"], of["filter_mode"], threads,
+        of["technique_depth"], of["first_pass"],
+    )
+    rendering.resume(fspath(file))
+    return _run(rendering, aovs, callback, progress, live)
+
+
+def merge(parts: Iterable[str | PathLike[str] | bytes | Result]) -> Result:
+    """Adds up renderings of one scene by one method: results, partial results (Result.partial), or .etd files.
+
+    They must have other seeds or other passes of the same seed; nothing depends on their order. Error, interval,
+    statistics and technique images of the result are those of all passes. Renderings of other scenes or methods, and
+    passes that occur twice, raise RuntimeError. A UserWarning says where more seeds do not reduce a bias.
+    """
+    merged = _etendue.merge(
+        [p.partial() if isinstance(p, Result) else p if isinstance(p, bytes) else fspath(p) for p in parts]
+    )
+    for text in merged.merge_warnings():
+        warnings.warn(text, stacklevel=2)
+    return Result(merged, "merged", ())
+
+
+def _unpickled(partial: bytes, stopped_by: str) -> Result:
+    return Result(_etendue.merge([partial]), stopped_by, ())
+
+
+def _check_checkpoint_name(file: str | PathLike[str]) -> None:
+    if not fspath(file).endswith(".etd"):
+        raise ValueError(f"the name of a checkpoint must end with .etd, but is {fspath(file)!r}")
+
+
+def _run(
+    rendering: _etendue.Rendering,
+    aovs: Sequence[str],
+    callback: Callable[[Progress], object] | None,
+    progress: bool | None,
+    live: bool,
+) -> Result:
     widget: Any = None
     if live:
         from ._show import LiveView

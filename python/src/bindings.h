@@ -32,6 +32,7 @@ struct SceneHandle : std::enable_shared_from_this<SceneHandle> {
 
     SceneDescription description;
     Scene scene;
+    bool lenient = false, watertight = false;  ///< As it was built.
     Film film;  ///< For film points of single paths; never rendered into.
 };
 using ScenePtr = std::shared_ptr<SceneHandle>;

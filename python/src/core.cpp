@@ -330,12 +330,21 @@ private:
     uint64_t numbers_ = 0;
 };
 
+/// The last owner may be a thread without the GIL.
+std::shared_ptr<nb::object> shared(nb::object object) {
+    return {new nb::object(std::move(object)), [](nb::object* o) {
+                const nb::gil_scoped_acquire gil;
+                delete o;
+            }};
+}
+
 /// Calls an object of Python, whose methods are those of etendue.Integrator.
 class PythonIntegrator final : public Integrator {
 public:
     PythonIntegrator(std::shared_ptr<nb::object> object, int max_depth)
         : object_(std::move(object)), max_depth_(max_depth) {
         const nb::gil_scoped_acquire gil;
+        before_ = shared(helpers().attr("attributes_of")(*object_));
         traces_light_paths_ = nb::cast<bool>(object_->attr("traces_light_paths"));
         const auto name = nb::cast<std::string>(object_->attr("estimator"));
         for (const Estimator e : {Estimator::Unbiased, Estimator::Consistent, Estimator::Biased})
@@ -364,12 +373,36 @@ public:
         return traces_light_paths_ ? scene.film().pixel_count() : 0;
     }
     Estimator estimator() const override { return estimator_; }
-    // What the object keeps is its own: samples are expected to depend on their random numbers alone.
-    void save(LearnedState&) const override {}
-    void load(LearnedState&) override {}
+    void save(LearnedState& to) const override {
+        const nb::gil_scoped_acquire gil;
+        nb::bytes state("", 0);
+        if (nb::hasattr(*object_, "save")) {
+            state = nb::cast<nb::bytes>(object_->attr("save")());
+        } else if (const auto changed = nb::cast<std::vector<std::string>>(
+                       helpers().attr("changed_attributes")(*object_, *before_));
+                   !changed.empty()) {
+            throw std::runtime_error(fmt::format(
+                "{} cannot be saved: rendering has changed {}, and it has no methods save() and "
+                "load()",
+                nb::cast<std::string>(object_->attr("name")), fmt::join(changed, ", ")));
+        }
+        const auto* begin = reinterpret_cast<const std::byte*>(state.c_str());
+        to.put(std::vector<std::byte>(begin, begin + state.size()));
+    }
+    void load(LearnedState& from) override {
+        std::vector<std::byte> state;
+        from.get(state);
+        const nb::gil_scoped_acquire gil;
+        if (nb::hasattr(*object_, "load"))
+            object_->attr("load")(
+                nb::bytes(reinterpret_cast<const char*>(state.data()), state.size()));
+    }
 
 private:
-    std::shared_ptr<nb::object> object_;
+    static nb::module_ helpers() { return nb::module_::import_("etendue._integrator"); }
+
+    std::shared_ptr<nb::object> object_,
+        before_;  ///< The object; its attributes before the first pass.
     int max_depth_;
     bool traces_light_paths_ = false;
     Estimator estimator_ = Estimator::Unbiased;
@@ -379,11 +412,7 @@ private:
 IntegratorSpec python_spec(nb::handle integrator) {
     IntegratorSpec spec;
     spec.name = nb::cast<std::string>(integrator.attr("name"));
-    // The last owner may be a thread without the GIL.
-    std::shared_ptr<nb::object> object(new nb::object(nb::borrow(integrator)), [](nb::object* o) {
-        const nb::gil_scoped_acquire gil;
-        delete o;
-    });
+    const auto object = shared(nb::borrow(integrator));
     spec.make = [object](const std::map<std::string, std::string>& params) {
         const auto depth = params.find("max_depth");
         const int max_depth = depth == params.end() ? kNoRoulette : std::stoi(depth->second);

@@ -483,7 +483,10 @@ ScenePtr build(const SceneDescription& description,
     use_threads();
     nb::gil_scoped_release no_gil;
     Scene scene = build_scene(description, options);
-    return std::make_shared<SceneHandle>(description, std::move(scene));
+    auto handle = std::make_shared<SceneHandle>(description, std::move(scene));
+    handle->lenient = lenient;
+    handle->watertight = watertight;
+    return handle;
 }
 
 nb::dict info(const SceneHandle& s) {

@@ -18,9 +18,11 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings.h"
+#include "description/fingerprint.h"
 #include "image/image_io.h"
 #include "math/statistics.h"
 #include "render/aov.h"
+#include "render/checkpoint.h"
 #include "render/defaults.h"
 #include "render/render_report.h"
 #include "render/renderer.h"
@@ -59,7 +61,8 @@ const char* technique_kind(const Technique& q) {
 RenderSettings settings_for(const SceneHandle& scene, nb::handle integrator,
                             std::optional<uint64_t> spp, std::optional<double> seconds,
                             std::optional<double> error, uint64_t seed, const std::string& sampler,
-                            const std::string& filter, int threads, int technique_depth) {
+                            const std::string& filter, int threads, int technique_depth,
+                            uint64_t first_pass) {
     RenderSettings s;
     s.integrator = to_spec(scene.scene, integrator);
     s.sampler = to_sampler(sampler);
@@ -73,7 +76,13 @@ RenderSettings settings_for(const SceneHandle& scene, nb::handle integrator,
     check_above_0("spp, time and error", {spp, seconds, error});
     set_default_limit(s, scene.scene);
     s.technique_depth = checked("techniques", technique_depth, 0, 64);
+    s.first_pass = first_pass;
     return s;
+}
+
+std::string python_identity(nb::handle integrator) {
+    return nb::cast<std::string>(
+        nb::module_::import_("etendue._integrator").attr("identity")(integrator));
 }
 
 /// Trial renderings of the integrator take time.
@@ -83,16 +92,31 @@ Renderer make_renderer(const Scene& scene, const RenderSettings& settings) {
     return Renderer(scene, settings);
 }
 
+/// 95 % half width of every pixel's confidence interval.
+std::vector<Rgb> half_width_of(const Film& film) {
+    std::vector<Rgb> out = film.variance();
+    // Where passes depend on each other, groups of them are the independent values.
+    const int groups = film.groups();
+    const double samples = groups > 0 ? groups / 2 + 1 : double(film.passes());
+    const bool is_known = samples >= 2 && film.passes() >= uint64_t(std::max(groups, 2));
+    const double t =
+        is_known ? student_quantile(0.05, samples - 1) : std::numeric_limits<double>::quiet_NaN();
+    for (Rgb& c : out)
+        for (int i = 0; i < 3; ++i) c[i] = float(t * std::sqrt(double(c[i])));
+    return out;
+}
+
 /// A renderer with its scene.
 class Rendering {
 public:
     Rendering(ScenePtr scene, nb::handle integrator, std::optional<uint64_t> spp,
               std::optional<double> seconds, std::optional<double> error, uint64_t seed,
               const std::string& sampler, const std::string& filter, int threads,
-              int technique_depth)
+              int technique_depth, uint64_t first_pass)
         : scene_(std::move(scene)),
           settings_(settings_for(*scene_, integrator, spp, seconds, error, seed, sampler, filter,
-                                 threads, technique_depth)),
+                                 threads, technique_depth, first_pass)),
+          python_integrator_(settings_.integrator.make ? python_identity(integrator) : ""),
           renderer_(make_renderer(scene_->scene, settings_)) {}
 
     /// `tick()` is called every 50 ms, `callback()` between passes, at least `interval` seconds apart; it returns False to
@@ -176,20 +200,6 @@ public:
         return now_;
     }
 
-    /// 95 % half width of every pixel's confidence interval.
-    std::vector<Rgb> half_width() const {
-        std::vector<Rgb> out = film().variance();
-        // Where passes depend on each other, groups of them are the independent values.
-        const int groups = renderer().integrator().error_groups();
-        const double samples = groups > 0 ? groups / 2 + 1 : double(film().passes());
-        const bool is_known = samples >= 2 && film().passes() >= uint64_t(std::max(groups, 2));
-        const double t = is_known ? student_quantile(0.05, samples - 1)
-                                  : std::numeric_limits<double>::quiet_NaN();
-        for (Rgb& c : out)
-            for (int i = 0; i < 3; ++i) c[i] = float(t * std::sqrt(double(c[i])));
-        return out;
-    }
-
     nlohmann::json report() const {
         return to_json(renderer(), scene_->scene, settings_, stopped_by_, log_);
     }
@@ -199,14 +209,39 @@ public:
         write_image(file, image_with_layers(renderer(), scene_->scene, settings_.seed,
                                             settings_.threads, aovs, report()));
     }
+    void save_checkpoint(const std::string& file) const {
+        write_checkpoint(file, renderer(), scene_->scene, conditions(), settings_, log_);
+    }
+    /// Before the first pass.
+    void resume(const std::string& file) {
+        use_threads();
+        CheckpointFile(file).resume(renderer_, conditions(), log_);
+        const std::scoped_lock lock(mutex_);
+        now_ = Now{renderer_.film().passes(), renderer_.seconds(), {}, 0, {}};
+    }
+    std::string partial() const {
+        return partial_result(renderer(), scene_->scene, conditions(), settings_, log_);
+    }
     std::vector<AovImage> aovs(const std::vector<std::string>& names) const {
         return render_aovs(scene_->scene, names, kAovSamples, settings_.seed, settings_.threads);
     }
     const RenderSettings& settings() const { return settings_; }
 
 private:
+    Conditions conditions() const {
+        Conditions all = conditions_of(
+            renderer_, scene_->scene,
+            {scene_fingerprint(scene_->description), scene_->lenient, scene_->watertight},
+            settings_);
+        if (!python_integrator_.empty())
+            for (auto& [name, value] : all)
+                if (name == kIntegratorCondition) value = python_integrator_;
+        return all;
+    }
+
     ScenePtr scene_;
     RenderSettings settings_;
+    std::string python_integrator_;  ///< What decides the samples of an integrator in Python.
     Renderer renderer_;
     mutable std::mutex mutex_;
     std::optional<Now> now_;
@@ -216,6 +251,54 @@ private:
     std::string stopped_by_;
 };
 using RenderingPtr = std::shared_ptr<Rendering>;
+
+constexpr const char* kTechniquesSignature =
+    "def techniques(self) -> list[tuple[int, int, str, numpy.typing.NDArray[numpy.float32], "
+    "numpy.typing.NDArray[numpy.float32]]]";
+
+/// The images of techniques as they go to Python.
+nb::list list_of(std::vector<TechniqueImages::Entry> images, const FilmGeometry& g) {
+    nb::list all;
+    for (auto& e : images) {
+        const Technique q = e.technique;
+        all.append(nb::make_tuple(q.s, q.t, technique_kind(q),
+                                  to_array(std::move(e.weighted), g.crop_width, g.crop_height),
+                                  to_array(std::move(e.unweighted), g.crop_width, g.crop_height)));
+    }
+    return all;
+}
+
+using Error = std::optional<std::tuple<double, double, double>>;
+Error tuple_of(const ErrorEstimate& e) {
+    if (!e.valid) return {};
+    return std::tuple{e.relative_rms, e.low, e.high};
+}
+
+/// The sum of several renderings.
+struct Merged {
+    std::optional<Merging> of;
+    RenderTotals totals;
+    /// The parts in bytes, as read or as partial results.
+    explicit Merged(std::vector<SectionReader> readers) {
+        std::vector<CheckpointFile> parts;
+        for (SectionReader& r : readers) parts.emplace_back(std::move(r));
+        of.emplace(std::move(parts));
+        totals = of->totals();
+    }
+    const Film& film() const { return *totals.film; }
+    int width() const { return film().geometry().crop_width; }
+    int height() const { return film().geometry().crop_height; }
+};
+
+/// A view of a film's sums, or of its sums of squares, which keeps its owner alive.
+template <class Owner>
+ReadOnlyDoubles sums_of(const Owner& owner, const Film& film, bool squares) {
+    const auto moments = film.moments();
+    const size_t w = size_t(film.geometry().crop_width), h = size_t(film.geometry().crop_height);
+    const double* data = squares ? moments.front().square : moments.front().sum;
+    constexpr int64_t kStride = sizeof(Film::Moments) / sizeof(double);
+    return ReadOnlyDoubles(data, {h, w, 3}, nb::cast(owner), {int64_t(w) * kStride, kStride, 1});
+}
 
 /// The film's sums, or the sums of squares. After the rendering, a view that keeps it alive. The film of a running one
 /// changes when the callback has ended, so that callbacks get copies.
@@ -232,20 +315,98 @@ ReadOnlyDoubles sums(const RenderingPtr& r, bool squares) {
                           [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
         return ReadOnlyDoubles(data, {h, w, 3}, owner);
     }
-    const double* data = squares ? moments.front().square : moments.front().sum;
-    constexpr int64_t kStride = sizeof(Film::Moments) / sizeof(double);
-    return ReadOnlyDoubles(data, {h, w, 3}, nb::cast(r), {int64_t(w) * kStride, kStride, 1});
+    return sums_of(r, r->film(), squares);
 }
 
 /// An image of the film, which is computed without the GIL.
-template <class Make>
-FloatArray image_of(const Rendering& r, const Make& make) {
+template <class R, class Make>
+FloatArray image_of(const R& r, const Make& make) {
     std::vector<Rgb> pixels;
     {
         const nb::gil_scoped_release no_gil;
         pixels = make();
     }
     return to_array(std::move(pixels), r.width(), r.height());
+}
+
+/// What et.merge() makes of files and of partial results.
+std::shared_ptr<Merged> merge(const nb::list& parts) {
+    std::vector<SectionReader> readers;
+    for (const nb::handle part : parts) {
+        if (nb::isinstance<nb::bytes>(part)) {
+            const auto bytes = nb::cast<nb::bytes>(part);
+            readers.emplace_back(std::string(bytes.c_str(), bytes.size()),
+                                 fmt::format("part {}", readers.size() + 1));
+        } else {
+            readers.emplace_back(nb::cast<std::string>(part));
+        }
+    }
+    if (readers.empty()) throw nb::value_error("there are no parts to merge");
+    use_threads();
+    const nb::gil_scoped_release no_gil;
+    return std::make_shared<Merged>(std::move(readers));
+}
+
+void bind_merging(nb::module_& m) {
+    using namespace nb::literals;
+    nb::class_<Merged>(m, "Merged")
+        .def_prop_ro("passes", [](const Merged& r) { return r.film().passes(); })
+        .def_prop_ro("seconds", [](const Merged& r) { return r.totals.seconds; })
+        .def_prop_ro("estimator", [](const Merged& r) { return r.of->first().estimator(); })
+        .def_prop_ro("integrator", [](const Merged& r) { return r.of->first().integrator(); })
+        .def_prop_ro("warnings", [](const Merged& r) { return warnings(r.totals.stats); })
+        .def("merge_warnings", [](const Merged& r) { return r.of->warnings(); })
+        .def("error", [](const Merged& r) { return tuple_of(r.film().error()); })
+        .def("image", [](const Merged& r) { return image_of(r, [&] { return r.film().image(); }); })
+        .def("variance",
+             [](const Merged& r) { return image_of(r, [&] { return r.film().variance(); }); })
+        .def("half_width",
+             [](const Merged& r) { return image_of(r, [&] { return half_width_of(r.film()); }); })
+        .def("sums", [](const std::shared_ptr<Merged>& r) { return sums_of(r, r->film(), false); })
+        .def("squares",
+             [](const std::shared_ptr<Merged>& r) { return sums_of(r, r->film(), true); })
+        .def("stats", [](const Merged& r) { return json_text(r.of->report(r.totals)); })
+        .def(
+            "techniques",
+            [](const Merged& r) {
+                std::vector<TechniqueImages::Entry> images;
+                if (r.totals.techniques) images = r.totals.techniques->images();
+                return list_of(std::move(images), r.film().geometry());
+            },
+            nb::sig(kTechniquesSignature))
+        .def("partial",
+             [](const Merged& r) {
+                 const std::string bytes = r.of->bytes(r.totals);
+                 return nb::bytes(bytes.data(), bytes.size());
+             })
+        .def(
+            "save",
+            [](const Merged& r, const std::string& file, const std::vector<std::string>&) {
+                check_image_extension(file);
+                write_image(file, image_with_layers(r.film(), {}, false, r.of->report(r.totals)));
+            },
+            nb::call_guard<nb::gil_scoped_release>(), "file"_a, "aovs"_a)
+        .def(
+            "save_checkpoint",
+            [](const Merged& r, const std::string& file) { r.of->write(file, r.totals); },
+            nb::call_guard<nb::gil_scoped_release>(), "file"_a);
+    m.def("merge", &merge, "parts"_a);
+    m.def(
+        "read_checkpoint",
+        [](const std::string& file) {
+            const CheckpointFile c(file);
+            const PassRange& range = c.ranges().front();
+            nb::dict d;
+            d["integrator"] = c.integrator();
+            d["condition"] = c.condition(kIntegratorCondition);
+            d["sampler"] = c.condition("sampler");
+            d["filter_mode"] = c.condition("filter mode");
+            d["seed"] = range.seed;
+            d["first_pass"] = range.first;
+            d["technique_depth"] = c.technique_depth();
+            return d;
+        },
+        "file"_a);
 }
 
 }  // namespace
@@ -259,12 +420,12 @@ void bind_render(nb::module_& m) {
             [](Rendering* self, ScenePtr scene, nb::handle integrator, std::optional<uint64_t> spp,
                std::optional<double> time, std::optional<double> error, uint64_t seed,
                const std::string& sampler, const std::string& filter, int threads,
-               int technique_depth) {
+               int technique_depth, uint64_t first_pass) {
                 new (self) Rendering(std::move(scene), integrator, spp, time, error, seed, sampler,
-                                     filter, threads, technique_depth);
+                                     filter, threads, technique_depth, first_pass);
             },
             "scene"_a, "integrator"_a, "spp"_a.none(), "time"_a.none(), "error"_a.none(), "seed"_a,
-            "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a)
+            "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a, "first_pass"_a)
         .def("run", &Rendering::run, "tick"_a.none(), "callback"_a.none(), "interval"_a)
         .def("now", &Rendering::now)
         .def_prop_ro("scene", &Rendering::scene_pointer)
@@ -282,18 +443,17 @@ void bind_render(nb::module_& m) {
                      [](const Rendering& r) { return r.settings().integrator.to_string(); })
         .def_prop_ro("warnings", [](const Rendering& r) { return warnings(r.renderer().stats()); })
         .def("error",
-             [](const Rendering& r) -> std::optional<std::tuple<double, double, double>> {
+             [](const Rendering& r) {
                  const nb::gil_scoped_release no_gil;
-                 const ErrorEstimate e = r.renderer().error();
-                 if (!e.valid) return {};
-                 return std::tuple{e.relative_rms, e.low, e.high};
+                 return tuple_of(r.renderer().error());
              })
         .def("image",
              [](const Rendering& r) { return image_of(r, [&] { return r.film().image(); }); })
         .def("variance",
              [](const Rendering& r) { return image_of(r, [&] { return r.film().variance(); }); })
-        .def("half_width",
-             [](const Rendering& r) { return image_of(r, [&] { return r.half_width(); }); })
+        .def(
+            "half_width",
+            [](const Rendering& r) { return image_of(r, [&] { return half_width_of(r.film()); }); })
         .def("sums", [](const RenderingPtr& r) { return sums(r, false); })
         .def("squares", [](const RenderingPtr& r) { return sums(r, true); })
         .def("stats",
@@ -304,25 +464,14 @@ void bind_render(nb::module_& m) {
         .def(
             "techniques",
             [](const Rendering& r) {
-                nb::list all;
-                if (!r.renderer().techniques()) return all;
                 std::vector<TechniqueImages::Entry> images;
-                {
+                if (const TechniqueImages* own = r.renderer().techniques()) {
                     const nb::gil_scoped_release no_gil;
-                    images = r.renderer().techniques()->images();
+                    images = own->images();
                 }
-                for (auto& e : images) {
-                    const Technique q = e.technique;
-                    all.append(
-                        nb::make_tuple(q.s, q.t, technique_kind(q),
-                                       to_array(std::move(e.weighted), r.width(), r.height()),
-                                       to_array(std::move(e.unweighted), r.width(), r.height())));
-                }
-                return all;
+                return list_of(std::move(images), r.film().geometry());
             },
-            nb::sig("def techniques(self) -> list[tuple[int, int, str, "
-                    "numpy.typing.NDArray[numpy.float32], "
-                    "numpy.typing.NDArray[numpy.float32]]]"))
+            nb::sig(kTechniquesSignature))
         .def(
             "aovs",
             [](const Rendering& r, const Strings& names) {
@@ -338,9 +487,22 @@ void bind_render(nb::module_& m) {
                 return out;
             },
             "names"_a)
+        .def("save_checkpoint", &Rendering::save_checkpoint,
+             nb::call_guard<nb::gil_scoped_release>(), "file"_a)
+        .def("resume", &Rendering::resume, nb::call_guard<nb::gil_scoped_release>(), "file"_a)
+        .def("partial",
+             [](const Rendering& r) {
+                 std::string bytes;
+                 {
+                     const nb::gil_scoped_release no_gil;
+                     bytes = r.partial();
+                 }
+                 return nb::bytes(bytes.data(), bytes.size());
+             })
         .def("save", &Rendering::save, nb::call_guard<nb::gil_scoped_release>(), "file"_a,
              "aovs"_a);
     m.def("check_aovs", &check_aovs, "names"_a);
+    bind_merging(m);
 }
 
 }  // namespace etendue::python

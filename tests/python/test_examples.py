@@ -7,6 +7,8 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
+import etendue as et
+
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NOTEBOOKS = sorted(EXAMPLES.glob("*.ipynb"))
 
@@ -49,7 +51,5 @@ def test_runs_on_a_cluster_are_merged_exactly(scenes: Path, monkeypatch: pytest.
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
         total = dask_cluster.render_on(client, file, "bdpt", 4, spp=2, size=(16, 16))
     parts = [dask_cluster.run(file, "bdpt", seed, 2, (16, 16)) for seed in range(4)]
-    expected = parts[0] + parts[1] + parts[2] + parts[3]
-    np.testing.assert_array_equal(total.sums, expected.sums)
-    np.testing.assert_array_equal(total.squares, expected.squares)
-    assert total.passes == 8 and (total.standard_error >= 0).all()
+    np.testing.assert_array_equal(total.image, et.merge(parts).image)
+    assert total.passes == 8

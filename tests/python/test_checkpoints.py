@@ -1,0 +1,174 @@
+"""Renderings that go on from files, and sums of several."""
+
+import pickle
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import etendue as et
+
+METHODS = ["path", "bdpt:max_depth=5", "upg+bdpt", "vcm", "mlt:groups=4,chains=48"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_rendering_goes_on_with_the_same_bits(cornell: et.Scene, tmp_path: Path, method: str) -> None:
+    whole = et.render(cornell, method, spp=7, techniques=3, progress=False)
+    et.render(cornell, method, spp=3, techniques=3, progress=False).save(tmp_path / "a.etd")
+    resumed = et.resume(tmp_path / "a.etd", cornell, spp=7, threads=1, progress=False)
+    np.testing.assert_array_equal(resumed.image, whole.image)
+    np.testing.assert_array_equal(resumed.variance, whole.variance)
+    assert resumed.error == whole.error and resumed.passes == 7
+    assert len(resumed.stats["pass_seconds"]) == 7
+    for a, b in zip(resumed.techniques, whole.techniques, strict=True):
+        np.testing.assert_array_equal(a.weighted, b.weighted)
+
+
+def test_callbacks_save_the_state_so_far(cornell: et.Scene, tmp_path: Path) -> None:
+    def save(p: et.Progress) -> None:
+        if p.passes == 2:
+            p.save(tmp_path / "a.etd")
+
+    whole = et.render(cornell, "bdpt", spp=5, callback=save, progress=False)
+    resumed = et.resume(tmp_path / "a.etd", cornell, spp=5, progress=False)
+    np.testing.assert_array_equal(resumed.image, whole.image)
+    with pytest.raises(ValueError, match=r"\.etd"):
+        et.render(cornell, "path", spp=1, callback=lambda p: p.save(tmp_path / "a.exr"), progress=False)
+
+
+def test_what_would_change_bits_is_refused(cornell: et.Scene, demo: et.Scene, tmp_path: Path) -> None:
+    et.render(cornell, "bdpt", spp=1, progress=False).save(tmp_path / "a.etd")
+    with pytest.raises(RuntimeError, match="scene contents"):
+        et.resume(tmp_path / "a.etd", demo, spp=2)
+    with pytest.raises(RuntimeError, match="no state of a rendering"):
+        (tmp_path / "b.etd").write_text("<scene/>")
+        et.resume(tmp_path / "b.etd", cornell, spp=2)
+    with pytest.raises(RuntimeError, match="missing.etd"):
+        et.resume(tmp_path / "missing.etd", cornell, spp=2)
+
+
+@pytest.mark.parametrize("method", ["bdpt", "mlt:groups=4,chains=48"])
+def test_merged_results_do_not_depend_on_their_order(cornell: et.Scene, tmp_path: Path, method: str) -> None:
+    results = [et.render(cornell, method, spp=12, seed=s, techniques=3, progress=False) for s in range(3)]
+    results[1].save(tmp_path / "1.etd")
+    a = et.merge(results)
+    b = et.merge([results[2].partial(), tmp_path / "1.etd", results[0]])
+    np.testing.assert_array_equal(a.image, b.image)
+    np.testing.assert_array_equal(a.half_width, b.half_width)
+    assert a.error == b.error and a.error is not None and a.error_interval == b.error_interval
+    assert a.passes == 36 and a.stopped_by == "merged"
+    sums = sum(r.film.sums for r in results)
+    np.testing.assert_allclose(a.film.sums, sums, rtol=1e-12)
+    assert a.stats["walk_rays"] == sum(r.stats["walk_rays"] for r in results)
+    assert len(a.techniques) == len(results[0].techniques)
+    a.save(tmp_path / "sum.exr")
+    np.testing.assert_array_equal(et.read_image(tmp_path / "sum.exr"), a.image)
+    a.save(tmp_path / "sum.etd")
+    np.testing.assert_array_equal(et.merge([tmp_path / "sum.etd"]).image, a.image)
+    with pytest.raises(RuntimeError, match="sum of several"):
+        et.resume(tmp_path / "sum.etd", cornell, spp=100)
+    with pytest.raises(RuntimeError, match="share passes"):
+        et.merge([a, results[1]])
+    with pytest.raises(RuntimeError, match="no scene"):
+        _ = a.scene
+    with pytest.raises(ValueError, match="no parts"):
+        et.merge([])
+
+
+def test_ranges_of_passes_make_up_a_rendering(cornell: et.Scene) -> None:
+    whole = et.render(cornell, "path", spp=8, progress=False)
+    parts = [et.render(cornell, "path", passes=p, progress=False) for p in [(5, 8), (0, 5)]]
+    merged = et.merge(parts)
+    np.testing.assert_allclose(merged.image, whole.image, rtol=1e-6)
+    assert merged.passes == 8
+    for wrong in [(3, 3), (-1, 2), (4, 2)]:
+        with pytest.raises(ValueError, match="passes"):
+            et.render(cornell, "path", passes=wrong)
+    with pytest.raises(ValueError, match="passes"):
+        et.render(cornell, "path", passes=(0, 2), spp=2)
+
+
+def test_seeds_that_do_not_reduce_a_bias_are_a_warning(cornell: et.Scene) -> None:
+    seeds = [et.render(cornell, "vcm", spp=1, seed=s, progress=False) for s in range(2)]
+    with pytest.warns(UserWarning, match="several seeds"):
+        et.merge(seeds)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        et.merge([et.render(cornell, "vcm", passes=p, progress=False) for p in [(0, 1), (1, 2)]])
+
+
+def test_results_can_be_pickled(cornell: et.Scene) -> None:
+    result = et.render(cornell, "bdpt", spp=12, techniques=2, progress=False)
+    copy = pickle.loads(pickle.dumps(result))
+    np.testing.assert_array_equal(copy.image, result.image)
+    np.testing.assert_array_equal(copy.variance, result.variance)
+    assert copy.error == result.error and copy.passes == 12 and copy.stopped_by == "samples"
+    assert len(copy.techniques) == len(result.techniques)
+    assert et.merge([copy]).passes == 12
+
+
+class Hits(et.Integrator):
+    """Emitted radiance that eye paths hit, times a factor."""
+
+    def __init__(self, factor: float = 1) -> None:
+        self.factor = factor
+
+    def counts(self, light_paths: int) -> et.core.Counts:
+        return et.core.Counts(hit=1)
+
+    def sample(self, c: et.core.Sample) -> None:
+        z = c.eye_path(max_vertices=4)
+        for t in range(2, len(z) + 1):
+            for x in c.join(0, t):
+                c.add(x)
+
+
+class Counting(Hits):
+    """One that changes while it renders."""
+
+    samples = 0
+
+    def sample(self, c: et.core.Sample) -> None:
+        self.samples += 1
+        super().sample(c)
+
+
+class Remembering(Counting):
+    """And that says what has changed."""
+
+    def save(self) -> bytes:
+        return str(self.samples).encode()
+
+    def load(self, state: bytes) -> None:
+        self.samples = int(state)
+
+
+def test_integrators_in_python_go_on(cornell: et.Scene, tmp_path: Path) -> None:
+    file = tmp_path / "a.etd"
+    remembering = Remembering()
+    for make in (Hits, Remembering):
+        whole = et.render(cornell, make(), spp=3, progress=False)
+        et.render(cornell, make(), spp=1, progress=False).save(file)
+        if make is Remembering:
+            resumed = et.resume(file, cornell, remembering, spp=3, progress=False)
+        else:
+            resumed = et.resume(file, cornell, make(), spp=3, progress=False)
+        np.testing.assert_array_equal(resumed.image, whole.image)
+    assert remembering.samples >= 3 * 32 * 24
+
+
+def test_integrators_in_python_are_refused_where_they_are_others(cornell: et.Scene, tmp_path: Path) -> None:
+    file = tmp_path / "a.etd"
+    et.render(cornell, Hits(), spp=1, progress=False).save(file)
+    for other in (Hits(2), Remembering(), "path"):
+        with pytest.raises(RuntimeError, match="Hits in Python, .* there, but .* here"):
+            et.resume(file, cornell, other, spp=2, progress=False)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="expected integrator"):
+        et.resume(file, cornell, spp=2)
+    with pytest.raises(RuntimeError, match=r"Counting cannot be saved: rendering has changed samples"):
+        et.render(cornell, Counting(), spp=1, progress=False).save(file)
+    parts = [et.render(cornell, Hits(), spp=1, seed=s, progress=False) for s in range(2)]
+    assert et.merge(parts).passes == 2
+    with pytest.raises(RuntimeError, match="cannot be merged"):
+        et.merge([parts[0], et.render(cornell, Hits(2), spp=1, seed=1, progress=False)])
