@@ -51,6 +51,20 @@ float triangle_slack(Vec3 e1, Vec3 e2) {
                                std::fabs(e2.y), std::fabs(e2.z)});
 }
 
+/// A ray in the space of a shape.
+struct LocalRay {
+    double o[3], d[3];
+};
+LocalRay local_ray(const Transform& to_local, Vec3 o, Vec3 d) {
+    const Transform::Matrix& m = to_local.matrix();
+    LocalRay r;
+    for (int i = 0; i < 3; ++i) {
+        r.o[i] = m[i][0] * o.x + m[i][1] * o.y + m[i][2] * o.z + m[i][3];
+        r.d[i] = m[i][0] * d.x + m[i][1] * d.y + m[i][2] * d.z;
+    }
+    return r;
+}
+
 /// a + u (b - a) + v (c - a), rounded once.
 float interpolate(float a, float b, float c, double u, double v) {
     return float(a + u * (double(b) - a) + v * (double(c) - a));
@@ -253,12 +267,7 @@ ShapeSample Disk::sample(uint32_t, Vec2 u) const {
 }
 
 bool Disk::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
-    const Transform::Matrix& m = to_local_.matrix();
-    double lo[3], ld[3];
-    for (int i = 0; i < 3; ++i) {
-        lo[i] = m[i][0] * o.x + m[i][1] * o.y + m[i][2] * o.z + m[i][3];
-        ld[i] = m[i][0] * d.x + m[i][1] * d.y + m[i][2] * d.z;
-    }
+    const auto [lo, ld] = local_ray(to_local_, o, d);
     if (ld[2] == 0) return false;
     const double t = -lo[2] / ld[2];
     if (!(t > tmin && t < tmax)) return false;
@@ -325,12 +334,7 @@ ShapeSample Cylinder::sample(uint32_t, Vec2 u) const {
 }
 
 bool Cylinder::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
-    const Transform::Matrix& m = to_local_.matrix();
-    double lo[3], ld[3];
-    for (int i = 0; i < 3; ++i) {
-        lo[i] = m[i][0] * o.x + m[i][1] * o.y + m[i][2] * o.z + m[i][3];
-        ld[i] = m[i][0] * d.x + m[i][1] * d.y + m[i][2] * d.z;
-    }
+    const auto [lo, ld] = local_ray(to_local_, o, d);
     const double a = ld[0] * ld[0] + ld[1] * ld[1];
     const double b = lo[0] * ld[0] + lo[1] * ld[1];
     const double c = lo[0] * lo[0] + lo[1] * lo[1] - 1;

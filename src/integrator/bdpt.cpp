@@ -77,8 +77,7 @@ public:
     bool samples_alone() const override { return !uses_cache_ && !paths_.guiding().is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        std::vector<std::pair<std::string, double>> figures;
-        paths_.guiding().add_figures(figures);
+        std::vector<std::pair<std::string, double>> figures = paths_.guiding().figures();
         if (!uses_cache_) return figures;
         figures.push_back({"cache_draws", draws_});
         figures.push_back({"cached_vertices", connectible_.size()});

@@ -472,6 +472,12 @@ void Guiding::load(LearnedState& from) {
     if (guide_) guide_->load(from);
 }
 
+std::vector<std::pair<std::string, double>> Guiding::figures() const {
+    std::vector<std::pair<std::string, double>> figures;
+    add_figures(figures);
+    return figures;
+}
+
 void Guiding::add_figures(std::vector<std::pair<std::string, double>>& figures) const {
     if (mode_ == Mode::Off) return;
     figures.push_back({"guided", guide_ ? 1 : 0});

@@ -31,6 +31,7 @@ public:
     void save(LearnedState& to) const;
     void load(LearnedState& from);
     /// See Integrator::figures().
+    std::vector<std::pair<std::string, double>> figures() const;
     void add_figures(std::vector<std::pair<std::string, double>>& figures) const;
 
 private:

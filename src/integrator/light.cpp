@@ -51,9 +51,7 @@ public:
     }
     uint64_t light_paths(const Scene& scene) const override { return scene.film().pixel_count(); }
     std::vector<std::pair<std::string, double>> figures() const override {
-        std::vector<std::pair<std::string, double>> figures;
-        guiding_.add_figures(figures);
-        return figures;
+        return guiding_.figures();
     }
     bool samples_alone() const override { return !guiding_.is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }

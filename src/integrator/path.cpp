@@ -41,9 +41,7 @@ public:
     }
     uint64_t light_paths(const Scene&) const override { return 0; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        std::vector<std::pair<std::string, double>> figures;
-        guiding_.add_figures(figures);
-        return figures;
+        return guiding_.figures();
     }
     bool samples_alone() const override { return !guiding_.is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }

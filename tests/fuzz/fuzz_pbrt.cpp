@@ -1,24 +1,13 @@
-// Any bytes as a pbrt scene: a description or a SceneError, nothing else, and no file is accessed. The included files are
-// the text itself and a spectrum, so that these directives are reached, too.
+// Any bytes as a pbrt scene.
 
-#include "fuzz_target.h"
+#include "fuzz_scene_text.h"
 #include "readers/pbrt.h"
 
 namespace etendue::fuzz {
 namespace {
 
 void run(std::string_view text) {
-    ReadOptions options;
-    options.lenient = text.size() % 2 == 1;
-    options.read_file = [text](const std::string& path) -> std::optional<std::string> {
-        if (path.ends_with(".spd")) return "400 1\n700 2\n";
-        if (path.ends_with(".pbrt")) return std::string(text);
-        return {};
-    };
-    try {
-        dump(parse_pbrt(text, "fuzz.pbrt", options));
-    } catch (const SceneError&) {
-    }
+    run_scene_text(text, ".pbrt", parse_pbrt);
 }
 
 const Register

@@ -217,6 +217,23 @@ TEST_P(Reciprocal, IsThatOfTheWalk) {
     RecordProperty("trials_per_pair", std::to_string(double(stats.trials) / (kWalks / 8 * n)));
 }
 
+/// Two grey planes, z = 0 and z = 2, that face each other.
+std::string floor_and_ceiling() {
+    return test::front_camera(8) + test::area_lamp() +
+           test::rectangle(
+               "<scale value=\"4\"/><rotate x=\"1\" angle=\"180\"/><translate z=\"2\"/>",
+               test::diffuse("0.5,0.5,0.5")) +
+           test::rectangle("<scale value=\"4\"/>", test::diffuse("0.5,0.5,0.5"));
+}
+/// The origin, which a walk reaches from `wo`.
+Vertex on_floor(const Scene& scene, Vec3 wo, ComponentArena& arena) {
+    SurfaceHit hit;
+    EXPECT_TRUE(scene.intersect({{0, 0, 0.5f}, {0, 0, -1}, kInf}, 0, hit));
+    Vertex floor;
+    floor.set_surface(*hit.shape, hit.location, hit.geometry, wo, arena);
+    return floor;
+}
+
 /// Only a strip of 2w × 2d of the neighbourhood is seen through a slit of width w half way: about one trial of a
 /// hundred hits, and a cap on their number shows. p_c = ∫ cos²θ / (π |v|²) = ∫ H² / (π |v|⁴) over the strip.
 TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
@@ -226,16 +243,10 @@ TEST(ReciprocalThroughASlit, EqualsTheIntegral) {
                                    "\" z=\"1\"/>",
                                test::diffuse("0,0,0"));
     };
-    const Scene scene = test::build(
-        test::front_camera(8) + test::area_lamp() + plate("2.0008") + plate("-2.0008") +
-        test::rectangle("<scale value=\"4\"/><rotate x=\"1\" angle=\"180\"/><translate z=\"2\"/>",
-                        test::diffuse("0.5,0.5,0.5")) +
-        test::rectangle("<scale value=\"4\"/>", test::diffuse("0.5,0.5,0.5")));
-    SurfaceHit hit;
-    ASSERT_TRUE(scene.intersect({{0, 0, 0.5f}, {0, 0, -1}, kInf}, 0, hit));
+    const Scene scene = test::build(floor_and_ceiling() + plate("2.0008") + plate("-2.0008"));
     ComponentArena arena;
-    Vertex floor, scratch;
-    floor.set_surface(*hit.shape, hit.location, hit.geometry, {0, 0, 1}, arena);
+    Vertex scratch;
+    const Vertex floor = on_floor(scene, {0, 0, 1}, arena);
 
     double p_c = 0;
     constexpr int kSteps = 4000;
@@ -282,16 +293,9 @@ RenderStats expect_reciprocal(const Scene& scene, const PairEvent& event, double
 
 /// Where the guide is for walks in the other mode alone, a cosine density keeps its proposals in closed form.
 TEST(ReciprocalOfAWalkWithoutGuide, IsThatWithoutGuide) {
-    const Scene scene = test::build(
-        test::front_camera(8) + test::area_lamp() +
-        test::rectangle("<scale value=\"4\"/><rotate x=\"1\" angle=\"180\"/><translate z=\"2\"/>",
-                        test::diffuse("0.5,0.5,0.5")) +
-        test::rectangle("<scale value=\"4\"/>", test::diffuse("0.5,0.5,0.5")));
-    SurfaceHit hit;
-    ASSERT_TRUE(scene.intersect({{0, 0, 0.5f}, {0, 0, -1}, kInf}, 0, hit));
+    const Scene scene = test::build(floor_and_ceiling());
     ComponentArena arena;
-    Vertex floor;
-    floor.set_surface(*hit.shape, hit.location, hit.geometry, normalize(Vec3{0.2f, 0, 1}), arena);
+    Vertex floor = on_floor(scene, normalize(Vec3{0.2f, 0, 1}), arena);
     GuideCell cell;
     auto& field = cell.fields[size_t(TransportMode::Importance)];
     field.share.fill(0.9f);
