@@ -96,7 +96,7 @@ NextEventDraws Bidirectional::add_next_events(const SampleContext& c, const Tech
                                               int t, Workspace& work) const {
     NextEventDraws draws;
     if (counts.next_event == 0) return draws;
-    draws.count = work.z[t - 1].sees_lens ? uint32_t(counts.repeated_next_event) : 1;
+    draws.count = work.z[t - 1].is_fixed_by_film ? uint32_t(counts.repeated_next_event) : 1;
     for (uint32_t i = 0; i < draws.count; ++i) {
         const auto join = join_next_event(c.scene, work.z, t, c.sampler, counts, i);
         const auto value = add(c, join, work, 1 / float(draws.count), i);

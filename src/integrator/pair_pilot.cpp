@@ -13,14 +13,14 @@ namespace {
 struct Place {
     Vec3 p, ng;
     ArrivalSide side;
-    int index;       ///< i of the vertex.
-    bool sees_lens;  ///< See Vertex; of eye vertices.
+    int index;              ///< i of the vertex.
+    bool is_fixed_by_film;  ///< See Vertex; of eye vertices.
 };
 
 void append_connectible(const SubPath& path, std::vector<Place>& to) {
     for (int i = 1; i < path.size(); ++i)
         if (const Vertex& v = path[i]; v.is_connectible && v.kind == Vertex::Kind::Surface)
-            to.push_back({v.p, v.ng, arrival_side(v), i, v.sees_lens});
+            to.push_back({v.p, v.ng, arrival_side(v), i, v.is_fixed_by_film});
 }
 
 /// Of the walks of a block, in order.
@@ -65,7 +65,7 @@ PairPilot run_pair_pilot(const PassContext& pass, const Bidirectional& paths,
             grid.for_each_near(z.p, radius, [&](const PointGrid::Entry& e) {
                 const Place& y = light[e.index];
                 if (counts.gathers(y.index + z.index) > 0 && near.contains(y.p, y.side))
-                    ++blocks[b].pairs[z.sees_lens];
+                    ++blocks[b].pairs[z.is_fixed_by_film];
             });
         }
     });

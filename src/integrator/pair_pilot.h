@@ -10,7 +10,7 @@ namespace etendue {
 struct PairPilot {
     CellCounts vertices;  ///< Connectible vertices of the light walks.
     double multiple;      ///< Number of light paths in a pass, divided by that of these walks.
-    /// Mean numbers of gathers of an eye path in a pass, by Vertex::sees_lens, divided by the square of their radius.
+    /// Mean numbers of gathers of an eye path in a pass, by Vertex::is_fixed_by_film, divided by the square of their radius.
     std::array<double, 2> pairs_per_radius2;
 };
 

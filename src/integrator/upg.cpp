@@ -39,14 +39,10 @@ public:
         : paths_(p, Guiding(p)), given_radius_(p.number("radius")), connects_(connects), light_(p),
           bound_(p.choice("bound", kBounds)),
           flatness_(bound_ == TrialBound::Slab ? kGatherConstants.flatness : 1.0f),
-          rule_(p.choice("drop", kRules)), short_rate_(p.number("short_rate")),
-          clamps_(p.flag("clamp")) {
+          rule_(p.choice("drop", kRules)), clamps_(p.flag("clamp")) {
         if (!(given_radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));
-        if (!(short_rate_ >= 0 && short_rate_ <= 1))
-            throw std::runtime_error(
-                fmt::format("{}: short_rate must lie in [0, 1]", p.integrator()));
     }
 
     void learn(const LearnContext& pass) override {
@@ -127,7 +123,6 @@ public:
         n.pairs = {.disc = kPi * sqr(learned_.radius.of(true)),
                    .inner_disc = kPi * sqr(learned_.radius.of(false)),
                    .min_edges = 3,
-                   .short_rate = short_rate_,
                    .rule = rule_,
                    .clamps = clamps_};
         n.guide = paths_.guiding().guide();
@@ -163,7 +158,7 @@ private:
         search.observe(pair, join);
         if (!join) return;
         const auto value = paths_.test(
-            c, *join, search.scale() / (pair.rate * join->pair_probability), pair.number, work);
+            c, *join, search.scale() / (pair.survival * join->pair_probability), pair.number, work);
         if (!value) return;
         ++work.stats.visible_pairs;
         PairEvent event = pair.event(work.pair, work.z);
@@ -177,14 +172,14 @@ private:
                 double(luminance(*value)) / double(luminance(join->contribution) * pair.survival);
             observe(c, pair, *join, work.stats.trials - trials, r, seen, search, work);
         }
-        c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.rate));
+        c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.survival));
     }
 
     /// Records the next events of z_{t-1} for later passes.
     static void observe(const SampleContext& c, int t, const NextEventDraws& draws,
                         Workspace& work) {
         const float pixel = c.expected_of_pixel();
-        if (work.z[t - 1].sees_lens && pixel > 0)
+        if (work.z[t - 1].is_fixed_by_film && pixel > 0)
             NextEventCount::observe(draws.span(), double(std::fabs(work.z.film_weight) / pixel),
                                     GatherSums::of(work));
     }
@@ -194,16 +189,16 @@ private:
     void observe(const SampleContext& c, const GatherPair& pair, const Join& join, uint64_t trials,
                  double r, double seen, const GatherSearch& search, Workspace& work) const {
         GatherSums& sums = GatherSums::of(work);
-        const bool sees_lens = work.z[pair.technique.t - 1].sees_lens;
+        const bool is_fixed_by_film = work.z[pair.technique.t - 1].is_fixed_by_film;
         const double x = double(pair.unlimited_survival);
-        if (sees_lens) GatherRadius::observe_trials(trials, x, sums);
+        if (is_fixed_by_film) GatherRadius::observe_trials(trials, x, sums);
         const float pixel = c.expected.at(work.z.film);
         if (!(pixel > 0)) return;
         const double weight_scale = double(learned_.weight_scale.value());
         const GatherMoment moment = GatherMoment::of(
             double(luminance(join.contribution) * search.scale() / pixel), double(join.mis_weight),
             weight_scale, double(join.pair_probability), r, seen);
-        if (sees_lens) GatherRadius::observe(moment, x, weight_scale, sums);
+        if (is_fixed_by_film) GatherRadius::observe(moment, x, weight_scale, sums);
         GatherWeightScale::observe(moment, sums);
     }
 
@@ -227,7 +222,6 @@ private:
     TrialBound bound_;
     float flatness_;  ///< Half the height of a neighbourhood, divided by its radius.
     PairRule rule_;
-    float short_rate_;
     bool clamps_;
 
     struct Learned {
@@ -264,9 +258,6 @@ std::vector<ParamInfo> upg_params() {
     params.push_back({"drop", ParamKind::String, "gloss",
                       "Vertex of a pair that is dropped: gloss (the one sampled from the less "
                       "glossy vertex), eye, light, or both (one path for each).",
-                      true});
-    params.push_back({"short_rate", ParamKind::Float, "1",
-                      "Fraction, in [0, 1], of the pairs that are used for paths of three edges.",
                       true});
     params.push_back({"clamp", ParamKind::Bool, "true",
                       "Whether the weights limit the probability of a pair to 1.", true});

@@ -255,7 +255,6 @@ public:
         n.pairs = {.disc = kPi * sqr(radius_),
                    .inner_disc = kPi * sqr(radius_),
                    .min_edges = kShortest,
-                   .short_rate = 1,
                    .rule = PairRule::Gloss,
                    .clamps = true};
         return n;

@@ -117,9 +117,7 @@ public:
         return light_.count(scene, paths_.depth(), paths_.vertex_bytes(kVertexBytes));
     }
     std::vector<std::pair<std::string, double>> figures() const override {
-        std::vector<std::pair<std::string, double>> figures;
-        paths_.guiding().add_figures(figures);
-        return figures;
+        return paths_.guiding().figures();
     }
     Estimator estimator() const override {
         return !merges_                   ? Estimator::Unbiased
@@ -145,7 +143,7 @@ private:
             if (y.s + t - 2 > paths_.max_depth() || !side.admits(y.side)) return {};
             return Chosen{};
         };
-        const float radius = z.sees_lens ? radius_ : kInnerRadius * radius_;
+        const float radius = z.is_fixed_by_film ? radius_ : kInnerRadius * radius_;
         grid_.for_each_in({z.p, reach() * radius}, choose, [&](const GatherCandidate& y, Chosen) {
             cache_.restore_first(c.scene, y.vertex, y.s, work.is_observed, work.pair, false);
             const auto join = join_merge(work.pair, y.s, work.z, t, n);
@@ -178,11 +176,11 @@ private:
             const PairEvent event = pair.event(work.pair, work.z);
             // Its reciprocal could overflow, where the quotient below does not.
             const float probability = event.from.survival.value() * join->pair_probability;
-            const auto value = paths_.test(c, *join, search.scale() / (probability * pair.rate),
+            const auto value = paths_.test(c, *join, search.scale() / (probability * pair.survival),
                                            pair.number, work);
             if (!value) return;
             ++work.stats.visible_pairs;
-            c.sink.add(*join, *value / Rgb(probability) * (c.splat_scale / pair.rate));
+            c.sink.add(*join, *value / Rgb(probability) * (c.splat_scale / pair.survival));
         });
     }
 

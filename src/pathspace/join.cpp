@@ -38,8 +38,8 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
                            : 0.0;
     double others = 0;
     if (const Vertex& prev = z[last - 1]; last >= 2 && !prev.is_delta)
-        others += sqr(counts.next_events(prev.sees_lens) * p_NE) +
-                  sqr(counts.connect_emission * counts.reaching(prev.sees_lens) * p_L);
+        others += sqr(counts.next_events(prev.is_fixed_by_film) * p_NE) +
+                  sqr(counts.connect_emission * counts.reaching(prev.is_fixed_by_film) * p_L);
     if (counts.uses_light_paths()) {
         const double rev_prev =
             v.is_infinite
@@ -47,14 +47,15 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
                 : emission_pdf(counts.guide, emitter, v.p, v.ng, v.wo, e.pdf_d) * v.to_predecessor;
         double inner = squares_at<Side::Eye>(z, last - 1, z[last - 1].is_delta, rev_prev,
                                              gloss_of_emitter(emitter.is_area()), last, counts) +
-                       sum_below<Side::Eye>(z, last, last, counts);
+                       z[last].weight_sum;
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
         others += sqr(p_L) * inner;
     }
     return Join{.technique = connection_technique(0, t),
                 .emitter = &emitter,
                 .contribution = v.beta * e.Le,
-                .mis_weight = power_heuristic(counts.hit * counts.reaching(v.sees_lens), others),
+                .mis_weight =
+                    power_heuristic(counts.hit * counts.reaching(v.is_fixed_by_film), others),
                 .film = z.film,
                 .needs_test = false};
 }
@@ -95,7 +96,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
         const double p_L = double(emission_pmf(counts.guide, emitter)) *
                            origin_pdf(counts.guide, emitter, d.p, d.pdf_y0);
         others += sqr(p_L / p_NE) *
-                  (sqr(double(counts.connect_emission * counts.reaching(v.sees_lens))) +
+                  (sqr(double(counts.connect_emission * counts.reaching(v.is_fixed_by_film))) +
                    outward_sum<Side::Eye>(
                        z, last, false, {rev_last, rev_prev, gloss_of_emitter(emitter.is_area()), t},
                        counts));
@@ -103,7 +104,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     return Join{.technique = {Strategy::NextEvent, 1, t},
                 .emitter = &emitter,
                 .contribution = C,
-                .mis_weight = power_heuristic(counts.next_events(v.sees_lens), others),
+                .mis_weight = power_heuristic(counts.next_events(v.is_fixed_by_film), others),
                 .film = z.film,
                 .a = v.ray_end(),
                 .b = x0,
@@ -139,8 +140,8 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     if (fa.f.is_zero()) return {};
     const double squares = s == 1
                                ? emission_squares(double(next_event_ratio(a, edge.w, counts.guide)),
-                                                  b.sees_lens, counts)
-                               : sqr(double(counts.connect * counts.reaching(b.sees_lens)));
+                                                  b.is_fixed_by_film, counts)
+                               : sqr(double(counts.connect * counts.reaching(b.is_fixed_by_film)));
     edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
     if (scene.has_media()) edge.contribution *= edge_attenuation(scene, a, b, edge.w);
 
@@ -180,8 +181,8 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
     if (!edge) return {};
     const Technique technique{Strategy::Connect, s, t};
     const Vertex &a = y[s - 1], &b = z[t - 1];
-    return joined(*edge, technique, double(counts.of(technique) * counts.reaching(b.sees_lens)), y,
-                  a, z, b);
+    return joined(*edge, technique,
+                  double(counts.of(technique) * counts.reaching(b.is_fixed_by_film)), y, a, z, b);
 }
 
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
@@ -191,10 +192,10 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     if (!edge) return {};
     const Vertex &a = y[drops_eye ? s - 1 : s - 2], &b = z[drops_eye ? t - 2 : t - 1];
     const Vertex& x_m = drops_eye ? y[s - 1] : z[t - 1];
-    const bool sees_lens = z[t - 1].sees_lens;
+    const bool is_fixed_by_film = z[t - 1].is_fixed_by_film;
     const double probability =
-        counts.pairs.probability(drops_eye ? edge->rev_a : edge->rev_b, sees_lens);
-    const double count = counts.weighed_gathers(x_m.pair_level, sees_lens, s + t - 2);
+        counts.pairs.probability(drops_eye ? edge->rev_a : edge->rev_b, is_fixed_by_film);
+    const double count = counts.weighed_gathers(x_m.pair_level, is_fixed_by_film, s + t - 2);
     Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * probability, y, a, z, b);
     join.pair_probability = float(probability);
     // A density that is too small for a float belongs to a contribution that is zero, too.
@@ -222,15 +223,15 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
     // Relative to the split after x_m, which has p_L(x_m) but not p_E(x_m).
     const double total =
         split_squares<Side::Eye>(z, t - 1, false, 0, counts) +
-        outward_sum<Side::Light>(
-            y, s - 1, false,
-            {b.pdf_fwd, f.pdf * a.to_predecessor, b.sees_lens ? kLensGloss : uint8_t(0), edges},
-            counts) +
+        outward_sum<Side::Light>(y, s - 1, false,
+                                 {b.pdf_fwd, f.pdf * a.to_predecessor,
+                                  b.is_fixed_by_film ? kLensGloss : uint8_t(0), edges},
+                                 counts) +
         sqr(f.pdf_rev * b.to_predecessor / z[t - 2].pdf_fwd) *
             (squares_at<Side::Eye>(z, t - 2, z[t - 2].is_delta, 0, 0, edges, counts) +
              b.weight_sum);
-    const double np = counts.merge_area(a.pair_level, b.sees_lens) * double(b.pdf_fwd);
-    const float disc = counts.pairs.disc_of(b.sees_lens);
+    const double np = counts.merge_area(a.pair_level, b.is_fixed_by_film) * double(b.pdf_fwd);
+    const float disc = counts.pairs.disc_of(b.is_fixed_by_film);
     return Join{.technique = {Strategy::Merge, s, t},
                 .emitter = y[0].emitter,
                 .contribution = density_estimate(a.beta, a.wo, f, b, disc),

@@ -27,10 +27,11 @@ inline uint8_t gloss(const Vertex& v, bool is_delta) {
     return is_delta ? kDeltaGloss : v.gloss;
 }
 
-/// Σ c² of the techniques C(1,t), relative to p_L(y_0); `sees_lens`: of z_{t-1}.
-inline double emission_squares(double next_event_ratio, bool sees_lens, const TechniqueCounts& n) {
-    return sqr(n.next_events(sees_lens) * next_event_ratio) +
-           sqr(double(n.connect_emission * n.reaching(sees_lens)));
+/// Σ c² of the techniques C(1,t), relative to p_L(y_0); `is_fixed_by_film`: of z_{t-1}.
+inline double emission_squares(double next_event_ratio, bool is_fixed_by_film,
+                               const TechniqueCounts& n) {
+    return sqr(n.next_events(is_fixed_by_film) * next_event_ratio) +
+           sqr(double(n.connect_emission * n.reaching(is_fixed_by_film)));
 }
 
 /// Σ c_i² of a sub-path over the techniques split between v[i-1] and v[i]: their samples, times the ratio of their own
@@ -50,7 +51,8 @@ inline double split_squares(const SubPath& v, int i, bool delta, uint8_t inward,
         if (i == 0) return sqr(double(n.hit_lens));
         if (delta) return 0;
         if (i == 1) return sqr(double(n.splat));
-        return v[i - 1].is_delta ? 0.0 : sqr(double(n.connect * n.reaching(v[i - 1].sees_lens)));
+        return v[i - 1].is_delta ? 0.0
+                                 : sqr(double(n.connect * n.reaching(v[i - 1].is_fixed_by_film)));
     }
 }
 
@@ -63,19 +65,20 @@ inline double pair_squares(const SubPath& v, int i, double rev, uint8_t inward, 
     if (i == 0 || !v[i].is_connectible || edges < n.pairs.min_edges) return 0;
     const double fwd = v[i].pdf_fwd;
     constexpr bool eye = side == Side::Eye;
-    // A light vertex sees the lens only where it is next to it: no technique splits a path beside a delta event.
-    const bool sees_lens = eye ? v[i].sees_lens : inward == kLensGloss;
+    // The film point fixes a light vertex only next to the lens: no technique splits a path beside a delta event.
+    const bool is_fixed_by_film = eye ? v[i].is_fixed_by_film : inward == kLensGloss;
     if (n.merge > 0) {
         if ((eye ? edges - i : i) < n.pairs.first_merge) return 0;
-        return sqr(n.merge_area(v[i].pair_level, sees_lens) * fwd);
+        return sqr(n.merge_area(v[i].pair_level, is_fixed_by_film) * fwd);
     }
     const uint8_t outward = gloss(v[i - 1], v[i - 1].is_delta);
     const uint8_t before = eye ? inward : outward, after = eye ? outward : inward;
     double sum = 0;
-    if (drops(n.pairs.rule, eye, before, after)) sum += sqr(n.pairs.probability(fwd, sees_lens));
+    if (drops(n.pairs.rule, eye, before, after))
+        sum += sqr(n.pairs.probability(fwd, is_fixed_by_film));
     if (rev > 0 && drops(n.pairs.rule, !eye, before, after))
-        sum += sqr(n.pairs.probability(rev, sees_lens) * (fwd / rev));
-    return sum > 0 ? sum * sqr(n.weighed_gathers(v[i].pair_level, sees_lens, edges)) : 0;
+        sum += sqr(n.pairs.probability(rev, is_fixed_by_film) * (fwd / rev));
+    return sum > 0 ? sum * sqr(n.weighed_gathers(v[i].pair_level, is_fixed_by_film, edges)) : 0;
 }
 
 /// b_i of a sub-path. `delta`, `rev`, `inward` as above; `edges`: length of the path, or any larger number.
@@ -111,19 +114,12 @@ inline double outward_sum(const SubPath& v, int last, bool last_is_delta, const 
 
 /// The sum from level i on, stored at v[i+2] as soon as v[i].pdf_rev is known; `below` is that of level i-1.
 template <Side side>
-inline double level_sum(const SubPath& v, int i, double below, const TechniqueCounts& n,
-                        int edges = 1 << 30) {
+inline double level_sum(const SubPath& v, int i, double below, const TechniqueCounts& n) {
+    constexpr int edges = 1 << 30;  // Paths with a vertex beyond v[i+1] have at least three edges.
     const double rev = v[i].pdf_rev;
     const uint8_t inward = gloss(v[i + 1], v[i + 1].is_delta);
     return sqr(rev / v[i].pdf_fwd) *
            (squares_at<side>(v, i, v[i].is_delta, rev, inward, edges, n) + below);
-}
-/// v[last].weight_sum for a path of `edges` edges. The stored sum is that of paths of more than three edges; three
-/// edges are the only length with its own rate of gathers (PairModel::short_rate).
-template <Side side>
-inline double sum_below(const SubPath& v, int last, int edges, const TechniqueCounts& n) {
-    if (edges != 3 || last != 3 || n.pairs.short_rate == 1) return v[last].weight_sum;
-    return level_sum<side>(v, 1, v[2].weight_sum, n, edges);
 }
 
 /// Power heuristic of a technique with `count` samples against the sum of the others' (n·p)², relative to its p.

@@ -32,9 +32,10 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     const int k = vertices() - 1, m = q.s - 1;
     const double n = counts.of(q);
     if (!(n > 0)) return 0;
-    if (q.strategy == Strategy::NextEvent) return counts.next_events(sees_lens[1]) * density(q);
+    if (q.strategy == Strategy::NextEvent)
+        return counts.next_events(is_fixed_by_film[1]) * density(q);
     if (!is_pair(q.strategy))
-        return n * density(q) * (q.t >= 2 ? counts.reaching(sees_lens[size_t(q.s)]) : 1);
+        return n * density(q) * (q.t >= 2 ? counts.reaching(is_fixed_by_film[size_t(q.s)]) : 1);
     if (m < 1 || m >= k || k < counts.pairs.min_edges || is_delta[m]) return 0;
     double others = 1;  // of all vertices but x_m
     for (int i = 0; i < m; ++i) others *= light[i];
@@ -42,11 +43,12 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
     if (q.strategy == Strategy::Merge)
         return m < counts.pairs.first_merge
                    ? 0
-                   : counts.merge_area(pair_level[m], sees_lens[m]) * others * light[m] * eye[m];
+                   : counts.merge_area(pair_level[m], is_fixed_by_film[m]) * others * light[m] *
+                         eye[m];
     if (!drops(counts.pairs.rule, q.drops_eye, gloss[m - 1], gloss[m + 1])) return 0;
     const double kept = q.drops_eye ? light[m] : eye[m], dropped = q.drops_eye ? eye[m] : light[m];
-    return counts.weighed_gathers(pair_level[m], sees_lens[m], k) * others * kept *
-           counts.pairs.probability(dropped, sees_lens[m]);
+    return counts.weighed_gathers(pair_level[m], is_fixed_by_film[m], k) * others * kept *
+           counts.pairs.probability(dropped, is_fixed_by_film[m]);
 }
 
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {
@@ -103,10 +105,10 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.eye.assign(size_t(n), 1);
     p.is_delta = delta;
     for (int i = 0; i < n; ++i) p.pair_level.push_back(x[size_t(i)]->pair_level);
-    p.sees_lens.assign(size_t(n), false);
+    p.is_fixed_by_film.assign(size_t(n), false);
     for (int i = k - 1; i >= 0; --i)
-        p.sees_lens[i] = i == k - 1 || (p.sees_lens[i + 1] && delta[size_t(i) + 1] &&
-                                        !scene.sensor().has_finite_lens());
+        p.is_fixed_by_film[i] = i == k - 1 || (p.is_fixed_by_film[i + 1] && delta[size_t(i) + 1] &&
+                                               !scene.sensor().has_finite_lens());
     for (int i = 0; i < n; ++i)
         p.gloss.push_back(i == 0 ? gloss_of_emitter(x[0]->emitter->is_area())
                                  : gloss(*x[i], delta[size_t(i)]));

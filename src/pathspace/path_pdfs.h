@@ -14,11 +14,11 @@ namespace etendue {
 /// Densities of every vertex of a full path x_0 (emitter) … x_k (lens), from either side, in the conventions of Vertex.
 struct PathPdfs {
     std::vector<double> light, eye;
-    std::vector<bool> is_delta;       ///< Whether the path scatters by a delta event.
-    std::vector<uint8_t> gloss;       ///< See gloss.h.
-    std::vector<uint8_t> pair_level;  ///< See Vertex.
-    std::vector<bool> sees_lens;      ///< See Vertex.
-    double next_event = 0;            ///< p_NE(x_0), sampled from x_1.
+    std::vector<bool> is_delta;          ///< Whether the path scatters by a delta event.
+    std::vector<uint8_t> gloss;          ///< See gloss.h.
+    std::vector<uint8_t> pair_level;     ///< See Vertex.
+    std::vector<bool> is_fixed_by_film;  ///< See Vertex.
+    double next_event = 0;               ///< p_NE(x_0), sampled from x_1.
     bool can_hit_emitter = true;
     bool can_connect_ends =
         true;  ///< False where both ends are at infinity, or x_0 is of a delta emitter.

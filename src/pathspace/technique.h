@@ -75,20 +75,19 @@ struct PathSelection {
 
 /// Pairs of light and eye vertices near each other.
 struct PairModel {
-    /// π d², the area of the disc in which the partners of an eye vertex that sees the lens (Vertex) are searched.
+    /// π d², the area of the disc in which the partners of an eye vertex fixed by the film point (Vertex) are searched.
     float disc = 0;
     float inner_disc = 0;  ///< The same for other eye vertices.
     int min_edges = 2;     ///< Length, in edges, of the shortest paths made from pairs.
     /// Least m of an x_m where vertices are merged. 2: next events make all direct light, with less noise.
     int first_merge = 1;
-    float short_rate = 1;  ///< Share of gathers made for paths of three edges.
     PairRule rule = PairRule::Gloss;
     bool clamps = true;  ///< Whether weights clamp probabilities to 1 [Qin et al. 2015, eq. 24].
 
-    float disc_of(bool sees_lens) const { return sees_lens ? disc : inner_disc; }
+    float disc_of(bool is_fixed_by_film) const { return is_fixed_by_film ? disc : inner_disc; }
     /// Approximate probability of finding a pair whose dropped vertex has the area density `pdf` [ibid., eq. 24].
-    double probability(double pdf, bool sees_lens) const {
-        const double p = double(disc_of(sees_lens)) * pdf;
+    double probability(double pdf, bool is_fixed_by_film) const {
+        const double p = double(disc_of(is_fixed_by_film)) * pdf;
         return clamps && p > 1 ? 1 : p;
     }
 
@@ -109,14 +108,15 @@ uint8_t pair_level_of_share(double share);
 struct TechniqueCounts {
     float hit = 0, next_event = 0, connect = 0, splat = 0, hit_lens = 0;
     float connect_emission = 0;  ///< C(1,t) with y_0 of light paths, Strategy::Connect.
-    /// Next events at an eye vertex that sees the lens (Vertex), for each of `next_event` at another vertex. The vertex
-    /// is not a random choice, so that they count as that many samples.
+    /// Next events at an eye vertex fixed by the film point (Vertex), for each of `next_event` at another vertex. The
+    /// vertex is not a random choice, so that they count as that many samples.
     float repeated_next_event = 1;
     float merge = 0,
           gather = 0;  ///< For each inner vertex of the path; at least one of the two is 0.
     PairModel pairs{};
     /// Probability with which an eye walk continues past the first vertex where it chooses a direction at random, the
-    /// last one that sees the lens (Vertex). The techniques beyond count this share of a sample. 1 where there are gathers.
+    /// last one fixed by the film point (Vertex). The techniques beyond count this share of a sample. 1 where there are
+    /// gathers.
     float continued = 1;
     const Guide* guide = nullptr;  ///< Guide of both walks; nullptr if they have none.
 
@@ -127,25 +127,23 @@ struct TechniqueCounts {
     }
     bool uses_pairs() const { return merge > 0 || gather > 0; }
     /// Number of gathers at each inner vertex of a path of `edges` edges.
-    float gathers(int edges) const {
-        return edges < pairs.min_edges ? 0.0f : edges == 3 ? gather * pairs.short_rate : gather;
-    }
+    float gathers(int edges) const { return edges < pairs.min_edges ? 0.0f : gather; }
     /// Count of gathers in MIS weights at an x_m of this level. All pairs of an eye vertex share its eye path. If x_m sees
     /// the lens (Vertex), this eye path contains no random choice, and the pairs count in full.
-    double weighed_gathers(uint8_t pair_level, bool sees_lens, int edges) const {
-        return double(gathers(edges)) * (sees_lens ? 1 : pair_share(pair_level));
+    double weighed_gathers(uint8_t pair_level, bool is_fixed_by_film, int edges) const {
+        return double(gathers(edges)) * (is_fixed_by_film ? 1 : pair_share(pair_level));
     }
     /// Count of merges in MIS weights at such an x_m, times the area of the disc.
-    double merge_area(uint8_t pair_level, bool sees_lens) const {
-        return sees_lens ? double(merge) * double(pairs.disc)
-                         : double(merge) * pair_share(pair_level) * double(pairs.inner_disc) *
-                               double(continued);
+    double merge_area(uint8_t pair_level, bool is_fixed_by_film) const {
+        return is_fixed_by_film ? double(merge) * double(pairs.disc)
+                                : double(merge) * pair_share(pair_level) *
+                                      double(pairs.inner_disc) * double(continued);
     }
     /// Number of eye sub-paths, of one sample, that reach a vertex.
-    float reaching(bool sees_lens) const { return sees_lens ? 1 : continued; }
+    float reaching(bool is_fixed_by_film) const { return is_fixed_by_film ? 1 : continued; }
     /// Number of next events of one sample that are made for a vertex.
-    float next_events(bool sees_lens) const {
-        return next_event * (sees_lens ? repeated_next_event : continued);
+    float next_events(bool is_fixed_by_film) const {
+        return next_event * (is_fixed_by_film ? repeated_next_event : continued);
     }
     float of(const Technique& q) const {
         switch (q.strategy) {

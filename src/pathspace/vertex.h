@@ -65,7 +65,7 @@ struct Vertex {
     bool is_connectible = false;  ///< Whether it has a smooth lobe or is an end point.
     /// For eye paths: whether the film point determines this vertex. This is the case after delta events alone if the
     /// lens is a point or at infinity. With a finite lens, only z_1 counts as determined.
-    bool sees_lens = false;
+    bool is_fixed_by_film = false;
     MediumId medium = kVacuum;  ///< On the edge to the predecessor.
     Survival survival;          ///< Of Russian roulette before the walk left this vertex.
     uint8_t gloss = 0;          ///< Of the emitter or the material, see gloss.h.
@@ -247,7 +247,7 @@ struct SubPath {
         v.pdf_rev = 0;
         v.weight_sum = 0;
         v.next_event_ratio = 1;
-        v.is_delta = v.is_infinite = v.is_connectible = v.sees_lens = false;
+        v.is_delta = v.is_infinite = v.is_connectible = v.is_fixed_by_film = false;
         v.has_cosine = true;
         v.medium = kVacuum;
         v.survival = {};

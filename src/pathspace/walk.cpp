@@ -60,10 +60,10 @@ std::optional<Survival> survival(const WalkContext& walk, SubPath& path) {
     return Survival(std::min(kMost, adjoint ? *adjoint : throughput_survival(path)));
 }
 
-/// Vertex::sees_lens of the vertex that follows `v`.
-bool next_sees_lens(const Vertex& v, bool is_delta, const Scene& scene) {
+/// Vertex::is_fixed_by_film of the vertex that follows `v`.
+bool next_is_fixed_by_film(const Vertex& v, bool is_delta, const Scene& scene) {
     return v.kind == Vertex::Kind::Sensor ||
-           (v.sees_lens && is_delta && !scene.sensor().has_finite_lens());
+           (v.is_fixed_by_film && is_delta && !scene.sensor().has_finite_lens());
 }
 
 /// Result of tracing a ray.
@@ -100,7 +100,7 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, Tra
     v.beta = beta;
     // hit.t is the distance from the offset origin of the ray; densities need the distance between the vertices.
     const Vertex& previous = path[path.size() - 2];
-    v.sees_lens = next_sees_lens(previous, previous.is_delta, scene);
+    v.is_fixed_by_film = next_is_fixed_by_film(previous, previous.is_delta, scene);
     const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
     v.pdf_fwd = pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
     v.to_predecessor = previous.has_cosine && !previous.is_infinite
@@ -115,7 +115,7 @@ Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, Tra
 void append_escape(const Scene& scene, SubPath& path, Vec3 d, Rgb beta, float pdf) {
     Vertex& v = path.append();
     const Vertex& previous = path[path.size() - 2];
-    v.sees_lens = next_sees_lens(previous, previous.is_delta, scene);
+    v.is_fixed_by_film = next_is_fixed_by_film(previous, previous.is_delta, scene);
     v.kind = Vertex::Kind::Emitter;
     v.is_infinite = true;
     v.p = d;
@@ -291,8 +291,8 @@ std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sa
     const float u_guide = v.guide ? sampler.next_1d() : 0.0f;
     const auto s = v.sample(u_lobe, u_direction, u_guide, mode);
     const float continued = walk.counts.continued;
-    if (mode == TransportMode::Radiance && continued < 1 && s && v.sees_lens &&
-        !next_sees_lens(v, s->is_delta, walk.scene)) {
+    if (mode == TransportMode::Radiance && continued < 1 && s && v.is_fixed_by_film &&
+        !next_is_fixed_by_film(v, s->is_delta, walk.scene)) {
         const Survival both(v.survival.value() * continued);
         if (!(sampler.next_1d() * v.survival.value() < both.value())) return {};
         v.survival = both;

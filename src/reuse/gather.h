@@ -19,7 +19,6 @@ struct GatherPair {
     float survival;      ///< Probability of surviving all roulette so far.
     /// Ratio of its estimated worth to the threshold of roulette; a pair above 1 always survives.
     float unlimited_survival;
-    float rate;  ///< `survival` times the share of gathers that are made (PairModel::short_rate).
 
     /// The event from which the dropped vertex was sampled, on the walks y and z.
     PairEvent event(const SubPath& y, const SubPath& z) const {
@@ -33,7 +32,7 @@ struct GatherSearch {
     const SampleContext& c;
     const TechniqueCounts& n;
     const LightVertexCache& cache;
-    /// For eye vertices that see the lens (Vertex), and for others. Their radii are those of `n`.
+    /// For eye vertices fixed by the film point (Vertex), and for others. Their radii are those of `n`.
     const LightVertexGrid &seen_grid, &inner_grid;
     const PairDensity& density;  ///< For the radius of `inner_grid`.
     const GatherRoulette& roulette;
@@ -59,11 +58,11 @@ struct GatherSearch {
         const Neighbourhood near_eye = near(z, arrival_side(z), grid.radius());
 
         struct Choice {
-            float estimate, survival, unlimited_survival, rate;
+            float estimate, survival, unlimited_survival;
             bool drops_eye, drops_light;
         };
         GatherSums& sums = GatherSums::of(work);
-        uint64_t& candidates = z.sees_lens ? sums.candidates : sums.inner_candidates;
+        uint64_t& candidates = z.is_fixed_by_film ? sums.candidates : sums.inner_candidates;
         std::optional<SystematicSampling> selection;
         const auto is_selected = [&](float q) {
             if (!(q < 1)) return true;
@@ -84,15 +83,13 @@ struct GatherSearch {
                 drops(n.pairs.rule, false, y.gloss_before, after) && near_eye.contains(y.p, y.side);
             if (!choice.drops_eye && !choice.drops_light) return {};
             ++work.stats.pairs;
-            sums.expected_pairs[z.sees_lens] +=
+            sums.expected_pairs[z.is_fixed_by_film] +=
                 uint64_t(std::lround(256 / std::max(search_survival, 1e-6f)));
             choice.estimate = reflected * y.flux;
-            const float share = n.gathers(edges) / n.gather;
             const float worth = roulette.of(y.s, t) * choice.estimate;
             choice.unlimited_survival = threshold > 0 ? worth / threshold : kInf;
-            choice.rate = std::min(share * join_survival(worth, threshold), search_survival);
-            choice.survival = choice.rate / share;
-            if (!is_selected(choice.rate / search_survival)) return {};
+            choice.survival = std::min(join_survival(worth, threshold), search_survival);
+            if (!is_selected(choice.survival / search_survival)) return {};
             return choice;
         };
         // The neighbourhood of z_{t-1}, or else the ball that holds all those that contain it.
@@ -111,8 +108,7 @@ struct GatherSearch {
                                .number = pair_number(y.vertex, t, eye ? kDropsEye : kDropsLight),
                                .estimate = choice.estimate,
                                .survival = choice.survival,
-                               .unlimited_survival = choice.unlimited_survival,
-                               .rate = choice.rate});
+                               .unlimited_survival = choice.unlimited_survival});
             }
         });
     }
@@ -136,7 +132,7 @@ private:
     /// Whether the pairs of z_{t-1} can only drop the light vertex: next to the lens and to delta events, see drops().
     bool keeps_eye(int t) const { return gloss_after(t) >= kDeltaGloss; }
     const LightVertexGrid& grid_of(const Vertex& z) const {
-        return z.sees_lens ? seen_grid : inner_grid;
+        return z.is_fixed_by_film ? seen_grid : inner_grid;
     }
     enum Use : uint64_t { kDropsEye, kDropsLight, kLook, kSearch };
     /// Distinct for distinct arguments with t < 2^22, and from join_number().
@@ -158,7 +154,7 @@ private:
         const Vertex& z = work.z[t - 1];
         const float roughness = 1 - float(z.gloss) / kSharpestGloss;
         const float highlight = std::max(1.0f, 0.25f / sqr(roughness));
-        const float disc = n.pairs.disc_of(z.sees_lens);
+        const float disc = n.pairs.disc_of(z.is_fixed_by_film);
         const float clamped = keeps_eye(t) ? 1 : std::max(1.0f, disc * z.pdf_fwd);
         return highlight * clamped * luminance(z.beta) * std::fabs(work.z.film_weight) *
                c.splat_scale / (kPi * disc);

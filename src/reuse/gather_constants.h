@@ -11,7 +11,7 @@ struct GatherConstants {
     /// Default radius of the first passes: the number of pairs that an eye path should find, and the upper limit relative
     /// to the radius of the scene's bounds.
     double pairs = 8;
-    /// Number of pairs that an eye path should find at vertices that do not see the lens (Vertex). Of 4 and 16,
+    /// Number of pairs that an eye path should find at vertices not fixed by the film point (Vertex). Of 4 and 16,
     /// 4 has the smaller error on yard-ring, two-rooms and staircase2, and 16 on veach-ajar.
     double inner_pairs = 4;
     float largest_first_radius = 0.02f;

@@ -92,8 +92,9 @@ void GatherRadius::learn(const Film& film, const RenderStats& so_far, const Gath
                  .time = now - std::exchange(time_before_, now)};
     if (is_given_) return;
 
-    const auto pairs = [&](bool sees_lens) {
-        return (totals.expected_pairs[sees_lens] - before.expected_pairs[sees_lens] + 1) /
+    const auto pairs = [&](bool is_fixed_by_film) {
+        return (totals.expected_pairs[is_fixed_by_film] - before.expected_pairs[is_fixed_by_film] +
+                1) /
                eye_paths;
     };
     if (!has_inner_) {

@@ -23,9 +23,9 @@ struct VarianceAndTime {
     }
 };
 
-/// A smaller radius makes gathers cheaper, a larger one makes them less noisy. Eye vertices that see the lens
-/// (Vertex::sees_lens) have one radius, and others have a smaller one. Pairs of the former share an eye path without any
-/// random choice, so that each of them helps; pairs of the latter share a random eye path.
+/// A smaller radius makes gathers cheaper, a larger one makes them less noisy. Eye vertices fixed by the film point
+/// (Vertex::is_fixed_by_film) have one radius, and others have a smaller one. Pairs of the former share an eye path
+/// without any random choice, so that each of them helps; pairs of the latter share a random eye path.
 ///
 /// The smaller radius is such that an eye path finds GatherConstants::inner_pairs pairs, and fewer where pairs bring
 /// little. The larger one is that of the least product of variance and time. With m times the number of pairs, variance
@@ -41,14 +41,14 @@ class GatherRadius {
 public:
     /// `given`: both radii, or 0 if they are to be chosen. `has_inner`: whether there are two; otherwise the one radius is
     /// that of GatherConstants::pairs pairs for an eye path. `scene_radius`: that of the scene's bounds.
-    /// `pairs_per_radius2`: numbers of pairs that an eye path finds, by Vertex::sees_lens, divided by the square of the
-    /// radius.
+    /// `pairs_per_radius2`: numbers of pairs that an eye path finds, by Vertex::is_fixed_by_film, divided by the square
+    /// of the radius.
     void start(float given, bool has_inner, float scene_radius,
                const std::array<double, 2>& pairs_per_radius2);
     /// Chooses the radii of the next passes, unless one was given.
     void learn(const Film& film, const RenderStats& so_far, const GatherTotals& totals);
-    /// The radius of eye vertices that see the lens, or of others.
-    float of(bool sees_lens) const { return radii_[sees_lens]; }
+    /// The radius of eye vertices fixed by the film point, or of others.
+    float of(bool is_fixed_by_film) const { return radii_[is_fixed_by_film]; }
     /// Of the passes that learn() saw last.
     const VarianceAndTime& observed() const { return observed_; }
 
@@ -57,8 +57,8 @@ public:
         constexpr double kFactors[kRadiusChanges] = {1 / 16.0, 1 / 4.0, 1, 4, 16};
         return kFactors[candidate];
     }
-    /// Records a visible pair of an eye vertex that sees the lens. `x`: its survival probability in roulette without the
-    /// limit of 1; `weight_scale`: GatherWeightScale::value().
+    /// Records a visible pair of an eye vertex fixed by the film point. `x`: its survival probability in roulette without
+    /// the limit of 1; `weight_scale`: GatherWeightScale::value().
     static void observe(const GatherMoment& pair, double x, double weight_scale, GatherSums& sums) {
         // A pair that adds ten times the pixel's luminance. V leaves rare ones out, too.
         constexpr double kMost = 100;

@@ -23,13 +23,13 @@ inline constexpr size_t kGatherLengths = 8;
 struct GatherSums final : PassSums {
     /// GatherMoment::fixed() by candidates of GatherWeightScale.
     std::array<uint64_t, kWeightScales> weight_moments{};
-    /// Of gathers at eye vertices that see the lens (Vertex): GatherMoment::fixed(), and trials in units of 1/256, by the
-    /// factor of the number of pairs.
+    /// Of gathers at eye vertices fixed by the film point (Vertex): GatherMoment::fixed(), and trials in units of 1/256, by
+    /// the factor of the number of pairs.
     std::array<uint64_t, kRadiusChanges> moments{}, trials{};
     uint64_t candidates = 0, inner_candidates = 0;  ///< Light vertices that searches looked at.
-    /// Pairs that would have been found if roulette had ended no search, in units of 1/256; by Vertex::sees_lens.
+    /// Pairs that would have been found if roulette had ended no search, in units of 1/256; by Vertex::is_fixed_by_film.
     std::array<uint64_t, 2> expected_pairs{};
-    /// Of next events at eye vertices that see the lens: GatherMoment::fixed() by candidates of NextEventCount.
+    /// Of next events at eye vertices fixed by the film point: GatherMoment::fixed() by candidates of NextEventCount.
     std::array<uint64_t, kNextEventCounts> next_event_moments{};
     uint64_t next_events = 0;
     struct Joins {

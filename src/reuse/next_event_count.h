@@ -1,5 +1,5 @@
 #pragma once
-// The number of next events at an eye vertex that sees the lens, learned from earlier passes.
+// The number of next events at an eye vertex fixed by the film point, learned from earlier passes.
 
 #include <array>
 #include <span>
@@ -25,8 +25,8 @@ struct NextEventDraws {
     std::span<const NextEventDraw> span() const { return {draws.data(), count}; }
 };
 
-/// A vertex that sees the lens (Vertex) is not a random choice, and its sample is costly where it also gathers. Several
-/// next events there share that cost. Their number N is that of the least product of variance and time. With N' instead,
+/// A vertex fixed by the film point (Vertex) is not a random choice, and its sample is costly where it also gathers.
+/// Several next events there share that cost. Their number N is that of the least product of variance and time. With N' instead,
 /// variance and time of a sample are taken to be
 ///     V - M(N) + M(N')   and   T - t N + t N'.
 /// M(N) is the part of the variance that belongs to paths that these next events can make,
@@ -42,8 +42,8 @@ public:
     /// N.
     uint32_t value() const { return value_; }
 
-    /// Records the next events of a vertex that sees the lens. `scale`: factor from a contribution to that of the pixel,
-    /// relative to the pixel's luminance.
+    /// Records the next events of a vertex fixed by the film point. `scale`: factor from a contribution to that of the
+    /// pixel, relative to the pixel's luminance.
     static void observe(std::span<const NextEventDraw> draws, double scale, GatherSums& sums);
 
 private:

@@ -222,15 +222,6 @@ INSTANTIATE_TEST_SUITE_P(Planted, Control, ::testing::ValuesIn(planted()),
                          [](const auto& p) { return std::string(p.param.name); });
 INSTANTIATE_TEST_SUITE_P(Clean, NoError,
                          ::testing::Combine(::testing::ValuesIn(planted()), kSamplers), kName);
-// Two roulettes of one pair, which need separate random numbers. With few samples, the rare joins that survive roulette
-// are missing from some tiles, and Sobol' points leave too little other noise to hide this.
-INSTANTIATE_TEST_SUITE_P(
-    CleanPairs, NoError,
-    ::testing::Combine(::testing::Values(Planted{
-                           "RateOfShortPaths", front_camera(kSize) + room() + area_lamp(),
-                           "upg+bdpt:short_rate=0.1,roulette=0.5,radius=0.15", 0, 0, 256}),
-                       kSamplers),
-    kName);
 
 }  // namespace
 }  // namespace etendue::test

@@ -219,8 +219,8 @@ TEST(GatherChoices, AgreeWithPathTracing) {
     const Scene scene = build(mixed_room(front_camera(kSize)));
     const Tiles path = indirect_tiles(scene, "path", 400, 1);
     uint64_t seed = 5;
-    for (const char* choice : {"bound=box", "bound=cone", "drop=eye", "drop=light", "drop=both",
-                               "clamp=false", "short_rate=0.3", "short_rate=0"})
+    for (const char* choice :
+         {"bound=box", "bound=cone", "drop=eye", "drop=light", "drop=both", "clamp=false"})
         expect_same_image(
             indirect_tiles(scene, fmt::format("upg+bdpt:radius=0.12,{}", choice), 192, seed++),
             path, 0.08, choice);

@@ -105,7 +105,6 @@ protected:
             if (extra() == Extra::Variants) {
                 counts.pairs.rule = PairRule::Both;
                 counts.pairs.clamps = false;
-                counts.pairs.short_rate = 0.3f;
             }
         }
         if (extra() == Extra::Guided || extra() == Extra::GuidedMerges) {
@@ -263,7 +262,7 @@ protected:
         const auto x = path_vertices(merged, s, z, t - 1);
         const auto delta = delta_events(x, s - 1, s - 1);
         const PathValue value = evaluate_path(scene, x, delta, counts.guide);
-        const float disc = b.sees_lens ? counts.pairs.disc : counts.pairs.inner_disc;
+        const float disc = b.is_fixed_by_film ? counts.pairs.disc : counts.pairs.inner_disc;
         const double p =
             density_of(merged, s) * density_of(z, t) * double(disc) * eye_jacobian(x, delta, s);
         Tally& tally = tally_of(Strategy::Merge, x, delta);

@@ -1,4 +1,4 @@
-// The number of next events at a vertex that sees the lens.
+// The number of next events at a vertex fixed by the film point.
 
 #include "reuse/next_event_count.h"
 
