@@ -361,7 +361,8 @@ void RenderCommand::run() const {
     const uint64_t passes = renderer.film().passes();
     if (passes == 0) throw std::runtime_error("interrupted in the first pass: nothing was written");
 
-    nlohmann::json report = to_json(renderer, s, settings, stopped_by, log);
+    const ErrorEstimate e = renderer.error();
+    nlohmann::json report = to_json(renderer, s, settings, stopped_by, log, &e);
     if (!failure.empty()) report["failure"] = failure;
     std::vector<std::string> failures;
     if (!saved.empty()) attempt(failures, save);
@@ -375,7 +376,6 @@ void RenderCommand::run() const {
                                     passes == 1 ? "pass" : fmt::format("{} passes", passes)));
     if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
     if (quiet) return;
-    const ErrorEstimate e = renderer.film().error();
     message("{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output, passes,
             format_seconds(renderer.seconds()), report["samples_per_second"].get<double>() * 1e-6,
             report["rays_per_second"].get<double>() * 1e-6,

@@ -52,8 +52,7 @@ nlohmann::json statistics(const Film& film, const RenderStats& s, double seconds
 nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettings& settings,
                        const std::string& stopped_by, const PassLog& log,
                        const ErrorEstimate* error) {
-    nlohmann::json j =
-        statistics(r.film(), r.stats(), r.seconds(), error ? *error : r.film().error());
+    nlohmann::json j = statistics(r.film(), r.stats(), r.seconds(), error ? *error : r.error());
     j["scene"] = scene.file();
     j["integrator"] = settings.integrator.to_string();
     j["estimator"] = to_string(r.integrator().estimator());

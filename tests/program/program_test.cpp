@@ -126,7 +126,7 @@ TEST_F(ProgramTest, NamesTheCommandThatIsMeant) {
         EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
         EXPECT_TRUE(r.errors.starts_with("etendue: ")) << r.errors;
     };
-    refused({}, "expected a command: render, info");
+    refused({}, "expected a command: render, merge");
     refused({"rendr", "a.xml"}, "there is no command \"rendr\"; did you mean \"etendue render\"?");
     refused({"Render", "a.xml"}, "did you mean \"etendue render\"?");
     refused({"scene.xml"}, "did you mean \"etendue render scene.xml -o image.exr\"?");
@@ -134,7 +134,7 @@ TEST_F(ProgramTest, NamesTheCommandThatIsMeant) {
             "did you mean \"etendue render scene.pbrt -o image.exr\"?");
     refused({"integrators"}, "did you mean \"etendue list\"?");
     refused({"view", "a.exr"}, "did you mean \"etendue studio\"?");
-    refused({"frobnicate"}, "there are: render, info");
+    refused({"frobnicate"}, "there are: render, merge");
     refused({"-i", "bdpt", "render", "a.xml"}, "options follow the command: etendue render");
     refused({"render", "a.xml", "-o", "a.exr", "--samples", "4"}, "did you mean \"--spp\"?");
     refused({"render", "a.xml", "--outptu", "a.exr"}, "did you mean \"--output\"?");

@@ -226,7 +226,7 @@ def test_other_threads_run_while_images_are_computed(tmp_path: Path, scenes: Pat
         "diff": lambda: et.diff(image, image[::-1]),
         "write": lambda: et.write_image(tmp_path / "b.exr", image),
         "load_string": lambda: et.load_string(long),
-        "pilot": lambda: _etendue.Rendering(scene, "upg+pssmlt", 1, None, None, 0, "sobol", "spread", 1, 0),
+        "pilot": lambda: _etendue.Rendering(scene, "upg+pssmlt", 1, None, None, 0, "sobol", "spread", 1, 0, 0),
     }
     for name, task in tasks.items():
         ticks, seconds = _ticks_during(task)
