@@ -210,10 +210,15 @@ void replace_emitter(PlainScene& s, int index) {
         const Param* p = o.find("two_sided");
         if (p && !std::get<bool>(p->value)) remove(o, "two_sided");
     }
-    if (o.type == "envmap") replace_environment(s, index);
-    if (o.type == "spot") replace_falloff(s, index);
-    if (o.type == "projection") replace_projection(s, index);
-    if (o.type == "goniometric") replace_goniometric(s, index);
+    // Each of these may add objects, which moves `o`.
+    if (o.type == "envmap")
+        replace_environment(s, index);
+    else if (o.type == "spot")
+        replace_falloff(s, index);
+    else if (o.type == "projection")
+        replace_projection(s, index);
+    else if (o.type == "goniometric")
+        replace_goniometric(s, index);
 }
 
 void report_masked_emission(PlainScene& s, int index) {
