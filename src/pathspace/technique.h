@@ -128,8 +128,8 @@ struct TechniqueCounts {
     bool uses_pairs() const { return merge > 0 || gather > 0; }
     /// Number of gathers at each inner vertex of a path of `edges` edges.
     float gathers(int edges) const { return edges < pairs.min_edges ? 0.0f : gather; }
-    /// Count of gathers in MIS weights at an x_m of this level. All pairs of an eye vertex share its eye path. If x_m sees
-    /// the lens (Vertex), this eye path contains no random choice, and the pairs count in full.
+    /// Count of gathers in MIS weights at an x_m of this level. All pairs of an eye vertex share its eye path. If the film
+    /// point fixes x_m (Vertex), this eye path contains no random choice, and the pairs count in full.
     double weighed_gathers(uint8_t pair_level, bool is_fixed_by_film, int edges) const {
         return double(gathers(edges)) * (is_fixed_by_film ? 1 : pair_share(pair_level));
     }
