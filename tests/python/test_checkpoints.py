@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import etendue as et
+from conftest import Hits
 
 METHODS = ["path", "bdpt:max_depth=5", "upg+bdpt", "vcm", "mlt:groups=4,chains=48"]
 
@@ -106,22 +107,6 @@ def test_results_can_be_pickled(cornell: et.Scene) -> None:
     assert copy.error == result.error and copy.passes == 12 and copy.stopped_by == "samples"
     assert len(copy.techniques) == len(result.techniques)
     assert et.merge([copy]).passes == 12
-
-
-class Hits(et.Integrator):
-    """Emitted radiance that eye paths hit, times a factor."""
-
-    def __init__(self, factor: float = 1) -> None:
-        self.factor = factor
-
-    def counts(self, light_paths: int) -> et.core.Counts:
-        return et.core.Counts(hit=1)
-
-    def sample(self, c: et.core.Sample) -> None:
-        z = c.eye_path(max_vertices=4)
-        for t in range(2, len(z) + 1):
-            for x in c.join(0, t):
-                c.add(x)
 
 
 class Counting(Hits):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import etendue as et
+from conftest import Hits
 
 
 @pytest.fixture(scope="module")
@@ -41,16 +42,6 @@ def test_the_report_of_a_comparison(comparison: et.CompareReport, tmp_path: Path
 
 
 def test_compare_takes_integrators_in_python(scenes: Path, tmp_path: Path) -> None:
-    class Hits(et.Integrator):
-        def counts(self, light_paths: int) -> et.core.Counts:
-            return et.core.Counts(hit=1)
-
-        def sample(self, c: et.core.Sample) -> None:
-            z = c.eye_path(max_vertices=4)
-            for t in range(2, len(z) + 1):
-                for x in c.join(0, t):
-                    c.add(x)
-
     scene = et.load(scenes / "cornell.xml").build(resolution=(8, 8))
     report = et.compare(scene, ["path:max_depth=3", Hits()], spp=2, references=tmp_path, reference_spp=64)
     assert [m["name"] for m in report.data[0]["methods"]] == ["path:max_depth=3", "Hits"]
