@@ -3,35 +3,23 @@
     pip install "dask[distributed]"
     python examples/dask_cluster.py scenes/glass-caustic.xml bdpt 8
 
-A LocalCluster of two processes stands for the cluster here; Client("scheduler:8786") uses another. The workers need the
-package and the scene's files. The sum does not depend on which worker was faster. If a worker is lost, Dask runs its task
+A LocalCluster of two processes stands for the cluster here. Client("scheduler:8786") uses another, whose workers need the
+package, the scene's files, and client.upload_file("examples/cluster_task.py"). The sum does not depend on which worker was faster. If a worker is lost, Dask runs its task
 again, and the result has the same bits.
 """
 
 import sys
-from functools import lru_cache
 from typing import Any
 
+import cluster_task
 import etendue as et
-
-
-@lru_cache(maxsize=1)
-def load(file: str, resolution: tuple[int, int]) -> et.Scene:
-    """The scene, loaded once by each worker."""
-    return et.load(file).build(resolution=resolution)
-
-
-def run(file: str, integrator: str, seed: int, spp: int, resolution: tuple[int, int]) -> bytes:
-    """One task: a rendering with its own seed."""
-    scene = load(file, resolution)
-    return et.render(scene, integrator, spp=spp, seed=seed, threads=1, progress=False).partial()
 
 
 def render_on(
     client: Any, file: str, integrator: str, runs: int, spp: int = 16, size: tuple[int, int] = (64, 64)
 ) -> et.Result:
     """Maps the seeds 0 ... runs-1 to the workers, and merges their results."""
-    futures = [client.submit(run, file, integrator, seed, spp, size, pure=False) for seed in range(runs)]
+    futures = [client.submit(cluster_task.run, file, integrator, seed, spp, size, pure=False) for seed in range(runs)]
     return et.merge(client.gather(futures))
 
 

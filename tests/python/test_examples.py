@@ -7,8 +7,6 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-import etendue as et
-
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NOTEBOOKS = sorted(EXAMPLES.glob("*.ipynb"))
 
@@ -37,19 +35,3 @@ def test_a_notebook_runs_in_a_minute(file: Path, tmp_path: Path, monkeypatch: py
     nbformat.write(notebook, executed)
     print(f"{file.stem}: {seconds:.0f} s")
     assert seconds < 60 * 2  # twice, since the machine may be busy
-
-
-def test_runs_on_a_cluster_are_merged_exactly(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import numpy as np
-    from dask.distributed import Client, LocalCluster
-
-    monkeypatch.syspath_prepend(str(EXAMPLES))
-    monkeypatch.setenv("PYTHONPATH", str(EXAMPLES), prepend=":")
-    import dask_cluster
-
-    file = str(scenes / "cornell.xml")
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
-        total = dask_cluster.render_on(client, file, "bdpt", 4, spp=2, size=(16, 16))
-    parts = [dask_cluster.run(file, "bdpt", seed, 2, (16, 16)) for seed in range(4)]
-    np.testing.assert_array_equal(total.image, et.merge(parts).image)
-    assert total.passes == 8

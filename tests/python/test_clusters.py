@@ -1,0 +1,329 @@
+"""The examples for clusters run on this machine: Dask, Ray, MPI, Slurm and GNU parallel."""
+
+import functools
+import getpass
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import etendue as et
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+RUNS, SPP, SIZE = 8, 64, (48, 36)
+
+
+def command(name: str) -> str:
+    """A program, which may be one for administrators."""
+    found = shutil.which(name, path=os.environ["PATH"] + ":/usr/local/sbin:/usr/sbin:/sbin")
+    return found or pytest.skip(f"no {name} here")
+
+
+def merged(file: Path, integrator: str, seeds: int, spp: int, size: tuple[int, int]) -> et.Result:
+    scene = et.load(file).build(resolution=size)
+    return et.merge(
+        [et.render(scene, integrator, spp=spp, seed=seed, threads=1, progress=False) for seed in range(seeds)]
+    )
+
+
+# -- Workers that are lost.
+
+
+@pytest.fixture
+def importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The examples and recorded_task, here and in processes that are started."""
+    for folder in (EXAMPLES, Path(__file__).parent):
+        monkeypatch.syspath_prepend(str(folder))
+        monkeypatch.setenv("PYTHONPATH", str(folder), prepend=":")
+
+
+class Killer(threading.Thread):
+    """Kills one worker in the middle of a task, but not in its first one."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(daemon=True)
+        self.folder = folder
+        self.is_over = threading.Event()
+        self.killed = ""
+        """Name of the task that was not ended."""
+
+    def run(self) -> None:
+        while not self.is_over.wait(0.005):
+            begun, ended = names(self.folder, "begin"), names(self.folder, "end")
+            experienced = {pid_of(name) for name in ended}
+            for name in begun - ended:
+                if pid_of(name) in experienced:
+                    os.kill(pid_of(name), signal.SIGKILL)
+                    time.sleep(0.1)
+                    if name not in names(self.folder, "end"):
+                        self.killed = name
+                    return
+
+
+def names(folder: Path, what: str) -> set[str]:
+    return {file.stem for file in folder.glob(f"*.{what}")}
+
+
+def pid_of(name: str) -> int:
+    return int(name.split("-")[1])
+
+
+def check_that_a_task_ran_again(folder: Path, killer: Killer, total: et.Result, scene: Path) -> None:
+    killer.is_over.set()
+    killer.join()
+    begun, ended = names(folder, "begin"), names(folder, "end")
+    assert killer.killed, "no worker was killed in the middle of a task"
+    again = {name for name in ended if name.split("-")[0] == killer.killed.split("-")[0]}
+    assert again and killer.killed not in again
+    assert begun - ended == {killer.killed}
+    assert {name.split("-")[0] for name in ended} == {str(seed) for seed in range(RUNS)}
+    # The scene was loaded once by each worker.
+    assert len(ended) > len({pid_of(name) for name in ended})
+    assert {file.read_text() for file in folder.glob("*.end")} == {"1"}
+    expected = merged(scene, "bdpt", RUNS, SPP, SIZE)
+    np.testing.assert_array_equal(total.image, expected.image)
+    assert total.passes == RUNS * SPP and total.error == expected.error
+
+
+def test_dask_runs_the_task_of_a_killed_worker_again(
+    scenes: Path, tmp_path: Path, importable: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed = pytest.importorskip("dask.distributed")
+    import cluster_task
+    import dask_cluster
+    import recorded_task
+
+    monkeypatch.setattr(cluster_task, "run", functools.partial(recorded_task.run, str(tmp_path)))
+    killer = Killer(tmp_path)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        killer.start()
+        total = dask_cluster.render_on(client, str(scenes / "cornell.xml"), "bdpt", RUNS, SPP, SIZE)
+    check_that_a_task_ran_again(tmp_path, killer, total, scenes / "cornell.xml")
+
+
+def test_ray_runs_the_task_of_a_killed_worker_again(
+    scenes: Path, tmp_path: Path, importable: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ray = pytest.importorskip("ray")
+    import cluster_task
+    import ray_cluster
+    import recorded_task
+
+    def run(*arguments: Any) -> bytes:
+        return recorded_task.run(str(tmp_path), *arguments)
+
+    monkeypatch.setattr(cluster_task, "run", run)
+    killer = Killer(tmp_path)
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+    try:
+        killer.start()
+        total = ray_cluster.render_on(str(scenes / "cornell.xml"), "bdpt", RUNS, SPP, SIZE)
+    finally:
+        ray.shutdown()
+    check_that_a_task_ran_again(tmp_path, killer, total, scenes / "cornell.xml")
+
+
+@pytest.mark.parametrize("example", ["dask", "ray"])
+def test_the_examples_run_as_programs(scenes: Path, tmp_path: Path, example: str) -> None:
+    pytest.importorskip(example)
+    scene = scenes / "cornell.xml"
+    subprocess.run(
+        [sys.executable, EXAMPLES / f"{example}_cluster.py", scene, "path", "3"], cwd=tmp_path, check=True, timeout=300
+    )
+    image = et.read_image(tmp_path / f"{example}.exr")
+    np.testing.assert_array_equal(image, merged(scene, "path", 3, 16, (64, 64)).image)
+
+
+# -- MPI.
+
+
+def test_mpi_merges_the_images_of_its_processes(scenes: Path, tmp_path: Path) -> None:
+    pytest.importorskip("mpi4py")
+    mpirun = command("mpirun")
+    scene = tmp_path / "small.xml"
+    scene.write_text((scenes / "cornell.xml").read_text().replace('value="400"', 'value="24"'))
+    # Open MPI refuses root and more processes than cores.
+    environment = os.environ | {
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    }
+    example = [mpirun, "-n", "3", sys.executable, "-m", "mpi4py", EXAMPLES / "mpi_cluster.py"]
+    subprocess.run([*example, scene, "path", "2", tmp_path / "mpi.exr"], env=environment, check=True, timeout=300)
+    image = et.read_image(tmp_path / "mpi.exr")
+    np.testing.assert_array_equal(image, merged(scene, "path", 3, 2, (24, 24)).image)
+
+
+# -- Job arrays.
+
+ARRAY = EXAMPLES / "slurm_array.sh"
+
+
+def environment_of_tasks(program: str, scenes: Path, spp: int) -> dict[str, str]:
+    return os.environ | {
+        "ETENDUE": program,
+        "SCENE": str(scenes / "cornell.xml"),
+        "METHOD": "path",
+        "SPP": str(spp),
+    }
+
+
+def check_tasks(folder: Path, program: str, tasks: int, spp: int) -> None:
+    """Their sum has all passes of all seeds."""
+    files = sorted(map(str, folder.glob("task-*.etd")))
+    assert len(files) == tasks
+    subprocess.run([program, "merge", *files, "-o", folder / "sum.etd", "--quiet"], check=True)
+    info = json.loads(subprocess.run([program, "info", "--json", folder / "sum.etd"], check=True, capture_output=True).stdout)
+    assert info["spp"] == tasks * spp
+
+
+def test_gnu_parallel_runs_the_array(program: str, scenes: Path, tmp_path: Path) -> None:
+    parallel = command("parallel")
+    if "GNU" not in subprocess.run([parallel, "--version"], capture_output=True, text=True).stdout:
+        pytest.skip("no GNU parallel here")
+    for spp in (1, 2):  # The second time, the tasks go on.
+        subprocess.run(
+            [parallel, "-j", "2", f"SLURM_ARRAY_TASK_ID={{}} bash {ARRAY}", ":::", "0", "1", "2"],
+            env=environment_of_tasks(program, scenes, spp), cwd=tmp_path, check=True, timeout=300,
+        )
+        check_tasks(tmp_path, program, 3, spp)
+
+
+SLURM_CONF = """
+ClusterName=one
+SlurmctldHost={host}(127.0.0.1)
+SlurmctldPort={ports[0]}
+SlurmdPort={ports[1]}
+SlurmUser={user}
+SlurmdUser={user}
+AuthInfo=socket={folder}/munge.socket,cred_expire=5
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.pid
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU
+MpiDefault=none
+KillWait=5
+ReturnToService=2
+SlurmdParameters=config_overrides
+NodeName={host} NodeAddr=127.0.0.1 CPUs=2
+PartitionName=all Nodes=ALL Default=YES State=UP
+"""
+
+
+def free_ports(count: int) -> list[int]:
+    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
+    ports = [s.getsockname()[1] for s in sockets]
+    for s in sockets:
+        s.close()
+    return ports
+
+
+def wait_until(done: Callable[[], object], seconds: float, what: str) -> None:
+    until = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < until, what
+        time.sleep(0.1)
+
+
+@pytest.fixture
+def slurm(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A cluster of this machine alone, whose daemons belong to the test; its folder."""
+    munged, slurmctld, slurmd = map(command, ("munged", "slurmctld", "slurmd"))
+    for name in ("sbatch", "scontrol", "sinfo", "squeue"):
+        command(name)
+    host = socket.gethostname().split(".")[0]
+    daemons: list[subprocess.Popen[bytes]] = []
+    # Names of sockets are short.
+    with tempfile.TemporaryDirectory(prefix="slurm-") as name:
+        folder = Path(name)
+        key, conf = folder / "munge.key", folder / "slurm.conf"
+        key.write_bytes(os.urandom(1024))
+        key.chmod(0o400)
+        user = getpass.getuser()
+        conf.write_text(SLURM_CONF.format(host=host, ports=free_ports(2), user=user, folder=folder))
+        for part in ("state", "spool"):
+            (folder / part).mkdir()
+        monkeypatch.setenv("SLURM_CONF", str(conf))
+        of_munge = [f"--{what}={folder}/munge.{what[:-5]}" for what in ("key-file", "pid-file", "log-file", "seed-file")]
+        commands = (
+            [munged, "--foreground", "--force", f"--socket={folder}/munge.socket", *of_munge],
+            [slurmctld, "-D"],
+            [slurmd, "-D"],
+        )
+        with (folder / "log").open("wb") as log:
+            try:
+                for words in commands:
+                    daemons.append(subprocess.Popen(words, stdout=log, stderr=log))
+                    if words[0] == munged:
+                        wait_until((folder / "munge.socket").exists, 30, "munged does not start")
+                wait_until(lambda: output_of("sinfo", "--noheader", "--format=%t") == "idle", 60, "Slurm does not start")
+                yield folder
+            finally:
+                output_of("scancel", "--user", user)
+                wait_for_jobs()
+                print((folder / "log").read_text())
+                for daemon in reversed(daemons):
+                    daemon.terminate()
+                    daemon.wait()
+
+
+def output_of(*words: str) -> str:
+    return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def wait_for_jobs() -> None:
+    wait_until(lambda: output_of("squeue", "--noheader") == "", 240, "the jobs do not end")
+
+
+def renders(folder: Path, argument: str) -> bool:
+    """Whether a process in this folder has this argument, and has begun to render: it handles the end of --grace."""
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if process.joinpath("cwd").resolve() == folder and argument in process.joinpath("cmdline").read_text().split("\0"):
+                caught = re.search(r"^SigCgt:\s*(\w+)", process.joinpath("status").read_text(), re.MULTILINE)
+                return caught is not None and bool(int(caught[1], 16) >> (signal.SIGALRM - 1) & 1)
+        except (OSError, UnicodeDecodeError):
+            continue  # It has ended.
+    return False
+
+
+def test_slurm_runs_the_array_and_queues_late_tasks_again(
+    slurm: Path, program: str, scenes: Path, tmp_path: Path
+) -> None:
+    def submit(spp: int) -> None:
+        subprocess.run(
+            ["sbatch", "--array=0-2", "--cpus-per-task=1", ARRAY], env=environment_of_tasks(program, scenes, spp),
+            cwd=tmp_path, check=True,
+        )
+
+    submit(1)
+    wait_for_jobs()
+    check_tasks(tmp_path, program, 3, 1)
+    # What Slurm sends before the end of the time.
+    submit(20)
+    wait_until(lambda: renders(tmp_path, "task-0.etd"), 60, "task 0 does not run")
+    array = output_of("squeue", "--noheader", "--format=%F").split()[0]
+    subprocess.run(["scancel", "--batch", "--signal=USR1", f"{array}_0"], check=True)
+    wait_until(lambda: "Restarts=1" in output_of("scontrol", "show", "job", f"{array}_0"), 60, "task 0 is not queued again")
+    wait_for_jobs()
+    check_tasks(tmp_path, program, 3, 20)
