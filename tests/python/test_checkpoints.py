@@ -3,6 +3,7 @@
 import pickle
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,6 +98,48 @@ def test_seeds_that_do_not_reduce_a_bias_are_a_warning(cornell: et.Scene) -> Non
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         et.merge([et.render(cornell, "vcm", passes=p, progress=False) for p in [(0, 1), (1, 2)]])
+
+
+# Pairs of renderings, and the number of standard errors beyond which 12 tiles and the whole image, or the whole image alone,
+# raise a false alarm with a probability of 0.001 (two-sided t test with 15 degrees of freedom, Šidák); and the quantile 0.9.
+PAIRS, ALARM_OF_13, ALARM_OF_1, POWER = 16, 5.377, 4.073, 1.341
+
+
+@pytest.mark.parametrize(
+    "method, passes",
+    [("path", 16), ("upg+bdpt", 10), ("pssmlt:groups=4,chains=48", 12), ("mmlt:groups=4,chains=48", 12),
+     ("mlt:groups=4,chains=48", 12)],
+    ids=lambda v: str(v).split(":")[0])
+def test_the_sum_of_8_runs_has_the_expectation_of_one_with_8_times_the_passes(
+    cornell: et.Scene, method: str, passes: int
+) -> None:
+    def rendering(seed: int, spp: int) -> et.Result:
+        return et.render(cornell, method, spp=spp, seed=seed, sampler="independent", progress=False)
+
+    def tiles(result: et.Result) -> Any:
+        grey = result.image.mean(axis=2, dtype=float)
+        return np.append(grey.reshape(3, 8, 4, 8).mean(axis=(1, 3)), grey.mean())
+
+    sums = [et.merge([rendering(9 * pair + run, passes) for run in range(8)]) for pair in range(PAIRS)]
+    others = [rendering(9 * pair + 8, 8 * passes) for pair in range(PAIRS)]
+    differences = np.array([tiles(a) - tiles(b) for a, b in zip(sums, others, strict=True)])
+    standard_error = differences.std(axis=0, ddof=1) / PAIRS**0.5
+    assert (np.abs(differences.mean(axis=0)) <= ALARM_OF_13 * standard_error).all()
+    # A difference of the whole image that would be found with a probability of 90 %.
+    found = (ALARM_OF_13 + POWER) * standard_error[-1] / tiles(sums[0])[-1]
+    print(f"{method}: a difference of {100 * found:.2f} % would be found")
+    assert found < 0.05
+
+    # The variance that a sum states is that of sums.
+    images = np.array([a.image for a in sums], float)
+    true = ((images - images.mean(axis=0)) ** 2).sum(axis=(1, 2, 3)) * PAIRS / (PAIRS - 1)
+    stated = np.array([a.variance.sum(dtype=float) for a in sums])
+    excess = stated - true
+    standard_error = excess.std(ddof=1) / PAIRS**0.5
+    print(f"{method}: stated over true variance {stated.mean() / true.mean():.3f} ± {standard_error / true.mean():.3f}")
+    assert abs(excess.mean()) <= ALARM_OF_1 * standard_error
+    assert all(a.error is not None and b.error is not None for a, b in zip(sums, others, strict=True))
+    print(f"{method}: error {np.mean([a.error for a in sums]):.4f}, of one run {np.mean([b.error for b in others]):.4f}")
 
 
 def test_results_can_be_pickled(cornell: et.Scene) -> None:
