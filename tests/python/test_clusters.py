@@ -121,6 +121,7 @@ def test_ray_runs_the_task_of_a_killed_worker_again(
     scenes: Path, tmp_path: Path, importable: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ray = pytest.importorskip("ray")
+    monkeypatch.setenv("RAY_worker_niceness", "0")  # Otherwise workers wait for all other tests.
     import cluster_task
     import ray_cluster
     import recorded_task
