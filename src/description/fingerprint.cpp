@@ -1,7 +1,9 @@
 #include "description/fingerprint.h"
 
+#include <dlfcn.h>
+#include <link.h>
+
 #include <bit>
-#include <charconv>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -18,22 +20,15 @@ std::string contents_of(const fs::path& path) {
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// The file from which the code of this function was loaded; empty if it is unknown.
+/// The file from which the code of this function was loaded: the program, or a library such as the module of Python.
 std::string file_with_code() {
-    const auto here = reinterpret_cast<uintptr_t>(&file_with_code);
-    std::ifstream maps("/proc/self/maps");
-    // begin-end permissions offset device inode file
-    for (std::string line; std::getline(maps, line);) {
-        uintptr_t begin = 0, end = 0;
-        const char* const last = line.data() + line.size();
-        const auto a = std::from_chars(line.data(), last, begin, 16);
-        if (a.ec != std::errc() || a.ptr == last) continue;
-        const auto b = std::from_chars(a.ptr + 1, last, end, 16);
-        if (b.ec != std::errc() || here < begin || here >= end) continue;
-        const size_t name = line.find('/');
-        return name != std::string::npos ? line.substr(name) : "";
-    }
-    return "";
+    Dl_info ignored;
+    void* loaded = nullptr;
+    const bool is_known = ::dladdr1(reinterpret_cast<void*>(&file_with_code), &ignored, &loaded,
+                                    RTLD_DL_LINKMAP) != 0;
+    const std::string library = is_known ? static_cast<link_map*>(loaded)->l_name : "";
+    // The program itself has no name there. It can be read under this one even after its file was replaced.
+    return library.empty() ? "/proc/self/exe" : library;
 }
 
 /// Adds the parts of a description. Every function names all members of its type, so that a new one does not compile
@@ -140,12 +135,7 @@ uint64_t file_fingerprint(const std::string& file) {
 }
 
 uint64_t program_fingerprint() {
-    const std::string program = "/proc/self/exe";
-    std::error_code ignored;
-    const std::string file = file_with_code();
-    // The program's own file can be read under that name even after it was replaced.
-    const bool is_program = file.empty() || fs::read_symlink(program, ignored) == file;
-    return file_fingerprint(is_program ? program : file);
+    return file_fingerprint(file_with_code());
 }
 
 }  // namespace etendue

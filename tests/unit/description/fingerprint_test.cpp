@@ -179,5 +179,10 @@ TEST(Fingerprint, CountsTheBytesOfNamedFiles) {
     EXPECT_NE(one, two);
 }
 
+TEST(Fingerprint, OfTheProgramIsThatOfItsFile) {
+    EXPECT_EQ(program_fingerprint(), file_fingerprint("/proc/self/exe"));
+    EXPECT_NE(program_fingerprint(), file_fingerprint(""));
+}
+
 }  // namespace
 }  // namespace etendue
