@@ -38,7 +38,6 @@ int PlainScene::add(SceneObject&& o) {
 void PlainScene::set_image(SceneObject& o, std::string bytes) {
     const size_t index = scene_.images.size();
     set(o, "image", int64_t(index));
-    // Images of the same name are one in the cache of textures.
     scene_.images.push_back(EncodedImage{fmt::format("texture {}", index), std::move(bytes)});
 }
 

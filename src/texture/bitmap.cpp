@@ -235,7 +235,7 @@ const PixelBuffer& load_image(const Params& params, TextureContext& context, boo
         return context.images().load(resolve_file(params), raw);
     const EncodedImage& image =
         images[size_t(params.integer("image", 0, 0, int64_t(images.size()) - 1))];
-    return context.images().decode(image.bytes, image.name, raw);
+    return context.images().decode(image, raw);
 }
 
 std::unique_ptr<Texture> make_bitmap(const Params& params, TextureContext& context) {

@@ -40,13 +40,14 @@ size_t sanitize(std::vector<uint8_t>&, bool) {
 }  // namespace
 
 template <class Read>
-const PixelBuffer& TextureCache::find_or_read(const std::string& name, bool raw, const Read& read) {
-    const std::pair key(name, raw);
+const PixelBuffer& TextureCache::find_or_read(const Key& key, const std::string& name,
+                                              const Read& read) {
     {
         const std::lock_guard lock(mutex_);
         if (const auto it = images_.find(key); it != images_.end()) return *it->second;
     }
     PixelBuffer image = read();
+    const bool raw = std::get<bool>(key);
     const size_t bad = std::visit([&](auto& data) { return sanitize(data, raw); }, image.data);
     if (bad > 0)
         throw std::runtime_error("image \"" + name + "\" has " + std::to_string(bad) +
@@ -56,13 +57,13 @@ const PixelBuffer& TextureCache::find_or_read(const std::string& name, bool raw,
 }
 
 const PixelBuffer& TextureCache::load(const std::string& path, bool raw) {
-    return find_or_read(std::filesystem::weakly_canonical(path).string(), raw,
-                        [&] { return read_pixels(path, raw); });
+    const std::string file = std::filesystem::weakly_canonical(path).string();
+    return find_or_read({file, nullptr, raw}, file, [&] { return read_pixels(path, raw); });
 }
 
-const PixelBuffer& TextureCache::decode(const std::string& bytes, const std::string& name,
-                                        bool raw) {
-    return find_or_read(name, raw, [&] { return decode_pixels(bytes, name, raw); });
+const PixelBuffer& TextureCache::decode(const EncodedImage& image, bool raw) {
+    return find_or_read({"", &image, raw}, image.name,
+                        [&] { return decode_pixels(image.bytes, image.name, raw); });
 }
 
 size_t TextureCache::memory_bytes() const {

@@ -4,8 +4,9 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <utility>
+#include <tuple>
 
+#include "description/scene_description.h"
 #include "image/image.h"
 
 namespace etendue {
@@ -17,17 +18,19 @@ public:
     /// Loads an image with read_pixels(). Negative values become zero unless `raw`. Throws std::runtime_error where the
     /// file cannot be read or a value is not finite.
     const PixelBuffer& load(const std::string& path, bool raw);
-    /// The same for the bytes of an image file, which is called `name`.
-    const PixelBuffer& decode(const std::string& bytes, const std::string& name, bool raw);
+    /// The same for an image that the scene file holds itself, which is recognised by its address.
+    const PixelBuffer& decode(const EncodedImage& image, bool raw);
     size_t memory_bytes() const;
 
 private:
-    /// The image `name`, which `read` returns the first time.
+    /// The file, or the image of a scene file; whether it is raw.
+    using Key = std::tuple<std::string, const EncodedImage*, bool>;
+    /// What `read` returns the first time.
     template <class Read>
-    const PixelBuffer& find_or_read(const std::string& name, bool raw, const Read& read);
+    const PixelBuffer& find_or_read(const Key& key, const std::string& name, const Read& read);
 
     std::mutex mutex_;
-    std::map<std::pair<std::string, bool>, std::unique_ptr<const PixelBuffer>> images_;
+    std::map<Key, std::unique_ptr<const PixelBuffer>> images_;
 };
 
 }  // namespace etendue

@@ -202,6 +202,17 @@ TEST(TextureCache, LoadsEachImageOnce) {
     std::filesystem::remove(path);
 }
 
+/// Names of images that a scene file holds are for messages.
+TEST(TextureCache, ImagesOfOneNameAreSeveral) {
+    const EncodedImage black{"image", "P5 1 1 255\n" + std::string(1, '\0')},
+        white{"image", "P5 1 1 255\n\xff"};
+    TextureCache cache;
+    const PixelBuffer& first = cache.decode(black, false);
+    EXPECT_EQ(&first, &cache.decode(black, false));
+    EXPECT_EQ(std::get<std::vector<uint8_t>>(first.data)[0], 0);
+    EXPECT_EQ(std::get<std::vector<uint8_t>>(cache.decode(white, false).data)[0], 255);
+}
+
 TEST(TextureRef, ScalarOfAConstantIsItsLuminance) {
     const Rgb colour(0.9f, 0.2f, 0.4f);
     EXPECT_EQ(TextureRef(colour).eval_scalar({}), luminance(colour));
