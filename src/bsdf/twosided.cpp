@@ -1,6 +1,7 @@
 // Makes a reflecting material visible from both sides.
 //   nested: one bsdf for both sides, or two, the first where the normal points, the second behind
-// The frame is turned to wo's side of the geometric surface, or of the shading surface where normals are not strict. Nested materials must not transmit light.
+// The frame is turned to wo's side of the geometric surface, or of the shading surface where normals are not strict.
+// Nested materials must not transmit light.
 
 #include "bsdf/wrapper.h"
 

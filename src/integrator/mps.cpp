@@ -2,14 +2,15 @@
 // target importons, a state is the set of random numbers of a light path. Small steps change all of them, block steps
 // draw those of some vertices anew, and large steps draw a whole path anew. In primary sample space all steps are
 // symmetric. A step that changes only late vertices keeps the beginning of the path, like the perturbations of [Fan et
-// al. 2005]. With the target path, it is a full path, see path_photons.cpp. User paths are a second way to draw the beginning of a light path; the densities of both ways add up.
+// al. 2005]. With the target path, it is a full path, see path_photons.cpp. User paths are a second way to draw the
+// beginning of a light path; the densities of both ways add up.
 //
 // The target of a photon with flux Φ at x is lum(Φ) times
 // - importons: the density of importance I at x, plus a floor. The power of a photon is b Φ / (lum(Φ) I).
-// - path: q a, with a = min(1, h/h_0) but at least 0.05, where q is the density of the remainder of the path from x to the lens, and h the response of
-//   the lens to this remainder. The power of a photon is b Φ/lum(Φ) r, where r is the number of trials of remainders until one succeeds with probability a, so that
-//   E[r] = 1/P(x). The printed power, Φ times a ratio of path contributions, compares densities over spaces of different
-//   dimensions.
+// - path: q a, with a = min(1, h/h_0) but at least 0.05, where q is the density of the remainder of the path from x to
+//   the lens, and h the response of the lens to this remainder. The power of a photon is b Φ/lum(Φ) r, where r is the
+//   number of trials of remainders until one succeeds with probability a, so that E[r] = 1/P(x). The printed power, Φ
+//   times a ratio of path contributions, compares densities over spaces of different dimensions.
 //
 // Both are exact for any I > 0 and any a in [0, 1] that are fixed before the chains start. A state at which a chain
 // stays accumulates its power on the same photons, and proposals leave their expected share. The densities of the maps

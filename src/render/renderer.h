@@ -100,9 +100,9 @@ public:
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop);
 
-    /// Traces sample `index` of the last pass again (see Film::sample_pixel()), with the data that the integrator keeps of that pass, such as
-    /// its light paths. Its contributions go to `sink`, its sub-paths to `work`. Must not run during run(). Returns false
-    /// if no pass was made, or if the integrator has the data of a discarded pass.
+    /// Traces sample `index` of the last pass again (see Film::sample_pixel()), with the data that the integrator keeps
+    /// of that pass, such as its light paths. Its contributions go to `sink`, its sub-paths to `work`. Must not run
+    /// during run(). Returns false if no pass was made, or if the integrator has the data of a discarded pass.
     bool sample_again(uint64_t index, Workspace& work, ContributionSink& sink) const;
 
     const Film& film() const { return film_; }

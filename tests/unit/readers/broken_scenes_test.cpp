@@ -1,5 +1,6 @@
 // Every file of tests/scenes/broken has one mistake, described by its name; the reader must refuse it with the message
-// in this table; those of pbrt and glTF are in folders of these names. The reader accepts the files in tests/scenes/broken/builder, and the scene builder must refuse them.
+// in this table; those of pbrt and glTF are in folders of these names. The reader accepts the files in
+// tests/scenes/broken/builder, and the scene builder must refuse them.
 
 #include <filesystem>
 #include <fstream>
