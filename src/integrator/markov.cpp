@@ -89,8 +89,10 @@ void MarkovIntegrator::trace(const PassContext& pass) {
         groups_ = std::make_unique<ChainGroups>(*space_, options, std::move(chains.plan));
     }
     if (is_loaded) {
-        LearnedState state(std::exchange(loaded_, {}));
+        // Kept until all of it is loaded: a checkpoint after a failure must have it, too.
+        LearnedState state(loaded_);
         groups_->load(state);
+        loaded_ = {};
         has_begun_ = true;
         pass.forget_statistics();
     }

@@ -82,6 +82,7 @@ public:
         cache_.assemble();
         inner_grid_.build(cache_, learned_.radius.of(false));
         if (has_two_grids()) seen_grid_.build(cache_, learned_.radius.of(true));
+        loaded_ = {};
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {

@@ -77,6 +77,7 @@ public:
                                  cache_, &density_);
         cache_.assemble();
         if (merges_) grid_.build(cache_, reach() * radius_, first_merge());
+        loaded_ = {};
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {

@@ -7,8 +7,10 @@
 #include <map>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "error_of.h"
 #include "render/defaults.h"
 #include "resumable.h"
 #include "test_scenes.h"
@@ -192,6 +194,52 @@ TEST(Checkpoint, GivesTheSameBitsWithOtherThreadsAndSamplers) {
         settings.threads = 3;
         expect_equal(renderings.resume("a", settings, 6), Outcome(whole));
     }
+}
+
+/// What the last pass did not have is not taken from an earlier one. Here, half of the light paths meet nothing.
+TEST(Checkpoint, PassesWithoutLightVerticesAreRemembered) {
+    const Scene scene =
+        build(sensor("0,0,6", "0,0,0", 6) +
+              "<emitter type=\"point\"><point name=\"position\" x=\"0\" y=\"0\" z=\"3\"/>"
+              "<rgb name=\"intensity\" value=\"30\"/></emitter>" +
+              sphere("0,0,0", "1.4", diffuse("0.5,0.5,0.5")) +
+              rectangle("<scale value=\"100\"/><translate z=\"-2\"/>", diffuse("0.5,0.5,0.5")));
+    const Renderings renderings(scene);
+    for (const char* method : {"upg:light_paths=1", "upg+bdpt:light_paths=1",
+                               "vcm:light_paths=1,exact=true", "vcm:light_paths=1"})
+        for (uint64_t seed = 0; seed < 12; ++seed) {
+            SCOPED_TRACE(fmt::format("{}, {}", method, seed));
+            RenderSettings settings = settings_of(method);
+            settings.seed = seed;
+            settings.threads = 1;
+            Renderer whole(scene, settings);
+            PassLog log;
+            renderings.run(whole, 8, log);
+            // Integrators learn from pass 3 before pass 4.
+            renderings.render("a", settings, 3);
+            expect_equal(renderings.resume("a", settings, 8), Outcome(whole));
+        }
+}
+
+/// A checkpoint that is written after such a failure must have them, too.
+TEST(Checkpoint, ChainsThatCannotBeLoadedAreKept) {
+    const Scene scene = build(mixed_room(lens_camera(16)));
+    Renderer saved(scene, settings_of("mlt:groups=4,chains=48")),
+        other(scene, settings_of("mlt:groups=4,chains=32"));
+    const Renderings renderings(scene);
+    PassLog log;
+    renderings.run(saved, 2, log);
+    SectionWriter state;
+    saved.save(state);
+    SectionReader reader(state.take(), "state");
+    other.load(reader);
+    EXPECT_NE(error_of([&] { renderings.run(other, 3, log); }).find("another number of chains"),
+              std::string::npos);
+    EXPECT_EQ(other.film().passes(), 2u);
+    LearnedState before, after;
+    saved.integrator().save(before);
+    other.integrator().save(after);
+    EXPECT_TRUE(before.bytes() == after.bytes());
 }
 
 /// The message with which a checkpoint is refused.
