@@ -2,16 +2,14 @@
 
 #include <unistd.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
-#include <jpeglib.h>
-
 #include "fuzz_target.h"
 #include "image/image_io.h"
+#include "jpeg_of_noise.h"
 
 namespace etendue::fuzz {
 namespace {
@@ -28,32 +26,6 @@ void run(std::string_view bytes) {
     }
 }
 
-std::string jpeg() {
-    jpeg_compress_struct c;
-    jpeg_error_mgr errors;
-    c.err = jpeg_std_error(&errors);
-    jpeg_create_compress(&c);
-    unsigned char* bytes = nullptr;
-    unsigned long size = 0;
-    jpeg_mem_dest(&c, &bytes, &size);
-    c.image_width = c.image_height = 16;
-    c.input_components = 3;
-    c.in_color_space = JCS_RGB;
-    jpeg_set_defaults(&c);
-    jpeg_start_compress(&c, TRUE);
-    for (int y = 0; y < 16; ++y) {
-        unsigned char row[48];
-        for (int i = 0; i < 48; ++i) row[i] = static_cast<unsigned char>(i * y);
-        JSAMPROW at = row;
-        jpeg_write_scanlines(&c, &at, 1);
-    }
-    jpeg_finish_compress(&c);
-    const std::string file(reinterpret_cast<const char*>(bytes), size);
-    jpeg_destroy_compress(&c);
-    std::free(bytes);
-    return file;
-}
-
 /// An image in each format that can be written.
 std::vector<std::string> seeds() {
     Image image;
@@ -62,7 +34,7 @@ std::vector<std::string> seeds() {
     for (int i = 0; i < 16 * 5 * 3; ++i) image.data.push_back(float(i) * 0.01f);
     const std::filesystem::path folder =
         std::filesystem::temp_directory_path() / ("fuzz-image-" + std::to_string(getpid()));
-    std::vector<std::string> files = {jpeg()};
+    std::vector<std::string> files = {test::jpeg_of_noise(16, 3, false)};
     for (const char* extension : {".exr", ".pfm", ".hdr", ".png"}) {
         const std::string name = (folder / ("image" + std::string(extension))).string();
         write_image(name, image);

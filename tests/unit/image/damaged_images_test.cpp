@@ -5,14 +5,12 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include <gtest/gtest.h>
-#include <jpeglib.h>
 
 #include "error_of.h"
 #include "image/image_io.h"
+#include "jpeg_of_noise.h"
 #include "math/hash.h"
 
 namespace etendue::test {
@@ -22,12 +20,6 @@ std::string complaint(const std::string& bytes) {
     return error_of([&] { decode_pixels(bytes, "picture", true); });
 }
 
-std::string noise(size_t bytes) {
-    std::string all(bytes, '\0');
-    for (size_t i = 0; i < bytes; ++i) all[i] = char(mix64(i));
-    return all;
-}
-
 std::string big_endian(unsigned v) {
     return {char(v >> 8), char(v)};
 }
@@ -35,33 +27,6 @@ std::string little_endian(uint32_t v, size_t bytes = 4) {
     std::string word;
     for (size_t i = 0; i < bytes; ++i) word += char(v >> 8 * i);
     return word;
-}
-
-/// A JPEG of noise.
-std::string jpeg(unsigned size, bool is_progressive) {
-    jpeg_compress_struct info{};
-    jpeg_error_mgr errors;
-    info.err = jpeg_std_error(&errors);
-    jpeg_create_compress(&info);
-    unsigned char* at = nullptr;
-    unsigned long bytes = 0;
-    jpeg_mem_dest(&info, &at, &bytes);
-    info.image_width = info.image_height = size;
-    info.input_components = 1;
-    info.in_color_space = JCS_GRAYSCALE;
-    jpeg_set_defaults(&info);
-    if (is_progressive) jpeg_simple_progression(&info);
-    jpeg_start_compress(&info, TRUE);
-    std::string row = noise(size);
-    for (unsigned y = 0; y < size; ++y) {
-        auto* values = reinterpret_cast<unsigned char*>(row.data());
-        jpeg_write_scanlines(&info, &values, 1);
-    }
-    jpeg_finish_compress(&info);
-    const std::string all(reinterpret_cast<const char*>(at), bytes);
-    jpeg_destroy_compress(&info);
-    std::free(at);
-    return all;
 }
 
 std::string segment(char marker, const std::string& contents) {
@@ -94,7 +59,7 @@ TEST(DamagedImages, EndEarly) {
         {"TGA", tga + noise(64 * 64 * 3)},
         {"TGA with runs", tga_with_runs + runs},
         {"BMP", bmp + noise(64 * 64 * 3)},
-        {"JPEG", jpeg(64, false)},
+        {"JPEG", jpeg_of_noise(64, 1, false)},
         {"PPM", "P6 64 64 255\n" + noise(64 * 64 * 3)},
     };
     for (const auto& [name, bytes] : files) {
@@ -105,7 +70,7 @@ TEST(DamagedImages, EndEarly) {
                 << name << " without " << less;
     }
     // What is left of it is a whole image of less detail.
-    const std::string progressive = jpeg(64, true);
+    const std::string progressive = jpeg_of_noise(64, 1, true);
     EXPECT_EQ(complaint(progressive), "");
     EXPECT_EQ(complaint(progressive.substr(0, progressive.size() - 2)), "");
 }
