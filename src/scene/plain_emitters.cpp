@@ -206,7 +206,7 @@ void replace_emitter(PlainScene& s, int index) {
         for (const char* name : {"scale", "sun_radius_scale", "resolution"}) remove(o, name);
         o.type = "sunsky";
     }
-    if (o.type == "area" && !o.find("power")) {
+    if (o.type == "area") {
         const Param* p = o.find("two_sided");
         if (p && !std::get<bool>(p->value)) remove(o, "two_sided");
     }

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "scene/builder.h"
+#include "scene/plain_area_lights.h"
 #include "scene/plain_bsdfs.h"
 #include "scene/plain_emitters.h"
 #include "scene/plain_textures.h"
@@ -147,6 +148,7 @@ void strip(PlainScene& s, int index) {
 
 std::vector<std::string> make_plain_mitsuba(SceneDescription& scene) {
     check_types(scene);
+    std::vector<std::string> warnings = make_plain_area_lights(scene);
     PlainScene s(scene);
     PlainTextures textures(s);
     // Objects that are added on the way are plain.
@@ -158,7 +160,8 @@ std::vector<std::string> make_plain_mitsuba(SceneDescription& scene) {
     for (int i = 0; i < int(scene.objects.size()); ++i) hoist_masks(s, i);
     for (int i = 0; i < count; ++i) strip(s, i);
     keep_one_environment(s);
-    return s.take_warnings();
+    for (std::string& w : s.take_warnings()) warnings.push_back(std::move(w));
+    return warnings;
 }
 
 }  // namespace etendue
