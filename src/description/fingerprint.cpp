@@ -6,7 +6,7 @@
 #include <bit>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <vector>
 
 #include "math/content_hash.h"
 
@@ -15,9 +15,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string contents_of(const fs::path& path) {
+/// Adds the bytes of a file, which may be larger than the memory; none where it cannot be read.
+void add_contents(const fs::path& path, ContentHash& hash) {
     std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
+    std::vector<char> piece(size_t(1) << 16);
+    uint64_t size = 0;
+    while (in.read(piece.data(), std::streamsize(piece.size())), in.gcount() > 0) {
+        hash.add_piece({piece.data(), size_t(in.gcount())});
+        size += uint64_t(in.gcount());
+    }
+    hash.add(size);
 }
 
 /// The file from which the code of this function was loaded: the program, or a library such as the module of Python.
@@ -115,7 +122,7 @@ private:
             const fs::path path = fs::path(folder) / name;
             std::error_code ignored;
             if (!fs::is_regular_file(path, ignored)) continue;
-            hash_.add(contents_of(path));
+            add_contents(path, hash_);
             return;
         }
     }
@@ -131,7 +138,9 @@ uint64_t scene_fingerprint(const SceneDescription& description) {
 }
 
 uint64_t file_fingerprint(const std::string& file) {
-    return ContentHash().add(contents_of(file)).value();
+    ContentHash hash;
+    add_contents(file, hash);
+    return hash.value();
 }
 
 uint64_t program_fingerprint() {

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <system_error>
 
@@ -34,6 +35,7 @@
 #include "color/srgb.h"
 #include "image/image_contents.h"
 #include "image/plain_formats.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 namespace {
@@ -428,7 +430,9 @@ std::string bytes_of(const std::string& path) {
     const auto close = [](FILE* f) { std::fclose(f); };
     const std::unique_ptr<FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
     if (!file) fail();
-    std::string bytes(fs::file_size(path), '\0');
+    const auto size = fs::file_size(path);
+    if (!MemoryWatch().add(size)) throw std::bad_alloc();
+    std::string bytes(size, '\0');
     bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file.get()));
     if (std::ferror(file.get())) fail();
     return bytes;
@@ -446,8 +450,6 @@ ImageContents contents_of(const ImageSource& source, bool as_floats) {
         if (magic.starts_with("P2") || magic.starts_with("P3")) return read_pnm_text(source);
         if (magic.starts_with("P5") || magic.starts_with("P6")) return read_pnm(source);
         return read_by_stb(source);
-    } catch (const std::bad_alloc&) {
-        fail_read(source.name, "its pixels do not fit into memory");
     } catch (const Iex::BaseExc& e) {
         fail_read(source.name, e.what());
     }
@@ -480,30 +482,34 @@ std::vector<float> to_floats(const ImageContents& c, bool keep_codes) {
     return out;
 }
 
-}  // namespace
-
-Image read_image(const std::string& path) {
-    ImageContents c = read_contents(path, true);
-    Image image;
-    image.width = c.pixels.width, image.height = c.pixels.height;
-    image.data = to_floats(c, false);
-    image.channels = std::move(c.channels);
-    image.attributes = std::move(c.attributes);
-    return image;
-}
-
-static PixelBuffer to_pixels(ImageContents c, bool raw) {
+PixelBuffer to_pixels(ImageContents c, bool raw) {
     const bool is_deep = std::holds_alternative<std::vector<float>>(c.pixels.data);
     if (is_deep && !c.is_linear && !raw) c.pixels.data = to_floats(c, false);
     return std::move(c.pixels);
 }
 
+}  // namespace
+
+Image read_image(const std::string& path) {
+    return decode_in_memory(path, [&] {
+        ImageContents c = read_contents(path, true);
+        Image image;
+        image.width = c.pixels.width, image.height = c.pixels.height;
+        image.data = to_floats(c, false);
+        image.channels = std::move(c.channels);
+        image.attributes = std::move(c.attributes);
+        return image;
+    });
+}
+
 PixelBuffer read_pixels(const std::string& path, bool raw) {
-    return to_pixels(read_contents(path, false), raw);
+    return decode_in_memory(path, [&] { return to_pixels(read_contents(path, false), raw); });
 }
 
 PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, bool raw) {
-    return to_pixels(contents_of({name, bytes}, false), raw);
+    return decode_in_memory(name, [&] {
+        return to_pixels(contents_of({name, bytes}, false), raw);
+    });
 }
 
 std::string encode_png(int width, int height, std::span<const uint8_t> codes) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "image/image.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 
@@ -19,6 +20,11 @@ struct ImageSource {
 };
 
 [[noreturn]] void fail_read(const std::string& path, const std::string& why);
+/// Calls read(), which makes something of an image file, and fails where it does not fit into memory.
+template <class Read>
+auto decode_in_memory(const std::string& path, const Read& read) {
+    return in_memory(read, [&](const char* why) { fail_read(path, why); });
+}
 
 /// Throws if a header claims an image that is empty, or too large for its file or the memory.
 void check_image_size(const ImageSource& source, uint64_t width, uint64_t height,

@@ -10,6 +10,7 @@
 
 #include "color/srgb.h"
 #include "image/image_codecs.h"
+#include "image/image_contents.h"
 
 namespace etendue {
 namespace {
@@ -138,11 +139,13 @@ std::string image_extension(const std::string& path) {
 
 RgbImage read_rgb(const std::string& path, std::string_view layer) {
     const Image image = read_image(path);
-    try {
-        return {image.width, image.height, rgb_pixels(image, layer)};
-    } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("cannot read \"{}\": {}", path, e.what()));
-    }
+    return decode_in_memory(path, [&]() -> RgbImage {
+        try {
+            return {image.width, image.height, rgb_pixels(image, layer)};
+        } catch (const std::runtime_error& e) {
+            fail_read(path, e.what());
+        }
+    });
 }
 
 void check_image_extension(const std::string& path) {

@@ -22,13 +22,19 @@ std::string read_file_bytes(const std::string& path) {
     if (!file) fail();
 
     std::string bytes;
+    const auto grow = [&](size_t size) {
+        read_in_memory(path, [&] {
+            if (!MemoryWatch().add(size)) throw std::bad_alloc();
+            bytes.resize(size);
+        });
+    };
     size_t used = 0;
     // The size is only a hint: pipes and devices have none, and folders fail when they are read.
     struct stat status;
     if (fstat(fileno(file.get()), &status) == 0 && S_ISREG(status.st_mode))
-        bytes.resize(size_t(status.st_size) + 1);
+        grow(size_t(status.st_size) + 1);
     for (;;) {
-        if (used == bytes.size()) bytes.resize(bytes.size() + (size_t(1) << 16));
+        if (used == bytes.size()) grow(bytes.size() + (size_t(1) << 16));
         const size_t got = std::fread(&bytes[used], 1, bytes.size() - used, file.get());
         if (got == 0) break;
         used += got;

@@ -158,7 +158,7 @@ MeshData parse_obj(std::string_view text, const std::string& name, const MeshOpt
 }
 
 MeshData read_obj(const std::string& path, const MeshOptions& options) {
-    return parse_obj(read_file_bytes(path), path, options);
+    return read_in_memory(path, [&] { return parse_obj(read_file_bytes(path), path, options); });
 }
 
 }  // namespace etendue

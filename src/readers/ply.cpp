@@ -704,9 +704,11 @@ MeshData parse_ply(std::string_view bytes, const std::string& name, const MeshOp
 }
 
 MeshData read_ply(const std::string& path, const MeshOptions& options) {
-    std::string bytes = read_file_bytes(path);
-    if (is_gzip(bytes)) bytes = unpack_gzip(bytes, path);
-    return parse_ply(bytes, path, options);
+    return read_in_memory(path, [&] {
+        std::string bytes = read_file_bytes(path);
+        if (is_gzip(bytes)) bytes = unpack_gzip(bytes, path);
+        return parse_ply(bytes, path, options);
+    });
 }
 
 }  // namespace etendue

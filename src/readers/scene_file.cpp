@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "readers/file_bytes.h"
 #include "readers/gltf.h"
 #include "readers/mitsuba_xml.h"
 #include "readers/pbrt.h"
@@ -22,14 +23,17 @@ SceneDescription read_scene_file(const std::string& file, const ReadOptions& opt
     std::filesystem::path path = file;
     if (path.extension() == ".gz") path = path.stem();
     const std::string extension = path.extension().string();
-    if (extension == ".xml") return read_mitsuba_xml(file, options);
+    const auto read = [&](SceneDescription (*reader)(const std::string&, const ReadOptions&)) {
+        return read_in_memory(file, [&] { return reader(file, options); });
+    };
+    if (extension == ".xml") return read(read_mitsuba_xml);
     if (extension == ".pbrt") {
         if (!options.defines.empty()) throw UnusedDefines("scenes of pbrt have no parameters");
-        return read_pbrt(file, options);
+        return read(read_pbrt);
     }
     if (extension == ".gltf" || extension == ".glb") {
         if (!options.defines.empty()) throw UnusedDefines("scenes of glTF have no parameters");
-        return read_gltf(file, options);
+        return read(read_gltf);
     }
     throw std::runtime_error(
         fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3; "

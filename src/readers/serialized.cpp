@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "readers/file_bytes.h"
 #include "system/available_memory.h"
 
 namespace etendue {
@@ -252,12 +253,15 @@ MeshData read_serialized(const std::string& path, int shape_index, const MeshOpt
     const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
     if (!file || fseeko(file.get(), 0, SEEK_END) != 0) fail();
     const auto read = [&](uint64_t begin, uint64_t size) {
+        if (!MemoryWatch().add(size)) throw std::bad_alloc();
         std::string bytes(size, '\0');
         if (fseeko(file.get(), off_t(begin), SEEK_SET) != 0) fail();
         if (std::fread(bytes.data(), 1, size, file.get()) != size) fail();
         return bytes;
     };
-    return parse({uint64_t(ftello(file.get())), read, {path, 0}}, shape_index, options);
+    return read_in_memory(path, [&] {
+        return parse({uint64_t(ftello(file.get())), read, {path, 0}}, shape_index, options);
+    });
 }
 
 }  // namespace etendue

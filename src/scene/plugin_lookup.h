@@ -2,6 +2,7 @@
 // Lookup of the plug-in that an object of a description names, and the check of its parameters. Unknown names are
 // errors, or warnings under `lenient`.
 
+#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,6 +53,10 @@ public:
             return make();
         } catch (const SceneError&) {
             throw;
+        } catch (const std::bad_alloc&) {
+            throw SceneError(object(index).where, "there is not enough memory for " +
+                                                      object(index).category + " \"" +
+                                                      object(index).type + "\"");
         } catch (const std::exception& e) {
             throw SceneError(object(index).where, e.what());
         }

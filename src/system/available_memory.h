@@ -3,6 +3,7 @@
 // than they have would otherwise end the process.
 
 #include <cstdint>
+#include <new>
 #include <optional>
 #include <string>
 
@@ -21,6 +22,17 @@ std::string format_bytes(uint64_t bytes);
 /// Throws std::runtime_error where `bytes` are not available: "WHAT needs 99 GiB of memory, but only 3 GiB are free".
 /// `advice` is appended to the message.
 void require_memory(uint64_t bytes, const std::string& what, const std::string& advice = "");
+
+/// Calls read(), which allocates as much as a file asks for. Where memory ends, calls fail() with the reason.
+template <class Read, class Fail>
+auto in_memory(const Read& read, const Fail& fail) {
+    try {
+        return read();
+    } catch (const std::bad_alloc&) {
+        fail("it does not fit into memory");
+        throw;
+    }
+}
 
 /// Watches the growth of something whose size is not known before it is made.
 class MemoryWatch {

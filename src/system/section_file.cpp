@@ -235,8 +235,7 @@ void SectionReader::get_bytes(void* data, size_t size) {
 }
 
 void SectionReader::get(std::string& text) {
-    text.resize(size_t(count(1)));
-    get_bytes(text.data(), text.size());
+    get_list(text, count(1));
 }
 
 void SectionReader::finish() const {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "math/content_hash.h"
+#include "system/available_memory.h"
 #include "system/output_file.h"
 
 namespace etendue {
@@ -107,8 +108,7 @@ public:
     template <class T>
     void get(std::vector<T>& values) {
         static_assert(StoredNumber<T>);
-        values.resize(size_t(count(sizeof(T))));
-        get_bytes(values.data(), values.size() * sizeof(T));
+        get_list(values, count(sizeof(T)));
     }
     /// A list that must have `count` elements.
     template <class T>
@@ -116,8 +116,7 @@ public:
         static_assert(StoredNumber<T>);
         const uint64_t found = count(sizeof(T));
         if (found != expected) fail_count(what, found, expected);
-        values.resize(size_t(found));
-        get_bytes(values.data(), values.size() * sizeof(T));
+        get_list(values, found);
     }
     void get(std::string& text);
     /// Bytes of the open section that have not been read.
@@ -128,6 +127,11 @@ public:
     [[noreturn]] void fail(const std::string& why) const;
 
 private:
+    template <class List>
+    void get_list(List& values, uint64_t count) {
+        in_memory([&] { values.resize(size_t(count)); }, [&](const char* why) { fail(why); });
+        get_bytes(values.data(), values.size() * sizeof(values[0]));
+    }
     struct Section {
         std::string name;
         uint64_t begin, size, hash;

@@ -4,14 +4,20 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
 
 #include <gtest/gtest.h>
 
 #include "error_of.h"
 #include "image/image_io.h"
 #include "jpeg_of_noise.h"
+#include "limited_memory.h"
 #include "math/hash.h"
+#include "run_program.h"
 
 namespace etendue::test {
 namespace {
@@ -98,6 +104,32 @@ TEST(DamagedImages, ThatClaimTooManyPixelsTakeNoMemory) {
     std::string why;
     EXPECT_LT(memory_to_read(black_jpeg(24000, 1, ""), why), 400);
     EXPECT_NE(why.find("its header claims 24000 x 24000 pixels"), std::string::npos) << why;
+}
+
+/// As bytes, as pixels, or as numbers.
+TEST(LargeImages, AreNamedWhereMemoryEnds) {
+    const TemporaryFolder folder;
+    const std::string file = folder.path() / "large.pfm";
+    std::ofstream(file) << "PF\n1024 1024\n-1\n";
+    const auto readings = [&] {
+        return std::array<std::function<void()>, 3>{
+            [&] { read_pixels(file, false); }, [&] { read_image(file); }, [&] { read_rgb(file); }};
+    };
+    std::filesystem::resize_file(file, uint64_t(1) << 40);
+    for (const auto& read : readings())
+        EXPECT_EQ(error_of(read), "cannot read \"" + file + "\": it does not fit into memory");
+    if (!kCanLimitMemory) return;
+    std::filesystem::resize_file(file, 18 + 12 * 1024 * 1024);
+    for (const auto& read : readings()) {
+        int failures = 0;
+        for (uint64_t limit = 1; limit <= 64; limit += 5) {
+            const std::string verdict = in_limited_memory(limit << 20, read);
+            failures += !verdict.empty();
+            EXPECT_TRUE(verdict.empty() || verdict.starts_with("cannot read \"" + file)) << verdict;
+        }
+        EXPECT_GT(failures, 2);
+        EXPECT_LT(failures, 13);
+    }
 }
 
 TEST(DamagedImages, OfManyScansAreRefused) {

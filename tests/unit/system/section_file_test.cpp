@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "limited_memory.h"
+
 namespace etendue::test {
 namespace {
 
@@ -124,6 +126,22 @@ TEST_F(SectionFileTest, ListsAreNotLongerThanTheirSections) {
     from.get<uint64_t>();
     EXPECT_THROW(from.get<double>(), std::runtime_error);
     EXPECT_THROW(from.finish(), std::runtime_error);
+}
+
+TEST_F(SectionFileTest, ListsThatDoNotFitIntoMemoryAreNamed) {
+    if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers need the address space";
+    SectionWriter to(file);
+    to.begin("list");
+    to.put(std::vector<double>(size_t(4) << 20));
+    to.commit();
+    EXPECT_EQ(in_limited_memory(uint64_t(8) << 20,
+                                [&] {
+                                    SectionReader from(file);
+                                    std::vector<double> list;
+                                    from.open("list");
+                                    from.get(list);
+                                }),
+              file + ": section \"list\": it does not fit into memory");
 }
 
 TEST_F(SectionFileTest, OfAnotherVersionSaysSo) {
