@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 const fs::path kBroken = fs::path(ETENDUE_SOURCE_DIR) / "tests/scenes/broken";
 
 /// A small scene with a lamp, further objects `more`, and film parameters.
-std::string scene_text(const std::string& more = "") {
+std::string furnace_text(const std::string& more = "") {
     return "<scene version=\"3.0.0\"><default name=\"size\" value=\"16\"/><integrator "
            "type=\"path\"/><sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/>"
            "<film type=\"hdrfilm\"><integer name=\"width\" value=\"$size\"/><integer "
@@ -32,7 +32,7 @@ std::string scene_text(const std::string& more = "") {
 
 class ProgramTest : public ::testing::Test {
 protected:
-    ProgramTest() { write(scene, scene_text()); }
+    ProgramTest() { write(scene, furnace_text()); }
 
     static void write(const fs::path& file, const std::string& text) {
         std::ofstream(file) << text;
@@ -101,8 +101,8 @@ protected:
             const std::string type = meshes[i].extension().string().substr(1);
             if (type != "obj" && type != "ply") continue;
             write(scene,
-                  scene_text("<shape type=\"" + type + "\"><string name=\"filename\" value=\"" +
-                             meshes[i].string() + "\"/></shape>"));
+                  furnace_text("<shape type=\"" + type + "\"><string name=\"filename\" value=\"" +
+                               meshes[i].string() + "\"/></shape>"));
             expect_refusal({"render", scene.string(), "--spp", "1"}, meshes[i].filename().string());
         }
     }
@@ -413,7 +413,7 @@ TEST_F(ProgramTest, VerifiesMethods) {
     // An image of this scene, and one of a scene with another lamp.
     const auto picture = [&](const std::string& name, const std::string& more) {
         const fs::path other = folder.path() / (name + ".xml");
-        write(other, scene_text(more));
+        write(other, furnace_text(more));
         const fs::path file = folder.path() / (name + ".exr");
         EXPECT_EQ(run({"render", other.string(), "-o", file.string(), "-D", "size=8", "-i", "path",
                        "--spp", "256", "--sampler", "independent", "--aov", "variance"})

@@ -13,7 +13,7 @@
 namespace etendue::test {
 namespace {
 
-constexpr int kSize = 16;
+constexpr int kAgreementSize = 16;
 
 struct AgreementCase {
     const char* name;
@@ -35,7 +35,7 @@ std::string environment(const std::string& radiance) {
            "\"/></emitter>";
 }
 std::string ortho_camera() {
-    return sensor("0,0,3.4", "0,0,0", kSize, "", "", "orthographic");
+    return sensor("0,0,3.4", "0,0,0", kAgreementSize, "", "", "orthographic");
 }
 
 const std::string kSpot = "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"50\"/><rgb "
@@ -80,12 +80,12 @@ std::string smooth_mesh(const std::string& bsdf) {
 std::vector<AgreementCase> cases() {
     const std::string two =
         sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) + sphere("0.4,-0.65,0.3", "0.3", kRoughGlass);
-    const std::string front = front_camera(kSize);
+    const std::string front = front_camera(kAgreementSize);
     return {
         {"room", front + room() + area_lamp(), true},
         {"rough", front + room() + area_lamp() + two, true},
         {"mixed_room", mixed_room(front), false, 192, 0.08},
-        {"thinlens", lens_camera(kSize) + room() + area_lamp() + two, true, 480},
+        {"thinlens", lens_camera(kAgreementSize) + room() + area_lamp() + two, true, 480},
         {"orthographic", ortho_camera() + room() + area_lamp() + two, true},
         {"point", front + room() + two + point_light("0.4,0.8,3.6", "30,20,10"), false},
         {"point_on_diffuse", front + room() + point_light("0.4,0.8,3.6", "30,20,10"), true},
@@ -136,7 +136,7 @@ Tiles indirect_tiles(const Scene& scene, const std::string& integrator, uint64_t
 /// Paths of one edge.
 TEST(DirectlySeenLight, IsTheSameForAllMethods) {
     const Scene scene =
-        build(sensor("0,-0.8,0.5", "0,1,0", kSize) + room() + area_lamp() +
+        build(sensor("0,-0.8,0.5", "0,1,0", kAgreementSize) + room() + area_lamp() +
               environment("0.3,0.4,0.5") + point_light("0.1,0.5,0.1", "9,6,3") + kSun);
     const Tiles path = render_tiles(scene, "path:max_depth=1", {1024, 4, 1});
     for (const char* method :
@@ -216,7 +216,7 @@ class LongGuidedAgreement : public GuidedAgreement {};
 
 /// All parameters of gathers give unbiased methods.
 TEST(GatherChoices, AgreeWithPathTracing) {
-    const Scene scene = build(mixed_room(front_camera(kSize)));
+    const Scene scene = build(mixed_room(front_camera(kAgreementSize)));
     const Tiles path = indirect_tiles(scene, "path", 400, 1);
     uint64_t seed = 5;
     for (const char* choice :
@@ -235,14 +235,14 @@ TEST_P(LongAgreement, WithPathTracing) {
 
 /// Otherwise, GuidedAgreement would compare unguided walks.
 TEST(LearnedGuide, IsUsedInTheLantern) {
-    const Scene scene = build(lantern_room(front_camera(kSize)));
+    const Scene scene = build(lantern_room(front_camera(kAgreementSize)));
     const LearnedGuide learned(scene, IntegratorSpec::parse("bdpt:guide=on"), 1, 2);
     EXPECT_TRUE(learned.guide().guides_surfaces());
     EXPECT_GT(LearnedGuide::mean_shares(learned.shares())[0], 0.2);
 }
 
 TEST(LearnedGuide, IsNotUsedAtSurfacesOfARoom) {
-    const Scene scene = build(front_camera(kSize) + room() + area_lamp());
+    const Scene scene = build(front_camera(kAgreementSize) + room() + area_lamp());
     const LearnedGuide learned(scene, IntegratorSpec::parse("bdpt:guide=on"), 1, 2);
     EXPECT_FALSE(learned.guide().guides_surfaces());
 }

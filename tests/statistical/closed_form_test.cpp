@@ -12,20 +12,20 @@
 namespace etendue::test {
 namespace {
 
-constexpr int kSize = 8;
+constexpr int kFurnaceSize = 8;
 constexpr float kGlassEta = 1.5f;
 const std::string kPlainGlass =
     "<float name=\"int_ior\" value=\"1.5\"/><float name=\"ext_ior\" value=\"1\"/></bsdf>";
 
-std::string rgb(const char* name, Rgb v) {
+std::string rgb_value(const char* name, Rgb v) {
     return fmt::format("<rgb name=\"{}\" value=\"{},{},{}\"/>", name, v.r, v.g, v.b);
 }
 std::string lambert(Rgb reflectance) {
-    return "<bsdf type=\"diffuse\">" + rgb("reflectance", reflectance) + "</bsdf>";
+    return "<bsdf type=\"diffuse\">" + rgb_value("reflectance", reflectance) + "</bsdf>";
 }
 /// Looks down on z = 0 from z = 2; a film of kSize² pixels shows [-half, half]² of it. x runs to the left.
 std::string camera_above(const std::string& type, float half) {
-    const std::string size = std::to_string(kSize);
+    const std::string size = std::to_string(kFurnaceSize);
     const bool is_orthographic = type == "orthographic";
     std::string s = "<sensor type=\"" + type + "\">";
     if (!is_orthographic)
@@ -44,7 +44,7 @@ std::string camera_above(const std::string& type, float half) {
 }
 /// The point of z = 0 at a film point. With the view along -z and y up, x increases to the right of the film.
 Vec3 on_plane(float half, float x, float y) {
-    return {half * (2 * x / kSize - 1), half * (1 - 2 * y / kSize), 0};
+    return {half * (2 * x / kFurnaceSize - 1), half * (1 - 2 * y / kFurnaceSize), 0};
 }
 std::string floor_of(Rgb reflectance, float half = 4) {
     return rectangle(fmt::format("<scale value=\"{}\"/>", half), lambert(reflectance));
@@ -65,9 +65,9 @@ constexpr Rgb kAlbedo{0.7f, 0.5f, 0.2f}, kEmitted{1, 2, 3};
 /// Camera inside, off the centre.
 std::string furnace(const std::string& shape, const std::string& sensor_type = "perspective",
                     const std::string& extra = "", const std::string& bsdf = lambert(kAlbedo)) {
-    return sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kSize, "70", extra, sensor_type) +
+    return sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kFurnaceSize, "70", extra, sensor_type) +
            "<shape type=\"" + shape + "\"><boolean name=\"flip_normals\" value=\"true\"/>" + bsdf +
-           "<emitter type=\"area\">" + rgb("radiance", kEmitted) + "</emitter></shape>";
+           "<emitter type=\"area\">" + rgb_value("radiance", kEmitted) + "</emitter></shape>";
 }
 /// A mixture with the albedo kAlbedo in all, of Lambert surfaces of one colour with these weights.
 std::string mixture(const std::vector<float>& weights) {
@@ -152,7 +152,8 @@ TEST(ClosedForm, FurnaceByNumberOfLightPaths) {
                                                      "value=\"0.2\"/><float "
                                                      "name=\"focus_distance\" value=\"0.7\"/>"
                                                    : ""));
-        for (const int light_paths : {kSize * kSize / 4, 4 * kSize * kSize, 150})
+        for (const int light_paths :
+             {kFurnaceSize * kFurnaceSize / 4, 4 * kFurnaceSize * kFurnaceSize, 150})
             for (const char* integrator : {"bdpt", "bdpt:connections=cache", "vcm:merges=false"}) {
                 IntegratorSpec with = IntegratorSpec::parse(integrator);
                 with.params["light_paths"] = std::to_string(light_paths);
@@ -307,7 +308,7 @@ TEST_P(InOtherUnits, RadianceFarFromOne) {
         const Scene scene = build(camera_above("perspective", 1) + floor_of(kFloor) +
                                   "<emitter type=\"directional\"><vector name=\"direction\" "
                                   "value=\"0.3,0.4,-1\"/>" +
-                                  rgb("irradiance", Rgb(3, 2, 1) * unit) + "</emitter>");
+                                  rgb_value("irradiance", Rgb(3, 2, 1) * unit) + "</emitter>");
         expect_image(
             scene, {GetParam()}, 2048,
             [&](float, float) { return kFloor * Rgb(3, 2, 1) * (unit / (std::sqrt(1.25f) * kPi)); },
@@ -322,7 +323,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, InOtherUnits, ::testing::Values("path", "light
 
 TEST(ClosedForm, EnvironmentOnDiffuseSphere) {
     const Scene scene =
-        build(sensor("0,0,5", "0,0,0", kSize, "8") + sphere("0,0,0", "1", lambert(kFloor)) +
+        build(sensor("0,0,5", "0,0,0", kFurnaceSize, "8") + sphere("0,0,0", "1", lambert(kFloor)) +
               "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter>");
     expect_image(
         scene, {"path", "light", "bdpt"}, 2048, [](float, float) { return kFloor * Rgb(3, 2, 1); },
@@ -342,7 +343,7 @@ TEST(ClosedForm, EnvironmentSeenDirectly) {
 
 TEST(ClosedForm, EnvironmentOnMirror) {
     const Scene scene =
-        build(sensor("0,0,5", "0,0,0", kSize, "8") +
+        build(sensor("0,0,5", "0,0,0", kFurnaceSize, "8") +
               sphere("0,0,0", "1",
                      "<bsdf type=\"conductor\"><string name=\"material\" value=\"none\"/><rgb "
                      "name=\"specular_reflectance\" value=\"0.9,0.5,0.2\"/></bsdf>") +

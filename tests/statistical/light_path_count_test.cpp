@@ -10,7 +10,7 @@
 namespace etendue::test {
 namespace {
 
-constexpr int kSize = 8, kPixels = kSize * kSize;
+constexpr int kCountSize = 8, kPixels = kCountSize * kCountSize;
 
 /// The methods with the parameter light_paths. Those that estimate densities have a fixed radius, so that all have the
 /// same bias.
@@ -42,7 +42,7 @@ class NumberOfLightPaths : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(NumberOfLightPaths, KeepsTheMean) {
     // Lamp and lens are hit by both kinds of paths, so all techniques have a part.
-    const Scene scene = build(sensor("0,0,3.4", "0,0,0", kSize, "45",
+    const Scene scene = build(sensor("0,0,3.4", "0,0,0", kCountSize, "45",
                                      "<float name=\"aperture_radius\" value=\"0.3\"/><float "
                                      "name=\"focus_distance\" value=\"3\"/>",
                                      "thinlens") +

@@ -1,4 +1,4 @@
-// Density estimates: exact cases, and the decrease of their bias with the radius.
+// Density estimates: exact approximations, and the decrease of their bias with the radius.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -9,15 +9,15 @@
 namespace etendue::test {
 namespace {
 
-constexpr int kSize = 8;
+constexpr int kMapSize = 8;
 
 // ---- Cases where the disc is exact.
 
 /// A closed sphere of albedo ½ that emits L_e = 1. A ball around a point of a sphere cuts off a cap of area π r²; and
 /// the density of a diffuse event is the same everywhere, so that even the disc's approximation of p_c is exact.
-Scene furnace() {
+Scene furnace_scene() {
     return build(
-        sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kSize, "70") +
+        sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kMapSize, "70") +
         "<shape type=\"sphere\"><boolean name=\"flip_normals\" value=\"true\"/><bsdf "
         "type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.5,0.5,0.5\"/></bsdf>"
         "<emitter type=\"area\"><rgb name=\"radiance\" value=\"1,1,1\"/></emitter></shape>");
@@ -37,7 +37,7 @@ const auto kMethodName = [](const ::testing::TestParamInfo<Method>& p) {
 class PhotonFurnace : public ::testing::TestWithParam<Method> {};
 
 TEST_P(PhotonFurnace, IsEmissionOverOneMinusAlbedo) {
-    const Scene scene = furnace();
+    const Scene scene = furnace_scene();
     const Tiles exact = exact_tiles(scene.film(), 2, [](float, float) { return Rgb(2); });
     expect_same_image(render_tiles(scene, GetParam().spec, {GetParam().passes, 2}), exact, 0.02,
                       GetParam().spec);
@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(
 /// The irradiance at the nearest photon is that of the point to first order: with 60 photons within 1 %, for any share of
 /// the photons.
 TEST(IrradianceAtPhotons, IsThatAroundThem) {
-    const Scene scene = furnace();
+    const Scene scene = furnace_scene();
     for (const int step : {1, 4, 16}) {
         const Tiles tiles = render_tiles(
             scene,
@@ -94,7 +94,7 @@ TEST(IrradianceAtPhotons, IsThatAroundThem) {
 }
 
 /// Parallel light on a floor that ends at x = edge; the camera sees [-1, 1]². All light comes by photons.
-Scene lit_floor(float edge) {
+Scene lit_floor_scene(float edge) {
     return build(
         "<sensor type=\"orthographic\"><transform name=\"to_world\"><lookat origin=\"0,0,2\" "
         "target=\"0,0,0\" up=\"0,1,0\"/></transform><film type=\"hdrfilm\"><integer "
@@ -114,7 +114,7 @@ Rgb floor_radiance() {
 class PhotonFloor : public ::testing::TestWithParam<Method> {};
 
 TEST_P(PhotonFloor, IsLitUniformly) {
-    const Scene scene = lit_floor(1.5f);
+    const Scene scene = lit_floor_scene(1.5f);
     const Tiles exact = exact_tiles(scene.film(), 2, [](float, float) { return floor_radiance(); });
     expect_same_image(render_tiles(scene, GetParam().spec, {GetParam().passes, 2}), exact, 0.03,
                       GetParam().spec);
@@ -130,7 +130,7 @@ INSTANTIATE_TEST_SUITE_P(
 /// Near the edge the disc reaches beyond the floor. Averaged over a strip of the width w the estimate loses the first
 /// moment of a half disc, 2 r³/3, over π r² w: the bias is proportional to the radius.
 TEST(PhotonBias, OfAnEdgeIsProportionalToTheRadius) {
-    const Scene scene = lit_floor(1);
+    const Scene scene = lit_floor_scene(1);
     for (const float radius : {0.4f, 0.2f, 0.1f})
         for (const char* method :
              {"sppm:next_event=false,alpha=1,", "vcm:connections=false,alpha=1,"}) {
@@ -156,7 +156,7 @@ void PrintTo(const ApproximationCase& c, std::ostream* out) {
     *out << c.name;
 }
 
-std::vector<ApproximationCase> cases() {
+std::vector<ApproximationCase> approximations() {
     const std::string front = front_camera(16);
     const std::string gloss =
         "<bsdf type=\"twosided\"><bsdf type=\"blendbsdf\"><float name=\"weight\" "
@@ -211,7 +211,7 @@ TEST_P(PhotonApproximation, IsCloseForASmallRadius) {
                           fmt::format("{}: {}", c.name, spec));
 }
 
-INSTANTIATE_TEST_SUITE_P(Long, PhotonApproximation, ::testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(Long, PhotonApproximation, ::testing::ValuesIn(approximations()),
                          [](const auto& p) { return std::string(p.param.name); });
 
 // ---- Progressive photon mapping.

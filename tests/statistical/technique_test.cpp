@@ -13,7 +13,7 @@
 namespace etendue::test {
 namespace {
 
-constexpr int kSize = 8, kLongest = 6;
+constexpr int kTechniqueSize = 8, kLongest = 6;
 
 struct TechniqueCase {
     const char *name, *sensor, *integrator;
@@ -30,7 +30,7 @@ protected:
                                        "name=\"focus_distance\" value=\"0.7\"/>"
                                      : "";
         return build(
-            sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kSize, "70", lens, type) +
+            sensor("0.3,0.1,-0.2", "-1,-0.2,0.4", kTechniqueSize, "70", lens, type) +
             "<shape type=\"sphere\"><boolean name=\"flip_normals\" value=\"true\"/><bsdf "
             "type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.5,0.5,0.5\"/></bsdf>"
             "<emitter type=\"area\"><rgb name=\"radiance\" value=\"1,1,1\"/></emitter></shape>");
@@ -108,7 +108,7 @@ TEST_P(Techniques, AloneHaveTheMeanOfTheirLength) {
 
 /// An image of selected paths is the sum of the weighted images of their techniques.
 TEST(PathSelection, ImagesAreTheSumOfTheirTechniques) {
-    const Scene scene = build(front_camera(kSize) + room() + area_lamp());
+    const Scene scene = build(front_camera(kTechniqueSize) + room() + area_lamp());
     const auto render = [&](const PathSelection& shown) {
         RenderSettings settings;
         settings.integrator = IntegratorSpec::parse("bdpt:max_depth=4,roulette=0");

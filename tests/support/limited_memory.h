@@ -56,15 +56,15 @@ std::string in_limited_memory(uint64_t more, const Action& action) {
         } catch (const std::exception& e) {
             text = std::string(e.what()).substr(0, 4000);
         }
-        const ssize_t written = write(ends[1], text.data(), text.size());
+        const ssize_t written = ::write(ends[1], text.data(), text.size());
         _exit(written == ssize_t(text.size()) ? 0 : 1);
     }
-    close(ends[1]);
+    ::close(ends[1]);
     std::string text;
     char buffer[4096];
-    for (ssize_t n = 0; (n = read(ends[0], buffer, sizeof buffer)) > 0;)
+    for (ssize_t n = 0; (n = ::read(ends[0], buffer, sizeof buffer)) > 0;)
         text.append(buffer, size_t(n));
-    close(ends[0]);
+    ::close(ends[0]);
     int status = 0;
     waitpid(child, &status, 0);
     if (WIFSIGNALED(status)) return "ended by signal " + std::to_string(WTERMSIG(status));

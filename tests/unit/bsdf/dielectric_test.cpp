@@ -14,14 +14,13 @@ using Kind = Microfacet::Kind;
 
 constexpr float kEta[] = {1.5f, 1 / 1.5f, 1.1f, 2.4f};
 
-struct Roughness {
+struct Widths {
     float x, y;
 };
-constexpr Roughness kRoughness[] = {
-    {1, 1}, {0.3f, 0.3f}, {0.05f, 0.05f}, {0.001f, 0.001f}, {0.4f, 0.1f}};
+constexpr Widths kWidths[] = {{1, 1}, {0.3f, 0.3f}, {0.05f, 0.05f}, {0.001f, 0.001f}, {0.4f, 0.1f}};
 
-RoughDielectricLobe glass(Kind kind, Roughness a, float eta, Rgb reflectance = Rgb(1),
-                          Rgb transmittance = Rgb(1)) {
+RoughDielectricLobe rough_glass(Kind kind, Widths a, float eta, Rgb reflectance = Rgb(1),
+                                Rgb transmittance = Rgb(1)) {
     return {Microfacet(kind, a.x, a.y), eta, reflectance, transmittance};
 }
 
@@ -87,28 +86,28 @@ INSTANTIATE_TEST_SUITE_P(Both, RoughDielectricOf, ::testing::Values(Kind::Beckma
 
 TEST_P(RoughDielectricOf, SamplesMatchPdf) {
     const auto directions = test_directions_both_sides();
-    const double significance =
-        sidak(1e-3, int(2 * (std::size(kRoughness) + 2) * directions.size()));
+    const double significance = sidak(1e-3, int(2 * (std::size(kWidths) + 2) * directions.size()));
     for (Vec3 wo : directions) {
-        for (const Roughness a : kRoughness) {
+        for (const Widths a : kWidths) {
             SCOPED_TRACE(a.x);
-            expect_samples_match_pdf(glass(GetParam(), a, 1.5f), wo, significance, 30000);
+            expect_samples_match_pdf(rough_glass(GetParam(), a, 1.5f), wo, significance, 30000);
         }
         for (const float eta : {1 / 1.3f, 2.4f}) {
             SCOPED_TRACE(eta);
-            expect_samples_match_pdf(glass(GetParam(), {0.3f, 0.3f}, eta), wo, significance, 30000);
+            expect_samples_match_pdf(rough_glass(GetParam(), {0.3f, 0.3f}, eta), wo, significance,
+                                     30000);
         }
     }
 }
 
 TEST_P(RoughDielectricOf, ValueDensityAndWeightAgree) {
-    for (const Roughness a : kRoughness)
+    for (const Widths a : kWidths)
         for (float eta : kEta)
             for (Vec3 wo : test_directions_both_sides()) {
                 SCOPED_TRACE(a.x);
                 SCOPED_TRACE(eta);
                 const RoughDielectricLobe lobe =
-                    glass(GetParam(), a, eta, Rgb(0.5f, 1, 0), Rgb(1, 0.5f, 1));
+                    rough_glass(GetParam(), a, eta, Rgb(0.5f, 1, 0), Rgb(1, 0.5f, 1));
                 // One rounding of wi moves the facet by 1e-7 / |η − 1|, which is to be held against
                 // α.
                 expect_sample_agrees_with_eval(lobe, wo, a.x < 0.01f ? 1e-1 : 3e-3, 500);
@@ -117,11 +116,12 @@ TEST_P(RoughDielectricOf, ValueDensityAndWeightAgree) {
 }
 
 TEST_P(RoughDielectricOf, AlbedoAgreesWithQuadratureAndLosesOnlyMultipleScattering) {
-    for (const Roughness a : kRoughness)
+    for (const Widths a : kWidths)
         for (Vec3 wo : test_directions_both_sides()) {
             SCOPED_TRACE(a.x);
             // Red sees all, green the reflection alone.
-            const RoughDielectricLobe lobe = glass(GetParam(), a, 1.5f, Rgb(1, 1, 0), Rgb(1, 0, 1));
+            const RoughDielectricLobe lobe =
+                rough_glass(GetParam(), a, 1.5f, Rgb(1, 1, 0), Rgb(1, 0, 1));
             expect_energy_conserved(lobe, wo);
             const Albedo sampled = sampled_albedo(lobe, wo);
             for (int c : {0, 1})
@@ -136,15 +136,15 @@ TEST_P(RoughDielectricOf, AlbedoAgreesWithQuadratureAndLosesOnlyMultipleScatteri
 
 TEST_P(RoughDielectricOf, IsFinite) {
     for (float eta : kEta) {
-        for (const Roughness a : kRoughness) expect_finite(glass(GetParam(), a, eta));
-        expect_finite(glass(GetParam(), {0, 0}, eta));
-        expect_finite(glass(GetParam(), {100, 100}, eta));
+        for (const Widths a : kWidths) expect_finite(rough_glass(GetParam(), a, eta));
+        expect_finite(rough_glass(GetParam(), {0, 0}, eta));
+        expect_finite(rough_glass(GetParam(), {100, 100}, eta));
     }
 }
 
 TEST_P(RoughDielectricOf, SharpLobeTendsToTheSmoothDielectric) {
     const RoughDielectricLobe lobe =
-        glass(GetParam(), {1e-4f, 1e-4f}, 1.5f, Rgb(1, 0, 0), Rgb(0, 1, 0));
+        rough_glass(GetParam(), {1e-4f, 1e-4f}, 1.5f, Rgb(1, 0, 0), Rgb(0, 1, 0));
     for (Vec3 wo : {direction(0, 0), direction(30, 0), direction(35, 130), direction(150, 40)}) {
         const float F = fresnel_dielectric(wo.z, 1.5f).R;
         const Albedo a = sampled_albedo(lobe, wo, 64);

@@ -10,30 +10,30 @@ namespace {
 
 using namespace etendue::testing;
 
-DiffuseTransmissionLobe lobe() {
+DiffuseTransmissionLobe paper() {
     return {Rgb(0.2f, 0.3f, 0.4f), Rgb(0.1f, 0.5f, 0.6f)};
 }
 
 TEST(DiffuseTransmission, SamplesMatchPdf) {
     const auto directions = test_directions_both_sides();
     const double significance = sidak(1e-3, int(2 * directions.size()));
-    for (Vec3 wo : directions) expect_samples_match_pdf(lobe(), wo, significance, 30000);
+    for (Vec3 wo : directions) expect_samples_match_pdf(paper(), wo, significance, 30000);
 }
 
 TEST(DiffuseTransmission, ValueDensityAndWeightAgree) {
     for (Vec3 wo : test_directions_both_sides()) {
-        expect_sample_agrees_with_eval(lobe(), wo);
-        expect_adjoint_symmetry(lobe(), wo);
-        expect_energy_conserved(lobe(), wo);
+        expect_sample_agrees_with_eval(paper(), wo);
+        expect_adjoint_symmetry(paper(), wo);
+        expect_energy_conserved(paper(), wo);
     }
-    expect_finite(lobe());
+    expect_finite(paper());
 }
 
 TEST(DiffuseTransmission, AlbedoIsTheSumOfBoth) {
     for (Vec3 wo : test_directions_both_sides())
         for (int c = 0; c < 3; ++c)
-            EXPECT_NEAR(integrated_albedo(lobe(), wo, c),
-                        lobe().reflectance[c] + lobe().transmittance[c], 1e-3);
+            EXPECT_NEAR(integrated_albedo(paper(), wo, c),
+                        paper().reflectance[c] + paper().transmittance[c], 1e-3);
 }
 
 TEST(DiffuseTransmission, MaterialRefusesMoreLightThanThereIs) {

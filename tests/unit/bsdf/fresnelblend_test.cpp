@@ -12,7 +12,7 @@ using namespace etendue::testing;
 
 constexpr float kAlphas[] = {0.02f, 0.1f, 0.5f};
 
-FresnelBlendLobe lobe(float alpha) {
+FresnelBlendLobe blend(float alpha) {
     return {Rgb(0.2f, 0.5f, 0.7f),
             Rgb(0.05f, 0.1f, 0.3f),
             {Microfacet::Kind::Ggx, alpha, 1.5f * alpha}};
@@ -23,7 +23,7 @@ TEST(FresnelBlend, SamplesMatchPdf) {
     for (const float alpha : kAlphas)
         for (Vec3 wo : test_directions()) {
             SCOPED_TRACE(alpha);
-            expect_samples_match_pdf(lobe(alpha), wo, significance, 30000);
+            expect_samples_match_pdf(blend(alpha), wo, significance, 30000);
         }
 }
 
@@ -31,11 +31,11 @@ TEST(FresnelBlend, ValueDensityAndWeightAgree) {
     for (const float alpha : kAlphas) {
         SCOPED_TRACE(alpha);
         for (Vec3 wo : test_directions_both_sides()) {
-            expect_sample_agrees_with_eval(lobe(alpha), wo, 3e-3);
-            expect_adjoint_symmetry(lobe(alpha), wo, 3e-3);
-            expect_energy_conserved(lobe(alpha), wo);
+            expect_sample_agrees_with_eval(blend(alpha), wo, 3e-3);
+            expect_adjoint_symmetry(blend(alpha), wo, 3e-3);
+            expect_energy_conserved(blend(alpha), wo);
         }
-        expect_finite(lobe(alpha));
+        expect_finite(blend(alpha));
     }
 }
 

@@ -10,7 +10,7 @@ namespace {
 using namespace etendue::testing;
 
 /// Mean of sample()'s weights.
-double sampled_albedo(const Bsdf& bsdf, Vec3 wo) {
+double albedo_of(const Bsdf& bsdf, Vec3 wo) {
     LobeRandom random(1);
     constexpr int kSamples = 200000;
     double sum = 0;
@@ -34,7 +34,7 @@ TEST(LobeSum, EveryLobeCountsInFull) {
                                          {"eta", 1.5}})
                           .bsdf(plane_point(wo), arena);
     const double F = fresnel_dielectric(wo.z, 1.5f).R;
-    EXPECT_NEAR(sampled_albedo(bsdf, wo), 0.3 + 0.5 * F + 0.3 * (1 - F), 3e-3);
+    EXPECT_NEAR(albedo_of(bsdf, wo), 0.3 + 0.5 * F + 0.3 * (1 - F), 3e-3);
 }
 
 TEST(LobeSum, DiffuseAndGlossyAddUp) {

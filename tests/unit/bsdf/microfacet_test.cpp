@@ -9,11 +9,11 @@ namespace {
 
 using testing::direction;
 
-struct Roughness {
+struct Alpha {
     float x, y;
 };
-constexpr Roughness kRoughness[] = {{1, 1},           {0.5f, 0.5f},  {0.1f, 0.1f},
-                                    {0.001f, 0.001f}, {0.4f, 0.08f}, {0.05f, 0.8f}};
+constexpr Alpha kAlphaPairs[] = {{1, 1},           {0.5f, 0.5f},  {0.1f, 0.1f},
+                                 {0.001f, 0.001f}, {0.4f, 0.08f}, {0.05f, 0.8f}};
 constexpr double kAngles[] = {0, 30, 60, 85, 89.5};
 
 class MicrofacetOf : public ::testing::TestWithParam<Microfacet::Kind> {};
@@ -40,7 +40,7 @@ double integrate_normals(const Microfacet& d, const F& f) {
 }
 
 TEST_P(MicrofacetOf, ProjectedAreaOfNormalsIsOne) {
-    for (const Roughness a : kRoughness) {
+    for (const Alpha a : kAlphaPairs) {
         const Microfacet d(GetParam(), a.x, a.y);
         EXPECT_NEAR(integrate_normals(d, [&](Vec3 m) { return d.D(m) * m.z; }), 1, 1e-3)
             << a.x << " " << a.y;
@@ -48,7 +48,7 @@ TEST_P(MicrofacetOf, ProjectedAreaOfNormalsIsOne) {
 }
 
 TEST_P(MicrofacetOf, SigmaIsTheProjectedAreaOfFacingNormals) {
-    for (const Roughness a : kRoughness)
+    for (const Alpha a : kAlphaPairs)
         for (const double theta : kAngles) {
             const Microfacet d(GetParam(), a.x, a.y);
             const Vec3 w = direction(theta, 35);
@@ -60,8 +60,8 @@ TEST_P(MicrofacetOf, SigmaIsTheProjectedAreaOfFacingNormals) {
 }
 
 TEST_P(MicrofacetOf, VisibleNormalsFollowTheirDensity) {
-    const double significance = sidak(1e-3, 2 * int(std::size(kRoughness) * std::size(kAngles)));
-    for (const Roughness a : kRoughness)
+    const double significance = sidak(1e-3, 2 * int(std::size(kAlphaPairs) * std::size(kAngles)));
+    for (const Alpha a : kAlphaPairs)
         for (const double theta : kAngles) {
             const Microfacet d(GetParam(), a.x, a.y);
             const Vec3 w = direction(theta, 35);

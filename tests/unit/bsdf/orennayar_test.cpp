@@ -12,22 +12,22 @@ using namespace etendue::testing;
 
 /// A and B at σ = 20°.
 constexpr float kA = 0.8651f, kB = 0.2589f;
-OrenNayarLobe lobe() {
+OrenNayarLobe clay() {
     return {Rgb(0.2f, 0.5f, 0.8f), kA, kB};
 }
 
 TEST(OrenNayar, SamplesMatchPdf) {
     const double significance = sidak(1e-3, int(2 * test_directions().size()));
-    for (Vec3 wo : test_directions()) expect_samples_match_pdf(lobe(), wo, significance, 30000);
+    for (Vec3 wo : test_directions()) expect_samples_match_pdf(clay(), wo, significance, 30000);
 }
 
 TEST(OrenNayar, ValueDensityAndWeightAgree) {
     for (Vec3 wo : test_directions_both_sides()) {
-        expect_sample_agrees_with_eval(lobe(), wo);
-        expect_adjoint_symmetry(lobe(), wo);
-        expect_energy_conserved(lobe(), wo);
+        expect_sample_agrees_with_eval(clay(), wo);
+        expect_adjoint_symmetry(clay(), wo);
+        expect_energy_conserved(clay(), wo);
     }
-    expect_finite(lobe());
+    expect_finite(clay());
 }
 
 TEST(OrenNayar, IsThePublishedFormula) {
@@ -35,10 +35,10 @@ TEST(OrenNayar, IsThePublishedFormula) {
     const Vec3 wo = direction(to * 180 / M_PI, 20),
                wi = direction(ti * 180 / M_PI, 20 + dphi * 180 / M_PI);
     const double f = 0.5 / M_PI * (kA + kB * std::cos(dphi) * std::sin(to) * std::tan(ti));
-    EXPECT_NEAR(lobe().eval(wo, wi).f.g, f * std::cos(ti), 1e-6);
+    EXPECT_NEAR(clay().eval(wo, wi).f.g, f * std::cos(ti), 1e-6);
     // Facets that face away from the light add nothing.
     const Vec3 behind = direction(ti * 180 / M_PI, 200);
-    EXPECT_NEAR(lobe().eval(wo, behind).f.g, 0.5 / M_PI * kA * std::cos(ti), 1e-6);
+    EXPECT_NEAR(clay().eval(wo, behind).f.g, 0.5 / M_PI * kA * std::cos(ti), 1e-6);
 }
 
 TEST(OrenNayar, MaterialTurnsSigmaIntoTheFactors) {

@@ -10,7 +10,7 @@ using namespace etendue::testing;
 
 /// A material at a point of the plane z = 0, with the interface of a lobe. The local frame is the
 /// world's.
-struct MaterialLobe {
+struct WrappedLobe {
     const Material* material;
     TransportMode mode = TransportMode::Importance;
     Vec2 uv{0.5f, 0.5f};
@@ -39,8 +39,8 @@ struct MaterialLobe {
 /// What the two ends of a path see of a vertex: f̃ |wi·ng| of radiance from wo is, up to the
 /// cosines, that of importance from wi, with the densities exchanged.
 void expect_both_ends_agree(const Material& material, Vec2 uv = {0.5f, 0.5f}) {
-    const MaterialLobe from_eye{&material, TransportMode::Radiance, uv};
-    const MaterialLobe from_light{&material, TransportMode::Importance, uv};
+    const WrappedLobe from_eye{&material, TransportMode::Radiance, uv};
+    const WrappedLobe from_light{&material, TransportMode::Importance, uv};
     LobeRandom random(11);
     int count = 0;
     for (int i = 0; i < 2000; ++i) {
@@ -76,7 +76,7 @@ TEST(TwoSided, LooksTheSameFromBothSides) {
     TestMaterials m;
     const int plastic = m.bsdf("roughplastic", {{"alpha", 0.2}});
     const Material& two_sided = m.make("twosided", {}, {{"", plastic}});
-    const MaterialLobe lobe{&two_sided}, one_sided{&m.make(plastic)};
+    const WrappedLobe lobe{&two_sided}, one_sided{&m.make(plastic)};
     EXPECT_TRUE(two_sided.is_two_sided());
     EXPECT_FALSE(two_sided.is_transmissive());
     LobeRandom random(12);
@@ -100,7 +100,7 @@ TEST(TwoSided, PutsTwoMaterialsOnTwoSides) {
     const int red = m.bsdf("diffuse", reflectance({1, 0, 0})),
               blue = m.bsdf("diffuse", reflectance({0, 0, 1}));
     const Material& material = m.make("twosided", {}, {{"", red}, {"", blue}});
-    const MaterialLobe lobe{&material};
+    const WrappedLobe lobe{&material};
     EXPECT_EQ(lobe.sample(direction(30, 0), 0.5f, {0.3f, 0.3f})->weight, Rgb(1, 0, 0));
     EXPECT_EQ(lobe.sample(direction(150, 0), 0.5f, {0.3f, 0.3f})->weight, Rgb(0, 0, 1));
     EXPECT_LT(lobe.sample(direction(150, 0), 0.5f, {0.3f, 0.3f})->wi.z, 0);
@@ -109,7 +109,7 @@ TEST(TwoSided, PutsTwoMaterialsOnTwoSides) {
 
     // Within another one the inner material sees its front only.
     const int inner = m.bsdf("twosided", {}, {{"", red}, {"", blue}});
-    const MaterialLobe outer{&m.make("twosided", {}, {{"", inner}})};
+    const WrappedLobe outer{&m.make("twosided", {}, {{"", inner}})};
     EXPECT_EQ(outer.sample(direction(150, 0), 0.5f, {0.3f, 0.3f})->weight, Rgb(1, 0, 0));
 }
 
@@ -147,7 +147,7 @@ TEST(Mask, HasItsOpacityAndDoesNotScaleTheNestedMaterial) {
     EXPECT_FLOAT_EQ(material.opacity({0.25f, 0}), 0.5f);
     EXPECT_EQ(material.opacity({0.75f, 0}), 1);  // not 1.5
     EXPECT_FALSE(material.is_opaque());
-    EXPECT_EQ(MaterialLobe{&material}.sample(direction(30, 0), 0.5f, {0.3f, 0.3f})->weight,
+    EXPECT_EQ(WrappedLobe{&material}.sample(direction(30, 0), 0.5f, {0.3f, 0.3f})->weight,
               Rgb(0.8f));
 
     EXPECT_FLOAT_EQ(m.make("mask", {}, {{"", diffuse}}).opacity(Vec2()), 0.5f);
@@ -167,7 +167,7 @@ TEST(Null, IsNeverMet) {
     EXPECT_EQ(material.opacity(Vec2()), 0);
     EXPECT_FALSE(material.is_opaque());
     EXPECT_FALSE(material.may_be_smooth());
-    const MaterialLobe lobe{&material};
+    const WrappedLobe lobe{&material};
     EXPECT_TRUE(lobe.eval(direction(30, 0), direction(30, 90)).f.is_zero());
     EXPECT_FALSE(lobe.sample(direction(30, 0), 0.5f, {0.5f, 0.5f}));
 }
@@ -181,8 +181,8 @@ TEST(BlendBsdf, IsTheWeightedSumOfItsMaterials) {
     const int c = m.bsdf("phong", {{"exponent", 50.0}});
     const int bc = m.bsdf("blendbsdf", {{"weight", 0.25}}, {{"", b}, {"", c}});
     const Material& blend = m.make("blendbsdf", {{"weight", 0.4}}, {{"", a}, {"", bc}});
-    const MaterialLobe lobe{&blend};
-    const std::pair<float, MaterialLobe> parts[] = {
+    const WrappedLobe lobe{&blend};
+    const std::pair<float, WrappedLobe> parts[] = {
         {0.6f, {&m.make(a)}}, {0.3f, {&m.make(b)}}, {0.1f, {&m.make(c)}}};
     LobeRandom random(13);
     for (Vec3 wo : test_directions())
@@ -213,7 +213,7 @@ TEST(BlendBsdf, BlendsOneSidedTwoSidedAndTransmissiveMaterials) {
     const int glass = m.bsdf("roughdielectric", {{"alpha", 0.3}});
     const Material& blend = m.make("blendbsdf", {{"weight", 0.5}}, {{"", dust}, {"", glass}});
     EXPECT_TRUE(blend.is_transmissive());
-    const MaterialLobe lobe{&blend}, only_glass{&m.make(glass)};
+    const WrappedLobe lobe{&blend}, only_glass{&m.make(glass)};
     // From behind, the frame of the two-sided half is turned and that of the glass is not.
     const Vec3 wo = direction(150, 0), through = direction(40, 180);
     EXPECT_FALSE(only_glass.eval(wo, through).f.is_zero());
@@ -232,12 +232,12 @@ TEST(BlendBsdf, SharesOpacity) {
     EXPECT_FALSE(blend.is_opaque());
     // Of the light that meets the surface, 0.4 of 0.6 meets the white material.
     const Vec3 wo = direction(30, 0), wi = direction(40, 90);
-    EXPECT_NEAR(MaterialLobe{&blend}.eval(wo, wi).f.g, wi.z / kPi * 0.4f / 0.6f, 1e-6f);
+    EXPECT_NEAR(WrappedLobe{&blend}.eval(wo, wi).f.g, wi.z / kPi * 0.4f / 0.6f, 1e-6f);
 
     const Material& with_null =
         m.make("blendbsdf", {{"weight", 1.0}}, {{"", white}, {"", m.bsdf("null")}});
     EXPECT_EQ(with_null.opacity(Vec2()), 0);
-    EXPECT_FALSE(MaterialLobe{&with_null}.sample(wo, 0.5f, {0.5f, 0.5f}));
+    EXPECT_FALSE(WrappedLobe{&with_null}.sample(wo, 0.5f, {0.5f, 0.5f}));
 }
 
 TEST(BlendBsdf, ParametersAreChecked) {
@@ -266,7 +266,7 @@ TEST(BumpMap, HasTheNormalOfTheDisplacedSurface) {
     TestMaterials m;
     const int diffuse = m.bsdf("diffuse");
     // z = 2 (0.3 x − 0.1 y)
-    const MaterialLobe lobe{&bumped(m, {0.3f, -0.1f}, diffuse, 2)};
+    const WrappedLobe lobe{&bumped(m, {0.3f, -0.1f}, diffuse, 2)};
     expect_near(lobe.shading_normal({0, 0, 1}), normalize({-0.6f, 0.2f, 1}));
 
     // Tangents of another length, not at right angles: u and v run along (2, 0) and (1, 4), and h =
@@ -291,7 +291,7 @@ TEST(BumpMap, HasTheNormalOfTheDisplacedSurface) {
     FunctionTexture slope;
     slope.slope = [](Vec2) { return Vec2{0.6f, -0.2f}; };
     for (const char* name : {"displacement", "arbitrary"}) {
-        const MaterialLobe named{&m.make("bumpmap", {}, {{"", diffuse}, {name, m.texture(slope)}})};
+        const WrappedLobe named{&m.make("bumpmap", {}, {{"", diffuse}, {name, m.texture(slope)}})};
         expect_near(named.shading_normal({0, 0, 1}), normalize({-0.6f, 0.2f, 1}));
     }
 
@@ -304,7 +304,7 @@ TEST(BumpMap, HasTheNormalOfTheDisplacedSurface) {
 TEST(NormalMap, HasTheNormalOfTheTexture) {
     TestMaterials m;
     const Vec3 n = normalize({0.3f, -0.4f, 0.8f});
-    const MaterialLobe lobe{&normal_mapped(m, n, m.bsdf("diffuse"))};
+    const WrappedLobe lobe{&normal_mapped(m, n, m.bsdf("diffuse"))};
     expect_near(lobe.shading_normal({0, 0, 1}), n);
     expect_near(lobe.shading_normal({0, 0, -1}), n);
 }
@@ -340,7 +340,7 @@ TEST(PerturbedFrame, TwoSidedWrapsInBothOrders) {
     heights.slope = [n](Vec2) { return Vec2{-n.x / n.z, -n.y / n.z}; };
     const int normal_map = m.texture(normals), bump_map = m.texture(heights);
     const auto normal_behind = [&](const Material& material) {
-        return MaterialLobe{&material}.shading_normal(behind);
+        return WrappedLobe{&material}.shading_normal(behind);
     };
 
     // Inside, the tilt is the same on both sides; outside, the whole normal is turned.
@@ -362,7 +362,7 @@ TEST(PerturbedFrame, BothEndsOfAPathAgree) {
     expect_both_ends_agree(bumped(m, {0.5f, -0.3f}, glass));
     expect_both_ends_agree(normal_mapped(m, {0.6f, 0, 0.8f}, both));
     // Samples lost below the surface are part of the density.
-    const MaterialLobe lobe{&bumped(m, {0.5f, -0.3f}, both)};
+    const WrappedLobe lobe{&bumped(m, {0.5f, -0.3f}, both)};
     const double significance = sidak(1e-3, 4);
     for (Vec3 wo : {direction(50, 30), direction(130, 200)}) {
         expect_samples_match_pdf(lobe, wo, significance, 20000);

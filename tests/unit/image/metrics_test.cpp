@@ -13,7 +13,7 @@
 namespace etendue {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kUndefined = std::numeric_limits<float>::quiet_NaN();
 
 std::vector<Rgb> random_image(size_t n, uint64_t seed) {
     std::vector<Rgb> v(n);
@@ -107,9 +107,9 @@ TEST(Metrics, BrightReferencesCountForMeansOnly) {
 
 TEST(Metrics, PixelsThatAreNotFiniteAreCounted) {
     std::vector<Rgb> x(10, Rgb(2)), r(10, Rgb(1));
-    x[3].g = kNaN;
+    x[3].g = kUndefined;
     x[4].r = std::numeric_limits<float>::infinity();
-    r[5].b = kNaN;
+    r[5].b = kUndefined;
     const ImageErrors e = image_errors(x, r);
     EXPECT_EQ(e.not_finite, 3u);
     EXPECT_EQ(e.mse, 1);
@@ -117,7 +117,7 @@ TEST(Metrics, PixelsThatAreNotFiniteAreCounted) {
     const auto map = relative_squared_errors(x, r);
     EXPECT_TRUE(std::isnan(map[3]) && std::isnan(map[4]) && std::isnan(map[5]));
     EXPECT_NEAR(map[0], 1 / 1.01, 1e-6);
-    EXPECT_THROW(image_errors(std::vector<Rgb>(1, Rgb(kNaN)), std::vector<Rgb>(1)),
+    EXPECT_THROW(image_errors(std::vector<Rgb>(1, Rgb(kUndefined)), std::vector<Rgb>(1)),
                  std::invalid_argument);
 }
 
@@ -198,7 +198,7 @@ TEST(Flip, LdrIsSymmetric) {
 
 TEST(Flip, PixelsThatAreNotFiniteAreWrong) {
     TestPair p;
-    p.hdr[777].g = kNaN;
+    p.hdr[777].g = kUndefined;
     const FlipResult flip = hdr_flip(p.hdr, p.hdr_reference, kWidth, kHeight);
     EXPECT_EQ(flip.map[777], 1);
     EXPECT_TRUE(std::isfinite(flip.mean));

@@ -16,13 +16,13 @@ using testing::Random;
 
 /// All χ² tests of this file together raise a false alarm with this probability (were the seeds not
 /// fixed).
-constexpr double kFalseAlarm = 1e-3;
-constexpr int kTests = 8;
-constexpr int kDraws = 200000;
+constexpr double kFalseAlarmOfWarps = 1e-3;
+constexpr int kWarps = 8;
+constexpr int kDrawsOfWarp = 200000;
 constexpr double kTau = 2 * M_PI;
 
 void expect_passes(const Chi2Result& result) {
-    EXPECT_GT(result.p_value, sidak(kFalseAlarm, kTests))
+    EXPECT_GT(result.p_value, sidak(kFalseAlarmOfWarps, kWarps))
         << "chi2 " << result.statistic << " at " << result.degrees << " degrees of freedom";
     EXPECT_NEAR(result.total_probability, 1, 1e-4);
 }
@@ -38,7 +38,7 @@ template <class Sample, class Pdf>
 void expect_directions(Sample&& sample, Pdf&& pdf, double lowest_cosine) {
     Random random(1);
     Chi2Grid grid(lowest_cosine, 1, 20, 0, kTau, 24);
-    for (int i = 0; i < kDraws; ++i) {
+    for (int i = 0; i < kDrawsOfWarp; ++i) {
         const Vec3 w = sample(random.next_2d());
         ASSERT_NEAR(length(w), 1, 1e-6f);
         // Near the pole x and y know the angle better than z does.
@@ -78,7 +78,7 @@ TEST(Warp, NarrowConesAreFine) {
 TEST(Warp, UniformDisk) {
     Random random(2);
     Chi2Grid grid(0, 1, 16, 0, kTau, 24);  // r² and φ: equal cells have equal areas
-    for (int i = 0; i < kDraws; ++i) {
+    for (int i = 0; i < kDrawsOfWarp; ++i) {
         const Vec2 p = sample_uniform_disk(random.next_2d());
         grid.add(double(p.x) * p.x + double(p.y) * p.y, azimuth(p.x, p.y));
     }
@@ -104,7 +104,7 @@ TEST(Warp, UniformDiskIsContinuous) {
 TEST(Warp, UniformTriangle) {
     Random random(3);
     Chi2Grid grid(0, 1, 16, 0, 1, 16);
-    for (int i = 0; i < kDraws; ++i) {
+    for (int i = 0; i < kDrawsOfWarp; ++i) {
         const Vec2 b = sample_uniform_triangle(random.next_2d());
         ASSERT_GE(b.x, 0);
         ASSERT_GE(b.y, 0);

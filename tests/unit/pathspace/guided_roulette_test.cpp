@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "guide/guide.h"
+#include "modes.h"
 #include "pathspace/walk.h"
 #include "test_scenes.h"
 
 namespace etendue {
 namespace {
 
-constexpr auto kEye = TransportMode::Radiance, kLight = TransportMode::Importance;
 constexpr float kLightContribution = 3;
 
 /// One cell without lobes, whose contributions differ by mode and side; unknown on the ceiling.

@@ -5,6 +5,7 @@
 #include "chi2.h"
 #include "guide/guide.h"
 #include "math/warp.h"
+#include "modes.h"
 #include "pathspace/walk.h"
 #include "random.h"
 #include "test_scenes.h"
@@ -13,8 +14,6 @@ namespace etendue {
 namespace {
 
 using testing::Random;
-
-constexpr auto kEye = TransportMode::Radiance, kLight = TransportMode::Importance;
 
 struct Case {
     const char* name;

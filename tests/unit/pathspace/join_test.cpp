@@ -15,13 +15,13 @@ namespace {
 
 constexpr int kPixels = 8;
 
-struct Case {
+struct JoinCase {
     const char* name;
     std::string xml;
     bool has_delta = false;  ///< Smooth glass and coats.
 };
 
-std::vector<Case> cases() {
+std::vector<JoinCase> join_cases() {
     using namespace test;
     const std::string spheres =
         sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) + sphere("0.4,-0.65,0.3", "0.3", kRoughGlass);
@@ -74,11 +74,11 @@ struct RandomLevels final : LearnedPlaces {
     }
 };
 
-class Joins : public ::testing::TestWithParam<std::tuple<Case, Extra>> {
+class Joins : public ::testing::TestWithParam<std::tuple<JoinCase, Extra>> {
 protected:
     Joins()
-        : scene(test::build(std::get<Case>(GetParam()).xml)), film(scene.film(), scene.filter()),
-          sampler(SamplerKind::Independent, 7) {
+        : scene(test::build(std::get<JoinCase>(GetParam()).xml)),
+          film(scene.film(), scene.filter()), sampler(SamplerKind::Independent, 7) {
         const float N = kPixels * kPixels;
         counts = {.hit = 1,
                   .next_event = 1,
@@ -375,7 +375,7 @@ TEST_P(Joins, EqualTheDefinition) {
     for (const auto& [strategy, tally] : tallies)
         EXPECT_LT(tally.deviating, kTolerance * tally.compared)
             << "strategy " << int(strategy) << ", " << tally.compared << " comparisons";
-    if (std::get<Case>(GetParam()).has_delta) {
+    if (std::get<JoinCase>(GetParam()).has_delta) {
         EXPECT_GE(delta_tallies.size(), 3u);
     }
     for (const auto& [strategy, tally] : delta_tallies)
@@ -418,13 +418,13 @@ TEST_P(Joins, StoredSumsEqualTheExplicitSum) {
     EXPECT_LT(tallies[Strategy::Connect].deviating, 0.002 * compared + 1);
 }
 
-const auto kName = [](const ::testing::TestParamInfo<std::tuple<Case, Extra>>& p) {
+const auto kName = [](const ::testing::TestParamInfo<std::tuple<JoinCase, Extra>>& p) {
     const char* suffix[] = {"",        "_merges", "_gathers",      "_variants",
                             "_stored", "_guided", "_guided_merges"};
-    return std::get<Case>(p.param).name + std::string(suffix[int(std::get<Extra>(p.param))]);
+    return std::get<JoinCase>(p.param).name + std::string(suffix[int(std::get<Extra>(p.param))]);
 };
 INSTANTIATE_TEST_SUITE_P(Scenes, Joins,
-                         ::testing::Combine(::testing::ValuesIn(cases()),
+                         ::testing::Combine(::testing::ValuesIn(join_cases()),
                                             ::testing::Values(Extra::None, Extra::Merges,
                                                               Extra::Gathers, Extra::Variants,
                                                               Extra::Stored, Extra::Guided,

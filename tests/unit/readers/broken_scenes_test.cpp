@@ -138,16 +138,16 @@ constexpr BrokenScene kBrokenScenes[] = {
      "/nodes/0/camera: must be an integer, but is the string \"front\""},
 };
 
-fs::path folder() {
+fs::path scenes_folder() {
     return fs::path(ETENDUE_SOURCE_DIR) / "tests" / "scenes" / "broken";
 }
 
 TEST(BrokenScenes, AreRefusedWithFileAndLine) {
     for (const BrokenScene& broken : kBrokenScenes) {
         SCOPED_TRACE(broken.file);
-        const std::string file = (folder() / broken.file).string();
+        const std::string file = (scenes_folder() / broken.file).string();
         const std::string faulty =
-            (folder() / (broken.faulty ? broken.faulty : broken.file)).string();
+            (scenes_folder() / (broken.faulty ? broken.faulty : broken.file)).string();
         expect_scene_error(broken.line, broken.message, [&] {
             try {
                 read_scene_file(file);
@@ -164,7 +164,7 @@ TEST(BrokenScenes, TheTableListsEveryFile) {
     std::set<std::string> listed, found;
     for (const BrokenScene& broken : kBrokenScenes) listed.insert(broken.file);
     for (const char* format : {"", "pbrt", "gltf"})
-        for (const auto& entry : fs::directory_iterator(folder() / format))
+        for (const auto& entry : fs::directory_iterator(scenes_folder() / format))
             if (entry.is_regular_file())
                 found.insert((fs::path(format) / entry.path().filename()).generic_string());
     EXPECT_EQ(listed, found);
@@ -175,12 +175,12 @@ TEST(BrokenScenes, AMissingSceneFileIsNamed) {
     expect_scene_error(0, "cannot read the scene file",
                        [] { read_mitsuba_xml("no_such_scene.xml"); });
     expect_scene_error(0, "cannot read the scene file",
-                       [] { read_mitsuba_xml(folder().string()); });
+                       [] { read_mitsuba_xml(scenes_folder().string()); });
 }
 
 TEST(BrokenScenes, ThoseOfTheBuilderReadWellAndTellWhatToExpect) {
     int count = 0;
-    for (const auto& entry : fs::directory_iterator(folder() / "builder")) {
+    for (const auto& entry : fs::directory_iterator(scenes_folder() / "builder")) {
         if (entry.path().extension() != ".xml") continue;
         SCOPED_TRACE(entry.path().string());
         EXPECT_NO_THROW(read_mitsuba_xml(entry.path().string()));

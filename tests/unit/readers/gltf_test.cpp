@@ -70,14 +70,14 @@ SceneDescription with_material(const std::string& material, const std::string& m
                 b);
 }
 
-const SceneObject& find(const SceneDescription& scene, const std::string& type) {
+const SceneObject& find_type(const SceneDescription& scene, const std::string& type) {
     for (const SceneObject& o : scene.objects)
         if (o.type == type) return o;
     throw std::runtime_error("there is no " + type);
 }
 
 template <class T>
-T value(const SceneObject& o, const char* name) {
+T value_of(const SceneObject& o, const char* name) {
     const Param* p = o.find(name);
     if (!p) throw std::runtime_error(std::string("there is no ") + name);
     const T* v = p->as<T>();
@@ -92,14 +92,14 @@ TEST(Gltf, ReadsASquare) {
     ASSERT_EQ(scene.meshes.size(), 1u);
     EXPECT_EQ(scene.meshes[0]->positions[2], (Vec3{1, 1, 0}));
     EXPECT_EQ(scene.meshes[0]->triangles[1], (MeshData::Triangle{0, 2, 3}));
-    const SceneObject& m = find(scene, "principled");
-    EXPECT_EQ(value<Rgb>(m, "base_color"), Rgb(0.1f, 0.2f, 0.3f));
-    EXPECT_EQ(value<double>(m, "metallic"), 0.25);
-    EXPECT_EQ(value<double>(m, "roughness"), 0.5);
-    EXPECT_NEAR(value<double>(m, "eta"), 1.25, 1e-9);
+    const SceneObject& m = find_type(scene, "principled");
+    EXPECT_EQ(value_of<Rgb>(m, "base_color"), Rgb(0.1f, 0.2f, 0.3f));
+    EXPECT_EQ(value_of<double>(m, "metallic"), 0.25);
+    EXPECT_EQ(value_of<double>(m, "roughness"), 0.5);
+    EXPECT_NEAR(value_of<double>(m, "eta"), 1.25, 1e-9);
     // Without camera and light.
-    EXPECT_EQ(find(scene, "constant").category, "emitter");
-    EXPECT_EQ(find(scene, "perspective").category, "sensor");
+    EXPECT_EQ(find_type(scene, "constant").category, "emitter");
+    EXPECT_EQ(find_type(scene, "perspective").category, "sensor");
 }
 
 TEST(Gltf, StripsAndFansHaveTheSameSides) {
@@ -135,7 +135,7 @@ TEST(Gltf, IntegersAreFractionsWhereNormalized) {
     EXPECT_FLOAT_EQ(mesh.uvs[3].x, 0.4f);
     EXPECT_FLOAT_EQ(mesh.colors[0].z, 1);
     EXPECT_FLOAT_EQ(mesh.colors[2].x, -1);
-    EXPECT_EQ(find(scene, "mesh_attribute").category, "texture");
+    EXPECT_EQ(find_type(scene, "mesh_attribute").category, "texture");
 }
 
 TEST(Gltf, SparseAccessorsReplaceValues) {
@@ -164,8 +164,8 @@ TEST(Gltf, NodesMultiplyFromTheRootAndSharedMeshesAreInstances) {
     std::vector<Vec3> origins, ends;
     for (const SceneObject& o : scene.objects)
         if (o.type == "instance") {
-            origins.push_back(value<Transform>(o, "to_world").point({0, 0, 0}));
-            ends.push_back(value<Transform>(o, "to_world").point({1, 0, 0}));
+            origins.push_back(value_of<Transform>(o, "to_world").point({0, 0, 0}));
+            ends.push_back(value_of<Transform>(o, "to_world").point({1, 0, 0}));
         }
     EXPECT_EQ(origins, (std::vector<Vec3>{{7, 0, 0}, {1, 0, 0}}));
     EXPECT_EQ(ends[1], (Vec3{-1, 0, 0}));
@@ -197,21 +197,22 @@ TEST(Gltf, ExtensionsOfMaterialsSetTheirParameters) {
             "KHR_materials_clearcoat":{"clearcoatFactor":0.3,"clearcoatRoughnessFactor":0.1},
             "KHR_materials_sheen":{"sheenColorFactor":[0.2,0.4,0.2]},
             "KHR_materials_anisotropy":{"anisotropyStrength":0.6}}})");
-    const SceneObject& m = find(scene, "principled");
-    EXPECT_EQ(value<double>(m, "spec_trans"), 0.75);
-    EXPECT_EQ(value<double>(m, "clearcoat"), 0.3);
-    EXPECT_NEAR(value<double>(m, "clearcoat_gloss"), 0.09 / 0.099, 1e-9);
-    EXPECT_NEAR(value<double>(m, "sheen"), 0.4, 1e-6);
-    EXPECT_EQ(value<double>(m, "anisotropic"), 0.6);
-    EXPECT_EQ(value<Rgb>(find(scene, "area"), "radiance"), Rgb(4, 2, 0));
-    EXPECT_NEAR(value<Rgb>(find(scene, "homogeneous"), "sigma_t").r, std::log(2.0) / 2, 1e-6);
+    const SceneObject& m = find_type(scene, "principled");
+    EXPECT_EQ(value_of<double>(m, "spec_trans"), 0.75);
+    EXPECT_EQ(value_of<double>(m, "clearcoat"), 0.3);
+    EXPECT_NEAR(value_of<double>(m, "clearcoat_gloss"), 0.09 / 0.099, 1e-9);
+    EXPECT_NEAR(value_of<double>(m, "sheen"), 0.4, 1e-6);
+    EXPECT_EQ(value_of<double>(m, "anisotropic"), 0.6);
+    EXPECT_EQ(value_of<Rgb>(find_type(scene, "area"), "radiance"), Rgb(4, 2, 0));
+    EXPECT_NEAR(value_of<Rgb>(find_type(scene, "homogeneous"), "sigma_t").r, std::log(2.0) / 2,
+                1e-6);
 }
 
 TEST(Gltf, TransmissionWithoutVolumeIsAPane) {
     const SceneDescription scene =
         with_material(R"({"extensions":{"KHR_materials_transmission":{"transmissionFactor":1}}})");
-    EXPECT_EQ(find(scene, "thindielectric").category, "bsdf");
-    EXPECT_EQ(value<double>(find(scene, "blendbsdf"), "weight"), 1);
+    EXPECT_EQ(find_type(scene, "thindielectric").category, "bsdf");
+    EXPECT_EQ(value_of<double>(find_type(scene, "blendbsdf"), "weight"), 1);
 }
 
 TEST(Gltf, TexturesKeepTheirTransformAndSampler) {
@@ -221,14 +222,14 @@ TEST(Gltf, TexturesKeepTheirTransformAndSampler) {
             "scale":[2,3]}}}}})",
         R"(,"textures":[{"source":0,"sampler":0}],"images":[{"uri":"a.png"}],
             "samplers":[{"magFilter":9728,"wrapS":33071,"wrapT":33071}])");
-    const SceneObject& image = find(scene, "bitmap");
-    EXPECT_EQ(value<std::string>(image, "filename"), "a.png");
-    EXPECT_EQ(value<std::string>(image, "filter_type"), "nearest");
-    EXPECT_EQ(value<std::string>(image, "wrap_mode"), "clamp");
-    const Vec3 uv = value<Transform>(image, "to_uv").point({1, 1, 0});
+    const SceneObject& image = find_type(scene, "bitmap");
+    EXPECT_EQ(value_of<std::string>(image, "filename"), "a.png");
+    EXPECT_EQ(value_of<std::string>(image, "filter_type"), "nearest");
+    EXPECT_EQ(value_of<std::string>(image, "wrap_mode"), "clamp");
+    const Vec3 uv = value_of<Transform>(image, "to_uv").point({1, 1, 0});
     EXPECT_NEAR(uv.x, 0.5 + 3, 1e-6);  // u' = 0.5 + 3 v
     EXPECT_NEAR(uv.y, -2, 1e-6);
-    EXPECT_EQ(value<double>(find(scene, "threshold"), "cutoff"), 0.25);
+    EXPECT_EQ(value_of<double>(find_type(scene, "threshold"), "cutoff"), 0.25);
 }
 
 TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
@@ -239,8 +240,8 @@ TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
     EXPECT_TRUE(std::any_of(scene.warnings.begin(), scene.warnings.end(), [](const auto& w) {
         return w.find("of the specular colour the luminance is used") != w.npos;
     }));
-    const SceneObject& m = find(scene, "principled");
-    EXPECT_EQ(value<double>(m, "eta"), 1000);
+    const SceneObject& m = find_type(scene, "principled");
+    EXPECT_EQ(value_of<double>(m, "eta"), 1000);
     ASSERT_EQ(m.children.size(), 2u);
     for (const auto& [name, expected] :
          {std::pair("specular_weight", ParamValue(0.5)), {"specular_color", Rgb(2, 1, 0)}}) {
@@ -254,12 +255,12 @@ TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
         const bool is_weight = std::string_view(name) == "specular_weight";
         EXPECT_EQ(image.find("channel") != nullptr, is_weight);  // alpha
         EXPECT_EQ(image.find("raw") != nullptr, is_weight);      // and not sRGB
-        EXPECT_EQ(value<std::string>(image, "filename"), is_weight ? "a.png" : "b.png");
+        EXPECT_EQ(value_of<std::string>(image, "filename"), is_weight ? "a.png" : "b.png");
     }
     // Without textures the factors alone.
     const SceneDescription black = with_material(
         R"({"extensions":{"KHR_materials_specular":{"specularColorFactor":[0,0,0]}}})");
-    EXPECT_EQ(value<Rgb>(find(black, "principled"), "specular_color"), Rgb(0));
+    EXPECT_EQ(value_of<Rgb>(find_type(black, "principled"), "specular_color"), Rgb(0));
 }
 
 TEST(Gltf, SpecularGlossinessIsReadAsWell) {
@@ -271,26 +272,26 @@ TEST(Gltf, SpecularGlossinessIsReadAsWell) {
     // A dielectric as others are, half of it there.
     const SceneDescription plastic =
         read(R"("diffuseFactor":[0.5,0.25,1,0.75],"specularFactor":[0.04,0.04,0.04])");
-    const SceneObject& p = find(plastic, "principled");
-    const Rgb base = value<Rgb>(p, "base_color");
+    const SceneObject& p = find_type(plastic, "principled");
+    const Rgb base = value_of<Rgb>(p, "base_color");
     EXPECT_NEAR(base.r, 0.5f, 1e-5f);
     EXPECT_NEAR(base.g, 0.25f, 1e-5f);
     EXPECT_NEAR(base.b, 1, 1e-5f);
-    EXPECT_NEAR(value<double>(p, "metallic"), 0, 1e-5);
-    EXPECT_NEAR(value<double>(p, "roughness"), 0.3, 1e-9);
-    EXPECT_EQ(value<double>(find(plastic, "mask"), "opacity"), 0.75);
+    EXPECT_NEAR(value_of<double>(p, "metallic"), 0, 1e-5);
+    EXPECT_NEAR(value_of<double>(p, "roughness"), 0.3, 1e-9);
+    EXPECT_EQ(value_of<double>(find_type(plastic, "mask"), "opacity"), 0.75);
     // Gold.
     const SceneDescription gold =
         read(R"("diffuseFactor":[0,0,0,1],"specularFactor":[1,0.75,0.3])");
-    const SceneObject& g = find(gold, "principled");
-    EXPECT_NEAR(value<double>(g, "metallic"), 1, 1e-5);
-    EXPECT_NEAR(value<Rgb>(g, "base_color").g, 0.75f, 1e-4f);
-    EXPECT_NEAR(value<Rgb>(g, "base_color").b, 0.3f, 1e-4f);
+    const SceneObject& g = find_type(gold, "principled");
+    EXPECT_NEAR(value_of<double>(g, "metallic"), 1, 1e-5);
+    EXPECT_NEAR(value_of<Rgb>(g, "base_color").g, 0.75f, 1e-4f);
+    EXPECT_NEAR(value_of<Rgb>(g, "base_color").b, 0.3f, 1e-4f);
     // Between them: the colours are those of the mixture.
     const SceneDescription half =
         read(R"("diffuseFactor":[0.4,0.4,0.4,1],"specularFactor":[0.3,0.3,0.3])");
-    const SceneObject& h = find(half, "principled");
-    const double m = value<double>(h, "metallic"), b = double(value<Rgb>(h, "base_color").r);
+    const SceneObject& h = find_type(half, "principled");
+    const double m = value_of<double>(h, "metallic"), b = double(value_of<Rgb>(h, "base_color").r);
     EXPECT_GT(m, 0.1);
     EXPECT_LT(m, 0.9);
     EXPECT_NEAR(0.96 * b * (1 - m), 0.4 * 0.7, 0.02);
@@ -310,7 +311,7 @@ const SceneObject& scaled_texture(const SceneDescription& scene, const SceneObje
                                   const char* name, Rgb factor) {
     const SceneObject& product = texture_of(scene, o, name);
     EXPECT_EQ(product.type, "scale") << name;
-    EXPECT_EQ(value<Rgb>(product, "scale"), factor) << name;
+    EXPECT_EQ(value_of<Rgb>(product, "scale"), factor) << name;
     return texture_of(scene, product, "value");
 }
 
@@ -329,33 +330,33 @@ TEST(Gltf, SpecularGlossinessHasTextures) {
         read(R"("diffuseFactor":[0.5,1,1,1],"specularFactor":[1,0.5,0.5],"glossinessFactor":0.8,
                 "diffuseTexture":{"index":0},"specularGlossinessTexture":{"index":1})");
     expect_no_warning_of_materials(both);
-    const SceneObject& p = find(both, "principled");
+    const SceneObject& p = find_type(both, "principled");
     for (const char* name : {"base_color", "metallic", "specular_weight"}) {
         const SceneObject& made = texture_of(both, p, name);
         EXPECT_EQ(made.type, "specular_to_metallic");
-        EXPECT_EQ(value<std::string>(made, "output"), name);
+        EXPECT_EQ(value_of<std::string>(made, "output"), name);
         const SceneObject &diffuse = scaled_texture(both, made, "diffuse", {0.5f, 1, 1}),
                           &specular = scaled_texture(both, made, "specular", {1, 0.5f, 0.5f});
-        EXPECT_EQ(value<std::string>(diffuse, "filename"), "a.png");
-        EXPECT_EQ(value<std::string>(specular, "filename"), "b.png");
+        EXPECT_EQ(value_of<std::string>(diffuse, "filename"), "a.png");
+        EXPECT_EQ(value_of<std::string>(specular, "filename"), "b.png");
         EXPECT_FALSE(specular.find("raw") || specular.find("channel"));  // colours of sRGB
     }
     const SceneObject& rough = texture_of(both, p, "roughness");
-    EXPECT_NEAR(value<double>(rough, "value1"), 0.2, 1e-9);
-    EXPECT_EQ(value<std::string>(texture_of(both, rough, "weight"), "channel"), "opacity");
+    EXPECT_NEAR(value_of<double>(rough, "value1"), 0.2, 1e-9);
+    EXPECT_EQ(value_of<std::string>(texture_of(both, rough, "weight"), "channel"), "opacity");
 
     // The share of metal depends on the diffuse colour where the specular one is brighter than a dielectric's.
     const SceneDescription metal =
         read(R"("specularFactor":[0.5,0.5,0.5],"diffuseTexture":{"index":0})");
-    EXPECT_EQ(texture_of(metal, find(metal, "principled"), "metallic").type,
+    EXPECT_EQ(texture_of(metal, find_type(metal, "principled"), "metallic").type,
               "specular_to_metallic");
     // Without specular reflection there is none of the dielectric, either.
     const SceneDescription matt = read(
         R"("specularFactor":[0,0,0],"diffuseTexture":{"index":0},"specularGlossinessTexture":{"index":1})");
-    const SceneObject& m = find(matt, "principled");
-    EXPECT_EQ(value<double>(m, "metallic"), 0);
-    EXPECT_EQ(value<double>(m, "specular_weight"), 0);
-    EXPECT_EQ(value<std::string>(texture_of(matt, m, "base_color"), "filename"), "a.png");
+    const SceneObject& m = find_type(matt, "principled");
+    EXPECT_EQ(value_of<double>(m, "metallic"), 0);
+    EXPECT_EQ(value_of<double>(m, "specular_weight"), 0);
+    EXPECT_EQ(value_of<std::string>(texture_of(matt, m, "base_color"), "filename"), "a.png");
 }
 
 TEST(Gltf, SpecularColoursOfDielectricsAreThoseOfMetal) {
@@ -368,12 +369,12 @@ TEST(Gltf, SpecularColoursOfDielectricsAreThoseOfMetal) {
     };
     const SceneDescription gold = read(R"("specularColorFactor":[1,0.75,0.3])");
     expect_no_warning_of_materials(gold);
-    const SceneObject& g = find(gold, "principled");
-    EXPECT_NEAR(value<double>(g, "metallic"), 1, 1e-2);
-    EXPECT_NEAR(value<Rgb>(g, "base_color").g, 0.75f, 1e-2f);
-    EXPECT_NEAR(value<Rgb>(g, "base_color").b, 0.3f, 1e-2f);
+    const SceneObject& g = find_type(gold, "principled");
+    EXPECT_NEAR(value_of<double>(g, "metallic"), 1, 1e-2);
+    EXPECT_NEAR(value_of<Rgb>(g, "base_color").g, 0.75f, 1e-2f);
+    EXPECT_NEAR(value_of<Rgb>(g, "base_color").b, 0.3f, 1e-2f);
     const SceneDescription textured = read(R"("specularColorTexture":{"index":0})");
-    EXPECT_EQ(texture_of(textured, find(textured, "principled"), "metallic").type,
+    EXPECT_EQ(texture_of(textured, find_type(textured, "principled"), "metallic").type,
               "specular_to_metallic");
 }
 
@@ -396,8 +397,8 @@ TEST(Gltf, HabitsOfExportersAreAccepted) {
     EXPECT_FLOAT_EQ(scene.meshes[0]->colors[1].x, 0.2f);
     EXPECT_FLOAT_EQ(scene.meshes[0]->colors[1].z, 1);
     EXPECT_TRUE(scene.meshes[0]->alphas.empty());  // one everywhere
-    EXPECT_EQ(value<double>(find(scene, "spot"), "beam_width"),
-              value<double>(find(scene, "spot"), "cutoff_angle"));
+    EXPECT_EQ(value_of<double>(find_type(scene, "spot"), "beam_width"),
+              value_of<double>(find_type(scene, "spot"), "cutoff_angle"));
 }
 
 TEST(Gltf, CamerasLookAlongMinusZ) {
@@ -405,15 +406,15 @@ TEST(Gltf, CamerasLookAlongMinusZ) {
         R"({"asset":{"version":"2.0"},"nodes":[{"camera":0,"translation":[0,0,5]},{"camera":1}],"cameras":[
             {"name":"front","type":"perspective","perspective":{"yfov":0.5,"aspectRatio":2}},
             {"type":"orthographic","orthographic":{"xmag":2,"ymag":1,"znear":0,"zfar":9}}]})");
-    const SceneObject& camera = find(scene, "perspective");
+    const SceneObject& camera = find_type(scene, "perspective");
     EXPECT_EQ(camera.id, "front");
-    EXPECT_NEAR(value<double>(camera, "fov"), 0.5 * 180 / kPi, 1e-5);
-    const Transform t = value<Transform>(camera, "to_world");
+    EXPECT_NEAR(value_of<double>(camera, "fov"), 0.5 * 180 / kPi, 1e-5);
+    const Transform t = value_of<Transform>(camera, "to_world");
     EXPECT_EQ(t.point({0, 0, 1}), (Vec3{0, 0, 4}));
     EXPECT_EQ(t.vector({1, 0, 0}), (Vec3{-1, 0, 0}));
     EXPECT_GT(t.determinant3(), 0);
-    EXPECT_EQ(value<int64_t>(scene.objects[size_t(camera.children[0].object)], "width"), 1440);
-    EXPECT_EQ(value<Transform>(find(scene, "orthographic"), "to_world").vector({1, 0, 0}),
+    EXPECT_EQ(value_of<int64_t>(scene.objects[size_t(camera.children[0].object)], "width"), 1440);
+    EXPECT_EQ(value_of<Transform>(find_type(scene, "orthographic"), "to_world").vector({1, 0, 0}),
               (Vec3{-2, 0, 0}));
 }
 
@@ -424,11 +425,11 @@ TEST(Gltf, PunctualLightsShineAlongMinusZ) {
             {"type":"point"}]}},"nodes":[{"extensions":{"KHR_lights_punctual":{"light":0}}},
             {"extensions":{"KHR_lights_punctual":{"light":1}}},{"translation":[1,2,3],
             "extensions":{"KHR_lights_punctual":{"light":2}}}]})");
-    EXPECT_EQ(value<Vec3>(find(scene, "directional"), "direction"), (Vec3{0, 0, -1}));
-    EXPECT_EQ(value<Rgb>(find(scene, "directional"), "irradiance"), Rgb(3, 0, 0));
-    EXPECT_EQ(value<Vec3>(find(scene, "point"), "position"), (Vec3{1, 2, 3}));
-    EXPECT_EQ(value<std::string>(find(scene, "spot"), "falloff"), "quadratic");
-    const Vec3 axis = value<Transform>(find(scene, "spot"), "to_world").vector({0, 0, 1});
+    EXPECT_EQ(value_of<Vec3>(find_type(scene, "directional"), "direction"), (Vec3{0, 0, -1}));
+    EXPECT_EQ(value_of<Rgb>(find_type(scene, "directional"), "irradiance"), Rgb(3, 0, 0));
+    EXPECT_EQ(value_of<Vec3>(find_type(scene, "point"), "position"), (Vec3{1, 2, 3}));
+    EXPECT_EQ(value_of<std::string>(find_type(scene, "spot"), "falloff"), "quadratic");
+    const Vec3 axis = value_of<Transform>(find_type(scene, "spot"), "to_world").vector({0, 0, 1});
     EXPECT_NEAR(axis.z, -1, 1e-6);
 }
 

@@ -14,24 +14,24 @@ namespace {
 
 using Files = std::map<std::string, std::string>;
 
-SceneDescription parse(const std::string& text, const ReadOptions& options = {}) {
+SceneDescription parse_xml(const std::string& text, const ReadOptions& options = {}) {
     return parse_mitsuba_xml(text, "s.xml", options);
 }
 
 /// A scene of version 3.0.0 on one line each.
-SceneDescription parse3(const std::string& body, const ReadOptions& options = {}) {
-    return parse("<scene version=\"3.0.0\">\n" + body + "\n</scene>", options);
+SceneDescription parse_xml3(const std::string& body, const ReadOptions& options = {}) {
+    return parse_xml("<scene version=\"3.0.0\">\n" + body + "\n</scene>", options);
 }
 SceneDescription parse06(const std::string& body, const ReadOptions& options = {}) {
-    return parse("<scene version=\"0.6.0\">\n" + body + "\n</scene>", options);
+    return parse_xml("<scene version=\"0.6.0\">\n" + body + "\n</scene>", options);
 }
 
 std::string error3(const std::string& body, const ReadOptions& options = {}) {
-    return test::error_of([&] { parse3(body, options); });
+    return test::error_of([&] { parse_xml3(body, options); });
 }
 
 template <class T>
-T value(const SceneDescription& scene, const char* name, int object = 0) {
+T value_in(const SceneDescription& scene, const char* name, int object = 0) {
     const Param* p = scene.objects.at(object).find(name);
     if (!p) throw std::runtime_error(std::string("no parameter ") + name);
     const T* v = p->as<T>();
@@ -39,7 +39,7 @@ T value(const SceneDescription& scene, const char* name, int object = 0) {
     return *v;
 }
 
-void expect_near(Rgb a, Rgb b) {
+void expect_near_rgb(Rgb a, Rgb b) {
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(a[i], b[i], 1e-5 * (1 + std::fabs(b[i])));
 }
 
@@ -126,8 +126,8 @@ shape obj
 )";
 
 TEST(MitsubaXml, BothDialectsGiveTheSameDescription) {
-    EXPECT_EQ(dump(parse(kOld)), kDump);
-    EXPECT_EQ(dump(parse(kNew)), kDump);
+    EXPECT_EQ(dump(parse_xml(kOld)), kDump);
+    EXPECT_EQ(dump(parse_xml(kNew)), kDump);
 }
 
 TEST(MitsubaXml, TranslatesNamesOfOldScenes) {
@@ -152,7 +152,7 @@ TEST(MitsubaXml, TranslatesNamesOfOldScenes) {
         EXPECT_EQ(scene.objects[0].params[0].name, expected);
         // The newer dialect keeps names as they are.
         const auto same =
-            parse3(fmt::format(R"(<bsdf type="x"><float name="{}" value="1"/></bsdf>)", old));
+            parse_xml3(fmt::format(R"(<bsdf type="x"><float name="{}" value="1"/></bsdf>)", old));
         EXPECT_EQ(same.objects[0].params[0].name, old);
     }
 }
@@ -161,23 +161,23 @@ TEST(MitsubaXml, TranslatesValuesOfOldScenes) {
     const auto bitmap = [](const char* params) {
         return parse06(fmt::format(R"(<texture type="bitmap">{}</texture>)", params));
     };
-    EXPECT_FALSE(value<bool>(bitmap(R"(<float name="gamma" value="-1"/>)"), "raw"));
+    EXPECT_FALSE(value_in<bool>(bitmap(R"(<float name="gamma" value="-1"/>)"), "raw"));
     const auto wrapped = bitmap(
         R"(<string name="wrapModeU" value="clamp"/><string name="wrapModeV" value="clamp"/>)");
-    EXPECT_EQ(value<std::string>(wrapped, "wrap_mode"), "clamp");
+    EXPECT_EQ(value_in<std::string>(wrapped, "wrap_mode"), "clamp");
     EXPECT_EQ(wrapped.objects[0].params.size(), 1u);
     EXPECT_EQ(parse06(R"(<bsdf type="bump"/>)").objects[0].type, "bumpmap");
     // Copper is the conductors' material in Mitsuba 0.6 where the file names none.
-    EXPECT_EQ(value<std::string>(parse06(R"(<bsdf type="conductor"/>)"), "material"), "Cu");
+    EXPECT_EQ(value_in<std::string>(parse06(R"(<bsdf type="conductor"/>)"), "material"), "Cu");
     EXPECT_TRUE(parse06(R"(<bsdf type="conductor"><rgb name="eta" value="1"/></bsdf>)")
                     .objects[0]
                     .find("eta"));
     EXPECT_FALSE(parse06(R"(<bsdf type="conductor"><rgb name="eta" value="1"/></bsdf>)")
                      .objects[0]
                      .find("material"));
-    EXPECT_FALSE(parse3(R"(<bsdf type="conductor"/>)").objects[0].find("material"));
+    EXPECT_FALSE(parse_xml3(R"(<bsdf type="conductor"/>)").objects[0].find("material"));
     // Scale applies before offset, as in Mitsuba 0.6.
-    const auto uv = value<Transform>(
+    const auto uv = value_in<Transform>(
         bitmap(R"(<float name="uscale" value="2"/><float name="uoffset" value="0.3"/>)"), "to_uv");
     EXPECT_NEAR(uv.point({1, 0, 0}).x, 2.3f, 1e-6f);
 }
@@ -272,8 +272,8 @@ constexpr const char* kAfter03 = R"(<scene version="0.6.0">
 </scene>)";
 
 TEST(MitsubaXml, OldestDialectsGiveTheSameDescription) {
-    EXPECT_EQ(dump(parse(kBefore04)), dump(parse(kAfter04)));
-    EXPECT_EQ(dump(parse(kBefore03)), dump(parse(kAfter03)));
+    EXPECT_EQ(dump(parse_xml(kBefore04)), dump(parse_xml(kAfter04)));
+    EXPECT_EQ(dump(parse_xml(kBefore03)), dump(parse_xml(kAfter03)));
     // These words are those of their versions alone.
     EXPECT_NE(error3(R"(<luminaire type="point"/>)").find("unknown element <luminaire>"),
               std::string::npos);
@@ -285,14 +285,17 @@ TEST(MitsubaXml, OldestDialectsOfIncludedFiles) {
         with_files({{"a.xml", R"(<luminaire type="point"/>)"},
                     {"b.xml", R"(<scene version="0.6.0"><emitter type="sky"/></scene>)"}});
     EXPECT_EQ(
-        dump(parse(R"(<scene version="0.3.1"><include filename="a.xml"/><include filename="b.xml"/>
+        dump(parse_xml(
+            R"(<scene version="0.3.1"><include filename="a.xml"/><include filename="b.xml"/>
                             <luminaire type="spot"/></scene>)",
-                   options)),
+            options)),
         dump(parse06("<emitter type=\"point\"/><emitter type=\"sky\"/><emitter type=\"spot\"/>")));
 }
 
 TEST(MitsubaXml, ErrorsInOldestDialectsHaveTheirLines) {
-    const auto error = [](const std::string& text) { return test::error_of([&] { parse(text); }); };
+    const auto error = [](const std::string& text) {
+        return test::error_of([&] { parse_xml(text); });
+    };
     EXPECT_EQ(
         error("<scene version=\"0.2.0\">\n<bsdf type=\"phong\">\n<float name=\"specularAmount\" "
               "value=\"a\"/></bsdf>\n</scene>"),
@@ -310,19 +313,19 @@ TEST(MitsubaXml, ErrorsInOldestDialectsHaveTheirLines) {
 // ---- Values
 
 TEST(MitsubaXml, ReadsNumbersStrictly) {
-    const auto scene = parse3(R"(<shape type="s">
+    const auto scene = parse_xml3(R"(<shape type="s">
         <float name="a" value=" -1.5e-3 "/><float name="b" value="+2"/><float name="c" value="5."/>
         <integer name="i" value="-9223372036854775808"/><boolean name="t" value="TRUE"/>
         <point name="p" x="1" y="2" z="3"/><vector name="v" value="4, 5 6"/><vector name="w" value="7"/>
     </shape>)");
-    EXPECT_EQ(value<double>(scene, "a"), -1.5e-3);
-    EXPECT_EQ(value<double>(scene, "b"), 2);
-    EXPECT_EQ(value<double>(scene, "c"), 5);
-    EXPECT_EQ(value<int64_t>(scene, "i"), std::numeric_limits<int64_t>::min());
-    EXPECT_TRUE(value<bool>(scene, "t"));
-    EXPECT_EQ(value<Vec3>(scene, "p"), (Vec3{1, 2, 3}));
-    EXPECT_EQ(value<Vec3>(scene, "v"), (Vec3{4, 5, 6}));
-    EXPECT_EQ(value<Vec3>(scene, "w"), (Vec3{7, 7, 7}));
+    EXPECT_EQ(value_in<double>(scene, "a"), -1.5e-3);
+    EXPECT_EQ(value_in<double>(scene, "b"), 2);
+    EXPECT_EQ(value_in<double>(scene, "c"), 5);
+    EXPECT_EQ(value_in<int64_t>(scene, "i"), std::numeric_limits<int64_t>::min());
+    EXPECT_TRUE(value_in<bool>(scene, "t"));
+    EXPECT_EQ(value_in<Vec3>(scene, "p"), (Vec3{1, 2, 3}));
+    EXPECT_EQ(value_in<Vec3>(scene, "v"), (Vec3{4, 5, 6}));
+    EXPECT_EQ(value_in<Vec3>(scene, "w"), (Vec3{7, 7, 7}));
     for (const char* bad : {"", " ", "1.0abc", "nan", "inf", "-inf", "1e999", "0x10", "1 2", "1,2",
                             "--1", "+-1", "1.f"})
         EXPECT_NE(
@@ -339,25 +342,26 @@ TEST(MitsubaXml, ReadsNumbersStrictly) {
 }
 
 TEST(MitsubaXml, ReadsColours) {
-    const auto scene = parse3(R"(<bsdf type="b">
+    const auto scene = parse_xml3(R"(<bsdf type="b">
         <rgb name="grey" value="0.25"/><rgb name="three" value="1, 0.5 0"/><rgb name="hex" value="#ff8000"/>
         <srgb name="s" value="#ff8000"/><srgb name="t" value="1 0.5 0"/><spectrum name="c" value="0.2"/>
     </bsdf>)");
-    EXPECT_EQ(value<Rgb>(scene, "grey"), Rgb(0.25f));
-    EXPECT_EQ(value<Rgb>(scene, "three"), Rgb(1, 0.5f, 0));
-    EXPECT_EQ(value<Rgb>(scene, "hex"), Rgb(1, srgb_to_linear(128 / 255.0f), 0));
-    EXPECT_EQ(value<Rgb>(scene, "s"), value<Rgb>(scene, "hex"));
-    EXPECT_EQ(value<Rgb>(scene, "t"), Rgb(1, srgb_to_linear(0.5f), 0));
-    EXPECT_EQ(value<Rgb>(scene, "c"), Rgb(0.2f));
+    EXPECT_EQ(value_in<Rgb>(scene, "grey"), Rgb(0.25f));
+    EXPECT_EQ(value_in<Rgb>(scene, "three"), Rgb(1, 0.5f, 0));
+    EXPECT_EQ(value_in<Rgb>(scene, "hex"), Rgb(1, srgb_to_linear(128 / 255.0f), 0));
+    EXPECT_EQ(value_in<Rgb>(scene, "s"), value_in<Rgb>(scene, "hex"));
+    EXPECT_EQ(value_in<Rgb>(scene, "t"), Rgb(1, srgb_to_linear(0.5f), 0));
+    EXPECT_EQ(value_in<Rgb>(scene, "c"), Rgb(0.2f));
     // In Mitsuba 0.6 a hexadecimal <rgb> is linear.
-    EXPECT_EQ(value<Rgb>(parse06(R"(<bsdf type="b"><rgb name="h" value="#ff8000"/></bsdf>)"), "h"),
-              Rgb(1, 128 / 255.0f, 0));
+    EXPECT_EQ(
+        value_in<Rgb>(parse06(R"(<bsdf type="b"><rgb name="h" value="#ff8000"/></bsdf>)"), "h"),
+        Rgb(1, 128 / 255.0f, 0));
 }
 
 TEST(MitsubaXml, SpectraUseTheIlluminantOfTheirRole) {
     const char* flat = R"(<{0}><spectrum name="{1}" value="300:0.5, 900:0.5"/></{2}>)";
     const auto colour = [&](const char* open, const char* name, const char* close) {
-        return value<Rgb>(parse3(fmt::format(fmt::runtime(flat), open, name, close)), name);
+        return value_in<Rgb>(parse_xml3(fmt::format(fmt::runtime(flat), open, name, close)), name);
     };
     // Values of Mitsuba 3.9 in RGB mode: 0.5 seen under D65, and 0.5 emitted.
     const Rgb seen = colour("bsdf type=\"b\"", "reflectance", "bsdf");
@@ -368,30 +372,33 @@ TEST(MitsubaXml, SpectraUseTheIlluminantOfTheirRole) {
     EXPECT_NEAR(emitted.b, 0.4546f, 2e-3f);
     // A reflectance ends at 1, an index of refraction does not.
     const char* two = R"(<bsdf type="b"><spectrum name="{}" value="300:2 900:2"/></bsdf>)";
-    EXPECT_EQ(value<Rgb>(parse3(fmt::format(fmt::runtime(two), "reflectance")), "reflectance"),
-              Rgb(1));
-    EXPECT_NEAR(value<Rgb>(parse3(fmt::format(fmt::runtime(two), "eta")), "eta").g, 2, 0.01);
+    EXPECT_EQ(
+        value_in<Rgb>(parse_xml3(fmt::format(fmt::runtime(two), "reflectance")), "reflectance"),
+        Rgb(1));
+    EXPECT_NEAR(value_in<Rgb>(parse_xml3(fmt::format(fmt::runtime(two), "eta")), "eta").g, 2, 0.01);
     // A nested texture of an emitter emits, too.
-    const auto nested = parse3(R"(<emitter type="area"><texture type="checkerboard" name="radiance">
+    const auto nested =
+        parse_xml3(R"(<emitter type="area"><texture type="checkerboard" name="radiance">
         <spectrum name="color0" value="300:0.5, 900:0.5"/></texture></emitter>)");
-    EXPECT_EQ(value<Rgb>(nested, "color0", 1), emitted);
+    EXPECT_EQ(value_in<Rgb>(nested, "color0", 1), emitted);
 }
 
 TEST(MitsubaXml, ReadsSpectrumFilesAndPlugins) {
     const auto options =
         with_files({{"spd/a.spd", "# silver\n400 0.1\n\n500\t0.4 # peak\r\n700 0.2"}});
-    const auto from_file = parse3(
+    const auto from_file = parse_xml3(
         R"(<path value="spd"/><bsdf type="b"><spectrum name="eta" filename="a.spd"/></bsdf>)",
         options);
-    const auto from_list =
-        parse3(R"(<bsdf type="b"><spectrum name="eta" value="400:0.1 500:0.4 700:0.2"/></bsdf>)");
-    EXPECT_EQ(value<Rgb>(from_file, "eta"), value<Rgb>(from_list, "eta"));
+    const auto from_list = parse_xml3(
+        R"(<bsdf type="b"><spectrum name="eta" value="400:0.1 500:0.4 700:0.2"/></bsdf>)");
+    EXPECT_EQ(value_in<Rgb>(from_file, "eta"), value_in<Rgb>(from_list, "eta"));
     const auto old_lines = with_files({{"a.spd", "# silver\r400 0.1\r\r500 0.4\r700 0.2\r"}});
-    EXPECT_EQ(value<Rgb>(parse3(R"(<bsdf type="b"><spectrum name="eta" filename="a.spd"/></bsdf>)",
-                                old_lines),
-                         "eta"),
-              value<Rgb>(from_list, "eta"));
-    const auto plugins = parse3(R"(<bsdf type="b">
+    EXPECT_EQ(
+        value_in<Rgb>(parse_xml3(R"(<bsdf type="b"><spectrum name="eta" filename="a.spd"/></bsdf>)",
+                                 old_lines),
+                      "eta"),
+        value_in<Rgb>(from_list, "eta"));
+    const auto plugins = parse_xml3(R"(<bsdf type="b">
         <spectrum name="eta" type="irregular"><string name="wavelengths" value="400 500 700"/>
             <string name="values" value="0.1 0.4 0.2"/></spectrum>
         <spectrum name="k" type="regular"><float name="wavelength_min" value="400"/>
@@ -401,24 +408,25 @@ TEST(MitsubaXml, ReadsSpectrumFilesAndPlugins) {
         <emitter type="point"><spectrum name="intensity" type="blackbody"><float name="temperature" value="5000"/>
             </spectrum><blackbody name="other" temperature="5000K" scale="2"/></emitter>)");
     EXPECT_EQ(plugins.objects.size(), 2u);
-    EXPECT_EQ(value<Rgb>(plugins, "eta"), value<Rgb>(from_list, "eta"));
+    EXPECT_EQ(value_in<Rgb>(plugins, "eta"), value_in<Rgb>(from_list, "eta"));
     EXPECT_EQ(
-        value<Rgb>(plugins, "k"),
-        value<Rgb>(
-            parse3(R"(<bsdf type="b"><spectrum name="k" value="400:0.1 500:0.4 600:0.2"/></bsdf>)"),
+        value_in<Rgb>(plugins, "k"),
+        value_in<Rgb>(
+            parse_xml3(
+                R"(<bsdf type="b"><spectrum name="k" value="400:0.1 500:0.4 600:0.2"/></bsdf>)"),
             "k"));
-    EXPECT_EQ(value<Rgb>(plugins, "u"), Rgb(3));
-    EXPECT_EQ(value<Rgb>(plugins, "d"), Rgb(2));
-    expect_near(value<Rgb>(plugins, "intensity", 1), blackbody_rgb(5000));
-    expect_near(value<Rgb>(plugins, "other", 1), blackbody_rgb(5000) * 2.0f);
+    EXPECT_EQ(value_in<Rgb>(plugins, "u"), Rgb(3));
+    EXPECT_EQ(value_in<Rgb>(plugins, "d"), Rgb(2));
+    expect_near_rgb(value_in<Rgb>(plugins, "intensity", 1), blackbody_rgb(5000));
+    expect_near_rgb(value_in<Rgb>(plugins, "other", 1), blackbody_rgb(5000) * 2.0f);
 }
 
 TEST(MitsubaXml, LaterTransformStepsApplyAfterEarlierOnes) {
-    const auto t = value<Transform>(parse3(R"(<shape type="s"><transform name="to_world">
+    const auto t = value_in<Transform>(parse_xml3(R"(<shape type="s"><transform name="to_world">
         <scale value="2"/><rotate z="3" angle="90"/><translate x="1"/>
         <matrix value="1 0 0 0  0 1 0 0  0 0 1 10  0 0 0 1"/><matrix value="0 1 0  1 0 0  0 0 1"/>
     </transform></shape>)"),
-                                    "to_world");
+                                       "to_world");
     const Vec3 p = t.point({1, 0, 0});  // (2,0,0), (0,2,0), (1,2,0), (1,2,10), (2,1,10)
     EXPECT_NEAR(p.x, 2, 1e-6);
     EXPECT_NEAR(p.y, 1, 1e-6);
@@ -426,15 +434,15 @@ TEST(MitsubaXml, LaterTransformStepsApplyAfterEarlierOnes) {
 }
 
 TEST(MitsubaXml, TheCameraLooksAlongItsZAxisWithXToTheLeft) {
-    const auto t = value<Transform>(parse3(R"(<sensor type="s"><transform name="to_world">
+    const auto t = value_in<Transform>(parse_xml3(R"(<sensor type="s"><transform name="to_world">
         <lookat origin="0 0 0" target="0 0 -1" up="0 1 0"/></transform></sensor>)"),
-                                    "to_world");
+                                       "to_world");
     EXPECT_EQ(t.vector({0, 0, 1}), (Vec3{0, 0, -1}));
     EXPECT_EQ(t.vector({1, 0, 0}), (Vec3{-1, 0, 0}));
     // Without "up", any roll.
-    const auto free = value<Transform>(parse3(R"(<sensor type="s"><transform name="to_world">
+    const auto free = value_in<Transform>(parse_xml3(R"(<sensor type="s"><transform name="to_world">
         <lookat origin="1 2 3" target="1 2 8"/></transform></sensor>)"),
-                                       "to_world");
+                                          "to_world");
     EXPECT_EQ(free.vector({0, 0, 1}), (Vec3{0, 0, 1}));
     EXPECT_NEAR(free.determinant3(), 1, 1e-6);
 }
@@ -444,15 +452,16 @@ TEST(MitsubaXml, TheCameraLooksAlongItsZAxisWithXToTheLeft) {
 TEST(MitsubaXml, SubstitutesParameters) {
     ReadOptions options;
     options.defines = {{"spp", "9"}, {"free", "y"}};
-    const auto scene = parse3(R"(<default name="spp" value="1"/><default name="spp_hi" value="4"/>
+    const auto scene =
+        parse_xml3(R"(<default name="spp" value="1"/><default name="spp_hi" value="4"/>
         <default name="dir" value="a/$spp"/><default name="dir" value="ignored"/>
         <integrator type="$free"><integer name="n" value="$spp"/><integer name="m" value="$spp_hi"/>
         <string name="s" value="$dir/x-$spp.exr costs \$5"/></integrator>)",
-                              options);
+                   options);
     EXPECT_EQ(scene.objects[0].type, "y");
-    EXPECT_EQ(value<int64_t>(scene, "n"), 9);
-    EXPECT_EQ(value<int64_t>(scene, "m"), 4);
-    EXPECT_EQ(value<std::string>(scene, "s"), "a/9/x-9.exr costs $5");
+    EXPECT_EQ(value_in<int64_t>(scene, "n"), 9);
+    EXPECT_EQ(value_in<int64_t>(scene, "m"), 4);
+    EXPECT_EQ(value_in<std::string>(scene, "s"), "a/9/x-9.exr costs $5");
 }
 
 TEST(MitsubaXml, OverridesMustBeKnown) {
@@ -471,9 +480,9 @@ TEST(MitsubaXml, OverridesMustBeKnown) {
 // ---- Objects and references
 
 TEST(MitsubaXml, KeepsNestingNamesAndLocations) {
-    const auto scene = parse3("<medium type=\"homogeneous\" id=\"fog\"/>\n"
-                              "<shape type=\"sphere\">\n<bsdf type=\"null\"/>\n"
-                              "<ref name=\"interior\" id=\"fog\"/></shape>");
+    const auto scene = parse_xml3("<medium type=\"homogeneous\" id=\"fog\"/>\n"
+                                  "<shape type=\"sphere\">\n<bsdf type=\"null\"/>\n"
+                                  "<ref name=\"interior\" id=\"fog\"/></shape>");
     ASSERT_EQ(scene.roots, (std::vector<int>{0, 1}));
     const SceneObject& shape = scene.objects[1];
     EXPECT_EQ(shape.where, (SourceLocation{"s.xml", 3}));
@@ -485,7 +494,7 @@ TEST(MitsubaXml, KeepsNestingNamesAndLocations) {
 }
 
 TEST(MitsubaXml, ReferencesMayPointForward) {
-    const auto scene = parse3(R"(<shape type="cube"><ref id="late"/></shape>
+    const auto scene = parse_xml3(R"(<shape type="cube"><ref id="late"/></shape>
         <bsdf type="diffuse" id="m"/><alias id="m" as="late"/><ref id="m"/>)");
     EXPECT_EQ(scene.objects[0].children[0].object, 1);
     EXPECT_EQ(scene.roots, (std::vector<int>{0, 1, 1}));
@@ -526,10 +535,10 @@ TEST(MitsubaXml, TextInMemoryOpensNoFiles) {
 TEST(MitsubaXml, LenientDropsUnknownElements) {
     ReadOptions options;
     options.lenient = true;
-    const auto scene =
-        parse3("<shape type=\"cube\" colour=\"red\">\n<animation type=\"dipole\"><x/></animation>\n"
-               "<transform name=\"to_world\"><shear x=\"1\"/></transform></shape>",
-               options);
+    const auto scene = parse_xml3(
+        "<shape type=\"cube\" colour=\"red\">\n<animation type=\"dipole\"><x/></animation>\n"
+        "<transform name=\"to_world\"><shear x=\"1\"/></transform></shape>",
+        options);
     EXPECT_EQ(dump(scene), "shape cube\n  to_world: transform 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
     ASSERT_EQ(scene.warnings.size(), 3u);
     EXPECT_EQ(scene.warnings[0], "s.xml:2: <shape> has no attribute \"colour\"; dropped");

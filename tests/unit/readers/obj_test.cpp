@@ -12,7 +12,7 @@
 namespace etendue {
 namespace {
 
-MeshData parse(std::string_view text, const MeshOptions& options = {}) {
+MeshData parse_obj(std::string_view text, const MeshOptions& options = {}) {
     return parse_obj(text, "test.obj", options);
 }
 
@@ -21,7 +21,7 @@ constexpr const char* kVertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
                                   "vn 0 0 2\nvn 0 1 0\n";
 
 TEST(Obj, PolygonsBecomeFans) {
-    const MeshData m = parse(std::string(kVertices) + "f 1 2 3 4\n");
+    const MeshData m = parse_obj(std::string(kVertices) + "f 1 2 3 4\n");
     EXPECT_EQ(m.positions.size(), 4u);
     EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 2, 3}}));
     EXPECT_TRUE(m.normals.empty());
@@ -29,15 +29,15 @@ TEST(Obj, PolygonsBecomeFans) {
 }
 
 TEST(Obj, VerticesAreNumberedInOrderOfFirstUse) {
-    const MeshData m = parse(std::string(kVertices) + "f 3 1 2\nf 3 4 1\n");
+    const MeshData m = parse_obj(std::string(kVertices) + "f 3 1 2\nf 3 4 1\n");
     EXPECT_EQ(m.positions[0], (Vec3{1, 1, 0}));
     EXPECT_EQ(m.positions[1], (Vec3{0, 0, 0}));
     EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 3, 1}}));
 }
 
 TEST(Obj, CornersAreUnifiedByAllThreeIndices) {
-    const MeshData m = parse(std::string(kVertices) +
-                             "f 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/2 4/4/2\nf 1/4/1 2/2/1 3/3/1\n");
+    const MeshData m = parse_obj(std::string(kVertices) +
+                                 "f 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/2 4/4/2\nf 1/4/1 2/2/1 3/3/1\n");
     // 1/1/1 2/2/1 3/3/1 | 3/3/2 4/4/2 | 1/4/1
     ASSERT_EQ(m.positions.size(), 6u);
     EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 3, 4}, {5, 1, 2}}));
@@ -53,7 +53,7 @@ TEST(Obj, ManyCornersAtTheSamePositionsStayApart) {
         const std::string n = std::to_string(i);
         text += "vt " + n + " 0\nf 1/" + n + " 2/" + n + " 3/" + n + "\n";
     }
-    const MeshData m = parse(text);
+    const MeshData m = parse_obj(text);
     ASSERT_EQ(m.positions.size(), size_t(3 * kCount));
     for (size_t i = 0; i < m.uvs.size(); ++i) {
         EXPECT_EQ(m.uvs[i].x, float(i / 3 + 1));
@@ -62,20 +62,20 @@ TEST(Obj, ManyCornersAtTheSamePositionsStayApart) {
 }
 
 TEST(Obj, NegativeIndicesCountBackFromHere) {
-    const MeshData m = parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf -3//-1 -2//-1 -1//-1\n"
-                             "v 5 0 0\nv 6 0 0\nv 5 1 0\nf -3//1 -2//1 -1//1\n");
+    const MeshData m = parse_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf -3//-1 -2//-1 -1//-1\n"
+                                 "v 5 0 0\nv 6 0 0\nv 5 1 0\nf -3//1 -2//1 -1//1\n");
     ASSERT_EQ(m.positions.size(), 6u);
     EXPECT_EQ(m.positions[0].x, 0);
     EXPECT_EQ(m.positions[3].x, 5);
 }
 
 TEST(Obj, FacesMayComeBeforeTheirVertices) {
-    const MeshData m = parse("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    const MeshData m = parse_obj("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n");
     EXPECT_EQ(m.positions[1].x, 1);
 }
 
 TEST(Obj, CornersWithoutAnAttributeThatOthersHave) {
-    const MeshData m = parse(std::string(kVertices) + "f 1/2/2 2/2/2 3/2/2\nf 1 3 4\n");
+    const MeshData m = parse_obj(std::string(kVertices) + "f 1/2/2 2/2/2 3/2/2\nf 1 3 4\n");
     ASSERT_EQ(m.positions.size(), 6u);
     EXPECT_EQ(m.uvs[3], (Vec2{0, 0}));
     EXPECT_EQ(m.replaced_normals, 3u);
@@ -84,12 +84,12 @@ TEST(Obj, CornersWithoutAnAttributeThatOthersHave) {
 
 TEST(Obj, TextureCoordinatesFlipOnRequest) {
     const std::string text = std::string(kVertices) + "f 1/4 2/2 3/3\n";
-    EXPECT_EQ(parse(text).uvs[0].y, 0.25f);
-    EXPECT_EQ(parse(text, {.flip_tex_coords = true}).uvs[0].y, 0.75f);
+    EXPECT_EQ(parse_obj(text).uvs[0].y, 0.25f);
+    EXPECT_EQ(parse_obj(text, {.flip_tex_coords = true}).uvs[0].y, 0.75f);
 }
 
 TEST(Obj, OtherStatementsAreIgnored) {
-    const MeshData m = parse(
+    const MeshData m = parse_obj(
         "# comment\nmtllib a.mtl\no object\ng one two\ns off\nusemtl m\n\n   \n"
         "v 0 0 0 1.0\nv 1 0 0 1 0.5 0.5 0.5\n\tv  0\t1  0  # here\nvt 0.5 # only u\nvt 0 1 0\n"
         "l 1 2\np 1\nf 1/1 2/2 3/1 # a face\n");
@@ -98,16 +98,17 @@ TEST(Obj, OtherStatementsAreIgnored) {
 }
 
 TEST(Obj, LineEndings) {
-    EXPECT_EQ(parse("v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n").positions.size(), 3u);
-    EXPECT_EQ(parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").positions.size(), 3u);
-    EXPECT_EQ(parse("# old\rv 0 0 \\\r0\rv 1 0 0\r\rv 0 1 0\rf 1 2 3\r").positions.size(), 3u);
-    expect_scene_error(4, "coordinate expected", [] { parse("v 0 0 0\r\r\nv 1 0 0\rv 1 x 0\r"); });
-    EXPECT_EQ(parse("v 0 0 \\\n0\nv 1 0 0\nv 0 1 0\nf 1 \\\r\n2 3\n").positions.size(), 3u);
-    expect_scene_error(4, "coordinate expected", [] { parse("v 0 \\\n 0 0\n\nv 1 x 0\n"); });
+    EXPECT_EQ(parse_obj("v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n").positions.size(), 3u);
+    EXPECT_EQ(parse_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").positions.size(), 3u);
+    EXPECT_EQ(parse_obj("# old\rv 0 0 \\\r0\rv 1 0 0\r\rv 0 1 0\rf 1 2 3\r").positions.size(), 3u);
+    expect_scene_error(4, "coordinate expected",
+                       [] { parse_obj("v 0 0 0\r\r\nv 1 0 0\rv 1 x 0\r"); });
+    EXPECT_EQ(parse_obj("v 0 0 \\\n0\nv 1 0 0\nv 0 1 0\nf 1 \\\r\n2 3\n").positions.size(), 3u);
+    expect_scene_error(4, "coordinate expected", [] { parse_obj("v 0 \\\n 0 0\n\nv 1 x 0\n"); });
 }
 
 TEST(Obj, NumbersInAllTheirForms) {
-    const MeshData m = parse("v +1.5e+2 -.5 1E-3\nv 1e-42 1e-300 0\nv 0 1 0.\nf 1 2 3\n");
+    const MeshData m = parse_obj("v +1.5e+2 -.5 1E-3\nv 1e-42 1e-300 0\nv 0 1 0.\nf 1 2 3\n");
     EXPECT_EQ(m.positions[0], (Vec3{150, -0.5f, 1e-3f}));
     EXPECT_EQ(m.positions[1].y, 0);
     EXPECT_EQ(m.positions[2].y, 1);
@@ -115,7 +116,7 @@ TEST(Obj, NumbersInAllTheirForms) {
 
 TEST(Obj, NormalsThatAreNotNumbersAreReplaced) {
     const MeshData m =
-        parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn nan nan -nan\nvn 0 0 1\nf 1//1 2//2 3//2\n");
+        parse_obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn nan nan -nan\nvn 0 0 1\nf 1//1 2//2 3//2\n");
     EXPECT_EQ(m.replaced_normals, 1u);
     EXPECT_NEAR(m.normals[0].z, 1, 1e-6f);
 }
@@ -134,7 +135,7 @@ TEST(Obj, ALargeFileIsReadFast) {
                     std::to_string(v + kSide + 1) + " " + std::to_string(v + kSide) + "\n";
         }
     const auto begin = std::chrono::steady_clock::now();
-    const MeshData m = parse(text);
+    const MeshData m = parse_obj(text);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     EXPECT_EQ(m.triangles.size(), size_t(2 * (kSide - 1) * (kSide - 1)));
     EXPECT_EQ(m.positions.size(), size_t(kSide * kSide));

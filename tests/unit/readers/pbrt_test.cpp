@@ -17,7 +17,7 @@ namespace {
 SceneDescription parse4(const std::string& world, const ReadOptions& options = {}) {
     return parse_pbrt("WorldBegin\n" + world, "s.pbrt", options);
 }
-SceneDescription parse3(const std::string& world, const ReadOptions& options = {}) {
+SceneDescription parse_pbrt3(const std::string& world, const ReadOptions& options = {}) {
     return parse_pbrt("WorldBegin\n" + world + "\nWorldEnd\n", "s.pbrt", options);
 }
 SceneDescription parse_options(const std::string& options) {
@@ -111,7 +111,9 @@ TEST(Pbrt, VersionIsThatOfTheEndOrOfTheFilm) {
     EXPECT_TRUE(ends_with_world_end("WorldBegin WorldEnd # the end\n# more\n\n"));
     EXPECT_FALSE(ends_with_world_end("WorldBegin\n# WorldEnd\n"));
     // Defaults of the two versions.
-    EXPECT_EQ(value<int64_t>(child(parse3(""), find(parse3(""), "sensor"), "film"), "width"), 640);
+    EXPECT_EQ(
+        value<int64_t>(child(parse_pbrt3(""), find(parse_pbrt3(""), "sensor"), "film"), "width"),
+        640);
     EXPECT_EQ(value<int64_t>(child(parse4(""), find(parse4(""), "sensor"), "film"), "width"), 1280);
     EXPECT_EQ(value<int64_t>(child(parse_options("Film \"image\""),
                                    find(parse_options("Film \"image\""), "sensor"), "film"),
@@ -120,7 +122,7 @@ TEST(Pbrt, VersionIsThatOfTheEndOrOfTheFilm) {
 }
 
 TEST(Pbrt, FilmsAreSampledBeyondTheirBorder) {
-    for (const SceneDescription& scene : {parse3(""), parse4("")})
+    for (const SceneDescription& scene : {parse_pbrt3(""), parse4("")})
         EXPECT_TRUE(value<bool>(child(scene, find(scene, "sensor"), "film"), "sample_border"));
 }
 
@@ -269,7 +271,7 @@ TEST(Pbrt, AlphaBecomesAMask) {
 
 TEST(Pbrt, ShadowsOfTheirOwnAreReported) {
     const auto warnings = [](const std::string& params) {
-        return parse3("Texture \"t\" \"float\" \"checkerboard\"\nShape \"sphere\" " + params)
+        return parse_pbrt3("Texture \"t\" \"float\" \"checkerboard\"\nShape \"sphere\" " + params)
             .warnings;
     };
     EXPECT_TRUE(warnings("\"float alpha\" 0.5 \"float shadowalpha\" 0.5").empty());
@@ -292,8 +294,9 @@ TEST(Pbrt, RoughnessIsRemappedByVersion) {
     EXPECT_NEAR(
         alpha(parse4("Material \"conductor\" \"float roughness\" 0.04 " + std::string(kSphere))),
         0.2, 1e-6);
-    EXPECT_NEAR(alpha(parse3("Material \"metal\" \"float roughness\" 0.1 " + std::string(kSphere))),
-                0.46176, 1e-4);
+    EXPECT_NEAR(
+        alpha(parse_pbrt3("Material \"metal\" \"float roughness\" 0.1 " + std::string(kSphere))),
+        0.46176, 1e-4);
     EXPECT_NEAR(
         alpha(parse4(
             "Material \"conductor\" \"float roughness\" 0.04 \"bool remaproughness\" false " +
@@ -352,7 +355,7 @@ TEST(Pbrt, MaterialsOfV3) {
         {"\"disney\"", "principled"},
         {"\"none\"", "null"}};
     for (const auto& [text, type] : kCases)
-        EXPECT_EQ(material(parse3(std::string("Material ") + text + " " + kSphere)).type, type)
+        EXPECT_EQ(material(parse_pbrt3(std::string("Material ") + text + " " + kSphere)).type, type)
             << text;
 }
 
@@ -370,7 +373,7 @@ TEST(Pbrt, NamedMaterialsMayBeMixed) {
     EXPECT_EQ(value<Rgb>(material(v4), "weight").r, 0.2f);
     EXPECT_LT(material(v4).children[0].object, material(v4).children[1].object);
     // In v3 the amount is that of the first.
-    const auto v3 = parse3(
+    const auto v3 = parse_pbrt3(
         with("matte") +
         "Material \"mix\" \"string namedmaterial1\" \"a\" \"string namedmaterial2\" \"b\"\n" +
         std::string(kSphere));
@@ -406,7 +409,7 @@ TEST(Pbrt, SampledSpectraBecomeColours) {
         return value<Rgb>(child(scene, find(scene, "shape"), "emitter"), "radiance");
     };
     // As it is in v3; in v4 with the luminance 1.
-    expect_near(L(parse3(text, options)), Rgb(0.6025f, 0.474f, 0.4545f), 2e-3);
+    expect_near(L(parse_pbrt3(text, options)), Rgb(0.6025f, 0.474f, 0.4545f), 2e-3);
     EXPECT_NEAR(luminance(L(parse4(text, options))), 1, 1e-4);
     const auto grey = parse4("Material \"diffuse\" \"spectrum reflectance\" [300 .4 900 .4] " +
                              std::string(kSphere));
@@ -421,7 +424,8 @@ TEST(Pbrt, BumpMapsLieAroundBothSides) {
     const SceneObject& bump = child(v4, find(v4, "shape"), "bsdf");
     EXPECT_EQ(bump.type, "bumpmap");
     EXPECT_EQ(child(v4, bump, "bsdf").type, "twosided");
-    const auto v3 = parse3(texture + "Material \"glass\" \"texture bumpmap\" \"h\" " + kSphere);
+    const auto v3 =
+        parse_pbrt3(texture + "Material \"glass\" \"texture bumpmap\" \"h\" " + kSphere);
     EXPECT_EQ(child(v3, child(v3, find(v3, "shape"), "bsdf"), "bsdf").type, "dielectric");
 }
 
@@ -468,11 +472,11 @@ TEST(Pbrt, InvisibleLightsAreRefused) {
 }
 
 TEST(Pbrt, ConstantsAndProductsOfConstantsAreColours) {
-    const auto scene =
-        parse3("Texture \"a\" \"color\" \"constant\" \"rgb value\" [.5 .6 .7]\n"
-               "Texture \"b\" \"color\" \"scale\" \"texture tex1\" \"a\" \"rgb tex2\" [.5 .5 .5]\n"
-               "Material \"matte\" \"texture Kd\" \"b\" " +
-               std::string(kSphere));
+    const auto scene = parse_pbrt3(
+        "Texture \"a\" \"color\" \"constant\" \"rgb value\" [.5 .6 .7]\n"
+        "Texture \"b\" \"color\" \"scale\" \"texture tex1\" \"a\" \"rgb tex2\" [.5 .5 .5]\n"
+        "Material \"matte\" \"texture Kd\" \"b\" " +
+        std::string(kSphere));
     expect_near(value<Rgb>(material(scene), "reflectance"), Rgb(0.25f, 0.3f, 0.35f));
 }
 
@@ -498,10 +502,10 @@ TEST(Pbrt, TexturesOfSpaceHaveTheCurrentTransform) {
     EXPECT_EQ(value<int64_t>(t, "octaves"), 4);
     expect_near(value<Transform>(t, "to_texture").point({2, 4, 6}), {1, 2, 3});
     // pbrt-v3 applies the transform itself to the points of the world.
-    const auto v3 =
-        parse3("Scale 2 2 2\nTexture \"t\" \"color\" \"checkerboard\" \"integer dimension\" 3\n"
-               "Identity Material \"matte\" \"texture Kd\" \"t\" " +
-               std::string(kSphere));
+    const auto v3 = parse_pbrt3(
+        "Scale 2 2 2\nTexture \"t\" \"color\" \"checkerboard\" \"integer dimension\" 3\n"
+        "Identity Material \"matte\" \"texture Kd\" \"t\" " +
+        std::string(kSphere));
     const SceneObject& cubes = child(v3, material(v3), "texture", "reflectance");
     EXPECT_EQ(cubes.type, "checkerboard3d");
     expect_near(value<Transform>(cubes, "to_texture").point({1, 2, 3}), {2, 4, 6});
@@ -531,8 +535,8 @@ TEST(Pbrt, LightsWithImages) {
     EXPECT_NEAR(value<double>(p, "power"), 50, 1e-4);
     expect_near(value<Transform>(p, "to_world").vector({0, 1, 0}), {0, 1, 0});
     const auto v3 =
-        parse3("LightSource \"goniometric\" \"string mapname\" \"a.exr\" \"rgb I\" [1 2 3]\n"
-               "LightSource \"projection\" \"string mapname\" \"b.exr\"\n");
+        parse_pbrt3("LightSource \"goniometric\" \"string mapname\" \"a.exr\" \"rgb I\" [1 2 3]\n"
+                    "LightSource \"projection\" \"string mapname\" \"b.exr\"\n");
     expect_near(value<Rgb>(find(v3, "emitter"), "intensity"), Rgb(1, 2, 3));
     // The column of azimuth 0 is +x, a quarter on it is +z; the zenith is +y.
     const Transform t = value<Transform>(find(v3, "emitter"), "to_world");
@@ -561,7 +565,7 @@ TEST(Pbrt, LightsOfV4AreScaledByPowerAndExposure) {
 TEST(Pbrt, SpotsFallOffAsInTheirVersion) {
     const std::string spot = "LightSource \"spot\" \"float coneangle\" 40 \"float conedeltaangle\" "
                              "10 \"point from\" [0 1 0] \"point to\" [0 0 0]";
-    const auto v3 = parse3(spot), v4 = parse4(spot);
+    const auto v3 = parse_pbrt3(spot), v4 = parse4(spot);
     EXPECT_EQ(value<double>(find(v3, "emitter"), "beam_width"), 30);
     EXPECT_EQ(value<std::string>(find(v3, "emitter"), "falloff"), "quartic");
     EXPECT_EQ(value<std::string>(find(v4, "emitter"), "falloff"), "smooth");
@@ -569,7 +573,7 @@ TEST(Pbrt, SpotsFallOffAsInTheirVersion) {
 }
 
 TEST(Pbrt, EnvironmentsOfV3HaveZUp) {
-    const auto scene = parse3("LightSource \"infinite\" \"string mapname\" \"sky.exr\"");
+    const auto scene = parse_pbrt3("LightSource \"infinite\" \"string mapname\" \"sky.exr\"");
     const Transform t = value<Transform>(find(scene, "emitter"), "to_world");
     expect_near(t.vector({0, 1, 0}), {0, 0, 1});   // the image's upper edge
     expect_near(t.vector({0, 0, -1}), {1, 0, 0});  // u = 0: azimuth 0 in pbrt
@@ -675,7 +679,7 @@ TEST(Pbrt, ErrorsNameTheLineAndWhatIsNear) {
     expect_scene_error(1, "Shape must stand after WorldBegin",
                        [] { parse_pbrt("Shape \"sphere\"", "s.pbrt"); });
     expect_scene_error(2, "Attribute is a directive of pbrt-v4",
-                       [] { parse3("Attribute \"shape\""); });
+                       [] { parse_pbrt3("Attribute \"shape\""); });
     expect_scene_error(1, "includes itself", [] {
         parse_pbrt("Include \"s.pbrt\"", "s.pbrt", with_files({{"s.pbrt", "Include \"s.pbrt\""}}));
     });
@@ -684,7 +688,7 @@ TEST(Pbrt, ErrorsNameTheLineAndWhatIsNear) {
 TEST(Pbrt, LenientReplacesWhatIsRefused) {
     ReadOptions lenient;
     lenient.lenient = true;
-    const auto scene = parse3(
+    const auto scene = parse_pbrt3(
         "Material \"fourier\" \"string bsdffile\" \"a.bsdf\"\n" + std::string(kSphere), lenient);
     EXPECT_EQ(material(scene).type, "diffuse");
     ASSERT_EQ(scene.warnings.size(), 1u);

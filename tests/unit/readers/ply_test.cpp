@@ -17,13 +17,13 @@
 namespace etendue {
 namespace {
 
-MeshData parse(std::string_view bytes, const MeshOptions& options = {}) {
+MeshData parse_ply(std::string_view bytes, const MeshOptions& options = {}) {
     return parse_ply(bytes, "test.ply", options);
 }
 
 /// Appends the bytes of a number, in big-endian order if wanted.
 template <class T>
-void put(std::string& bytes, T value, bool big_endian) {
+void put_ply(std::string& bytes, T value, bool big_endian) {
     std::string raw(reinterpret_cast<const char*>(&value), sizeof(T));
     if (big_endian) std::reverse(raw.begin(), raw.end());
     bytes += raw;
@@ -33,13 +33,13 @@ constexpr const char* kXyz = "property float x\nproperty float y\nproperty float
 
 TEST(Ply, AsciiWithNormalsAndTextureCoordinates) {
     const MeshData m =
-        parse("ply\nformat ascii 1.0\ncomment made by hand\nobj_info none\nelement vertex 4\n"
-              "property float x\nproperty float y\nproperty float z\n"
-              "property float nx\nproperty float ny\nproperty float nz\n"
-              "property float u\nproperty float v\nelement face 2\n"
-              "property list uchar int vertex_indices\nend_header\n"
-              "0 0 0 0 0 2 0 0.25\n1 0 0 0 0 1 1 0\n1 1 0 0 0 1 1 1\n0 1 0 0 0 1 0 1\n"
-              "3 0 1 2\n3 0 2 3\n");
+        parse_ply("ply\nformat ascii 1.0\ncomment made by hand\nobj_info none\nelement vertex 4\n"
+                  "property float x\nproperty float y\nproperty float z\n"
+                  "property float nx\nproperty float ny\nproperty float nz\n"
+                  "property float u\nproperty float v\nelement face 2\n"
+                  "property list uchar int vertex_indices\nend_header\n"
+                  "0 0 0 0 0 2 0 0.25\n1 0 0 0 0 1 1 0\n1 1 0 0 0 1 1 1\n0 1 0 0 0 1 0 1\n"
+                  "3 0 1 2\n3 0 2 3\n");
     EXPECT_EQ(m.positions.size(), 4u);
     EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 2, 3}}));
     EXPECT_EQ(m.normals[0], (Vec3{0, 0, 1}));
@@ -47,10 +47,11 @@ TEST(Ply, AsciiWithNormalsAndTextureCoordinates) {
 }
 
 TEST(Ply, PolygonsBecomeFansAndShorterListsAreDropped) {
-    const MeshData m = parse(std::string("ply\nformat ascii 1.0\nelement vertex 5\n") + kXyz +
-                             "element face 3\nproperty list uchar int vertex_index\nend_header\n"
-                             "0 0 0\n1 0 0\n2 1 0\n1 2 0\n0 1 0\n"
-                             "5 0 1 2 3 4\n2 0 1\n4 0 1 2 4\n");
+    const MeshData m =
+        parse_ply(std::string("ply\nformat ascii 1.0\nelement vertex 5\n") + kXyz +
+                  "element face 3\nproperty list uchar int vertex_index\nend_header\n"
+                  "0 0 0\n1 0 0\n2 1 0\n1 2 0\n0 1 0\n"
+                  "5 0 1 2 3 4\n2 0 1\n4 0 1 2 4\n");
     EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{
                                {0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 1, 2}, {0, 2, 4}}));
     EXPECT_EQ(m.dropped_degenerate, 1u);
@@ -64,10 +65,10 @@ TEST(Ply, NamesOfTextureCoordinates) {
                                  "property float " + v + "\n" + kXyz + "property float " + u +
                                  "\nelement face 1\nproperty list uchar int vertex_indices\n"
                                  "end_header\n.1 0 0 0 .2\n.3 1 0 0 .4\n.5 0 1 0 .6\n3 0 1 2\n";
-        const MeshData m = parse(text);
+        const MeshData m = parse_ply(text);
         ASSERT_EQ(m.uvs.size(), 3u) << u;
         EXPECT_EQ(m.uvs[1], (Vec2{0.4f, 0.3f}));
-        EXPECT_EQ(parse(text, {.flip_tex_coords = true}).uvs[1], (Vec2{0.4f, 0.7f}));
+        EXPECT_EQ(parse_ply(text, {.flip_tex_coords = true}).uvs[1], (Vec2{0.4f, 0.7f}));
     }
 }
 
@@ -85,28 +86,28 @@ TEST_P(PlyBinary, AllTypesInAnyOrder) {
                         "property list uint16 uint32 vertex_indices\nproperty list uint8 float uv\n"
                         "element empty 1000000000000\nend_header\n";
     for (int i = 0; i < 2; ++i) {
-        put<double>(bytes, 35, big);
-        put<uint16_t>(bytes, 2, big);
-        put<int16_t>(bytes, -1, big);
-        put<int16_t>(bytes, 7, big);
+        put_ply<double>(bytes, 35, big);
+        put_ply<uint16_t>(bytes, 2, big);
+        put_ply<int16_t>(bytes, -1, big);
+        put_ply<int16_t>(bytes, 7, big);
     }
     const int xy[4][2] = {{-300, 0}, {300, 0}, {300, 100}, {-300, 100}};
     for (int i = 0; i < 4; ++i) {
-        put<uint8_t>(bytes, 255, big);
-        put<double>(bytes, 0.5 * i, big);
-        put<int16_t>(bytes, int16_t(xy[i][0]), big);
-        put<int8_t>(bytes, int8_t(i), big);
-        for (int k = 0; k < i; ++k) put<float>(bytes, 1, big);
-        put<int8_t>(bytes, int8_t(xy[i][1]), big);
+        put_ply<uint8_t>(bytes, 255, big);
+        put_ply<double>(bytes, 0.5 * i, big);
+        put_ply<int16_t>(bytes, int16_t(xy[i][0]), big);
+        put_ply<int8_t>(bytes, int8_t(i), big);
+        for (int k = 0; k < i; ++k) put_ply<float>(bytes, 1, big);
+        put_ply<int8_t>(bytes, int8_t(xy[i][1]), big);
     }
     for (const auto& face : {std::vector<uint32_t>{0, 1, 2, 3}, std::vector<uint32_t>{2, 1, 0}}) {
-        put<int32_t>(bytes, -5, big);
-        put<uint16_t>(bytes, uint16_t(face.size()), big);
-        for (const uint32_t v : face) put<uint32_t>(bytes, v, big);
-        put<uint8_t>(bytes, 1, big);
-        put<float>(bytes, 3, big);
+        put_ply<int32_t>(bytes, -5, big);
+        put_ply<uint16_t>(bytes, uint16_t(face.size()), big);
+        for (const uint32_t v : face) put_ply<uint32_t>(bytes, v, big);
+        put_ply<uint8_t>(bytes, 1, big);
+        put_ply<float>(bytes, 3, big);
     }
-    const MeshData m = parse(bytes);
+    const MeshData m = parse_ply(bytes);
     EXPECT_EQ(m.positions,
               (std::vector<Vec3>{{-300, 0, 0}, {300, 0, 0.5f}, {300, 100, 1}, {-300, 100, 1.5f}}));
     EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 2, 3}, {2, 1, 0}}));
@@ -116,7 +117,7 @@ TEST_P(PlyBinary, AllTypesInAnyOrder) {
     // A file truncated at any byte is an error.
     const size_t body = bytes.find("end_header\n") + 11;
     for (size_t n = body; n < bytes.size(); ++n)
-        EXPECT_THROW(parse(std::string_view(bytes).substr(0, n)), SceneError) << n;
+        EXPECT_THROW(parse_ply(std::string_view(bytes).substr(0, n)), SceneError) << n;
 }
 
 /// A binary file in the most frequent layout: floats, then faces with lengths of one byte and indices of four.
@@ -134,21 +135,21 @@ struct PlainMesh {
         vertices = bytes.size();
         const Vec2 corners[5] = {{0, 0}, {1, 0}, {2, 1}, {1, 2}, {0, 1}};
         for (const Vec2 p : corners) {
-            for (const float x : {p.x, p.y, -1.5f}) put(bytes, x, big);
-            put<uint8_t>(bytes, 3, big);
-            for (const float x : {p.x / 2, p.y / 2}) put(bytes, x, big);
+            for (const float x : {p.x, p.y, -1.5f}) put_ply(bytes, x, big);
+            put_ply<uint8_t>(bytes, 3, big);
+            for (const float x : {p.x / 2, p.y / 2}) put_ply(bytes, x, big);
         }
         faces = bytes.size();
         for (const auto& polygon : polygons) {
-            put(bytes, uint8_t(polygon.size()), big);
-            for (const uint32_t v : polygon) put(bytes, v, big);
+            put_ply(bytes, uint8_t(polygon.size()), big);
+            for (const uint32_t v : polygon) put_ply(bytes, v, big);
         }
     }
 };
 
 TEST_P(PlyBinary, PolygonsAndTrianglesInAnyOrder) {
     const PlainMesh plain(GetParam(), {{0, 1, 2}, {0, 2, 3}, {0, 1, 2, 3, 4}, {1, 2}, {2, 3, 4}});
-    const MeshData m = parse(plain.bytes);
+    const MeshData m = parse_ply(plain.bytes);
     EXPECT_EQ(m.positions,
               (std::vector<Vec3>{
                   {0, 0, -1.5f}, {1, 0, -1.5f}, {2, 1, -1.5f}, {1, 2, -1.5f}, {0, 1, -1.5f}}));
@@ -165,13 +166,13 @@ TEST_P(PlyBinary, IndicesOutOfRange) {
         expect_scene_error(0,
                            fmt::format("vertex index {} must lie in [0, 4] (at byte {})", bad,
                                        plain.faces + 3 * 13),
-                           [&] { parse(plain.bytes); });
+                           [&] { parse_ply(plain.bytes); });
     }
 }
 
 TEST_P(PlyBinary, TruncatedAnywhere) {
     const PlainMesh plain(GetParam(), {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}});
-    const auto cut = [&](size_t n) { parse(std::string_view(plain.bytes).substr(0, n)); };
+    const auto cut = [&](size_t n) { parse_ply(std::string_view(plain.bytes).substr(0, n)); };
     for (size_t n = plain.vertices; n < plain.bytes.size(); ++n)
         EXPECT_THROW(cut(n), SceneError) << n;
     expect_scene_error(0,
@@ -187,13 +188,13 @@ TEST_P(PlyBinary, TruncatedAnywhere) {
 TEST_P(PlyBinary, PositionThatIsNotFinite) {
     PlainMesh plain(GetParam(), {{0, 1, 2}});
     std::string nan;
-    put(nan, std::nanf(""), plain.big_endian);
+    put_ply(nan, std::nanf(""), plain.big_endian);
     constexpr size_t kRecord = 21;
     plain.bytes.replace(plain.vertices + 3 * kRecord + 4, 4, nan);
     expect_scene_error(0,
                        fmt::format("position of vertex 3 is not finite (at byte {})",
                                    plain.vertices + 3 * kRecord),
-                       [&] { parse(plain.bytes); });
+                       [&] { parse_ply(plain.bytes); });
 }
 
 INSTANTIATE_TEST_SUITE_P(ByteOrders, PlyBinary, ::testing::Values(false, true),
@@ -203,10 +204,10 @@ TEST(Ply, FacesMayComeBeforeTheirVertices) {
     const std::string text = std::string("ply\nformat ascii 1.0\nelement face 1\n") +
                              "property list uchar int vertex_indices\nelement vertex 3\n" + kXyz +
                              "end_header\n3 0 1 2\n0 0 0\n1 0 0\n0 1 0\n";
-    EXPECT_EQ(parse(text).triangles.size(), 1u);
+    EXPECT_EQ(parse_ply(text).triangles.size(), 1u);
     std::string wrong = text;
     wrong.replace(wrong.find("3 0 1 2"), 7, "3 0 1 3");
-    expect_scene_error(0, "triangle 0 refers to vertex 3", [&] { parse(wrong); });
+    expect_scene_error(0, "triangle 0 refers to vertex 3", [&] { parse_ply(wrong); });
 }
 
 TEST(Ply, LineEndings) {
@@ -217,8 +218,8 @@ TEST(Ply, LineEndings) {
     for (size_t i = 0; (i = windows.find('\n', i)) != std::string::npos; i += 2)
         windows.insert(i, "\r");
     std::replace(old.begin(), old.end(), '\n', '\r');
-    EXPECT_EQ(parse(windows).triangles.size(), 1u);
-    EXPECT_EQ(parse(old).triangles.size(), 1u);
+    EXPECT_EQ(parse_ply(windows).triangles.size(), 1u);
+    EXPECT_EQ(parse_ply(old).triangles.size(), 1u);
 }
 
 // Binary data may begin with the characters that end lines.
@@ -232,11 +233,11 @@ TEST(Ply, LineEndingsBeforeBinaryData) {
                   "property list uchar int vertex_indices", "end_header"})
                 bytes += line + end;
             const size_t body = bytes.size();
-            for (const float x : {0, 0, 0, 1, 0, 0, 0, 1, 0}) put(bytes, x, false);
-            put<uint8_t>(bytes, 3, false);
-            for (const int32_t i : {0, 1, 2}) put(bytes, i, false);
+            for (const float x : {0, 0, 0, 1, 0, 0, 0, 1, 0}) put_ply(bytes, x, false);
+            put_ply<uint8_t>(bytes, 3, false);
+            for (const int32_t i : {0, 1, 2}) put_ply(bytes, i, false);
             bytes.replace(body, first.size(), first);
-            const MeshData m = parse(bytes);
+            const MeshData m = parse_ply(bytes);
             EXPECT_EQ(m.positions[1], (Vec3{1, 0, 0})) << end << first;
             EXPECT_EQ(m.triangles.size(), 1u) << end << first;
         }
@@ -251,7 +252,7 @@ TEST(Ply, WrittenMeshesAreReadAgain) {
     mesh.colors = {{0.25f, 0.5f, 1}, {1, 0, 0}, {0, 1, 0}};
     mesh.alphas = {0, 0.5f, 1};
     mesh.triangles = {{0, 1, 2}};
-    const MeshData read = parse(write_ply(mesh));
+    const MeshData read = parse_ply(write_ply(mesh));
     std::vector<std::string> arrays;
     for_each_vertex_array(mesh, [&](const char* name, const auto& values) {
         EXPECT_FALSE(values.empty()) << name;

@@ -72,7 +72,7 @@ struct Writer {
     }
 };
 
-MeshData parse(std::string_view bytes, int index, const MeshOptions& options = {}) {
+MeshData parse_serialized(std::string_view bytes, int index, const MeshOptions& options = {}) {
     return parse_serialized(bytes, "test.serialized", index, options);
 }
 
@@ -86,7 +86,7 @@ TEST_P(Serialized, EveryMeshOfAFile) {
     const std::string bytes = w.file();
     const char* names[] = {"first", "second", "third"};
     for (int i = 0; i < 3; ++i) {
-        const MeshData m = parse(bytes, i);
+        const MeshData m = parse_serialized(bytes, i);
         EXPECT_EQ(m.name, GetParam() == 3 ? "test.serialized" : names[i]);
         EXPECT_EQ(m.positions[2], (Vec3{1 + float(i), 1, 0.5f}));
         EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 2, 3}}));
@@ -95,12 +95,12 @@ TEST_P(Serialized, EveryMeshOfAFile) {
         EXPECT_EQ(m.face_normals, i == 2);
         EXPECT_EQ(m.colors.size(), i == 2 ? 4u : 0u);
     }
-    EXPECT_EQ(parse(bytes, 2).colors[1], (Vec3{1, 1, 1}));
-    EXPECT_EQ(parse(bytes, 1).normals[3], (Vec3{0, 0, 1}));
-    EXPECT_EQ(parse(bytes, 1).uvs[0], (Vec2{0, 0.25f}));
-    EXPECT_EQ(parse(bytes, 1, {.flip_tex_coords = true}).uvs[0], (Vec2{0, 0.75f}));
+    EXPECT_EQ(parse_serialized(bytes, 2).colors[1], (Vec3{1, 1, 1}));
+    EXPECT_EQ(parse_serialized(bytes, 1).normals[3], (Vec3{0, 0, 1}));
+    EXPECT_EQ(parse_serialized(bytes, 1).uvs[0], (Vec2{0, 0.25f}));
+    EXPECT_EQ(parse_serialized(bytes, 1, {.flip_tex_coords = true}).uvs[0], (Vec2{0, 0.75f}));
     for (const int index : {-1, 3})
-        expect_scene_error(0, "the file has 3", [&] { parse(bytes, index); });
+        expect_scene_error(0, "the file has 3", [&] { parse_serialized(bytes, index); });
 }
 
 // As old exporters wrote them, in either version.
@@ -109,22 +109,22 @@ TEST_P(Serialized, FlagsWithoutPrecisionMeanSingle) {
     w.add(0, "first");
     w.add(kNormals | kTexcoords, "second");
     for (int i = 0; i < 2; ++i) {
-        const MeshData m = parse(w.file(), i);
+        const MeshData m = parse_serialized(w.file(), i);
         EXPECT_EQ(m.positions[2], (Vec3{1 + float(i), 1, 0.5f}));
         EXPECT_EQ(m.triangles, (std::vector<MeshData::Triangle>{{0, 1, 2}, {0, 2, 3}}));
     }
-    EXPECT_EQ(parse(w.file(), 1).uvs[2], (Vec2{1, 1.25f}));
+    EXPECT_EQ(parse_serialized(w.file(), 1).uvs[2], (Vec2{1, 1.25f}));
 }
 
 INSTANTIATE_TEST_SUITE_P(Versions, Serialized, ::testing::Values(3, 4),
                          [](const auto& version) { return std::to_string(version.param); });
 
 TEST(SerializedErrors, NotSuchAFile) {
-    expect_scene_error(0, "beyond the end", [] { parse("", 0); });
-    expect_scene_error(0, "0x041C is missing", [] { parse("wavefront", 0); });
+    expect_scene_error(0, "beyond the end", [] { parse_serialized("", 0); });
+    expect_scene_error(0, "0x041C is missing", [] { parse_serialized("wavefront", 0); });
     Writer w{.version = 5, .meshes = {}};
     w.add(kSingle, "");
-    expect_scene_error(0, "version 5", [&] { parse(w.file(), 0); });
+    expect_scene_error(0, "version 5", [&] { parse_serialized(w.file(), 0); });
 }
 
 TEST(SerializedErrors, DamagedTable) {
@@ -132,10 +132,10 @@ TEST(SerializedErrors, DamagedTable) {
     w.add(kSingle, "");
     std::string many = w.file(), far = w.file();
     many.replace(many.size() - 4, 4, "\xff\xff\xff\xff");
-    expect_scene_error(0, "table of meshes", [&] { parse(many, 0); });
+    expect_scene_error(0, "table of meshes", [&] { parse_serialized(many, 0); });
     far.replace(far.size() - 12, 8, "\xf0\xff\xff\xff\xff\xff\xff\xff");
-    expect_scene_error(0, "beyond the end", [&] { parse(far, 0); });
-    expect_scene_error(0, "table of meshes", [&] { parse(w.header(), 0); });
+    expect_scene_error(0, "beyond the end", [&] { parse_serialized(far, 0); });
+    expect_scene_error(0, "table of meshes", [&] { parse_serialized(w.header(), 0); });
 }
 
 TEST(SerializedErrors, DamagedContents) {
@@ -143,8 +143,8 @@ TEST(SerializedErrors, DamagedContents) {
     w.add(kSingle | kDouble, "");
     w.add(kSingle, "", 4);
     const std::string bytes = w.file();
-    expect_scene_error(0, "precision", [&] { parse(bytes, 0); });
-    expect_scene_error(0, "refers to vertex 4", [&] { parse(bytes, 1); });
+    expect_scene_error(0, "precision", [&] { parse_serialized(bytes, 0); });
+    expect_scene_error(0, "refers to vertex 4", [&] { parse_serialized(bytes, 1); });
 }
 
 TEST(SerializedErrors, CountsBeyondTheData) {
@@ -156,7 +156,7 @@ TEST(SerializedErrors, CountsBeyondTheData) {
         put<uint64_t>(plain, vertices);
         put<uint64_t>(plain, 1);
         w.meshes.push_back(w.header() + Writer::deflate(plain));
-        EXPECT_THROW(parse(w.file(), 0), SceneError);
+        EXPECT_THROW(parse_serialized(w.file(), 0), SceneError);
     }
 }
 
@@ -169,7 +169,7 @@ TEST(SerializedErrors, EveryDamagedByteIsSurvived) {
         std::string damaged = bytes;
         damaged[i] = char(damaged[i] ^ 0x5a);
         try {
-            expect_well_formed(parse(damaged, 0));
+            expect_well_formed(parse_serialized(damaged, 0));
         } catch (const SceneError&) {
             ++errors;
         }

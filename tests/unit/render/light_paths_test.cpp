@@ -14,7 +14,7 @@ Scene small_room() {
     return build(mixed_room(front_camera(8)));
 }
 
-RenderSettings settings_of(const std::string& integrator, uint64_t spp) {
+RenderSettings settings_with(const std::string& integrator, uint64_t spp) {
     RenderSettings settings;
     settings.integrator = IntegratorSpec::parse(integrator);
     settings.spp = spp;
@@ -31,7 +31,7 @@ double figure(const Renderer& renderer, const std::string& name) {
 TEST(LightPaths, VcmWithoutMergesIsBdpt) {
     const Scene scene = small_room();
     const auto image = [&](const char* integrator) {
-        Renderer renderer(scene, settings_of(integrator, 4));
+        Renderer renderer(scene, settings_with(integrator, 4));
         renderer.run([](const Progress&) {}, std::atomic<bool>(false));
         return renderer.film().image();
     };
@@ -53,7 +53,8 @@ TEST(LightPaths, StoredPathsHaveNoMoreMemoryThanTheirVertices) {
 TEST(LightPaths, PcbptStaysWithinItsMemory) {
     const Scene scene = build(mixed_room(front_camera(64)));
     const auto bytes = [&](const std::string& options) {
-        Renderer renderer(scene, settings_of("pcbpt:record_fraction=0,max_depth=2," + options, 1));
+        Renderer renderer(scene,
+                          settings_with("pcbpt:record_fraction=0,max_depth=2," + options, 1));
         renderer.run([](const Progress&) {}, std::atomic<bool>(false));
         return figure(renderer, "path_bytes");
     };
@@ -74,7 +75,7 @@ TEST_P(LightPathMemory, SufficesForTheirNumber) {
     const Scene scene =
         build(is_guided ? lantern_room(lens_camera(64)) : mixed_room(lens_camera(64)));
     constexpr uint64_t kPasses = 20;
-    RenderSettings settings = settings_of(method + ",memory=1", kPasses);
+    RenderSettings settings = settings_with(method + ",memory=1", kPasses);
     settings.threads = 2;
     Renderer renderer(scene, settings);
     EXPECT_LT(renderer.integrator().light_paths(scene), 2000u);

@@ -28,12 +28,12 @@ Scene scene_with(const std::string& integrator, bool lenient = false,
 std::string integrator(const std::string& type, const std::string& params = "") {
     return "<integrator type=\"" + type + "\">" + params + "</integrator>";
 }
-std::string chosen(const Scene& scene, const std::string& text = "") {
+std::string chosen_method(const Scene& scene, const std::string& text = "") {
     return choose_integrator(scene, text).to_string();
 }
-std::string error_of(const Scene& scene) {
+std::string error_of_scene(const Scene& scene) {
     try {
-        return "no error: " + chosen(scene);
+        return "no error: " + chosen_method(scene);
     } catch (const std::exception& e) {
         return e.what();
     }
@@ -76,11 +76,13 @@ TEST(SceneIntegrator, NamesInCamelCaseAreThoseOfTheOldDialect) {
                           "value=\"5\"/><float name=\"radius\" value=\"0.25\"/><boolean "
                           "name=\"merges\" value=\"false\"/>"),
         false, "0.6.0");
-    EXPECT_EQ(chosen(scene), "vcm:light_paths=7,max_depth=5,merges=false,radius=0.25");
+    EXPECT_EQ(chosen_method(scene), "vcm:light_paths=7,max_depth=5,merges=false,radius=0.25");
 }
 
 TEST(SceneIntegrator, CounterpartsOfMitsubasParametersAreUsed) {
-    const auto of = [&](const std::string& xml) { return chosen(scene_with(xml, false, "0.6.0")); };
+    const auto of = [&](const std::string& xml) {
+        return chosen_method(scene_with(xml, false, "0.6.0"));
+    };
     const std::string progressive = "<integer name=\"photonCount\" value=\"5000\"/><float "
                                     "name=\"initialRadius\" value=\"0.5\"/><float name=\"alpha\" "
                                     "value=\"0.7\"/>";
@@ -96,8 +98,8 @@ TEST(SceneIntegrator, CounterpartsOfMitsubasParametersAreUsed) {
                                    "name=\"lookupSize\" value=\"1000\"/><float "
                                    "name=\"globalLookupRadius\" value=\"0.125\"/>"),
         false, "0.6.0");
-    EXPECT_EQ(chosen(photons), fmt::format("pm:light_paths=20000,nearest=512,radius={}",
-                                           0.125f * photons.bounds().radius()));
+    EXPECT_EQ(chosen_method(photons), fmt::format("pm:light_paths=20000,nearest=512,radius={}",
+                                                  0.125f * photons.bounds().radius()));
     EXPECT_TRUE(has(warnings_of(photons), "nearest is at most 512"));
 }
 
@@ -129,7 +131,7 @@ TEST(SceneIntegrator, WhatHasNoCounterpartIsSaid) {
 }
 
 TEST(SceneIntegrator, ErrorsSayWhereAndWhatIsNear) {
-    const auto error = [](const std::string& xml) { return error_of(scene_with(xml)); };
+    const auto error = [](const std::string& xml) { return error_of_scene(scene_with(xml)); };
     EXPECT_EQ(error(integrator("upg+bdtp")), "test.xml:2: unknown integrator \"upg+bdtp\" (did you "
                                              "mean \"upg+bdpt\"?); choose another one (-i)");
     EXPECT_NE(error(integrator("photonmaper")).find("did you mean \"photonmapper\"?"),
@@ -182,17 +184,17 @@ TEST(SceneIntegrator, TablesHaveTheDefaultsThatHold) {
 }
 
 TEST(SceneIntegrator, NeverStopsTheScene) {
-    EXPECT_EQ(chosen(scene_with(integrator("no_such")), "bdpt"), "bdpt");
-    EXPECT_EQ(chosen(scene_with("")), "path");
-    EXPECT_EQ(chosen(scene_with(integrator("adaptive"))), "path");
+    EXPECT_EQ(chosen_method(scene_with(integrator("no_such")), "bdpt"), "bdpt");
+    EXPECT_EQ(chosen_method(scene_with("")), "path");
+    EXPECT_EQ(chosen_method(scene_with(integrator("adaptive"))), "path");
     const Scene lenient = scene_with(integrator("no_such"), true);
-    EXPECT_EQ(chosen(lenient), "path");
+    EXPECT_EQ(chosen_method(lenient), "path");
     EXPECT_TRUE(has(warnings_of(lenient), "unknown integrator \"no_such\""));
     const Scene param = scene_with(
         integrator("vcm", "<float name=\"radios\" value=\"1\"/><integer name=\"max_depth\" "
                           "value=\"4\"/>"),
         true);
-    EXPECT_EQ(chosen(param), "vcm:max_depth=4");
+    EXPECT_EQ(chosen_method(param), "vcm:max_depth=4");
     EXPECT_TRUE(has(warnings_of(param), "has no parameter \"radios\""));
 }
 
@@ -200,12 +202,12 @@ TEST(SceneIntegrator, AnotherMethodTakesOnlyWhatBelongsToTheScene) {
     const Scene scene = scene_with(
         integrator("bdpt", "<integer name=\"max_depth\" value=\"6\"/><integer name=\"rr_depth\" "
                            "value=\"9\"/><float name=\"roulette\" value=\"0.5\"/>"));
-    EXPECT_EQ(chosen(scene), "bdpt:max_depth=6,roulette=0.5,rr_depth=9");
-    EXPECT_EQ(chosen(scene, "bdpt"), "bdpt:max_depth=6,roulette=0.5,rr_depth=9");
-    EXPECT_EQ(chosen(scene, "bdpt:rr_depth=3"), "bdpt:max_depth=6,roulette=0.5,rr_depth=3");
-    EXPECT_EQ(chosen(scene, "vcm"), "vcm:max_depth=6");
-    EXPECT_EQ(chosen(scene, "path:max_depth=3"), "path:max_depth=3");
-    EXPECT_EQ(chosen(scene_with(integrator("direct")), "bdpt"), "bdpt:max_depth=2");
+    EXPECT_EQ(chosen_method(scene), "bdpt:max_depth=6,roulette=0.5,rr_depth=9");
+    EXPECT_EQ(chosen_method(scene, "bdpt"), "bdpt:max_depth=6,roulette=0.5,rr_depth=9");
+    EXPECT_EQ(chosen_method(scene, "bdpt:rr_depth=3"), "bdpt:max_depth=6,roulette=0.5,rr_depth=3");
+    EXPECT_EQ(chosen_method(scene, "vcm"), "vcm:max_depth=6");
+    EXPECT_EQ(chosen_method(scene, "path:max_depth=3"), "path:max_depth=3");
+    EXPECT_EQ(chosen_method(scene_with(integrator("direct")), "bdpt"), "bdpt:max_depth=2");
 }
 
 TEST(SceneIntegrator, RouletteOfFilesBeginsInTime) {
@@ -236,14 +238,14 @@ TEST(SceneIntegrator, ThoseOfPbrtHaveTheirParameters) {
     const Scene mlt =
         pbrt("Integrator \"mlt\" \"integer maxdepth\" 7 \"float largestepprobability\" 0.25 "
              "\"integer chains\" 64 \"integer mutationsperpixel\" 48 \"float sigma\" 0.02");
-    EXPECT_EQ(chosen(mlt), "mmlt:chains=64,max_depth=8,p_large=0.25");
+    EXPECT_EQ(chosen_method(mlt), "mmlt:chains=64,max_depth=8,p_large=0.25");
     EXPECT_EQ(default_spp(mlt), 48u);
     EXPECT_TRUE(has(mlt.warnings(), "ignored: sigma"));
     const Scene sppm = pbrt("Integrator \"sppm\" \"float radius\" 0.5 \"integer "
                             "photonsperiteration\" 5000");
-    EXPECT_EQ(chosen(sppm), "sppm:light_paths=5000,max_depth=6,radius=0.5");
+    EXPECT_EQ(chosen_method(sppm), "sppm:light_paths=5000,max_depth=6,radius=0.5");
     EXPECT_TRUE(sppm.warnings().empty());
-    EXPECT_EQ(chosen(pbrt("Integrator \"lightpath\"")), "light:max_depth=6");
+    EXPECT_EQ(chosen_method(pbrt("Integrator \"lightpath\"")), "light:max_depth=6");
     EXPECT_TRUE(has(pbrt("Integrator \"ambientocclusion\"").warnings(), "\"path\" instead"));
 }
 

@@ -9,19 +9,19 @@
 namespace etendue {
 namespace {
 
-using Moments = std::array<double, kNextEventCounts>;
+using CountMoments = std::array<double, kNextEventCounts>;
 
 /// Moments of the candidates, from the next events of one vertex.
-Moments moments_of(std::vector<NextEventDraw> draws, double scale = 1) {
+CountMoments moments_of(std::vector<NextEventDraw> draws, double scale = 1) {
     GatherSums sums;
     NextEventCount::observe(draws, scale, sums);
     EXPECT_EQ(sums.next_events, draws.size());
-    Moments moments;
+    CountMoments moments;
     for (size_t i = 0; i < kNextEventCounts; ++i)
         moments[i] = double(sums.next_event_moments[i]) / GatherMoment::kUnit;
     return moments;
 }
-void expect_near(const Moments& a, const Moments& b) {
+void expect_near(const CountMoments& a, const CountMoments& b) {
     for (size_t i = 0; i < kNextEventCounts; ++i) EXPECT_NEAR(a[i], b[i], 2e-6) << i;
 }
 
@@ -43,7 +43,7 @@ TEST(NextEventCount, KnowsTheVarianceOfOneFromTheDifferences) {
 /// Of two next events with the weight 1/2, odds are (N/2)² with N instead, and (n_S p_S)/p is 2.
 TEST(NextEventCount, KnowsThatOthersGiveTheirWeight) {
     const NextEventDraw d{.contribution = 1, .weight = 0.5f, .passed = 1};
-    Moments expected;
+    CountMoments expected;
     for (size_t i = 0; i < kNextEventCounts; ++i) {
         const double n = std::pow(2.0, double(i)), w = n * n / (n * n + 4);
         expected[i] = (1 - w) * (1 - w) / 2;
@@ -52,7 +52,7 @@ TEST(NextEventCount, KnowsThatOthersGiveTheirWeight) {
     // Roulette leaves half of them with twice the value.
     const NextEventDraw twice{.contribution = 1, .weight = 0.5f, .passed = 2},
         none{.contribution = 1, .weight = 0.5f, .passed = 0};
-    const Moments with_roulette = moments_of({twice, none});
+    const CountMoments with_roulette = moments_of({twice, none});
     for (size_t i = 0; i < kNextEventCounts; ++i) {
         const double n = std::pow(2.0, double(i)), w = n * n / (n * n + 4);
         EXPECT_NEAR(with_roulette[i], expected[i] + 2 * w * w / std::pow(n, 1.5), 2e-6) << i;
@@ -66,7 +66,7 @@ TEST(NextEventCount, HasTheLeastProductOfVarianceAndTime) {
                 return (1 - b + b / n) * (1 - time + time * n);
             };
             for (const uint32_t present : {2u, 4u, 8u}) {
-                Moments moments;
+                CountMoments moments;
                 for (size_t i = 0; i < kNextEventCounts; ++i) moments[i] = b / double(1u << i);
                 const VarianceAndTime observed{1 - b + b / present, 1 - time + time * present};
                 const uint32_t chosen = best_next_event_count(observed, present, moments, time);

@@ -69,7 +69,7 @@ std::vector<Case> cases() {
 
 enum class Guided { No, Wide, Narrow };
 
-class Reciprocal : public testing::TestWithParam<std::tuple<Case, Guided>> {
+class Reciprocal : public ::testing::TestWithParam<std::tuple<Case, Guided>> {
 protected:
     Reciprocal()
         : scene(test::build(test::front_camera(8) + test::room() + given().light +
@@ -396,15 +396,15 @@ TEST(ReciprocalUnderALeaningNormal, EqualsTheIntegral) {
     expect_reciprocal(scene, event, p_c);
 }
 
-const auto kName = [](const testing::TestParamInfo<std::tuple<Case, Guided>>& given) {
+const auto kName = [](const ::testing::TestParamInfo<std::tuple<Case, Guided>>& given) {
     const char* suffix[] = {"", "_guided", "_narrowly_guided"};
     return std::get<Case>(given.param).name +
            std::string(suffix[int(std::get<Guided>(given.param))]);
 };
 INSTANTIATE_TEST_SUITE_P(Starts, Reciprocal,
-                         testing::Combine(testing::ValuesIn(cases()),
-                                          testing::Values(Guided::No, Guided::Wide,
-                                                          Guided::Narrow)),
+                         ::testing::Combine(::testing::ValuesIn(cases()),
+                                            ::testing::Values(Guided::No, Guided::Wide,
+                                                              Guided::Narrow)),
                          kName);
 
 }  // namespace

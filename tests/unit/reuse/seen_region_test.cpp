@@ -13,7 +13,7 @@
 namespace etendue {
 namespace {
 
-constexpr float kRadius = 0.3f;
+constexpr float kRegionRadius = 0.3f;
 const Vec3 kNormal = normalize(Vec3{0.3f, -0.5f, 0.8f});
 
 struct Viewer {
@@ -28,7 +28,7 @@ const Viewer kAnywhere[] = {{1, 0, 0.006f},       {0.4f, 0.9f, 0.03f},    {0.01f
 SlabView view_of(const Viewer& v) {
     const Frame frame = Frame::from_normal(kNormal);
     return {frame.s * (0.6f * v.foot) + frame.t * (0.8f * v.foot) - kNormal * v.height, kNormal,
-            kRadius, v.half_height};
+            kRegionRadius, v.half_height};
 }
 float cosine_pdf(Vec3 n, Vec3 d) {
     return std::max(0.0f, dot(n, d)) * kInvPi;

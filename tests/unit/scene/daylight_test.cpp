@@ -18,7 +18,7 @@ Scene daylight(const std::string& type, const std::string& params,
 
 constexpr const char* kSunInZ = "<vector name=\"sun_direction\" x=\"0\" y=\"0.6\" z=\"0.8\"/>";
 
-std::string number(const char* name, double value) {
+std::string float_element(const char* name, double value) {
     return "<float name=\"" + std::string(name) + "\" value=\"" + std::to_string(value) + "\"/>";
 }
 
@@ -32,7 +32,7 @@ Rgb radiance(const Scene& scene, Vec3 d) {
 TEST(Sun, HasTheDensityOfItsSamples) {
     for (const double aperture : {0.01, 0.5358, 20.0}) {
         const Scene scene =
-            daylight("sun", std::string(kSunInZ) + number("sun_aperture", aperture) +
+            daylight("sun", std::string(kSunInZ) + float_element("sun_aperture", aperture) +
                                 "<boolean name=\"complex_sun\" value=\"true\"/>");
         const Emitter& sun = *scene.emitters().front();
         const Vec3 axis = normalize(Vec3{0, 0.6f, 0.8f});
@@ -62,7 +62,7 @@ TEST(Sun, HasTheDensityOfItsSamples) {
 TEST(Sun, PowerDoesNotDependOnItsAperture) {
     const auto power = [](double aperture) {
         const Scene scene =
-            daylight("sun", std::string(kSunInZ) + number("sun_aperture", aperture));
+            daylight("sun", std::string(kSunInZ) + float_element("sun_aperture", aperture));
         return scene.emitters().front()->power();
     };
     for (const double aperture : {0.01, 0.1, 5.0, 60.0})

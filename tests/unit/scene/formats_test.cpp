@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <regex>
 #include <set>
-#include <sstream>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -19,6 +17,7 @@
 #include "scene/builder.h"
 #include "scene/mitsuba_manual.h"
 #include "scene/settings.h"
+#include "words.h"
 
 namespace etendue::test {
 namespace {
@@ -55,11 +54,6 @@ void expect_used(const Uses& uses, const std::string& category, const std::strin
 }
 
 // ---- Mitsuba
-
-std::vector<std::string> words(const char* list) {
-    std::istringstream in(list);
-    return {std::istream_iterator<std::string>(in), {}};
-}
 
 /// Whether a plug-in's own table says that a parameter has no effect.
 bool is_without_effect(const ManualEntry& entry, const std::string& param) {

@@ -4,21 +4,16 @@
 
 #include <algorithm>
 #include <set>
-#include <sstream>
 
 #include <gtest/gtest.h>
 
 #include "error_of.h"
 #include "scene/settings.h"
 #include "test_scenes.h"
+#include "words.h"
 
 namespace etendue::test {
 namespace {
-
-std::vector<std::string> words(const char* list) {
-    std::istringstream in(list);
-    return {std::istream_iterator<std::string>(in), {}};
-}
 
 std::vector<PluginInfo> all_plugins() {
     std::vector<PluginInfo> plugins = scene_plugins();
@@ -48,7 +43,7 @@ bool has(const std::vector<std::string>& lines, const std::string& text) {
                        [&](const std::string& l) { return l.find(text) != l.npos; });
 }
 
-const std::string kLamp = "<emitter type=\"constant\"/>";
+const std::string kBulb = "<emitter type=\"constant\"/>";
 
 TEST(MitsubaManual, SaysWhatBecomesOfEveryParameter) {
     const std::vector<PluginInfo> plugins = all_plugins();
@@ -74,7 +69,7 @@ TEST(MitsubaManual, SaysWhatBecomesOfEveryParameter) {
 }
 
 TEST(MitsubaManual, RefusalsGiveTheReason) {
-    EXPECT_NE(error_of(front_camera(4) + kLamp +
+    EXPECT_NE(error_of(front_camera(4) + kBulb +
                        "<shape type=\"sphere\"><bsdf type=\"measured\"/></shape>")
                   .find("bsdf \"measured\" is not supported: measured materials"),
               std::string::npos);
@@ -126,7 +121,7 @@ TEST(MitsubaManual, SaysWhatIsReplaced) {
 }
 
 TEST(MitsubaScenes, LenientLeavesOutWhatItCannotRender) {
-    const Scene scene = read(front_camera(4) + kLamp +
+    const Scene scene = read(front_camera(4) + kBulb +
                                  "<shape type=\"sphere\"/>"
                                  "<shape type=\"hair\"/>"  // 1
                                  "<shape type=\"obj\"><string name=\"filename\" "
@@ -147,7 +142,7 @@ TEST(MitsubaScenes, LenientLeavesOutWhatItCannotRender) {
 }
 
 TEST(MitsubaScenes, WithLenientACoatingIsWhatItCovers) {
-    const std::string coated = front_camera(4) + kLamp +
+    const std::string coated = front_camera(4) + kBulb +
                                "<shape type=\"sphere\"><bsdf type=\"coating\"><bsdf "
                                "type=\"diffuse\"><rgb name=\"reflectance\" value=\"1 0 "
                                "0\"/></bsdf></bsdf></shape>";
@@ -161,7 +156,7 @@ TEST(MitsubaScenes, SensorsAreChosenByNumberOrName) {
                "name=\"width\" value=\"" +
                std::to_string(width) + "\"/></film></sensor>";
     };
-    const std::string scene = camera("left", 5) + camera("right", 6) + kLamp;
+    const std::string scene = camera("left", 5) + camera("right", 6) + kBulb;
     EXPECT_EQ(read(scene).film().width, 5);
     EXPECT_TRUE(has(read(scene).warnings(), "the scene has 2 sensors (left, right)"));
     EXPECT_EQ(read(scene, false, "3.0.0", "1").film().width, 6);
@@ -172,7 +167,7 @@ TEST(MitsubaScenes, SensorsAreChosenByNumberOrName) {
 
 TEST(MitsubaScenes, GroupsCanBeNested) {
     const Scene scene = read(
-        front_camera(4) + kLamp +
+        front_camera(4) + kBulb +
         "<shape type=\"shapegroup\" id=\"a\"><shape type=\"sphere\"/></shape>"
         "<shape type=\"shapegroup\" id=\"b\"><shape type=\"rectangle\"/><shape "
         "type=\"instance\"><ref "
@@ -189,7 +184,7 @@ TEST(MitsubaScenes, StretchedQuadricsAreMeshes) {
                                   "</transform></shape>";
     for (const char* shape : {"sphere", "cylinder"}) {
         const Scene scene =
-            read(front_camera(4) + kLamp + "<shape type=\"" + shape + "\">" + stretched);
+            read(front_camera(4) + kBulb + "<shape type=\"" + shape + "\">" + stretched);
         EXPECT_TRUE(scene.shapes()[0].is_mesh);
         EXPECT_NEAR(scene.bounds().hi.x, 2, 1e-5);
         EXPECT_NEAR(scene.bounds().hi.y, 1, 1e-5);
@@ -201,7 +196,7 @@ TEST(MitsubaScenes, StretchedQuadricsAreMeshes) {
 }
 
 TEST(MitsubaScenes, In06AMediumAloneIsInvisible) {
-    const std::string fog = front_camera(4) + kLamp +
+    const std::string fog = front_camera(4) + kBulb +
                             "<shape type=\"cube\"><medium type=\"homogeneous\" name=\"interior\">"
                             "<float name=\"albedo\" value=\"0\"/></medium></shape>";
     EXPECT_EQ(read(fog, false, "0.6.0").shapes()[0].material->opacity(Vec2()), 0);
@@ -212,7 +207,7 @@ TEST(MitsubaScenes, In06AMediumAloneIsInvisible) {
 TEST(MitsubaScenes, NormalsAreStrictWhereTheIntegratorSaysSo) {
     for (const bool strict : {false, true}) {
         const Scene scene =
-            read(front_camera(4) + kLamp + "<shape type=\"rectangle\">" + diffuse("0.5,0.5,0.5") +
+            read(front_camera(4) + kBulb + "<shape type=\"rectangle\">" + diffuse("0.5,0.5,0.5") +
                  "</shape><integrator type=\"path\"><boolean name=\"strict_normals\" value=\"" +
                  (strict ? "true" : "false") + "\"/></integrator>");
         const Vec3 ns = normalize(Vec3{1, 0, 1}), wo = normalize(Vec3{-0.95f, 0, 0.3f}),

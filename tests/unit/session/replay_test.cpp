@@ -10,7 +10,7 @@
 namespace etendue::test {
 namespace {
 
-Scene small_room() {
+Scene room_with_ball() {
     return build(sensor("0,0,3.5", "0,0,0", 8) + room() + area_lamp() +
                  sphere("0.3,-0.5,0.1", "0.4", "<bsdf type=\"conductor\"/>"));
 }
@@ -48,7 +48,7 @@ class ReplayOf : public ::testing::TestWithParam<std::string> {};
 
 /// Contributions with t ≥ 2 sum to what the pixel has of them; the film's other part are splats.
 TEST_P(ReplayOf, SumsToThePixel) {
-    const Scene scene = small_room();
+    const Scene scene = room_with_ball();
     constexpr uint32_t kPasses = 16;
     RenderSettings settings = settings_of(GetParam());
     settings.spp = kPasses;
@@ -110,7 +110,7 @@ private:
 
 /// The integrator answers, not its name.
 TEST(Replay, AsksTheIntegrator) {
-    const Scene scene = small_room();
+    const Scene scene = room_with_ball();
     ReplayRequest request;
     request.pixel = 27;
     request.passes = 4;
@@ -130,7 +130,7 @@ TEST(Replay, AsksTheIntegrator) {
 }
 
 TEST(Replay, SplatsAreThoseOfOnePass) {
-    const Scene scene = small_room();
+    const Scene scene = room_with_ball();
     RenderSettings settings;
     settings.integrator = IntegratorSpec::parse("light");
     settings.seed = 4;
@@ -149,7 +149,7 @@ TEST(Replay, SplatsAreThoseOfOnePass) {
 
 /// Also where pixels have several light paths, and where some have none.
 TEST(Replay, TracesAllLightPaths) {
-    const Scene scene = small_room();
+    const Scene scene = room_with_ball();
     for (const int light_paths : {40, 64, 150}) {
         RenderSettings settings =
             settings_of("bdpt:roulette=0,light_paths=" + std::to_string(light_paths));
@@ -172,7 +172,7 @@ TEST(Replay, TracesAllLightPaths) {
 }
 
 TEST(Replay, EndsAtItsLimits) {
-    const Scene scene = small_room();
+    const Scene scene = room_with_ball();
     ReplayRequest request;
     request.integrator = IntegratorSpec::parse("bdpt");
     request.pixel = 27;
@@ -204,7 +204,7 @@ class LastReplayOf : public ::testing::TestWithParam<const char*> {};
 
 /// Contributions with t ≥ 2 sum to the difference of the pixel's sums after and before the last pass.
 TEST_P(LastReplayOf, SumsToTheLastPass) {
-    const Scene scene = small_room();
+    const Scene scene = room_with_ball();
     constexpr int kPasses = 6;
     const RenderSettings settings = settings_of(GetParam());
     Renderer renderer(scene, settings);

@@ -5,8 +5,6 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -15,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "image/image.h"
+#include "image_body.h"
 #include "run_program.h"
 #include "studio/api.h"
 #include "test_scenes.h"
@@ -88,18 +87,6 @@ protected:
 private:
     std::string lamp_;
 };
-
-uint32_t field_at(const std::string& body, size_t index) {
-    uint32_t value = 0;
-    std::memcpy(&value, body.data() + 4 + 4 * index, 4);
-    return value;
-}
-/// A value of an image as the page reads it.
-float value_at(const std::string& body, size_t index) {
-    uint16_t bits = 0;
-    std::memcpy(&bits, body.data() + 64 + 2 * index, 2);
-    return std::ldexp(float(Half(Half::FromBits, bits)), int32_t(field_at(body, 9)));
-}
 
 TEST_F(ApiTest, AReferenceOfAnotherSizeIsNotShown) {
     for (const auto& [width, height] : {std::pair{8, 8}, {16, 8}, {8, 32}, {16, 17}}) {

@@ -1,13 +1,13 @@
 // Requests, names of files and images of the studio, without sockets; and the reader of requests.
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "image/image.h"
+#include "image_body.h"
 #include "studio/guard.h"
 #include "studio/image_reply.h"
 #include "studio/pixel_values.h"
@@ -103,17 +103,6 @@ TEST(Requests, AreReadWithinLimits) {
     EXPECT_EQ(refused("POST / HTTP/1.1\r\nContent-Length: 9\r\n\r\n[]"), 400);
     EXPECT_EQ(refused("GET / HTTP/1.1\r\nHost: a"), 400);
     EXPECT_EQ(refused(""), 400);
-}
-
-float half_at(const std::string& body, size_t index) {
-    uint16_t bits = 0;
-    std::memcpy(&bits, body.data() + 64 + 2 * index, 2);
-    return float(Half(Half::FromBits, bits));
-}
-uint32_t field_at(const std::string& body, size_t index) {
-    uint32_t value = 0;
-    std::memcpy(&value, body.data() + 4 + 4 * index, 4);
-    return value;
 }
 
 TEST(RectangleValues, LeaveOutPixelsThatAreNotFinite) {
