@@ -205,16 +205,18 @@ double stated_over_true_variance(const Scene& scene, const std::string& method,
 
 /// The groups of chains are independent of each other. Their samples of direct light are so with independent numbers. With
 /// Sobol' points they are negatively correlated, as passes are with other methods, and the variance is an upper bound.
-TEST(ChainErrors, AreThoseOfSeeds) {
+class ChainErrors : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(ChainErrors, AreThoseOfSeeds) {
     const Scene scene = build(front_camera(12) + room() + area_lamp());
-    for (const char* method : {"mlt:mutations=1", "pssmlt:mutations=1"}) {
-        const double independent =
-            stated_over_true_variance(scene, method, SamplerKind::Independent);
-        EXPECT_GT(independent, 0.8) << method;
-        EXPECT_LT(independent, 1.25) << method;
-        EXPECT_GT(stated_over_true_variance(scene, method, SamplerKind::Sobol), 0.9) << method;
-    }
+    const std::string method = fmt::format("{}:mutations=1", GetParam());
+    const double independent = stated_over_true_variance(scene, method, SamplerKind::Independent);
+    EXPECT_GT(independent, 0.8);
+    EXPECT_LT(independent, 1.25);
+    EXPECT_GT(stated_over_true_variance(scene, method, SamplerKind::Sobol), 0.9);
 }
+INSTANTIATE_TEST_SUITE_P(Quick, ChainErrors, ::testing::Values("pssmlt"));
+INSTANTIATE_TEST_SUITE_P(Long, ChainErrors, ::testing::Values("mlt"));
 
 }  // namespace
 }  // namespace etendue::test
