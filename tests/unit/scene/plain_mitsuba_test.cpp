@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-SceneDescription parse(const std::string& body) {
+SceneDescription parsed(const std::string& body) {
     return parse_mitsuba_xml("<scene version=\"3.0.0\">" + body + "</scene>", "scene.xml");
 }
 
@@ -85,7 +85,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, PlainScenes,
 /// The message with which a scene cannot be converted, as plain Mitsuba or with its own plug-ins.
 std::string refusal(const std::string& body, bool plain) {
     try {
-        SceneDescription scene = parse(body);
+        SceneDescription scene = parsed(body);
         if (plain) make_plain_mitsuba(scene);
         write_mitsuba_xml(scene, "out.xml", "files", [](const SceneFile&) {});
     } catch (const SceneError& e) {
@@ -134,7 +134,7 @@ TEST(PlainMitsuba, MeshesAndImagesThatTheFileDoesNotHoldAreNotWritten) {
 
 TEST(PlainMitsuba, CoefficientsBecomeExtinctionAndAlbedo) {
     SceneDescription scene =
-        parse(R"(<shape type="sphere"><medium type="homogeneous" name="interior">
+        parsed(R"(<shape type="sphere"><medium type="homogeneous" name="interior">
         <rgb name="sigma_a" value="1 2 4"/><rgb name="sigma_s" value="0 0 0"/><float name="scale" value="0.5"/>
         </medium></shape>)");
     EXPECT_TRUE(make_plain_mitsuba(scene).empty());
@@ -150,7 +150,7 @@ TEST(PlainMitsuba, CoefficientsBecomeExtinctionAndAlbedo) {
 }
 
 TEST(PlainMitsuba, FilmsAndIntegrators) {
-    SceneDescription scene = parse(R"(<integrator type="bdpt"><integer name="max_depth" value="7"/>
+    SceneDescription scene = parsed(R"(<integrator type="bdpt"><integer name="max_depth" value="7"/>
         </integrator><sensor type="perspective"><film type="ldrfilm"><integer name="width" value="20"/>
         <string name="file_format" value="jpeg"/><boolean name="high_quality_edges" value="true"/>
         <float name="exposure" value="1"/></film></sensor>)");
@@ -171,7 +171,7 @@ TEST(PlainMitsuba, EveryIntegratorBecomesOneOfMitsuba) {
     for (const char* type :
          {"vcm", "upg+bdpt", "mmlt", "light", "ptracer", "sppm", "no_such", "aov"}) {
         SceneDescription scene =
-            parse("<integrator type=\"" + std::string(type) +
+            parsed("<integrator type=\"" + std::string(type) +
                   "\"><integer name=\"max_depth\" value=\"7\"/><float name=\"radius\" value=\"1\"/>"
                   "<boolean name=\"merges\" value=\"false\"/></integrator>");
         make_plain_mitsuba(scene);
@@ -183,7 +183,7 @@ TEST(PlainMitsuba, EveryIntegratorBecomesOneOfMitsuba) {
 }
 
 TEST(PlainMitsuba, SkyIsSunAndSkyWithoutSun) {
-    SceneDescription scene = parse(R"(<emitter type="sky"><float name="scale" value="3"/>
+    SceneDescription scene = parsed(R"(<emitter type="sky"><float name="scale" value="3"/>
         <integer name="resolution" value="64"/></emitter>)");
     const std::vector<std::string> warnings = make_plain_mitsuba(scene);
     ASSERT_EQ(warnings.size(), 1u);
@@ -197,7 +197,7 @@ TEST(PlainMitsuba, SkyIsSunAndSkyWithoutSun) {
 }
 
 TEST(PlainMitsuba, MixturesAreBlendsWithTheSameShares) {
-    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="mixturebsdf">
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="mixturebsdf">
         <string name="weights" value="0.2, 0.3"/><bsdf type="diffuse"/><bsdf type="plastic"/></bsdf></shape>)");
     EXPECT_TRUE(make_plain_mitsuba(scene).empty());
     const SceneObject& shape = only(scene, "shape");
@@ -211,7 +211,7 @@ TEST(PlainMitsuba, MixturesAreBlendsWithTheSameShares) {
 }
 
 TEST(PlainMitsuba, StandInsAreReported) {
-    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="orennayar">
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="orennayar">
         <rgb name="reflectance" value="0.1 0.2 0.3"/><float name="sigma" value="30"/></bsdf></shape>)");
     const std::vector<std::string> warnings = make_plain_mitsuba(scene);
     ASSERT_EQ(warnings.size(), 1u);
@@ -222,7 +222,7 @@ TEST(PlainMitsuba, StandInsAreReported) {
 }
 
 TEST(PlainMitsuba, CoatsHaveAnInterface) {
-    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="fresnelblend">
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="fresnelblend">
         <rgb name="specular_reflectance" value="0"/></bsdf></shape>)");
     make_plain_mitsuba(scene);
     EXPECT_EQ(only(scene, "bsdf").type, "roughplastic");
@@ -230,7 +230,7 @@ TEST(PlainMitsuba, CoatsHaveAnInterface) {
 }
 
 TEST(PlainMitsuba, TexturesOfUvBecomeImages) {
-    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="diffuse">
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="diffuse">
         <texture type="gridtexture" name="reflectance"/></bsdf></shape>)");
     make_plain_mitsuba(scene);
     const SceneObject& bsdf = only(scene, "bsdf");
@@ -263,7 +263,7 @@ float intensity_at(const Scene& scene, float degrees, float around) {
 // Mitsuba's spots fall off linearly in the angle alone.
 TEST(PlainMitsuba, FalloffOfSpotsBecomesAnImage) {
     const auto spot = [](const std::string& falloff, int cutoff, const char* scale) {
-        return parse(fmt::format(
+        return parsed(fmt::format(
             R"(<sensor type="perspective"/><shape type="rectangle"/><emitter type="spot">
             <rgb name="intensity" value="3"/><float name="cutoff_angle" value="{}"/>
             <float name="beam_width" value="15"/><string name="falloff" value="{}"/>
@@ -311,7 +311,7 @@ TEST(PlainMitsuba, GoniometricLightsBecomeProjectors) {
         for (const char* amount : {"<rgb name=\"intensity\" value=\"1 2 3\"/>",
                                    "<float name=\"power\" value=\"20\"/>"}) {
             SCOPED_TRACE(fmt::format("{} {}", projection, amount));
-            SceneDescription plain = parse(fmt::format(
+            SceneDescription plain = parsed(fmt::format(
                 R"(<sensor type="perspective"/><shape type="rectangle"/>
                 <emitter type="goniometric"><string name="filename" value="{}"/>
                 <string name="projection" value="{}"/>{}<transform name="to_world">
@@ -350,7 +350,7 @@ TEST(PlainMitsuba, GoniometricLightsBecomeProjectors) {
 
 // Mitsuba 3 renders no bump map of another texture: it has no gradient of it.
 TEST(PlainMitsuba, BumpMapsAreOfImages) {
-    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="bumpmap">
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="bumpmap">
         <texture type="checkerboard" name="arbitrary"/><bsdf type="diffuse">
         <texture type="checkerboard" name="reflectance"/></bsdf></bsdf></shape>)");
     make_plain_mitsuba(scene);
@@ -366,7 +366,7 @@ TEST(PlainMitsuba, BumpMapsAreOfImages) {
 
 // A bump map whose texture Mitsuba 3 lacks is no bump map: it refuses one without texture.
 TEST(PlainMitsuba, ReliefWithoutTextureIsLeftOut) {
-    SceneDescription scene = parse(R"(<bsdf type="bumpmap" id="rough"><texture type="scale">
+    SceneDescription scene = parsed(R"(<bsdf type="bumpmap" id="rough"><texture type="scale">
         <texture type="fbm" name="value"/><float name="scale" value="0.1"/></texture>
         <bsdf type="diffuse"/></bsdf><shape type="sphere"><ref id="rough"/></shape>
         <shape type="cube"><bsdf type="twosided"><bsdf type="bumpmap"><texture type="fbm"/>
@@ -385,7 +385,7 @@ TEST(PlainMitsuba, ReliefWithoutTextureIsLeftOut) {
 }
 
 TEST(PlainMitsuba, ReliefOfAConstantIsLeftOutInSilence) {
-    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="bumpmap"><texture
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="bumpmap"><texture
         type="constant"/><bsdf type="diffuse"/></bsdf></shape>)");
     EXPECT_TRUE(make_plain_mitsuba(scene).empty());
     EXPECT_EQ(scene.objects[size_t(only(scene, "shape").children[0].object)].type, "diffuse");
@@ -393,7 +393,7 @@ TEST(PlainMitsuba, ReliefOfAConstantIsLeftOutInSilence) {
 
 /// The only warning of a scene with this shape.
 std::string warning_of(const std::string& inside) {
-    SceneDescription scene = parse("<shape type=\"sphere\">" + inside + "</shape>");
+    SceneDescription scene = parsed("<shape type=\"sphere\">" + inside + "</shape>");
     const std::vector<std::string> warnings = make_plain_mitsuba(scene);
     EXPECT_EQ(warnings.size(), 1u) << fmt::format("{}", fmt::join(warnings, "\n"));
     return warnings.empty() ? "" : warnings[0];
@@ -454,7 +454,7 @@ Rgb diffuse_albedo(const SceneDescription& description, float cos_o) {
 TEST(PlainMitsuba, CoatsKeepTheirMeanAbsorption) {
     for (const char* nonlinear : {"true", "false"}) {
         const auto scene = [&](const char* thickness) {
-            return parse(fmt::format(
+            return parsed(fmt::format(
                 R"(<sensor type="perspective"/><emitter type="constant"/><shape type="rectangle">
                 <bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.2 0.5 0.9"/>
                 <boolean name="nonlinear" value="{}"/><float name="thickness" value="{}"/></bsdf>
@@ -479,7 +479,7 @@ TEST(PlainMitsuba, CoatsKeepTheirMeanAbsorption) {
 }
 
 TEST(PlainMitsuba, ReflectanceBecomesAnIndexOfRefraction) {
-    SceneDescription scene = parse(R"(<shape type="sphere"><bsdf type="principled">
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="principled">
         <float name="eta" value="1000"/><rgb name="specular_color" value="0.04"/></bsdf></shape>)");
     make_plain_mitsuba(scene);
     EXPECT_NEAR(number(only(scene, "bsdf"), "eta"), 1.5, 0.01);

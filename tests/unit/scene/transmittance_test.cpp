@@ -78,7 +78,7 @@ std::string instance(const std::string& inside, const std::string& transform) {
            shape("instance", transform, "<ref id=\"group\"/>");
 }
 
-const std::string kTurned =
+const std::string kTurnedSquare =
     "<rotate x=\"1\" y=\"0.3\" angle=\"23\"/><rotate y=\"1\" z=\"0.4\" angle=\"71\"/>";
 
 const LargeShape kLargeShapes[] = {
@@ -90,19 +90,19 @@ const LargeShape kLargeShapes[] = {
      "name=\"radius\" value=\"100000\"/></shape>"},
     {"sphere around the scene", shape("sphere", "<scale value=\"20000\"/><translate y=\"20000\"/>",
                                       "<boolean name=\"flip_normals\" value=\"true\"/>")},
-    {"disk", shape("disk", "<scale value=\"5000\"/>" + kTurned)},
+    {"disk", shape("disk", "<scale value=\"5000\"/>" + kTurnedSquare)},
     {"cylinder",
-     shape("cylinder", "<translate y=\"-1\" z=\"-0.5\"/><scale value=\"3000\"/>" + kTurned)},
-    {"rectangle", shape("rectangle", "<scale value=\"1000\"/>" + kTurned)},
-    {"large rectangle", shape("rectangle", "<scale value=\"100000\"/>" + kTurned)},
-    {"box", shape("cube", "<translate z=\"-1\"/><scale value=\"2000\"/>" + kTurned)},
+     shape("cylinder", "<translate y=\"-1\" z=\"-0.5\"/><scale value=\"3000\"/>" + kTurnedSquare)},
+    {"rectangle", shape("rectangle", "<scale value=\"1000\"/>" + kTurnedSquare)},
+    {"large rectangle", shape("rectangle", "<scale value=\"100000\"/>" + kTurnedSquare)},
+    {"box", shape("cube", "<translate z=\"-1\"/><scale value=\"2000\"/>" + kTurnedSquare)},
     {"instance of a rectangle",
-     instance(shape("rectangle", kTurned + "<translate x=\"3000\" y=\"2000\" z=\"-700\"/>"),
+     instance(shape("rectangle", kTurnedSquare + "<translate x=\"3000\" y=\"2000\" z=\"-700\"/>"),
               "<translate x=\"-3000\" y=\"-2000\" z=\"700\"/>")},
     {"instance of a sphere",
      instance("<shape type=\"sphere\"><point name=\"center\" value=\"0,-10,0\"/><float "
               "name=\"radius\" value=\"10\"/></shape>",
-              "<scale value=\"300\"/>" + kTurned)},
+              "<scale value=\"300\"/>" + kTurnedSquare)},
 };
 
 /// A point on the last shape of the scene, and near the origin on large ones.
@@ -156,9 +156,9 @@ TEST(Transmittance, LargeThinWallsBlock) {
         std::string xml;
         float thickness;
     } walls[] = {
-        {shape("cube", "<scale x=\"1000\" y=\"1000\" z=\"0.02\"/>" + kTurned), 0.04f},
-        {shape("rectangle", "<scale value=\"1000\"/>" + kTurned) +
-             shape("rectangle", "<scale value=\"1000\"/><translate z=\"0.01\"/>" + kTurned),
+        {shape("cube", "<scale x=\"1000\" y=\"1000\" z=\"0.02\"/>" + kTurnedSquare), 0.04f},
+        {shape("rectangle", "<scale value=\"1000\"/>" + kTurnedSquare) +
+             shape("rectangle", "<scale value=\"1000\"/><translate z=\"0.01\"/>" + kTurnedSquare),
          0.01f},
         {shape("sphere", "<scale value=\"1000\"/><translate y=\"-1000\"/>") +
              shape("sphere", "<scale value=\"999.999\"/><translate y=\"-1000\"/>"),
