@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "readers/scene_file.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "scene/builder.h"
 
 namespace etendue::bench {

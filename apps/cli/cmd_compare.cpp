@@ -20,7 +20,7 @@
 #include "messages.h"
 #include "number_checks.h"
 #include "path_lengths.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "scene_options.h"
 #include "system/output_file.h"
 
@@ -30,8 +30,9 @@ namespace {
 struct CompareCommand {
     std::vector<std::string> scenes, methods, references;
     SceneOptions reading;
-    std::string paths = "all", lengths = "1..", reference_method, sampler = "sobol",
+    std::string paths = "all", lengths = "1..", reference_method,
                 report = "out/compare", kept_references = "out/references";
+    SamplerKind sampler = CompareSettings().sampler;
     double seconds = 0, reference_seconds = 0;
     uint64_t spp = 0, reference_spp = 0, seed = 0;
     int runs = 1, threads = 0, technique_depth = 5;
@@ -102,7 +103,7 @@ PathSelection CompareCommand::shown() const {
 CompareSettings CompareCommand::settings(const Scene& scene) const {
     CompareSettings s;
     for (const std::string& m : methods) s.methods.push_back({m, choose_integrator(scene, m)});
-    s.sampler = parse_sampler(sampler);
+    s.sampler = sampler;
     s.seed = seed;
     s.threads = threads;
     if (seconds > 0) s.limits.seconds = seconds;
@@ -118,7 +119,7 @@ RenderSettings CompareCommand::reference_settings(const Scene& scene,
     RenderSettings s;
     s.integrator = reference_method.empty() ? reference_integrator(scene, specs)
                                             : choose_integrator(scene, reference_method);
-    s.sampler = parse_sampler(sampler);
+    s.sampler = sampler;
     s.threads = threads;
     s.shown = shown();
     if (reference_seconds > 0) s.seconds = reference_seconds;
@@ -302,7 +303,7 @@ void add_compare_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(0, 16));
     c.add_option("--seed", command->seed, "Seed of the first run")->capture_default_str();
-    c.add_option("--sampler", command->sampler, "independent or sobol")->capture_default_str();
+    add_sampler_option(c, command->sampler);
     c.add_option("--threads", command->threads, "Number of threads; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));

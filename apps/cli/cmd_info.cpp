@@ -7,7 +7,7 @@
 #include "json_text.h"
 #include "math/content_hash.h"
 #include "render/checkpoint.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "render/scene_integrator.h"
 #include "scene_options.h"
 

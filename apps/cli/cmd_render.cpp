@@ -22,7 +22,7 @@
 #include "preview.h"
 #include "render/aov.h"
 #include "render/checkpoint.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "render/render_report.h"
 #include "render/renderer.h"
 #include "render/scene_integrator.h"
@@ -37,14 +37,12 @@ namespace {
 
 struct RenderCommand {
     SceneOptions scene;
-    std::string output = "out.exr", integrator, sampler,
-                filter_mode = etendue::to_string(etendue::RenderSettings().filter_mode), techniques,
-                preview, stats, checkpoint, resume, passes;
+    RenderRequest request;
+    std::string output = "out.exr", techniques, preview, stats, checkpoint, resume, passes;
     std::vector<std::string> aovs;
-    uint64_t seed = 0, spp = 0;
-    double seconds = 0, error = 0, checkpoint_every = 60, write_every = 60;
+    double checkpoint_every = 60, write_every = 60;
     unsigned grace = 20;
-    int threads = 0, technique_depth = 6;
+    int technique_depth = 6;
     bool quiet = false;
 
     void run() const;
@@ -142,10 +140,12 @@ private:
 
 void RenderCommand::check_options() const {
     const auto [first_pass, count] = pass_range();
-    if (count > 0 && spp > 0)
+    if (count > 0 && request.spp)
         throw std::runtime_error(
             "--passes and --spp exclude each other: --passes says how many passes there are");
-    check_limits({.spp = count > 0 ? count : spp, .seconds = {}, .error = {}}, first_pass);
+    RenderLimits limits = request;
+    if (count > 0) limits.spp = count;
+    check_limits(limits, first_pass);
     if (resume == kAuto && checkpoint.empty())
         throw std::runtime_error("--resume auto requires --checkpoint, the file to resume from");
     if (checkpoint_file() == output)
@@ -191,25 +191,13 @@ std::optional<CheckpointFile> RenderCommand::earlier_checkpoint() const {
 }
 
 RenderSettings RenderCommand::settings_for(const Scene& s) const {
-    RenderSettings settings;
-    settings.integrator = choose_integrator(s, integrator);
-    settings.sampler = parse_sampler(sampler);
-    const auto mode = etendue::filter_mode(filter_mode);
-    if (!mode)
-        throw std::runtime_error(
-            fmt::format("--filter-mode must be spread or sample, but is \"{}\"", filter_mode));
-    settings.filter_mode = *mode;
-    settings.seed = seed;
-    settings.threads = threads;
+    RenderRequest r = request;
     const auto [first_pass, count] = pass_range();
-    settings.first_pass = first_pass;
-    if (count > 0) settings.spp = count;
-    if (spp > 0) settings.spp = spp;
-    if (seconds > 0) settings.seconds = seconds;
-    if (error > 0) settings.error = error;
-    set_default_limit(settings, s);
-    if (!techniques.empty()) settings.technique_depth = technique_depth;
-    return settings;
+    r.first_pass = first_pass;
+    if (count > 0) r.spp = count;
+    set_default_limit(r, s);
+    if (!techniques.empty()) r.technique_depth = technique_depth;
+    return settings_of(r, s);
 }
 
 std::unique_ptr<Renderer> make_renderer(const Scene& s, const RenderSettings& settings) try {
@@ -281,7 +269,7 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
 void RenderCommand::run() const {
     check_options();
     SceneOptions loading = scene;
-    loading.threads = threads;
+    loading.threads = request.threads;
     std::optional<CheckpointFile> earlier = earlier_checkpoint();
     const std::string& saved = checkpoint_file();
     uint64_t fingerprint = 0;
@@ -290,7 +278,7 @@ void RenderCommand::run() const {
         if (!saved.empty()) fingerprint = scene_fingerprint(description);
         return build_scene(description, loading);
     }();
-    print_warnings(warnings_of(s, integrator));
+    print_warnings(warnings_of(s, request.integrator));
     const RenderSettings settings = settings_for(s);
     if (settings.technique_depth > 0 && !quiet)
         message("technique images of paths up to {} edges: {:.0f} MiB\n", technique_depth,
@@ -314,7 +302,7 @@ void RenderCommand::run() const {
         earlier.reset();
     }
     // Before the passes, so that nothing that can fail stands between them and their image.
-    const std::vector<AovImage> layers = render_aovs(s, aovs, kAovSamples, seed, threads);
+    const std::vector<AovImage> layers = render_aovs(s, aovs, kAovSamples, settings.seed, settings.threads);
 
     const Interrupts interrupts = catch_interrupts(grace);
     std::unique_ptr<Preview> viewer;
@@ -393,12 +381,12 @@ void add_render_command(CLI::App& app) {
     c.add_option("-o,--output", command->output, "Image to write: .exr, .pfm, .hdr or .png")
         ->capture_default_str();
     c.add_option(
-        "-i,--integrator", command->integrator,
+        "-i,--integrator", command->request.integrator,
         "Integrator with parameters: bdpt or bdpt:max_depth=12,rr_depth=5 (default: the scene's)");
-    c.add_option("--spp", command->spp, "Samples per pixel")->check(must_be_above_0);
-    c.add_option("--time", command->seconds, "Seconds to render; may be exceeded by half a pass")
+    c.add_option("--spp", command->request.spp, "Samples per pixel")->check(must_be_above_0);
+    c.add_option("--time", command->request.seconds, "Seconds to render; may be exceeded by half a pass")
         ->check(must_be_above_0);
-    c.add_option("--error", command->error,
+    c.add_option("--error", command->request.error,
                  "Stop at this estimated relative RMS error of the image, e.g. 0.01")
         ->check(must_be_above_0);
     c.add_option("--passes", command->passes,
@@ -423,14 +411,18 @@ void add_render_command(CLI::App& app) {
                  "Seconds that the current pass may continue after Ctrl-C, SIGTERM or SIGHUP")
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
-    c.add_option("--seed", command->seed, "Seed of all random numbers")->capture_default_str();
-    c.add_option(
-         "--filter-mode", command->filter_mode,
+    c.add_option("--seed", command->request.seed, "Seed of all random numbers")->capture_default_str();
+    FilterMode& filter_mode = command->request.filter_mode;
+    c.add_option_function<std::string>(
+         "--filter-mode",
+         [&filter_mode](const std::string& name) {
+             filter_mode = filter_mode_named(name, "--filter-mode");
+         },
          "spread: an eye path contributes to all pixels that the filter reaches; sample: to "
          "its own pixel, with a film point drawn from the filter")
-        ->capture_default_str();
-    add_sampler_option(c, command->sampler, "; with sobol the error estimate is an upper bound");
-    c.add_option("--threads", command->threads, "Number of threads; 0: one per core")
+        ->default_str(to_string(filter_mode));
+    add_sampler_option(c, command->request.sampler, "; with sobol the error estimate is an upper bound");
+    c.add_option("--threads", command->request.threads, "Number of threads; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
     c.add_option("--aov", command->aovs,

@@ -30,7 +30,8 @@ namespace {
 
 struct StudioCommand {
     SceneOptions scene;
-    std::string integrator, sampler, output = ".", listen = "127.0.0.1", reference;
+    RunRequest first_run;
+    std::string output = ".", listen = "127.0.0.1", reference;
     std::vector<std::string> hosts;
     int port = 0, threads = 0;
     unsigned grace = 20;
@@ -57,11 +58,8 @@ std::string free_name(const std::string& folder, const std::string& stem) {
 }
 
 void StudioCommand::start_first_run(Session& session) const {
-    RunRequest request;
-    request.integrator = integrator;
-    request.sampler = parse_sampler(sampler);
     try {
-        session.start(request);
+        session.start(first_run);
     } catch (const std::exception& e) {
         message("warning: nothing is rendered yet: {}\n", e.what());
     }
@@ -92,7 +90,7 @@ void StudioCommand::save_all(Session& session) const {
             const std::string file = free_name(folder, stem);
             const Saved saved = save_and_wait(session, s.id, file);
             if (saved.error.empty()) {
-                message("{}: run {}, {}, {} spp\n", file, s.id, s.integrator, saved.passes);
+                message("{}: run {}, {}, {} spp\n", file, s.id, s.request.integrator, saved.passes);
                 return;
             }
             // A run in its first pass may have been discarded.
@@ -195,8 +193,8 @@ void StudioCommand::run() const {
         throw std::runtime_error(fmt::format("--output: {} is not a folder", output));
     if (!std::filesystem::exists(scene.file))
         throw std::runtime_error(fmt::format("{}: no such file", scene.file));
-    parse_sampler(sampler);
-    if (!integrator.empty()) make_integrator(IntegratorSpec::parse(integrator));
+    if (const std::string& i = first_run.integrator; !i.empty())
+        make_integrator(IntegratorSpec::parse(i));
     const ApiOptions options = api_options();
 
     const Interrupts interrupts = catch_interrupts(grace);
@@ -229,9 +227,9 @@ void add_studio_command(CLI::App& app) {
     CLI::App& c = *app.add_subcommand(
         "studio", "Show a progressive rendering in a browser, compare methods, edit light paths");
     command->scene.add_to(c);
-    c.add_option("-i,--integrator", command->integrator,
+    c.add_option("-i,--integrator", command->first_run.integrator,
                  "Integrator of the first run, with parameters (default: the scene's)");
-    add_sampler_option(c, command->sampler);
+    add_sampler_option(c, command->first_run.sampler);
     c.add_flag("--idle", command->idle, "Render nothing until the page asks for it");
     c.add_option("-o,--output", command->output,
                  "Folder for saved images and light paths; on Ctrl-C the images of all runs are "

@@ -17,6 +17,7 @@
 #include "messages.h"
 #include "number_checks.h"
 #include "path_lengths.h"
+#include "render/render_request.h"
 #include "scene_options.h"
 #include "system/output_file.h"
 #include "verify/reference_image.h"
@@ -30,7 +31,7 @@ struct VerifyCommand {
     SceneOptions scene;
     std::vector<std::string> methods{"path", "light", "bdpt"};
     std::vector<std::string> against{"path", "light"};
-    std::string lengths = "1..8", sampler, detect, reference, json;
+    std::string lengths = "1..8", detect, reference, json;
     uint64_t spp = 0;
     double seconds = 0;
     VerifyOptions options;
@@ -209,11 +210,10 @@ void print_verdict(const VerifyReport& report, const MethodReport& m,
     fmt::print("\n\n");
 }
 
-void print_report(const VerifyReport& report, const Scene& scene, const std::string& sampler,
-                  const VerifyOptions& options) {
+void print_report(const VerifyReport& report, const Scene& scene, const VerifyOptions& options) {
     fmt::print("{}, {} x {} pixels, {} runs, sampler {}, against {}\n", scene.file(),
-               scene.film().crop_width, scene.film().crop_height, options.runs, sampler,
-               report.reference);
+               scene.film().crop_width, scene.film().crop_height, options.runs,
+               to_string(options.sampler), report.reference);
     fmt::print("{} comparisons with a joint probability of a false alarm of {}: each is tested at "
                "{:.3g}\n",
                report.tests, options.alpha, report.level);
@@ -241,7 +241,6 @@ void VerifyCommand::run() {
         throw std::runtime_error("--time and --spp exclude each other, except with --detect");
     if (seconds > 0) options.seconds = seconds;
     if (!detect.empty()) options.detect = parse_share(detect, "--detect");
-    options.sampler = parse_sampler(sampler);
     options.against.clear();
     for (const std::string& m : against) options.against.push_back(IntegratorSpec::parse(m));
     std::vector<IntegratorSpec> specs;
@@ -265,11 +264,11 @@ void VerifyCommand::run() {
     if (report.methods.empty())
         throw std::runtime_error("interrupted before the first comparison: nothing was written");
     // The file first, since standard output may have gone.
-    if (!json.empty()) write_file(json, json_text(to_json(report, s, sampler, options)));
+    if (!json.empty()) write_file(json, json_text(to_json(report, s, options)));
     print_warnings(report.warnings);
     if (report.interrupted)
         message("warning: interrupted; what follows is based on the renderings until then\n");
-    if (!quiet) print_report(report, s, sampler, options);
+    if (!quiet) print_report(report, s, options);
     std::vector<std::string> rejected;
     for (const MethodReport& m : report.methods)
         if (m.estimator == Estimator::Unbiased && report.verdict(m) == Verdict::Deviates)
@@ -310,7 +309,7 @@ void add_verify_command(CLI::App& app) {
         "--detect", command->detect,
         "Render until a relative error of this size (0.5% or 0.005) in the image, or in a path "
         "length with at least 2 % of the light, would be found with 90 % probability");
-    add_sampler_option(c, command->sampler, ", as for render");
+    add_sampler_option(c, command->options.sampler, ", as for render");
     auto* against = c.add_option("--against", command->against,
                                  "Methods to compare with: the first one, and each other one on "
                                  "the classes of paths that it estimates much better")

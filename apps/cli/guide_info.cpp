@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "image/image_io.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "render/learned_guide.h"
 #include "system/output_file.h"
 

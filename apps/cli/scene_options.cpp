@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "readers/scene_file.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "scene/builder.h"
 
 namespace etendue {
@@ -97,15 +97,13 @@ Scene load_scene(const SceneOptions& options) {
     return build_scene(read_scene(options), options);
 }
 
-void add_sampler_option(CLI::App& command, std::string& name, const std::string& more) {
-    name = "sobol";
-    command.add_option("--sampler", name, "independent or sobol" + more)->capture_default_str();
-}
-
-SamplerKind parse_sampler(const std::string& name) {
-    if (const auto kind = sampler_kind(name)) return *kind;
-    throw std::runtime_error(
-        fmt::format("--sampler must be independent or sobol, but is \"{}\"", name));
+void add_sampler_option(CLI::App& command, SamplerKind& sampler, const std::string& more) {
+    command
+        .add_option_function<std::string>(
+            "--sampler",
+            [&sampler](const std::string& name) { sampler = sampler_named(name, "--sampler"); },
+            "independent or sobol" + more)
+        ->default_str(to_string(sampler));
 }
 
 }  // namespace etendue

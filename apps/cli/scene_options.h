@@ -31,8 +31,7 @@ Scene build_scene(const SceneDescription& description, const SceneOptions& optio
 /// Reads and builds the scene.
 Scene load_scene(const SceneOptions& options);
 
-/// Adds --sampler and sets `name` to its default. `more` is appended to the option's description.
-void add_sampler_option(CLI::App& command, std::string& name, const std::string& more = "");
-SamplerKind parse_sampler(const std::string& name);
+/// Adds --sampler, whose default is the value of `sampler`. `more` is appended to the option's description.
+void add_sampler_option(CLI::App& command, SamplerKind& sampler, const std::string& more = "");
 
 }  // namespace etendue

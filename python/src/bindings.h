@@ -14,7 +14,6 @@
 #include "description/scene_description.h"
 #include "film/film.h"
 #include "integrator/integrator.h"
-#include "sampler/sampler.h"
 #include "scene/scene.h"
 
 namespace etendue::python {
@@ -57,7 +56,6 @@ using ImageArgument = nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_conti
 
 /// An integrator by name and parameters, or an object that etendue.Integrator is the base of.
 IntegratorSpec to_spec(const Scene& scene, nb::handle integrator);
-SamplerKind to_sampler(const std::string& name);
 
 /// Runs tasks on a thread of their own, without the GIL, while the calling thread handles signals and callbacks.
 class Background {

@@ -15,7 +15,7 @@
 #include "math/hash.h"
 #include "pathspace/path_pdfs.h"
 #include "pathspace/sample_context.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "render/renderer.h"
 #include "values.h"
 
@@ -144,7 +144,7 @@ PathPtr trace(const ScenePtr& scene, std::optional<std::pair<int, int>> pixel, u
     auto out = std::make_shared<Path>(scene, counts);
     RenderStats stats;
     const WalkContext walk{scene->scene, counts, stats, walk_options(max_vertices, rr_depth)};
-    Sampler sampler(to_sampler(sampler_name), seed);
+    Sampler sampler(sampler_named(sampler_name, "sampler"), seed);
     sampler.start(pass, pixel ? pixel_index(scene->scene, *pixel) : path);
     if (pixel)
         trace_eye_path(walk, scene->film, pixel_index(scene->scene, *pixel), sampler, out->own);
@@ -479,7 +479,7 @@ nb::tuple sample_paths(const ScenePtr& scene, size_t n, nb::handle integrator, u
                           size_t(checked("max_vertices", most_vertices, 2, kMostVertices)));
     RenderSettings settings;
     settings.integrator = to_spec(scene->scene, integrator);
-    settings.sampler = to_sampler(sampler);
+    settings.sampler = sampler_named(sampler, "sampler");
     settings.seed = seed;
     settings.threads = 1;
     settings.observer = &recorder;

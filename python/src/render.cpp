@@ -23,7 +23,7 @@
 #include "math/statistics.h"
 #include "render/aov.h"
 #include "render/checkpoint.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "render/render_report.h"
 #include "render/renderer.h"
 #include "render/warnings.h"
@@ -31,19 +31,7 @@
 
 namespace etendue::python {
 
-SamplerKind to_sampler(const std::string& name) {
-    if (const auto kind = sampler_kind(name)) return *kind;
-    throw nb::value_error(
-        fmt::format("sampler must be \"independent\" or \"sobol\", but is \"{}\"", name).c_str());
-}
-
 namespace {
-
-FilterMode to_filter_mode(const std::string& name) {
-    if (const auto mode = filter_mode(name)) return *mode;
-    throw nb::value_error(
-        fmt::format("filter_mode must be \"spread\" or \"sample\", but is \"{}\"", name).c_str());
-}
 
 const char* technique_kind(const Technique& q) {
     switch (q.strategy) {
@@ -58,25 +46,14 @@ const char* technique_kind(const Technique& q) {
     return "";
 }
 
-RenderSettings settings_for(const SceneHandle& scene, nb::handle integrator,
-                            std::optional<uint64_t> spp, std::optional<double> seconds,
-                            std::optional<double> error, uint64_t seed, const std::string& sampler,
-                            const std::string& filter, int threads, int technique_depth,
-                            uint64_t first_pass) {
-    RenderSettings s;
-    s.integrator = to_spec(scene.scene, integrator);
-    s.sampler = to_sampler(sampler);
-    s.filter_mode = to_filter_mode(filter);
-    s.seed = seed;
+RenderSettings settings_for(const Scene& scene, nb::handle integrator, RenderRequest request) {
+    check_above_0("spp, time and error", {request.spp, request.seconds, request.error});
+    checked_threads(request.threads);
+    checked("techniques", request.technique_depth, 0, 64);
+    set_default_limit(request, scene);
+    RenderSettings s = settings_of(request, to_spec(scene, integrator));
     // Objects of Python work on one thread.
-    s.threads = s.integrator.make ? 1 : checked_threads(threads);
-    s.spp = spp;
-    s.seconds = seconds;
-    s.error = error;
-    check_above_0("spp, time and error", {spp, seconds, error});
-    set_default_limit(s, scene.scene);
-    s.technique_depth = checked("techniques", technique_depth, 0, 64);
-    s.first_pass = first_pass;
+    if (s.integrator.make) s.threads = 1;
     return s;
 }
 
@@ -109,13 +86,9 @@ std::vector<Rgb> half_width_of(const Film& film) {
 /// A renderer with its scene.
 class Rendering {
 public:
-    Rendering(ScenePtr scene, nb::handle integrator, std::optional<uint64_t> spp,
-              std::optional<double> seconds, std::optional<double> error, uint64_t seed,
-              const std::string& sampler, const std::string& filter, int threads,
-              int technique_depth, uint64_t first_pass)
+    Rendering(ScenePtr scene, nb::handle integrator, const RenderRequest& request)
         : scene_(std::move(scene)),
-          settings_(settings_for(*scene_, integrator, spp, seconds, error, seed, sampler, filter,
-                                 threads, technique_depth, first_pass)),
+          settings_(settings_for(scene_->scene, integrator, request)),
           python_integrator_(settings_.integrator.make ? python_identity(integrator) : ""),
           renderer_(make_renderer(scene_->scene, settings_)) {}
 
@@ -421,8 +394,17 @@ void bind_render(nb::module_& m) {
                std::optional<double> time, std::optional<double> error, uint64_t seed,
                const std::string& sampler, const std::string& filter, int threads,
                int technique_depth, uint64_t first_pass) {
-                new (self) Rendering(std::move(scene), integrator, spp, time, error, seed, sampler,
-                                     filter, threads, technique_depth, first_pass);
+                RenderRequest r;
+                r.spp = spp;
+                r.seconds = time;
+                r.error = error;
+                r.seed = seed;
+                r.sampler = sampler_named(sampler, "sampler");
+                r.filter_mode = filter_mode_named(filter, "filter_mode");
+                r.threads = threads;
+                r.technique_depth = technique_depth;
+                r.first_pass = first_pass;
+                new (self) Rendering(std::move(scene), integrator, r);
             },
             "scene"_a, "integrator"_a, "spp"_a.none(), "time"_a.none(), "error"_a.none(), "seed"_a,
             "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a, "first_pass"_a)

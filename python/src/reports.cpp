@@ -15,7 +15,7 @@
 #include "compare/comparison.h"
 #include "compare/default_reference.h"
 #include "compare/report.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "values.h"
 #include "verify/report_json.h"
 #include "verify/verify.h"
@@ -104,7 +104,7 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
                 nb::isinstance<nb::str>(method) ? nb::cast<std::string>(method) : spec.to_string();
             s.methods.push_back({name, std::move(spec)});
         }
-        s.sampler = to_sampler(sampler);
+        s.sampler = sampler_named(sampler, "sampler");
         s.seed = seed;
         s.threads = checked_threads(threads);
         for (const MethodSpec& m : s.methods)
@@ -175,8 +175,7 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
 }
 
 std::string verify_methods(const ScenePtr& scene, const nb::list& methods,
-                           const VerifyOptions& options, const std::string& sampler,
-                           const nb::object& listener) {
+                           const VerifyOptions& options, const nb::object& listener) {
     std::vector<IntegratorSpec> specs;
     for (nb::handle method : methods)
         specs.push_back(nb::isinstance<nb::str>(method)
@@ -193,7 +192,7 @@ std::string verify_methods(const ScenePtr& scene, const nb::list& methods,
         },
         listener);
     if (was_interrupted && report->methods.empty()) raise_interrupt();
-    return json_text(to_json(*report, scene->scene, sampler, options));
+    return json_text(to_json(*report, scene->scene, options));
 }
 
 }  // namespace
@@ -264,7 +263,7 @@ void bind_reports(nb::module_& m) {
             o.longest = longest;
             o.runs = checked("runs", runs, 8, 4096);
             o.alpha = alpha;
-            o.sampler = to_sampler(sampler);
+            o.sampler = sampler_named(sampler, "sampler");
             o.spp = spp;
             o.seconds = time;
             o.detect = detect;
@@ -274,7 +273,7 @@ void bind_reports(nb::module_& m) {
             o.against.clear();
             for (const std::string& a : against) o.against.push_back(IntegratorSpec::parse(a));
             if (o.against.empty()) throw nb::value_error("against must name a method");
-            return verify_methods(scene, methods, o, sampler, listener);
+            return verify_methods(scene, methods, o, listener);
         },
         "scene"_a, "methods"_a, "spp"_a.none(), "time"_a.none(), "detect"_a.none(), "shortest"_a,
         "longest"_a, "runs"_a, "alpha"_a, "against"_a, "tiles"_a, "seed"_a, "sampler"_a,

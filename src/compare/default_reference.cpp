@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "render/defaults.h"
+#include "render/render_request.h"
 
 namespace etendue {
 namespace {

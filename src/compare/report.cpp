@@ -15,6 +15,7 @@
 #include "compare/report_page.h"
 #include "image/image_io.h"
 #include "image/tonemap.h"
+#include "render/render_request.h"
 #include "system/output_file.h"
 #include "system/threads.h"
 
@@ -104,7 +105,7 @@ Json to_json(const CompareSettings& s) {
             {"longest_path",
              s.shown.longest == PathSelection::kNoLimit ? Json() : Json(s.shown.longest)},
             {"seed", s.seed},
-            {"sampler", s.sampler == SamplerKind::Sobol ? "sobol" : "independent"},
+            {"sampler", to_string(s.sampler)},
             {"threads", thread_count(s.threads)},
             {"technique_depth", s.technique_depth}};
 }

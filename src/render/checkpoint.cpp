@@ -13,6 +13,7 @@
 #include "description/json_text.h"
 #include "geometry/ray_tracer.h"
 #include "math/content_hash.h"
+#include "render/render_request.h"
 #include "render/statistics_section.h"
 
 namespace etendue {
@@ -190,7 +191,7 @@ Conditions conditions_of(const Renderer& renderer, const Scene& scene, const Sce
             {"files of the integrator", files_of(settings.integrator)},
             {"light paths", fmt::format("{}", renderer.light_paths())},
             {"paths shown", shown},
-            {"sampler", settings.sampler == SamplerKind::Sobol ? "sobol" : "independent"},
+            {"sampler", to_string(settings.sampler)},
             {"seed", fmt::format("{}", settings.seed)},
             {"first pass", fmt::format("{}", settings.first_pass)},
             {"technique images", settings.technique_depth > 0

@@ -14,7 +14,7 @@ namespace etendue {
 struct ReplayRequest {
     IntegratorSpec integrator;
     SamplerKind sampler = SamplerKind::Sobol;
-    FilterMode filter_mode = RenderSettings().filter_mode;
+    FilterMode filter_mode = FilterMode::Spread;
     uint64_t seed = 0;
     uint64_t pixel = 0;  ///< Index within the crop.
     uint32_t first_pass = 0, passes = 1;

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <tbb/task_arena.h>
 
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "render/render_report.h"
 #include "system/threads.h"
 
@@ -228,7 +228,7 @@ void Session::make_renderer(Run& run) {
     run.renderer.reset();
     run.is_counted = false;
     run.error = {};
-    run.settings.seed = run.status.seed + uint64_t(run.seeds.count());
+    run.settings.seed = run.status.request.seed + uint64_t(run.seeds.count());
     std::unique_ptr<Integrator> integrator = std::move(run.integrator);
     if (!integrator) integrator = make_integrator(run.settings.integrator);
     run.renderer = std::make_unique<Renderer>(*run.scene, run.settings, std::move(integrator));
@@ -366,7 +366,7 @@ void Session::fill(Run& run, Snapshot& snapshot) {
         to_json(*run.renderer, *run.scene, run.settings, "studio", {}, &run.status.error));
     if (run.has_seeds()) {
         (*report)["spp"] = snapshot.passes;
-        (*report)["seed"] = run.status.seed;
+        (*report)["seed"] = run.status.request.seed;
         (*report)["seeds"] = run.seeds.count() + (film ? 1 : 0);
     }
     snapshot.report = std::move(report);
@@ -435,24 +435,16 @@ int Session::start(const RunRequest& request) {
     if (!scene) throw std::runtime_error("the scene is not loaded yet");
     auto run = std::make_shared<Run>();
     run->scene = scene;
-    RenderSettings& settings = run->settings;
-    static_cast<RenderLimits&>(settings) = request.limits;
-    settings.integrator = choose_integrator(*scene, request.integrator);
-    if (!request.user_paths.empty()) settings.integrator.params["user_paths"] = request.user_paths;
-    settings.sampler = request.sampler;
-    settings.filter_mode = request.filter_mode;
-    settings.seed = request.seed;
-    settings.threads = threads_;
-    settings.technique_depth =
-        request.seeds > 1 ? 0 : fitting_depth(*scene, request.technique_depth);
-    run->integrator = make_integrator(settings.integrator);
     RunStatus& s = run->status;
-    s.integrator = settings.integrator.to_string();
-    s.sampler = settings.sampler;
-    s.filter_mode = settings.filter_mode;
-    s.seed = settings.seed;
-    s.limits = settings;
-    s.technique_depth = settings.technique_depth;
+    s.request = request;
+    s.request.threads = threads_;
+    s.request.technique_depth =
+        request.seeds > 1 ? 0 : fitting_depth(*scene, request.technique_depth);
+    RenderSettings& settings = run->settings;
+    settings = settings_of(s.request, *scene);
+    if (!request.user_paths.empty()) settings.integrator.params["user_paths"] = request.user_paths;
+    s.request.integrator = settings.integrator.to_string();
+    run->integrator = make_integrator(settings.integrator);
     s.seeds = request.seeds;
     s.estimator = run->integrator->estimator();
     s.interval = interval_kind(*run->integrator, settings.sampler, request.seeds);
@@ -511,7 +503,7 @@ void Session::resume(int id, const RenderLimits& limits) {
         } else {
             if (limits.spp || limits.seconds || limits.error)
                 static_cast<RenderLimits&>(r.settings) = limits;
-            s.limits = r.settings;
+            static_cast<RenderLimits&>(s.request) = r.settings;
         }
         s.message.clear();
         s.state = RunState::Rendering;
@@ -625,7 +617,7 @@ std::shared_ptr<const Snapshot> Session::snapshot(int id) {
 std::shared_ptr<const TechniqueSnapshot> Session::techniques(int id) {
     const std::lock_guard lock(mutex_);
     const std::shared_ptr<Run> run = find(id);
-    if (run->status.technique_depth == 0) return nullptr;
+    if (run->status.request.technique_depth == 0) return nullptr;
     run->wants_techniques = true;
     const auto shown = run->techniques.load();
     if (!shown || shown->passes != run->status.passes) show_if_idle(run);

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "render/renderer.h"
+#include "render/render_request.h"
 #include "session/replay.h"
 #include "session/seed_series.h"
 #include "session/shared_slot.h"
@@ -21,15 +21,11 @@
 
 namespace etendue {
 
-struct RunRequest {
-    std::string integrator;  ///< As text; empty for the scene's.
+/// Without any limit, the run ends when it is stopped. The technique depth is reduced until the images fit into
+/// kTechniqueBytes, and the number of threads is that of the session.
+struct RunRequest : RenderRequest {
     /// Value of the integrator's parameter `user_paths`; empty: not given.
     std::string user_paths;
-    SamplerKind sampler = SamplerKind::Sobol;
-    FilterMode filter_mode = RenderSettings().filter_mode;
-    uint64_t seed = 0;
-    RenderLimits limits;      ///< Without any, the run ends when it is stopped.
-    int technique_depth = 0;  ///< In edges; reduced until the images fit into kTechniqueBytes.
     /// Number of renderings, with the seeds `seed`, `seed` + 1, …; the limits apply to each. The run then shows the mean
     /// of all their passes, and has a SeedSeries.
     int seeds = 1;
@@ -56,12 +52,7 @@ struct ConvergencePoint {
 
 struct RunStatus {
     int id = 0;
-    std::string integrator;
-    SamplerKind sampler = SamplerKind::Sobol;
-    FilterMode filter_mode = RenderSettings().filter_mode;
-    uint64_t seed = 0;
-    RenderLimits limits;
-    int technique_depth = 0;
+    RenderRequest request;  ///< As it is rendered.
     int seeds = 1, finished_seeds = 0;
     RunState state = RunState::Rendering;
     std::string message;                       ///< Why the run failed.

@@ -11,7 +11,7 @@
 #include "math/content_hash.h"
 #include "mcmc/pick_paths.h"
 #include "render/aov.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "render/plugin_list.h"
 #include "render/scene_integrator.h"
 #include "session/light_ray.h"
@@ -236,25 +236,17 @@ RunRequest Api::run_request(const json& body) const {
         }
         request.integrator = spec.to_string();
     }
-    const std::string sampler = text_of(body, "sampler", "sobol");
-    const auto kind = sampler_kind(sampler);
-    if (!kind)
-        throw ApiError(
-            422, fmt::format("\"sampler\" must be independent or sobol, but is \"{}\"", sampler));
-    request.sampler = *kind;
-    const std::string filter = text_of(body, "filter_mode", to_string(request.filter_mode));
-    const auto mode = filter_mode(filter);
-    if (!mode)
-        throw ApiError(
-            422, fmt::format("\"filter_mode\" must be spread or sample, but is \"{}\"", filter));
-    request.filter_mode = *mode;
+    request.sampler =
+        sampler_named(text_of(body, "sampler", to_string(request.sampler)), "\"sampler\"");
+    request.filter_mode = filter_mode_named(
+        text_of(body, "filter_mode", to_string(request.filter_mode)), "\"filter_mode\"");
     request.seed = uint64_t(integer(body, "seed", 0, INT64_MAX, 0));
-    request.limits = limits_of(body);
+    static_cast<RenderLimits&>(request) = limits_of(body);
     constexpr int kMostDepth = 64;
     request.technique_depth = int(integer(body, "techniques", 0, kMostDepth, 0));
     constexpr int kMostSeeds = 64;
     request.seeds = int(integer(body, "seeds", 1, kMostSeeds, 1));
-    if (request.seeds > 1 && !request.limits.spp && !request.limits.seconds)
+    if (request.seeds > 1 && !request.spp && !request.seconds)
         throw ApiError(422, "several seeds need \"spp\" or \"seconds\" for each");
     return request;
 }
@@ -424,7 +416,7 @@ void Api::replay_pixel(const json& body, const Done& done) {
                                          int(integer(body, "y", 0, g.crop_height - 1)));
     constexpr size_t kMostPaths = 10000;
     const auto most = size_t(integer(body, "most", 1, kMostPaths, 1000));
-    const IntegratorSpec integrator = IntegratorSpec::parse(status.integrator);
+    const IntegratorSpec integrator = IntegratorSpec::parse(status.request.integrator);
     switch (replayed_passes(integrator)) {
     case ReplayedPasses::None:
         throw ApiError(422, fmt::format("paths of {} cannot be traced again: they are states of "
@@ -442,9 +434,9 @@ void Api::replay_pixel(const json& body, const Done& done) {
     }
     ReplayRequest request;
     request.integrator = integrator;
-    request.sampler = status.sampler;
-    request.filter_mode = status.filter_mode;
-    request.seed = status.seed;
+    request.sampler = status.request.sampler;
+    request.filter_mode = status.request.filter_mode;
+    request.seed = status.request.seed;
     request.pixel = pixel;
     request.first_pass = uint32_t(integer(body, "pass", 0, INT32_MAX, 0));
     request.passes = uint32_t(integer(body, "passes", 1, 100000, 16));

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "render/defaults.h"
+#include "render/render_request.h"
 
 namespace etendue {
 namespace {
@@ -68,16 +68,16 @@ json progress_of(const RunStatus& s) {
 
 json to_json(const RunStatus& s) {
     json j = progress_of(s);
-    j["integrator"] = s.integrator;
-    j["sampler"] = s.sampler == SamplerKind::Sobol ? "sobol" : "independent";
-    j["filter_mode"] = to_string(s.filter_mode);
-    j["seed"] = s.seed;
-    j["techniques"] = s.technique_depth;
+    j["integrator"] = s.request.integrator;
+    j["sampler"] = to_string(s.request.sampler);
+    j["filter_mode"] = to_string(s.request.filter_mode);
+    j["seed"] = s.request.seed;
+    j["techniques"] = s.request.technique_depth;
     j["estimator"] = to_string(s.estimator);
     j["interval"] = to_string(s.interval);
-    if (s.limits.spp) j["limits"]["spp"] = *s.limits.spp;
-    if (s.limits.seconds) j["limits"]["seconds"] = *s.limits.seconds;
-    if (s.limits.error) j["limits"]["error"] = *s.limits.error;
+    if (s.request.spp) j["limits"]["spp"] = *s.request.spp;
+    if (s.request.seconds) j["limits"]["seconds"] = *s.request.seconds;
+    if (s.request.error) j["limits"]["error"] = *s.request.error;
     j["figures"] = json::object();
     for (const auto& [name, value] : s.figures) j["figures"][name] = value;
     j["history"] = json::array();

@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "render/render_request.h"
+
 namespace etendue {
 namespace {
 
@@ -77,14 +79,14 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m
 }  // namespace
 
 nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
-                               const std::string& sampler, const VerifyOptions& options) {
+                               const VerifyOptions& options) {
     nlohmann::ordered_json j{{"scene", scene.file()},
                              {"width", scene.film().crop_width},
                              {"height", scene.film().crop_height},
                              {"reference", report.reference},
                              {"runs", options.runs},
                              {"seed", options.seed},
-                             {"sampler", sampler},
+                             {"sampler", to_string(options.sampler)},
                              {"alpha", options.alpha},
                              {"tests", report.tests},
                              {"level", report.level},

@@ -6,8 +6,8 @@
 
 namespace etendue {
 
-/// All results of a verification, as `etendue verify --json` writes them. `sampler` is the name of the sampler.
+/// All results of a verification, as `etendue verify --json` writes them.
 nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
-                               const std::string& sampler, const VerifyOptions& options);
+                               const VerifyOptions& options);
 
 }  // namespace etendue

@@ -4,12 +4,15 @@ import ctypes
 import gc
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
 import time
+import urllib.error
+import urllib.request
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,6 +20,7 @@ import numpy as np
 import pytest
 
 import etendue as et
+from etendue import _etendue
 
 
 def allocated_bytes(folder: Path) -> int:
@@ -101,6 +105,66 @@ def test_filter_modes_are_those_of_the_command_line(program: str, scenes: Path, 
     ours = et.render(scene, spp=2, filter_mode=mode).image
     np.testing.assert_array_equal(ours, et.read_image(tmp_path / "a.pfm"))
     np.testing.assert_equal(np.array_equal(ours, et.render(scene, spp=2).image), mode == "spread")
+
+
+def test_all_ways_to_ask_for_a_rendering_take_the_same_names(program: str, scenes: Path, tmp_path: Path) -> None:
+    """Of samplers and filter modes: on the command line, in Python and in studio, with the same defaults and hints."""
+    size = {"width": 40, "height": 30}
+    options = [str(scenes / "demo.xml"), *(f"-D{name}={value}" for name, value in size.items())]
+    scene = et.load(scenes / "demo.xml", size).build()
+    names = ("sampler", "filter_mode", "seed")
+
+    def of_checkpoint(file: Path) -> dict[str, object]:
+        found = _etendue.read_checkpoint(str(file))
+        return {name: found[name] for name in names}
+
+    def by_program(given: dict[str, str]) -> object:
+        file = tmp_path / "program.etd"
+        ran = subprocess.run([program, "render", *options, "--spp", "1", "-o", str(tmp_path / "a.pfm"), "--checkpoint", str(file),
+                              "--quiet", *(f"--{name.replace('_', '-')}={value}" for name, value in given.items())],
+                             capture_output=True, text=True)
+        return of_checkpoint(file) if ran.returncode == 0 else ran.stderr.strip()
+
+    def by_python(given: dict[str, str]) -> object:
+        file = tmp_path / "python.etd"
+        try:
+            et.render(scene, spp=1, **given).save_checkpoint(file)  # type: ignore[arg-type]
+        except ValueError as refusal:
+            return str(refusal)
+        return of_checkpoint(file)
+
+    studio = subprocess.Popen([program, "studio", *options, "--idle", "-o", str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert studio.stdout
+        url, token = re.search("(http.*)/#token=(.*)", studio.stdout.readline()).groups()  # type: ignore[union-attr]
+
+        def ask(path: str, body: dict[str, str] | None = None) -> dict[str, object]:
+            request = urllib.request.Request(url + path, headers={"Authorization": f"Bearer {token}"},
+                                             data=json.dumps(body).encode() if body else None)
+            return json.load(urllib.request.urlopen(request))  # type: ignore[no-any-return]
+
+        while ask("/v1/state")["scene"] is None:
+            time.sleep(0.01)
+
+        def by_studio(given: dict[str, str]) -> object:
+            try:
+                ask("/v1/run", {"action": "start", **given})
+            except urllib.error.HTTPError as refusal:
+                return json.load(refusal)["error"]
+            run = ask("/v1/state")["runs"][-1]  # type: ignore[index]
+            return {name: run[name] for name in names}
+
+        for given in ({}, {"sampler": "independent"}, {"sampler": "sobol"}, {"filter_mode": "sample"}, {"filter_mode": "spread"}):
+            asked = by_python(given)
+            assert asked == {"sampler": "sobol", "filter_mode": "spread", "seed": 0, **given}
+            assert by_program(given) == asked
+            assert by_studio(given) == asked
+        for given in ({"sampler": "sobl"}, {"sampler": "halton"}, {"filter_mode": "Spred"}, {"filter_mode": ""}):
+            refusals = [str(ask_for(given)).partition(" must be ") for ask_for in (by_program, by_python, by_studio)]
+            assert refusals[0][2] and len({refusal[2] for refusal in refusals}) == 1, refusals
+    finally:
+        studio.terminate()
+        studio.wait()
 
 
 def test_inks_of_a_jpeg_become_colours(tmp_path: Path) -> None:
@@ -202,8 +266,8 @@ def test_what_a_callback_raises_ends_the_rendering(cornell: et.Scene) -> None:
         ({"integrator": "bdp"}, 'there is no integrator "bdp"; did you mean "bdpt"'),
         ({"integrator": "bdpt:max_dept=3"}, 'has no parameter "max_dept" .did you mean "max_depth"'),
         ({"aovs": ["albdo"]}, 'unknown layer "albdo" .known: albedo'),
-        ({"sampler": "halton"}, 'sampler must be "independent" or "sobol", but is "halton"'),
-        ({"filter_mode": "box"}, 'filter_mode must be "spread" or "sample", but is "box"'),
+        ({"sampler": "halton"}, 'sampler must be independent or sobol, but is "halton"'),
+        ({"filter_mode": "box"}, 'filter_mode must be spread or sample, but is "box"'),
         ({"spp": 0}, "spp, time and error must be above 0"),
         ({"integrator": 3}, "an integrator is a text"),
         ({"threads": -1}, "threads must lie between 0 and 4096, but is -1"),
@@ -247,6 +311,7 @@ def test_renderings_in_several_threads(cornell: et.Scene) -> None:
 CHILD = """
     import sys, time
     import etendue as et
+from etendue import _etendue
     d = et.load({scene!r})
     scene = d.build(resolution={size})
     print("ready", flush=True)

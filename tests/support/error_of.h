@@ -6,11 +6,11 @@
 namespace etendue::test {
 
 /// What a call complains about, or "".
-template <class Call>
+template <class Error = std::runtime_error, class Call>
 std::string error_of(const Call& call) {
     try {
         call();
-    } catch (const std::runtime_error& e) {
+    } catch (const Error& e) {
         return e.what();
     }
     return "";

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "error_of.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "resumable.h"
 #include "test_scenes.h"
 

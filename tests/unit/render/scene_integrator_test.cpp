@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "readers/pbrt.h"
-#include "render/defaults.h"
+#include "render/render_request.h"
 #include "scene/settings.h"
 #include "test_scenes.h"
 

@@ -34,7 +34,7 @@ RunRequest request(const std::string& integrator, uint64_t spp) {
     RunRequest r;
     r.integrator = integrator;
     r.seed = 3;
-    r.limits.spp = spp;
+    r.spp = spp;
     return r;
 }
 
@@ -44,7 +44,7 @@ std::vector<Rgb> plain_image(const Scene& scene, const RunRequest& r) {
     settings.sampler = r.sampler;
     settings.seed = r.seed;
     settings.threads = 1;
-    settings.spp = r.limits.spp;
+    settings.spp = r.spp;
     Renderer renderer(scene, settings);
     renderer.run([](const Progress&) {}, std::atomic<bool>(false));
     return renderer.film().image();
@@ -116,7 +116,7 @@ TEST(Session, SnapshotHasTheVarianceOfTheFilm) {
     settings.integrator = IntegratorSpec::parse("path");
     settings.sampler = r.sampler;
     settings.seed = r.seed;
-    settings.spp = r.limits.spp;
+    settings.spp = r.spp;
     Renderer renderer(scene, settings);
     renderer.run([](const Progress&) {}, std::atomic<bool>(false));
     const std::vector<Rgb> expected = renderer.film().variance();
@@ -552,7 +552,7 @@ TEST(Session, RunsWithSeveralSeedsShowAllTheirPasses) {
     ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Stopped; }));
     const uint64_t passes = session.status(run).passes;
     EXPECT_EQ(session.snapshot(run)->passes, passes);
-    r.limits.spp = passes;
+    r.spp = passes;
     const std::vector<Rgb> expected = plain_image(small_room(), r);
     for (size_t i = 0; i < expected.size(); ++i)
         for (int c = 0; c < 3; ++c)
