@@ -30,8 +30,8 @@ namespace {
 struct CompareCommand {
     std::vector<std::string> scenes, methods, references;
     SceneOptions reading;
-    std::string paths = "all", lengths = "1..", reference_method,
-                report = "out/compare", kept_references = "out/references";
+    std::string paths = "all", lengths = "1..", reference_method, report = "out/compare",
+                kept_references = "out/references";
     SamplerKind sampler = CompareSettings().sampler;
     double seconds = 0, reference_seconds = 0;
     uint64_t spp = 0, reference_spp = 0, seed = 0;

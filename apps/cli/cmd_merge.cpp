@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "figures.h"
 #include "image/image_io.h"
 #include "json_text.h"
 #include "messages.h"
@@ -46,12 +47,8 @@ struct MergeCommand {
         }
         if (!stats.empty()) write_file(stats, json_text(report));
         if (quiet) return;
-        const ErrorEstimate e = totals.film->error();
         message("{}: {} spp of {} file{}{}\n", output, totals.film->passes(), files.size(),
-                files.size() == 1 ? "" : "s",
-                e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})",
-                                      e.relative_rms, e.low, e.high)
-                        : "");
+                files.size() == 1 ? "" : "s", format_error(totals.film->error()));
     }
 };
 

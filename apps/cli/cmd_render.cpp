@@ -14,6 +14,7 @@
 
 #include "commands.h"
 #include "description/fingerprint.h"
+#include "figures.h"
 #include "image/image_io.h"
 #include "interrupt.h"
 #include "json_text.h"
@@ -22,8 +23,8 @@
 #include "preview.h"
 #include "render/aov.h"
 #include "render/checkpoint.h"
-#include "render/render_request.h"
 #include "render/render_report.h"
+#include "render/render_request.h"
 #include "render/renderer.h"
 #include "render/scene_integrator.h"
 #include "render/warnings.h"
@@ -97,13 +98,6 @@ private:
     double interval_, most_, wait_ = interval_;
     Clock::time_point last_ = Clock::now();
 };
-
-std::string format_seconds(double s) {
-    if (s < 100) return fmt::format("{:.1f} s", s);
-    const long t = std::lround(s);
-    return t < 3600 ? fmt::format("{}:{:02}", t / 60, t % 60)
-                    : fmt::format("{}:{:02}:{:02}", t / 3600, t / 60 % 60, t % 60);
-}
 
 /// Progress on stderr: on a terminal one line that is rewritten, otherwise new lines at growing intervals.
 class ProgressLine {
@@ -302,7 +296,8 @@ void RenderCommand::run() const {
         earlier.reset();
     }
     // Before the passes, so that nothing that can fail stands between them and their image.
-    const std::vector<AovImage> layers = render_aovs(s, aovs, kAovSamples, settings.seed, settings.threads);
+    const std::vector<AovImage> layers =
+        render_aovs(s, aovs, kAovSamples, settings.seed, settings.threads);
 
     const Interrupts interrupts = catch_interrupts(grace);
     std::unique_ptr<Preview> viewer;
@@ -366,10 +361,7 @@ void RenderCommand::run() const {
     if (quiet) return;
     message("{}: {} spp in {}, {:.3f} Msamples/s, {:.2f} Mrays/s{}\n", output, passes,
             format_seconds(renderer.seconds()), report["samples_per_second"].get<double>() * 1e-6,
-            report["rays_per_second"].get<double>() * 1e-6,
-            e.valid ? fmt::format(", relative error {:.4f} (95 %: {:.4f} to {:.4f})",
-                                  e.relative_rms, e.low, e.high)
-                    : "");
+            report["rays_per_second"].get<double>() * 1e-6, format_error(e));
 }
 
 }  // namespace
@@ -384,7 +376,8 @@ void add_render_command(CLI::App& app) {
         "-i,--integrator", command->request.integrator,
         "Integrator with parameters: bdpt or bdpt:max_depth=12,rr_depth=5 (default: the scene's)");
     c.add_option("--spp", command->request.spp, "Samples per pixel")->check(must_be_above_0);
-    c.add_option("--time", command->request.seconds, "Seconds to render; may be exceeded by half a pass")
+    c.add_option("--time", command->request.seconds,
+                 "Seconds to render; may be exceeded by half a pass")
         ->check(must_be_above_0);
     c.add_option("--error", command->request.error,
                  "Stop at this estimated relative RMS error of the image, e.g. 0.01")
@@ -411,7 +404,8 @@ void add_render_command(CLI::App& app) {
                  "Seconds that the current pass may continue after Ctrl-C, SIGTERM or SIGHUP")
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
-    c.add_option("--seed", command->request.seed, "Seed of all random numbers")->capture_default_str();
+    c.add_option("--seed", command->request.seed, "Seed of all random numbers")
+        ->capture_default_str();
     FilterMode& filter_mode = command->request.filter_mode;
     c.add_option_function<std::string>(
          "--filter-mode",
@@ -421,7 +415,8 @@ void add_render_command(CLI::App& app) {
          "spread: an eye path contributes to all pixels that the filter reaches; sample: to "
          "its own pixel, with a film point drawn from the filter")
         ->default_str(to_string(filter_mode));
-    add_sampler_option(c, command->request.sampler, "; with sobol the error estimate is an upper bound");
+    add_sampler_option(c, command->request.sampler,
+                       "; with sobol the error estimate is an upper bound");
     c.add_option("--threads", command->request.threads, "Number of threads; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "image/image_io.h"
-#include "render/render_request.h"
 #include "render/learned_guide.h"
+#include "render/render_request.h"
 #include "system/output_file.h"
 
 namespace etendue {

@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <tbb/task_arena.h>
 
-#include "render/render_request.h"
 #include "render/render_report.h"
+#include "render/render_request.h"
 #include "system/threads.h"
 
 namespace etendue {
