@@ -54,6 +54,9 @@ FloatArray to_array(Rgb c);
 /// The pixels of an array of shape (H, W, 3).
 using ImageArgument = nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
 
+/// As Technique.strategy names it.
+const char* name_of(Strategy strategy);
+
 /// An integrator by name and parameters, or an object that etendue.Integrator is the base of.
 IntegratorSpec to_spec(const Scene& scene, nb::handle integrator);
 
@@ -88,6 +91,9 @@ void bind_description(nb::module_& m);
 void bind_render(nb::module_& m);
 void bind_reports(nb::module_& m);
 void bind_images(nb::module_& m);
-void bind_core(nb::module_& m);
+void bind_techniques(nb::module_& m);
+void bind_sub_paths(nb::module_& m);
+void bind_integrators(nb::module_& m);
+void bind_path_records(nb::module_& m);
 
 }  // namespace etendue::python

@@ -7,7 +7,10 @@ NB_MODULE(_etendue, m) {
     watch_forks();
     bind_description(m);
     bind_images(m);
-    bind_core(m);
+    bind_techniques(m);
+    bind_sub_paths(m);
+    bind_integrators(m);
+    bind_path_records(m);
     bind_render(m);
     bind_reports(m);
 }

@@ -23,8 +23,8 @@
 #include "math/statistics.h"
 #include "render/aov.h"
 #include "render/checkpoint.h"
-#include "render/render_request.h"
 #include "render/render_report.h"
+#include "render/render_request.h"
 #include "render/renderer.h"
 #include "render/warnings.h"
 #include "values.h"
@@ -34,16 +34,7 @@ namespace etendue::python {
 namespace {
 
 const char* technique_kind(const Technique& q) {
-    switch (q.strategy) {
-    case Strategy::Hit: return "hit";
-    case Strategy::NextEvent: return "next_event";
-    case Strategy::Connect: return q.s == 1 ? "stored" : "connect";
-    case Strategy::Splat: return "splat";
-    case Strategy::HitLens: return "hit_lens";
-    case Strategy::Merge: return "merge";
-    case Strategy::Gather: return "gather";
-    }
-    return "";
+    return q.strategy == Strategy::Connect && q.s == 1 ? "stored" : name_of(q.strategy);
 }
 
 RenderSettings settings_for(const Scene& scene, nb::handle integrator, RenderRequest request) {
@@ -87,8 +78,7 @@ std::vector<Rgb> half_width_of(const Film& film) {
 class Rendering {
 public:
     Rendering(ScenePtr scene, nb::handle integrator, const RenderRequest& request)
-        : scene_(std::move(scene)),
-          settings_(settings_for(scene_->scene, integrator, request)),
+        : scene_(std::move(scene)), settings_(settings_for(scene_->scene, integrator, request)),
           python_integrator_(settings_.integrator.make ? python_identity(integrator) : ""),
           renderer_(make_renderer(scene_->scene, settings_)) {}
 
