@@ -29,6 +29,7 @@ std::string integrator_text(const Scene& s) try {
 void checkpoint_info(const std::string& file, bool as_json) {
     CheckpointFile c(file);
     c.check();
+    const CheckpointHeader& h = c.header();
     const RenderTotals totals = c.totals(false);
     const std::span<const Film::Moments> moments = totals.film->moments();
     const std::string bits = fmt::format(
@@ -39,35 +40,35 @@ void checkpoint_info(const std::string& file, bool as_json) {
     const double mean = totals.film->mean_luminance().mean;
     if (as_json) {
         nlohmann::json j{{"checkpoint", file},
-                         {"scene", c.scene()},
-                         {"integrator", c.integrator()},
-                         {"estimator", c.estimator()},
-                         {"width", c.width()},
-                         {"height", c.height()},
-                         {"spp", c.passes()},
+                         {"scene", h.scene},
+                         {"integrator", h.integrator},
+                         {"estimator", h.estimator},
+                         {"width", h.film.crop_width},
+                         {"height", h.film.crop_height},
+                         {"spp", h.passes()},
                          {"seconds", totals.seconds},
-                         {"merged", c.is_merged()},
+                         {"merged", h.is_merged},
                          {"mean_luminance", mean},
                          {"bits", bits}};
         if (e.valid) j["relative_error"] = e.relative_rms;
-        for (const PassRange& r : c.ranges())
+        for (const PassRange& r : h.ranges)
             j["passes"].push_back(
                 {{"seed", r.seed}, {"first_pass", r.first}, {"passes", r.passes}});
-        for (const auto& [name, value] : c.conditions()) j["conditions"][name] = value;
+        for (const auto& [name, value] : h.conditions) j["conditions"][name] = value;
         fmt::print("{}", json_text(j));
         return;
     }
     const auto line = [](const std::string& name, const std::string& value) {
         fmt::print("  {:<24} {}\n", name, value);
     };
-    fmt::print("{}: {}\n", file, c.is_merged() ? "sum of renderings" : "state of a rendering");
-    line("scene", c.scene());
-    for (const PassRange& r : c.ranges()) line("contains", to_string(r));
+    fmt::print("{}: {}\n", file, h.is_merged ? "sum of renderings" : "state of a rendering");
+    line("scene", h.scene);
+    for (const PassRange& r : h.ranges) line("contains", to_string(r));
     line("time", fmt::format("{:.1f} s", totals.seconds));
     line("mean luminance", fmt::format("{:.6g}", mean));
     if (e.valid) line("relative error", fmt::format("{:.4f}", e.relative_rms));
-    line("estimator", c.estimator());
-    for (const auto& [name, value] : c.conditions()) line(name, value);
+    line("estimator", h.estimator);
+    for (const auto& [name, value] : h.conditions) line(name, value);
     line("bits of the sums", bits);
 }
 

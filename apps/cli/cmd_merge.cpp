@@ -11,7 +11,7 @@
 #include "image/image_io.h"
 #include "json_text.h"
 #include "messages.h"
-#include "render/checkpoint.h"
+#include "render/merging.h"
 #include "system/output_file.h"
 #include "technique_files.h"
 

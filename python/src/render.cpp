@@ -22,7 +22,7 @@
 #include "image/image_io.h"
 #include "math/statistics.h"
 #include "render/aov.h"
-#include "render/checkpoint.h"
+#include "render/merging.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
 #include "render/renderer.h"
@@ -315,8 +315,9 @@ void bind_merging(nb::module_& m) {
     nb::class_<Merged>(m, "Merged")
         .def_prop_ro("passes", [](const Merged& r) { return r.film().passes(); })
         .def_prop_ro("seconds", [](const Merged& r) { return r.totals.seconds; })
-        .def_prop_ro("estimator", [](const Merged& r) { return r.of->first().estimator(); })
-        .def_prop_ro("integrator", [](const Merged& r) { return r.of->first().integrator(); })
+        .def_prop_ro("estimator", [](const Merged& r) { return r.of->first().header().estimator; })
+        .def_prop_ro("integrator",
+                     [](const Merged& r) { return r.of->first().header().integrator; })
         .def_prop_ro("warnings", [](const Merged& r) { return warnings(r.totals.stats); })
         .def("merge_warnings", [](const Merged& r) { return r.of->warnings(); })
         .def("error", [](const Merged& r) { return tuple_of(r.film().error()); })
@@ -357,16 +358,17 @@ void bind_merging(nb::module_& m) {
     m.def(
         "read_checkpoint",
         [](const std::string& file) {
-            const CheckpointFile c(file);
-            const PassRange& range = c.ranges().front();
+            const CheckpointFile checkpoint(file);
+            const CheckpointHeader& c = checkpoint.header();
+            const PassRange& range = c.ranges.front();
             nb::dict d;
-            d["integrator"] = c.integrator();
+            d["integrator"] = c.integrator;
             d["condition"] = c.condition(kIntegratorCondition);
             d["sampler"] = c.condition("sampler");
             d["filter_mode"] = c.condition("filter mode");
             d["seed"] = range.seed;
             d["first_pass"] = range.first;
-            d["technique_depth"] = c.technique_depth();
+            d["technique_depth"] = c.technique_depth;
             return d;
         },
         "file"_a);

@@ -5,7 +5,7 @@
 
 #include "fuzz_target.h"
 #include "math/content_hash.h"
-#include "render/checkpoint.h"
+#include "render/merging.h"
 #include "render/statistics_section.h"
 
 namespace etendue::fuzz {

@@ -9,8 +9,10 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "error_of.h"
+#include "render/merging.h"
 #include "render/render_request.h"
 #include "resumable.h"
 #include "test_scenes.h"
