@@ -105,7 +105,7 @@ std::vector<GivenPath> parse_user_paths(const std::string& text, const std::stri
 }
 
 std::vector<GivenPath> read_user_paths(const std::string& file) {
-    return parse_user_paths(read_file_bytes(file), file);
+    return read_in_memory(file, [&] { return parse_user_paths(read_file_bytes(file), file); });
 }
 
 std::string to_json(std::span<const GivenPath> paths) {

@@ -134,18 +134,23 @@ void CheckpointFile::resume(Renderer& renderer, const Conditions& conditions, Pa
 
 RenderTotals CheckpointFile::totals(bool with_techniques) {
     static const ReconstructionFilter kUnused = ReconstructionFilter::box();
-    RenderTotals t;
-    t.film = std::make_unique<Film>(header_.film, kUnused);
-    t.film->load(reader_);
-    if (t.film->passes() != header_.passes()) reader_.fail("the passes are not those of its film");
-    load_statistics(reader_, t.stats, t.seconds);
-    if (header_.technique_depth > 0 && with_techniques) {
-        t.techniques =
-            std::make_unique<TechniqueImages>(header_.film, kUnused, header_.technique_depth);
-        t.techniques->add_saved(reader_);
-    }
-    t.log = load_log(reader_);
-    return t;
+    return in_memory(
+        [&] {
+            RenderTotals t;
+            t.film = std::make_unique<Film>(header_.film, kUnused);
+            t.film->load(reader_);
+            if (t.film->passes() != header_.passes())
+                reader_.fail("the passes are not those of its film");
+            load_statistics(reader_, t.stats, t.seconds);
+            if (header_.technique_depth > 0 && with_techniques) {
+                t.techniques = std::make_unique<TechniqueImages>(header_.film, kUnused,
+                                                                 header_.technique_depth);
+                t.techniques->add_saved(reader_);
+            }
+            t.log = load_log(reader_);
+            return t;
+        },
+        [&](const char* why) { reader_.fail(why); });
 }
 
 }  // namespace etendue
