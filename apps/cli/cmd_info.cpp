@@ -61,7 +61,10 @@ void checkpoint_info(const std::string& file, bool as_json) {
     const auto line = [](const std::string& name, const std::string& value) {
         fmt::print("  {:<24} {}\n", name, value);
     };
-    fmt::print("{}: {}\n", file, h.is_merged ? "sum of renderings" : "state of a rendering");
+    fmt::print("{}: {}\n", file,
+               h.is_merged     ? "sum of renderings"
+               : c.has_state() ? "state of a rendering"
+                               : "sums of a rendering");
     line("scene", h.scene);
     for (const PassRange& r : h.ranges) line("contains", to_string(r));
     line("time", fmt::format("{:.1f} s", totals.seconds));

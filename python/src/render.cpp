@@ -241,10 +241,7 @@ Error tuple_of(const ErrorEstimate& e) {
 struct Merged {
     std::optional<Merging> of;
     RenderTotals totals;
-    /// The parts in bytes, as read or as partial results.
-    explicit Merged(std::vector<SectionReader> readers) {
-        std::vector<CheckpointFile> parts;
-        for (SectionReader& r : readers) parts.emplace_back(std::move(r));
+    explicit Merged(std::vector<CheckpointFile> parts) {
         of.emplace(std::move(parts));
         totals = of->totals();
     }
@@ -294,20 +291,20 @@ FloatArray image_of(const R& r, const Make& make) {
 
 /// What et.merge() makes of files and of partial results.
 std::shared_ptr<Merged> merge(const nb::list& parts) {
-    std::vector<SectionReader> readers;
+    std::vector<CheckpointFile> files;
     for (const nb::handle part : parts) {
         if (nb::isinstance<nb::bytes>(part)) {
             const auto bytes = nb::cast<nb::bytes>(part);
-            readers.emplace_back(std::string(bytes.c_str(), bytes.size()),
-                                 fmt::format("part {}", readers.size() + 1));
+            files.emplace_back(SectionReader(std::string(bytes.c_str(), bytes.size()),
+                                             fmt::format("part {}", files.size() + 1)));
         } else {
-            readers.emplace_back(nb::cast<std::string>(part));
+            files.emplace_back(nb::cast<std::string>(part));
         }
     }
-    if (readers.empty()) throw nb::value_error("there are no parts to merge");
+    if (files.empty()) throw nb::value_error("there are no parts to merge");
     use_threads();
     const nb::gil_scoped_release no_gil;
-    return std::make_shared<Merged>(std::move(readers));
+    return std::make_shared<Merged>(std::move(files));
 }
 
 void bind_merging(nb::module_& m) {

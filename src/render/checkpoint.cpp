@@ -23,13 +23,19 @@ const char* yes_or_no(bool b) {
     return b ? "yes" : "no";
 }
 
+/// A text as it is read again from a header, where names of files that are not UTF-8 have marks in their place.
+std::string as_read(const std::string& text) {
+    return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace))
+        .get<std::string>();
+}
+
 /// The parameters with those that were not given.
 std::string with_defaults(const IntegratorSpec& spec) {
     if (spec.make) return spec.to_string();
     IntegratorSpec full = spec;
     for (const ParamInfo& p : integrator_entry(spec.name).info.params)
         full.params.emplace(p.name, p.fallback);
-    return full.to_string();
+    return as_read(full.to_string());
 }
 
 /// Hash of the files that the parameters name.
@@ -117,6 +123,10 @@ void CheckpointFile::resume(Renderer& renderer, const Conditions& conditions, Pa
     if (header_.is_merged)
         throw std::runtime_error(fmt::format(
             "{} cannot be resumed: it is the sum of several renderings (etendue merge)", name()));
+    if (!has_state())
+        throw std::runtime_error(fmt::format(
+            "{} cannot be resumed: it contains the sums of a rendering, but not its state",
+            name()));
     std::vector<std::string> differences;
     for (const auto& [condition_name, own] : conditions)
         if (const std::string theirs = header_.condition(condition_name); theirs != own)
@@ -130,6 +140,7 @@ void CheckpointFile::resume(Renderer& renderer, const Conditions& conditions, Pa
     if (renderer.film().passes() != header_.passes())
         reader_.fail("the passes are not those of its film");
     log = load_log(reader_);
+    reader_.close();
 }
 
 RenderTotals CheckpointFile::totals(bool with_techniques) {
@@ -148,6 +159,7 @@ RenderTotals CheckpointFile::totals(bool with_techniques) {
                 t.techniques->add_saved(reader_);
             }
             t.log = load_log(reader_);
+            reader_.close();
             return t;
         },
         [&](const char* why) { reader_.fail(why); });

@@ -40,7 +40,7 @@ struct RenderTotals {
     PassLog log;
 };
 
-/// A checkpoint that is read. All errors are std::runtime_error and name the file.
+/// A checkpoint that is read. All errors are std::runtime_error and name the file, which is open only while it is read.
 class CheckpointFile {
 public:
     /// Reads the description of the rendering.
@@ -50,6 +50,8 @@ public:
 
     const std::string& name() const { return reader_.name(); }
     const CheckpointHeader& header() const { return header_; }
+    /// Whether a rendering can go on from it. Otherwise it has only sums.
+    bool has_state() const { return reader_.has("learned"); }
     /// Verifies every byte of the file.
     void check() { reader_.check(); }
 

@@ -85,6 +85,7 @@ CheckpointHeader load_header(SectionReader& from) {
     from.open("rendering");
     from.get(text);
     from.finish();
+    from.close();
     const char* const kDamaged = "the description of the rendering is damaged";
     CheckpointHeader h;
     try {

@@ -63,7 +63,9 @@ RenderTotals Merging::totals() {
     for (size_t i = 1; i < parts_.size(); ++i) {
         CheckpointFile& part = parts_[i];
         add(sum, part.totals(false));
-        if (sum.techniques) sum.techniques->add_saved(part.sections());
+        if (!sum.techniques) continue;
+        sum.techniques->add_saved(part.sections());
+        part.sections().close();
     }
     return sum;
 }

@@ -110,7 +110,7 @@ std::string SectionWriter::take() {
 }
 
 SectionReader::SectionReader(const std::string& file)
-    : name_(file), in_(std::make_unique<std::ifstream>(file, std::ios::binary)) {
+    : name_(file), is_file_(true), in_(std::make_unique<std::ifstream>(file, std::ios::binary)) {
     if (!*in_)
         throw std::runtime_error(
             fmt::format("cannot read \"{}\": {}", file, std::generic_category().message(errno)));
@@ -118,7 +118,8 @@ SectionReader::SectionReader(const std::string& file)
 }
 
 SectionReader::SectionReader(std::string bytes, std::string name)
-    : name_(std::move(name)), in_(std::make_unique<std::istringstream>(std::move(bytes))) {
+    : name_(std::move(name)), is_file_(false),
+      in_(std::make_unique<std::istringstream>(std::move(bytes))) {
     read_table();
 }
 
@@ -191,7 +192,20 @@ uint64_t SectionReader::size(std::string_view section) const {
     return found ? found->size : 0;
 }
 
+void SectionReader::close() {
+    open_.clear();
+    left_ = 0;
+    if (is_file_) in_.reset();
+}
+
+void SectionReader::open_again() {
+    SectionReader again(name_);
+    if (again.sections_ != sections_) fail("the file was changed while it was read");
+    in_ = std::move(again.in_);
+}
+
 void SectionReader::verify(const Section& section) {
+    if (!in_) open_again();
     ContentHash hash;
     hash.add(section.name);
     std::vector<char> piece(size_t(std::min<uint64_t>(section.size, 16 * kBuffer)));

@@ -94,6 +94,8 @@ public:
     void open(std::string_view section);
     /// Verifies every section.
     void check();
+    /// Closes the file until the next open() or check(), which throw if it has changed meanwhile. For those who have many.
+    void close();
 
     template <StoredNumber T>
     void get(T& value) {
@@ -135,18 +137,22 @@ private:
     struct Section {
         std::string name;
         uint64_t begin, size, hash;
+
+        friend bool operator==(const Section&, const Section&) = default;
     };
     void read_table();
     const Section* find(std::string_view name) const;
     void read_at(uint64_t position, void* data, size_t size);
     void verify(const Section& section);
+    void open_again();
     /// Number of elements of a list, of which there are enough bytes.
     uint64_t count(size_t element);
     void get_bytes(void* data, size_t size);
     [[noreturn]] void fail_count(const char* what, uint64_t found, uint64_t expected) const;
 
     std::string name_, open_;
-    std::unique_ptr<std::istream> in_;
+    bool is_file_;
+    std::unique_ptr<std::istream> in_;  ///< nullptr after close().
     std::vector<Section> sections_;
     uint64_t left_ = 0;
 };

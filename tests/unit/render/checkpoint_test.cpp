@@ -488,6 +488,31 @@ TEST(Merge, InStagesHasTheSamePasses) {
     EXPECT_NE(refusal(renderings, scene, "02", settings).find("sum of several"), std::string::npos);
 }
 
+/// Also of one rendering alone.
+TEST(Merge, NothingGoesOnFromSums) {
+    const Scene scene = build(mixed_room(lens_camera(16)));
+    const Renderings renderings(scene);
+    const RenderSettings settings = settings_of("bdpt");
+    renderings.render("a", settings, 1);
+    EXPECT_TRUE(CheckpointFile(renderings.file("a")).has_state());
+    std::vector<CheckpointFile> parts;
+    parts.emplace_back(renderings.file("a"));
+    Merging merging(std::move(parts));
+    merging.write(renderings.file("sums"), merging.totals());
+    EXPECT_FALSE(CheckpointFile(renderings.file("sums")).has_state());
+    Renderer r(scene, settings);
+    PassLog log;
+    renderings.run(r, 1, log);
+    CheckpointFile partial(SectionReader(
+        partial_result(r, scene, renderings.conditions(r, settings), settings, log), "partial"));
+    EXPECT_FALSE(partial.has_state());
+    Renderer other(scene, settings);
+    EXPECT_EQ(error_of([&] { partial.resume(other, renderings.conditions(r, settings), log); }),
+              "partial cannot be resumed: it contains the sums of a rendering, but not its state");
+    EXPECT_NE(refusal(renderings, scene, "sums", settings).find("but not its state"),
+              std::string::npos);
+}
+
 TEST(Merge, RefusesWhatDoesNotBelongTogether) {
     const Scene scene = build(mixed_room(lens_camera(16))),
                 larger = build(mixed_room(lens_camera(24)));

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "error_of.h"
 #include "limited_memory.h"
 
 namespace etendue::test {
@@ -86,6 +87,33 @@ TEST_F(SectionFileTest, InMemoryItIsTheSame) {
     to.begin("text");
     to.put(std::string("a text"));
     EXPECT_EQ(to.take(), bytes());
+}
+
+TEST_F(SectionFileTest, ClosedFilesAreOpenedAgain) {
+    SectionReader from(file), in_memory(bytes(), "it");
+    for (SectionReader* r : {&from, &in_memory}) {
+        for (int i = 0; i < 2; ++i) {
+            r->close();
+            EXPECT_TRUE(r->has("text"));
+            EXPECT_EQ(read(*r), "");
+        }
+        r->close();
+        r->check();
+    }
+}
+
+TEST_F(SectionFileTest, FilesThatChangeWhileTheyAreClosedAreRefused) {
+    SectionReader from(file);
+    from.close();
+    SectionWriter to(file);
+    to.begin("text");
+    to.put(std::string("another text"));
+    to.commit();
+    const std::string message = error_of([&] { from.open("text"); });
+    EXPECT_EQ(message, file + ": the file was changed while it was read");
+    from.close();
+    fs::remove(file);
+    EXPECT_NE(error_of([&] { from.check(); }).find("No such file"), std::string::npos);
 }
 
 TEST_F(SectionFileTest, EveryChangedByteIsNoticed) {
