@@ -11,6 +11,7 @@
 #include "image/image_io.h"
 #include "json_text.h"
 #include "messages.h"
+#include "output_checks.h"
 #include "render/merging.h"
 #include "system/output_file.h"
 #include "technique_files.h"
@@ -28,9 +29,14 @@ struct MergeCommand {
         if (is_image) check_image_extension(output);
         OutputFile::check(output);
         if (!stats.empty()) OutputFile::check(stats);
+        refuse_same_file("sum", output, "statistics", stats);
         std::vector<CheckpointFile> parts;
         for (const std::string& file : files) parts.emplace_back(file);
         Merging merging(std::move(parts));
+        if (!techniques.empty() && merging.first().technique_depth() == 0)
+            throw std::runtime_error(
+                fmt::format("--techniques: {} has no technique images; render with --techniques",
+                            merging.first().name()));
         print_warnings(merging.warnings());
         const RenderTotals totals = merging.totals();
         const nlohmann::json report = merging.report(totals);
@@ -38,13 +44,8 @@ struct MergeCommand {
             write_image(output, image_with_layers(*totals.film, {}, has_variance, report));
         else
             merging.write(output, totals);
-        if (!techniques.empty()) {
-            if (!totals.techniques)
-                throw std::runtime_error(fmt::format(
-                    "--techniques: {} has no technique images; render with --techniques",
-                    merging.first().name()));
+        if (!techniques.empty())
             write_techniques(*totals.techniques, totals.film->geometry(), techniques);
-        }
         if (!stats.empty()) write_file(stats, json_text(report));
         if (quiet) return;
         message("{}: {} spp of {} file{}{}\n", output, totals.film->passes(), files.size(),

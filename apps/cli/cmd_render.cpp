@@ -20,6 +20,7 @@
 #include "json_text.h"
 #include "messages.h"
 #include "number_checks.h"
+#include "output_checks.h"
 #include "preview.h"
 #include "render/aov.h"
 #include "render/checkpoint.h"
@@ -58,6 +59,8 @@ private:
     }
     /// The checkpoint from which the rendering goes on, if there is one.
     std::optional<CheckpointFile> earlier_checkpoint() const;
+    /// Warns where a checkpoint is to be replaced without having been resumed. No other file is replaced by one.
+    void check_replaced_checkpoint() const;
     static constexpr const char* kAuto = "auto";
     /// Checks that need no scene.
     void check_options() const;
@@ -142,9 +145,9 @@ void RenderCommand::check_options() const {
     check_limits(limits, first_pass);
     if (resume == kAuto && checkpoint.empty())
         throw std::runtime_error("--resume auto requires --checkpoint, the file to resume from");
-    if (checkpoint_file() == output)
-        throw std::runtime_error(
-            fmt::format("the image and the checkpoint cannot be the same file: {}", output));
+    refuse_same_file("image", output, "checkpoint", checkpoint_file());
+    refuse_same_file("image", output, "statistics", stats);
+    refuse_same_file("checkpoint", checkpoint_file(), "statistics", stats);
     check_image_extension(output);
     const auto folder = std::filesystem::path(output).parent_path();
     if (!folder.empty() && std::filesystem::exists(folder) &&
@@ -178,10 +181,29 @@ std::pair<uint64_t, uint64_t> RenderCommand::pass_range() const {
 }
 
 std::optional<CheckpointFile> RenderCommand::earlier_checkpoint() const {
+    if (resume.empty()) return {};
+    if (resume != kAuto) return CheckpointFile(resume);
     std::error_code error;
-    if (resume.empty() || (resume == kAuto && !std::filesystem::exists(checkpoint, error)))
-        return {};
-    return CheckpointFile(resume == kAuto ? checkpoint : resume);
+    const bool is_there = std::filesystem::exists(checkpoint, error);
+    // One that cannot be read now is not replaced by a rendering that starts anew.
+    if (error)
+        throw std::runtime_error(
+            fmt::format("cannot read \"{}\": {}", checkpoint, error.message()));
+    return is_there ? std::optional<CheckpointFile>(checkpoint) : std::nullopt;
+}
+
+void RenderCommand::check_replaced_checkpoint() const {
+    std::error_code error;
+    const std::string& file = checkpoint_file();
+    const bool is_resumed = resume == kAuto || std::filesystem::equivalent(resume, file, error);
+    if (is_resumed || !std::filesystem::is_regular_file(file, error) ||
+        std::filesystem::file_size(file, error) == 0)
+        return;
+    if (!SectionReader::is_one(file))
+        throw std::runtime_error(
+            fmt::format("{} is not replaced by a checkpoint, since it is none", file));
+    print_warnings({fmt::format(
+        "{} is replaced; with --resume auto, the rendering would go on from it", file)});
 }
 
 RenderSettings RenderCommand::settings_for(const Scene& s) const {
@@ -264,6 +286,7 @@ void RenderCommand::run() const {
     check_options();
     SceneOptions loading = scene;
     loading.threads = request.threads;
+    check_replaced_checkpoint();
     std::optional<CheckpointFile> earlier = earlier_checkpoint();
     const std::string& saved = checkpoint_file();
     uint64_t fingerprint = 0;

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "description/fingerprint.h"
 #include "geometry/ray_tracer.h"
@@ -25,7 +26,8 @@ const char* yes_or_no(bool b) {
 
 /// A text as it is read again from a header, where names of files that are not UTF-8 have marks in their place.
 std::string as_read(const std::string& text) {
-    return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace))
+    using nlohmann::json;
+    return json::parse(json(text).dump(-1, ' ', false, json::error_handler_t::replace))
         .get<std::string>();
 }
 

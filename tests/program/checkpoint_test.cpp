@@ -1,5 +1,7 @@
 // Renderings that are interrupted, killed, resumed, split and merged.
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <cctype>
 #include <chrono>
@@ -167,6 +169,27 @@ TEST_F(CheckpointTest, SignalsLeaveACheckpointAndAnImage) {
         }
 }
 
+/// The third signal ends the program while it writes, which leaves the files that were there. A pipe that nobody reads
+/// makes it wait.
+TEST_F(CheckpointTest, TheThirdSignalEndsTheProgramAtOnce) {
+    const std::string pipe = path("pipe.pfm");
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    const Program program =
+        start({"render", scene, "-o", pipe, "--quiet", "--resolution", "16x12", "--time", "600",
+               "--checkpoint", path("a.etd"), "--checkpoint-every", "1e-6"});
+    wait_for_file("a.etd");
+    program.send(SIGTERM);
+    // It now waits for the reader.
+    wait(1);
+    program.send(SIGTERM);
+    wait(0.2);
+    program.send(SIGTERM);
+    EXPECT_EQ(program.wait().status, 130);
+    EXPECT_GT(info("a.etd")["spp"], 0);
+    for (const auto& e : fs::directory_iterator(folder.path()))
+        EXPECT_FALSE(e.path().filename().string().starts_with(".")) << e.path();
+}
+
 TEST_F(CheckpointTest, TheImageIsWrittenWhileItRenders) {
     const Program program =
         start(render("a.exr", {"-i", "path", "--time", "600", "--write-every", "0.1"}));
@@ -265,6 +288,53 @@ TEST_F(CheckpointTest, RefusalsSayWhatDiffers) {
     EXPECT_NE(r.errors.find("scene contents"), std::string::npos) << r.errors;
 }
 
+TEST_F(CheckpointTest, NoFileIsWrittenTwice) {
+    const std::string a = path("a.exr"), same = path("./a.exr");
+    fs::create_symlink("a.exr", path("link"));
+    for (const Arguments& more : {Arguments{"--checkpoint", same}, Arguments{"--stats", same},
+                                  Arguments{"--checkpoint", path("link")},
+                                  Arguments{"--checkpoint", path("s"), "--stats", path("./s")}}) {
+        Arguments all = render("a.exr", {"-i", "path", "--spp", "1"});
+        all.insert(all.end(), more.begin(), more.end());
+        const ProgramResult r = run(all);
+        EXPECT_EQ(r.status, 1);
+        EXPECT_NE(r.errors.find("cannot be the same file"), std::string::npos) << r.errors;
+        EXPECT_FALSE(fs::exists(a));
+    }
+    expect_run(render("a.exr", {"-i", "path", "--spp", "1", "--checkpoint", path("a.etd")}));
+    const ProgramResult r =
+        run({"merge", path("a.etd"), "-o", path("m.exr"), "--stats", path("./m.exr")});
+    EXPECT_EQ(r.status, 1);
+    EXPECT_FALSE(fs::exists(path("m.exr")));
+}
+
+TEST_F(CheckpointTest, NothingElseIsReplacedByACheckpoint) {
+    const std::string text = path("text"), a = path("a.etd"), loop = path("loop");
+    const auto arguments = [&](const std::string& file, const Arguments& more) {
+        Arguments all = render("a.exr", {"-i", "path", "--spp", "1", "--checkpoint", file});
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    };
+    std::ofstream(text) << "a text";
+    const ProgramResult refused = run(arguments(text, {}));
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_NE(refused.errors.find("text is not replaced"), std::string::npos) << refused.errors;
+    EXPECT_EQ(read_text(text), "a text");
+    // An earlier one is, with a warning; an empty file is none.
+    std::ofstream(path("a.etd")).close();
+    EXPECT_EQ(run(arguments(a, {})).errors, "");
+    const ProgramResult again = run(arguments(a, {}));
+    EXPECT_EQ(again.status, 0);
+    EXPECT_NE(again.errors.find("--resume auto"), std::string::npos) << again.errors;
+    EXPECT_EQ(run(arguments(a, {"--resume", "auto"})).errors, "");
+    // Nor is one that cannot be read, by a rendering that starts anew.
+    fs::create_symlink("loop", loop);
+    const ProgramResult unreadable = run(arguments(loop, {"--resume", "auto"}));
+    EXPECT_EQ(unreadable.status, 1);
+    EXPECT_NE(unreadable.errors.find("cannot read \"" + loop), std::string::npos)
+        << unreadable.errors;
+}
+
 TEST_F(CheckpointTest, DamagedFilesAreNamed) {
     expect_run(render("a.exr", {"-i", "bdpt", "--spp", "1", "--checkpoint", path("a.etd")}));
     const std::string whole = read_text(path("a.etd"));
@@ -352,6 +422,122 @@ TEST_F(CheckpointTest, IsWholeWhateverCallFails) {
     }
 }
 
+/// The disk has room again a moment later.
+TEST_F(CheckpointTest, AfterAFailureTheNextOneIsTriedInTime) {
+    const Arguments how = {"-i",   "path",        "--spp", "6", "--checkpoint-every",
+                           "1e-6", "--checkpoint"};
+    Arguments whole = how, faulty = how;
+    fs::create_directory(path("faulty"));
+    whole.push_back(path("whole.etd"));
+    faulty.push_back(path("faulty/a.etd"));
+    expect_run(render("whole.exr", whole));
+    int warned = 0;
+    // The first call is that of the check before the first pass; the next ones belong to the first checkpoint.
+    for (int n = 2; n <= 5; ++n) {
+        SCOPED_TRACE(n);
+        fs::remove(path("faulty/a.etd"));
+        Arguments shell = {"-c",
+                           fmt::format("LD_PRELOAD='{}' ETENDUE_FAULT=fail:{} exec \"$0\" \"$@\"",
+                                       ETENDUE_IO_FAULTS, n),
+                           ETENDUE_PROGRAM};
+        const Arguments rest = render("a.exr", faulty);
+        shell.insert(shell.end(), rest.begin(), rest.end());
+        const ProgramResult r = Program("/bin/bash", shell, folder.path()).wait();
+        EXPECT_EQ(r.status, 0) << r.errors;
+        warned += r.errors.find("warning: cannot write") != std::string::npos;
+        EXPECT_EQ(bits("faulty/a.etd"), bits("whole.etd"));
+        EXPECT_EQ(pixels("a.exr"), pixels("whole.exr"));
+    }
+    EXPECT_EQ(warned, 4);
+}
+
+/// Whatever fails, the image is the old one or the new one, and the new one is somewhere.
+TEST_F(CheckpointTest, AnImageIsWholeWhateverCallFails) {
+    const std::string image = path("faulty/a.pfm");
+    const auto arguments = [&](const char* spp) {
+        return Arguments{"render", scene, "-o",   image,   "--quiet", "--resolution",
+                         "48x36",  "-i",  "path", "--spp", spp,       "--write-every",
+                         "0"};
+    };
+    expect_run(arguments("2"));
+    const std::string expected = read_text(image);
+    expect_run(arguments("1"));
+    const std::string old = read_text(image);
+    ASSERT_NE(old, expected);
+    for (const char* fault : {"fail", "kill"}) {
+        int n = 0, elsewhere = 0;
+        for (bool is_reached = true; is_reached;) {
+            SCOPED_TRACE(fmt::format("{}:{}", fault, ++n));
+            ASSERT_LT(n, 100);
+            std::ofstream(image, std::ios::binary) << old;
+            Arguments shell = {
+                "-c",
+                fmt::format("cd '{}'; LD_PRELOAD='{}' ETENDUE_FAULT={}:{} exec \"$0\" \"$@\"",
+                            folder.path().string(), ETENDUE_IO_FAULTS, fault, n),
+                ETENDUE_PROGRAM};
+            const Arguments rest = arguments("2");
+            shell.insert(shell.end(), rest.begin(), rest.end());
+            const ProgramResult r = Program("/bin/bash", shell, folder.path()).wait();
+            is_reached = r.signal == SIGKILL || r.status != 0;
+            // The folder may fail to become durable, when the new file is there already.
+            const std::string left = read_text(image);
+            EXPECT_TRUE(left == old || left == expected);
+            if (!is_reached) {
+                EXPECT_EQ(left, expected);
+            }
+            if (r.signal == SIGKILL) continue;
+            const std::string mark = "; the image is in ";
+            const size_t at = r.errors.find(mark);
+            if (at == std::string::npos) continue;
+            const std::string file =
+                r.errors.substr(at + mark.size(), r.errors.find('\n') - at - mark.size());
+            EXPECT_EQ(read_text(file), expected) << r.errors;
+            fs::remove(file);
+            ++elsewhere;
+        }
+        EXPECT_GT(n, 4);
+        if (std::string(fault) == "fail") {
+            EXPECT_GE(elsewhere, 3);
+        }
+    }
+}
+
+/// A limit of memory that the first passes meet, but not a later one.
+TEST_F(CheckpointTest, APassThatFailsLeavesTheCheckpointBeforeIt) {
+    const auto vcm = [&](int light_paths, const char* spp, int seed) {
+        return render("a.exr",
+                      {"-i", fmt::format("vcm:memory=1,light_paths={}", light_paths), "--spp", spp,
+                       "--seed", std::to_string(seed), "--checkpoint", path("a.etd")});
+    };
+    int fits = 1, fails = 1 << 16;
+    while (fails - fits > 1) {
+        const int light_paths = (fits + fails) / 2;
+        fs::remove(path("a.etd"));
+        (run(vcm(light_paths, "1", 0)).status == 0 ? fits : fails) = light_paths;
+    }
+    for (int seed = 0; seed < 20; ++seed) {
+        fs::remove(path("a.etd"));
+        const ProgramResult r = run(vcm(fits, "100", seed));
+        if (r.status == 0 || !fs::exists(path("a.etd"))) continue;
+        EXPECT_NE(r.errors.find("need more than 1 MiB"), std::string::npos) << r.errors;
+        const std::vector<float> image = pixels("a.exr");
+        const auto saved = info("a.etd");
+        const int passes = saved["spp"];
+        // The same without the pass that fails, and going on fails in it again.
+        fs::remove(path("a.etd"));
+        const std::string all = std::to_string(passes);
+        expect_run(vcm(fits, all.c_str(), seed));
+        EXPECT_EQ(pixels("a.exr"), image);
+        EXPECT_EQ(info("a.etd")["bits"], saved["bits"]);
+        Arguments on = vcm(fits, "100", seed);
+        on.insert(on.end(), {"--resume", "auto"});
+        EXPECT_EQ(run(on).status, 1);
+        EXPECT_EQ(info("a.etd")["bits"], saved["bits"]);
+        return;
+    }
+    FAIL() << "no pass failed with light_paths=" << fits;
+}
+
 // -- Merging.
 
 TEST_F(CheckpointTest, RangesMakeUpOneRendering) {
@@ -388,6 +574,61 @@ TEST_F(CheckpointTest, RangesMakeUpOneRendering) {
         run(render("p.exr", {"-i", "path", "--spp", "20", "--resume", path("ac.etd")}));
     EXPECT_EQ(resumed.status, 1);
     EXPECT_NE(resumed.errors.find("sum of several"), std::string::npos) << resumed.errors;
+}
+
+TEST_F(CheckpointTest, MergesMoreFilesThanMayBeOpen) {
+    constexpr int kFiles = 24;
+    Arguments merge = {"-c",
+                       "ulimit -n 20; exec \"$0\" \"$@\"",
+                       ETENDUE_PROGRAM,
+                       "merge",
+                       "-o",
+                       path("m.exr"),
+                       "--techniques",
+                       path("m"),
+                       "--quiet"};
+    for (int seed = 0; seed < kFiles; ++seed) {
+        const std::string file = path(fmt::format("{}.etd", seed));
+        expect_run({"render", scene, "-o", path("a.pfm"), "--quiet", "--resolution", "4x4", "-i",
+                    "path", "--spp", "1", "--techniques-max-depth", "1", "--techniques", path("t"),
+                    "--seed", std::to_string(seed), "--checkpoint", file});
+        merge.push_back(file);
+    }
+    const ProgramResult r = Program("/bin/bash", merge, folder.path()).wait();
+    EXPECT_EQ(r.status, 0) << r.errors;
+    EXPECT_EQ(pixels("m.exr").size(), 4u * 4 * 3);
+}
+
+TEST_F(CheckpointTest, WhatIsMissingIsSaidBeforeAnythingIsWritten) {
+    expect_run(render("a.exr", {"-i", "path", "--spp", "1", "--checkpoint", path("a.etd")}));
+    const ProgramResult r =
+        run({"merge", path("a.etd"), "-o", path("m.exr"), "--techniques", path("m")});
+    EXPECT_EQ(r.status, 1);
+    EXPECT_NE(r.errors.find("no technique images"), std::string::npos) << r.errors;
+    EXPECT_FALSE(fs::exists(path("m.exr")));
+}
+
+TEST_F(CheckpointTest, NamesThatAreNotUtf8GoOn) {
+    const std::string paths = path("p\xe8.json");
+    fs::copy_file(fs::path(ETENDUE_SOURCE_DIR) / "scenes/shutter-paths.json", paths);
+    const auto with = [&](const char* spp, const char* option) {
+        return Arguments{"render",
+                         fs::path(ETENDUE_SOURCE_DIR) / "scenes/shutter.xml",
+                         "-o",
+                         path("a.exr"),
+                         "--quiet",
+                         "--resolution",
+                         "8x8",
+                         "-i",
+                         "mlt:groups=2,chains=16,user_paths=" + paths,
+                         "--spp",
+                         spp,
+                         option,
+                         path("a.etd")};
+    };
+    expect_run(with("1", "--checkpoint"));
+    expect_run(with("2", "--resume"));
+    EXPECT_EQ(info("a.etd")["spp"], 2);
 }
 
 TEST_F(CheckpointTest, TheScriptForSlurmRunsWithoutIt) {

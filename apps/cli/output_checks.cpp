@@ -1,0 +1,34 @@
+#include "output_checks.h"
+
+#include <filesystem>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace etendue {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A path without links, also of a file that is still to be made.
+fs::path real_path(const std::string& file) {
+    std::error_code error;
+    const fs::path path = fs::weakly_canonical(fs::absolute(file, error), error);
+    return error ? fs::path(file) : path;
+}
+
+}  // namespace
+
+void refuse_same_file(const char* one, const std::string& file, const char* other,
+                      const std::string& other_file) {
+    if (file.empty() || other_file.empty()) return;
+    const fs::path path = real_path(file);
+    std::error_code error;
+    if (path != real_path(other_file) ||
+        (fs::exists(path, error) && !fs::is_regular_file(path, error)))
+        return;
+    throw std::runtime_error(
+        fmt::format("the {} and the {} cannot be the same file: {}", one, other, other_file));
+}
+
+}  // namespace etendue
