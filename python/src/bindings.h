@@ -31,6 +31,7 @@ struct SceneHandle : std::enable_shared_from_this<SceneHandle> {
 
     SceneDescription description;
     Scene scene;
+    uint64_t fingerprint;  ///< scene_fingerprint(); files may change after the scene was built.
     bool lenient = false, watertight = false;  ///< As it was built.
     Film film;  ///< For film points of single paths; never rendered into.
 };

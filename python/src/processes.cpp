@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "bindings.h"
+#include "description/fingerprint.h"
 
 namespace etendue::python {
 namespace {
@@ -19,7 +20,8 @@ std::atomic<bool> has_used_threads{false}, has_lost_threads{false};
 }  // namespace
 
 SceneHandle::SceneHandle(SceneDescription d, Scene s)
-    : description(std::move(d)), scene(std::move(s)), film(scene.film(), scene.filter()) {
+    : description(std::move(d)), scene(std::move(s)), fingerprint(scene_fingerprint(description)),
+      film(scene.film(), scene.filter()) {
     const std::scoped_lock lock(scenes_mutex);
     scenes.emplace(&scene, this);
 }

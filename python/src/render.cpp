@@ -18,7 +18,6 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings.h"
-#include "description/fingerprint.h"
 #include "image/image_io.h"
 #include "math/statistics.h"
 #include "render/aov.h"
@@ -80,7 +79,7 @@ public:
     Rendering(ScenePtr scene, nb::handle integrator, const RenderRequest& request)
         : scene_(std::move(scene)), settings_(settings_for(scene_->scene, integrator, request)),
           python_integrator_(settings_.integrator.make ? python_identity(integrator) : ""),
-          renderer_(make_renderer(scene_->scene, settings_)) {}
+          renderer_(make_renderer(scene_->scene, settings_)), conditions_(conditions()) {}
 
     /// `tick()` is called every 50 ms, `callback()` between passes, at least `interval` seconds apart; it returns False to
     /// stop.
@@ -173,17 +172,17 @@ public:
                                             settings_.threads, aovs, report()));
     }
     void save_checkpoint(const std::string& file) const {
-        write_checkpoint(file, renderer(), scene_->scene, conditions(), settings_, log_);
+        write_checkpoint(file, renderer(), scene_->scene, conditions_, settings_, log_);
     }
     /// Before the first pass.
     void resume(const std::string& file) {
         use_threads();
-        CheckpointFile(file).resume(renderer_, conditions(), log_);
+        CheckpointFile(file).resume(renderer_, conditions_, log_);
         const std::scoped_lock lock(mutex_);
         now_ = Now{renderer_.film().passes(), renderer_.seconds(), {}, 0, {}};
     }
     std::string partial() const {
-        return partial_result(renderer(), scene_->scene, conditions(), settings_, log_);
+        return partial_result(renderer(), scene_->scene, conditions_, settings_, log_);
     }
     std::vector<AovImage> aovs(const std::vector<std::string>& names) const {
         return render_aovs(scene_->scene, names, kAovSamples, settings_.seed, settings_.threads);
@@ -192,10 +191,9 @@ public:
 
 private:
     Conditions conditions() const {
-        Conditions all = conditions_of(
-            renderer_, scene_->scene,
-            {scene_fingerprint(scene_->description), scene_->lenient, scene_->watertight},
-            settings_);
+        Conditions all =
+            conditions_of(renderer_, scene_->scene,
+                          {scene_->fingerprint, scene_->lenient, scene_->watertight}, settings_);
         if (!python_integrator_.empty())
             for (auto& [name, value] : all)
                 if (name == kIntegratorCondition) value = python_integrator_;
@@ -206,6 +204,7 @@ private:
     RenderSettings settings_;
     std::string python_integrator_;  ///< What decides the samples of an integrator in Python.
     Renderer renderer_;
+    Conditions conditions_;  ///< At the start: files may change later.
     mutable std::mutex mutex_;
     std::optional<Now> now_;
     std::atomic<bool> is_running_{false};

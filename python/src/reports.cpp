@@ -146,9 +146,7 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
                         reference = read_reference(references[i], scene.scene.film());
                     else
                         reference = make_reference(
-                            scene.scene,
-                            {jobs[i].reference, folder, scene_fingerprint(scene.description),
-                             program},
+                            scene.scene, {jobs[i].reference, folder, scene.fingerprint, program},
                             [&](const Progress& p) {
                                 status.set(fmt::format("reference, {} spp, {:.1f} s", p.passes,
                                                        p.seconds));

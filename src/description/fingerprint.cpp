@@ -144,7 +144,8 @@ uint64_t file_fingerprint(const std::string& file) {
 }
 
 uint64_t program_fingerprint() {
-    return file_fingerprint(file_with_code());
+    static const uint64_t of_first_call = file_fingerprint(file_with_code());
+    return of_first_call;
 }
 
 }  // namespace etendue

@@ -13,7 +13,8 @@ namespace etendue {
 uint64_t scene_fingerprint(const SceneDescription& description);
 /// Hash of the bytes of a file; that of no bytes where it cannot be read.
 uint64_t file_fingerprint(const std::string& file);
-/// Hash of the file with this code, since another build may render another image: the program, or a module of Python.
+/// Hash of the file with this code, since another build may render another image: the program, or a module of Python. A
+/// module is read at the first call, since its file may be replaced later.
 uint64_t program_fingerprint();
 
 }  // namespace etendue

@@ -50,6 +50,23 @@ def test_what_would_change_bits_is_refused(cornell: et.Scene, demo: et.Scene, tm
         et.resume(tmp_path / "missing.etd", cornell, spp=2)
 
 
+def test_files_that_change_after_a_scene_was_built_do_not_count(tmp_path: Path) -> None:
+    mesh = tmp_path / "mesh.obj"
+    mesh.write_text("v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n")
+    (tmp_path / "scene.xml").write_text(
+        '<scene version="3.0.0"><sensor type="perspective"><transform name="to_world">'
+        '<lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform></sensor><emitter type="constant"/>'
+        '<shape type="obj"><string name="filename" value="mesh.obj"/></shape></scene>'
+    )
+    scene = et.load(tmp_path / "scene.xml").build(resolution=(8, 8))
+    mesh.write_text("v -1 -1 0\nv 1 -1 0\nv 0 2 0\nf 1 2 3\n")
+    et.render(scene, "path", spp=1, progress=False).save(tmp_path / "a.etd")
+    other = et.load(tmp_path / "scene.xml").build(resolution=(8, 8))
+    with pytest.raises(RuntimeError, match="scene contents"):
+        et.resume(tmp_path / "a.etd", other, spp=2)
+    assert et.resume(tmp_path / "a.etd", scene, spp=2, progress=False).passes == 2
+
+
 @pytest.mark.parametrize("method", ["bdpt", "mlt:groups=4,chains=48"])
 def test_merged_results_do_not_depend_on_their_order(cornell: et.Scene, tmp_path: Path, method: str) -> None:
     results = [et.render(cornell, method, spp=12, seed=s, techniques=3, progress=False) for s in range(3)]
