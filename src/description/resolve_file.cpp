@@ -89,6 +89,9 @@ std::string near_file_hint(const std::string& file, const std::vector<std::strin
             !near.empty())
             return meant(near);
     for (const std::string& folder : folders) {
+        std::error_code error;
+        if (!file.empty() && fs::is_directory(fs::path(folder) / path, error))
+            return "; it is a folder";
         if (is_absolute(slashes)) {
             if (const std::string near = file_below(folder, path.filename().string());
                 !near.empty())

@@ -13,13 +13,13 @@
 
 namespace etendue {
 
+UnreadableFile::UnreadableFile(const std::string& path)
+    : SceneError({path, 0}, std::string("cannot read: ") + std::strerror(errno)) {}
+
 std::string read_file_bytes(const std::string& path) {
-    const auto fail = [&] {
-        throw SceneError({path, 0}, std::string("cannot read: ") + std::strerror(errno));
-    };
     const auto close = [](std::FILE* f) { std::fclose(f); };
     const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
-    if (!file) fail();
+    if (!file) throw UnreadableFile(path);
 
     std::string bytes;
     const auto grow = [&](size_t size) {
@@ -39,9 +39,19 @@ std::string read_file_bytes(const std::string& path) {
         if (got == 0) break;
         used += got;
     }
-    if (std::ferror(file.get())) fail();
+    if (std::ferror(file.get())) throw UnreadableFile(path);
     bytes.resize(used);
     return bytes;
+}
+
+std::optional<std::string> read_named_file(const ReadOptions& options, const std::string& path,
+                                           const SourceLocation& where) {
+    if (!options.read_file) return {};
+    try {
+        return options.read_file(path);
+    } catch (const UnreadableFile& e) {
+        throw SceneError(where, e.what());
+    }
 }
 
 std::string_view plain_text(std::string_view text, const std::string& file) {

@@ -82,8 +82,8 @@ GltfReader::GltfReader(const std::string& file, const ReadOptions& options,
           const std::string& folder = scene_.search_paths[0];
           for (const std::string& spelling : spellings(name)) {
               const auto path = (std::filesystem::path(folder) / spelling).lexically_normal();
-              if (!options_.read_file) continue;
-              if (auto bytes = options_.read_file(path.string())) return *std::move(bytes);
+              if (auto bytes = read_named_file(options_, path.string(), where.where()))
+                  return *std::move(bytes);
           }
           where.fail(fmt::format("cannot read the file {}{}",
                                  (std::filesystem::path(folder) / name).lexically_normal().string(),

@@ -411,8 +411,7 @@ std::string MitsubaReader::load(const std::string& name, const SourceLocation& w
     for (const std::string& spelling : spellings(name))
         for (const std::string& directory : directories) {
             path = join(directory, spelling);
-            if (!options_.read_file) continue;
-            if (auto contents = options_.read_file(path)) return *std::move(contents);
+            if (auto contents = read_named_file(options_, path, where)) return *std::move(contents);
         }
     throw SceneError(where, fmt::format("cannot read the file {} (looked in {}{})", quote(name),
                                         fmt::join(directories, ", "),

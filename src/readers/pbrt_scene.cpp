@@ -114,8 +114,7 @@ std::string PbrtScene::load(const std::string& name, const SourceLocation& where
         path = folder == "." || std::filesystem::path(spelling).is_absolute()
                    ? spelling
                    : (std::filesystem::path(folder) / spelling).string();
-        if (!options.read_file) continue;
-        if (auto contents = options.read_file(path)) return *std::move(contents);
+        if (auto contents = read_named_file(options, path, where)) return *std::move(contents);
     }
     throw SceneError(where, fmt::format("cannot read the file {}{}", quote(path),
                                         options.is_disk ? near_file_hint(name, {folder}) : ""));

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <functional>
@@ -246,17 +245,14 @@ MeshData parse_serialized(std::string_view bytes, const std::string& name, int s
 }
 
 MeshData read_serialized(const std::string& path, int shape_index, const MeshOptions& options) {
-    const auto fail = [&] {
-        throw SceneError({path, 0}, std::string("cannot read: ") + std::strerror(errno));
-    };
     const auto close = [](std::FILE* f) { std::fclose(f); };
     const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
-    if (!file || fseeko(file.get(), 0, SEEK_END) != 0) fail();
+    if (!file || fseeko(file.get(), 0, SEEK_END) != 0) throw UnreadableFile(path);
     const auto read = [&](uint64_t begin, uint64_t size) {
         if (!MemoryWatch().add(size)) throw std::bad_alloc();
         std::string bytes(size, '\0');
-        if (fseeko(file.get(), off_t(begin), SEEK_SET) != 0) fail();
-        if (std::fread(bytes.data(), 1, size, file.get()) != size) fail();
+        if (fseeko(file.get(), off_t(begin), SEEK_SET) != 0) throw UnreadableFile(path);
+        if (std::fread(bytes.data(), 1, size, file.get()) != size) throw UnreadableFile(path);
         return bytes;
     };
     return read_in_memory(path, [&] {

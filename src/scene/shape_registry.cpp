@@ -8,6 +8,7 @@
 #include "description/mesh_data.h"
 #include "description/resolve_file.h"
 #include "math/frame.h"
+#include "readers/file_bytes.h"
 #include "readers/obj.h"
 #include "readers/ply.h"
 #include "readers/serialized.h"
@@ -93,12 +94,23 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     return mesh;
 }
 
+/// What `read` makes of the file that a shape names.
+template <class Read>
+MeshData read_mesh(const Params& params, const Read& read) {
+    const std::string file = resolve_file(params);
+    try {
+        return read(file);
+    } catch (const UnreadableFile& e) {
+        params.fail("filename", e.what());
+    }
+}
+
 template <MeshData (*read)(const std::string&, const MeshOptions&)>
 std::unique_ptr<Shape> make_file_mesh(const Params& params, const Warn& warn,
                                       bool flip_by_default) {
-    return finish(read(resolve_file(params),
-                       {.flip_tex_coords = params.flag("flip_tex_coords", flip_by_default)}),
-                  params, warn);
+    const MeshOptions options{.flip_tex_coords = params.flag("flip_tex_coords", flip_by_default)};
+    return finish(read_mesh(params, [&](const std::string& f) { return read(f, options); }), params,
+                  warn);
 }
 
 std::unique_ptr<Shape> make_own_mesh(const Params& params, const Warn& warn) {
@@ -282,10 +294,12 @@ const std::vector<ShapeEntry>& shape_registry() {
          make_own_mesh},
         {{"shape", "serialized", "Compressed mesh of Mitsuba 0.6.", mesh_params("false")},
          [](const Params& p, const Warn& w) {
-             return finish(read_serialized(resolve_file(p),
-                                           int(p.integer("shape_index", 0, 0, 1 << 24)),
-                                           {.flip_tex_coords = p.flag("flip_tex_coords", false)}),
-                           p, w);
+             const int index = int(p.integer("shape_index", 0, 0, 1 << 24));
+             const MeshOptions options{.flip_tex_coords = p.flag("flip_tex_coords", false)};
+             return finish(
+                 read_mesh(
+                     p, [&](const std::string& f) { return read_serialized(f, index, options); }),
+                 p, w);
          }},
         {{"shape", "rectangle", "The square [-1, 1]² in the xy plane, normal +z.", with_common({})},
          make_rectangle},

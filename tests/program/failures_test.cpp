@@ -137,6 +137,57 @@ TEST_F(FailuresTest, FullDisksAreNamedAndKeepTheOldImage) {
     EXPECT_EQ(hidden_files(), 0u);
 }
 
+/// Messages name the file and the line of the scene that asks for it.
+TEST_F(FailuresTest, FilesThatCannotBeReadAreNamedWithTheirPlace) {
+    const fs::path own = folder.path() / "own.xml", pbrt = folder.path() / "own.pbrt";
+    for (const char* kind : {"obj", "ply", "serialized", "xml", "spd", "pbrt"})
+        fs::create_symlink("/proc/self/mem", folder.path() / (std::string("unreadable.") + kind));
+    for (const char* kind : {"obj", "png", "xml"})
+        fs::create_directory(folder.path() / (std::string("folder.") + kind));
+    const auto mesh = [](const std::string& type, const std::string& file) {
+        return fmt::format("<shape type=\"{}\">\n<string name=\"filename\" value=\"{}\"/></shape>",
+                           type, file);
+    };
+    const auto expect = [&](const fs::path& file, const std::string& text, int line,
+                            const std::string& name, const char* why) {
+        std::ofstream(file) << text;
+        const ProgramResult r = run({"info", file});
+        EXPECT_EQ(r.status, 1) << text;
+        EXPECT_TRUE(r.errors.starts_with(fmt::format("etendue: {}:{}: ", file.string(), line)))
+            << r.errors;
+        EXPECT_NE(r.errors.find(name), std::string::npos) << r.errors;
+        EXPECT_NE(r.errors.find(why), std::string::npos) << r.errors;
+        EXPECT_EQ(r.errors.find("did you mean"), std::string::npos) << r.errors;
+    };
+    const auto expect_in_xml = [&](const std::string& text, int line, const std::string& name,
+                                   const char* why) {
+        expect(own,
+               "<scene version=\"3.0.0\">\n<sensor type=\"perspective\"/>\n" + text + "</scene>",
+               line, name, why);
+    };
+    const char *const error = "Input/output error", *const is_folder = "it is a folder";
+    for (const char* type : {"obj", "ply"})
+        expect_in_xml(mesh(type, std::string("unreadable.") + type), 4,
+                      std::string("unreadable.") + type, error);
+    expect_in_xml("<include filename=\"unreadable.xml\"/>", 3, "unreadable.xml", error);
+    expect_in_xml("<shape type=\"sphere\"><bsdf type=\"diffuse\">\n"
+                  "<spectrum name=\"reflectance\" filename=\"unreadable.spd\"/></bsdf></shape>",
+                  4, "unreadable.spd", error);
+    expect(pbrt, "Camera \"perspective\"\nWorldBegin\nInclude \"unreadable.pbrt\"\n", 3,
+           "unreadable.pbrt", error);
+    expect(pbrt,
+           "Camera \"perspective\"\nWorldBegin\n"
+           "Shape \"plymesh\" \"string filename\" \"unreadable.ply\"\n",
+           3, "unreadable.ply", error);
+    expect_in_xml(mesh("obj", "folder.obj"), 4, "folder.obj", is_folder);
+    expect_in_xml("<include filename=\"folder.xml\"/>", 3, "folder.xml", is_folder);
+    expect_in_xml("<texture type=\"bitmap\" id=\"t\">\n"
+                  "<string name=\"filename\" value=\"folder.png\"/></texture>\n"
+                  "<shape type=\"sphere\"><bsdf type=\"diffuse\">"
+                  "<ref id=\"t\" name=\"reflectance\"/></bsdf></shape>",
+                  4, "folder.png", is_folder);
+}
+
 TEST_F(FailuresTest, AnImageWhoseFolderIsGoneIsWrittenElsewhere) {
     const fs::path place = folder.path() / "place", there = folder.path() / "there";
     fs::create_directory(there);
