@@ -145,6 +145,11 @@ void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
         working_.steps = groups_[g].steps;
     }
 
+    // Made before the pass, so that nothing can fail once it is finished.
+    if (groups_[g].chains.empty())
+        for (size_t i = spare_.size(); i < class_of_chain_.size(); ++i)
+            spare_.emplace_back(space_, class_of_chain_[i]);
+
     const size_t chains = working_.chains.size();
     const uint64_t steps =
         uint64_t(std::ceil(options_.mutations * double(pass.pixels) / double(chains)));
@@ -185,12 +190,11 @@ void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
     working_.steps += steps;
 }
 
-void ChainGroups::commit() {
+void ChainGroups::commit() noexcept {
     Group& group = groups_[working_group_];
-    if (group.chains.empty())
-        for (const int k : class_of_chain_) group.chains.emplace_back(space_, k);
+    if (group.chains.empty()) group.chains.swap(spare_);
     group.chains.swap(working_.chains);
-    group.normalisation = working_.normalisation;
+    group.normalisation.swap(working_.normalisation);
     group.steps = working_.steps;
     stats_ += working_stats_;
 }

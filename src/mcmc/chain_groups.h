@@ -51,7 +51,7 @@ public:
     using MakeSink = std::function<std::unique_ptr<StateSink>(
         uint64_t chain, int chain_class, const ChainContext& c, SplatSink& film)>;
     void advance(const PassContext& pass, const MakeSink& make_sink);
-    void commit();
+    void commit() noexcept;
 
     /// Everything that later passes depend on. load() throws std::runtime_error if the data belong to other chains.
     void save(LearnedState& to) const;
@@ -91,6 +91,7 @@ private:
     std::vector<int> class_of_chain_;
     std::vector<Group> groups_;
     Group working_;
+    std::vector<Chain> spare_;  ///< For the group of the pass, if it has none.
     size_t working_group_ = 0;
     ChainStats working_stats_, stats_;
     double own_scale_ = 1;

@@ -150,6 +150,30 @@ TEST(ChainGroups, APassThatIsNotCommittedLeavesNothing) {
     EXPECT_EQ(run(false), run(true));
 }
 
+/// A finished pass is in the film already, so that nothing may fail any more.
+TEST(ChainGroups, CommitAllocatesNoStates) {
+    class CountingSpace : public PrimarySpace {
+    public:
+        using PrimarySpace::PrimarySpace;
+        std::unique_ptr<ChainState> make_state() const override {
+            ++made;
+            return PrimarySpace::make_state();
+        }
+        mutable int made = 0;
+    };
+    ToyPasses toy;
+    const CountingSpace space(1, toy_sample, TargetMap(toy.geometry()));
+    ChainGroups groups(space, {.groups = 2, .chains = 4},
+                       {{.chains = 4, .pool = 64, .c = toy_b()}});
+    CellSums sums;
+    for (uint32_t i = 0; i < 4; ++i) {
+        groups.advance(toy.pass(i, 5, 100, sums));
+        const int before = space.made;
+        groups.commit();
+        EXPECT_EQ(space.made, before) << i;
+    }
+}
+
 TEST(SharedOut, ClassesThatThePilotDidNotSeeHaveChainsAndLargeSteps) {
     const std::vector<double> cost{3, 4, 5, 6};
     const std::vector<ClassPlan> plan = share_out(8, {5, 0, 3, 0}, cost, 4096, 256);
