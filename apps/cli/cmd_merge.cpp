@@ -33,7 +33,7 @@ struct MergeCommand {
         std::vector<CheckpointFile> parts;
         for (const std::string& file : files) parts.emplace_back(file);
         Merging merging(std::move(parts));
-        if (!techniques.empty() && merging.first().technique_depth() == 0)
+        if (!techniques.empty() && merging.first().header().technique_depth == 0)
             throw std::runtime_error(
                 fmt::format("--techniques: {} has no technique images; render with --techniques",
                             merging.first().name()));

@@ -172,7 +172,7 @@ void StudioCommand::watch(Session& session, const Api& api, const std::atomic<bo
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
         if (session.scene_version() != version) {
             version = session.scene_version();
-            for (const std::string& w : warnings_of(*session.scene(), integrator))
+            for (const std::string& w : warnings_of(*session.scene(), first_run.integrator))
                 message("warning: {}\n", w);
             if (const std::string problem = api.reference_problem(); !problem.empty())
                 message("warning: {}\n", problem);
