@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -32,6 +33,7 @@ constexpr bool kCanLimitMemory = true;
 /// Limits the memory of this process to what it has and so many bytes more, where that is possible.
 inline void limit_memory(uint64_t more) {
     if (!kCanLimitMemory) return;
+    malloc_trim(0);
     std::ifstream statm("/proc/self/statm");
     uint64_t pages = 0;
     statm >> pages;

@@ -160,7 +160,8 @@ TEST_F(SectionFileTest, ListsThatDoNotFitIntoMemoryAreNamed) {
     if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers need the address space";
     SectionWriter to(file);
     to.begin("list");
-    to.put(std::vector<double>(size_t(4) << 20));
+    const std::vector<double> written(size_t(4) << 20);  // not free while it is read
+    to.put(written);
     to.commit();
     EXPECT_EQ(in_limited_memory(uint64_t(8) << 20,
                                 [&] {
