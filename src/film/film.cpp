@@ -4,6 +4,17 @@
 #include "math/statistics.h"
 
 namespace etendue {
+namespace {
+
+/// luminance(), but without the rounding to float, which would be a variance between equal passes.
+template <class T>
+double exact_luminance(const T& channels) {
+    constexpr double kRed = luminance({1, 0, 0}), kGreen = luminance({0, 1, 0}),
+                     kBlue = luminance({0, 0, 1});
+    return kRed * double(channels[0]) + kGreen * double(channels[1]) + kBlue * double(channels[2]);
+}
+
+}  // namespace
 
 Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
            double typical_radiance, FilterMode mode)
@@ -11,7 +22,7 @@ Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
       spreads_(mode == FilterMode::Spread && filter.is_wide()),
       grid_(geometry, filter, {0.5f, 0.5f}), pass_(geometry_, filter_, typical_radiance),
       moments_(geometry.pixel_count()), expected_(geometry), expected_in_last_pass_(geometry),
-      previous_(geometry.pixel_count()) {}
+      previous_(geometry.pixel_count()), luminance_squares_(geometry.pixel_count()) {}
 
 void Film::begin_pass(uint64_t light_paths, Vec2 offset) {
     if (spreads_) grid_ = SampleGrid(geometry_, filter_, offset);
@@ -39,6 +50,7 @@ void ExpectedLuminance::average_blocks() {
 }
 
 void Film::set_groups(int count) {
+    luminance_squares_ = std::vector<double>();
     group_sums_.assign(size_t(count), std::vector<float>(geometry_.pixel_count()));
     group_passes_.assign(size_t(count), 0);
 }
@@ -86,11 +98,13 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
             luminance_sum[chunk] += y;
             expected[i] = m.luminance_sum() / float(passes_);
             total[chunk] += expected[i];
-            if (group)
+            if (group) {
                 group[i] +=
                     float((1 - splat_factor) * double(previous_[i]) + splat_factor * double(y));
-            else
+            } else {
                 previous_[i] = second ? previous_[i] - y : y;
+                luminance_squares_[i] += sqr(exact_luminance(v));
+            }
         }
     });
     double sum = 0, mean = 0;
@@ -209,6 +223,23 @@ size_t Film::noisy_pairs() const {
     return is_merged_ ? 0 : std::min<size_t>(pair_errors_.size() / 4, 8);
 }
 
+double Film::error2_of_pass() const {
+    const uint64_t pixels = moments_.size(), chunks = film_chunks(pixels);
+    const double n = double(passes_), mean = mean_luminance().mean;
+    std::vector<double> error_sum(chunks);
+    for_film_chunks(pixels, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+        for (uint64_t i = begin; i < end; ++i) {
+            const double y = exact_luminance(moments_[i].sum) / n;
+            const double scale2 = y * y + 0.01 * mean * mean;
+            const double variance = std::max(0.0, luminance_squares_[i] / n - y * y) * n / (n - 1);
+            if (scale2 > 0) error_sum[chunk] += variance / scale2;
+        }
+    });
+    double error2 = 0;
+    for (const double sum : error_sum) error2 += sum;
+    return error2 / double(pixels);
+}
+
 ErrorEstimate Film::error() const {
     if (has_groups()) return group_error();
     ErrorEstimate e;
@@ -223,11 +254,12 @@ ErrorEstimate Film::error() const {
     mean /= double(count);
     const double spread =
         std::sqrt(std::max(0.0, square / double(count) - mean * mean) / double(count - 1));
-    const double half = student_quantile(0.05, double(count - 1)) * spread;
-    const double n = double(passes_);
-    e.relative_rms = std::sqrt(mean / n);
-    e.low = std::sqrt(std::max(0.0, mean - half) / n);
-    e.high = std::sqrt((mean + half) / n);
+    const double relative_half =
+        mean > 0 ? student_quantile(0.05, double(count - 1)) * spread / mean : 0.0;
+    const double error2 = (is_merged_ ? error2_of_pass() : mean) / double(passes_);
+    e.relative_rms = std::sqrt(error2);
+    e.low = std::sqrt(error2 * std::max(0.0, 1 - relative_half));
+    e.high = std::sqrt(error2 * (1 + relative_half));
     e.valid = true;
     return e;
 }

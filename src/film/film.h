@@ -38,7 +38,7 @@ public:
     /// Memory of a film, by pixel, at most, without the samples of a grid's margin. `groups`: see set_groups().
     static uint64_t bytes_per_pixel(bool has_splats, int groups) {
         return sizeof(Moments) + 3 * sizeof(Rgb) + (3 + uint64_t(groups)) * sizeof(float) +
-               (has_splats ? 3 * sizeof(int64_t) : 0);
+               (groups > 0 ? 0 : sizeof(double)) + (has_splats ? 3 * sizeof(int64_t) : 0);
     }
 
     const FilmGeometry& geometry() const { return geometry_; }
@@ -113,7 +113,8 @@ public:
     std::vector<Rgb> image() const;
     /// Variance of that mean, per pixel and channel; zero with fewer than two passes.
     std::vector<Rgb> variance() const;
-    /// Reads the sums of all groups if there are any, and otherwise only one number for each pair of passes.
+    /// Reads the sums of all groups if there are any; otherwise only one number for each pair of passes, and, of a sum of
+    /// films, the moments.
     ErrorEstimate error() const;
     bool has_groups() const { return !group_sums_.empty(); }
     int groups() const { return int(group_sums_.size()); }
@@ -154,8 +155,10 @@ private:
     /// Squared error of the mean luminance of a pixel, estimated from the groups 2·pair and 2·pair + 1.
     double group_error2(size_t pair, size_t pixel) const;
     ErrorEstimate group_error() const;
+    /// Relative squared error of one pass, from the moments of all passes.
+    double error2_of_pass() const;
     /// Number of pairs of passes at the beginning whose errors are relative to a mean that was still noisy. They are left
-    /// out when there are others.
+    /// out when there are others. In short films all are like that, so that a sum of films uses only how they differ.
     size_t noisy_pairs() const;
     void fold(std::span<const Rgb> pass, double splat_factor);
 
@@ -176,6 +179,8 @@ private:
     std::vector<uint64_t> group_passes_;
     uint64_t passes_ = 0, rejected_ = 0;
     bool is_merged_ = false;  ///< Whether it is a sum of several films.
+    /// Sums of squared luminance, by pixel, from which such a sum gets its error. Empty with groups.
+    std::vector<double> luminance_squares_;
 };
 
 template <class Use>

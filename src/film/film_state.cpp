@@ -29,6 +29,7 @@ void Film::save(SectionWriter& to) const {
     to.put(pair_errors_);
     to.put(group_passes_);
     for (const std::vector<float>& sums : group_sums_) to.put(sums);
+    to.put(luminance_squares_);
     // A sum of films needs nothing for later passes.
     if (is_merged_) return;
     to.put(expected_.pixels_);
@@ -58,6 +59,7 @@ void Film::load(SectionReader& from) {
     group_sums_.clear();
     for (size_t g = 0; g < group_passes_.size(); ++g)
         from.get(group_sums_.emplace_back(), pixels, "pixels of a group");
+    from.get(luminance_squares_, has_groups() ? 0 : pixels, "squares of pixels");
     if (!is_merged_) {
         from.get(expected_.pixels_, pixels, "pixels");
         expected_.blocks_.clear();
@@ -76,6 +78,7 @@ void Film::merge(const Film& other) {
                 moments_[i].sum[c] += other.moments_[i].sum[c];
                 moments_[i].square[c] += other.moments_[i].square[c];
             }
+            if (!has_groups()) luminance_squares_[i] += other.luminance_squares_[i];
             for (size_t g = 0; g < group_sums_.size(); ++g)
                 group_sums_[g][i] += other.group_sums_[g][i];
         }

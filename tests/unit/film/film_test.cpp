@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -162,6 +163,59 @@ TEST(Film, ErrorIsThatOfTheMean) {
     EXPECT_GT(film.error().high, film.error().relative_rms);
 }
 
+/// The images of short parts are noisy, and more so where a pair is bright: an error that is relative to them is too
+/// small. The channels are independent, so that the variance of the luminance is not that of any channel.
+TEST(Film, ErrorOfASumOfShortPartsIsThatOfTheMean) {
+    constexpr int kSums = 50, kParts = 8, kPasses = 16;
+    const double variance =
+        4 * (sqr(double(luminance({1, 0, 0}))) + sqr(double(luminance({0, 1, 0}))) +
+             sqr(double(luminance({0, 0, 1}))));
+    const double expected = std::sqrt(variance / (kParts * kPasses) / 1.01);
+    constexpr FilmGeometry kSize{10, 10, 0, 0, 10, 10};
+    std::mt19937 random(7);
+    std::gamma_distribution<float> value(0.25f, 4);  // mean 1, variance 4
+    Moments relative;
+    int covered = 0;
+    for (int s = 0; s < kSums; ++s) {
+        std::unique_ptr<Film> sum;
+        for (int p = 0; p < kParts; ++p) {
+            auto part = std::make_unique<Film>(kSize, ReconstructionFilter::box());
+            for (int pass = 0; pass < kPasses; ++pass) {
+                part->begin_pass(0);
+                for (uint64_t i = 0; i < kSize.pixel_count(); ++i)
+                    part->add_eye(i, {value(random), value(random), value(random)});
+                part->end_pass();
+            }
+            if (sum)
+                sum->merge(*part);
+            else
+                sum = std::move(part);
+        }
+        const ErrorEstimate e = sum->error();
+        ASSERT_TRUE(e.valid);
+        relative.add(e.relative_rms);
+        covered += e.low <= expected && expected <= e.high;
+        EXPECT_LT(e.high - e.low, 0.2 * expected);
+    }
+    // Noise of I² in the sum takes 1.6 % away.
+    EXPECT_NEAR(relative.mean() / expected, 1, 0.03);
+    EXPECT_GE(covered, kSums * 7 / 10) << "of " << kSums;
+}
+
+TEST(Film, ASumOfEqualPassesHasNoError) {
+    Film sum(kGeometry, ReconstructionFilter::box()), part(kGeometry, ReconstructionFilter::box());
+    for (Film* film : {&sum, &part})
+        for (int pass = 0; pass < 12; ++pass) {
+            film->begin_pass(0);
+            for (uint64_t i = 0; i < kGeometry.pixel_count(); ++i)
+                film->add_eye(i, {0.3f, 0.1f * float(i), 0.7f});
+            film->end_pass();
+        }
+    sum.merge(part);
+    ASSERT_TRUE(sum.error().valid);
+    EXPECT_LT(sum.error().high, 1e-7);
+}
+
 /// Passes of a group share what they have: more of them make the image no better.
 TEST(Film, ErrorIsThatOfGroups) {
     constexpr int kGroups = 16, kPasses = 40, kFilms = 30;
@@ -255,21 +309,26 @@ TEST(Film, BlackPassesHaveNoError) {
 
 /// A square of luminances would leave the range of a float.
 TEST(Film, ErrorDoesNotDependOnTheUnitOfRadiance) {
-    double expected = 0;
-    for (const float unit : {1.0f, 0x1p-70f, 0x1p70f}) {
-        Film film(kGeometry, ReconstructionFilter::box(), unit);
+    const auto errors = [](float unit) {
+        Film film(kGeometry, ReconstructionFilter::box(), unit),
+            part(kGeometry, ReconstructionFilter::box(), unit);
         std::mt19937 random(6);
         std::exponential_distribution<float> value(1);
-        for (int pass = 0; pass < 12; ++pass) {
-            film.begin_pass(0);
-            for (uint64_t i = 0; i < kGeometry.pixel_count(); ++i)
-                film.add_eye(i, Rgb(value(random) * unit));
-            film.end_pass();
-        }
-        if (unit == 1) expected = film.error().relative_rms;
-        EXPECT_GT(expected, 0);
-        EXPECT_EQ(film.error().relative_rms, expected) << unit;
-    }
+        for (Film* f : {&film, &part})
+            for (int pass = 0; pass < 12; ++pass) {
+                f->begin_pass(0);
+                for (uint64_t i = 0; i < kGeometry.pixel_count(); ++i)
+                    f->add_eye(i, Rgb(value(random) * unit));
+                f->end_pass();
+            }
+        const double alone = film.error().relative_rms;
+        film.merge(part);
+        return std::pair(alone, film.error().relative_rms);
+    };
+    const auto expected = errors(1);
+    EXPECT_GT(expected.first, 0);
+    EXPECT_GT(expected.second, 0);
+    for (const float unit : {0x1p-70f, 0x1p70f}) EXPECT_EQ(errors(unit), expected) << unit;
 }
 
 TEST(Film, SplatsAreMeansOverTheLightPaths) {
