@@ -10,11 +10,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A path without links, also of a file that is still to be made.
+/// A path without links, also of a file that is still to be made, and through links to it.
 fs::path real_path(const std::string& file) {
+    constexpr int kMostLinks = 40;  // as the kernel
     std::error_code error;
-    const fs::path path = fs::weakly_canonical(fs::absolute(file, error), error);
-    return error ? fs::path(file) : path;
+    fs::path path = fs::absolute(file, error);
+    for (int i = 0; i < kMostLinks && fs::is_symlink(fs::symlink_status(path, error)); ++i)
+        path = path.parent_path() / fs::read_symlink(path, error);
+    const fs::path real = fs::weakly_canonical(path, error);
+    return error ? fs::path(file) : real;
 }
 
 }  // namespace
