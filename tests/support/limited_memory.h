@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <malloc.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -30,15 +29,23 @@ constexpr bool kCanLimitMemory = true;
 #endif
 #undef ETENDUE_HAS_FEATURE
 
-/// Limits the memory of this process to what it has and so many bytes more, where that is possible.
+/// Limits the memory of this process to what it has and so many bytes more, where that is possible. What is free in the heap
+/// would come on top, and is taken away.
 inline void limit_memory(uint64_t more) {
     if (!kCanLimitMemory) return;
-    malloc_trim(0);
     std::ifstream statm("/proc/self/statm");
     uint64_t pages = 0;
     statm >> pages;
-    const uint64_t most = pages * uint64_t(sysconf(_SC_PAGESIZE)) + more;
-    const rlimit limit{most, most};
+    const uint64_t now = pages * uint64_t(sysconf(_SC_PAGESIZE));
+    rlimit limit{now, now + more};
+    setrlimit(RLIMIT_AS, &limit);
+    void* volatile taken = nullptr;
+    for (size_t size = size_t(1) << 30; size >= size_t(1) << 16; size /= 2) {
+        do {
+            taken = std::malloc(size);
+        } while (taken);
+    }
+    limit.rlim_cur = limit.rlim_max;
     setrlimit(RLIMIT_AS, &limit);
 }
 

@@ -394,8 +394,9 @@ TEST(Merge, OfRangesOfAMethodWithIndependentPassesIsOneRendering) {
 TEST(Merge, RangesOfMethodsThatLearnHaveOtherNumbers) {
     const Scene scene = build(mixed_room(lens_camera(16)));
     const Renderings renderings(scene);
-    for (const char* method : {"upg+bdpt", "vcm", "mlt:groups=4,chains=48", "pcbpt", "sppm", "ppm",
-                               "upg+pssmlt:groups=2,chains=16", "bdpt", "path:guide=on,guide_walks=4000"}) {
+    for (const char* method :
+         {"upg+bdpt", "vcm", "mlt:groups=4,chains=48", "pcbpt", "sppm", "ppm",
+          "upg+pssmlt:groups=2,chains=16", "bdpt", "path:guide=on,guide_walks=4000"}) {
         RenderSettings settings = settings_of(method);
         renderings.render("a", settings, 1);
         settings.first_pass = 1;
