@@ -170,10 +170,10 @@ TEST(PlainMitsuba, FilmsAndIntegrators) {
 TEST(PlainMitsuba, EveryIntegratorBecomesOneOfMitsuba) {
     for (const char* type :
          {"vcm", "upg+bdpt", "mmlt", "light", "ptracer", "sppm", "no_such", "aov"}) {
-        SceneDescription scene =
-            parsed("<integrator type=\"" + std::string(type) +
-                  "\"><integer name=\"max_depth\" value=\"7\"/><float name=\"radius\" value=\"1\"/>"
-                  "<boolean name=\"merges\" value=\"false\"/></integrator>");
+        SceneDescription scene = parsed(
+            "<integrator type=\"" + std::string(type) +
+            "\"><integer name=\"max_depth\" value=\"7\"/><float name=\"radius\" value=\"1\"/>"
+            "<boolean name=\"merges\" value=\"false\"/></integrator>");
         make_plain_mitsuba(scene);
         const SceneObject& integrator = only(scene, "integrator");
         EXPECT_EQ(integrator.type, "path") << type;
