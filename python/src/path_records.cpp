@@ -4,6 +4,7 @@
 
 #include <nanobind/stl/string.h>
 
+#include "pathspace/path_pdfs.h"
 #include "render/render_request.h"
 #include "render/renderer.h"
 #include "sub_paths.h"
