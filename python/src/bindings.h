@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/shared_ptr.h>  // of scenes
 #include <nanobind/ndarray.h>
 
 #include "description/scene_description.h"

@@ -128,7 +128,7 @@ def test_all_ways_to_ask_for_a_rendering_take_the_same_names(program: str, scene
     def by_python(given: dict[str, str]) -> object:
         file = tmp_path / "python.etd"
         try:
-            et.render(scene, spp=1, **given).save_checkpoint(file)  # type: ignore[arg-type]
+            et.render(scene, spp=1, **given).save(file)  # type: ignore[arg-type]
         except ValueError as refusal:
             return str(refusal)
         return of_checkpoint(file)
@@ -311,7 +311,6 @@ def test_renderings_in_several_threads(cornell: et.Scene) -> None:
 CHILD = """
     import sys, time
     import etendue as et
-from etendue import _etendue
     d = et.load({scene!r})
     scene = d.build(resolution={size})
     print("ready", flush=True)
