@@ -9,8 +9,8 @@
 #include <vector>
 
 #include <nanobind/nanobind.h>
-#include <nanobind/stl/shared_ptr.h>  // of scenes
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/shared_ptr.h>  // of scenes
 
 #include "description/scene_description.h"
 #include "film/film.h"
