@@ -4,8 +4,8 @@
     python examples/dask_cluster.py scenes/glass-caustic.xml bdpt 8
 
 A LocalCluster of two processes stands for the cluster here. Client("scheduler:8786") uses another, whose workers need the
-package, the scene's files, and client.upload_file("examples/cluster_task.py"). The sum does not depend on which worker was faster. If a worker is lost, Dask runs its task
-again, and the result has the same bits.
+package, the scene's files, and client.upload_file("examples/cluster_task.py"). The sum does not depend on which worker was
+faster. If a worker is lost, Dask runs its task again, and the result has the same bits.
 """
 
 import sys
