@@ -87,6 +87,7 @@ public:
         whole_->learn(pass);
         paths_.learn(pass);
     }
+    void prepare(const PassContext& pass) override { whole_->prepare(pass); }
     void save(LearnedState&) const override {}
     void load(LearnedState&) override {}
     std::unique_ptr<PassSums> make_sums() const override { return whole_->make_sums(); }

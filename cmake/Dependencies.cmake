@@ -10,6 +10,9 @@ find_package(Boost REQUIRED)  # Boost.Math, header only
 find_package(OpenEXR REQUIRED)
 find_package(PNG REQUIRED)
 find_package(JPEG REQUIRED)
+if(ETENDUE_MPI)
+    find_package(MPI REQUIRED COMPONENTS CXX)
+endif()
 find_path(XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
 find_path(STB_INCLUDE_DIR stb_image.h PATH_SUFFIXES stb REQUIRED)
 

@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -32,6 +33,7 @@
 #include "scene_options.h"
 #include "system/available_memory.h"
 #include "system/output_file.h"
+#include "system/ranks.h"
 #include "technique_files.h"
 
 namespace etendue {
@@ -50,6 +52,18 @@ struct RenderCommand {
     void run() const;
 
 private:
+    /// What is to be rendered, and its state.
+    struct Job {
+        Scene scene;
+        uint64_t fingerprint = 0;
+        RenderSettings settings{};
+        std::unique_ptr<Renderer> renderer{};
+        Conditions conditions{};
+        PassLog log{};
+        std::vector<AovImage> layers{};  ///< Of the image, beside those of the renderer.
+    };
+    std::unique_ptr<Job> make_job(const Ranks& ranks) const;
+    void render(Job& job, const Ranks& ranks) const;
     RenderSettings settings_for(const Scene& scene) const;
     /// First and number of the passes of --passes; the number is 0 if they are not given.
     std::pair<uint64_t, uint64_t> pass_range() const;
@@ -84,9 +98,9 @@ private:
 class Timer {
 public:
     explicit Timer(double interval, double most = 1) : interval_(interval), most_(most) {}
+    bool is_due() const { return interval_ > 0 && seconds_since(last_) >= wait_; }
     template <class Task>
-    void call_if_due(const Task& task) {
-        if (interval_ <= 0 || seconds_since(last_) < wait_) return;
+    void call(const Task& task) {
         const Clock::time_point begin = Clock::now();
         task();
         last_ = Clock::now();
@@ -282,79 +296,141 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
     return failures;
 }
 
-void RenderCommand::run() const {
+/// Calls `task` in all processes. If it fails in one of them, it fails in all.
+template <class Task>
+auto together(const Ranks& ranks, const Task& task) {
+    if (ranks.count() == 1) return task();
+    decltype(task()) result{};
+    std::vector<std::string> failures;
+    attempt(failures, [&] { result = task(); });
+    failures = ranks.gather(failures.empty() ? "" : failures.front());
+    for (size_t r = 0; r < failures.size(); ++r)
+        if (!failures[r].empty())
+            throw std::runtime_error(r == 0 ? failures[r]
+                                            : fmt::format("process {}: {}", r, failures[r]));
+    return result;
+}
+
+/// Throws unless all processes make passes with the same bits.
+void check_conditions(const Conditions& conditions, const Ranks& ranks) {
+    const std::vector<std::string> all = ranks.gather(nlohmann::json(conditions).dump());
+    for (size_t r = 1; r < all.size(); ++r) {
+        if (all[r] == all[0]) continue;
+        std::vector<std::string> differences;
+        const auto first = nlohmann::json::parse(all[0]), other = nlohmann::json::parse(all[r]);
+        for (size_t i = 0; i < std::min(first.size(), other.size()); ++i)
+            if (first[i] != other[i])
+                differences.push_back(fmt::format("{}: {} and {}", first[i][0].get<std::string>(),
+                                                  first[i][1].dump(), other[i][1].dump()));
+        throw std::runtime_error(
+            fmt::format("processes 0 and {} cannot render one image together; {}", r,
+                        fmt::join(differences, "; ")));
+    }
+}
+
+/// What several processes say is said by the first one.
+void print_nothing() {
+    if (const int nothing = ::open("/dev/null", O_WRONLY | O_CLOEXEC); nothing >= 0)
+        ::dup2(nothing, STDERR_FILENO);
+}
+
+std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) const {
     check_options();
+    const bool is_first = ranks.index() == 0;
+    if (ranks.count() > 1 && !preview.empty())
+        throw std::runtime_error("--preview shows the image of one process, not of several");
     SceneOptions loading = scene;
     loading.threads = request.threads;
     check_replaced_checkpoint();
     std::optional<CheckpointFile> earlier = earlier_checkpoint();
-    const std::string& saved = checkpoint_file();
+    const bool needs_conditions = !checkpoint_file().empty() || ranks.count() > 1;
     uint64_t fingerprint = 0;
-    const Scene s = [&] {
+    std::unique_ptr<Job> job(new Job{[&] {
         const SceneDescription description = read_scene(loading);
-        if (!saved.empty()) fingerprint = scene_fingerprint(description);
+        if (needs_conditions) fingerprint = scene_fingerprint(description);
         return build_scene(description, loading);
-    }();
+    }()});
+    const Scene& s = job->scene;
     print_warnings(warnings_of(s, request.integrator));
-    const RenderSettings settings = settings_for(s);
-    if (settings.technique_depth > 0 && !quiet)
+    job->settings = settings_for(s);
+    job->settings.ranks = &ranks;
+    if (job->settings.technique_depth > 0 && !quiet)
         message("technique images of paths up to {} edges: {:.0f} MiB\n", technique_depth,
                 double(TechniqueImages::memory_bytes(s.film().pixel_count(), technique_depth)) /
                     (1 << 20));
-    const std::unique_ptr<Renderer> owned = make_renderer(s, settings);
-    Renderer& renderer = *owned;
+    job->renderer = make_renderer(s, job->settings);
+    Renderer& renderer = *job->renderer;
     print_warnings(
-        memory_warnings(s, settings.integrator, renderer.light_paths(), available_memory()));
-    check_outputs();
-    PassLog log;
-    Conditions conditions;
-    if (!saved.empty())
-        conditions =
-            conditions_of(renderer, s, {fingerprint, scene.lenient, scene.watertight}, settings);
+        memory_warnings(s, job->settings.integrator, renderer.light_paths(), available_memory()));
+    if (is_first) check_outputs();
+    if (needs_conditions)
+        job->conditions = conditions_of(renderer, s, {fingerprint, scene.lenient, scene.watertight},
+                                        job->settings);
     if (earlier) {
-        earlier->resume(renderer, conditions, log);
+        earlier->resume(renderer, job->conditions, job->log);
         if (!quiet)
             message("{}: resumed after {} passes, {}\n", earlier->name(), renderer.film().passes(),
                     format_seconds(renderer.seconds()));
-        earlier.reset();
     }
     // Before the passes, so that nothing that can fail stands between them and their image.
-    const std::vector<AovImage> layers =
-        render_aovs(s, aovs, kAovSamples, settings.seed, settings.threads);
+    if (is_first)
+        job->layers = render_aovs(s, aovs, kAovSamples, job->settings.seed, job->settings.threads);
+    return job;
+}
 
+void RenderCommand::run() const {
+    const std::unique_ptr<const Ranks> ranks = join_ranks();
+    if (ranks->index() > 0) print_nothing();
+    const std::unique_ptr<Job> job = together(*ranks, [&] { return make_job(*ranks); });
+    check_conditions(job->conditions, *ranks);
+    render(*job, *ranks);
+}
+
+void RenderCommand::render(Job& job, const Ranks& ranks) const {
+    const Scene& s = job.scene;
+    Renderer& renderer = *job.renderer;
+    PassLog& log = job.log;
+    const bool is_first = ranks.index() == 0;
     const Interrupts interrupts = catch_interrupts(grace);
+    if (ranks.count() > 1) catch_signal_of_mpirun();
     std::unique_ptr<Preview> viewer;
     if (!preview.empty())
         viewer =
             std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
 
-    const auto save = [&] { write_checkpoint(saved, renderer, s, conditions, settings, log); };
+    const std::string& saved = checkpoint_file();
+    const auto save = [&] {
+        write_checkpoint(saved, renderer, s, job.conditions, job.settings, log);
+    };
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
     constexpr double kMostForImages = 0.01;
     Timer checkpoints(saved.empty() ? 0 : checkpoint_every),
         images(is_in_place() ? 0 : write_every, kMostForImages);
-    // What fails now may succeed later, and is no reason to end.
-    const auto try_to = [&](const auto& task) {
-        std::vector<std::string> problems;
-        attempt(problems, task);
-        print_warnings(problems);
+    // All processes gather what the first one writes. What fails now may succeed later, and is no reason to end.
+    const auto write_if_due = [&](Timer& timer, bool may_be, const auto& task) {
+        if (!ranks.of_first(may_be && timer.is_due())) return;
+        timer.call([&] {
+            renderer.gather();
+            std::vector<std::string> problems;
+            if (is_first) attempt(problems, task);
+            print_warnings(problems);
+        });
     };
     std::string stopped_by, failure;
     try {
-        ProgressLine line(quiet);
+        ProgressLine line(quiet || !is_first);
         stopped_by = to_string(renderer.run(
             [&](const Progress& p) {
                 line.show(p);
                 log.add(p.seconds, renderer.stats().pairs);
                 if (viewer && !viewer->update(renderer.film(), p.seconds)) viewer.reset();
-                if (interrupts.stop || p.fraction.value_or(0) >= 1) return;
-                checkpoints.call_if_due([&] { try_to(save); });
-                images.call_if_due([&] {
-                    try_to([&] {
-                        write_image(output, image_with_layers(
-                                                renderer.film(), layers, has_variance,
-                                                to_json(renderer, s, settings, "unfinished", log)));
-                    });
+                const bool goes_on = !interrupts.stop && p.fraction.value_or(0) < 1;
+                if (!p.ends_round) return;
+                write_if_due(checkpoints, goes_on, save);
+                write_if_due(images, goes_on, [&] {
+                    write_image(output, image_with_layers(
+                                            renderer.film(), job.layers, has_variance,
+                                            to_json(renderer, s, job.settings, "unfinished", log)));
                 });
             },
             interrupts.stop, interrupts.drop));
@@ -366,13 +442,16 @@ void RenderCommand::run() const {
     }
     const uint64_t passes = renderer.film().passes();
     if (passes == 0) throw std::runtime_error("interrupted in the first pass: nothing was written");
+    renderer.gather();
+    if (!is_first) return;
 
     const ErrorEstimate e = renderer.error();
-    nlohmann::json report = to_json(renderer, s, settings, stopped_by, log, &e);
+    nlohmann::json report = to_json(renderer, s, job.settings, stopped_by, log, &e);
     if (!failure.empty()) report["failure"] = failure;
     std::vector<std::string> failures;
     if (!saved.empty()) attempt(failures, save);
-    for (std::string& f : write_outputs(renderer, layers, report)) failures.push_back(std::move(f));
+    for (std::string& f : write_outputs(renderer, job.layers, report))
+        failures.push_back(std::move(f));
 
     print_warnings(warnings(renderer.stats()));
     if (!failure.empty())

@@ -78,4 +78,8 @@ Interrupts catch_interrupts(unsigned grace) {
     return {catch_interrupts(), drop};
 }
 
+void catch_signal_of_mpirun() {
+    std::signal(SIGUSR1, on_interrupt);
+}
+
 }  // namespace etendue

@@ -21,16 +21,27 @@ Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
     : geometry_(geometry), filter_(filter),
       spreads_(mode == FilterMode::Spread && filter.is_wide()),
       grid_(geometry, filter, {0.5f, 0.5f}), pass_(geometry_, filter_, typical_radiance),
-      moments_(geometry.pixel_count()), expected_(geometry), expected_in_last_pass_(geometry),
-      previous_(geometry.pixel_count()), luminance_squares_(geometry.pixel_count()) {}
+      moments_(geometry.pixel_count()), expected_(geometry), previous_(geometry.pixel_count()),
+      luminance_squares_(geometry.pixel_count()) {
+    set_ranks(kAlone);
+}
+
+void Film::set_ranks(const Ranks& ranks) {
+    const uint64_t pixels = geometry_.pixel_count(), chunks = film_chunks(pixels),
+                   count = uint64_t(ranks.count());
+    ranks_ = &ranks;
+    chunk_begins_.clear(), pixel_begins_.clear();
+    for (uint64_t r = 0; r <= count; ++r) {
+        chunk_begins_.push_back(chunks * r / count);
+        pixel_begins_.push_back(std::min(pixels, chunk_begins_.back() * kFilmChunk));
+    }
+    if (count > 1) exchanged_.resize(size_t(count * (own_end() - own_begin())));
+}
 
 void Film::begin_pass(uint64_t light_paths, Vec2 offset) {
     if (spreads_) grid_ = SampleGrid(geometry_, filter_, offset);
     pass_.begin(light_paths, spreads_ ? &grid_ : nullptr);
-    if (!pass_.has_splats()) return;
-    // This also allocates the blocks of the second one, into which the pass is folded.
-    for (ExpectedLuminance* e : {&expected_, &expected_in_last_pass_})
-        if (e->blocks_.empty()) e->average_blocks();
+    if (pass_.has_splats() && expected_.blocks_.empty()) expected_.average_blocks();
 }
 
 void ExpectedLuminance::average_blocks() {
@@ -67,14 +78,50 @@ void Film::end_pass(double splat_factor) {
     pass_.clear();
 }
 
+void Film::finish_pass() {
+    pass_.finish_eye();
+    pass_.finish();
+}
+
+void Film::exchange(int passes) {
+    ranks_->distribute(pass_.pixels().data(), passes, sizeof(Rgb), pixel_begins_,
+                       exchanged_.data());
+    pass_.clear();
+}
+
+void Film::add_pass(int rank, uint64_t rejected) {
+    const size_t own = size_t(own_end() - own_begin());
+    fold(std::span(exchanged_).subspan(size_t(rank) * own, own), 1);
+    rejected_ += rejected;
+}
+
+void Film::complete() {
+    ranks_->share(moments_.data(), sizeof(Moments), pixel_begins_);
+    ranks_->share(previous_.data(), sizeof(float), pixel_begins_);
+    ranks_->share(luminance_squares_.data(), sizeof(double), pixel_begins_);
+}
+
 void Film::keep_luminance(std::span<const Rgb> eye) {
     for_film_chunks(eye.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) previous_[i] = luminance(eye[i]);
     });
 }
 
+template <class Body>
+void Film::for_own_chunks(const Body& body) const {
+    const auto rank = size_t(ranks_->index());
+    for_film_chunks(geometry_.pixel_count(), chunk_begins_[rank], chunk_begins_[rank + 1], body);
+}
+
+double Film::sum_of_chunks(std::vector<double>& sums) const {
+    ranks_->share(sums.data(), sizeof(double), chunk_begins_);
+    double sum = 0;
+    for (const double s : sums) sum += s;
+    return sum;
+}
+
 void Film::fold(std::span<const Rgb> pass, double splat_factor) {
-    const uint64_t n = geometry_.pixel_count(), chunks = film_chunks(n);
+    const uint64_t n = geometry_.pixel_count(), chunks = film_chunks(n), first = own_begin();
     const bool second = !has_groups() && passes_ % 2 == 1;
     const size_t g = has_groups() ? passes_ % group_sums_.size() : 0;
     float* const group = has_groups() ? group_sums_[g].data() : nullptr;
@@ -84,11 +131,10 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
         if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);
     ++passes_;
     if (group) ++group_passes_[g];
-    std::swap(expected_, expected_in_last_pass_);
-    std::vector<float>& expected = expected_.pixels_;
-    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    const auto mean_of = [&](uint64_t i) { return moments_[i].luminance_sum() / float(passes_); };
+    for_own_chunks([&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
-            const Rgb v = pass[i];
+            const Rgb v = pass[i - first];
             Moments& m = moments_[i];
             for (int c = 0; c < 3; ++c) {
                 m.sum[c] += v[c];
@@ -96,8 +142,7 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
             }
             const float y = luminance(v);
             luminance_sum[chunk] += y;
-            expected[i] = m.luminance_sum() / float(passes_);
-            total[chunk] += expected[i];
+            if (second) total[chunk] += double(mean_of(i));
             if (group) {
                 group[i] +=
                     float((1 - splat_factor) * double(previous_[i]) + splat_factor * double(y));
@@ -107,24 +152,39 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
             }
         }
     });
-    double sum = 0, mean = 0;
-    for (uint64_t c = 0; c < chunks; ++c) sum += luminance_sum[c], mean += total[c];
-    pass_means_.push_back(sum / double(n));
-    mean /= double(n);
-    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    pass_means_.push_back(sum_of_chunks(luminance_sum) / double(n));
+    if (!second) return;
+    const double mean = sum_of_chunks(total) / double(n);
+    for_own_chunks([&](uint64_t chunk, uint64_t begin, uint64_t end) {
         for (uint64_t i = begin; i < end; ++i) {
             // Half the squared difference of two passes estimates the variance of one pass, even if its samples are
             // correlated.
-            const double scale2 = sqr(double(expected[i])) + 0.01 * mean * mean;
-            if (second && scale2 > 0) pair_sum[chunk] += 0.5 * sqr(double(previous_[i])) / scale2;
-            expected[i] = std::max(expected[i], float(0.1 * mean));
+            const double scale2 = sqr(double(mean_of(i))) + 0.01 * mean * mean;
+            if (scale2 > 0) pair_sum[chunk] += 0.5 * sqr(double(previous_[i])) / scale2;
         }
     });
-    if (pass_.has_splats()) expected_.average_blocks();
-    if (!second) return;
-    double pair = 0;
-    for (double p : pair_sum) pair += p;
-    pair_errors_.push_back(pair / double(n));
+    pair_errors_.push_back(sum_of_chunks(pair_sum) / double(n));
+}
+
+void Film::renew_expected() {
+    if (passes_ == 0) return;
+    const uint64_t n = geometry_.pixel_count();
+    std::vector<double> total(film_chunks(n));
+    std::vector<float>& expected = expected_.pixels_;
+    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+        for (uint64_t i = begin; i < end; ++i) {
+            expected[i] = moments_[i].luminance_sum() / float(passes_);
+            total[chunk] += double(expected[i]);
+        }
+    });
+    double mean = 0;
+    for (const double t : total) mean += t;
+    mean /= double(n);
+    for_film_chunks(n, [&](uint64_t, uint64_t begin, uint64_t end) {
+        for (uint64_t i = begin; i < end; ++i)
+            expected[i] = std::max(expected[i], float(0.1 * mean));
+    });
+    expected_.average_blocks();
 }
 
 std::vector<Rgb> Film::image() const {

@@ -9,6 +9,7 @@
 #include "color/rgb.h"
 #include "film/expected_luminance.h"
 #include "film/pass_image.h"
+#include "system/ranks.h"
 
 namespace etendue {
 
@@ -37,7 +38,7 @@ public:
 
     /// Memory of a film, by pixel, at most, without the samples of a grid's margin. `groups`: see set_groups().
     static uint64_t bytes_per_pixel(bool has_splats, int groups) {
-        return sizeof(Moments) + 3 * sizeof(Rgb) + (3 + uint64_t(groups)) * sizeof(float) +
+        return sizeof(Moments) + 3 * sizeof(Rgb) + (2 + uint64_t(groups)) * sizeof(float) +
                (groups > 0 ? 0 : sizeof(double)) + (has_splats ? 3 * sizeof(int64_t) : 0);
     }
 
@@ -79,6 +80,9 @@ public:
     /// and groups are independent. error(), variance() and the error of the mean are then computed from groups, and are
     /// unknown until every group has had a pass. `count` must be even. To be called before the first pass.
     void set_groups(int count);
+    /// Declares that several processes render the image, all of which have such a film. Each of them adds up a part of the
+    /// pixels. The film must have no groups. To be called before the first pass.
+    void set_ranks(const Ranks& ranks);
 
     // -- The current pass.
 
@@ -98,13 +102,24 @@ public:
     /// Discards the pass; the totals are unchanged.
     void drop_pass() { pass_.clear(); }
 
+    // -- The same with several processes, each of which makes another pass.
+
+    /// Ends the pass that this process has made; its image is kept.
+    void finish_pass();
+    /// Values of the finished pass that were not finite and were left out.
+    uint64_t rejected_in_pass() const { return pass_.rejected(); }
+    /// Exchanges the images of the finished passes of the first `passes` processes, and discards the pass of this one.
+    void exchange(int passes);
+    /// Adds the pass of process `rank` to the totals, of which it has `rejected` values; after exchange().
+    void add_pass(int rank, uint64_t rejected);
+    /// Makes totals complete, of which each process has a part.
+    void complete();
+
     // -- Totals of the finished passes; they do not include the current pass.
 
     uint64_t passes() const { return passes_; }
-    /// What samples of the next pass know of the earlier ones.
+    /// What samples know of the passes that were finished at the last call of renew_expected().
     const ExpectedLuminance& expected() const { return expected_; }
-    /// What samples of the last finished pass knew.
-    const ExpectedLuminance& expected_in_last_pass() const { return expected_in_last_pass_; }
     /// The pixel of a sample; the nearest one for samples outside the crop.
     uint64_t pixel_of(uint64_t index) const {
         return index < geometry_.pixel_count() ? index : geometry_.pixel_at(grid_.point(index));
@@ -139,6 +154,8 @@ public:
 
     // -- Between passes.
 
+    /// Sets expected() from the totals, which must be complete.
+    void renew_expected();
     /// Writes the totals, and what later passes need, as a section "film".
     void save(SectionWriter& to) const;
     /// Replaces them with saved ones of a film of the same size, which throws std::runtime_error if it is none. Then the
@@ -160,7 +177,15 @@ private:
     /// Number of pairs of passes at the beginning whose errors are relative to a mean that was still noisy. They are left
     /// out when there are others. In short films all are like that, so that a sum of films uses only how they differ.
     size_t noisy_pairs() const;
+    /// Adds the pixels of this process, whose values are `pass`, to the totals.
     void fold(std::span<const Rgb> pass, double splat_factor);
+    /// Calls `body(chunk, begin, end)` for the chunks of the pixels of this process.
+    template <class Body>
+    void for_own_chunks(const Body& body) const;
+    /// Sums over all chunks, from the sums of each chunk of this process.
+    double sum_of_chunks(std::vector<double>& sums) const;
+    uint64_t own_begin() const { return pixel_begins_[size_t(ranks_->index())]; }
+    uint64_t own_end() const { return pixel_begins_[size_t(ranks_->index()) + 1]; }
 
     FilmGeometry geometry_;
     ReconstructionFilter filter_;
@@ -168,7 +193,7 @@ private:
     SampleGrid grid_;  ///< Of the current or last pass.
     PassImage pass_;
     std::vector<Moments> moments_;
-    ExpectedLuminance expected_, expected_in_last_pass_;
+    ExpectedLuminance expected_;
     /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. With
     /// groups: the luminance of the eye paths in the pass that is being added.
     std::vector<float> previous_;
@@ -181,6 +206,12 @@ private:
     bool is_merged_ = false;  ///< Whether it is a sum of several films.
     /// Sums of squared luminance, by pixel, from which such a sum gets its error. Empty with groups.
     std::vector<double> luminance_squares_;
+
+    const Ranks* ranks_ = &kAlone;
+    /// The first chunk and the first pixel of each process, and their numbers.
+    std::vector<uint64_t> chunk_begins_, pixel_begins_;
+    /// The pixels of this process in the passes of all; empty if it renders alone.
+    std::vector<Rgb> exchanged_;
 };
 
 template <class Use>

@@ -15,12 +15,17 @@ inline uint64_t film_chunks(uint64_t count) {
     return (count + kFilmChunk - 1) / kFilmChunk;
 }
 
-/// Calls `body(chunk, begin, end)` for the chunks of [0, count) in parallel.
+/// Calls `body(chunk, begin, end)` in parallel for the chunks first … last-1 of [0, count).
 template <class Body>
-void for_film_chunks(uint64_t count, const Body& body) {
-    tbb::parallel_for(uint64_t(0), film_chunks(count), [&](uint64_t chunk) {
+void for_film_chunks(uint64_t count, uint64_t first, uint64_t last, const Body& body) {
+    tbb::parallel_for(first, last, [&](uint64_t chunk) {
         body(chunk, chunk * kFilmChunk, std::min(count, (chunk + 1) * kFilmChunk));
     });
+}
+/// The same for all chunks.
+template <class Body>
+void for_film_chunks(uint64_t count, const Body& body) {
+    for_film_chunks(count, 0, film_chunks(count), body);
 }
 
 }  // namespace etendue

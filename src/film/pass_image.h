@@ -46,6 +46,8 @@ public:
     std::span<const Rgb> finish_eye();
     /// The finished image; after finish_eye().
     std::span<const Rgb> finish();
+    /// The same, once it is finished.
+    std::span<const Rgb> pixels() const { return pixels_; }
     /// Number of values that were not finite and were left out.
     uint64_t rejected() const {
         return rejected_.load(std::memory_order_relaxed) + (splats_ ? splats_->rejected() : 0);

@@ -37,10 +37,12 @@ public:
         from.get(draws_);
         from.get(count_);
     }
-    void trace(const PassContext& pass) override {
+    void prepare(const PassContext& pass) override {
         paths_.train(pass);
+        if (uses_cache_ && draws_ == 0) choose_draws(pass);
+    }
+    void trace(const PassContext& pass) override {
         if (!uses_cache_) return;
-        if (draws_ == 0) choose_draws(pass);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,

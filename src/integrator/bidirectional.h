@@ -29,7 +29,7 @@ public:
                 .hit_lens = scene.sensor().has_finite_lens() ? N : 0.0f};
     }
 
-    /// Trains the guide. Must be called before any path of the pass is traced.
+    /// Trains the guide. For Integrator::prepare().
     void train(const PassContext& pass, GuidedWalks walks = GuidedWalks::Both) {
         guiding_.train(pass, depth_, walks);
     }

@@ -302,7 +302,8 @@ std::vector<ParamInfo> Guiding::params() {
          "for tests."},
         {"guide_walks", ParamKind::Int, "100000",
          "Number of light walks, and of eye walks, that train the guide before the first pass. A "
-         "refit traces as many, when the image has had 8, 64, 512 … times as many samples."},
+         "refit traces as many, before the first of passes 1, 4, 16, 64 … at which the image has "
+         "had 8, 64, 512 … times as many samples."},
         {"guide_roulette", ParamKind::Bool, "true",
          "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
          "walks had from the same place on. Has no effect if `guide` is off."}};
@@ -353,16 +354,11 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     constexpr int kRounds = 4;  // Each has twice the walks of the last.
     constexpr uint64_t kFirstPart = (1 << kRounds) - 1;
     const auto passes = uint32_t(pass.film.passes());
-    // A pass that was dropped and is traced again is trained for once.
-    if (mode_ == Mode::Off || is_given_up_ || trained_passes_ > passes) return;
-    if (!pass.scene.has_emitters()) return;
-    // Logarithm to base 8, rounded down, of the samples of pixels before a pass over the walks.
-    const auto refits = [&](uint64_t before) {
-        return (std::bit_width(before * pass.pixels / walks_) - 1) / 3;
-    };
+    if (mode_ == Mode::Off || is_given_up_ || !pass.scene.has_emitters()) return;
+    const uint64_t refits =
+        (std::bit_width(std::max<uint64_t>(1, passes * pass.pixels / walks_)) - 1) / 3;
     // As many walks would not gain more where a guide gains nothing.
-    const bool is_due =
-        passes == 0 || (guide_->uses_surfaces && refits(passes) > refits(passes - 1));
+    const bool is_due = passes == 0 || (guide_->uses_surfaces && refits > refits_);
     if (!is_due) return;
     const auto begin = Clock::now();
     const uint64_t seed = pilot_seed(pass.seed, PilotUse::Guide, passes);
@@ -398,7 +394,7 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
         next->uses_surfaces = !gains_nothing(*next, walks);
     }
     guide_ = std::move(next);
-    trained_passes_ = passes + 1;
+    refits_ = refits;
     seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
@@ -455,7 +451,7 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
 }
 
 void Guiding::save(LearnedState& to) const {
-    to.put(trained_passes_);
+    to.put(refits_);
     to.put(is_given_up_);
     to.put(seconds_);
     to.put(guide_ != nullptr);
@@ -463,7 +459,7 @@ void Guiding::save(LearnedState& to) const {
 }
 
 void Guiding::load(LearnedState& from) {
-    from.get(trained_passes_);
+    from.get(refits_);
     from.get(is_given_up_);
     from.get(seconds_);
     bool has_guide = false;

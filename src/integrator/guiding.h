@@ -19,9 +19,9 @@ public:
 
     /// False with `guide=off`: then no walk is ever guided.
     bool is_on() const { return mode_ != Mode::Off; }
-    /// Trains before pass 0 and refits after 8, 64, 512 … times as many samples of pixels as walks, from walks of its own:
-    /// light walks show eye walks where radiance comes from, and eye walks show light walks where importance does. Each
-    /// round is guided by the one before. For Integrator::trace(), before it traces anything.
+    /// Trains before pass 0, and refits where the image has had 8, 64, 512 … times as many samples of pixels as walks, from
+    /// walks of its own: light walks show eye walks where radiance comes from, and eye walks show light walks where
+    /// importance does. Each round is guided by the one before. For Integrator::prepare().
     void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks);
     /// What guides walks until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
@@ -49,9 +49,10 @@ private:
     uint64_t walks_ = 0;         ///< Of each kind, in training.
     bool has_roulette_ = false;  ///< The option; see Guide::has_roulette.
     std::unique_ptr<Guide> guide_;
-    uint32_t trained_passes_ = 0;  ///< That train() was called for.
-    bool is_given_up_ = false;     ///< By Mode::Auto.
-    double seconds_ = 0;           ///< Spent in train().
+    uint64_t refits_ =
+        0;  ///< Logarithm to base 8 of the samples over the walks, at the last call of train().
+    bool is_given_up_ = false;  ///< By Mode::Auto.
+    double seconds_ = 0;        ///< Spent in train().
 };
 
 }  // namespace etendue

@@ -22,10 +22,14 @@ class Integrator {
 public:
     virtual ~Integrator() = default;
     /// Learns from the statistics of earlier passes. Called before pass 0, when there are none, and before passes 1, 4,
-    /// 16, 64 …. What is learned holds until the next call. From each call on, the random numbers are independent of
-    /// all earlier ones. Therefore no pass uses learned data that depend on its own random numbers, and learning causes
-    /// no bias.
+    /// 16, 64 …. What is learned holds for a generation of passes, until the next call. From each call on, the random
+    /// numbers are independent of all earlier ones. Therefore no pass uses learned data that depend on its own random
+    /// numbers, and learning causes no bias. Without error_groups(), the passes of a generation are independent of each
+    /// other: what trace() keeps for later ones is a function of the seed.
     virtual void learn(const LearnContext&) {}
+    /// Traces paths of its own from which it learns. Called after learn(), by one thread. Nothing of this is left if it
+    /// throws an exception; then it is called again.
+    virtual void prepare(const PassContext&) {}
     /// Whether learn() changes the sampling or the weights of later passes.
     virtual bool is_learning() const { return false; }
     /// Number of the eye paths of a pass. Passes with the same number have the same film points.
@@ -36,12 +40,12 @@ public:
     virtual void save(LearnedState& to) const = 0;
     virtual void load(LearnedState& from) = 0;
     /// Traces the paths that the samples of the pass share. Called by one thread, before the samples. An exception,
-    /// here or in a sample, discards the pass.
+    /// here or in a sample, discards the pass. Other processes may make other passes of the generation.
     virtual void trace(const PassContext&) {}
 
     /// Makes the sums that a worker accumulates during a pass for learn() (Workspace::sums); nullptr if there are none.
     virtual std::unique_ptr<PassSums> make_sums() const { return nullptr; }
-    /// Takes the sums of all workers at the end of a pass.
+    /// Takes the sums of all workers at the end of a pass, which another process may have made. Passes come in order.
     virtual void collect(std::span<const std::unique_ptr<PassSums>>) {}
 
     /// Traces sample `context.index` and reports its contributions.

@@ -17,7 +17,7 @@ public:
 
     void save(LearnedState& to) const override { guiding_.save(to); }
     void load(LearnedState& from) override { guiding_.load(from); }
-    void trace(const PassContext& pass) override {
+    void prepare(const PassContext& pass) override {
         guiding_.train(pass, depth_, GuidedWalks::Light);
     }
 

@@ -18,7 +18,9 @@ public:
 
     void save(LearnedState& to) const override { guiding_.save(to); }
     void load(LearnedState& from) override { guiding_.load(from); }
-    void trace(const PassContext& pass) override { guiding_.train(pass, depth_, GuidedWalks::Eye); }
+    void prepare(const PassContext& pass) override {
+        guiding_.train(pass, depth_, GuidedWalks::Eye);
+    }
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, 0);

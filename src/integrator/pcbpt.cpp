@@ -48,8 +48,8 @@ public:
     void learn(const LearnContext& pass) override { paths_.learn(pass); }
     void save(LearnedState& to) const override { paths_.save(to); }
     void load(LearnedState& from) override { paths_.load(from); }
+    void prepare(const PassContext& pass) override { paths_.train(pass); }
     void trace(const PassContext& pass) override {
-        paths_.train(pass);
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
         trace_light_paths(pass, n);
         make_records(pass, n);

@@ -37,6 +37,9 @@ private:
 /// Rays of the samples of a pass, without those that made the photons.
 struct RaySums final : PassSums {
     uint64_t rays = 0;
+
+    void save(LearnedState& to) const override { to.put(rays); }
+    void load(LearnedState& from) override { from.get(rays); }
 };
 
 /// Purpose of a density estimate, which determines the photons that it uses.

@@ -49,7 +49,7 @@ public:
         paths_.learn(pass);
         if (connects_) learned_.weight_scale.learn(learned_.gathers);
         learned_.roulette.learn(learned_.gathers);
-        if (pass.film.passes() == 0) return;  // see start()
+        if (pass.film.passes() == 0) return;  // see prepare()
         learned_.radius.learn(pass.film, pass.so_far, learned_.gathers);
         if (connects_) learned_.next_events.learn(learned_.radius.observed(), learned_.gathers);
         density_ = PairDensity(cells(), learned_.radius.of(false), kGatherConstants.correlation);
@@ -65,6 +65,7 @@ public:
         from.get(learned_);
         density_.load(from);
         loaded_.load(from);
+        inner_grid_ = {};
     }
     bool is_learning() const override { return true; }
     std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }
@@ -72,9 +73,11 @@ public:
         learned_.gathers.add(workers);
     }
 
-    void trace(const PassContext& pass) override {
+    void prepare(const PassContext& pass) override {
         paths_.train(pass, GuidedWalks::BothWithPairs);
         if (pass.film.passes() == 0) start(pass);
+    }
+    void trace(const PassContext& pass) override {
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
         paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,

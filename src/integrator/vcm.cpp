@@ -61,6 +61,7 @@ public:
         from.get(roulette_);
         density_.load(from);
         loaded_.load(from);
+        grid_ = {};
     }
     bool is_learning() const override { return merges_; }
     std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }
@@ -68,8 +69,8 @@ public:
         gathers_.add(workers);
     }
 
+    void prepare(const PassContext& pass) override { paths_.train(pass); }
     void trace(const PassContext& pass) override {
-        paths_.train(pass);
         radius_ = radius_params_.radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());

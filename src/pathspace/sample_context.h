@@ -9,11 +9,16 @@
 
 namespace etendue {
 
+class LearnedState;
+
 /// Sums that an integrator accumulates during a pass, for later passes; integers, since the order of workers is not
 /// fixed.
 class PassSums {
 public:
     virtual ~PassSums() = default;
+    /// For a process that did not make the pass.
+    virtual void save(LearnedState& to) const = 0;
+    virtual void load(LearnedState& from) = 0;
 };
 
 /// Buffers of one worker, reused from sample to sample.

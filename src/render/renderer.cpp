@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <exception>
+#include <new>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -25,10 +27,13 @@ namespace {
 /// Number of samples in a chunk of parallel work. It does not depend on the number of threads.
 constexpr uint64_t kChunk = 256;
 
-/// Integrators learn before passes 0, 1, 4, 16, 64 …
+/// Integrators learn before passes 0, 1, 4, 16, 64 …; those up to the next learning step are a generation.
 struct LearningStep {
     uint32_t number;  ///< Index of the learning step.
     uint32_t pass;    ///< Index of the pass within the step.
+
+    /// The first pass that follows its generation.
+    uint64_t end() const { return uint64_t(1) << (2 * number); }
 
     static LearningStep of(uint32_t pass) {
         if (pass == 0) return {0, 0};
@@ -193,6 +198,31 @@ std::unique_ptr<tbb::global_control> allow_threads(int threads) {
 /// Exception that ends a pass which is to be discarded.
 struct PassDropped {};
 
+std::string what_of(const std::exception_ptr& failure) {
+    try {
+        std::rethrow_exception(failure);
+    } catch (const std::bad_alloc&) {
+        return "not enough memory";
+    } catch (const std::exception& e) {
+        return e.what();
+    }
+}
+
+/// Throws if several processes cannot render together.
+void check_ranks(const RenderSettings& settings, const Integrator& integrator) {
+    if (settings.ranks->count() == 1) return;
+    if (integrator.error_groups() > 0)
+        throw std::runtime_error(
+            fmt::format("{} cannot be rendered by several processes together, since each pass "
+                        "continues the chains of earlier ones; give each process another seed, and "
+                        "merge the results",
+                        settings.integrator.name));
+    if (settings.technique_depth > 0)
+        throw std::runtime_error(
+            "technique images cannot be rendered by several processes together; give each process "
+            "other passes, and merge the results");
+}
+
 /// The film's geometry, if there is memory for its film and for the image that is written.
 const FilmGeometry& fitting_film(const Scene& scene, const RenderSettings& settings,
                                  const Integrator& integrator, uint64_t light_paths) {
@@ -243,6 +273,8 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
             typical_radiance(scene), settings.filter_mode),
       workers_(std::make_unique<Workers>(settings.threads)) {
     check_limits(settings, settings.first_pass);
+    check_ranks(settings, *integrator_);
+    film_.set_ranks(*settings.ranks);
     if (integrator_->error_groups() > 0) film_.set_groups(integrator_->error_groups());
     if (settings.technique_depth > 0)
         techniques_ = std::make_unique<TechniqueImages>(
@@ -250,26 +282,6 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
 }
 
 Renderer::~Renderer() = default;
-
-void Renderer::pass(const std::atomic<bool>& drop) {
-    const uint64_t rejected_before = film_.rejected();
-    has_last_pass_ = false;
-    try {
-        workers_->arena.execute([&] { trace_pass(drop); });
-    } catch (...) {
-        workers_->arena.execute([&] {
-            film_.drop_pass();
-            if (techniques_) techniques_->drop_pass();
-        });
-        workers_->take_stats();
-        workers_->take_sums();
-        throw;
-    }
-    stats_ += workers_->take_stats();
-    stats_.rejected += film_.rejected() - rejected_before;
-    integrator_->collect(workers_->take_sums());
-    has_last_pass_ = true;
-}
 
 Renderer::Numbers Renderer::numbers(uint32_t passes) const {
     const bool is_learning = integrator_->is_learning();
@@ -301,101 +313,272 @@ bool Renderer::sample_again(uint64_t index, Workspace& work, ContributionSink& s
     work.sums = integrator_->make_sums();
     Sampler sampler(settings_.sampler, place.seed);
     sampler.start(place.pass, index);
-    integrator_->sample({scene_, film_, film_.expected_in_last_pass(), index, index / kChunk,
-                         light_paths_, splat_scale, sampler, sink},
+    integrator_->sample({scene_, film_, film_.expected(), index, index / kChunk, light_paths_,
+                         splat_scale, sampler, sink},
                         work);
     return true;
 }
 
-void Renderer::trace_pass(const std::atomic<bool>& drop) {
-    const auto passes = uint32_t(film_.passes());
-    const uint32_t index = uint32_t(settings_.first_pass) + passes;
-    const uint64_t pixels = scene_.film().pixel_count(), light_paths = light_paths_;
-    const float splat_scale = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
-    const Numbers place = numbers(passes);
-    film_.begin_pass(light_paths, film_offset(settings_.sampler, place.seed,
-                                              integrator_->eye_paths_of(place.pass)));
-    const uint64_t seed = place.seed;
-    const auto go_on = [&] {
-        if (drop.load(std::memory_order_relaxed)) throw PassDropped();
-    };
-    const auto workspace = [&]() -> Workspace& {
-        Workspace& work = workers_->spaces.local();
-        work.is_observed = settings_.observer != nullptr;
-        if (!work.sums) work.sums = integrator_->make_sums();
+/// The paths of one pass.
+class Renderer::Pass {
+public:
+    /// The pass that follows `passes` others.
+    Pass(Renderer& renderer, uint32_t passes, const std::atomic<bool>& drop)
+        : r_(renderer), drop_(drop), index_(uint32_t(r_.settings_.first_pass) + passes),
+          numbers_(r_.numbers(passes)),
+          splat_scale_(r_.light_paths_ > 0 ? float(1.0 / double(r_.light_paths_)) : 0.0f) {}
+
+    void learn() {
+        r_.film_.renew_expected();
+        r_.integrator_->learn({.scene = r_.scene_,
+                               .film = r_.film_,
+                               .index = index_,
+                               .light_paths = r_.light_paths_,
+                               .so_far = r_.stats_});
+    }
+    void prepare() {
+        r_.integrator_->prepare(context());
+        // These paths do not count.
+        r_.workers_->take_stats();
+    }
+    void trace() {
+        r_.film_.begin_pass(r_.light_paths_,
+                            film_offset(r_.settings_.sampler, numbers_.seed,
+                                        r_.integrator_->eye_paths_of(numbers_.pass)));
+        r_.integrator_->trace(context());
+        for_each_sample(r_.film_.sample_count(),
+                        [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
+                            sink.begin(c.index, c.light_paths);
+                            r_.integrator_->sample(c, work);
+                            sink.end();
+                        });
+    }
+
+private:
+    static uint64_t chunks(uint64_t samples) { return (samples + kChunk - 1) / kChunk; }
+    void go_on() const {
+        if (drop_.load(std::memory_order_relaxed)) throw PassDropped();
+    }
+    Workspace& workspace() const {
+        Workspace& work = r_.workers_->spaces.local();
+        work.is_observed = r_.settings_.observer != nullptr;
+        if (!work.sums) work.sums = r_.integrator_->make_sums();
         return work;
-    };
-    const auto chunks = [](uint64_t samples) { return (samples + kChunk - 1) / kChunk; };
-    // Calls use(context, work, sink) for the samples 0 … count-1 of the pass.
-    const auto for_each_sample = [&](uint64_t count, const auto& use) {
+    }
+    Receivers receivers(Workspace& work) const {
+        return {r_.film_, r_.techniques_.get(), r_.settings_, splat_scale_, work};
+    }
+
+    /// Calls use(context, work, sink) for the samples 0 … count-1 of the pass.
+    template <class Use>
+    void for_each_sample(uint64_t count, const Use& use) const {
         tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
             Workspace& work = workspace();
-            Sampler sampler(settings_.sampler, seed);
-            FilmSink sink({film_, techniques_.get(), settings_, splat_scale, work});
+            Sampler sampler(r_.settings_.sampler, numbers_.seed);
+            FilmSink sink(receivers(work));
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
             for (uint64_t i = chunk * kChunk; i < end; ++i) {
                 go_on();
-                sampler.start(place.pass, i);
+                sampler.start(numbers_.pass, i);
                 work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
-                use(SampleContext{scene_, film_, film_.expected(), i, chunk, light_paths,
-                                  splat_scale, sampler, sink},
+                use(SampleContext{r_.scene_, r_.film_, r_.film_.expected(), i, chunk,
+                                  r_.light_paths_, splat_scale_, sampler, sink},
                     work, sink);
             }
         });
-    };
-    // If a discarded pass is traced again, its learning step is not repeated.
-    if (learned_passes_ == passes) {
-        if (LearningStep::of(passes).pass == 0)
-            integrator_->learn({.scene = scene_,
-                                .film = film_,
-                                .index = index,
-                                .light_paths = light_paths,
-                                .so_far = stats_});
-        ++learned_passes_;
     }
-    integrator_->trace(
-        {.scene = scene_,
-         .film = film_,
-         .index = index,
-         .light_paths = light_paths,
-         .pixels = pixels,
-         .seed = seed,
-         .for_each_sample =
-             [&](uint64_t count, const PassContext::Use& use) {
-                 for_each_sample(count, [&](const SampleContext& c, Workspace& work, FilmSink&) {
-                     use(c, work);
-                 });
-             },
-         .chunks = chunks,
-         .for_each_other_path =
-             [&](uint64_t count, const PassContext::Task& task) {
-                 tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
-                     go_on();
-                     Sampler sampler(settings_.sampler, pilot_seed(seed, PilotUse::OtherPaths));
-                     Workspace& work = workspace();
-                     work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
-                     task(i, sampler, work);
-                 });
-             },
-         .for_each_chain =
-             [&](uint64_t count, const PassContext::ChainTask& task) {
-                 tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
-                     go_on();
-                     Workspace& work = workspace();
-                     FilmSplats splats({film_, techniques_.get(), settings_, splat_scale, work});
-                     work.is_observed = splats.needs_joins();
-                     task(i, splats, work);
-                 });
-             },
-         .forget_statistics = [&] { workers_->take_stats(); }});
-    for_each_sample(film_.sample_count(),
-                    [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
-                        sink.begin(c.index, c.light_paths);
-                        integrator_->sample(c, work);
-                        sink.end();
-                    });
-    film_.end_pass(integrator_->splat_error_factor());
+
+    PassContext context() const {
+        return {.scene = r_.scene_,
+                .film = r_.film_,
+                .index = index_,
+                .light_paths = r_.light_paths_,
+                .pixels = r_.scene_.film().pixel_count(),
+                .seed = numbers_.seed,
+                .for_each_sample =
+                    [this](uint64_t count, const PassContext::Use& use) {
+                        for_each_sample(count, [&](const SampleContext& c, Workspace& work,
+                                                   FilmSink&) { use(c, work); });
+                    },
+                .chunks = chunks,
+                .for_each_other_path =
+                    [this](uint64_t count, const PassContext::Task& task) {
+                        tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                            go_on();
+                            Sampler sampler(r_.settings_.sampler,
+                                            pilot_seed(numbers_.seed, PilotUse::OtherPaths));
+                            Workspace& work = workspace();
+                            work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
+                            task(i, sampler, work);
+                        });
+                    },
+                .for_each_chain =
+                    [this](uint64_t count, const PassContext::ChainTask& task) {
+                        tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                            go_on();
+                            Workspace& work = workspace();
+                            FilmSplats splats(receivers(work));
+                            work.is_observed = splats.needs_joins();
+                            task(i, splats, work);
+                        });
+                    },
+                .forget_statistics = [this] { r_.workers_->take_stats(); }};
+    }
+
+    Renderer& r_;
+    const std::atomic<bool>& drop_;
+    uint32_t index_;
+    Numbers numbers_;
+    float splat_scale_;
+};
+
+struct Renderer::Round {
+    int passes = 0;  ///< That are wanted: one of each of the first processes.
+    int made = 0;    ///< That can be added: those before the first one that is missing.
+    bool is_dropped = false;
+    std::exception_ptr failure;        ///< Of this process, or what another one says.
+    uint64_t rejected_before = 0;      ///< Of the film.
+    std::vector<std::string> results;  ///< Statistics and sums of the pass of each process.
+};
+
+void Renderer::drop_pass() {
+    workers_->arena.execute([&] {
+        film_.drop_pass();
+        if (techniques_) techniques_->drop_pass();
+    });
+    workers_->take_stats();
+    workers_->take_sums();
+}
+
+void Renderer::trace_own_pass(const Round& round, const std::atomic<bool>& drop) {
+    const auto passes = uint32_t(film_.passes());
+    const int rank = settings_.ranks->index();
+    has_last_pass_ = false;
+    // If a discarded pass is traced again, its learning step is not repeated.
+    if (learned_steps_ == LearningStep::of(passes).number) {
+        Pass(*this, passes, drop).learn();
+        ++learned_steps_;
+        is_prepared_ = false;
+    }
+    if (!is_prepared_) Pass(*this, passes, drop).prepare();
+    is_prepared_ = true;
+    if (rank >= round.passes) return;
+    Pass(*this, passes + uint32_t(rank), drop).trace();
+    if (settings_.ranks->count() == 1)
+        film_.end_pass(integrator_->splat_error_factor());
+    else
+        film_.finish_pass();
     if (techniques_) techniques_->end_pass();
+}
+
+Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atomic<bool>& drop) {
+    enum class Outcome : uint8_t { Good, Dropped, Failed };
+    const Ranks& ranks = *settings_.ranks;
+    Round round;
+    round.passes = round_size(limits);
+    round.rejected_before = film_.rejected();
+    if (learned_steps_ == LearningStep::of(uint32_t(film_.passes())).number) gather();
+
+    auto outcome = Outcome::Good;
+    std::string failure;
+    try {
+        workers_->arena.execute([&] { trace_own_pass(round, drop); });
+    } catch (const PassDropped&) {
+        outcome = Outcome::Dropped;
+    } catch (...) {
+        outcome = Outcome::Failed;
+        round.failure = std::current_exception();
+        failure = what_of(round.failure);
+    }
+    if (outcome != Outcome::Good) drop_pass();
+
+    const std::vector<Outcome> outcomes = ranks.gather_values(outcome);
+    const auto first_bad = std::find_if(outcomes.begin(), outcomes.end(),
+                                        [](Outcome o) { return o != Outcome::Good; });
+    round.made = std::min(round.passes, int(first_bad - outcomes.begin()));
+    round.is_dropped = first_bad != outcomes.end();
+    if (std::find(outcomes.begin(), outcomes.end(), Outcome::Failed) != outcomes.end()) {
+        const std::vector<std::string> failures = ranks.gather(failure);
+        for (size_t r = 0; r < failures.size() && !round.failure; ++r)
+            if (!failures[r].empty())
+                round.failure = std::make_exception_ptr(
+                    std::runtime_error(fmt::format("process {}: {}", r, failures[r])));
+    }
+    if (round.made > 0) exchange(round);
+    return round;
+}
+
+void Renderer::exchange(Round& round) {
+    const Ranks& ranks = *settings_.ranks;
+    if (ranks.count() == 1) return;
+    LearnedState own;
+    if (ranks.index() < round.made) {
+        own.put(workers_->take_stats());
+        own.put(film_.rejected_in_pass());
+        const auto sums = workers_->take_sums();
+        own.put(uint64_t(sums.size()));
+        for (const auto& s : sums) s->save(own);
+    } else {
+        workers_->take_stats();
+        workers_->take_sums();
+    }
+    round.results =
+        ranks.gather({reinterpret_cast<const char*>(own.bytes().data()), own.bytes().size()});
+    workers_->arena.execute([&] { film_.exchange(round.made); });
+}
+
+void Renderer::add_pass(Round& round, int rank) {
+    if (settings_.ranks->count() == 1) {
+        stats_ += workers_->take_stats();
+        stats_.rejected += film_.rejected() - round.rejected_before;
+        integrator_->collect(workers_->take_sums());
+        has_last_pass_ = true;
+        return;
+    }
+    const auto* const bytes =
+        reinterpret_cast<const std::byte*>(round.results[size_t(rank)].data());
+    LearnedState result(std::vector<std::byte>(bytes, bytes + round.results[size_t(rank)].size()));
+    RenderStats stats;
+    uint64_t rejected = 0, workers = 0;
+    result.get(stats);
+    result.get(rejected);
+    result.get(workers);
+    std::vector<std::unique_ptr<PassSums>> sums;
+    for (uint64_t i = 0; i < workers; ++i)
+        sums.emplace_back(integrator_->make_sums())->load(result);
+    workers_->arena.execute([&] { film_.add_pass(rank, rejected); });
+    stats_ += stats;
+    stats_.rejected += rejected;
+    integrator_->collect(sums);
+    last_rank_ = rank;
+}
+
+void Renderer::gather() {
+    const Ranks& ranks = *settings_.ranks;
+    if (ranks.count() == 1) return;
+    film_.complete();
+    if (last_rank_ < 0) return;
+    std::vector<std::byte> state;
+    if (ranks.index() == last_rank_) state = learned_state();
+    ranks.broadcast(state, last_rank_);
+    if (ranks.index() != last_rank_) load_learned_state(std::move(state));
+    last_rank_ = -1;
+}
+
+std::vector<std::byte> Renderer::learned_state() const {
+    LearnedState state;
+    state.put(learned_steps_);
+    state.put(is_prepared_);
+    integrator_->save(state);
+    return state.bytes();
+}
+
+void Renderer::load_learned_state(std::vector<std::byte> bytes) {
+    LearnedState state(std::move(bytes));
+    state.get(learned_steps_);
+    state.get(is_prepared_);
+    integrator_->load(state);
+    has_last_pass_ = false;
 }
 
 void Renderer::save_sums(SectionWriter& to) const {
@@ -406,11 +589,8 @@ void Renderer::save_sums(SectionWriter& to) const {
 
 void Renderer::save(SectionWriter& to) const {
     save_sums(to);
-    LearnedState learned;
-    integrator_->save(learned);
     to.begin("learned");
-    to.put(learned_passes_);
-    to.put(learned.bytes());
+    to.put(learned_state());
 }
 
 void Renderer::load(SectionReader& from) {
@@ -418,13 +598,11 @@ void Renderer::load(SectionReader& from) {
     workers_->arena.execute([&] { film_.load(from); });
     if (techniques_) techniques_->add_saved(from);
     from.open("learned");
-    from.get(learned_passes_);
     std::vector<std::byte> bytes;
     from.get(bytes);
     from.finish();
-    LearnedState learned(std::move(bytes));
     try {
-        integrator_->load(learned);
+        load_learned_state(std::move(bytes));
     } catch (const std::runtime_error& e) {
         from.fail(e.what());
     }
@@ -449,13 +627,22 @@ const ErrorEstimate& RecentError::update(const Progress& progress) {
     return last_;
 }
 
+int Renderer::round_size(const RenderLimits& limits) const {
+    const uint64_t passes = film_.passes(), all = kMostPasses - settings_.first_pass,
+                   end =
+                       std::min(LearningStep::of(uint32_t(passes)).end(), limits.spp.value_or(all));
+    return int(std::min(end - passes, uint64_t(settings_.ranks->count())));
+}
+
 std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
-                                            const std::optional<ErrorEstimate>& error) const {
+                                            const std::optional<ErrorEstimate>& error,
+                                            bool ends_round) const {
     if (film_.passes() == 0) return {};
     if (film_.passes() >= limits.spp.value_or(kMostPasses - settings_.first_pass))
         return StopReason::Samples;
-    // A pass is begun only if at least half of it is expected to fit.
-    if (limits.seconds && seconds_ + 0.5 * seconds_ / double(film_.passes()) > *limits.seconds)
+    // A round is begun only if at least half of it is expected to fit.
+    if (limits.seconds && ends_round &&
+        seconds_ + 0.5 * seconds_ * round_size(limits) / double(film_.passes()) > *limits.seconds)
         return StopReason::Time;
     if (limits.error && error && error->valid && error->relative_rms <= *limits.error)
         return StopReason::Error;
@@ -468,34 +655,47 @@ StopReason Renderer::run(const RenderLimits& limits,
     using Clock = std::chrono::steady_clock;
     const auto begin = Clock::now();
     const double before = seconds_;
+    const Ranks& ranks = *settings_.ranks;
     check_limits(limits, settings_.first_pass);
     // Computed only where it matters, since it may take as long as a pass.
     const auto error_of_image = [&] {
         return limits.error ? std::optional(error()) : std::nullopt;
     };
-    if (const auto reason = reached(limits, error_of_image())) return *reason;
+    if (const auto reason = reached(limits, error_of_image(), true)) return *reason;
     while (true) {
-        try {
-            pass(drop);
-        } catch (const PassDropped&) {
-            return StopReason::Interrupted;
+        const double before_round = seconds_;
+        Round round = make_round(limits, drop);
+        for (int i = 0; i < round.made; ++i) {
+            add_pass(round, i);
+            const double so_far =
+                before + std::chrono::duration<double>(Clock::now() - begin).count();
+            // Each pass has its share of the time of the round.
+            seconds_ = ranks.of_first(before_round + (so_far - before_round) *
+                                                         (double(i + 1) / double(round.made)));
+
+            const std::optional<ErrorEstimate> found = error_of_image();
+            Progress now{.renderer = *this,
+                         .passes = film_.passes(),
+                         .seconds = seconds_,
+                         .fraction = {},
+                         .rays_per_second = double(stats_.rays()) / seconds_,
+                         .ends_round = i + 1 == round.made};
+            if (limits.spp) now.fraction = double(now.passes) / double(*limits.spp);
+            if (limits.seconds)
+                now.fraction = std::max(now.fraction.value_or(0), seconds_ / *limits.seconds);
+            // The error falls with the square root of the number of passes.
+            if (found && found->valid)
+                now.fraction =
+                    std::max(now.fraction.value_or(0), sqr(*limits.error / found->relative_rms));
+            if (now.fraction) now.fraction = std::min(*now.fraction, 1.0);
+            progress(now);
+
+            if (now.ends_round && ranks.any(interrupted.load(std::memory_order_relaxed)))
+                return StopReason::Interrupted;
+            if (const auto reason = reached(limits, found, now.ends_round)) return *reason;
         }
-        seconds_ = before + std::chrono::duration<double>(Clock::now() - begin).count();
-
-        const std::optional<ErrorEstimate> found = error_of_image();
-        Progress now{*this, film_.passes(), seconds_, {}, double(stats_.rays()) / seconds_};
-        if (limits.spp) now.fraction = double(now.passes) / double(*limits.spp);
-        if (limits.seconds)
-            now.fraction = std::max(now.fraction.value_or(0), seconds_ / *limits.seconds);
-        // The error falls with the square root of the number of passes.
-        if (found && found->valid)
-            now.fraction =
-                std::max(now.fraction.value_or(0), sqr(*limits.error / found->relative_rms));
-        if (now.fraction) now.fraction = std::min(*now.fraction, 1.0);
-        progress(now);
-
-        if (interrupted.load(std::memory_order_relaxed)) return StopReason::Interrupted;
-        if (const auto reason = reached(limits, found)) return *reason;
+        if (round.failure) std::rethrow_exception(round.failure);
+        if (round.is_dropped) return StopReason::Interrupted;
     }
 }
 

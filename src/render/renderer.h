@@ -11,6 +11,7 @@
 #include "integrator/integrator.h"
 #include "render/contribution_observer.h"
 #include "render/technique_images.h"
+#include "system/ranks.h"
 
 namespace etendue {
 
@@ -41,6 +42,8 @@ struct RenderSettings : RenderLimits {
     PathSelection
         shown;  ///< Paths that are added to the image. Other paths are sampled, but not added.
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
+    /// The processes that render the image together, each of them by a Renderer with these settings. They must outlive it.
+    const Ranks* ranks = &kAlone;
 };
 
 class Renderer;
@@ -51,6 +54,8 @@ struct Progress {
     double seconds;                  ///< See Renderer::seconds().
     std::optional<double> fraction;  ///< Finished fraction of the work; empty if it is unknown.
     double rays_per_second;
+    /// Whether the state can be saved and the image read now. Not if other processes have finished later passes.
+    bool ends_round = true;
 
     /// The image's error, which is computed by this call; for methods with groups of passes, from all pixels.
     ErrorEstimate error() const;
@@ -89,6 +94,10 @@ public:
     ///
     /// A pass is discarded if `drop` is set or if it throws an exception, which is passed to the caller. Film,
     /// technique images and statistics are then the same as after the previous pass.
+    ///
+    /// Several processes share the passes of a generation (Integrator::learn()); the bits are the same for any number. All of
+    /// them must call this function, and get the same calls of `progress` and the same result: it ends if any of them is
+    /// interrupted or fails.
     StopReason run(const std::function<void(const Progress&)>& progress,
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop) {
@@ -104,6 +113,10 @@ public:
     /// of that pass, such as its light paths. Its contributions go to `sink`, its sub-paths to `work`. Must not run
     /// during run(). Returns false if no pass was made, or if the integrator has the data of a discarded pass.
     bool sample_again(uint64_t index, Workspace& work, ContributionSink& sink) const;
+
+    /// With several processes: makes the film and the learned state of this one complete. To be called by all of them after
+    /// run(), or where Progress::ends_round is true, before the image is read or the state is saved.
+    void gather();
 
     const Film& film() const { return film_; }
     uint64_t light_paths() const { return light_paths_; }  ///< Number of light paths in a pass.
@@ -132,11 +145,23 @@ private:
     };
     /// Of the pass that follows `passes` others of this rendering.
     Numbers numbers(uint32_t passes) const;
-    void pass(const std::atomic<bool>& drop);
-    void trace_pass(const std::atomic<bool>& drop);
+    class Pass;
+    /// Passes that the processes make at the same time: of each process at most one.
+    struct Round;
+    /// Traces the pass of this process, and exchanges what all of them have made.
+    Round make_round(const RenderLimits& limits, const std::atomic<bool>& drop);
+    void trace_own_pass(const Round& round, const std::atomic<bool>& drop);
+    void drop_pass();
+    void exchange(Round& round);
+    void add_pass(Round& round, int rank);
+    std::vector<std::byte> learned_state() const;
+    void load_learned_state(std::vector<std::byte> bytes);
     /// `error`: empty if there is no limit of the error.
     std::optional<StopReason> reached(const RenderLimits& limits,
-                                      const std::optional<ErrorEstimate>& error) const;
+                                      const std::optional<ErrorEstimate>& error,
+                                      bool ends_round) const;
+    /// Number of passes in the next round.
+    int round_size(const RenderLimits& limits) const;
 
     const Scene& scene_;
     RenderSettings settings_;
@@ -146,9 +171,11 @@ private:
     std::unique_ptr<TechniqueImages> techniques_;
     struct Workers;
     std::unique_ptr<Workers> workers_;
-    uint64_t learned_passes_ = 0;  ///< Number of passes for which the integrator has learned.
+    uint64_t learned_steps_ = 0;  ///< Number of calls of Integrator::learn().
+    bool is_prepared_ = false;    ///< Whether Integrator::prepare() has followed the last of them.
     bool has_last_pass_ =
-        false;  ///< Whether the integrator has the data of the last finished pass.
+        false;            ///< Whether the integrator has the data of the last finished pass.
+    int last_rank_ = -1;  ///< The process whose state is that after the last pass; -1: of each.
     RenderStats stats_;
     double seconds_ = 0;
 };

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "pathspace/learned_state.h"
 #include "pathspace/sample_context.h"
 #include "reuse/gather_moment.h"
 
@@ -39,6 +40,13 @@ struct GatherSums final : PassSums {
 
     static GatherSums& of(Workspace& work) { return static_cast<GatherSums&>(*work.sums); }
 
+    void save(LearnedState& to) const override {
+        for_each(*this, [&](const auto& sums) { to.put(sums); });
+    }
+    void load(LearnedState& from) override {
+        for_each(*this, [&](auto& sums) { from.get(sums); });
+    }
+
     void add(const GatherSums& o) {
         for (size_t i = 0; i < kWeightScales; ++i) weight_moments[i] += o.weight_moments[i];
         for (size_t i = 0; i < kRadiusChanges; ++i) {
@@ -55,6 +63,14 @@ struct GatherSums final : PassSums {
             joins[i].count += o.joins[i].count;
             joins[i].squares += o.joins[i].squares;
         }
+    }
+
+private:
+    template <class Sums, class Use>
+    static void for_each(Sums& s, const Use& use) {
+        use(s.weight_moments), use(s.moments), use(s.trials);
+        use(s.candidates), use(s.inner_candidates), use(s.expected_pairs);
+        use(s.next_event_moments), use(s.next_events), use(s.joins);
     }
 };
 

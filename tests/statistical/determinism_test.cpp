@@ -41,8 +41,8 @@ Rendering render(const Scene& scene, const std::string& integrator, SamplerKind 
     settings.filter_mode = sampler == SamplerKind::Sobol ? FilterMode::Spread : FilterMode::Sample;
     settings.seed = seed;
     settings.threads = threads;
-    // Guides of 8000 walks are fitted again before pass 40, after as many samples as eight times these walks.
-    settings.spp = is_guided(integrator) ? 41 : 3;
+    // Guides of 3000 walks are fitted again before pass 16: there are eight times as many samples.
+    settings.spp = is_guided(integrator) ? 17 : 3;
     Renderer renderer(scene, settings);
     const std::atomic<bool> interrupted{false};
     EXPECT_EQ(renderer.run([](const Progress&) {}, interrupted), StopReason::Samples);
@@ -82,8 +82,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Combine(
         ::testing::Values(
             "path", "light", "bdpt", "bdpt:eorr=true", "bdpt:connections=cache", "pcbpt", "vcm",
-            "vcm:exact=true", "upg+bdpt", "path:guide=on,guide_roulette=false,guide_walks=8000",
-            "bdpt:guide=hp02,guide_walks=8000", "upg+bdpt:guide=on,guide_walks=8000", "sppm",
+            "vcm:exact=true", "upg+bdpt", "path:guide=on,guide_roulette=false,guide_walks=3000",
+            "bdpt:guide=hp02,guide_walks=3000", "upg+bdpt:guide=on,guide_walks=3000", "sppm",
             "ppm:eye_paths=2", "pm:light_paths=2000",
             "pm:light_paths=2000,cache_error=0.3,cache_rays=32", "pssmlt:groups=2,chains=24",
             "mmlt:groups=2,chains=48", "mlt:groups=2,chains=48", "upg+pssmlt:groups=2,chains=24",

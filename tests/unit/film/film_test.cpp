@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "math/statistics.h"
+#include "thread_ranks.h"
 
 namespace etendue {
 namespace {
@@ -32,6 +33,7 @@ public:
     void add(uint64_t light_paths = 0) {
         begin(light_paths);
         film_.end_pass();
+        film_.renew_expected();
     }
 
 private:
@@ -394,6 +396,48 @@ TEST(Film, PassesAfterADroppedOneAreAsWithoutIt) {
         return Totals(film, true);
     };
     totals(true).expect_same_bits(totals(false));
+}
+
+/// Several processes, each of which adds up some of the pixels, if there are enough of them.
+TEST(Film, OfSeveralProcessesHasTheSameTotals) {
+    constexpr int kPasses = 11;
+    for (const FilmGeometry& g : {FilmGeometry{130, 100, 0, 0, 130, 100}, kGeometry}) {
+        const auto add = [&](Film& film, int pass) {
+            std::mt19937 random{unsigned(pass)};
+            std::exponential_distribution<float> value(1);
+            film.begin_pass(1);
+            for (uint64_t i = 0; i < g.pixel_count(); ++i) film.add_eye(i, Rgb(value(random)));
+            film.add_splat({3.5f, 2.5f}, Rgb(value(random)));
+            film.add_eye(uint64_t(pass), Rgb(std::nanf("")));
+        };
+        Film alone(g, ReconstructionFilter::box());
+        for (int pass = 0; pass < kPasses; ++pass) {
+            add(alone, pass);
+            alone.end_pass();
+        }
+        alone.renew_expected();
+        EXPECT_EQ(alone.rejected(), uint64_t(kPasses));
+        for (const int count : {2, 3, 5}) {
+            SCOPED_TRACE(count);
+            test::ThreadRanks::run(count, [&](const Ranks& ranks) {
+                Film film(g, ReconstructionFilter::box());
+                film.set_ranks(ranks);
+                for (int pass = 0; pass < kPasses; pass += count) {
+                    const int made = std::min(count, kPasses - pass);
+                    if (ranks.index() < made) {
+                        add(film, pass + ranks.index());
+                        film.finish_pass();
+                    }
+                    const auto rejected = ranks.gather_values(film.rejected_in_pass());
+                    film.exchange(made);
+                    for (int r = 0; r < made; ++r) film.add_pass(r, rejected[size_t(r)]);
+                }
+                film.complete();
+                film.renew_expected();
+                Totals(film, true).expect_same_bits(Totals(alone, true));
+            });
+        }
+    }
 }
 
 }  // namespace

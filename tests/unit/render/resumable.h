@@ -16,7 +16,7 @@ namespace etendue::test {
 inline const std::vector<const char*>& resumable_methods() {
     static const std::vector<const char*> methods{
         "path",
-        "path:guide=on,guide_roulette=false,guide_walks=8000",
+        "path:guide=on,guide_roulette=false,guide_walks=4000",
         "light",
         "light:guide=on,guide_walks=2000",
         "bdpt",
@@ -31,7 +31,7 @@ inline const std::vector<const char*>& resumable_methods() {
         "upg:eorr=true",
         "upg:guide=on,guide_walks=2000",
         "upg+bdpt",
-        "upg+bdpt:guide=on,guide_walks=8000",
+        "upg+bdpt:guide=on,guide_walks=4000",
         "sppm",
         "sppm:eorr=true",
         "ppm:eorr=true,eye_paths=3",
@@ -54,14 +54,16 @@ inline const std::vector<const char*>& resumable_methods() {
     return methods;
 }
 
-/// The first pass before which a method refits its guide, for images with this many pixels: there are eight times as many
-/// samples as walks. 0 if it has no guide.
+/// The first pass before which a method refits its guide, for images with this many pixels: there are at least eight times as
+/// many samples as walks, and integrators learn. 0 if it has no guide.
 inline uint32_t refit_pass(std::string_view method, uint32_t pixels) {
     constexpr std::string_view kWalks = "guide_walks=";
     const size_t at = method.find(kWalks);
     if (at == std::string_view::npos) return 0;
     const auto walks = uint32_t(std::atoi(method.data() + at + kWalks.size()));
-    return (8 * walks + pixels - 1) / pixels;
+    uint32_t pass = 1;
+    while (pass * pixels < 8 * walks) pass *= 4;
+    return pass;
 }
 
 /// Name of a test of one of them.

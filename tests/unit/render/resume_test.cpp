@@ -22,6 +22,7 @@ public:
     bool is_learning() const override { return inner_->is_learning(); }
     void save(LearnedState& to) const override { inner_->save(to); }
     void load(LearnedState& from) override { inner_->load(from); }
+    void prepare(const PassContext& pass) override { inner_->prepare(pass); }
     void trace(const PassContext& pass) override {
         if (pass.index == resume_at_ && !is_resumed_) resume();
         inner_->trace(pass);
