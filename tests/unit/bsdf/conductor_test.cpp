@@ -4,6 +4,7 @@
 
 #include "bsdf/roughconductor.h"
 #include "lobe_tests.h"
+#include "roughness.h"
 
 namespace etendue {
 namespace {
@@ -12,12 +13,6 @@ using namespace etendue::testing;
 using Kind = Microfacet::Kind;
 
 const Rgb kGoldEta{0.143f, 0.375f, 1.44f}, kGoldK{3.98f, 2.39f, 1.60f};
-
-struct Roughness {
-    float x, y;
-};
-constexpr Roughness kRoughness[] = {
-    {1, 1}, {0.3f, 0.3f}, {0.05f, 0.05f}, {0.001f, 0.001f}, {0.4f, 0.1f}};
 
 RoughConductorLobe mirror(Kind kind, Roughness a) {
     return {Microfacet(kind, a.x, a.y), Rgb(0), Rgb(1), Rgb(1)};

@@ -5,6 +5,7 @@
 #include "bsdf/roughdielectric.h"
 #include "bsdf/thindielectric.h"
 #include "lobe_tests.h"
+#include "roughness.h"
 
 namespace etendue {
 namespace {
@@ -14,12 +15,7 @@ using Kind = Microfacet::Kind;
 
 constexpr float kEta[] = {1.5f, 1 / 1.5f, 1.1f, 2.4f};
 
-struct Widths {
-    float x, y;
-};
-constexpr Widths kWidths[] = {{1, 1}, {0.3f, 0.3f}, {0.05f, 0.05f}, {0.001f, 0.001f}, {0.4f, 0.1f}};
-
-RoughDielectricLobe rough_glass(Kind kind, Widths a, float eta, Rgb reflectance = Rgb(1),
+RoughDielectricLobe rough_glass(Kind kind, Roughness a, float eta, Rgb reflectance = Rgb(1),
                                 Rgb transmittance = Rgb(1)) {
     return {Microfacet(kind, a.x, a.y), eta, reflectance, transmittance};
 }
@@ -86,9 +82,10 @@ INSTANTIATE_TEST_SUITE_P(Both, RoughDielectricOf, ::testing::Values(Kind::Beckma
 
 TEST_P(RoughDielectricOf, SamplesMatchPdf) {
     const auto directions = test_directions_both_sides();
-    const double significance = sidak(1e-3, int(2 * (std::size(kWidths) + 2) * directions.size()));
+    const double significance =
+        sidak(1e-3, int(2 * (std::size(kRoughness) + 2) * directions.size()));
     for (Vec3 wo : directions) {
-        for (const Widths a : kWidths) {
+        for (const Roughness a : kRoughness) {
             SCOPED_TRACE(a.x);
             expect_samples_match_pdf(rough_glass(GetParam(), a, 1.5f), wo, significance, 30000);
         }
@@ -101,7 +98,7 @@ TEST_P(RoughDielectricOf, SamplesMatchPdf) {
 }
 
 TEST_P(RoughDielectricOf, ValueDensityAndWeightAgree) {
-    for (const Widths a : kWidths)
+    for (const Roughness a : kRoughness)
         for (float eta : kEta)
             for (Vec3 wo : test_directions_both_sides()) {
                 SCOPED_TRACE(a.x);
@@ -116,7 +113,7 @@ TEST_P(RoughDielectricOf, ValueDensityAndWeightAgree) {
 }
 
 TEST_P(RoughDielectricOf, AlbedoAgreesWithQuadratureAndLosesOnlyMultipleScattering) {
-    for (const Widths a : kWidths)
+    for (const Roughness a : kRoughness)
         for (Vec3 wo : test_directions_both_sides()) {
             SCOPED_TRACE(a.x);
             // Red sees all, green the reflection alone.
@@ -136,7 +133,7 @@ TEST_P(RoughDielectricOf, AlbedoAgreesWithQuadratureAndLosesOnlyMultipleScatteri
 
 TEST_P(RoughDielectricOf, IsFinite) {
     for (float eta : kEta) {
-        for (const Widths a : kWidths) expect_finite(rough_glass(GetParam(), a, eta));
+        for (const Roughness a : kRoughness) expect_finite(rough_glass(GetParam(), a, eta));
         expect_finite(rough_glass(GetParam(), {0, 0}, eta));
         expect_finite(rough_glass(GetParam(), {100, 100}, eta));
     }

@@ -3,17 +3,16 @@
 #include "bsdf/microfacet.h"
 
 #include "lobe_tests.h"
+#include "roughness.h"
 
 namespace etendue {
 namespace {
 
 using testing::direction;
+using testing::Roughness;
 
-struct Alpha {
-    float x, y;
-};
-constexpr Alpha kAlphaPairs[] = {{1, 1},           {0.5f, 0.5f},  {0.1f, 0.1f},
-                                 {0.001f, 0.001f}, {0.4f, 0.08f}, {0.05f, 0.8f}};
+constexpr Roughness kAlphaPairs[] = {{1, 1},           {0.5f, 0.5f},  {0.1f, 0.1f},
+                                     {0.001f, 0.001f}, {0.4f, 0.08f}, {0.05f, 0.8f}};
 constexpr double kAngles[] = {0, 30, 60, 85, 89.5};
 
 class MicrofacetOf : public ::testing::TestWithParam<Microfacet::Kind> {};
@@ -40,7 +39,7 @@ double integrate_normals(const Microfacet& d, const F& f) {
 }
 
 TEST_P(MicrofacetOf, ProjectedAreaOfNormalsIsOne) {
-    for (const Alpha a : kAlphaPairs) {
+    for (const Roughness a : kAlphaPairs) {
         const Microfacet d(GetParam(), a.x, a.y);
         EXPECT_NEAR(integrate_normals(d, [&](Vec3 m) { return d.D(m) * m.z; }), 1, 1e-3)
             << a.x << " " << a.y;
@@ -48,7 +47,7 @@ TEST_P(MicrofacetOf, ProjectedAreaOfNormalsIsOne) {
 }
 
 TEST_P(MicrofacetOf, SigmaIsTheProjectedAreaOfFacingNormals) {
-    for (const Alpha a : kAlphaPairs)
+    for (const Roughness a : kAlphaPairs)
         for (const double theta : kAngles) {
             const Microfacet d(GetParam(), a.x, a.y);
             const Vec3 w = direction(theta, 35);
@@ -61,7 +60,7 @@ TEST_P(MicrofacetOf, SigmaIsTheProjectedAreaOfFacingNormals) {
 
 TEST_P(MicrofacetOf, VisibleNormalsFollowTheirDensity) {
     const double significance = sidak(1e-3, 2 * int(std::size(kAlphaPairs) * std::size(kAngles)));
-    for (const Alpha a : kAlphaPairs)
+    for (const Roughness a : kAlphaPairs)
         for (const double theta : kAngles) {
             const Microfacet d(GetParam(), a.x, a.y);
             const Vec3 w = direction(theta, 35);
