@@ -13,7 +13,7 @@ public:
     explicit ExpectedLuminance(const FilmGeometry& geometry)
         : geometry_(geometry), pixels_(geometry.pixel_count()) {}
 
-    /// Mean luminance of a pixel in the finished passes, at least a tenth of the image's mean; 0 in the first pass.
+    /// Mean luminance of a pixel in the passes before this generation, at least a tenth of the image's mean; 0 in the first one.
     float at(uint64_t pixel) const { return pixels_[pixel]; }
     /// The same at a film point (clamped to the crop), averaged over a block of pixels. Splats read this in random
     /// order; unlike the pixels, the blocks fit into the processor's cache.

@@ -126,7 +126,7 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     const size_t g = has_groups() ? passes_ % group_sums_.size() : 0;
     float* const group = has_groups() ? group_sums_[g].data() : nullptr;
     // All memory is allocated before anything changes, so that a failure leaves the totals unchanged.
-    std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks);
+    std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks), pass_sum(chunks);
     for (std::vector<double>* list : {&pass_means_, &pair_errors_})
         if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);
     ++passes_;
@@ -161,9 +161,11 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
             // correlated.
             const double scale2 = sqr(double(mean_of(i))) + 0.01 * mean * mean;
             if (scale2 > 0) pair_sum[chunk] += 0.5 * sqr(double(previous_[i])) / scale2;
+            pass_sum[chunk] += error2_of_pass(i, mean);
         }
     });
     pair_errors_.push_back(sum_of_chunks(pair_sum) / double(n));
+    error2_of_pass_ = sum_of_chunks(pass_sum) / double(n);
 }
 
 void Film::renew_expected() {
@@ -283,21 +285,23 @@ size_t Film::noisy_pairs() const {
     return is_merged_ ? 0 : std::min<size_t>(pair_errors_.size() / 4, 8);
 }
 
-double Film::error2_of_pass() const {
+double Film::error2_of_pass(uint64_t pixel, double mean) const {
+    const double n = double(passes_), y = exact_luminance(moments_[pixel].sum) / n;
+    const double scale2 = y * y + 0.01 * mean * mean;
+    const double variance = std::max(0.0, luminance_squares_[pixel] / n - y * y) * n / (n - 1);
+    return scale2 > 0 ? variance / scale2 : 0;
+}
+
+void Film::renew_error2_of_pass() {
     const uint64_t pixels = moments_.size(), chunks = film_chunks(pixels);
-    const double n = double(passes_), mean = mean_luminance().mean;
+    const double mean = mean_luminance().mean;
     std::vector<double> error_sum(chunks);
     for_film_chunks(pixels, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
-        for (uint64_t i = begin; i < end; ++i) {
-            const double y = exact_luminance(moments_[i].sum) / n;
-            const double scale2 = y * y + 0.01 * mean * mean;
-            const double variance = std::max(0.0, luminance_squares_[i] / n - y * y) * n / (n - 1);
-            if (scale2 > 0) error_sum[chunk] += variance / scale2;
-        }
+        for (uint64_t i = begin; i < end; ++i) error_sum[chunk] += error2_of_pass(i, mean);
     });
     double error2 = 0;
     for (const double sum : error_sum) error2 += sum;
-    return error2 / double(pixels);
+    error2_of_pass_ = error2 / double(pixels);
 }
 
 ErrorEstimate Film::error() const {
@@ -316,7 +320,7 @@ ErrorEstimate Film::error() const {
         std::sqrt(std::max(0.0, square / double(count) - mean * mean) / double(count - 1));
     const double relative_half =
         mean > 0 ? student_quantile(0.05, double(count - 1)) * spread / mean : 0.0;
-    const double error2 = (is_merged_ ? error2_of_pass() : mean) / double(passes_);
+    const double error2 = error2_of_pass_ / double(passes_);
     e.relative_rms = std::sqrt(error2);
     e.low = std::sqrt(error2 * std::max(0.0, 1 - relative_half));
     e.high = std::sqrt(error2 * (1 + relative_half));

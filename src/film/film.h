@@ -128,8 +128,7 @@ public:
     std::vector<Rgb> image() const;
     /// Variance of that mean, per pixel and channel; zero with fewer than two passes.
     std::vector<Rgb> variance() const;
-    /// Reads the sums of all groups if there are any; otherwise only one number for each pair of passes, and, of a sum of
-    /// films, the moments.
+    /// Reads the sums of all groups if there are any; otherwise only one number for each pair of passes.
     ErrorEstimate error() const;
     bool has_groups() const { return !group_sums_.empty(); }
     int groups() const { return int(group_sums_.size()); }
@@ -172,10 +171,12 @@ private:
     /// Squared error of the mean luminance of a pixel, estimated from the groups 2·pair and 2·pair + 1.
     double group_error2(size_t pair, size_t pixel) const;
     ErrorEstimate group_error() const;
-    /// Relative squared error of one pass, from the moments of all passes.
-    double error2_of_pass() const;
+    /// Relative squared error of one pass in a pixel, from the moments of all passes. `mean`: luminance of the crop.
+    double error2_of_pass(uint64_t pixel, double mean) const;
+    /// Sets error2_of_pass_ from the totals, of which there must be at least two passes.
+    void renew_error2_of_pass();
     /// Number of pairs of passes at the beginning whose errors are relative to a mean that was still noisy. They are left
-    /// out when there are others. In short films all are like that, so that a sum of films uses only how they differ.
+    /// out when there are others, but not in a sum of films, where all may be like that: only their spread matters.
     size_t noisy_pairs() const;
     /// Adds the pixels of this process, whose values are `pass`, to the totals.
     void fold(std::span<const Rgb> pass, double splat_factor);
@@ -197,14 +198,17 @@ private:
     /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. With
     /// groups: the luminance of the eye paths in the pass that is being added.
     std::vector<float> previous_;
-    std::vector<double>
-        pair_errors_;  ///< Relative squared error of one pass, from each pair of passes.
+    /// Relative squared error of one pass, from each pair of passes: their spread gives the interval. They are relative to the
+    /// mean of their time, and that is bright where the pair is, so their mean would be too small.
+    std::vector<double> pair_errors_;
+    /// Relative squared error of one pass, from the moments after the last pair.
+    double error2_of_pass_ = 0;
     std::vector<double> pass_means_;
     std::vector<std::vector<float>> group_sums_;  ///< Sums of luminance, by group and pixel.
     std::vector<uint64_t> group_passes_;
     uint64_t passes_ = 0, rejected_ = 0;
     bool is_merged_ = false;  ///< Whether it is a sum of several films.
-    /// Sums of squared luminance, by pixel, from which such a sum gets its error. Empty with groups.
+    /// Sums of squared luminance, by pixel, for the error. Empty with groups.
     std::vector<double> luminance_squares_;
 
     const Ranks* ranks_ = &kAlone;

@@ -27,6 +27,7 @@ void Film::save(SectionWriter& to) const {
     to.put(moments_);
     to.put(pass_means_);
     to.put(pair_errors_);
+    to.put(error2_of_pass_);
     to.put(group_passes_);
     for (const std::vector<float>& sums : group_sums_) to.put(sums);
     to.put(luminance_squares_);
@@ -48,6 +49,7 @@ void Film::load(SectionReader& from) {
     from.get(pair_errors_);
     if (pair_errors_.size() > passes_ / 2)
         from.fail(fmt::format("{} pairs of {} passes", pair_errors_.size(), passes_));
+    from.get(error2_of_pass_);
     from.get(group_passes_);
     if (has_groups() && group_passes_.size() != group_sums_.size())
         from.fail(fmt::format("{} groups of passes, but expected {}", group_passes_.size(),
@@ -91,6 +93,7 @@ void Film::merge(const Film& other) {
     passes_ += other.passes_;
     rejected_ += other.rejected_;
     is_merged_ = true;
+    if (!has_groups() && passes_ > 1) renew_error2_of_pass();
 }
 
 }  // namespace etendue
