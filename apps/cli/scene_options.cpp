@@ -8,6 +8,7 @@
 #include "readers/scene_file.h"
 #include "render/render_request.h"
 #include "scene/builder.h"
+#include "system/memory_limit.h"
 
 namespace etendue {
 namespace {
@@ -52,6 +53,16 @@ void SceneOptions::add_reading_options(CLI::App& command) {
                        "Sensor to use, by its number (from 0) or its name; see etendue info");
     command.add_option("--resolution", resolution, "Image size WxH instead of the file's");
     command.add_option("--crop", crop, "Part of the image to render: x,y,w,h in pixels");
+    command
+        .add_option("--memory", memory,
+                    "Memory that the program may take, such as 4G (default: what is free)")
+        ->transform(CLI::AsSizeValue(false));
+    command.parse_complete_callback([this] {
+        if (memory)
+            limit_memory(*memory);
+        else
+            limit_memory_to_available();
+    });
 }
 
 SceneDescription read_scene(const SceneOptions& options) {

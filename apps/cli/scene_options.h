@@ -1,6 +1,8 @@
 #pragma once
 // Options and steps shared by every subcommand that reads a scene.
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,8 @@ struct SceneOptions {
     bool lenient = false;
     bool watertight = false;
     std::string resolution, crop, sensor;
+    /// Limit of this process, in bytes, from the parsing of the command line on; if empty, what the machine has.
+    std::optional<uint64_t> memory;
     int threads = 0;  ///< Of BuildOptions; set by commands that have --threads.
 
     void add_to(CLI::App& command);

@@ -63,14 +63,8 @@ RenderSettings settings_of(const RenderRequest& request, const Scene& scene) {
 
 RenderSettings settings_of(const RenderRequest& request, IntegratorSpec integrator) {
     RenderSettings s;
-    static_cast<RenderLimits&>(s) = request;
+    static_cast<RenderOptions&>(s) = request;
     s.integrator = std::move(integrator);
-    s.sampler = request.sampler;
-    s.filter_mode = request.filter_mode;
-    s.seed = request.seed;
-    s.first_pass = request.first_pass;
-    s.threads = request.threads;
-    s.technique_depth = request.technique_depth;
     return s;
 }
 

@@ -9,13 +9,10 @@
 namespace etendue {
 
 /// A rendering as users ask for it. Its defaults are theirs.
-struct RenderRequest : RenderLimits {
+struct RenderRequest : RenderOptions {
+    RenderRequest() { sampler = SamplerKind::Sobol; }
+
     std::string integrator;  ///< As choose_integrator() takes it.
-    SamplerKind sampler = SamplerKind::Sobol;
-    FilterMode filter_mode = FilterMode::Spread;
-    uint64_t seed = 0, first_pass = 0;
-    int threads = 0;          ///< 0: one per core.
-    int technique_depth = 0;  ///< Technique images up to this many edges; 0 for none.
 };
 
 RenderSettings settings_of(const RenderRequest& request, const Scene& scene);

@@ -78,20 +78,25 @@ void lower_by_groups(std::optional<uint64_t>& least, const std::string& proc,
     }
 }
 
-/// What `ulimit -v` leaves.
-void lower_by_address_space(std::optional<uint64_t>& least, const std::string& proc) {
+/// What a limit of the process leaves of that of which it has `used`.
+void lower_by_limit(std::optional<uint64_t>& least, decltype(RLIMIT_AS) kind,
+                    std::optional<uint64_t> used) {
     rlimit limit{};
-    if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return;
-    if (const auto used = entry(proc + "/self/status", "VmSize:"))
-        lower(least, uint64_t(limit.rlim_cur) - std::min(*used, uint64_t(limit.rlim_cur)));
+    if (getrlimit(kind, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY || !used) return;
+    lower(least, uint64_t(limit.rlim_cur) - std::min(*used, uint64_t(limit.rlim_cur)));
 }
 
 }  // namespace
 
+std::optional<uint64_t> memory_for_data(const std::string& proc) {
+    return entry(proc + "/self/status", "VmData:");
+}
+
 std::optional<uint64_t> available_memory(const std::string& proc, const std::string& cgroup) {
     std::optional<uint64_t> least = entry(proc + "/meminfo", "MemAvailable:");
     lower_by_groups(least, proc, cgroup);
-    lower_by_address_space(least, proc);
+    lower_by_limit(least, RLIMIT_AS, entry(proc + "/self/status", "VmSize:"));
+    lower_by_limit(least, RLIMIT_DATA, memory_for_data(proc));
     return least;
 }
 

@@ -10,11 +10,14 @@
 namespace etendue {
 
 /// Bytes that this process can still use: the least of what the system has, what its control groups allow, and what its
-/// limit of address space leaves. Empty where the system does not tell.
+/// limits of address space and of memory for data leave. Empty where the system does not tell.
 std::optional<uint64_t> available_memory();
 
 /// The same from other files: `proc` stands for /proc, `cgroup` for /sys/fs/cgroup.
 std::optional<uint64_t> available_memory(const std::string& proc, const std::string& cgroup);
+
+/// Bytes of private memory that this process can write, used or not.
+std::optional<uint64_t> memory_for_data(const std::string& proc);
 
 /// "1.5 GiB", "12 MiB", ...
 std::string format_bytes(uint64_t bytes);

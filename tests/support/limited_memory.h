@@ -31,7 +31,7 @@ constexpr bool kCanLimitMemory = true;
 
 /// Limits the memory of this process to what it has and so many bytes more, where that is possible. What is free in the heap
 /// would come on top, and is taken away.
-inline void limit_memory(uint64_t more) {
+inline void limit_address_space(uint64_t more) {
     if (!kCanLimitMemory) return;
     std::ifstream statm("/proc/self/statm");
     uint64_t pages = 0;
@@ -57,7 +57,7 @@ std::string in_limited_memory(uint64_t more, const Action& action) {
     if (pipe(ends) != 0) return "no pipe";
     const pid_t child = fork();
     if (child == 0) {
-        limit_memory(more);
+        limit_address_space(more);
         alarm(60);
         std::string text;
         try {

@@ -25,30 +25,5 @@ TEST(RenderRequest, OtherNamesAreRefusedWithTheNearest) {
               "filter_mode must be spread or sample, but is \"Spread\"; did you mean \"spread\"?");
 }
 
-/// A new option that is not passed on is a difference here.
-TEST(RenderRequest, AllOfItIsInTheSettings) {
-    RenderRequest request;
-    request.spp = 3;
-    request.seconds = 4;
-    request.error = 0.5;
-    request.sampler = SamplerKind::Independent;
-    request.filter_mode = FilterMode::Sample;
-    request.seed = 5;
-    request.first_pass = 6;
-    request.threads = 7;
-    request.technique_depth = 8;
-    const RenderSettings s = settings_of(request, IntegratorSpec::parse("bdpt:max_depth=9"));
-    EXPECT_EQ(s.spp, 3u);
-    EXPECT_EQ(s.seconds, 4);
-    EXPECT_EQ(s.error, 0.5);
-    EXPECT_EQ(s.integrator.to_string(), "bdpt:max_depth=9");
-    EXPECT_EQ(s.sampler, SamplerKind::Independent);
-    EXPECT_EQ(s.filter_mode, FilterMode::Sample);
-    EXPECT_EQ(s.seed, 5u);
-    EXPECT_EQ(s.first_pass, 6u);
-    EXPECT_EQ(s.threads, 7);
-    EXPECT_EQ(s.technique_depth, 8);
-}
-
 }  // namespace
 }  // namespace etendue::test

@@ -1,0 +1,29 @@
+#pragma once
+// A limit of the memory of this process.
+
+#include <cstdint>
+
+namespace etendue {
+
+/// Limits the memory for data (private memory that can be written; each thread has 8 MiB of it for its stack): an allocation
+/// beyond `bytes` fails, which is std::bad_alloc, and available_memory() is what is left. A limit of the system that is
+/// lower stays. Throws std::runtime_error if the process already has more.
+void limit_memory(uint64_t bytes);
+
+/// The same with what the system and its control groups have now, so that what does not fit fails here, instead of the
+/// process being ended. No limit where that is unknown, or where address space says nothing about memory (sanitizers).
+void limit_memory_to_available();
+
+/// Lifts it for a while, such as for writing what there is after an allocation has failed.
+class UnlimitedMemory {
+public:
+    UnlimitedMemory();
+    ~UnlimitedMemory();
+    UnlimitedMemory(const UnlimitedMemory&) = delete;
+    UnlimitedMemory& operator=(const UnlimitedMemory&) = delete;
+
+private:
+    uint64_t limit_;
+};
+
+}  // namespace etendue
