@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 #include <new>
 
 #include <CLI/CLI.hpp>
@@ -32,8 +33,11 @@
 #include "render/warnings.h"
 #include "scene_options.h"
 #include "system/available_memory.h"
+#include "system/descriptor.h"
+#include "system/memory_limit.h"
 #include "system/output_file.h"
 #include "system/ranks.h"
+#include "system/section_file.h"
 #include "technique_files.h"
 
 namespace etendue {
@@ -104,16 +108,39 @@ public:
         const Clock::time_point begin = Clock::now();
         task();
         last_ = Clock::now();
-        wait_ = std::max(interval_, seconds_since(begin) / most_);
+        const double taken = seconds_since(begin);
+        wait_ = std::max(interval_, taken / most_);
+        seconds_ += taken;
+        ++calls_;
     }
+    /// Number of calls, and the seconds that they took.
+    uint64_t calls() const { return calls_; }
+    double seconds() const { return seconds_; }
 
 private:
     using Clock = std::chrono::steady_clock;
     static double seconds_since(Clock::time_point t) {
         return std::chrono::duration<double>(Clock::now() - t).count();
     }
-    double interval_, most_, wait_ = interval_;
+    double interval_, most_, wait_ = interval_, seconds_ = 0;
+    uint64_t calls_ = 0;
     Clock::time_point last_ = Clock::now();
+};
+
+/// A file that becomes durable while the rendering goes on.
+class LaterCommit {
+public:
+    /// After finish().
+    void begin(std::unique_ptr<SectionWriter> file) {
+        result_ = std::async(std::launch::async, [file = std::move(file)] { file->commit(); });
+    }
+    /// Waits for the file. Throws if it could not be written.
+    void finish() {
+        if (result_.valid()) result_.get();
+    }
+
+private:
+    std::future<void> result_;
 };
 
 /// Progress on stderr: on a terminal one line that is rewritten, otherwise new lines at growing intervals.
@@ -296,6 +323,11 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
     return failures;
 }
 
+/// A failure of which all processes know. The first one reports it.
+struct CommonFailure : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
 /// Calls `task` in all processes. If it fails in one of them, it fails in all.
 template <class Task>
 auto together(const Ranks& ranks, const Task& task) {
@@ -306,13 +338,16 @@ auto together(const Ranks& ranks, const Task& task) {
     failures = ranks.gather(failures.empty() ? "" : failures.front());
     for (size_t r = 0; r < failures.size(); ++r)
         if (!failures[r].empty())
-            throw std::runtime_error(r == 0 ? failures[r]
-                                            : fmt::format("process {}: {}", r, failures[r]));
+            throw CommonFailure(r == 0 ? failures[r]
+                                       : fmt::format("process {}: {}", r, failures[r]));
     return result;
 }
 
-/// Throws unless all processes make passes with the same bits.
-void check_conditions(const Conditions& conditions, const Ranks& ranks) {
+/// Throws unless all processes make the same passes with the same bits.
+void check_conditions(Conditions conditions, uint64_t passes, const Ranks& ranks) {
+    if (ranks.count() == 1) return;
+    // A checkpoint that not all of them have found.
+    conditions.emplace_back("passes so far", fmt::format("{}", passes));
     const std::vector<std::string> all = ranks.gather(nlohmann::json(conditions).dump());
     for (size_t r = 1; r < all.size(); ++r) {
         if (all[r] == all[0]) continue;
@@ -322,17 +357,27 @@ void check_conditions(const Conditions& conditions, const Ranks& ranks) {
             if (first[i] != other[i])
                 differences.push_back(fmt::format("{}: {} and {}", first[i][0].get<std::string>(),
                                                   first[i][1].dump(), other[i][1].dump()));
-        throw std::runtime_error(
-            fmt::format("processes 0 and {} cannot render one image together; {}", r,
-                        fmt::join(differences, "; ")));
+        throw CommonFailure(fmt::format("processes 0 and {} cannot render one image together; {}",
+                                        r, fmt::join(differences, "; ")));
     }
 }
 
-/// What several processes say is said by the first one.
-void print_nothing() {
-    if (const int nothing = ::open("/dev/null", O_WRONLY | O_CLOEXEC); nothing >= 0)
-        ::dup2(nothing, STDERR_FILENO);
-}
+/// While one exists, nothing is printed: what several processes say is said by the first one.
+class Silence {
+public:
+    Silence() : errors_(::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 0)) {
+        const Descriptor nothing(::open("/dev/null", O_WRONLY | O_CLOEXEC));
+        if (nothing.is_open()) ::dup2(nothing.get(), STDERR_FILENO);
+    }
+    ~Silence() {
+        if (errors_.is_open()) ::dup2(errors_.get(), STDERR_FILENO);
+    }
+    Silence(const Silence&) = delete;
+    Silence& operator=(const Silence&) = delete;
+
+private:
+    Descriptor errors_;
+};
 
 std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) const {
     check_options();
@@ -379,11 +424,22 @@ std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) 
 }
 
 void RenderCommand::run() const {
-    const std::unique_ptr<const Ranks> ranks = join_ranks();
-    if (ranks->index() > 0) print_nothing();
-    const std::unique_ptr<Job> job = together(*ranks, [&] { return make_job(*ranks); });
-    check_conditions(job->conditions, *ranks);
-    render(*job, *ranks);
+    std::unique_ptr<const Ranks> ranks = join_ranks();
+    if (is_first_of_strangers())
+        print_warnings({"mpirun has started several processes, each of which renders the whole "
+                        "image: this program was built without MPI (ETENDUE_MPI)"});
+    std::optional<Silence> silence;
+    if (ranks->index() > 0) silence.emplace();
+    try {
+        const std::unique_ptr<Job> job = together(*ranks, [&] { return make_job(*ranks); });
+        check_conditions(job->conditions, job->renderer->film().passes(), *ranks);
+        render(*job, *ranks);
+    } catch (const CommonFailure&) {
+        // Before any process ends, since mpirun then ends the others.
+        print_failure();
+        ranks.reset();
+        end_at_once(EXIT_FAILURE);
+    }
 }
 
 void RenderCommand::render(Job& job, const Ranks& ranks) const {
@@ -399,24 +455,30 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
             std::make_unique<Preview>(preview, output, s.film().crop_width, s.film().crop_height);
 
     const std::string& saved = checkpoint_file();
-    const auto save = [&] {
-        write_checkpoint(saved, renderer, s, job.conditions, job.settings, log);
+    const auto written_state = [&] {
+        return written_checkpoint(saved, renderer, s, job.conditions, job.settings, log);
     };
+    LaterCommit last_checkpoint;
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
     constexpr double kMostForImages = 0.01;
     Timer checkpoints(saved.empty() ? 0 : checkpoint_every),
         images(is_in_place() ? 0 : write_every, kMostForImages);
-    // All processes gather what the first one writes. What fails now may succeed later, and is no reason to end.
+    // What fails now may succeed later, and is no reason to end.
+    const auto warn_of_failures = [](const auto& task) {
+        std::vector<std::string> problems;
+        attempt(problems, task);
+        print_warnings(problems);
+    };
+    // All processes gather what the first one writes.
     const auto write_if_due = [&](Timer& timer, bool may_be, const auto& task) {
         if (!ranks.of_first(may_be && timer.is_due())) return;
         timer.call([&] {
             renderer.gather();
-            std::vector<std::string> problems;
-            if (is_first) attempt(problems, task);
-            print_warnings(problems);
+            if (is_first) warn_of_failures(task);
         });
     };
     std::string stopped_by, failure;
+    std::optional<UnlimitedMemory> unlimited;
     try {
         ProgressLine line(quiet || !is_first);
         stopped_by = to_string(renderer.run(
@@ -426,7 +488,10 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
                 if (viewer && !viewer->update(renderer.film(), p.seconds)) viewer.reset();
                 const bool goes_on = !interrupts.stop && p.fraction.value_or(0) < 1;
                 if (!p.ends_round) return;
-                write_if_due(checkpoints, goes_on, save);
+                write_if_due(checkpoints, goes_on, [&] {
+                    warn_of_failures([&] { last_checkpoint.finish(); });
+                    last_checkpoint.begin(written_state());
+                });
                 write_if_due(images, goes_on, [&] {
                     write_image(output, image_with_layers(
                                             renderer.film(), job.layers, has_variance,
@@ -436,9 +501,11 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
             interrupts.stop, interrupts.drop));
     } catch (const std::exception& e) {
         // The passes before this one are complete and can be written.
-        if (renderer.film().passes() == 0) throw;
+        if (renderer.film().passes() == 0 || !renderer.ended_together()) throw;
         stopped_by = "failure";
         failure = dynamic_cast<const std::bad_alloc*>(&e) ? "not enough memory" : e.what();
+        // The last pass may have taken all of it, and what there is needs some more to be written.
+        unlimited.emplace();
     }
     const uint64_t passes = renderer.film().passes();
     if (passes == 0) throw std::runtime_error("interrupted in the first pass: nothing was written");
@@ -449,7 +516,12 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     nlohmann::json report = to_json(renderer, s, job.settings, stopped_by, log, &e);
     if (!failure.empty()) report["failure"] = failure;
     std::vector<std::string> failures;
-    if (!saved.empty()) attempt(failures, save);
+    if (!saved.empty()) {
+        warn_of_failures([&] { last_checkpoint.finish(); });
+        report["checkpoints"] = {{"written", checkpoints.calls()},
+                                 {"seconds", checkpoints.seconds()}};
+        attempt(failures, [&] { written_state()->commit(); });
+    }
     for (std::string& f : write_outputs(renderer, job.layers, report))
         failures.push_back(std::move(f));
 

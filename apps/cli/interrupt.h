@@ -35,7 +35,7 @@ struct Interrupts {
 /// Handles the signals from now on by setting these flags; a further signal once `drop` is set ends the program.
 /// `grace`: seconds after the first signal.
 Interrupts catch_interrupts(unsigned grace);
-/// Handles SIGUSR1 in the same way, which mpirun passes on at once.
+/// Handles SIGUSR1 in the same way. mpirun passes this signal on at once.
 void catch_signal_of_mpirun();
 
 }  // namespace etendue

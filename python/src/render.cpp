@@ -172,7 +172,7 @@ public:
                                             settings_.threads, aovs, report()));
     }
     void save_checkpoint(const std::string& file) const {
-        write_checkpoint(file, renderer(), scene_->scene, conditions_, settings_, log_);
+        written_checkpoint(file, renderer(), scene_->scene, conditions_, settings_, log_)->commit();
     }
     /// Before the first pass.
     void resume(const std::string& file) {

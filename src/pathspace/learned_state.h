@@ -7,6 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace etendue {
@@ -43,6 +44,7 @@ public:
     }
 
     const std::vector<std::byte>& bytes() const { return bytes_; }
+    std::vector<std::byte> take() { return std::move(bytes_); }
     /// For reading the values.
     explicit LearnedState(std::vector<std::byte> bytes) : bytes_(std::move(bytes)) {}
     LearnedState() = default;

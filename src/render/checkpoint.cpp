@@ -101,14 +101,15 @@ Conditions conditions_of(const Renderer& renderer, const Scene& scene, const Sce
                                      : "none"}};
 }
 
-void write_checkpoint(const std::string& file, const Renderer& renderer, const Scene& scene,
-                      const Conditions& conditions, const RenderSettings& settings,
-                      const PassLog& log) {
-    SectionWriter to(file);
-    save_header(header_of(renderer, scene, conditions, settings), to);
-    renderer.save(to);
-    save_log(log, to);
-    to.commit();
+std::unique_ptr<SectionWriter> written_checkpoint(const std::string& file, const Renderer& renderer,
+                                                  const Scene& scene, const Conditions& conditions,
+                                                  const RenderSettings& settings,
+                                                  const PassLog& log) {
+    auto to = std::make_unique<SectionWriter>(file);
+    save_header(header_of(renderer, scene, conditions, settings), *to);
+    renderer.save(*to);
+    save_log(log, *to);
+    return to;
 }
 
 std::string partial_result(const Renderer& renderer, const Scene& scene,

@@ -9,6 +9,7 @@
 #include "render/checkpoint_header.h"
 #include "render/render_report.h"
 #include "render/renderer.h"
+#include "system/section_file.h"
 
 namespace etendue {
 
@@ -21,10 +22,13 @@ struct SceneSource {
 Conditions conditions_of(const Renderer& renderer, const Scene& scene, const SceneSource& source,
                          const RenderSettings& settings);
 
-/// Throws std::runtime_error if the file cannot be written; then one that was there before is still there.
-void write_checkpoint(const std::string& file, const Renderer& renderer, const Scene& scene,
-                      const Conditions& conditions, const RenderSettings& settings,
-                      const PassLog& log);
+/// A checkpoint that is written, but not yet under its name, which commit() gives it when it is durable: that takes about as
+/// long again, and another thread can do it. Throws std::runtime_error if it cannot be written; then one that was there
+/// before is still there.
+std::unique_ptr<SectionWriter> written_checkpoint(const std::string& file, const Renderer& renderer,
+                                                  const Scene& scene, const Conditions& conditions,
+                                                  const RenderSettings& settings,
+                                                  const PassLog& log);
 
 /// The sums of a rendering in the same format, for Merging. Nothing goes on from them.
 std::string partial_result(const Renderer& renderer, const Scene& scene,

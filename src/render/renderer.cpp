@@ -204,8 +204,10 @@ std::string what_of(const std::exception_ptr& failure) {
     } catch (const std::bad_alloc&) {
         return "not enough memory";
     } catch (const std::exception& e) {
-        return e.what();
+        if (*e.what() != '\0') return e.what();
+    } catch (...) {
     }
+    return "a failure without a name";
 }
 
 /// Throws if several processes cannot render together.
@@ -221,6 +223,9 @@ void check_ranks(const RenderSettings& settings, const Integrator& integrator) {
         throw std::runtime_error(
             "technique images cannot be rendered by several processes together; give each process "
             "other passes, and merge the results");
+    if (settings.observer)
+        throw std::runtime_error(
+            "contributions cannot be observed where several processes render together");
 }
 
 /// The film's geometry, if there is memory for its film and for the image that is written.
@@ -230,6 +235,7 @@ const FilmGeometry& fitting_film(const Scene& scene, const RenderSettings& setti
     uint64_t bytes =
         g.pixel_count() * Film::bytes_per_pixel(light_paths > 0, integrator.error_groups()) +
         g.pixel_count() * sizeof(Rgb);
+    if (settings.ranks->count() > 1) bytes += g.pixel_count() * sizeof(Rgb);
     if (settings.technique_depth > 0)
         bytes += TechniqueImages::memory_bytes(g.pixel_count(), settings.technique_depth);
     require_memory(bytes, fmt::format("an image of {} x {} pixels", g.crop_width, g.crop_height),
@@ -340,6 +346,7 @@ public:
         r_.integrator_->prepare(context());
         // These paths do not count.
         r_.workers_->take_stats();
+        r_.workers_->take_sums();
     }
     void trace() {
         r_.film_.begin_pass(r_.light_paths_,
@@ -433,9 +440,10 @@ private:
 };
 
 struct Renderer::Round {
-    int passes = 0;  ///< That are wanted: one of each of the first processes.
-    int made = 0;    ///< That can be added: those before the first one that is missing.
-    bool is_dropped = false;
+    int passes = 0;  ///< Number of passes that it asks for: one of each of the first processes.
+    int made =
+        0;  ///< Number of them that can be added: those before the first one that is missing.
+    bool is_incomplete = false;        ///< Whether any is missing.
     std::exception_ptr failure;        ///< Of this process, or what another one says.
     uint64_t rejected_before = 0;      ///< Of the film.
     std::vector<std::string> results;  ///< Statistics and sums of the pass of each process.
@@ -477,7 +485,9 @@ Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atom
     Round round;
     round.passes = round_size(limits);
     round.rejected_before = film_.rejected();
-    if (learned_steps_ == LearningStep::of(uint32_t(film_.passes())).number) gather();
+    // What is learned next is learned from all passes. The processes agree on their number, but if one of them failed, not
+    // on what they have learned already.
+    if (LearningStep::of(uint32_t(film_.passes())).pass == 0) gather();
 
     auto outcome = Outcome::Good;
     std::string failure;
@@ -496,7 +506,7 @@ Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atom
     const auto first_bad = std::find_if(outcomes.begin(), outcomes.end(),
                                         [](Outcome o) { return o != Outcome::Good; });
     round.made = std::min(round.passes, int(first_bad - outcomes.begin()));
-    round.is_dropped = first_bad != outcomes.end();
+    round.is_incomplete = first_bad != outcomes.end();
     if (std::find(outcomes.begin(), outcomes.end(), Outcome::Failed) != outcomes.end()) {
         const std::vector<std::string> failures = ranks.gather(failure);
         for (size_t r = 0; r < failures.size() && !round.failure; ++r)
@@ -504,7 +514,10 @@ Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atom
                 round.failure = std::make_exception_ptr(
                     std::runtime_error(fmt::format("process {}: {}", r, failures[r])));
     }
-    if (round.made > 0) exchange(round);
+    if (round.made > 0)
+        exchange(round);
+    else
+        drop_pass();
     return round;
 }
 
@@ -570,7 +583,7 @@ std::vector<std::byte> Renderer::learned_state() const {
     state.put(learned_steps_);
     state.put(is_prepared_);
     integrator_->save(state);
-    return state.bytes();
+    return state.take();
 }
 
 void Renderer::load_learned_state(std::vector<std::byte> bytes) {
@@ -635,15 +648,10 @@ int Renderer::round_size(const RenderLimits& limits) const {
 }
 
 std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
-                                            const std::optional<ErrorEstimate>& error,
-                                            bool ends_round) const {
+                                            const std::optional<ErrorEstimate>& error) const {
     if (film_.passes() == 0) return {};
     if (film_.passes() >= limits.spp.value_or(kMostPasses - settings_.first_pass))
         return StopReason::Samples;
-    // A round is begun only if at least half of it is expected to fit.
-    if (limits.seconds && ends_round &&
-        seconds_ + 0.5 * seconds_ * round_size(limits) / double(film_.passes()) > *limits.seconds)
-        return StopReason::Time;
     if (limits.error && error && error->valid && error->relative_rms <= *limits.error)
         return StopReason::Error;
     return {};
@@ -657,21 +665,36 @@ StopReason Renderer::run(const RenderLimits& limits,
     const double before = seconds_;
     const Ranks& ranks = *settings_.ranks;
     check_limits(limits, settings_.first_pass);
+    ended_together_ = false;
+    const auto end = [&](StopReason reason) {
+        ended_together_ = true;
+        return reason;
+    };
+    // Where another process was interrupted in its pass, this one may have learned what it has not.
+    if (last_rank_ >= 0) gather();
     // Computed only where it matters, since it may take as long as a pass.
     const auto error_of_image = [&] {
         return limits.error ? std::optional(error()) : std::nullopt;
     };
-    if (const auto reason = reached(limits, error_of_image(), true)) return *reason;
+    seconds_ = ranks.of_first(seconds_);
+    double round_seconds = film_.passes() > 0 ? seconds_ / double(film_.passes()) : 0;
+    // A round is begun only if at least half of it is expected to fit.
+    const auto has_no_time = [&] {
+        return limits.seconds && film_.passes() > 0 &&
+               seconds_ + 0.5 * round_seconds > *limits.seconds;
+    };
+    if (const auto reason = reached(limits, error_of_image())) return end(*reason);
+    if (has_no_time()) return end(StopReason::Time);
     while (true) {
         const double before_round = seconds_;
         Round round = make_round(limits, drop);
+        const double so_far =
+            ranks.of_first(before + std::chrono::duration<double>(Clock::now() - begin).count());
         for (int i = 0; i < round.made; ++i) {
             add_pass(round, i);
-            const double so_far =
-                before + std::chrono::duration<double>(Clock::now() - begin).count();
             // Each pass has its share of the time of the round.
-            seconds_ = ranks.of_first(before_round + (so_far - before_round) *
-                                                         (double(i + 1) / double(round.made)));
+            seconds_ =
+                before_round + (so_far - before_round) * (double(i + 1) / double(round.made));
 
             const std::optional<ErrorEstimate> found = error_of_image();
             Progress now{.renderer = *this,
@@ -691,11 +714,18 @@ StopReason Renderer::run(const RenderLimits& limits,
             progress(now);
 
             if (now.ends_round && ranks.any(interrupted.load(std::memory_order_relaxed)))
-                return StopReason::Interrupted;
-            if (const auto reason = reached(limits, found, now.ends_round)) return *reason;
+                return end(StopReason::Interrupted);
+            if (const auto reason = reached(limits, found)) return end(*reason);
         }
-        if (round.failure) std::rethrow_exception(round.failure);
-        if (round.is_dropped) return StopReason::Interrupted;
+        if (round.failure) {
+            ended_together_ = true;
+            std::rethrow_exception(round.failure);
+        }
+        if (round.is_incomplete) return end(StopReason::Interrupted);
+        // Alone, a round is a pass. The times of passes vary, and their mean less.
+        round_seconds =
+            ranks.count() == 1 ? seconds_ / double(film_.passes()) : so_far - before_round;
+        if (has_no_time()) return end(StopReason::Time);
     }
 }
 

@@ -27,8 +27,8 @@ constexpr uint64_t kMostPasses = uint64_t(1) << 32;
 /// Throws std::runtime_error if a limit is beyond what can be rendered.
 void check_limits(const RenderLimits& limits, uint64_t first_pass = 0);
 
-struct RenderSettings : RenderLimits {
-    IntegratorSpec integrator{"path", {}};
+/// How an image is rendered, apart from the method.
+struct RenderOptions : RenderLimits {
     SamplerKind sampler = SamplerKind::Independent;
     FilterMode filter_mode = FilterMode::Spread;
     uint64_t seed = 0;
@@ -39,6 +39,10 @@ struct RenderSettings : RenderLimits {
         0;  ///< Number of threads of this renderer; 0: one per core. Renderers share no threads.
     /// Technique images up to this many edges; 0 for none.
     int technique_depth = 0;
+};
+
+struct RenderSettings : RenderOptions {
+    IntegratorSpec integrator{"path", {}};
     PathSelection
         shown;  ///< Paths that are added to the image. Other paths are sampled, but not added.
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
@@ -118,6 +122,10 @@ public:
     /// run(), or where Progress::ends_round is true, before the image is read or the state is saved.
     void gather();
 
+    /// Whether the last run() has ended in all processes. Otherwise it has thrown an exception in this one alone: the others
+    /// wait for it in vain, so it must end.
+    bool ended_together() const { return ended_together_ || settings_.ranks->count() == 1; }
+
     const Film& film() const { return film_; }
     uint64_t light_paths() const { return light_paths_; }  ///< Number of light paths in a pass.
     const Integrator& integrator() const { return *integrator_; }
@@ -158,8 +166,7 @@ private:
     void load_learned_state(std::vector<std::byte> bytes);
     /// `error`: empty if there is no limit of the error.
     std::optional<StopReason> reached(const RenderLimits& limits,
-                                      const std::optional<ErrorEstimate>& error,
-                                      bool ends_round) const;
+                                      const std::optional<ErrorEstimate>& error) const;
     /// Number of passes in the next round.
     int round_size(const RenderLimits& limits) const;
 
@@ -176,6 +183,7 @@ private:
     bool has_last_pass_ =
         false;            ///< Whether the integrator has the data of the last finished pass.
     int last_rank_ = -1;  ///< The process whose state is that after the last pass; -1: of each.
+    bool ended_together_ = true;
     RenderStats stats_;
     double seconds_ = 0;
 };

@@ -153,19 +153,34 @@ std::unique_ptr<const Ranks> join_ranks() {
     if (!is_started_by_mpi()) return std::make_unique<Ranks>();
     // All calls come from the thread that renders; its workers make none.
     int level = 0;
-    if (MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &level) != MPI_SUCCESS)
+    if (MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &level) != MPI_SUCCESS ||
+        level < MPI_THREAD_FUNNELED)
         throw std::runtime_error("MPI cannot be initialised");
     return std::make_unique<MpiRanks>();
+}
+
+bool is_first_of_strangers() {
+    return false;
 }
 
 }  // namespace etendue
 
 #else
 
+#include <cstdlib>
+
 namespace etendue {
 
 std::unique_ptr<const Ranks> join_ranks() {
     return std::make_unique<Ranks>();
+}
+
+bool is_first_of_strangers() {
+    const auto number = [](const char* variable) {
+        const char* const text = std::getenv(variable);
+        return text ? std::atoi(text) : 0;
+    };
+    return number("OMPI_COMM_WORLD_SIZE") > 1 && number("OMPI_COMM_WORLD_RANK") == 0;
 }
 
 }  // namespace etendue

@@ -73,4 +73,8 @@ inline const Ranks kAlone;
 /// called once. The object must live until all of them have finished their work; if one ends before, they are all ended.
 std::unique_ptr<const Ranks> join_ranks();
 
+/// Whether mpirun has started several processes that join_ranks() cannot connect, since the program was built without MPI.
+/// True in the first of them alone.
+bool is_first_of_strangers();
+
 }  // namespace etendue

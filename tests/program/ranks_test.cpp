@@ -129,7 +129,7 @@ TEST_F(RanksTest, SignalsLeaveACheckpointAndAnImage) {
         EXPECT_TRUE(ranks_of_job().empty());
         EXPECT_TRUE(fs::exists(path("part.exr")));
         const uint64_t passes = info("part")["spp"];
-        expect_run(render("whole", {"-i", "light", "--spp", std::to_string(passes), "--quiet"}), 0);
+        expect_run(render("whole", {"-i", "bdpt", "--spp", std::to_string(passes), "--quiet"}), 0);
         expect_same_bits("part", "whole");
     }
 }

@@ -100,7 +100,7 @@ public:
     }
     void write(const std::string& name, const Renderer& r, const RenderSettings& settings,
                const PassLog& log) const {
-        write_checkpoint(file(name), r, scene_, conditions(r, settings), settings, log);
+        written_checkpoint(file(name), r, scene_, conditions(r, settings), settings, log)->commit();
     }
     /// Loads a checkpoint and renders until there are `passes`.
     Outcome resume(const std::string& name, const RenderSettings& settings, uint64_t passes) const {
@@ -134,10 +134,10 @@ Scene with_wide_filter(const std::string& body) {
 }
 
 TEST_P(Checkpoints, GiveTheSameBits) {
-    constexpr int kSize = 16;
-    const uint64_t refit = refit_pass(GetParam(), kSize * kSize);
-    const Scene scene = with_wide_filter(refit > 0 ? lantern_room(lens_camera(kSize))
-                                                   : mixed_room(lens_camera(kSize)));
+    const uint64_t refit = refit_pass(GetParam());
+    const Scene scene =
+        with_wide_filter(refit > 0 ? lantern_room(lens_camera(image_size(GetParam())))
+                                   : mixed_room(lens_camera(16)));
     const Renderings renderings(scene);
     RenderSettings settings = settings_of(GetParam());
     settings.technique_depth = 4;

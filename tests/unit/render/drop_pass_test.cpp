@@ -249,9 +249,9 @@ TEST(DropPassOfPhotons, ChangesNothing) {
 /// Guides, whose training takes seconds. Nothing of it may be left where it is dropped.
 class DropTraining : public DropPass {
 protected:
-    DropTraining() : DropPass(build(lantern_room(lens_camera(24)))) {
+    DropTraining() : DropPass(build(lantern_room(lens_camera(36)))) {
         settings.technique_depth = 0;
-        settings.spp = 65;  // A refit of 4000 walks comes before pass 64.
+        settings.spp = 65;  // A refit of 8000 walks comes before pass 64.
     }
     /// The number of groups of training walks in a whole rendering, and the pass of each.
     std::vector<uint32_t> groups() {
@@ -285,8 +285,8 @@ TEST_P(DropTraining, AnywhereChangesNothing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Guided, DropTraining,
-                         ::testing::Values("path:guide=on,guide_walks=4000",
-                                           "bdpt:guide=on,guide_walks=4000"),
+                         ::testing::Values("path:guide=on,guide_walks=8000",
+                                           "bdpt:guide=on,guide_walks=8000"),
                          [](const auto& p) {
                              const std::string name = p.param;
                              return name.substr(0, name.find(':'));

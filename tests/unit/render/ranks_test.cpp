@@ -102,9 +102,8 @@ class SharedRendering : public ::testing::TestWithParam<const char*> {};
 TEST_P(SharedRendering, HasTheSameBits) {
     // Methods whose passes depend on those before them.
     static const std::set<std::string> kChained{"pssmlt", "mmlt", "mlt", "upg+pssmlt"};
-    constexpr int kSize = 24;
-    const uint32_t refit = refit_pass(GetParam(), kSize * kSize);
-    const std::string camera = with_filter(lens_camera(kSize), "gaussian");
+    const uint32_t refit = refit_pass(GetParam());
+    const std::string camera = with_filter(lens_camera(image_size(GetParam())), "gaussian");
     const Scene scene = build(refit > 0 ? lantern_room(camera) : mixed_room(camera));
     RenderSettings settings = settings_of(GetParam());
     settings.spp = refit > 0 ? refit + 2 : 18;

@@ -11,12 +11,14 @@
 
 #include <gtest/gtest.h>
 
+#include "math/vec.h"
+
 namespace etendue::test {
 
 inline const std::vector<const char*>& resumable_methods() {
     static const std::vector<const char*> methods{
         "path",
-        "path:guide=on,guide_roulette=false,guide_walks=4000",
+        "path:guide=on,guide_roulette=false,guide_walks=8000",
         "light",
         "light:guide=on,guide_walks=2000",
         "bdpt",
@@ -31,7 +33,7 @@ inline const std::vector<const char*>& resumable_methods() {
         "upg:eorr=true",
         "upg:guide=on,guide_walks=2000",
         "upg+bdpt",
-        "upg+bdpt:guide=on,guide_walks=4000",
+        "upg+bdpt:guide=on,guide_walks=8000",
         "sppm",
         "sppm:eorr=true",
         "ppm:eorr=true,eye_paths=3",
@@ -54,13 +56,23 @@ inline const std::vector<const char*>& resumable_methods() {
     return methods;
 }
 
-/// The first pass before which a method refits its guide, for images with this many pixels: there are at least eight times as
-/// many samples as walks, and integrators learn. 0 if it has no guide.
-inline uint32_t refit_pass(std::string_view method, uint32_t pixels) {
+/// Number of the walks that train a method's guide; 0 if it has none.
+inline uint32_t guide_walks(std::string_view method) {
     constexpr std::string_view kWalks = "guide_walks=";
     const size_t at = method.find(kWalks);
-    if (at == std::string_view::npos) return 0;
-    const auto walks = uint32_t(std::atoi(method.data() + at + kWalks.size()));
+    return at == std::string_view::npos ? 0 : uint32_t(std::atoi(&method[at + kWalks.size()]));
+}
+
+/// Width and height of an image for a test of one of them: with a guide, so many pixels that few passes come before a refit.
+inline int image_size(std::string_view method) {
+    return guide_walks(method) > 0 ? 36 : 24;
+}
+
+/// The first pass of such an image before which a method refits its guide: there are at least eight times as many samples as
+/// walks, and integrators learn. 0 if it has no guide.
+inline uint32_t refit_pass(std::string_view method) {
+    const uint32_t walks = guide_walks(method), pixels = uint32_t(sqr(image_size(method)));
+    if (walks == 0) return 0;
     uint32_t pass = 1;
     while (pass * pixels < 8 * walks) pass *= 4;
     return pass;

@@ -68,9 +68,8 @@ class Resume : public ::testing::TestWithParam<const char*> {};
 TEST_P(Resume, GivesTheSameBits) {
     // With a filter that is wider than a pixel, the film points of a pass have a common place within their pixels, which
     // differs from pass to pass.
-    constexpr int kSize = 24;
-    const uint32_t refit = refit_pass(GetParam(), kSize * kSize);
-    const std::string camera = with_filter(lens_camera(kSize), "gaussian");
+    const uint32_t refit = refit_pass(GetParam());
+    const std::string camera = with_filter(lens_camera(image_size(GetParam())), "gaussian");
     const Scene scene = build(refit > 0 ? lantern_room(camera) : mixed_room(camera));
     RenderSettings settings;
     settings.sampler = SamplerKind::Sobol;
