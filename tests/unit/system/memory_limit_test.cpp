@@ -56,7 +56,8 @@ TEST_F(MemoryLimit, FailsAllocationsBeyondIt) {
 }
 
 TEST_F(MemoryLimit, IsNoLessThanTheProgramHas) {
-    const std::string error = in_limited_memory(1024 * kMebibyte, [] { limit_memory(kMebibyte / 4); });
+    const std::string error =
+        in_limited_memory(1024 * kMebibyte, [] { limit_memory(kMebibyte / 4); });
     EXPECT_TRUE(error.starts_with("the memory cannot be limited to 0 MiB, since the program needs"))
         << error;
 }
