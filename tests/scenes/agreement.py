@@ -45,29 +45,37 @@ def add_arguments(parser):
     parser.add_argument("--etendue", default=str(ROOT / "build/release/etendue"))
     parser.add_argument("--variant", help="variant of Mitsuba (default: llvm_ad_rgb if LLVM 16 or later is found)")
     parser.add_argument("--threads", type=int, default=os.cpu_count())
+    name = pathlib.Path(sys.argv[0]).stem.replace("_", "-")
+    parser.add_argument(
+        "--json",
+        type=pathlib.Path,
+        default=ROOT / f"out/{name}.json",
+        help=f"JSON report, which keeps what it has from earlier runs (default: out/{name}.json)",
+    )
+
+
+def earlier_report(args, kind):
+    """The contents of the report, or one without any `kind` ("cases") yet, and a folder for it."""
+    args.json.parent.mkdir(parents=True, exist_ok=True)
+    return json.loads(args.json.read_text()) if args.json.exists() else {kind: {}}
 
 
 def start(parser, kind, table):
-    """The arguments, Mitsuba, and the file and contents of the report, with the `kind` ("cases") of earlier runs.
+    """The arguments, Mitsuba, and the contents of the report, with the `kind` ("cases") of earlier runs.
 
     With --table, prints the report by the function `table` and ends.
     """
-    name = pathlib.Path(sys.argv[0]).stem.replace("_", "-")
-    parser.add_argument(
-        "--json", default=f"{name}.json", help=f"JSON report; {kind} of earlier runs are kept"
-    )
     parser.add_argument("--pictures", help="existing folder for the mean image of each renderer")
     parser.add_argument("--table", action="store_true", help="only print the JSON file as a table")
     args = parser.parse_args()
-    output = pathlib.Path(args.json)
     if args.table:
-        print(table(json.loads(output.read_text())))
+        print(table(json.loads(args.json.read_text())))
         sys.exit()
     ensure_packages()
     mitsuba = Mitsuba(args)
-    report = json.loads(output.read_text()) if output.exists() else {kind: {}}
+    report = earlier_report(args, kind)
     report["mitsuba"] = mitsuba.version
-    return args, mitsuba, output, report
+    return args, mitsuba, report
 
 
 def default_variant():

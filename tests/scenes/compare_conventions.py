@@ -322,7 +322,7 @@ def main():
     agreement.add_arguments(parser)
     parser.add_argument("--runs", type=int, default=8)
     parser.add_argument("--spp", type=int, default=128, help="samples per pixel of each run")
-    args, mitsuba, output, report = agreement.start(parser, "cases", markdown_table)
+    args, mitsuba, report = agreement.start(parser, "cases", markdown_table)
     surprises = 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
@@ -350,7 +350,7 @@ def main():
                 flush=True,
             )
             report["cases"][name] = result
-    output.write_text(json.dumps(report, indent=1) + "\n")
+    args.json.write_text(json.dumps(report, indent=1) + "\n")
     sys.exit(1 if surprises else 0)
 
 

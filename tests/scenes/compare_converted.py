@@ -156,7 +156,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1, help="of the first run")
     parser.add_argument("--spp", type=int, default=1024, help="samples per pixel of each run of small images")
     parser.add_argument("--mitsuba-spp", type=int, default=128, help="the same of Mitsuba, which is slower")
-    args, mitsuba, output, report = agreement.start(parser, "scenes", markdown_table)
+    args, mitsuba, report = agreement.start(parser, "scenes", markdown_table)
     root = agreement.ROOT
     files = sorted([*root.glob("tests/scenes/formats/[gmp]*/*"), *root.glob("scenes/*.xml")])
     scenes = {f"{file.parent.name}/{file.stem}": file for file in files}
@@ -179,7 +179,7 @@ def main():
             agreed = result.get("agrees") or result.get("converted", {}).get("agrees", False)
             surprises += agreed == (name in DIFFERENT)
             report["scenes"][name] = result
-            output.write_text(json.dumps(report, indent=1) + "\n")
+            args.json.write_text(json.dumps(report, indent=1) + "\n")
     sys.exit(1 if surprises else 0)
 
 

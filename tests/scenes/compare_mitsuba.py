@@ -179,20 +179,18 @@ def main():
     parser.add_argument("--runs", type=int, default=16)
     parser.add_argument("--seconds", type=float, default=60, help="seconds for all runs of a renderer")
     parser.add_argument("--max-depth", type=int, help="longest path in edges, instead of that of the file")
-    parser.add_argument("--json", default="compare-mitsuba.json")
     parser.add_argument("--pictures", help="folder for the mean image of each renderer")
     parser.add_argument("--table", action="store_true", help="only print the JSON file as tables")
     args = parser.parse_args()
     if args.table:
-        print(markdown_tables(json.loads(pathlib.Path(args.json).read_text())))
+        print(markdown_tables(json.loads(args.json.read_text())))
         return
     agreement.ensure_packages()
 
     root = os.environ.get("ETENDUE_SCENES", agreement.ROOT.parent / "shared" / "scenes")
     mitsuba = agreement.Mitsuba(args)
     names = args.scenes or known
-    output = pathlib.Path(args.json)
-    report = json.loads(output.read_text()) if output.exists() else {"scenes": {}}
+    report = agreement.earlier_report(args, "scenes")
     report["mitsuba"] = mitsuba.version
     with tempfile.TemporaryDirectory() as temporary:
         temporary = pathlib.Path(temporary)
@@ -216,7 +214,7 @@ def main():
                 "runs": args.runs,
                 "renderers": results,
             }
-            output.write_text(json.dumps(report, indent=1) + "\n")
+            args.json.write_text(json.dumps(report, indent=1) + "\n")
 
 
 if __name__ == "__main__":
