@@ -280,12 +280,14 @@ def slurm(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
                 wait_until(lambda: output_of("sinfo", "--noheader", "--format=%t") == "idle", 60, "Slurm does not start")
                 yield folder
             finally:
-                output_of("scancel", "--user", user)
-                wait_for_jobs()
-                print((folder / "log").read_text())
-                for daemon in reversed(daemons):
-                    daemon.terminate()
-                    daemon.wait()
+                try:
+                    output_of("scancel", "--user", user)
+                    wait_for_jobs()
+                finally:
+                    print((folder / "log").read_text())
+                    for daemon in reversed(daemons):
+                        daemon.terminate()
+                        daemon.wait()
 
 
 def output_of(*words: str) -> str:
