@@ -10,19 +10,20 @@
 #     SCENE=scenes/demo.xml METHOD=upg+bdpt SPP=128 sbatch examples/slurm_array.sh
 #     etendue merge task-*.etd -o image.exr
 # Without Slurm, on one machine:
-#     seq 0 7 | SCENE=scenes/demo.xml METHOD=upg+bdpt SPP=128 \
+#     seq 0 7 | SCENE=scenes/demo.xml METHOD=upg+bdpt SPP=128 SLURM_CPUS_PER_TASK=$(($(nproc) / 2)) \
 #         xargs -P 2 -I N env SLURM_ARRAY_TASK_ID=N bash examples/slurm_array.sh
 set -euo pipefail
 task=task-$SLURM_ARRAY_TASK_ID
 
-# Two minutes before the end of its time (--signal), the rendering is stopped, which leaves a checkpoint.
+# Two minutes before the end of its time (--signal), the rendering is stopped, which leaves a checkpoint. It may have ended.
 is_late=false
-trap 'is_late=true; kill -TERM $!' USR1
+trap 'is_late=true; kill -TERM $! 2>/dev/null || :' USR1
 # Slurm sends these to the rendering as well, which then ends by itself.
 trap : TERM INT HUP
 
 "${ETENDUE:-etendue}" render "$SCENE" -i "$METHOD" --spp "$SPP" --seed "$SLURM_ARRAY_TASK_ID" \
-    --threads "${SLURM_CPUS_PER_TASK:-0}" --checkpoint "$task.etd" --resume auto -o "$task.exr" --quiet &
+    --threads "${SLURM_CPUS_PER_TASK:-0}" --grace "${GRACE:-20}" \
+    --checkpoint "$task.etd" --resume auto -o "$task.exr" --quiet &
 # A signal ends `wait`, but not the rendering.
 while kill -0 $! 2>/dev/null; do wait $! || :; done
 status=0

@@ -655,6 +655,30 @@ TEST_F(CheckpointTest, TheScriptForSlurmRunsWithoutIt) {
     EXPECT_EQ(nlohmann::json::parse(read_text(path("s.json")))["spp"], 8);
 }
 
+/// The signal before the end of a task's time may come when its rendering has ended.
+TEST_F(CheckpointTest, TheScriptForSlurmTakesLateSignals) {
+    const auto write_program = [&](const char* name, const char* text) {
+        std::ofstream(path(name)) << "#!/bin/bash\n" << text;
+        fs::permissions(path(name), fs::perms::owner_all);
+    };
+    // Each sends the signal to the script that calls it; the rendering then waits to be stopped.
+    write_program(
+        "etendue",
+        "trap 'exit 0' TERM; echo \"$@\"; kill -USR1 $PPID; while :; do sleep 0.01; done");
+    write_program("scontrol", "echo \"$@\"; kill -USR1 $PPID; sleep 0.1");
+    const ProgramResult r =
+        Program("/bin/bash",
+                {"-c", fmt::format("cd '{0}' && PATH='{0}':$PATH SCENE=a METHOD=b SPP=1 "
+                                   "SLURM_ARRAY_TASK_ID=7 SLURM_JOB_ID=12 GRACE=60 bash "
+                                   "'" ETENDUE_SOURCE_DIR "/examples/slurm_array.sh'",
+                                   folder.path().string())},
+                folder.path())
+            .wait();
+    EXPECT_EQ(r.status, 0) << r.errors;
+    EXPECT_NE(r.output.find("--grace 60"), std::string::npos) << r.output;
+    EXPECT_NE(r.output.find("requeue 12"), std::string::npos) << r.output;
+}
+
 TEST_F(CheckpointTest, PassesMustBeARange) {
     for (const char* range :
          {"3", "3:", ":3", "3:3", "4:3", "a:b", "-1:3", "1:2:3", "0:5000000000"}) {
