@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -15,6 +16,14 @@ namespace {
 
 /// Far more than the rounding of a ray's intersection, but invisible.
 constexpr float kRelativeDistance = 1e-4f;
+constexpr float kMostOfSize = 0.05f, kMostOfRadius = 0.5f;
+
+/// Of a sphere or a cylinder.
+std::optional<float> radius_of(const Shape& shape) {
+    if (!dynamic_cast<const Sphere*>(&shape) && !dynamic_cast<const Cylinder*>(&shape)) return {};
+    // These points are opposite.
+    return length(shape.surface(0, 0.5f, 0.5f, false).p - shape.surface(0, 0, 0.5f, false).p) / 2;
+}
 
 float distance_of_back(const Shape& front) {
     const Bounds3 b = front.bounds();
@@ -22,18 +31,25 @@ float distance_of_back(const Shape& front) {
     for (const Vec3 corner : {b.lo, b.hi})
         largest =
             std::max({largest, std::fabs(corner.x), std::fabs(corner.y), std::fabs(corner.z)});
-    return kRelativeDistance * largest;
+    // Small shapes far from the origin are turned inside out by more than this.
+    const float distance = std::min(kRelativeDistance * largest, kMostOfSize * length(b.hi - b.lo));
+    const std::optional<float> radius = radius_of(front);
+    return radius ? std::min(distance, kMostOfRadius * *radius) : distance;
 }
 
 MeshData back_of(const TriangleMesh& front, float distance) {
+    MeshData back;
     std::vector<Vec3> normals(front.positions.size());
     for (uint32_t i = 0; i < front.triangles.size(); ++i) {
-        const Vec3 weighted =
-            front.surface(i, 1.0f / 3, 1.0f / 3, false).ng * float(front.primitive_area(i));
-        for (const uint32_t vertex : front.triangles[i])
-            normals[vertex] = normals[vertex] + weighted;
+        const Vec3 ng = front.surface(i, 1.0f / 3, 1.0f / 3, false).ng;
+        const auto& [a, b, c] = front.triangles[i];
+        for (const uint32_t vertex : {a, b, c})
+            normals[vertex] = normals[vertex] + ng * float(front.primitive_area(i));
+        // The winding of a front that is mirrored or flipped may be against its normals. That of its back is not.
+        const bool agrees = dot(front.face_normals[i], ng) > 0;
+        back.triangles.push_back(agrees ? MeshData::Triangle{a, c, b}
+                                        : MeshData::Triangle{a, b, c});
     }
-    MeshData back;
     back.positions = front.positions;
     for (size_t i = 0; i < normals.size(); ++i)
         if (length2(normals[i]) > 0)
@@ -44,8 +60,12 @@ MeshData back_of(const TriangleMesh& front, float distance) {
     back.second_uvs = front.second_uvs;
     back.colors = front.colors;
     back.alphas = front.alphas;
-    for (const auto& [a, b, c] : front.triangles) back.triangles.push_back({a, c, b});
     return back;
+}
+
+/// A material that reflects nothing.
+SceneObject black(const SourceLocation& where) {
+    return {"bsdf", "diffuse", "", where, {{"reflectance", Rgb(0), where}}, {}};
 }
 
 class AreaLights {
@@ -157,14 +177,8 @@ private:
         }
         for (auto& c : back.children)
             if (scene_.objects[size_t(c.object)].category == "bsdf")
-                c.object = material && material->is_two_sided()
-                               ? from_behind(c.object)
-                               : add({"bsdf",
-                                      "diffuse",
-                                      "",
-                                      back.where,
-                                      {{"reflectance", Rgb(0), back.where}},
-                                      {}});
+                c.object = material && material->is_two_sided() ? from_behind(c.object)
+                                                                : add(black(back.where));
         warnings_.push_back(
             SceneError(
                 back.where,
@@ -179,15 +193,13 @@ private:
     static void move_back(SceneObject& o, const Shape& front, float distance) {
         const Param* flip = o.find("flip_normals");
         const bool is_flipped = flip && *flip->as<bool>();
-        const SurfaceGeometry a = front.surface(0, 0, 0.5f, false);
         if (o.type == "disk") {
+            const Vec3 ng = front.surface(0, 0, 0.5f, false).ng;
             const Param* p = o.find("to_world");
             const Transform t = p ? *p->as<Transform>() : Transform();
-            set(o, "to_world", Transform::translate(a.ng * -distance) * t);
+            set(o, "to_world", Transform::translate(ng * -distance) * t);
         } else {
-            // A sphere or a cylinder, on which these points are opposite.
-            const float radius = length(front.surface(0, 0.5f, 0.5f, false).p - a.p) / 2;
-            const float share = distance / radius;
+            const float share = distance / *radius_of(front);
             set(o, "radius", number(o, "radius", 1) * double(is_flipped ? 1 + share : 1 - share));
         }
         set(o, "flip_normals", !is_flipped);
@@ -225,10 +237,58 @@ private:
     std::vector<std::string> warnings_;
 };
 
+/// Leaves out the lights of shapes in shapegroups.
+class LightsOfGroups {
+public:
+    explicit LightsOfGroups(SceneDescription& scene) : scene_(scene) {}
+
+    std::vector<std::string> remove() {
+        const size_t count = scene_.objects.size();
+        for (size_t i = 0; i < count; ++i)
+            if (scene_.objects[i].type == "shapegroup") remove_below(i);
+        return std::move(warnings_);
+    }
+
+private:
+    bool is(const SceneObject::Child& c, const char* category) const {
+        return scene_.objects[size_t(c.object)].category == category;
+    }
+
+    void remove_below(size_t parent) {
+        const std::vector<SceneObject::Child> children = scene_.objects[parent].children;
+        for (const auto& c : children) {
+            if (!is(c, "shape")) continue;
+            const auto shape = size_t(c.object);
+            if (scene_.objects[shape].type == "merge") remove_below(shape);
+            remove_light(shape);
+        }
+    }
+
+    void remove_light(size_t shape) {
+        SceneObject o = scene_.objects[shape];
+        if (std::erase_if(o.children, [&](const auto& c) { return is(c, "emitter"); }) == 0) return;
+        // What emits is black unless it says otherwise.
+        if (std::none_of(o.children.begin(), o.children.end(),
+                         [&](const auto& c) { return is(c, "bsdf"); })) {
+            o.children.push_back({"", int(scene_.objects.size()), o.where});
+            scene_.objects.push_back(black(o.where));
+        }
+        warnings_.push_back(
+            SceneError(o.where, "an emitter in a shapegroup is left out, since Mitsuba 3 has none")
+                .what());
+        scene_.objects[shape] = std::move(o);
+    }
+
+    SceneDescription& scene_;
+    std::vector<std::string> warnings_;
+};
+
 }  // namespace
 
 std::vector<std::string> make_plain_area_lights(SceneDescription& scene) {
-    return AreaLights(scene).run();
+    std::vector<std::string> warnings = LightsOfGroups(scene).remove();
+    for (std::string& w : AreaLights(scene).run()) warnings.push_back(std::move(w));
+    return warnings;
 }
 
 }  // namespace etendue

@@ -55,6 +55,8 @@ constexpr const char* kTurned = R"(<transform name="to_world"><rotate x="1" angl
 const std::string kFlipped = "<boolean name=\"flip_normals\" value=\"true\"/>";
 const std::string kStretched = R"(<transform name="to_world"><scale x="1" y="0.5" z="2"/>
     </transform>)";
+const std::string kMesh = R"("obj"><string name="filename" value=")" ETENDUE_SOURCE_DIR
+                          R"(/tests/scenes/icosahedron.obj"/>)";
 const std::string kShapes[] = {
     "\"rectangle\">" + std::string(kTurned),
     "\"rectangle\">" + kFlipped,
@@ -64,8 +66,7 @@ const std::string kShapes[] = {
     "\"sphere\">" + kFlipped,
     "\"sphere\">" + kStretched,
     R"("cylinder"><point name="p1" x="2" y="1" z="0"/><float name="radius" value="0.4"/>)",
-    R"("obj"><string name="filename" value=")" ETENDUE_SOURCE_DIR
-    R"(/tests/scenes/icosahedron.obj"/>)"};
+    kMesh};
 
 TEST(PlainAreaLights, LookTheSame) {
     const std::string colour = "<rgb name=\"radiance\" value=\"1 2 3\"/>",
@@ -101,6 +102,84 @@ TEST(PlainAreaLights, LookTheSame) {
                 for (int c = 0; c < 3; ++c)
                     EXPECT_NEAR(found[side][c], expected[side][c], 4e-3f * expected[side][c]);
         }
+}
+
+const std::string kTwoSided =
+    R"(<emitter type="area"><boolean name="two_sided" value="true"/></emitter></shape>)";
+
+/// So that no reader can take either for the other side, even where those of the front disagree.
+TEST(PlainAreaLights, TheWindingOfBacksAgreesWithTheirNormals) {
+    const std::string mirror =
+        R"(<transform name="to_world"><scale x="-1" y="1" z="1"/></transform>)";
+    const std::string quadric = "\"sphere\">" + kStretched;
+    for (const std::string& shape : {kMesh, kMesh + kFlipped, kMesh + mirror,
+                                     kMesh + mirror + kFlipped, quadric, quadric + kFlipped}) {
+        SCOPED_TRACE(shape);
+        SceneDescription plain = parse("<shape type=" + shape + kTwoSided);
+        make_plain_mitsuba(plain);
+        ASSERT_EQ(plain.meshes.size(), 1u);
+        const MeshData& back = plain.meshes[0];
+        ASSERT_EQ(back.normals.size(), back.positions.size());
+        const auto against = std::count_if(
+            back.triangles.begin(), back.triangles.end(), [&](const MeshData::Triangle& t) {
+                const auto& [a, b, c] = t;
+                const Vec3 n = cross(back.positions[b] - back.positions[a],
+                                     back.positions[c] - back.positions[a]);
+                // But for slivers at a pole.
+                return length(n) > 1e-6f &&
+                       dot(n, back.normals[a] + back.normals[b] + back.normals[c]) <= 0;
+            });
+        EXPECT_EQ(against, 0);
+    }
+}
+
+/// The back lies behind the front, but not beyond what is opposite. Distances grow with coordinates.
+TEST(PlainAreaLights, BacksOfSmallShapesLieWithinThem) {
+    const Vec3 center{100, 50, 0};
+    const std::string place = R"(<transform name="to_world"><scale value="0.005"/>
+        <rotate x="1" angle="50"/><translate x="100" y="50" z="0"/></transform>)";
+    const std::string tube =
+        R"("cylinder"><point name="p0" x="0" y="0" z="-40"/><point name="p1" x="0" y="0" z="40"/>)";
+    for (const std::string& shape :
+         {std::string("\"sphere\">"), "\"sphere\">" + kFlipped, tube, tube + kFlipped, kMesh}) {
+        SCOPED_TRACE(shape);
+        SceneDescription plain = parse("<shape type=" + shape + place + kTwoSided);
+        make_plain_mitsuba(plain);
+        const Scene scene = build_scene(plain);
+        for (const Vec3 d : {Vec3{1, 0, 0}, Vec3{-1, 0.2f, 0}})
+            for (const float start : {0.0f, 1.0f}) {
+                SurfaceHit hit;
+                const Vec3 from = center - d * start;
+                ASSERT_TRUE(scene.intersect(Ray{from, d}, 0.5f, hit));
+                ASSERT_TRUE(hit.shape->emitter);
+                EXPECT_GT(hit.shape->emitter
+                              ->eval_surface(hit.geometry.ng, {hit.location.u, hit.location.v},
+                                             hit.location.prim, -d)
+                              .Le.max(),
+                          0);
+            }
+    }
+}
+
+/// Mitsuba 3 refuses scenes that have any.
+TEST(PlainAreaLights, GroupsHaveNone) {
+    const std::string lamp = "<emitter type=\"area\"/></shape>";
+    SceneDescription plain =
+        parse("<shape type=\"shapegroup\" id=\"g\"><shape type=\"sphere\">" + kTwoSided +
+              "<shape type=\"merge\"><shape type=\"disk\"><bsdf type=\"diffuse\"/>" + lamp +
+              "</shape></shape><shape type=\"instance\"><ref id=\"g\"/></shape>"
+              "<shape type=\"rectangle\">" +
+              lamp);
+    SceneDescription lenient = plain;
+    const std::vector<std::string> warnings = make_plain_mitsuba(plain);
+    EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(),
+                            [](const std::string& w) {
+                                return w.find("in a shapegroup is left out") != w.npos;
+                            }),
+              2);
+    const Scene scene = build_scene(plain);
+    EXPECT_EQ(scene.emitters().size(), 1u);
+    EXPECT_EQ(plain.roots.size(), lenient.roots.size());
 }
 
 /// Shapes that share a light do not share its power.
