@@ -21,7 +21,7 @@ IntegratorSpec chosen_by_scene(const Scene& scene) {
     try {
         return scene_integrator(scene).spec;
     } catch (const std::exception& e) {
-        throw std::runtime_error(std::string(e.what()) + "; choose another one (-i)");
+        throw std::runtime_error(std::string(e.what()) + "; choose another integrator");
     }
 }
 

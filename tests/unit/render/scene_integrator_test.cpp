@@ -133,7 +133,7 @@ TEST(SceneIntegrator, WhatHasNoCounterpartIsSaid) {
 TEST(SceneIntegrator, ErrorsSayWhereAndWhatIsNear) {
     const auto error = [](const std::string& xml) { return error_of_scene(scene_with(xml)); };
     EXPECT_EQ(error(integrator("upg+bdtp")), "test.xml:2: unknown integrator \"upg+bdtp\" (did you "
-                                             "mean \"upg+bdpt\"?); choose another one (-i)");
+                                             "mean \"upg+bdpt\"?); choose another integrator");
     EXPECT_NE(error(integrator("photonmaper")).find("did you mean \"photonmapper\"?"),
               std::string::npos);
     EXPECT_NE(
