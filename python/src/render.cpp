@@ -316,7 +316,11 @@ void bind_merging(nb::module_& m) {
                      [](const Merged& r) { return r.of->first().header().integrator; })
         .def_prop_ro("warnings", [](const Merged& r) { return warnings(r.totals.stats); })
         .def("merge_warnings", [](const Merged& r) { return r.of->warnings(); })
-        .def("error", [](const Merged& r) { return tuple_of(r.film().error()); })
+        .def("error",
+             [](const Merged& r) {
+                 const nb::gil_scoped_release no_gil;
+                 return tuple_of(r.film().error());
+             })
         .def("image", [](const Merged& r) { return image_of(r, [&] { return r.film().image(); }); })
         .def("variance",
              [](const Merged& r) { return image_of(r, [&] { return r.film().variance(); }); })
@@ -325,7 +329,11 @@ void bind_merging(nb::module_& m) {
         .def("sums", [](const std::shared_ptr<Merged>& r) { return sums_of(r, r->film(), false); })
         .def("squares",
              [](const std::shared_ptr<Merged>& r) { return sums_of(r, r->film(), true); })
-        .def("stats", [](const Merged& r) { return json_text(r.of->report(r.totals)); })
+        .def("stats",
+             [](const Merged& r) {
+                 const nb::gil_scoped_release no_gil;
+                 return json_text(r.of->report(r.totals));
+             })
         .def(
             "techniques",
             [](const Merged& r) {
