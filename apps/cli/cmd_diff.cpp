@@ -15,6 +15,7 @@
 #include "image/metrics.h"
 #include "image/tonemap.h"
 #include "json_text.h"
+#include "output_checks.h"
 #include "system/output_file.h"
 
 namespace etendue {
@@ -97,6 +98,8 @@ void DiffCommand::write_map(const std::vector<float>& errors, int width, int hei
 void DiffCommand::run() const {
     if (!map.empty()) {
         check_image_extension(map);
+        for (const std::string& file : {image, reference, reference2})
+            refuse_same_file("image", file, "error map", map);
         OutputFile::check(map);
     }
     const RgbImage x = read_rgb(image, layer), r = read_like(reference, x);

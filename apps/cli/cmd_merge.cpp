@@ -13,6 +13,7 @@
 #include "messages.h"
 #include "output_checks.h"
 #include "render/merging.h"
+#include "render/warnings.h"
 #include "system/output_file.h"
 #include "technique_files.h"
 
@@ -27,9 +28,18 @@ struct MergeCommand {
     void run() const {
         const bool is_image = std::filesystem::path(output).extension() != ".etd";
         if (is_image) check_image_extension(output);
+        if (!is_image && has_variance)
+            throw std::runtime_error(
+                fmt::format("--variance adds a layer to an image, but {} is none", output));
+        refuse_same_file("sum", output, "statistics", stats);
+        for (const std::string& file : files) {
+            refuse_same_file("sum", output, "checkpoint", file);
+            refuse_same_file("statistics", stats, "checkpoint", file);
+        }
+        // A sum can replace an earlier one, but no other file.
+        if (!is_image) replaces_checkpoint(output);
         OutputFile::check(output);
         if (!stats.empty()) OutputFile::check(stats);
-        refuse_same_file("sum", output, "statistics", stats);
         std::vector<CheckpointFile> parts;
         for (const std::string& file : files) parts.emplace_back(file);
         Merging merging(std::move(parts));
@@ -37,8 +47,10 @@ struct MergeCommand {
             throw std::runtime_error(
                 fmt::format("--techniques: {} has no technique images; render with --techniques",
                             merging.first().name()));
+        if (!techniques.empty()) check_technique_folder(techniques);
         print_warnings(merging.warnings());
         const RenderTotals totals = merging.totals();
+        print_warnings(warnings(totals.stats));
         const nlohmann::json report = merging.report(totals);
         if (is_image)
             write_image(output, image_with_layers(*totals.film, {}, has_variance, report));

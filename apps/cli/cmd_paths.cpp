@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "mcmc/pick_paths.h"
+#include "output_checks.h"
 #include "scene_options.h"
 #include "system/output_file.h"
 
@@ -40,6 +41,7 @@ void PathsCommand::run() {
         throw std::runtime_error("paths: expected either --pick N or --check FILE");
     if (count > 0 && (pixel.empty() || output.empty()))
         throw std::runtime_error("paths: --pick needs --pixel x,y and -o FILE");
+    refuse_same_file("scene", scene.file, "paths", output);
     const Scene s = load_scene(scene);
     if (count == 0) return check_paths(s, check);
     OutputFile::check(output);

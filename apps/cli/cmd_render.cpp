@@ -186,6 +186,9 @@ void RenderCommand::check_options() const {
     check_limits(limits, first_pass);
     if (resume == kAuto && checkpoint.empty())
         throw std::runtime_error("--resume auto requires --checkpoint, the file to resume from");
+    for (const auto& [name, file] :
+         {std::pair{"image", output}, {"checkpoint", checkpoint_file()}, {"statistics", stats}})
+        refuse_same_file("scene", scene.file, name, file);
     refuse_same_file("image", output, "checkpoint", checkpoint_file());
     refuse_same_file("image", output, "statistics", stats);
     refuse_same_file("checkpoint", checkpoint_file(), "statistics", stats);
@@ -205,7 +208,7 @@ void RenderCommand::check_outputs() const {
     OutputFile::check(output);
     if (!stats.empty()) OutputFile::check(stats);
     if (!checkpoint_file().empty()) OutputFile::check(checkpoint_file());
-    if (!techniques.empty()) OutputFile::check(techniques + "/length01_s00_t02_weighted.exr");
+    if (!techniques.empty()) check_technique_folder(techniques);
 }
 
 std::pair<uint64_t, uint64_t> RenderCommand::pass_range() const {
@@ -237,12 +240,7 @@ void RenderCommand::check_replaced_checkpoint() const {
     std::error_code error;
     const std::string& file = checkpoint_file();
     const bool is_resumed = resume == kAuto || std::filesystem::equivalent(resume, file, error);
-    if (is_resumed || !std::filesystem::is_regular_file(file, error) ||
-        std::filesystem::file_size(file, error) == 0)
-        return;
-    if (!SectionReader::is_one(file))
-        throw std::runtime_error(
-            fmt::format("{} is not replaced by a checkpoint, since it is none", file));
+    if (is_resumed || !replaces_checkpoint(file)) return;
     print_warnings({fmt::format(
         "{} is replaced; with --resume auto, the rendering would go on from it", file)});
 }

@@ -16,6 +16,7 @@
 #include "json_text.h"
 #include "messages.h"
 #include "number_checks.h"
+#include "output_checks.h"
 #include "path_lengths.h"
 #include "render/render_request.h"
 #include "scene_options.h"
@@ -241,6 +242,7 @@ void VerifyCommand::run() {
         throw std::runtime_error("--time and --spp exclude each other, except with --detect");
     if (seconds > 0) options.seconds = seconds;
     if (!detect.empty()) options.detect = parse_share(detect, "--detect");
+    refuse_same_file("scene", scene.file, "results", json);
     options.against.clear();
     for (const std::string& m : against) options.against.push_back(IntegratorSpec::parse(m));
     std::vector<IntegratorSpec> specs;

@@ -3,8 +3,13 @@
 #include <fmt/format.h>
 
 #include "image/image_io.h"
+#include "system/output_file.h"
 
 namespace etendue {
+
+void check_technique_folder(const std::string& folder) {
+    OutputFile::check(folder + "/length01_s00_t02_weighted.exr");
+}
 
 void write_techniques(const TechniqueImages& images, const FilmGeometry& film,
                       const std::string& folder) {

@@ -40,17 +40,13 @@ std::string with_defaults(const IntegratorSpec& spec) {
     return as_read(full.to_string());
 }
 
-/// Hash of the files that the parameters name.
+/// Hash of the file that the parameters name.
 std::string files_of(const IntegratorSpec& spec) {
-    ContentHash hash;
-    bool has_files = false;
-    for (const auto& [name, value] : spec.params) {
-        std::error_code ignored;
-        if (value.empty() || !std::filesystem::is_regular_file(value, ignored)) continue;
-        hash.add(name).add(file_fingerprint(value));
-        has_files = true;
-    }
-    return has_files ? hexadecimal(hash.value()) : "none";
+    const auto file = spec.params.find("user_paths");
+    std::error_code ignored;
+    if (file == spec.params.end() || !std::filesystem::is_regular_file(file->second, ignored))
+        return "none";
+    return hexadecimal(ContentHash().add(file->first).add(file_fingerprint(file->second)).value());
 }
 
 std::string describe(const FilmGeometry& g) {
@@ -88,7 +84,8 @@ Conditions conditions_of(const Renderer& renderer, const Scene& scene, const Sce
             {"watertight", yes_or_no(source.watertight)},
             {"sensor", fmt::format("{}", scene.sensor_index())},
             {"image", describe(scene.film())},
-            {"filter mode", renderer.film().spreads() ? "spread" : "sample"},
+            {"filter mode",
+             to_string(renderer.film().spreads() ? FilterMode::Spread : FilterMode::Sample)},
             {kIntegratorCondition, with_defaults(settings.integrator)},
             {"files of the integrator", files_of(settings.integrator)},
             {"light paths", fmt::format("{}", renderer.light_paths())},

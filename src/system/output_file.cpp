@@ -124,7 +124,20 @@ int keep_permissions(int file, const struct stat& old) {
     return ::fchmod(file, mode) == 0 || errno == EPERM ? 0 : errno;
 }
 
-constexpr int kMostLinks = 40;
+/// Where links lead, also if that file is still to be made. Stops at the name of an open descriptor.
+fs::path follow_links(fs::path path, std::error_code& error) {
+    constexpr int kMostLinks = 40;  // As the kernel.
+    std::error_code ignored;
+    for (int followed = 0;
+         fs::is_symlink(fs::symlink_status(path, ignored)) && !open_descriptor(path); ++followed) {
+        if (followed == kMostLinks)
+            error = std::make_error_code(std::errc::too_many_symbolic_link_levels);
+        const fs::path to = error ? fs::path() : fs::read_symlink(path, error);
+        if (error) break;
+        path = path.parent_path() / to;
+    }
+    return path;
+}
 
 }  // namespace
 
@@ -137,16 +150,11 @@ OutputFile::OutputFile(const std::string& path, Links links) : path_(path) {
     bool exists = ::stat(path.c_str(), &found) == 0;
     if (!exists && errno != ENOENT) fail(reason(errno));
     if (links == Links::Follow) {
-        int followed = 0;
-        for (; fs::is_symlink(fs::symlink_status(target, error)); ++followed) {
-            if (followed == kMostLinks) fail(reason(ELOOP));
-            if (open_descriptor(target)) {
-                check_in_place(target.string());
-                return;
-            }
-            const fs::path to = fs::read_symlink(target, error);
-            if (error) fail(error.message());
-            target = target.parent_path() / to;
+        target = follow_links(path, error);
+        if (error) fail(error.message());
+        if (open_descriptor(target)) {
+            check_in_place(target.string());
+            return;
         }
     } else if (fs::is_symlink(fs::symlink_status(target, error))) {
         exists = false;
@@ -294,6 +302,24 @@ void write_file(const std::string& path, std::string_view bytes, Links links) {
     OutputFile file(path, links);
     file.write(bytes);
     file.commit();
+}
+
+bool are_one_file(const std::string& a, const std::string& b) {
+    std::error_code error;
+    const fs::path to_a = follow_links(a, error), to_b = follow_links(b, error);
+    if (error) return false;
+    const auto is_in_place = [&](const fs::path& path) {
+        return open_descriptor(path) ||
+               (fs::exists(path, error) && !fs::is_regular_file(path, error));
+    };
+    const bool is_a_in_place = is_in_place(to_a), is_b_in_place = is_in_place(to_b);
+    if (is_a_in_place && is_b_in_place) return false;
+    // The descriptor of a file that the other one replaces.
+    if (is_a_in_place || is_b_in_place) return fs::equivalent(to_a, to_b, error);
+    const auto real = [&](const fs::path& path) {
+        return fs::weakly_canonical(fs::absolute(path, error), error);
+    };
+    return real(to_a) == real(to_b) && !error;
 }
 
 void remove_temporary_files() noexcept {

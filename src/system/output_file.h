@@ -72,6 +72,10 @@ private:
 /// Writes `bytes` as a file, through an OutputFile.
 void write_file(const std::string& path, std::string_view bytes, Links links = Links::Follow);
 
+/// Whether outputs of these names would replace each other. Links are followed, also to files that are still to be made.
+/// What is written in place, such as a pipe, can be written by several, one after the other.
+bool are_one_file(const std::string& a, const std::string& b);
+
 /// Removes the temporary files of all OutputFiles of this process; for signal handlers that end it.
 void remove_temporary_files() noexcept;
 

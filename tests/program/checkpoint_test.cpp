@@ -268,7 +268,8 @@ TEST_F(CheckpointTest, RefusalsSayWhatDiffers) {
     expect_refused({"-i", "bdpt", "--techniques", path("t")},
                    {"technique images", "up to 6 edges"});
     expect_refused({"-i", "bdpt", "--resume", path("missing.etd")}, {"missing.etd"});
-    expect_refused({"-i", "bdpt", "--resume", scene}, {"cornell.xml", "no state of a rendering"});
+    expect_refused({"-i", "bdpt", "--resume", ETENDUE_SOURCE_DIR "/README.md"},
+                   {"README.md", "no state of a rendering"});
     expect_refused({"-i", "bdpt", "--resume", "auto"}, {"--checkpoint"});
     expect_refused({"-i", "bdpt", "--passes", "0:2"}, {"--passes and --spp"});
     expect_refused({"-i", "bdpt", "--checkpoint", path("b.exr")}, {"same file"});
@@ -308,6 +309,55 @@ TEST_F(CheckpointTest, NoFileIsWrittenTwice) {
     EXPECT_FALSE(fs::exists(path("m.exr")));
 }
 
+/// Standard output is written by one after the other.
+TEST_F(CheckpointTest, APipeIsWrittenTwice) {
+    fs::create_symlink("/dev/stdout", path("out.pfm"));
+    Arguments all = {"-c", "\"$0\" \"$@\" | cat", ETENDUE_PROGRAM};
+    const Arguments rest =
+        render("out.pfm", {"-i", "path", "--spp", "1", "--stats", "/dev/stdout"});
+    all.insert(all.end(), rest.begin(), rest.end());
+    const ProgramResult r = Program("/bin/bash", all, folder.path()).wait();
+    EXPECT_EQ(r.errors, "");
+    ASSERT_TRUE(r.output.starts_with("PF\n48 36\n")) << r.output.substr(0, 20);
+    const size_t at = r.output.find("{\n", 48 * 36 * 12);
+    ASSERT_NE(at, std::string::npos);
+    EXPECT_EQ(nlohmann::json::parse(r.output.substr(at))["spp"], 1);
+}
+
+TEST_F(CheckpointTest, NoOutputReplacesAnInput) {
+    const std::string own = path("own.xml"), a = path("a.etd"), b = path("b.etd");
+    fs::copy_file(scene, own);
+    expect_run(render("a.exr", {"-i", "path", "--passes", "0:1", "--checkpoint", a}));
+    expect_run(render("b.exr", {"-i", "path", "--passes", "1:2", "--checkpoint", b}));
+    fs::create_symlink("a.etd", path("link.etd"));
+    fs::create_symlink("own.xml", path("link.exr"));
+    const std::vector<std::string> inputs = {own, a, b, path("a.exr")};
+    std::vector<std::string> before;
+    for (const std::string& file : inputs) before.push_back(read_text(file));
+    const std::string image = path("m.exr");
+    for (const Arguments& arguments :
+         {Arguments{"merge", a, b, "-o", a}, Arguments{"merge", b, a, "-o", a},
+          Arguments{"merge", a, b, "-o", path("./b.etd")},
+          Arguments{"merge", a, b, "-o", path("link.etd")},
+          Arguments{"merge", path("link.etd"), b, "-o", a},
+          Arguments{"merge", a, b, "-o", image, "--stats", a},
+          Arguments{"merge", a, b, "-o", image, "--stats", path("link.etd")},
+          Arguments{"render", own, "-o", image, "--spp", "1", "--stats", own},
+          Arguments{"render", own, "-o", path("link.exr"), "--spp", "1"},
+          Arguments{"render", own, "-o", image, "--spp", "1", "--checkpoint", own},
+          Arguments{"verify", own, "--spp", "1", "--json", own},
+          Arguments{"paths", own, "--pick", "1", "--pixel", "1,1", "-o", own},
+          Arguments{"diff", path("a.exr"), path("b.exr"), "--map", path("a.exr")}}) {
+        SCOPED_TRACE(fmt::format("{}", fmt::join(arguments, " ")));
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.status, 1);
+        EXPECT_NE(r.errors.find("cannot be the same file"), std::string::npos) << r.errors;
+        for (size_t i = 0; i < inputs.size(); ++i)
+            EXPECT_TRUE(read_text(inputs[i]) == before[i]) << inputs[i];
+        EXPECT_FALSE(fs::exists(image));
+    }
+}
+
 TEST_F(CheckpointTest, NothingElseIsReplacedByACheckpoint) {
     const std::string text = path("text"), a = path("a.etd"), loop = path("loop");
     const auto arguments = [&](const std::string& file, const Arguments& more) {
@@ -320,6 +370,15 @@ TEST_F(CheckpointTest, NothingElseIsReplacedByACheckpoint) {
     EXPECT_EQ(refused.status, 1);
     EXPECT_NE(refused.errors.find("text is not replaced"), std::string::npos) << refused.errors;
     EXPECT_EQ(read_text(text), "a text");
+    // Nor by a sum of checkpoints, which replaces an earlier sum.
+    const std::string b = path("b.etd"), other = path("other.etd"), sum = path("sum.etd");
+    expect_run(arguments(b, {}));
+    fs::copy_file(text, other);
+    const ProgramResult merged = run({"merge", b, "-o", other});
+    EXPECT_EQ(merged.status, 1);
+    EXPECT_NE(merged.errors.find("other.etd is not replaced"), std::string::npos) << merged.errors;
+    EXPECT_EQ(read_text(other), "a text");
+    for (int i = 0; i < 2; ++i) expect_run({"merge", b, "-o", sum});
     // An earlier one is, with a warning; an empty file is none.
     std::ofstream(path("a.etd")).close();
     EXPECT_EQ(run(arguments(a, {})).errors, "");
@@ -606,6 +665,34 @@ TEST_F(CheckpointTest, WhatIsMissingIsSaidBeforeAnythingIsWritten) {
     EXPECT_EQ(r.status, 1);
     EXPECT_NE(r.errors.find("no technique images"), std::string::npos) << r.errors;
     EXPECT_FALSE(fs::exists(path("m.exr")));
+    // A folder that cannot be made, and a layer of what is no image.
+    expect_run(render("b.exr", {"-i", "path", "--spp", "1", "--techniques", path("t"),
+                                "--techniques-max-depth", "1", "--checkpoint", path("b.etd")}));
+    const ProgramResult no_folder =
+        run({"merge", path("b.etd"), "-o", path("m.exr"), "--techniques", path("b.exr/m")});
+    EXPECT_EQ(no_folder.status, 1);
+    EXPECT_NE(no_folder.errors.find("b.exr/m"), std::string::npos) << no_folder.errors;
+    EXPECT_FALSE(fs::exists(path("m.exr")));
+    const ProgramResult no_layer = run({"merge", path("b.etd"), "-o", path("m.etd"), "--variance"});
+    EXPECT_EQ(no_layer.status, 1);
+    EXPECT_NE(no_layer.errors.find("--variance"), std::string::npos) << no_layer.errors;
+    EXPECT_FALSE(fs::exists(path("m.etd")));
+}
+
+/// A file that is called as a value of a parameter is no file of the integrator.
+TEST_F(CheckpointTest, FilesOfOtherNamesMayChange) {
+    const auto with = [&](const char* spp, const char* option) {
+        std::ofstream(path("8")) << "when " << spp;
+        Arguments all = {"-c", "cd \"$0\" && exec \"$@\"", folder.path(), ETENDUE_PROGRAM};
+        const Arguments rest =
+            render("a.exr", {"-i", "path:max_depth=8", "--spp", spp, option, path("a.etd")});
+        all.insert(all.end(), rest.begin(), rest.end());
+        const ProgramResult r = Program("/bin/bash", all, folder.path()).wait();
+        EXPECT_EQ(r.status, 0) << r.errors;
+    };
+    with("1", "--checkpoint");
+    EXPECT_EQ(info("a.etd")["conditions"]["files of the integrator"], "none");
+    with("2", "--resume");
 }
 
 TEST_F(CheckpointTest, NamesThatAreNotUtf8GoOn) {

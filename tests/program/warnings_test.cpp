@@ -48,6 +48,18 @@ TEST_F(WarningsTest, OfRender) {
     EXPECT_GT(report()["rejected_contributions"], 0);
 }
 
+TEST_F(WarningsTest, OfMerge) {
+    const std::string saved = folder.path() / "a.etd";
+    run({"render", scene, "-o", folder.path() / "image.exr", "-i", "bdpt", "--spp", "2",
+         "--checkpoint", saved});
+    const ProgramResult r =
+        Program(ETENDUE_PROGRAM, {"merge", saved, "-o", folder.path() / "sum.exr", "--quiet"},
+                folder.path())
+            .wait();
+    EXPECT_EQ(r.status, 0) << r.errors;
+    expect_warnings(r.errors, "", 1);
+}
+
 TEST_F(WarningsTest, OfVerify) {
     const ProgramResult r = run({"verify", scene, "--methods", "bdpt", "--against", "path", "bdpt",
                                  "--spp", "2", "--lengths", "1..3", "--json", json});

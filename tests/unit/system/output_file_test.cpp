@@ -185,6 +185,50 @@ TEST_F(OutputFiles, LinksAreWrittenThroughOrReplaced) {
               std::string::npos);
 }
 
+TEST_F(OutputFiles, AreOneFileIfOneReplacesTheOther) {
+    fs::create_directories(folder_ / "there");
+    put("a", "old");
+    fs::create_symlink("a", file("link"));
+    fs::create_symlink("there/new", file("dangling"));
+    fs::create_symlink("there", file("folder"));
+    fs::create_symlink("loop", file("loop"));
+    fs::create_hard_link(file("a"), file("hard"));
+    ASSERT_EQ(::mkfifo(file("pipe").c_str(), 0600), 0);
+    const int descriptor = ::open(file("a").c_str(), O_WRONLY);
+    const std::string open = "/proc/self/fd/" + std::to_string(descriptor);
+    for (const auto& [one, other] :
+         {std::pair{file("a"), file("a")},
+          {file("a"), file("./there/../a")},
+          {file("a"), file("link")},
+          {file("new"), file("./new")},
+          {file("dangling"), file("folder/new")},
+          {file("dangling"), file("there/new")},
+          {file("missing/new"), file("missing/./new")},
+          // What is written to the old file is lost when the new one replaces it.
+          {file("a"), open}}) {
+        EXPECT_TRUE(are_one_file(one, other)) << one << ", " << other;
+        EXPECT_TRUE(are_one_file(other, one)) << one << ", " << other;
+    }
+    for (const auto& [one, other] : {std::pair{file("a"), file("b")},
+                                     {file("a"), file("there/a")},
+                                     {file("dangling"), file("new")},
+                                     {file("loop"), file("a")},
+                                     // The other name keeps the old file.
+                                     {file("a"), file("hard")},
+                                     // These are written one after the other.
+                                     {open, open},
+                                     {open, "/dev/fd/" + std::to_string(descriptor)},
+                                     {file("pipe"), file("pipe")},
+                                     {"/dev/null", "/dev/null"},
+                                     {"/dev/null", file("a")},
+                                     {"/dev/stdout", "/dev/stdout"},
+                                     {"/dev/stdout", file("a")}}) {
+        EXPECT_FALSE(are_one_file(one, other)) << one << ", " << other;
+        EXPECT_FALSE(are_one_file(other, one)) << one << ", " << other;
+    }
+    ::close(descriptor);
+}
+
 TEST_F(OutputFiles, FullDisksDamageNothing) {
     put("a", "old");
     // A limit on the size of files stands for a disk that is full.
