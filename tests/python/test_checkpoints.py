@@ -124,8 +124,9 @@ PAIRS, ALARM_OF_13, ALARM_OF_1, POWER = 16, 5.377, 4.073, 1.341
 
 @pytest.mark.parametrize(
     "method, passes",
-    [("path", 16), ("upg+bdpt", 10), ("pssmlt:groups=4,chains=48", 12), ("mmlt:groups=4,chains=48", 12),
-     ("mlt:groups=4,chains=48", 12)],
+    [("path", 16), ("mlt:groups=4,chains=48", 12)]
+    + [pytest.param(*p, marks=pytest.mark.long)
+       for p in [("upg+bdpt", 10), ("pssmlt:groups=4,chains=48", 12), ("mmlt:groups=4,chains=48", 12)]],
     ids=lambda v: str(v).split(":")[0])
 def test_the_sum_of_8_runs_has_the_expectation_of_one_with_8_times_the_passes(
     cornell: et.Scene, method: str, passes: int

@@ -378,14 +378,17 @@ def test_many_renderings_leave_no_memory(scenes: Path, tmp_path: Path) -> None:
 
 
 def test_import_is_fast_and_reports_no_leaks_at_exit() -> None:
-    """User time of the import, least of five."""
-    code = ("import resource, etendue as et; u = resource.getrusage(resource.RUSAGE_SELF); "
-            "print(u.ru_utime + u.ru_stime)")
-    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(5)]
-    assert all(run.stderr == "" for run in runs), runs[0].stderr
-    seconds = min(float(run.stdout) for run in runs)
-    print(f"import etendue: {seconds:.3f} s")
-    assert seconds < 0.3
+    """Little more than NumPy takes, which it imports. Processor time, least of five."""
+
+    def seconds(module: str) -> float:
+        code = f"import resource, {module}; u = resource.getrusage(resource.RUSAGE_SELF); print(u.ru_utime + u.ru_stime)"
+        runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(5)]
+        assert all(run.stderr == "" for run in runs), runs[0].stderr
+        return min(float(run.stdout) for run in runs)
+
+    own, numpy = seconds("etendue"), seconds("numpy")
+    print(f"import etendue: {own:.3f} s, numpy: {numpy:.3f} s")
+    assert own < 1.5 * numpy
 
 
 def test_an_old_processor_is_a_message(tmp_path: Path) -> None:
