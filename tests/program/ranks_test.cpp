@@ -127,7 +127,9 @@ TEST_F(RanksTest, SignalsLeaveACheckpointAndAnImage) {
         job.send(signal);
         const int status = job.wait().status;
         // mpirun itself ends with an error after the others.
-        if (signal == SIGUSR1) EXPECT_EQ(status, 0);
+        if (signal == SIGUSR1) {
+            EXPECT_EQ(status, 0);
+        }
         EXPECT_TRUE(ranks_of_job().empty());
         EXPECT_TRUE(fs::exists(path("part.exr")));
         const uint64_t passes = info("part")["spp"];
