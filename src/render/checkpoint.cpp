@@ -49,6 +49,8 @@ std::string files_of(const IntegratorSpec& spec) {
     return hexadecimal(ContentHash().add(file->first).add(file_fingerprint(file->second)).value());
 }
 
+constexpr const char *kSceneCondition = "scene contents", *kSensorCondition = "sensor";
+
 std::string describe(const FilmGeometry& g) {
     std::string text = fmt::format("{} x {}", g.width, g.height);
     if (g.crop_width != g.width || g.crop_height != g.height)
@@ -79,10 +81,10 @@ Conditions conditions_of(const Renderer& renderer, const Scene& scene, const Sce
             {"build", hexadecimal(program_fingerprint())},
             {"C library", ::gnu_get_libc_version()},
             {"ray tracer", ray_tracer()},
-            {"scene contents", hexadecimal(source.fingerprint)},
+            {kSceneCondition, hexadecimal(source.fingerprint)},
             {"lenient", yes_or_no(source.lenient)},
             {"watertight", yes_or_no(source.watertight)},
-            {"sensor", fmt::format("{}", scene.sensor_index())},
+            {kSensorCondition, fmt::format("{}", scene.sensor_index())},
             {"image", describe(scene.film())},
             {"filter mode",
              to_string(renderer.film().spreads() ? FilterMode::Spread : FilterMode::Sample)},
@@ -96,6 +98,12 @@ Conditions conditions_of(const Renderer& renderer, const Scene& scene, const Sce
             {"technique images", settings.technique_depth > 0
                                      ? fmt::format("up to {} edges", settings.technique_depth)
                                      : "none"}};
+}
+
+bool is_of(const CheckpointHeader& header, const Scene& scene, const SceneSource& source) {
+    return header.condition(kSceneCondition) == hexadecimal(source.fingerprint) &&
+           header.condition(kSensorCondition) == fmt::format("{}", scene.sensor_index()) &&
+           describe(header.film) == describe(scene.film());
 }
 
 std::unique_ptr<SectionWriter> written_checkpoint(const std::string& file, const Renderer& renderer,

@@ -21,6 +21,8 @@ struct SceneSource {
 
 Conditions conditions_of(const Renderer& renderer, const Scene& scene, const SceneSource& source,
                          const RenderSettings& settings);
+/// Whether the image of a checkpoint is that of this scene, whatever else its conditions are.
+bool is_of(const CheckpointHeader& header, const Scene& scene, const SceneSource& source);
 
 /// A checkpoint that is written, but not yet under its name, which commit() gives it when it is durable: that takes about as
 /// long again, and another thread can do it. Throws std::runtime_error if it cannot be written; then one that was there

@@ -180,8 +180,8 @@ Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths) 
     });
     if (!has_pass)
         throw std::runtime_error(
-            "the light paths of the last pass are gone, because the pass after "
-            "it was discarded; continue the run for another pass");
+            "the light paths of the last pass are gone, because the pass after it was discarded or "
+            "the run was opened from a file; continue the run for another pass");
     result.passes = 1;
     sort_by_luminance(result);
     return result;

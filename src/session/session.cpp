@@ -13,6 +13,7 @@
 
 #include "render/render_report.h"
 #include "render/render_request.h"
+#include "session/run.h"
 #include "system/threads.h"
 
 namespace etendue {
@@ -29,17 +30,21 @@ double process_cpu_seconds() {
     return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
-IntervalKind interval_kind(const Integrator& integrator, SamplerKind sampler, int seeds) {
-    if (integrator.error_groups() > 0 || seeds > 1) return IntervalKind::None;
-    if (integrator.estimator() != Estimator::Unbiased) return IntervalKind::NoiseOnly;
-    return sampler == SamplerKind::Sobol ? IntervalKind::Upper : IntervalKind::Confidence;
+int fitting_depth(const Scene& scene, int depth) {
+    while (!technique_images_fit(scene, depth)) --depth;
+    return depth;
 }
 
-int fitting_depth(const Scene& scene, int depth) {
-    const uint64_t pixels = scene.film().pixel_count();
-    while (depth > 0 && TechniqueImages::memory_bytes(pixels, depth) > Session::kTechniqueBytes)
-        --depth;
-    return depth;
+/// The statistics of a run that is looked at.
+nlohmann::json report_of(const RenderTotals& totals, const Scene& scene, const RunStatus& run) {
+    nlohmann::json j = statistics(*totals.film, totals.stats, totals.seconds, run.error);
+    j["scene"] = scene.file();
+    j["integrator"] = run.request.integrator;
+    j["estimator"] = to_string(run.estimator);
+    j["seed"] = run.request.seed;
+    j["stopped_by"] = "studio";
+    for (const auto& [name, value] : run.figures) j[name] = value;
+    return j;
 }
 
 }  // namespace
@@ -65,34 +70,16 @@ const char* to_string(IntervalKind kind) {
     return "";
 }
 
-struct Session::Run {
-    RunStatus status;  ///< Guarded by the session's mutex.
-    SharedSlot<const Snapshot> snapshot;
-    SharedSlot<const TechniqueSnapshot> techniques;
-    SharedSlot<const SeedSeries> series{std::make_shared<const SeedSeries>()};
-    std::atomic<bool> is_wanted{true}, wants_techniques{false};
-    std::shared_ptr<const Scene> scene;  ///< Constant from the start on.
+IntervalKind interval_kind(Estimator estimator, SamplerKind sampler, bool has_groups, int seeds) {
+    if (has_groups || seeds > 1) return IntervalKind::None;
+    if (estimator != Estimator::Unbiased) return IntervalKind::NoiseOnly;
+    return sampler == SamplerKind::Sobol ? IntervalKind::Upper : IntervalKind::Confidence;
+}
 
-    // Of the session's thread.
-    bool has_seeds() const { return status.seeds > 1; }
-    uint64_t passes() const {
-        return seeds.passes() + (renderer && !is_counted ? renderer->film().passes() : 0);
-    }
-
-    RenderSettings settings;
-    std::unique_ptr<Integrator> integrator;  ///< Until the first renderer is made.
-    std::unique_ptr<Renderer> renderer;
-    bool is_counted = false;  ///< Whether the renderer's image is among `seeds`.
-    SeedMean seeds;
-    int shown_seeds = 0;       ///< Of them, those in the last snapshot.
-    double pass_seconds = 0;   ///< Of the last pass.
-    double shown_seconds = 0;  ///< Processor time of the last snapshot.
-    RecentError error;
-    SnapshotPool pool;
-    uint64_t last_turn = 0;
-};
-
-Session::Session(Load load, int threads) : load_(std::move(load)), threads_(threads) {
+Session::Session(Load load, int threads, RunKeeping keeping)
+    : load_(std::move(load)), threads_(threads),
+      folder_(keeping.folder.empty() ? std::nullopt : std::optional<RunFolder>(keeping.folder)),
+      keep_every_(keeping.every) {
     thread_ = std::thread([this] { work(); });
     try {
         loader_ = std::thread([this] { load_scenes(); });
@@ -159,7 +146,7 @@ void Session::load_scenes() {
 void Session::load_scene() {
     std::string error;
     try {
-        auto scene = std::make_shared<const Scene>(load_());
+        auto scene = std::make_shared<const LoadedScene>(load_());
         const std::lock_guard lock(mutex_);
         load_error_.clear();
         for (const auto& run : runs_) request_stop(run);
@@ -176,6 +163,7 @@ void Session::load_scene() {
         const std::lock_guard lock(mutex_);
         load_error_.swap(error);
     }
+    look_into_folder();
     changed();
 }
 
@@ -231,7 +219,11 @@ void Session::make_renderer(Run& run) {
     run.settings.seed = run.status.request.seed + uint64_t(run.seeds.count());
     std::unique_ptr<Integrator> integrator = std::move(run.integrator);
     if (!integrator) integrator = make_integrator(run.settings.integrator);
-    run.renderer = std::make_unique<Renderer>(*run.scene, run.settings, std::move(integrator));
+    run.renderer = std::make_unique<Renderer>(run.scene(), run.settings, std::move(integrator));
+    run.log = {};
+    if (!folder_) return;
+    run.conditions = conditions_of(*run.renderer, run.scene(), run.loaded->source, run.settings);
+    wait_for_next_file(run, 0);
 }
 
 void Session::take_turn(Run& run) {
@@ -298,6 +290,7 @@ void Session::finish_turn(Run& run, RunState state, const char* message) noexcep
         if (state != RunState::Rendering) run.status.state = state;
         run.status.message.swap(text);
     }
+    if (state != RunState::Rendering) keep(run);
     changed();
 }
 
@@ -312,10 +305,13 @@ void Session::request_stop(const std::shared_ptr<Run>& run) {
 
 void Session::finish_stop(Run& run) {
     show(run);
-    const std::lock_guard lock(mutex_);
-    if (run.status.state != RunState::Stopping) return;
-    run.status.state = RunState::Stopped;
-    run.status.message.clear();
+    {
+        const std::lock_guard lock(mutex_);
+        if (run.status.state != RunState::Stopping) return;
+        run.status.state = RunState::Stopped;
+        run.status.message.clear();
+    }
+    keep(run);
 }
 
 void Session::after_pass(Run& run, const Progress& p) {
@@ -342,28 +338,32 @@ void Session::after_pass(Run& run, const Progress& p) {
                 s.history.push_back({p.passes, p.seconds, error});
         }
     }
+    run.log.add(p.seconds, p.renderer.stats().pairs);
     // The first picture does not wait. Long passes are shown unasked, so that saving need not wait for the next one.
     constexpr double kLong = 0.5;
     const bool is_long =
         run.pass_seconds > kLong && run.shown_seconds < SnapshotBudget::kShare * run.pass_seconds;
     if (shows || is_long || run.passes() == 1) show(run);
+    if (p.fraction.value_or(0) < 1 && Clock::now() >= run.next_file) keep(run);
     changed();
 }
 
 void Session::fill(Run& run, Snapshot& snapshot) {
-    const Film* film = run.renderer && !run.is_counted ? &run.renderer->film() : nullptr;
+    const Film* film = run.film();
     snapshot.run = run.status.id;
-    snapshot.width = run.scene->film().crop_width;
-    snapshot.height = run.scene->film().crop_height;
+    snapshot.width = run.scene().film().crop_width;
+    snapshot.height = run.scene().film().crop_height;
     if (run.seeds.count() > 0)
         run.seeds.fill(film, snapshot);
     else
-        fill_snapshot(*film, run.renderer->integrator().error_groups() > 0, snapshot);
+        fill_snapshot(*film, film->has_groups(), snapshot);
     snapshot.report = nullptr;
-    if (!run.renderer) return;
+    if (!run.renderer && !run.totals) return;
     // Lists, such as the times of passes, are not stored in images.
     auto report = std::make_shared<nlohmann::json>(
-        to_json(*run.renderer, *run.scene, run.settings, "studio", {}, &run.status.error));
+        run.totals
+            ? report_of(*run.totals, run.scene(), run.status)
+            : to_json(*run.renderer, run.scene(), run.settings, "studio", {}, &run.status.error));
     if (run.has_seeds()) {
         (*report)["spp"] = snapshot.passes;
         (*report)["seed"] = run.status.request.seed;
@@ -390,11 +390,10 @@ void Session::show(Run& run) noexcept {
             const std::lock_guard lock(mutex_);
             run.status.snapshot_passes = passes;
         }
-        if (!run.has_seeds() && run.renderer && run.renderer->techniques() &&
-            run.wants_techniques.exchange(false)) {
-            const FilmGeometry& g = run.scene->film();
+        if (run.technique_images() && run.wants_techniques.exchange(false)) {
+            const FilmGeometry& g = run.scene().film();
             run.techniques.store(std::make_shared<const TechniqueSnapshot>(TechniqueSnapshot{
-                passes, g.crop_width, g.crop_height, run.renderer->techniques()->images()}));
+                passes, g.crop_width, g.crop_height, run.technique_images()->images()}));
         }
     } catch (const std::exception&) {
         // No memory: the earlier picture stays, and the run goes on.
@@ -431,28 +430,30 @@ std::shared_ptr<Session::Run> Session::find(int id) const {
 }
 
 int Session::start(const RunRequest& request) {
-    const std::shared_ptr<const Scene> scene = this->scene();
-    if (!scene) throw std::runtime_error("the scene is not loaded yet");
+    const std::shared_ptr<const LoadedScene> loaded = scene_.load();
+    if (!loaded) throw std::runtime_error("the scene is not loaded yet");
+    const Scene& scene = loaded->scene;
     auto run = std::make_shared<Run>();
-    run->scene = scene;
+    run->loaded = loaded;
     RunStatus& s = run->status;
     s.request = request;
     s.request.threads = threads_;
     s.request.technique_depth =
-        request.seeds > 1 ? 0 : fitting_depth(*scene, request.technique_depth);
+        request.seeds > 1 ? 0 : fitting_depth(scene, request.technique_depth);
     RenderSettings& settings = run->settings;
-    settings = settings_of(s.request, *scene);
+    settings = settings_of(s.request, scene);
     if (!request.user_paths.empty()) settings.integrator.params["user_paths"] = request.user_paths;
     s.request.integrator = settings.integrator.to_string();
     run->integrator = make_integrator(settings.integrator);
     s.seeds = request.seeds;
     s.estimator = run->integrator->estimator();
-    s.interval = interval_kind(*run->integrator, settings.sampler, request.seeds);
+    s.interval = interval_kind(s.estimator, settings.sampler, run->integrator->error_groups() > 0,
+                               request.seeds);
     {
         const std::lock_guard lock(mutex_);
         if (is_closed_) throw std::runtime_error("the program is about to end");
         // Otherwise another scene was loaded in the meantime.
-        if (scene_.load() == scene) {
+        if (scene_.load() == loaded) {
             s.id = last_id_ + 1;
             runs_.push_back(run);
             ++last_id_;
@@ -488,7 +489,10 @@ void Session::resume(int id, const RenderLimits& limits) {
     const std::shared_ptr<Run> run = [&] {
         const std::lock_guard lock(mutex_);
         if (is_closed_) throw std::runtime_error("the program is about to end");
-        return find(id);
+        auto found = find(id);
+        if (const std::string& why = found->status.why_look_only; !why.empty())
+            throw std::runtime_error(fmt::format("run {} can only be looked at: {}", id, why));
+        return found;
     }();
     post(run, [this, limits](Run& r) {
         const std::lock_guard lock(mutex_);
@@ -513,8 +517,11 @@ void Session::resume(int id, const RenderLimits& limits) {
 void Session::remove(int id) {
     discard(id);
     post([this, id] {
-        const std::lock_guard lock(mutex_);
-        std::erase_if(runs_, [&](const auto& run) { return run->status.id == id; });
+        {
+            const std::lock_guard lock(mutex_);
+            std::erase_if(runs_, [&](const auto& run) { return run->status.id == id; });
+        }
+        look_into_folder();
     });
 }
 
@@ -571,11 +578,18 @@ void Session::settle() {
     std::promise<void> reached;
     post([&] { reached.set_value(); });
     reached.get_future().wait();
+    std::vector<std::shared_future<void>> files;
+    {
+        const std::lock_guard lock(mutex_);
+        for (const auto& run : runs_)
+            if (run->file_written.valid()) files.push_back(run->file_written);
+    }
+    for (const auto& file : files) file.wait();
 }
 
 RunStatus Session::status_of(const Run& run) const {
     RunStatus status = run.status;
-    status.is_of_this_scene = run.scene == scene_.load();
+    status.is_of_this_scene = run.loaded == scene_.load();
     return status;
 }
 
@@ -593,7 +607,8 @@ std::vector<RunStatus> Session::runs() const {
 
 std::shared_ptr<const Scene> Session::scene_of(int id) const {
     const std::lock_guard lock(mutex_);
-    return find(id)->scene;
+    const std::shared_ptr<const LoadedScene> loaded = find(id)->loaded;
+    return {loaded, &loaded->scene};
 }
 
 void Session::show_if_idle(const std::shared_ptr<Run>& run) {
@@ -638,6 +653,7 @@ void Session::replay_last(int id, uint64_t pixel, size_t most_paths,
     post([run, pixel, most_paths, done = std::move(done)] {
         Replay replay;
         try {
+            if (run->totals) throw std::runtime_error("the run can only be looked at");
             if (!run->renderer) throw std::runtime_error("no pass is finished yet");
             replay = etendue::replay_last(*run->renderer, pixel, most_paths);
         } catch (const std::bad_alloc&) {

@@ -1,6 +1,7 @@
 #pragma once
 // An interactive session: a thread that loads a scene and renders runs, one per method. Other threads start and stop runs,
 // and read snapshots. The images are bit-identical to those of `etendue render`, however often a run is stopped or shown.
+// Runs can be kept in a folder, and go on in another session.
 
 #include <atomic>
 #include <condition_variable>
@@ -8,12 +9,15 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "render/render_request.h"
+#include "session/loaded_scene.h"
 #include "session/replay.h"
+#include "session/run_folder.h"
 #include "session/seed_series.h"
 #include "session/shared_slot.h"
 #include "session/snapshot.h"
@@ -43,6 +47,7 @@ enum class IntervalKind {
     None,        ///< No interval: the passes belong to Markov chains, or the run has several seeds.
 };
 const char* to_string(IntervalKind kind);
+IntervalKind interval_kind(Estimator estimator, SamplerKind sampler, bool has_groups, int seeds);
 
 struct ConvergencePoint {
     uint64_t passes;
@@ -65,6 +70,13 @@ struct RunStatus {
     std::vector<std::pair<std::string, double>> figures;
     std::vector<ConvergencePoint> history;  ///< Points that are about equally spaced in log time.
     bool is_of_this_scene = true;           ///< False after the scene was loaded again.
+
+    // Of runs that are kept in a folder.
+    std::string file;            ///< Name of its file there; empty: there is none.
+    uint64_t file_passes = 0;    ///< Of the file.
+    uint64_t opened_passes = 0;  ///< Of the file from which it was opened; 0: it was started.
+    std::string file_problem;    ///< Why a later state could not be saved; empty if it could.
+    std::string why_look_only;   ///< Why the run cannot go on; empty if it can.
 };
 
 /// The technique images of a run after a number of passes.
@@ -80,15 +92,27 @@ struct Saved {
     uint64_t passes = 0;  ///< Of the image.
 };
 
+/// The file that was to be opened as a run.
+struct Opened {
+    std::string error;  ///< Empty: it was.
+    int run = 0;
+};
+
+/// How runs are kept.
+struct RunKeeping {
+    std::string folder;  ///< Empty: they are not.
+    double every = 60;   ///< Seconds between two states that are saved while a run renders.
+};
+
 class Session {
 public:
-    using Load = std::function<Scene()>;
+    using Load = std::function<LoadedScene()>;
     static constexpr size_t kTechniqueBytes = size_t(512) << 20;
 
     /// Loads the scene in a thread of its own, while runs of an earlier one go on. `threads`: number of threads of each
     /// rendering; 0: one per core.
-    Session(Load load, int threads);
-    /// Discards the current pass. Images that are to be saved are.
+    Session(Load load, int threads, RunKeeping keeping = {});
+    /// Discards the current pass. Images that are to be saved are, and runs are kept.
     ~Session();
     Session(const Session&) = delete;
     Session& operator=(const Session&) = delete;
@@ -96,7 +120,10 @@ public:
     // -- From any thread.
 
     /// nullptr while the first scene is being loaded, or if it could not be loaded.
-    std::shared_ptr<const Scene> scene() const { return scene_.load(); }
+    std::shared_ptr<const Scene> scene() const {
+        const std::shared_ptr<const LoadedScene> loaded = scene_.load();
+        return loaded ? std::shared_ptr<const Scene>(loaded, &loaded->scene) : nullptr;
+    }
     /// Number of times that a scene was loaded; runs of earlier ones keep them.
     uint64_t scene_version() const { return scene_version_.load(); }
     /// The reason why the scene could not be loaded; empty otherwise.
@@ -112,7 +139,8 @@ public:
     void stop(int run);
     /// Discards the current pass, and stops.
     void discard(int run);
-    /// Continues a run that was stopped or has finished, up to `limits` if any are given.
+    /// Continues a run that was stopped or has finished, up to `limits` if any are given. Throws std::runtime_error if it
+    /// can only be looked at.
     void resume(int run, const RenderLimits& limits);
     /// Removes the run and its image.
     void remove(int run);
@@ -124,13 +152,28 @@ public:
     void stop_all(bool drop);
     /// The same, and from now on no run is started or continued.
     void close(bool drop);
-    /// Waits until the current pass and all commands so far are finished.
+    /// Waits until the current pass and all commands so far are finished, and the files of the runs are written.
     void settle();
+
+    // Runs are kept in the folder when they end or are stopped, and from time to time while they render; those with several
+    // seeds are not.
+
+    /// The folder; empty if runs are not kept.
+    std::string runs_folder() const { return folder_ ? folder_->path() : ""; }
+    /// The runs of the scene there that are not open, and what cannot be read, as of the last look into the folder. That is
+    /// after a scene was loaded or a run was removed, and at a call of list_kept(), which does not wait for it.
+    std::vector<KeptRun> kept() const;
+    void list_kept();
+    /// A number that changes whenever kept() does, apart from runs that are opened and removed.
+    uint64_t kept_version() const { return kept_version_.load(); }
+    /// Opens a file of the folder, unless it is open, and calls `done` in a thread of the session. The run goes on with the
+    /// same bits; where they would be others, it can only be looked at.
+    void open(const std::string& name, std::function<void(const Opened&)> done);
 
     /// Throws std::runtime_error for an unknown run, as do all functions that take one.
     RunStatus status(int run) const;
     std::vector<RunStatus> runs() const;
-    /// The scene that the run was started with.
+    /// The scene that the run was started with, or opened.
     std::shared_ptr<const Scene> scene_of(int run) const;
     /// A number that changes whenever the status of a run changes.
     uint64_t revision() const { return revision_.load(); }
@@ -179,6 +222,17 @@ private:
     void show_if_idle(const std::shared_ptr<Run>& run);
     void write(const std::shared_ptr<const Snapshot>& snapshot, const std::string& file,
                bool replaces, const std::function<void(const Saved&)>& done);
+    /// Keeps the state of a run, if it has changed and there is a folder.
+    void keep(Run& run) noexcept;
+    void write_state(Run& run);
+    /// Sets the time of the next file of a run that renders. `seconds`: what the last one took.
+    void wait_for_next_file(Run& run, double seconds) const;
+    /// A run with the state of a file, which is not yet one of the session.
+    std::shared_ptr<Run> load_run(const std::string& name);
+    /// Returns the id of the run.
+    int open_now(const std::string& name);
+    /// Looks into the folder. False if too many files wait.
+    bool look_into_folder() noexcept;
     /// Marks a run as stopping, and lets the session's thread do the rest. Needs the mutex.
     void request_stop(const std::shared_ptr<Run>& run);
     /// The same for a run in any state: one that does not render is stopped after the commands that wait, since one of
@@ -188,8 +242,10 @@ private:
 
     const Load load_;
     const int threads_;
-    SharedSlot<const Scene> scene_;
-    std::atomic<uint64_t> scene_version_{0};
+    const std::optional<RunFolder> folder_;
+    const double keep_every_;
+    SharedSlot<const LoadedScene> scene_;
+    std::atomic<uint64_t> scene_version_{0}, kept_version_{0};
     std::atomic<uint64_t> revision_{1};
 
     mutable std::mutex mutex_;  ///< Guards all members below, and the status of runs.
@@ -197,6 +253,7 @@ private:
     std::string load_error_;
     std::deque<std::function<void()>> commands_;
     std::vector<std::shared_ptr<Run>> runs_;
+    std::vector<KeptRun> kept_;
     SnapshotBudget budget_;
     int last_id_ = 0;
     bool must_load_ = true, is_loading_ = false;
@@ -207,7 +264,8 @@ private:
     std::atomic<bool> drop_{false};       ///< The current pass is to be discarded.
     int turn_of_ = 0;                     ///< Id of the run whose turn it is; 0: none.
     uint64_t turns_ = 0;
-    Workers writer_{1, Workers::AtEnd::FinishAll};  ///< Of files. Outlives the threads.
+    /// Writes files, and reads runs. Outlives the threads.
+    Workers writer_{1, Workers::AtEnd::FinishAll};
     std::thread thread_, loader_;
 };
 

@@ -1,7 +1,5 @@
 #include "studio/api.h"
 
-#include <sys/stat.h>
-
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -14,6 +12,7 @@
 #include "render/plugin_list.h"
 #include "render/render_request.h"
 #include "render/scene_integrator.h"
+#include "session/file_version.h"
 #include "session/light_ray.h"
 #include "session/replay.h"
 #include "studio/guard.h"
@@ -47,14 +46,6 @@ const std::array<PageFile, 10>& page_files() {
     return files;
 }
 
-/// Time and size of a file's last change.
-std::string fingerprint(const std::string& file) {
-    struct stat about {};
-    if (::stat(file.c_str(), &about) != 0) return {};
-    return fmt::format("{}.{} {} {}", about.st_mtim.tv_sec, about.st_mtim.tv_nsec, about.st_size,
-                       about.st_ino);
-}
-
 std::string hash_of(const std::string& text) {
     return fmt::format("\"{:016x}\"", ContentHash().add(text).value());
 }
@@ -64,7 +55,7 @@ std::string hash_of(const std::string& text) {
 Api::Api(Session& session, ApiOptions options) : session_(session), options_(std::move(options)) {
     const std::filesystem::path folder = std::filesystem::path(options_.scene_file).parent_path();
     scene_folder_ = folder.empty() ? "." : folder.string();
-    fingerprint_ = fingerprint(options_.scene_file);
+    scene_file_version_ = file_version(options_.scene_file);
 }
 
 // -- Requests.
@@ -113,7 +104,7 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
         });
     }
     if (path == "/v1/run")
-        return needs(request.method == "POST"), done(run(parse_object(request.body)));
+        return needs(request.method == "POST"), run(parse_object(request.body), done);
     if (path == "/v1/save")
         return needs(request.method == "POST"), save(parse_object(request.body), done);
     for (const char* known :
@@ -157,7 +148,7 @@ void Api::look_at_scene_file() {
     const auto now = std::chrono::steady_clock::now();
     if (now < looked_ + 2s) return;
     looked_ = now;
-    const bool is_changed = fingerprint(options_.scene_file) != fingerprint_;
+    const bool is_changed = file_version(options_.scene_file) != scene_file_version_;
     if (is_changed != is_scene_changed_) ++own_revision_;
     is_scene_changed_ = is_changed;
 }
@@ -173,7 +164,8 @@ std::string Api::event() {
     return dump({{"runs", runs},
                  {"scene_version", session_.scene_version()},
                  {"load_error", session_.load_error()},
-                 {"scene_changed", is_scene_changed_}});
+                 {"scene_changed", is_scene_changed_},
+                 {"kept_version", session_.kept_version()}});
 }
 
 Reply Api::state() {
@@ -209,6 +201,10 @@ Reply Api::state() {
     }
     j["runs"] = json::array();
     for (const RunStatus& s : session_.runs()) j["runs"].push_back(to_json(s));
+    j["keeps_runs"] = !session_.runs_folder().empty();
+    j["kept_version"] = session_.kept_version();
+    j["kept"] = json::array();
+    for (const KeptRun& k : session_.kept()) j["kept"].push_back(to_json(k));
     j["integrators"] =
         json::parse(etendue::to_json(choose_plugins(plugin_list(), "integrator", "")).dump());
     j["layers"] = json::array();
@@ -251,17 +247,34 @@ RunRequest Api::run_request(const json& body) const {
     return request;
 }
 
-Reply Api::run(const json& body) {
+/// A run is opened by the name of a file in the folder of kept runs; links are not followed.
+void Api::open(const json& body, const Done& done) {
+    const std::string folder = session_.runs_folder(), name = text_of(body, "file");
+    if (!folder.empty()) find_file_in({folder}, name);
+    if (!name.ends_with(RunFolder::kExtension))
+        throw ApiError(422, fmt::format("the name must end with {}", RunFolder::kExtension));
+    session_.open(name, [done](const Opened& opened) {
+        done(opened.error.empty() ? Reply::json(dump({{"run", opened.run}}))
+                                  : Reply::error(422, opened.error));
+    });
+}
+
+void Api::run(const json& body, const Done& done) {
     const std::string action = text_of(body, "action");
     if (action == "start") {
         const int id = session_.start(run_request(body));
-        return Reply::json(dump({{"run", id}}));
+        return done(Reply::json(dump({{"run", id}})));
+    }
+    if (action == "open") return open(body, done);
+    if (action == "list") {
+        session_.list_kept();
+        return done(Reply::json("{}"));
     }
     if (action == "reload") {
-        fingerprint_ = fingerprint(options_.scene_file);
+        scene_file_version_ = file_version(options_.scene_file);
         looked_ = {};
         session_.reload();
-        return Reply::json("{}");
+        return done(Reply::json("{}"));
     }
     const int id = int(integer(body, "run", 1, INT32_MAX));
     if (action == "stop")
@@ -273,8 +286,9 @@ Reply Api::run(const json& body) {
     else if (action == "remove")
         session_.remove(id);
     else
-        throw ApiError(422, "\"action\" must be start, stop, continue, discard, remove or reload");
-    return Reply::json(dump({{"run", id}}));
+        throw ApiError(422, "\"action\" must be start, stop, continue, discard, remove, open, list "
+                            "or reload");
+    done(Reply::json(dump({{"run", id}})));
 }
 
 void Api::save(const json& body, const Done& done) {
@@ -416,6 +430,10 @@ void Api::replay_pixel(const json& body, const Done& done) {
                                          int(integer(body, "y", 0, g.crop_height - 1)));
     constexpr size_t kMostPaths = 10000;
     const auto most = size_t(integer(body, "most", 1, kMostPaths, 1000));
+    if (!status.why_look_only.empty())
+        throw ApiError(422, fmt::format("its paths cannot be traced again, since the run can only "
+                                        "be looked at: {}",
+                                        status.why_look_only));
     const IntegratorSpec integrator = IntegratorSpec::parse(status.request.integrator);
     switch (replayed_passes(integrator)) {
     case ReplayedPasses::None:
@@ -438,7 +456,8 @@ void Api::replay_pixel(const json& body, const Done& done) {
     request.filter_mode = status.request.filter_mode;
     request.seed = status.request.seed;
     request.pixel = pixel;
-    request.first_pass = uint32_t(integer(body, "pass", 0, INT32_MAX, 0));
+    request.first_pass =
+        uint32_t(status.request.first_pass) + uint32_t(integer(body, "pass", 0, INT32_MAX, 0));
     request.passes = uint32_t(integer(body, "passes", 1, 100000, 16));
     request.splats = boolean(body, "splats");
     request.most_paths = most;

@@ -49,7 +49,8 @@ private:
     void gain(const Request& request, const Done& done);
     Reply techniques(const Request& request);
     void image(const Request& request, const Done& done);
-    Reply run(const nlohmann::json& body);
+    void run(const nlohmann::json& body, const Done& done);
+    void open(const nlohmann::json& body, const Done& done);
     void save(const nlohmann::json& body, const Done& done);
     Reply get_paths(const Request& request);
     Reply put_paths(const Request& request);
@@ -74,7 +75,7 @@ private:
     double charged_ = 0;  ///< Processor time of the server's thread that was charged to snapshots.
 
     std::chrono::steady_clock::time_point looked_{};
-    std::string fingerprint_;  ///< Of the scene's file as it was loaded.
+    std::string scene_file_version_;  ///< As it was loaded.
     bool is_scene_changed_ = false;
     uint64_t own_revision_ = 0;
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "render/render_request.h"
+#include "studio/guard.h"
 
 namespace etendue {
 namespace {
@@ -63,12 +64,28 @@ json progress_of(const RunStatus& s) {
     if (s.seeds > 1) j["seeds"] = {s.finished_seeds, s.seeds};
     if (!s.message.empty()) j["message"] = s.message;
     if (!s.is_of_this_scene) j["old_scene"] = true;
+    if (!s.file.empty()) j["file"] = s.file;
+    if (!s.file.empty()) j["file_passes"] = s.file_passes;
+    // Empty once a later state could be saved.
+    j["file_problem"] = s.file_problem;
     return j;
+}
+
+json to_json(const KeptRun& run) {
+    if (!run.problem.empty()) return {{"file", run.file}, {"problem", run.problem}};
+    if (!is_file_name(run.file))
+        return {{"file", run.file},
+                {"problem", "its name must have only letters, digits, '.', '_' and '-'"}};
+    return {{"file", run.file},
+            {"integrator", run.integrator},
+            {"seed", run.seed},
+            {"passes", run.passes}};
 }
 
 json to_json(const RunStatus& s) {
     json j = progress_of(s);
     j["integrator"] = s.request.integrator;
+    j["why_look_only"] = s.why_look_only;
     j["sampler"] = to_string(s.request.sampler);
     j["filter_mode"] = to_string(s.request.filter_mode);
     j["seed"] = s.request.seed;

@@ -21,6 +21,7 @@ nlohmann::json to_json(Rgb c);
 /// What changes from pass to pass.
 nlohmann::json progress_of(const RunStatus& s);
 nlohmann::json to_json(const RunStatus& s);
+nlohmann::json to_json(const KeptRun& run);
 nlohmann::json to_json(const SeedComparison::Method& m, const SeedSeries& series);
 /// The name of a technique in requests: connect-2-3.
 std::string key_of(const Technique& q);

@@ -244,7 +244,8 @@ TEST(Session, AStopFollowsTheResumptionBefore) {
 
 /// Commands and queries of four threads at a time, while the scene is loaded again.
 TEST(Session, TakesCommandsOfSeveralThreads) {
-    Session session(small_room, 2);
+    const TemporaryFolder folder;
+    Session session(small_room, 2, {.folder = folder.path().string(), .every = 0.05});
     ASSERT_TRUE(wait_for_scene(session));
     for (int i = 0; i < 3; ++i) session.start(request("path", 1u << 30));
     const auto user = [&](uint32_t seed) {
@@ -253,7 +254,7 @@ TEST(Session, TakesCommandsOfSeveralThreads) {
         for (int i = 0; i < kCommands; ++i) {
             const int run = 1 + int(random() % 6);
             try {
-                switch (random() % 12) {
+                switch (random() % 14) {
                 case 0: {
                     RunRequest r = request(random() % 2 ? "bdpt" : "vcm", 1 + random() % 100);
                     r.technique_depth = int(random() % 4);
@@ -277,13 +278,20 @@ TEST(Session, TakesCommandsOfSeveralThreads) {
                     break;
                 case 9: session.seed_series(run); break;
                 case 10: session.spent(1e-4); break;
+                case 11: session.list_kept(); break;
+                case 12:
+                    for (const KeptRun& k : session.kept()) {
+                        session.open(k.file, [](const Opened& o) { EXPECT_EQ(o.error, ""); });
+                        break;
+                    }
+                    break;
                 default:
                     if (const auto shown = session.snapshot(run)) {
                         EXPECT_EQ(shown->mean.size(), size_t(24 * 24));
                     }
                 }
             } catch (const std::runtime_error&) {
-                // Another thread removed the run.
+                // Another thread removed the run, or too many files wait.
             }
             for (const RunStatus& s : session.runs()) EXPECT_NE(s.state, RunState::Failed);
         }

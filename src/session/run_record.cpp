@@ -1,0 +1,80 @@
+#include "session/run_record.h"
+
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include "description/json_text.h"
+
+namespace etendue {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kSection = "session";
+
+/// What is thrown for a number that cannot be.
+struct ImpossibleNumber {};
+
+double positive(const json& value) {
+    const auto v = value.get<double>();
+    if (!(v > 0)) throw ImpossibleNumber();
+    return v;
+}
+uint64_t passes_of(const json& value) {
+    if (!value.is_number_unsigned() || value.get<uint64_t>() == 0 ||
+        value.get<uint64_t>() > kMostPasses)
+        throw ImpossibleNumber();
+    return value.get<uint64_t>();
+}
+
+}  // namespace
+
+void save_record(const RunStatus& run, SectionWriter& to) {
+    json limits = json::object(), history = json::array(), figures = json::array();
+    if (run.request.spp) limits["spp"] = *run.request.spp;
+    if (run.request.seconds) limits["seconds"] = *run.request.seconds;
+    if (run.request.error) limits["error"] = *run.request.error;
+    for (const ConvergencePoint& p : run.history)
+        history.push_back({p.passes, p.seconds, p.error.relative_rms, p.error.low, p.error.high});
+    for (const auto& [name, value] : run.figures)
+        if (std::isfinite(value)) figures.push_back({name, value});
+    to.begin(kSection);
+    to.put(json{{"limits", limits},
+                {"finished", run.state == RunState::Finished},
+                {"history", history},
+                {"figures", figures}}
+               .dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
+bool load_record(SectionReader& from, RunStatus& run) {
+    if (!from.has(kSection)) return false;
+    std::string text;
+    from.open(kSection);
+    from.get(text);
+    from.finish();
+    const char* const kDamaged = "the record of the run is damaged";
+    try {
+        const json record = parse_json(text, from.name());
+        const json& limits = record.at("limits");
+        if (limits.contains("spp")) run.request.spp = passes_of(limits["spp"]);
+        if (limits.contains("seconds")) run.request.seconds = positive(limits["seconds"]);
+        if (limits.contains("error")) run.request.error = positive(limits["error"]);
+        run.state = record.at("finished").get<bool>() ? RunState::Finished : RunState::Stopped;
+        for (const json& p : record.at("history")) {
+            const auto number = [&](size_t i) { return p.at(i).get<double>(); };
+            run.history.push_back(
+                {passes_of(p.at(0)), number(1), {number(2), number(3), number(4), true}});
+        }
+        for (const json& f : record.at("figures"))
+            run.figures.emplace_back(f.at(0).get<std::string>(), f.at(1).get<double>());
+    } catch (const json::exception&) {
+        from.fail(kDamaged);
+    } catch (const ImpossibleNumber&) {
+        from.fail(kDamaged);
+    }
+    from.close();
+    return true;
+}
+
+}  // namespace etendue
