@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "commands.h"
+#include "description/fingerprint.h"
 #include "image/image_io.h"
 #include "interrupt.h"
 #include "messages.h"
@@ -24,6 +25,7 @@
 #include "studio/api.h"
 #include "studio/guard.h"
 #include "studio/server.h"
+#include "system/output_file.h"
 
 namespace etendue {
 namespace {
@@ -31,7 +33,7 @@ namespace {
 struct StudioCommand {
     SceneOptions scene;
     RunRequest first_run;
-    std::string output = ".", listen = "127.0.0.1", reference;
+    std::string output = ".", runs, listen = "127.0.0.1", reference;
     std::vector<std::string> hosts;
     int port = 0, threads = 0;
     unsigned grace = 20;
@@ -40,11 +42,14 @@ struct StudioCommand {
     void run() const;
 
 private:
+    void check_files() const;
     ApiOptions api_options() const;
+    LoadedScene load() const;
     void print_urls(const Server& server, const std::string& token) const;
     void start_first_run(Session& session) const;
     void watch(Session& session, const Api& api, const std::atomic<bool>& stop) const;
     void save_all(Session& session) const;
+    void tell_of_kept_runs(Session& session) const;
     void finish(Session& session, const std::atomic<bool>& drop) const;
 };
 
@@ -105,7 +110,8 @@ void StudioCommand::save_all(Session& session) const {
     std::stable_partition(runs.begin(), runs.end(),
                           [](const RunStatus& s) { return s.state != RunState::Stopping; });
     for (const RunStatus& s : runs) try {
-            if (s.passes > 0 || s.state == RunState::Stopping) save_one(s);
+            const bool is_only_opened = s.opened_passes > 0 && s.passes == s.opened_passes;
+            if (!is_only_opened && (s.passes > 0 || s.state == RunState::Stopping)) save_one(s);
         } catch (const std::exception& e) {
             // Such as that the page has removed the run.
             message("run {}: {}\n", s.id, e.what());
@@ -113,7 +119,22 @@ void StudioCommand::save_all(Session& session) const {
     if (!errors.empty()) throw std::runtime_error(errors);
 }
 
-/// Saves all images. `drop`, of a second signal or at the end of the time of grace, discards the pass in flight.
+/// Waits until the runs are kept. Throws if one is not.
+void StudioCommand::tell_of_kept_runs(Session& session) const {
+    if (runs.empty()) return;
+    session.settle();
+    std::vector<std::string> errors;
+    for (const RunStatus& s : session.runs()) {
+        if (!s.file_problem.empty())
+            errors.push_back(fmt::format("run {} is not kept: {}", s.id, s.file_problem));
+        else if (!s.file.empty() && s.passes > s.opened_passes)
+            message("{}/{}: run {} is kept, {}, {} spp\n", runs, s.file, s.id, s.request.integrator,
+                    s.file_passes);
+    }
+    if (!errors.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(errors, "; ")));
+}
+
+/// Saves all images, and waits for the files of runs. `drop`, of a second signal or at the end of the time of grace, discards the pass in flight.
 void StudioCommand::finish(Session& session, const std::atomic<bool>& drop) const {
     std::atomic<bool> is_saved{false};
     std::thread dropper([&] {
@@ -127,6 +148,13 @@ void StudioCommand::finish(Session& session, const std::atomic<bool>& drop) cons
         save_all(session);
     } catch (...) {
         failure = std::current_exception();
+    }
+    try {
+        tell_of_kept_runs(session);
+    } catch (const std::exception& e) {
+        // Of two failures, the program reports one at its end.
+        if (failure) message("{}\n", e.what());
+        if (!failure) failure = std::current_exception();
     }
     is_saved = true;
     dropper.join();
@@ -186,13 +214,32 @@ void StudioCommand::watch(Session& session, const Api& api, const std::atomic<bo
     }
 }
 
-void StudioCommand::run() const {
-    std::error_code error;
-    std::filesystem::create_directories(output, error);
-    if (!std::filesystem::is_directory(output))
-        throw std::runtime_error(fmt::format("--output: {} is not a folder", output));
+LoadedScene StudioCommand::load() const {
+    SceneOptions loading = scene;
+    loading.threads = threads;
+    const SceneDescription description = read_scene(loading);
+    const SceneSource source{.fingerprint = runs.empty() ? 0 : scene_fingerprint(description),
+                             .lenient = loading.lenient,
+                             .watertight = loading.watertight};
+    return {build_scene(description, loading), source};
+}
+
+/// Creates missing folders.
+void StudioCommand::check_files() const {
+    for (const auto& [option, folder] : {std::pair("--output", output), {"--runs", runs}}) {
+        if (folder.empty()) continue;
+        std::error_code error;
+        std::filesystem::create_directories(folder, error);
+        if (!std::filesystem::is_directory(folder))
+            throw std::runtime_error(fmt::format("{}: {} is not a folder", option, folder));
+    }
+    if (!runs.empty()) OutputFile::check(free_name(runs, "run"));
     if (!std::filesystem::exists(scene.file))
         throw std::runtime_error(fmt::format("{}: no such file", scene.file));
+}
+
+void StudioCommand::run() const {
+    check_files();
     if (const std::string& i = first_run.integrator; !i.empty())
         make_integrator(IntegratorSpec::parse(i));
     const ApiOptions options = api_options();
@@ -200,9 +247,7 @@ void StudioCommand::run() const {
     const Interrupts interrupts = catch_interrupts(grace);
     // Declared so that what calls others is destroyed before these.
     Server server(listen, port);
-    SceneOptions loading = scene;
-    loading.threads = threads;
-    Session session([loading] { return load_scene(loading); }, threads);
+    Session session([this] { return load(); }, threads, {.folder = runs});
     Api api(session, options);
     const Server::Serving serving = server.start(api);
     try {
@@ -235,6 +280,10 @@ void add_studio_command(CLI::App& app) {
                  "Folder for saved images and light paths; on Ctrl-C the images of all runs are "
                  "written there, without replacing files")
         ->capture_default_str();
+    c.add_option(
+        "--runs", command->runs,
+        "Folder in which the runs are kept, and from which those of the scene can be opened "
+        "again (default: none)");
     c.add_option("--reference", command->reference,
                  "Reference image of the same size: .exr, .pfm or .hdr");
     c.add_option("--threads", command->threads, "Number of threads; 0: one per core")

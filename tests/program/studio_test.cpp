@@ -18,6 +18,7 @@
 #include <nlohmann/json.hpp>
 
 #include "run_program.h"
+#include "wait_for.h"
 
 namespace etendue::test {
 namespace {
@@ -111,6 +112,7 @@ protected:
         std::vector<std::string> arguments{"studio", scene,  "--resolution", "40x30",
                                            "-o",     output, "--threads",    "1"};
         arguments.insert(arguments.end(), more.begin(), more.end());
+        fs::remove(folder.path() / "stdout.txt");  // of an earlier program
         program.emplace(ETENDUE_PROGRAM, arguments, folder.path());
         std::smatch m;
         std::string printed;
@@ -615,6 +617,47 @@ TEST_F(StudioTest, CtrlCWritesAllImages) {
     EXPECT_TRUE(fs::exists(fs::path(output) / "box-3.exr"));
 }
 
+/// Ctrl-C keeps the runs, and they go on the next time; nothing is written without --runs.
+TEST_F(StudioTest, CtrlCKeepsRuns) {
+    const fs::path runs = folder.path() / "runs";
+    start({"-i", "bdpt", "--runs", runs});
+    ASSERT_TRUE(wait_for([&] { return get("/v1/state").parsed()["runs"][0]["passes"] > 0; }));
+    const ProgramResult first = stop();
+    EXPECT_EQ(first.status, 0) << first.errors;
+    EXPECT_NE(first.errors.find("box-bdpt-1.etd: run 1 is kept, bdpt"), std::string::npos)
+        << first.errors;
+
+    start({"--idle", "--runs", runs});
+    json kept;
+    ASSERT_TRUE(wait_for([&] {
+        kept = get("/v1/state").parsed()["kept"];
+        return kept.size() == 1;
+    }));
+    const uint64_t passes = kept[0]["passes"];
+    EXPECT_GT(passes, 0u);
+    EXPECT_EQ(post("/v1/run", {{"action", "open"}, {"file", kept[0]["file"]}}).status, 200);
+    EXPECT_EQ(wait_for_run(1, "stopped")["passes"], passes);
+    // What was only opened is written nowhere again.
+    fs::remove_all(output);
+    fs::create_directory(output);
+    EXPECT_EQ(stop().status, 0);
+    EXPECT_TRUE(fs::is_empty(output));
+
+    start({"--idle", "--runs", runs});
+    ASSERT_TRUE(wait_for([&] { return get("/v1/state").parsed()["kept"].size() == 1; }));
+    post("/v1/run", {{"action", "open"}, {"file", kept[0]["file"]}});
+    post("/v1/run", {{"action", "continue"}, {"run", 1}, {"spp", passes + 2}});
+    EXPECT_EQ(wait_for_run(1, "finished")["passes"], passes + 2);
+    fs::remove_all(runs);
+    std::ofstream(runs) << "no folder";
+    post("/v1/run", {{"action", "continue"}, {"run", 1}, {"spp", passes + 3}});
+    EXPECT_EQ(wait_for_run(1, "finished")["passes"], passes + 3);
+    const ProgramResult last = stop();
+    EXPECT_EQ(last.status, 1);
+    EXPECT_NE(last.errors.find("run 1 is not kept: "), std::string::npos) << last.errors;
+    EXPECT_FALSE(fs::is_empty(output)) << "the image is written";
+}
+
 /// Where the output folder cannot be written to, the images of all runs are saved among temporary files.
 TEST_F(StudioTest, CtrlCSavesElsewhereWhatCannotBeSaved) {
     const fs::path other = folder.path() / "temporary";
@@ -681,6 +724,7 @@ TEST_F(StudioTest, FailsBeforeItServes) {
     expect({"studio", scene, "--listen", "nowhere"}, "nowhere");
     expect({"studio", scene, "--host", "no name"}, "no name");
     expect({"studio", scene, "-o", scene}, "is not a folder");
+    expect({"studio", scene, "--runs", scene}, "--runs");
 }
 
 TEST_F(StudioTest, SaysWhenTheSceneChangesAndLoadsItAgain) {

@@ -1,5 +1,5 @@
 // Uses `etendue studio` in a headless browser: pixels appear and change with exposure, zoom and wipe; runs are started,
-// stopped and continued; rectangles and differences are measured; a path by way of a mirror is drawn by keys alone, and
+// stopped and continued, kept and opened again; rectangles and differences are measured; a path by way of a mirror is drawn by keys alone, and
 // another by the pointer alone; the paths of a pixel are traced again; two pages edit the same paths; the program is killed.
 // Controls have names, the console is quiet.
 //
@@ -168,6 +168,38 @@ async function imagePart() {
         await browser.until("document.getElementById('banner-text').textContent.includes('does not answer since')", 'the banner');
         check(await browser.evaluate('studio.view.pictures[0] !== undefined'), 'the picture is kept');
         await browser.screenshot('6-gone');
+    } finally {
+        browser.close();
+        await studio.stop('SIGKILL');
+    }
+}
+
+/// A run that Ctrl-C has kept is opened and goes on.
+async function keptPart() {
+    const more = ['--resolution', '64x48', '--runs', join(folder, 'runs')];
+    const first = await Studio.start(sceneFile, '-i', 'bdpt', ...more);
+    try {
+        const [origin, token] = first.url.split('/#token='), headers = {Authorization: `Bearer ${token}`};
+        while (!((await (await fetch(`${origin}/v1/state`, {headers})).json()).runs[0]?.passes > 1)) await new Promise(r => setTimeout(r, 50));
+        check(await first.stop() === 0 && existsSync(join(folder, 'runs', 'cornell-bdpt-1.etd')), 'Ctrl-C keeps the run');
+    } finally {
+        await first.stop('SIGKILL');
+    }
+    const studio = await Studio.start(sceneFile, '--idle', ...more);
+    const browser = openBrowser();
+    try {
+        await browser.open(studio.url);
+        await browser.until("document.querySelector('#kept-list summary')?.textContent === 'Kept runs: 1'", 'it is listed');
+        await browser.evaluate("document.querySelector('#kept-list details').open = true");
+        await checkNames(browser, 'kept runs');
+        await browser.screenshot('5c-kept');
+        await browser.evaluate("document.querySelector('#kept-list .run button').click()");
+        await browser.until('studio.shown[0].run === 1 && studio.shown[0].passes > 1', 'its image is shown');
+        const passes = await browser.evaluate('studio.shown[0].passes');
+        check(await browser.evaluate("document.querySelector('#run-list .figures').textContent.includes('kept in cornell-bdpt-1.etd')"), 'with the name of its file');
+        await browser.evaluate("[...document.querySelectorAll('#run-list button')].find(b => b.textContent === 'Continue').click()");
+        await browser.until(`studio.shown[0].passes > ${passes}`, 'and it goes on');
+        check(browser.complaints.length === 0, `the console is quiet: ${browser.complaints.join('; ')}`);
     } finally {
         browser.close();
         await studio.stop('SIGKILL');
@@ -465,4 +497,4 @@ async function pathPart() {
     }
 }
 
-await runParts(foreignPagePart, fifthPagePart, imagePart, instancePart, motionPart, pathPart);
+await runParts(foreignPagePart, fifthPagePart, imagePart, keptPart, instancePart, motionPart, pathPart);

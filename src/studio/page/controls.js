@@ -35,6 +35,15 @@ export function describe(run) {
     return `${seeds}${run.passes} spp, ${time(run.seconds)}, ${significant(run.rays / 1e6)} Mrays/s${error}`;
 }
 
+/**
+ * What there is to say of the file of a run.
+ * @param {any} run
+ */
+function describeFile(run) {
+    const kept = run.file ? `; kept in ${run.file}${run.file_passes < run.passes ? ` (${run.file_passes} spp)` : ''}` : '';
+    return kept + (run.file_problem ? `; not kept: ${run.file_problem}` : '') + (run.why_look_only ? `; it can only be looked at: ${run.why_look_only}` : '');
+}
+
 export class RunList {
     /**
      * @param {HTMLElement} parent
@@ -72,9 +81,10 @@ export class RunList {
             const isRendering = run.state === 'rendering', isInPass = isRendering || run.state === 'stopping';
             row.state.textContent = /** @type {any} */ (kSymbols)[run.state];
             row.state.title = run.state;
-            const text = `${run.state}: ${describe(run)}${run.old_scene ? ' (earlier version of the scene)' : ''}${run.message ? `: ${run.message}` : ''}`;
+            const text = `${run.state}: ${describe(run)}${run.old_scene ? ' (earlier version of the scene)' : ''}${run.message ? `: ${run.message}` : ''}${describeFile(run)}`;
             if (row.figures.textContent !== text) row.figures.textContent = text;
-            row.figures.classList.toggle('error', run.state === 'failed');
+            row.figures.classList.toggle('error', run.state === 'failed' || Boolean(run.file_problem));
+            row.toggle.disabled = Boolean(run.why_look_only);
             const label = isRendering ? 'Stop' : 'Continue';
             if (row.toggle.textContent !== label) {
                 row.toggle.textContent = label;
@@ -84,6 +94,34 @@ export class RunList {
             row.discard.disabled = !isInPass;
             row.box.classList.toggle('shown', run.id === this.tell.shown());
         }
+    }
+}
+
+/** The runs in the folder of the program that are not open. */
+export class KeptList {
+    /**
+     * @param {HTMLElement} parent
+     * @param {{open: (file: string) => void, look: () => void}} tell
+     */
+    constructor(parent, tell) {
+        this.tell = tell;
+        this.title = element('summary');
+        this.rows = element('div');
+        parent.append(element('details', {}, [this.title, this.rows,
+            element('button', {type: 'button', textContent: 'Look again', title: 'Look again into the folder', onclick: () => tell.look()})]));
+        this.update([]);
+    }
+
+    /** @param {any[]} runs */
+    update(runs) {
+        const key = JSON.stringify(runs);
+        if (this.rows.dataset.key === key) return;
+        this.rows.dataset.key = key;
+        this.title.textContent = `Kept runs: ${runs.length}`;
+        this.rows.replaceChildren(...runs.map(run => element('div', {className: 'run'}, [
+            element('div', {className: 'name', textContent: run.file}),
+            element('div', {className: run.problem ? 'figures error' : 'figures', textContent: run.problem ?? `${run.integrator}, seed ${run.seed}, ${run.passes} spp`}),
+            run.problem ? null : element('div', {className: 'bar'}, [element('button', {type: 'button', textContent: 'Open', 'aria-label': `Open ${run.file}`, onclick: () => this.tell.open(run.file)})])])));
     }
 }
 

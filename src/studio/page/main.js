@@ -3,7 +3,7 @@
 
 import {Server, Refusal} from './server.js';
 import {View} from './view.js';
-import {RunForm, RunList, describe, element, significant} from './controls.js';
+import {KeptList, RunForm, RunList, describe, element, significant} from './controls.js';
 import {drawPlot} from './plot.js';
 import {Space} from './space.js';
 import {PathEditor} from './paths.js';
@@ -287,6 +287,8 @@ async function updateViewOptions() {
 
 const list = new RunList(at('run-list'), {act, shown: () => shown[0].run, show: run => showIn(0, run, tools.view.value || 'image')});
 
+const kept = new KeptList(at('kept-list'), {open: file => report(begin({action: 'open', file})), look: () => report(server.post('/v1/run', {action: 'list'}))});
+
 function updateRuns() {
     const all = [...runs.values()];
     list.update(all);
@@ -325,8 +327,11 @@ function act(action, run) {
     report(server.post('/v1/run', request));
 }
 
-/** @param {any} request @returns {Promise<number>} */
-async function start(request) {
+/**
+ * Starts or opens a run, and shows it.
+ * @param {any} request @returns {Promise<number>}
+ */
+async function begin(request) {
     const {run} = await server.post('/v1/run', request);
     await update();
     showIn(0, run, 'image');
@@ -344,9 +349,11 @@ async function update() {
     at('scene-name').textContent = state.scene ? `${state.scene_file}, ${state.scene.width} × ${state.scene.height}` : `${state.scene_file} is being loaded`;
     banner('load', state.load_error);
     if (state.reference_problem !== problemBefore) banner('reference', state.reference_problem, 'Dismiss', () => banner('reference', ''));
+    at('kept-list').hidden = !state.keeps_runs;
+    kept.update(state.kept);
     if (state.scene) view.setSize(state.scene.width, state.scene.height);
     if (!tools.form) {
-        tools.form = new RunForm(at('run-form'), state.integrators, {start: async request => { await start(request); }});
+        tools.form = new RunForm(at('run-form'), state.integrators, {start: async request => { await begin(request); }});
         if (state.scene) tools.form.choose(state.scene.integrator);
     }
     await updateViewOptions();
@@ -371,7 +378,7 @@ function showOtherScene(scene) {
 /** @param {any} event */
 async function onEvent(event) {
     const isNew = event.runs.length !== runs.size || event.runs.some((/** @type {any} */ r) => !runs.has(r.id)) || event.scene_version !== state.scene_version
-        || event.load_error !== state.load_error;
+        || event.load_error !== state.load_error || event.kept_version !== state.kept_version;
     if (isNew) await update();
     for (const r of event.runs) {
         const run = runs.get(r.id);
@@ -430,7 +437,7 @@ function showPane(name) {
     if (name === 'paths' && !space && state?.scene) {
         space = new Space(at('space'), at('space-tools'), at('space-label'), server, state.scene);
         editor = new PathEditor(at('editor'), space, server, {
-            pixel: () => ({x: view.cursor[0], y: view.cursor[1]}), start, runs: () => runs, fail: text => banner('editor', text, 'Dismiss', () => banner('editor', ''))});
+            pixel: () => ({x: view.cursor[0], y: view.cursor[1]}), start: begin, runs: () => runs, fail: text => banner('editor', text, 'Dismiss', () => banner('editor', ''))});
         inspector = new Inspector(at('inspector'), space, server, editor);
         inspector.setPixel(view.cursor[0], view.cursor[1], shown[0].run);
         report(space.load());

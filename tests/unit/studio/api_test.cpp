@@ -30,7 +30,7 @@ class ApiTest : public ::testing::Test {
 protected:
     void open(ApiOptions options = {}, const std::string& lamp = "12,11,9") {
         lamp_ = lamp;
-        session.emplace([this] { return scene(); }, 1);
+        session.emplace([this] { return scene(); }, 1, RunKeeping{.folder = runs});
         options.token = "secret";
         options.scene_file = (folder.path() / "room.xml").string();
         options.output_folder = folder.path().string();
@@ -81,6 +81,7 @@ protected:
 
     TemporaryFolder folder;
     std::atomic<int> size = 16;
+    std::string runs;  ///< The folder in which they are kept.
     std::optional<Session> session;
     std::optional<Api> api;
 
@@ -309,6 +310,71 @@ TEST_F(ApiTest, ExtremeRaysHaveAnswers) {
                        {{"index", index}, {"points", {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}}})
                       .status,
                   200);
+}
+
+TEST_F(ApiTest, KeptRunsAreListedAndOpened) {
+    runs = (folder.path() / "runs").string();
+    fs::create_directory(runs);
+    open();
+    const int first = finished_run({{"integrator", "bdpt"}, {"spp", 3}});
+    session->settle();
+    const json of_first = json::parse(get("/v1/state").body)["runs"][0];
+    EXPECT_EQ(of_first["file"], "test-bdpt-1.etd");
+    EXPECT_EQ(of_first["file_passes"], 3);
+    EXPECT_EQ(of_first["file_problem"], "");
+    EXPECT_TRUE(json::parse(get("/v1/state").body)["kept"].empty());
+    const auto version = [&] { return json::parse(api->event())["kept_version"].get<int>(); };
+    const int before = version();
+    EXPECT_EQ(post("/v1/run", {{"action", "remove"}, {"run", first}}).status, 200);
+    ASSERT_TRUE(wait_for([&] { return version() > before; }));
+    std::ofstream(fs::path(runs) / "a name.etd") << "no state of a rendering";
+    EXPECT_EQ(post("/v1/run", {{"action", "list"}}).status, 200);
+    json kept;
+    ASSERT_TRUE(wait_for([&] {
+        kept = json::parse(get("/v1/state").body)["kept"];
+        return kept.size() == 2;
+    })) << kept;
+    EXPECT_EQ(json::parse(get("/v1/state").body)["keeps_runs"], true);
+    EXPECT_TRUE(kept[0].contains("problem")) << kept;
+    EXPECT_EQ(
+        kept[1],
+        json({{"file", "test-bdpt-1.etd"}, {"integrator", "bdpt"}, {"seed", 0}, {"passes", 3}}));
+
+    const Reply opened = post("/v1/run", {{"action", "open"}, {"file", "test-bdpt-1.etd"}});
+    ASSERT_EQ(opened.status, 200) << opened.body;
+    const int run = json::parse(opened.body)["run"].get<int>();
+    const std::string id = std::to_string(run);
+    EXPECT_EQ(get("/v1/image?view=image&run=" + id).status, 200);
+    EXPECT_EQ(json::parse(get("/v1/pixel?x=3&y=4&run=" + id).body)["passes"], 3);
+    EXPECT_EQ(post("/v1/run", {{"action", "continue"}, {"run", run}, {"spp", 5}}).status, 200);
+    EXPECT_TRUE(wait_for([&] { return session->status(run).passes == 5; }));
+}
+
+TEST_F(ApiTest, OnlyFilesOfTheFolderAreOpened) {
+    const auto status = [&](const json& name) {
+        return post("/v1/run", {{"action", "open"}, {"file", name}}).status;
+    };
+    runs = (folder.path() / "runs").string();
+    fs::create_directory(runs);
+    open();
+    finished_run();
+    session->settle();
+    ASSERT_TRUE(fs::exists(fs::path(runs) / "test-path-1.etd"));
+    fs::copy(fs::path(runs) / "test-path-1.etd", folder.path() / "outside.etd");
+    fs::create_symlink(folder.path() / "outside.etd", fs::path(runs) / "link.etd");
+    fs::copy(folder.path() / "outside.etd", fs::path(runs) / "other.name");
+    fs::create_directory(fs::path(runs) / "folder.etd");
+    for (const json& bad : {json("../outside.etd"), json((folder.path() / "outside.etd").string()),
+                            json("outside.etd"), json("link.etd"), json("folder.etd"),
+                            json("other.name"), json(""), json(3), json(nullptr)})
+        EXPECT_EQ(status(bad), 422) << bad;
+    EXPECT_EQ(session->runs().size(), 1u);
+    // Without a folder, nothing is.
+    api.reset();
+    runs.clear();
+    open();
+    EXPECT_EQ(json::parse(get("/v1/state").body)["keeps_runs"], false);
+    EXPECT_EQ(status("test-path-1.etd"), 422);
 }
 
 /// Names of files that were edited are not kept for ever.
