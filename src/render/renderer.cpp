@@ -151,7 +151,7 @@ void check_limits(const RenderLimits& limits, uint64_t first_pass) {
     if (first_pass >= kMostPasses || limits.spp.value_or(1) > kMostPasses - first_pass)
         throw std::runtime_error(fmt::format(
             "{} samples per pixel are too many: there are random numbers for 2^32; render with "
-            "several seeds instead, and average the images",
+            "several seeds instead, and add them up (etendue merge)",
             first_pass + limits.spp.value_or(1)));
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // The processes that render one image together.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -30,7 +31,9 @@ public:
     /// finds those of all senders, one after another, in `to`.
     virtual void distribute(const void* from, int senders, size_t size,
                             std::span<const uint64_t> begins, void* to) const {
-        if (senders > 0) std::memcpy(to, from, size_t(begins[1] - begins[0]) * size);
+        if (senders > 0)
+            std::copy_n(static_cast<const std::byte*>(from), size_t(begins[1] - begins[0]) * size,
+                        static_cast<std::byte*>(to));
     }
     /// Sets `bytes` to those of process `from`.
     virtual void broadcast(std::vector<std::byte>& /*bytes*/, int /*from*/) const {}

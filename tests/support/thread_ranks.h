@@ -1,8 +1,8 @@
 #pragma once
 // Threads in the place of processes that render one image together.
 
+#include <algorithm>
 #include <barrier>
-#include <cstring>
 #include <functional>
 #include <thread>
 #include <vector>
@@ -36,8 +36,8 @@ public:
         show(from, [&] {
             const auto own = size_t(begins[size_t(index_) + 1] - begins[size_t(index_)]);
             for (int r = 0; r < senders; ++r)
-                std::memcpy(static_cast<std::byte*>(to) + size_t(r) * own * size,
-                            at(r) + begins[size_t(index_)] * size, own * size);
+                std::copy_n(at(r) + begins[size_t(index_)] * size, own * size,
+                            static_cast<std::byte*>(to) + size_t(r) * own * size);
         });
     }
     void broadcast(std::vector<std::byte>& bytes, int from) const override {
@@ -77,7 +77,7 @@ private:
     static void copy(const std::byte* from, size_t size, std::span<const uint64_t> begins, int r,
                      std::byte* to) {
         const uint64_t begin = begins[size_t(r)], end = begins[size_t(r) + 1];
-        std::memcpy(to + begin * size, from + begin * size, size_t(end - begin) * size);
+        std::copy_n(from + begin * size, size_t(end - begin) * size, to + begin * size);
     }
 
     Group& group_;
