@@ -134,7 +134,8 @@ void StudioCommand::tell_of_kept_runs(Session& session) const {
     if (!errors.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(errors, "; ")));
 }
 
-/// Saves all images, and waits for the files of runs. `drop`, of a second signal or at the end of the time of grace, discards the pass in flight.
+/// Saves all images, and waits for the files of runs. `drop`, of a second signal or at the end of the time of grace,
+/// discards the pass in flight.
 void StudioCommand::finish(Session& session, const std::atomic<bool>& drop) const {
     std::atomic<bool> is_saved{false};
     std::thread dropper([&] {
