@@ -198,8 +198,9 @@ private:
     /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. With
     /// groups: the luminance of the eye paths in the pass that is being added.
     std::vector<float> previous_;
-    /// Relative squared error of one pass, from each pair of passes: their spread gives the interval. They are relative to the
-    /// mean of their time, and that is bright where the pair is, so their mean would be too small.
+    /// Relative squared error of one pass, estimated from each pair of passes. The spread of these numbers gives the interval.
+    /// Their mean would be too small: each is divided by the square of the image up to its pair, which is brighter where
+    /// the pair is.
     std::vector<double> pair_errors_;
     /// Relative squared error of one pass, from the moments after the last pair.
     double error2_of_pass_ = 0;
