@@ -35,9 +35,9 @@ constexpr int kLongestRemainder = 64;
 struct Deposit {
     int i;
     MapPhoton::Origin origin;
-    bool is_caustic;   ///< Whether it is in the caustic map; otherwise in the global map.
-    PathProduct flux;  ///< f_map
-    double unclamped;  ///< lum(f_map) q
+    bool is_caustic;        ///< Whether it is in the caustic map; otherwise in the global map.
+    PathProduct flux;       ///< f_map
+    PathDensity unclamped;  ///< lum(f_map) q
     double h;
 
     bool is_same(const Deposit& o) const { return i == o.i && is_caustic == o.is_caustic; }
@@ -65,14 +65,14 @@ public:
     void for_each_deposit(const PathState& x, const Use& use) const {
         if (!measure_.film.contains(x.film)) return;
         const int k = x.last();
-        const double f = luminance(x.contribution());
+        const PathDensity f = luminance(x.contribution());
         if (!(f > 0)) return;
         const auto diffuse = [this](const Vertex& v) { return is_diffuse(v); };
         const int D = x.before(k, diffuse);
         // The first vertex from which only vertices that are not diffuse lead to D.
         const int first = x.before(D, diffuse);
         PhotonOrigins origins(mapping_, x[0].v);
-        const auto add = [&](int i, MapPhoton::Origin origin, bool is_caustic, double q) {
+        const auto add = [&](int i, MapPhoton::Origin origin, bool is_caustic, PathDensity q) {
             if (!(q > 0)) return;
             Deposit d{.i = i,
                       .origin = origin,
@@ -81,7 +81,7 @@ public:
                       .unclamped = 0,
                       .h = 0};
             d.unclamped = luminance(d.flux) * q;
-            d.h = f / d.unclamped;
+            d.h = double(f / d.unclamped);
             if (d.unclamped > 0) use(d);
         };
         for (int i = 1; i < k; ++i) {
@@ -96,7 +96,7 @@ public:
     MapPhoton photon(const PathState& x, const Deposit& d, double power) const {
         const Vertex& v = x[d.i].v;
         const Vec3 wi = direction(v, x[d.i - 1].v);
-        const double Y = luminance(d.flux);
+        const PathDensity Y = luminance(d.flux);
         const Rgb colour(float(d.flux[0] / Y), float(d.flux[1] / Y), float(d.flux[2] / Y));
         return {
             {v.p, wi, colour * float(power), &x.emitter(), d.i + 1}, d.origin, arrival_side(v, wi)};
@@ -117,9 +117,9 @@ public:
 
 private:
     /// q of a photon at x_i for the global map, where D has the index d.
-    static double gathered(const PathState& x, int i, int d) {
+    static PathDensity gathered(const PathState& x, int i, int d) {
         const int k = x.last();
-        double by_light = 0, by_eye = 0;
+        PathDensity by_light = 0, by_eye = 0;
         if (d == k - 1) {
             by_light = x.eye(k);
             for (int j = i + 1; j < k; ++j) by_light *= x.light(j);
@@ -128,7 +128,7 @@ private:
             by_eye = 1;
             for (int j = i + 1; j <= k; ++j) by_eye *= x.eye(j);
         }
-        return 0.5 * (by_light + by_eye);
+        return (by_light + by_eye) / 2;
     }
 
     bool sample_remainder(PathBuilder& builder, Sampler& sampler) const {
@@ -164,7 +164,7 @@ protected:
     void deposit(const ChainState& state, double factor, double, uint64_t key) override {
         const auto& x = static_cast<const PathState&>(state);
         rule_.for_each_deposit(x, [&](const Deposit& d) {
-            const double part = d.unclamped * rule_.clamped(d) / x.large_step_density();
+            const double part = double(d.unclamped * rule_.clamped(d) / x.large_step_density());
             const MapPhoton photon = rule_.photon(x, d, factor * part);
             MapPhoton powered = photon;
             powered.power *= float(reciprocal(x, d, photon, hash_combine(key, 1 + uint64_t(d.i))));
@@ -179,7 +179,8 @@ private:
         if (d.is_caustic && !has_finite_lens_) return 1 / rule_.clamped(d);
         uint64_t place = hash_combine(place_key(photon), d.is_caustic);
         // P depends on the colour of the flux.
-        for (const double f : d.flux) place = hash_combine(place, std::bit_cast<uint64_t>(f));
+        for (const PathDensity f : d.flux)
+            place = hash_combine(place, std::bit_cast<uint64_t>(double(f)));
         const auto [at, is_new] = reciprocals_.try_emplace(place, 0.0);
         if (is_new) at->second = count_trials(x, d, key);
         return at->second;
@@ -244,10 +245,10 @@ private:
         techniques_.emplace(measure_.scene, kShortest,
                             std::min(kTabulated, measure_.longest - kShortest + 1), light);
         const auto importance = [this](const PathState& x, Rgb) {
-            double sum = 0;
+            PathDensity sum = 0;
             rule_.for_each_deposit(
                 x, [&](const Deposit& d) { sum += d.unclamped * rule_.clamped(d); });
-            return sum / x.large_step_density();
+            return double(sum / x.large_step_density());
         };
         const auto stores = [this](const Vertex& v) {
             return v.kind == Vertex::Kind::Surface && v.is_connectible && rule_.is_diffuse(v);
@@ -277,12 +278,13 @@ private:
             Sample& sample = samples[i];
             const int k = sample.k = x.last();
             rule_.for_each_deposit(x, [&](const Deposit& d) {
-                sample.deposits.push_back({d, d.unclamped / x.large_step_density()});
+                sample.deposits.push_back({d, double(d.unclamped / x.large_step_density())});
             });
             double sum = 0;
             for (int s = 0; s <= k + 1; ++s) {
                 const double pmf = techniques_->pmf(k, s);
-                sum += sample.shares.emplace_back(pmf > 0 ? pmf * x.density(s) : 0.0);
+                sum += sample.shares.emplace_back(
+                    pmf > 0 ? double(pmf * x.density(s) / x.large_step_density()) : 0.0);
             }
             for (double& share : sample.shares) share /= sum;
         });

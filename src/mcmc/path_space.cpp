@@ -94,10 +94,10 @@ PathSpace::Choices PathSpace::choices(const PathState& x) const {
     return p;
 }
 
-double PathSpace::Q(Kind kind, const Choices& at_x, const PathState& x, const PathState& y,
-                    const MutationWay& way) const {
+PathDensity PathSpace::Q(Kind kind, const Choices& at_x, const PathState& x, const PathState& y,
+                         const MutationWay& way) const {
     const auto density = [&](Kind of) {
-        return at_x[of] > 0 ? at_x[of] * mutations_[of]->Q(x, y, way) : 0.0;
+        return at_x[of] > 0 ? at_x[of] * mutations_[of]->Q(x, y, way) : PathDensity(0);
     };
     const bool is_either =
         (kind == PathMutations::Bidirectional || kind == PathMutations::UserPath) &&
@@ -132,9 +132,9 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
     expect_announced(x, y, way);
     y.finish(c.work.stats);
     if (!(y.target > 0)) return proposal;
-    const double there = Q(kind, p, x, y, way), back = Q(kind, choices(y), y, x, way.back());
+    const PathDensity there = Q(kind, p, x, y, way), back = Q(kind, choices(y), y, x, way.back());
     proposal.Q_ratio =
-        there > 0 ? back * y.large_step_density() / (there * x.large_step_density()) : 0.0;
+        there > 0 ? double(back * y.large_step_density() / (there * x.large_step_density())) : 0.0;
     return proposal;
 }
 

@@ -51,8 +51,8 @@ private:
     using Choices = std::array<double, PathMutations::kCount>;
     Choices choices(const PathState& x) const;
     /// `at_x` is choices(x).
-    double Q(Kind kind, const Choices& at_x, const PathState& x, const PathState& y,
-             const MutationWay& way) const;
+    PathDensity Q(Kind kind, const Choices& at_x, const PathState& x, const PathState& y,
+                  const MutationWay& way) const;
 
     PathTarget target_;
     PathMutations options_;

@@ -20,10 +20,10 @@ PathImportance weighted_luminance(TargetMap map) {
     };
 }
 
-double luminance(const PathProduct& f) {
+PathDensity luminance(const PathProduct& f) {
     constexpr Rgb kRed{1, 0, 0}, kGreen{0, 1, 0}, kBlue{0, 0, 1};
-    return f[0] * double(luminance(kRed)) + f[1] * double(luminance(kGreen)) +
-           f[2] * double(luminance(kBlue));
+    return f[0] * PathDensity(luminance(kRed)) + f[1] * PathDensity(luminance(kGreen)) +
+           f[2] * PathDensity(luminance(kBlue));
 }
 
 PathMeasure::PathMeasure(const Scene& of, const FilmRegion& region, int shortest_path,
@@ -171,24 +171,24 @@ bool PathState::trace_edge(int i, RenderStats& stats) {
     return Tr > 0;
 }
 
-double PathState::density(int s) const {
+PathDensity PathState::density(int s) const {
     const int n = size();
     if (s == 0 ? emitter().is_delta() : s < n && !is_connected_at(s - 1)) return 0;
-    double p = 1;
+    PathDensity p = 1;
     for (int i = 0; i < s; ++i) p *= s == 1 ? next_event() : light(i);
     return p * eye_density(s);
 }
 
-double PathState::eye_density(int s) const {
-    double p = 1;
+PathDensity PathState::eye_density(int s) const {
+    PathDensity p = 1;
     for (int i = s; i <= last(); ++i) p *= eye(i);
     return p;
 }
 
-double PathState::density(const UserPaths& paths, int s) const {
+PathDensity PathState::density(const UserPaths& paths, int s) const {
     if (s < 2 || s >= size() || !is_connected_at(s - 1)) return 0;
     std::vector<const Vertex*> light;
-    double p = 1;
+    PathDensity p = 1;
     for (int i = 0; i < s; ++i) {
         light.push_back(&x_[size_t(i)].v);
         p *= measure_.unit_area;
@@ -197,17 +197,17 @@ double PathState::density(const UserPaths& paths, int s) const {
     return p * paths.density(light);
 }
 
-double PathState::independent_path_density() const {
+PathDensity PathState::independent_path_density() const {
     const int k = last();
-    double T = 0;
+    PathDensity T = 0;
     for (int s = 0; s <= k + 1; ++s)
         if (const double p = target_.techniques.pmf(k, s); p > 0) T += p * density(s);
     T *= target_.lengths.pmf(k);
     const UserSteps& user = target_.user;
     if (!user.paths) return T;
-    double T_user = 0;
+    PathDensity T_user = 0;
     for (int s = 2; s <= std::min(k, user.paths->longest()); ++s)
-        if (const double p = density(*user.paths, s); p > 0)
+        if (const PathDensity p = density(*user.paths, s); p > 0)
             T_user += p * UserSteps::pmf(s, k + 1 - s, measure_.shortest) * eye_density(s);
     return (1 - user.share) * T + user.share * T_user;
 }
@@ -242,7 +242,7 @@ void PathState::set_black() {
 void PathState::finish(RenderStats& stats) {
     set_black();
     edges = last();
-    const double T = large_step_density_ = independent_path_density();
+    const PathDensity T = large_step_density_ = independent_path_density();
     if (T == 0) return;
     const PathProduct f = contribution();
     const Rgb value(float(f[0] / T), float(f[1] / T), float(f[2] / T));
@@ -264,8 +264,8 @@ void PathState::tell(const TechniqueCounts& counts, Workspace& work, Contributio
     for (int i = n; i-- > 0;) z.append() = x_[size_t(i)].v;
     z.film = film, z.film_weight = 1;
     // Counts refer to densities per pixel.
-    std::vector<double> squares(size_t(n) + 1);
-    double sum = 0;
+    std::vector<PathDensity> squares(size_t(n) + 1);
+    PathDensity sum = 0;
     for (int s = 0; s <= n; ++s) {
         const double per_pixel = n - s >= 2 ? double(measure_.film.area()) : 1.0;
         const double np = double(counts.of(connection_technique(s, n - s)));

@@ -4,7 +4,7 @@
 //
 // The conventions are those of path_pdfs.h. At a delta event, f and the densities of both sides leave out the factor δ of
 // the direction toward the eye given the direction toward the light, and keep the geometry term of the edge behind the
-// event. Areas are in units of PathMeasure::unit_area, so that products over long paths neither overflow nor underflow.
+// event. Areas are in units of PathMeasure::unit_area.
 
 #include <algorithm>
 #include <cmath>
@@ -62,9 +62,12 @@ struct PathTarget {
     std::function<bool(const Vertex&)> stores = [](const Vertex& v) { return v.is_connectible; };
 };
 
-/// A product over the vertices of a path, by colour. Long paths exceed the range of float.
-using PathProduct = std::array<double, 3>;
-double luminance(const PathProduct& f);
+/// A product over the vertices of a path. Where a scene is much larger than what its paths see, each vertex has a factor
+/// of 10⁸, and fifty of them exceed the range of double.
+using PathDensity = long double;
+/// The same by colour.
+using PathProduct = std::array<PathDensity, 3>;
+PathDensity luminance(const PathProduct& f);
 
 /// A vertex of a full path.
 class PathVertex {
@@ -139,10 +142,10 @@ public:
     /// Makes this a path that contributes nothing.
     void set_black();
     /// Density with which the technique C(s, k+1-s) samples the path.
-    double density(int s) const;
+    PathDensity density(int s) const;
     /// Density per unit_area with which `paths` sample x_0 … x_{s-1}, to be joined to x_s; zero if these are not joined.
-    double density(const UserPaths& paths, int s) const;
-    double large_step_density() const { return large_step_density_; }
+    PathDensity density(const UserPaths& paths, int s) const;
+    PathDensity large_step_density() const { return large_step_density_; }
     /// f, the contribution to the image.
     PathProduct contribution() const;
     /// The same for the light sub-path x_0 … x_i: its flux at x_i, without scattering there. i ≥ 1.
@@ -156,9 +159,9 @@ public:
 
 private:
     /// Density of the path as a large step.
-    double independent_path_density() const;
+    PathDensity independent_path_density() const;
     /// Density with which an eye sub-path samples x_s … x_k.
-    double eye_density(int s) const;
+    PathDensity eye_density(int s) const;
     /// Without masks.
     double geometry(int from, int to) const;
     /// Probability that a ray from x_{i-1} to x_i, or from x_{i+1} to x_i, passes the masks of the edge and meets x_i.
@@ -176,7 +179,7 @@ private:
     const PathMeasure& measure_;
     std::vector<PathVertex> x_;
     ComponentArena arena_;
-    double large_step_density_ = 0;
+    PathDensity large_step_density_ = 0;
 };
 
 }  // namespace etendue

@@ -17,7 +17,7 @@ struct Effort {
 Effort effort_for(const std::string& integrator) {
     if (integrator == "upg") return {.resolution = 0.5};
     if (integrator == "ppm" || integrator == "sppm") return {.spp = 128, .resolution = 0.2};
-    if (integrator == "mlt") return {.resolution = 0.12};
+    if (integrator == "mlt") return {.spp = 24, .resolution = 0.12};
     return {};
 }
 

@@ -113,18 +113,18 @@ bool BidirectionalMutation::propose(const PathState& x, const MutationContext& c
     return builder.sample(from_light, n - from_light) && builder.finish(y);
 }
 
-double BidirectionalMutation::Q(const PathState& x, const PathState& y,
-                                const MutationWay& way) const {
+PathDensity BidirectionalMutation::Q(const PathState& x, const PathState& y,
+                                     const MutationWay& way) const {
     const Gap gap{way.l, way.m, x.last()};
     const int inserted = way.m_y - way.l;
     const Splits s = splits(x, gap, inserted - 1);
     if (s.last < s.first || !is_possible(gap, inserted)) return 0;
-    double sum = 0;
+    PathDensity sum = 0;
     for (int count = s.first; count <= s.last; ++count) {
         const int joint = way.l + count;  // The vertex before the edge that joins both sides.
         const bool is_hit = joint < 0 || joint == y.last();
         if (is_hit ? joint < 0 && y.emitter().is_delta() : !y.is_connected_at(joint)) continue;
-        double p = 1;
+        PathDensity p = 1;
         // If x_0 is the only vertex on the light's side, a next event samples it.
         for (int i = way.l + 1; i <= joint; ++i) p *= joint == 0 ? y.next_event() : y.light(i);
         for (int i = joint + 1; i < way.m_y; ++i) p *= y.eye(i);

@@ -14,7 +14,7 @@ public:
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
                  MutationWay& way) const override;
     /// Sum over all splits of the new vertices between the two sides, not only the split that made them.
-    double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
+    PathDensity Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
 
 private:
     /// Range of the number of vertices, of n in total, that may be sampled from the light's side of the gap.

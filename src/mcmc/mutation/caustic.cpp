@@ -81,13 +81,14 @@ bool CausticMutation::propose(const PathState& x, const MutationContext& c, Path
     return builder.finish(y);
 }
 
-double CausticMutation::Q(const PathState& x, const PathState& y, const MutationWay& way) const {
+PathDensity CausticMutation::Q(const PathState& x, const PathState& y,
+                               const MutationWay& way) const {
     // The logarithm of the angle is uniform over ranges of equal length in both directions, but the ranges differ.
     if (!range(x, way.l).contains(way.angle)) return 0;
     if (first(y) != way.l) return 0;
     for (int i = way.l + 1; i < y.last() - 1; ++i)
         if (!is_same_event(x, y, i, events_)) return 0;
-    double p = y.geometry_from_light(way.l + 1);
+    PathDensity p = y.geometry_from_light(way.l + 1);
     for (int i = way.l + 1; i < y.last() - 1; ++i)
         p *= followed_density(y, i, TransportMode::Importance);
     return p;

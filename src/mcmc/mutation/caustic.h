@@ -15,7 +15,7 @@ public:
     bool suits(const PathState& x) const override;
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
                  MutationWay& way) const override;
-    double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
+    PathDensity Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
 
 private:
     /// The vertex whose direction is turned.

@@ -71,7 +71,8 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
     return builder.finish(y);
 }
 
-double EyeChainMutation::Q(const PathState& x, const PathState& y, const MutationWay& way) const {
+PathDensity EyeChainMutation::Q(const PathState& x, const PathState& y,
+                                const MutationWay& way) const {
     if (way.l < 0 && y.emitter().is_delta()) return 0;  // The chain cannot hit it.
     const int k = y.last();
     // On the way back, the same events must be followed.
@@ -79,7 +80,7 @@ double EyeChainMutation::Q(const PathState& x, const PathState& y, const Mutatio
     for (int i = k - 1; i > std::max(way.l, 0); --i)
         if (!is_same_event(x, y, i, events_)) return 0;
     // Film points, turned directions and half vectors have the same density in both directions.
-    double p = y.eye(k - 1);
+    PathDensity p = y.eye(k - 1);
     for (int i = k - 1; i > way.l + 1; --i)
         p *= is_followed(y, i, events_) ? followed_density(y, i, TransportMode::Radiance)
                                         : y.geometry_from_eye(i - 1);

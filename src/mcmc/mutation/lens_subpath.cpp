@@ -23,8 +23,9 @@ bool LensSubpathMutation::propose(const PathState& x, const MutationContext& c, 
     return true;
 }
 
-double LensSubpathMutation::Q(const PathState&, const PathState& y, const MutationWay& way) const {
-    double p = 1;
+PathDensity LensSubpathMutation::Q(const PathState&, const PathState& y,
+                                   const MutationWay& way) const {
+    PathDensity p = 1;
     for (int i = way.l + 1; i <= y.last(); ++i) p *= y.eye(i);
     return p;
 }

@@ -36,7 +36,7 @@ public:
     virtual bool propose(const PathState& x, const MutationContext& c, PathState& y,
                          MutationWay& way) const = 0;
     /// Density of the proposal y from x in this way, up to a factor that is the same for the way back.
-    virtual double Q(const PathState& x, const PathState& y, const MutationWay& way) const = 0;
+    virtual PathDensity Q(const PathState& x, const PathState& y, const MutationWay& way) const = 0;
 };
 
 }  // namespace etendue

@@ -35,9 +35,10 @@ bool PhotonMapMutation::propose(const PathState& x, const MutationContext& c, Pa
     return true;
 }
 
-double PhotonMapMutation::Q(const PathState&, const PathState& y, const MutationWay& way) const {
+PathDensity PhotonMapMutation::Q(const PathState&, const PathState& y,
+                                 const MutationWay& way) const {
     // The density in the cone is the same in both directions.
-    double p = y.geometry_from_eye(way.m_y - 1);
+    PathDensity p = y.geometry_from_eye(way.m_y - 1);
     for (int i = way.m_y - 2; i > way.l; --i) p *= y.eye(i);
     return p;
 }

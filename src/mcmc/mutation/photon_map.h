@@ -17,7 +17,7 @@ public:
     bool suits(const PathState& x) const override;
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
                  MutationWay& way) const override;
-    double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
+    PathDensity Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
 
 private:
     /// Index of the first vertex from the eye that stores photons; 0 if there is none.

@@ -15,8 +15,9 @@ bool UserPathMutation::propose(const PathState& x, const MutationContext& c, Pat
     return true;
 }
 
-double UserPathMutation::Q(const PathState& x, const PathState& y, const MutationWay& way) const {
-    return is_way(x, way) ? y.density(paths_, way.m_y) : 0.0;
+PathDensity UserPathMutation::Q(const PathState& x, const PathState& y,
+                                const MutationWay& way) const {
+    return is_way(x, way) ? y.density(paths_, way.m_y) : 0;
 }
 
 }  // namespace etendue

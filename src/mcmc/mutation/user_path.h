@@ -16,7 +16,7 @@ public:
     bool suits(const PathState& x) const override { return kept(x) > 0; }
     bool propose(const PathState& x, const MutationContext& c, PathState& y,
                  MutationWay& way) const override;
-    double Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
+    PathDensity Q(const PathState& x, const PathState& y, const MutationWay& way) const override;
     /// Whether a mutation of this way keeps the same part as proposals from user paths.
     static bool is_way(const PathState& x, const MutationWay& way) {
         return way.l == -1 && way.m == kept(x);

@@ -108,5 +108,24 @@ TEST(RenderLimits, PassesOfLongPathsAreDroppedAtOnce) {
     }
 }
 
+// Densities of vertices are relative to the size of the scene, here the square of 10⁵ rooms.
+TEST(RenderLimits, LongPathsInASmallPartOfTheSceneCount) {
+    const Scene scene =
+        build(sensor("0,0,3", "0,0,0", 8) +
+              "<shape type=\"sphere\"><float name=\"radius\" value=\"10\"/><boolean "
+              "name=\"flip_normals\" value=\"true\"/>" +
+              diffuse("1,1,1") + "</shape>" + area_lamp("1,1,1") +
+              rectangle("<translate x=\"1000000\"/>", diffuse("1,1,1")));
+    for (const char* method : {"mlt:groups=2,max_depth=60",
+                               "mps:target=path,mutations=500,precision=0.2,max_depth=60"}) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse(method);
+        settings.spp = 4;
+        Renderer renderer(scene, settings);
+        renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+        EXPECT_EQ(renderer.stats().rejected, 0u) << method;
+    }
+}
+
 }  // namespace
 }  // namespace etendue::test
