@@ -54,12 +54,14 @@ bool same_bits(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
 }
 
 #ifdef __SANITIZE_THREAD__
-// A race shows with either sampler, and a rendering takes ten times as long.
-constexpr int kThreads[] = {2, 7};
+// A race shows with either sampler and with few threads, and a rendering takes ten times as long.
+constexpr int kThreads[] = {4};
 constexpr SamplerKind kSamplers[] = {SamplerKind::Sobol};
+constexpr bool kComparesSeeds = false;
 #else
 constexpr int kThreads[] = {1, 2, 3, 7};
 constexpr SamplerKind kSamplers[] = {SamplerKind::Independent, SamplerKind::Sobol};
+constexpr bool kComparesSeeds = true;
 #endif
 
 class Determinism : public ::testing::TestWithParam<std::tuple<const char*, SamplerKind>> {};
@@ -74,7 +76,9 @@ TEST_P(Determinism, OfThreadsAndSeeds) {
         EXPECT_TRUE(same_bits(one.variance, more.variance)) << threads << " threads";
         EXPECT_EQ(one.rays, more.rays) << threads << " threads";
     }
-    EXPECT_FALSE(same_bits(one.image, render(scene, integrator, sampler, 6, 1).image));
+    if (kComparesSeeds) {
+        EXPECT_FALSE(same_bits(one.image, render(scene, integrator, sampler, 6, 1).image));
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(

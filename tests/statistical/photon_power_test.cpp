@@ -187,17 +187,20 @@ TEST(PhotonRepeats, OfOneChainAddTheirPower) {
     EXPECT_EQ(sums.repeats, 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Targets, PhotonPower,
-    ::testing::Values(PowerCase{PhotonTarget::Importons, false},
-                      PowerCase{PhotonTarget::Importons, true},
-                      PowerCase{PhotonTarget::Path, false}, PowerCase{PhotonTarget::Path, true},
-                      PowerCase{PhotonTarget::Importons, true, true},
-                      PowerCase{PhotonTarget::Path, false, true}),
-    [](const auto& p) {
-        return std::string(p.param.target == PhotonTarget::Path ? "path" : "importons") +
-               (p.param.has_user_paths ? "_user_paths" : "") + (p.param.is_long ? "_long" : "");
-    });
+const auto kName = [](const ::testing::TestParamInfo<PowerCase>& p) {
+    return std::string(p.param.target == PhotonTarget::Path ? "path" : "importons") +
+           (p.param.has_user_paths ? "_user_paths" : "") + (p.param.is_long ? "_long" : "");
+};
+INSTANTIATE_TEST_SUITE_P(Quick, PhotonPower,
+                         ::testing::Values(PowerCase{PhotonTarget::Importons, false},
+                                           PowerCase{PhotonTarget::Path, true},
+                                           PowerCase{PhotonTarget::Path, false, true}),
+                         kName);
+INSTANTIATE_TEST_SUITE_P(Long, PhotonPower,
+                         ::testing::Values(PowerCase{PhotonTarget::Importons, true},
+                                           PowerCase{PhotonTarget::Path, false},
+                                           PowerCase{PhotonTarget::Importons, true, true}),
+                         kName);
 
 }  // namespace
 }  // namespace etendue::test

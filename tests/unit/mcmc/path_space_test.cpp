@@ -222,7 +222,7 @@ TEST_P(Paths, LargeStepsThatFollowUserPathsHaveTheirDensity) {
     for (size_t i = 0; i < 2; ++i) {
         const auto space = passes.space({}, i == 0 ? UserSteps{} : UserSteps{given, 0.6});
         const auto x = space->make_state();
-        const uint64_t states = i == 0 ? 2'000'000 : 200'000;
+        const uint64_t states = i == 0 ? 1'000'000 : 100'000;
         for (uint64_t n = 0; n < states; ++n) {
             space->draw(0, hash_combine(7 + i, n), c, *x);
             std::array<double, kFunctions> value{};
