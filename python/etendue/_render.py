@@ -223,7 +223,8 @@ class Result:
 
     def save(self, file: str | PathLike[str]) -> None:
         """Writes the image, like `etendue render -o`. An .exr file also contains the auxiliary images and statistics. An
-        .etd file is a checkpoint: resume() goes on from it, and merge() adds it to others.
+        .etd file is a checkpoint: resume() goes on from it, and merge() adds it to others. The sum that merge() made is
+        not written to the file of a part, which could then not go on: RuntimeError.
         """
         if fspath(file).endswith(".etd"):
             self._rendering.save_checkpoint(fspath(file))

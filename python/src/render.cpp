@@ -26,6 +26,7 @@
 #include "render/render_request.h"
 #include "render/renderer.h"
 #include "render/warnings.h"
+#include "system/output_file.h"
 #include "values.h"
 
 namespace etendue::python {
@@ -240,9 +241,20 @@ Error tuple_of(const ErrorEstimate& e) {
 struct Merged {
     std::optional<Merging> of;
     RenderTotals totals;
-    explicit Merged(std::vector<CheckpointFile> parts) {
+    std::vector<std::string> files;  ///< Those of the parts that have one.
+
+    Merged(std::vector<CheckpointFile> parts, std::vector<std::string> part_files)
+        : files(std::move(part_files)) {
         of.emplace(std::move(parts));
         totals = of->totals();
+    }
+    void save_checkpoint(const std::string& file) const {
+        for (const std::string& part : files)
+            if (are_one_file(part, file))
+                throw std::runtime_error(fmt::format(
+                    "{} is one of the parts, which could then not go on: choose another file",
+                    file));
+        of->write(file, totals);
     }
     const Film& film() const { return *totals.film; }
     int width() const { return film().geometry().crop_width; }
@@ -291,19 +303,20 @@ FloatArray image_of(const R& r, const Make& make) {
 /// What et.merge() makes of files and of partial results.
 std::shared_ptr<Merged> merge(const nb::list& parts) {
     std::vector<CheckpointFile> files;
+    std::vector<std::string> names;
     for (const nb::handle part : parts) {
         if (nb::isinstance<nb::bytes>(part)) {
             const auto bytes = nb::cast<nb::bytes>(part);
             files.emplace_back(SectionReader(std::string(bytes.c_str(), bytes.size()),
                                              fmt::format("part {}", files.size() + 1)));
         } else {
-            files.emplace_back(nb::cast<std::string>(part));
+            files.emplace_back(names.emplace_back(nb::cast<std::string>(part)));
         }
     }
     if (files.empty()) throw nb::value_error("there are no parts to merge");
     use_threads();
     const nb::gil_scoped_release no_gil;
-    return std::make_shared<Merged>(std::move(files));
+    return std::make_shared<Merged>(std::move(files), std::move(names));
 }
 
 void bind_merging(nb::module_& m) {
@@ -354,10 +367,8 @@ void bind_merging(nb::module_& m) {
                 write_image(file, image_with_layers(r.film(), {}, false, r.of->report(r.totals)));
             },
             nb::call_guard<nb::gil_scoped_release>(), "file"_a, "aovs"_a)
-        .def(
-            "save_checkpoint",
-            [](const Merged& r, const std::string& file) { r.of->write(file, r.totals); },
-            nb::call_guard<nb::gil_scoped_release>(), "file"_a);
+        .def("save_checkpoint", &Merged::save_checkpoint, nb::call_guard<nb::gil_scoped_release>(),
+             "file"_a);
     m.def("merge", &merge, "parts"_a);
     m.def(
         "read_checkpoint",

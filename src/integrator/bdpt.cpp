@@ -76,6 +76,7 @@ public:
         return light_.count(scene, paths_.depth(),
                             uses_cache_ ? paths_.vertex_bytes(kVertexBytes) : 0);
     }
+    uint64_t light_path_memory() const override { return uses_cache_ ? light_.memory : 0; }
     bool samples_alone() const override { return !uses_cache_ && !paths_.guiding().is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {

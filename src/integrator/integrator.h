@@ -58,6 +58,8 @@ public:
     }
     /// N_L, the number of light paths in a pass; 0 if there are none.
     virtual uint64_t light_paths(const Scene& scene) const = 0;
+    /// Largest memory, in bytes, of the light paths or photons that a pass keeps; 0 if it keeps none.
+    virtual uint64_t light_path_memory() const { return 0; }
     /// Whether contributions are reported together with their sub-paths, which `verify` needs to identify the paths.
     virtual bool keeps_paths() const { return true; }
     /// Whether sample() needs nothing that trace() and learn() leave, apart from the Russian roulette of joins. Any

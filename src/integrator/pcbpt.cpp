@@ -86,6 +86,7 @@ public:
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override { return scene.film().pixel_count(); }
+    uint64_t light_path_memory() const override { return memory_; }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
         std::vector<std::pair<std::string, double>> figures{

@@ -53,8 +53,8 @@ enum class Look {
 class PmIntegrator final : public Integrator {
 public:
     PmIntegrator(const IntegratorParams& p, const MakePhotonSource& make_source)
-        : mapping_(p, true),
-          source_(make_source(p, mapping_, uint64_t(p.integer("memory", 1, 1 << 30)) << 20)),
+        : mapping_(p, true), memory_(uint64_t(p.integer("memory", 1, 1 << 30)) << 20),
+          source_(make_source(p, mapping_, memory_)),
           nearest_(p.integer("nearest", 2, PhotonMap::kMostNeighbours)),
           gather_rays_(p.integer("gather_rays", 0, 1 << 20)), radius_(p.number("radius")),
           irradiance_(p.integer("irradiance", 0, 1 << 20)), retrace_(p.flag("retrace")),
@@ -129,6 +129,7 @@ public:
         return n;
     }
     uint64_t light_paths(const Scene&) const override { return source_->light_paths(); }
+    uint64_t light_path_memory() const override { return memory_; }
     bool keeps_paths() const override { return false; }
     Estimator estimator() const override { return Estimator::Biased; }
     std::vector<std::pair<std::string, double>> figures() const override {
@@ -394,6 +395,7 @@ private:
     static constexpr uint64_t kImportons = 0x696d706f72746f6e;  ///< Key of random numbers.
 
     PhotonMapping mapping_;
+    uint64_t memory_;  ///< Of the photons, in bytes.
     std::unique_ptr<PhotonSource> source_;
     int nearest_, gather_rays_;
     float radius_, max_radius_ = 0;

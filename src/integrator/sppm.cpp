@@ -65,6 +65,7 @@ public:
     uint64_t light_paths(const Scene& scene) const override {
         return light_.count(scene, mapping_.paths().depth(), kVertexBytes);
     }
+    uint64_t light_path_memory() const override { return light_.memory; }
     Estimator estimator() const override {
         return radius_params_.shrinks() ? Estimator::Consistent : Estimator::Biased;
     }

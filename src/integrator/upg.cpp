@@ -135,6 +135,7 @@ public:
     uint64_t light_paths(const Scene& scene) const override {
         return light_.count(scene, paths_.depth(), paths_.vertex_bytes(kVertexBytes));
     }
+    uint64_t light_path_memory() const override { return light_.memory; }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
         std::vector<std::pair<std::string, double>> figures{

@@ -249,6 +249,7 @@ public:
                 fmt::format("{}: radius must not be negative", p.integrator()));
     }
 
+    uint64_t light_path_memory() const override { return light_.memory; }
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n = MarkovIntegrator::counts(scene, light_paths);
         n.gather = kSample * float(gathered_ > 0 ? gathered_ : scene.film().pixel_count());

@@ -26,14 +26,11 @@ std::vector<std::string> warnings(const RenderStats& stats) {
     return all;
 }
 
-std::vector<std::string> memory_warnings(const Scene& scene, const IntegratorSpec& integrator,
-                                         uint64_t light_paths, std::optional<uint64_t> available) {
-    if (integrator.make || !available) return {};
-    const PluginInfo& info = integrator_entry(integrator.name).info;
-    if (std::none_of(info.params.begin(), info.params.end(),
-                     [](const ParamInfo& p) { return p.name == std::string_view("memory"); }))
-        return {};
-    const auto allowed = uint64_t(IntegratorParams(integrator, info).integer("memory")) << 20;
+std::vector<std::string> memory_warnings(const Scene& scene, const std::string& name,
+                                         const Integrator& integrator, uint64_t light_paths,
+                                         std::optional<uint64_t> available) {
+    const uint64_t allowed = integrator.light_path_memory();
+    if (allowed == 0 || !available) return {};
     // About what a pass stores for a light path of a closed room.
     constexpr uint64_t kBytesPerPath = 24 * 68;
     const uint64_t paths = std::max(light_paths, scene.film().pixel_count());
@@ -42,7 +39,7 @@ std::vector<std::string> memory_warnings(const Scene& scene, const IntegratorSpe
     const uint64_t fitting = std::max<uint64_t>(*available / 4 * 3 >> 20, 1);
     return {fmt::format("{} may need up to {} for its light paths, but only {} of memory are free; "
                         "memory={} limits it, and there are fewer light paths then",
-                        integrator.name, format_bytes(need), format_bytes(*available), fitting)};
+                        name, format_bytes(need), format_bytes(*available), fitting)};
 }
 
 }  // namespace etendue

@@ -16,7 +16,8 @@ std::vector<std::string> warnings(const RenderStats& stats);
 
 /// Warns before the rendering if the light paths of a pass may need more memory than `available` bytes. Their number is
 /// never reduced silently, since the image depends on it.
-std::vector<std::string> memory_warnings(const Scene& scene, const IntegratorSpec& integrator,
-                                         uint64_t light_paths, std::optional<uint64_t> available);
+std::vector<std::string> memory_warnings(const Scene& scene, const std::string& name,
+                                         const Integrator& integrator, uint64_t light_paths,
+                                         std::optional<uint64_t> available);
 
 }  // namespace etendue

@@ -62,11 +62,11 @@ json progress_of(const RunStatus& s) {
            {"error", to_json(s.error)}};
     if (s.fraction) j["fraction"] = *s.fraction;
     if (s.seeds > 1) j["seeds"] = {s.finished_seeds, s.seeds};
-    if (!s.message.empty()) j["message"] = s.message;
-    if (!s.is_of_this_scene) j["old_scene"] = true;
     if (!s.file.empty()) j["file"] = s.file;
     if (!s.file.empty()) j["file_passes"] = s.file_passes;
-    // Empty once a later state could be saved.
+    // Also where they are no longer so: the page keeps what it was told before.
+    j["message"] = s.message;
+    j["old_scene"] = !s.is_of_this_scene;
     j["file_problem"] = s.file_problem;
     return j;
 }

@@ -50,6 +50,16 @@ def test_what_would_change_bits_is_refused(cornell: et.Scene, demo: et.Scene, tm
         et.resume(tmp_path / "missing.etd", cornell, spp=2)
 
 
+def test_a_sum_does_not_replace_its_parts(cornell: et.Scene, tmp_path: Path) -> None:
+    parts = [tmp_path / "a.etd", tmp_path / "b.etd"]
+    for seed, part in enumerate(parts):
+        et.render(cornell, "path", spp=2, seed=seed, progress=False).save(part)
+    with pytest.raises(RuntimeError, match="one of the parts"):
+        et.merge(parts).save(tmp_path / "." / "b.etd")
+    assert et.resume(parts[1], cornell, spp=3, progress=False).passes == 3
+    et.merge(parts).save(tmp_path / "sum.etd")
+
+
 def test_files_that_change_after_a_scene_was_built_do_not_count(tmp_path: Path) -> None:
     mesh = tmp_path / "mesh.obj"
     mesh.write_text("v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n")

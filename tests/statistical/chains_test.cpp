@@ -155,7 +155,7 @@ TEST_P(LongChains, GoOnAsTheyBegan) {
     const Tiles bdpt = render_tiles(scene, "bdpt", {4096, 4, 1});
     for (const std::string& method : GetParam().methods) {
         Tiles tiles(4);
-        for (uint64_t run = 0; run < 48; ++run) {
+        for (uint64_t run = 0; run < 64; ++run) {
             RenderSettings settings;
             settings.integrator = IntegratorSpec::parse(
                 fmt::format("{}:chains=48,groups=2,p_large=0.01,mutations=4{}", method, options));

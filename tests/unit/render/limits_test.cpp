@@ -60,13 +60,14 @@ TEST(RenderLimits, ImagesMustFitIntoTheMemory) {
 TEST(RenderLimits, LightPathsThatMayNotFitAreNamedBefore) {
     const Scene scene = small_scene(2048);
     const auto warned = [&](const char* text, uint64_t light_paths, uint64_t available) {
-        return memory_warnings(scene, IntegratorSpec::parse(text), light_paths, available);
+        const IntegratorSpec spec = IntegratorSpec::parse(text);
+        return memory_warnings(scene, spec.name, *make_integrator(spec), light_paths, available);
     };
     constexpr uint64_t kGiB = uint64_t(1) << 30;
     EXPECT_TRUE(warned("upg", 1 << 22, 8 * kGiB).empty());
     EXPECT_TRUE(warned("upg:memory=1000", 1 << 22, kGiB).empty());
-    EXPECT_TRUE(warned("path", 0, 1).empty());
-    for (const char* name : {"upg", "vcm", "sppm", "pcbpt", "pm"}) {
+    for (const char* name : {"path", "bdpt", "mlt"}) EXPECT_TRUE(warned(name, 1 << 22, 1).empty());
+    for (const char* name : {"upg", "upg+pssmlt", "vcm", "sppm", "pcbpt", "pm"}) {
         const auto all = warned(name, 1 << 22, 2 * kGiB);
         ASSERT_EQ(all.size(), 1u) << name;
         EXPECT_EQ(all[0], std::string(name) +

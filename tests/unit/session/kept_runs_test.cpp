@@ -12,6 +12,7 @@
 
 #include "render/checkpoint.h"
 #include "run_program.h"
+#include "run_request.h"
 #include "session/session.h"
 #include "test_scenes.h"
 #include "wait_for.h"
@@ -28,16 +29,8 @@ LoadedScene kept_room() {
             {.fingerprint = kFingerprint}};
 }
 
-RunRequest request_for(const std::string& integrator, uint64_t spp) {
-    RunRequest r;
-    r.integrator = integrator;
-    r.seed = 3;
-    r.spp = spp;
-    return r;
-}
-
 RenderSettings settings_for(const std::string& integrator, uint64_t spp) {
-    RenderSettings s = settings_of(request_for(integrator, spp), IntegratorSpec::parse(integrator));
+    RenderSettings s = settings_of(run_of(integrator, spp), IntegratorSpec::parse(integrator));
     s.threads = 1;
     return s;
 }
@@ -120,7 +113,7 @@ class KeptMethods : public KeptRuns, public ::testing::WithParamInterface<const 
 
 TEST_P(KeptMethods, GoOnInAnotherSessionWithTheSameBits) {
     open_session();
-    RunRequest request = request_for(GetParam(), 16);
+    RunRequest request = run_of(GetParam(), 16);
     request.technique_depth = std::string(GetParam()) == "bdpt" ? 3 : 0;
     const int first = finished(request);
     const RunStatus before = session->status(first);
@@ -176,7 +169,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, KeptMethods,
 
 TEST_F(KeptRuns, AreSavedAtStopsWhileTheyRenderAndAtTheEnd) {
     open_session(0);
-    const int run = session->start(request_for("path", 1u << 30));
+    const int run = session->start(run_of("path", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session->status(run).file_passes > 2; }));
     EXPECT_EQ(session->status(run).state, RunState::Rendering);
     session->stop(run);
@@ -194,7 +187,7 @@ TEST_F(KeptRuns, AreSavedAtStopsWhileTheyRenderAndAtTheEnd) {
     EXPECT_EQ(status.file_passes, status.passes);
     // At the end of the session, too.
     open_session();
-    const int other = session->start(request_for("light", 1u << 30));
+    const int other = session->start(run_of("light", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session->status(other).passes > 0; }));
     session.reset();
     EXPECT_GT(CheckpointFile((folder.path() / "test-light-1.etd").string()).header().passes(), 0u);
@@ -205,7 +198,7 @@ TEST_F(KeptRuns, AllOfManyAreSaved) {
     open_session();
     constexpr int kRuns = 2 * int(Workers::kMostWaiting);
     for (int i = 0; i < kRuns; ++i) {
-        const int run = session->start(request_for("path", 1u << 30));
+        const int run = session->start(run_of("path", 1u << 30));
         ASSERT_TRUE(wait_for([&] { return session->status(run).passes > 0; }));
     }
     session->close(false);
@@ -219,12 +212,12 @@ TEST_F(KeptRuns, AllOfManyAreSaved) {
 TEST_F(KeptRuns, NeedAFolder) {
     session.emplace(kept_room, 1);
     ASSERT_TRUE(wait_for([&] { return session->scene() != nullptr; }));
-    EXPECT_EQ(session->status(finished(request_for("path", 2))).file, "");
+    EXPECT_EQ(session->status(finished(run_of("path", 2))).file, "");
     EXPECT_TRUE(fs::is_empty(folder.path()));
     EXPECT_THROW(session->open("test-path-1.etd", [](const Opened&) {}), std::runtime_error);
     // Those with several seeds have no state that could be kept.
     open_session();
-    RunRequest several = request_for("path", 2);
+    RunRequest several = run_of("path", 2);
     several.seeds = 2;
     EXPECT_EQ(session->status(finished(several)).file_problem, "");
     EXPECT_TRUE(fs::is_empty(folder.path()));
@@ -236,7 +229,7 @@ TEST_F(KeptRuns, ReplaceNoFilesOfOthers) {
     write_checkpoint("test-bdpt-3.etd");
     const std::string of_render = bytes("test-bdpt-3.etd");
     open_session();
-    const int run = finished(request_for("bdpt", 2));
+    const int run = finished(run_of("bdpt", 2));
     EXPECT_EQ(session->status(run).file, "test-bdpt-4.etd");
     // Another program writes there.
     std::ofstream(folder.path() / "test-bdpt-4.etd") << "other";
@@ -332,7 +325,7 @@ TEST_F(KeptRuns, WhatCannotBeSavedIsSaidAndSavedLater) {
     const fs::path runs = folder.path() / "runs";
     session.emplace(kept_room, 1, RunKeeping{.folder = runs.string()});
     ASSERT_TRUE(wait_for([&] { return session->scene() != nullptr; }));
-    const int run = finished(request_for("path", 2));
+    const int run = finished(run_of("path", 2));
     RunStatus status = session->status(run);
     EXPECT_EQ(status.state, RunState::Finished);
     EXPECT_NE(status.file_problem.find(runs.string()), std::string::npos) << status.file_problem;
@@ -348,7 +341,7 @@ TEST_F(KeptRuns, WhatCannotBeSavedIsSaidAndSavedLater) {
 /// Methods that share light paths have those of the last pass again after one more.
 TEST_F(KeptRuns, TracePathsAgainAfterAnotherPass) {
     open_session();
-    const std::string file = session->status(finished(request_for("vcm", 3))).file;
+    const std::string file = session->status(finished(run_of("vcm", 3))).file;
     open_session();
     const int run = open(file).run;
     const auto problem = [&] {

@@ -13,6 +13,7 @@
 
 #include "no_memory.h"
 #include "run_program.h"
+#include "run_request.h"
 #include "session/workers.h"
 #include "test_scenes.h"
 #include "wait_for.h"
@@ -30,14 +31,6 @@ bool wait_for_scene(const Session& session) {
     return wait_for([&] { return session.scene() || !session.load_error().empty(); });
 }
 
-RunRequest request(const std::string& integrator, uint64_t spp) {
-    RunRequest r;
-    r.integrator = integrator;
-    r.seed = 3;
-    r.spp = spp;
-    return r;
-}
-
 std::vector<Rgb> plain_image(const Scene& scene, const RunRequest& r) {
     RenderSettings settings;
     settings.integrator = IntegratorSpec::parse(r.integrator);
@@ -52,7 +45,7 @@ std::vector<Rgb> plain_image(const Scene& scene, const RunRequest& r) {
 
 /// A run of three passes with technique images that nobody has asked for yet.
 int run_with_techniques(Session& session) {
-    RunRequest r = request("bdpt", 3);
+    RunRequest r = run_of("bdpt", 3);
     r.technique_depth = 3;
     const int run = session.start(r);
     EXPECT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
@@ -75,7 +68,7 @@ class SessionBits : public ::testing::TestWithParam<std::tuple<const char*, int>
 TEST_P(SessionBits, AreThoseOfRenderThroughStopsAndSnapshots) {
     const auto& [integrator, threads] = GetParam();
     constexpr int kStops = 20;
-    const RunRequest r = request(integrator, 3 * kStops);
+    const RunRequest r = run_of(integrator, 3 * kStops);
     Session session(small_room, threads);
     ASSERT_TRUE(wait_for_scene(session));
     const int run = session.start(r);
@@ -108,7 +101,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, SessionBits,
 TEST(Session, SnapshotHasTheVarianceOfTheFilm) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    const RunRequest r = request("path", 8);
+    const RunRequest r = run_of("path", 8);
     const int run = session.start(r);
     ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
     const Scene scene = small_room();
@@ -130,7 +123,7 @@ TEST(Session, SnapshotHasTheVarianceOfTheFilm) {
 TEST(Session, RunsTakeTurnsAndCanBeRemoved) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    const int a = session.start(request("path", 1u << 30)), b = session.start(request("light", 4));
+    const int a = session.start(run_of("path", 1u << 30)), b = session.start(run_of("light", 4));
     EXPECT_NE(a, b);
     ASSERT_TRUE(wait_for([&] { return session.status(b).state == RunState::Finished; }));
     EXPECT_EQ(session.status(a).state, RunState::Rendering);
@@ -155,7 +148,7 @@ TEST(Session, RefusesWithTheIntegratorsMessage) {
             expected = e.what();
         }
         try {
-            session.start(request(bad, 1));
+            session.start(run_of(bad, 1));
         } catch (const std::exception& e) {
             message = e.what();
         }
@@ -168,7 +161,7 @@ TEST(Session, RefusesWithTheIntegratorsMessage) {
 TEST(Session, SavesBetweenPasses) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    const int run = session.start(request("path", 1u << 30));
+    const int run = session.start(run_of("path", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).passes > 2; }));
     EXPECT_EQ(saved(session, run).error, "");
 }
@@ -192,12 +185,12 @@ TEST(Session, FailureToLoadIsKept) {
         1);
     ASSERT_TRUE(wait_for_scene(session));
     EXPECT_EQ(session.load_error(), "no such scene");
-    EXPECT_THROW(session.start(request("path", 1)), std::runtime_error);
+    EXPECT_THROW(session.start(run_of("path", 1)), std::runtime_error);
     is_bad = false;
     session.reload();
     ASSERT_TRUE(wait_for([&] { return session.scene() != nullptr; }));
     EXPECT_EQ(session.load_error(), "");
-    const int run = session.start(request("path", 1u << 30));
+    const int run = session.start(run_of("path", 1u << 30));
     session.reload();
     ASSERT_TRUE(wait_for([&] { return !session.status(run).is_of_this_scene; }));
     EXPECT_TRUE(wait_for([&] { return session.status(run).state == RunState::Stopped; }));
@@ -207,8 +200,8 @@ TEST(Session, StoppedRunsShowTheirLastPass) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
     // Two runs, so that one is stopped within its turn, and the other between its turns.
-    const int runs[] = {session.start(request("path", 1u << 30)),
-                        session.start(request("bdpt", 1u << 30))};
+    const int runs[] = {session.start(run_of("path", 1u << 30)),
+                        session.start(run_of("bdpt", 1u << 30))};
     for (uint64_t round = 1; round <= 3; ++round) {
         for (const int run : runs)
             ASSERT_TRUE(wait_for([&] { return session.status(run).passes >= round; }));
@@ -230,7 +223,7 @@ TEST(Session, StoppedRunsShowTheirLastPass) {
 TEST(Session, AStopFollowsTheResumptionBefore) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    const int run = session.start(request("path", 1u << 30));
+    const int run = session.start(run_of("path", 1u << 30));
     session.stop(run);
     const auto is_stopped = [&] { return session.status(run).state == RunState::Stopped; };
     ASSERT_TRUE(wait_for(is_stopped));
@@ -247,7 +240,7 @@ TEST(Session, TakesCommandsOfSeveralThreads) {
     const TemporaryFolder folder;
     Session session(small_room, 2, {.folder = folder.path().string(), .every = 0.05});
     ASSERT_TRUE(wait_for_scene(session));
-    for (int i = 0; i < 3; ++i) session.start(request("path", 1u << 30));
+    for (int i = 0; i < 3; ++i) session.start(run_of("path", 1u << 30));
     const auto user = [&](uint32_t seed) {
         std::mt19937 random(seed);
         constexpr int kCommands = 300;
@@ -256,7 +249,7 @@ TEST(Session, TakesCommandsOfSeveralThreads) {
             try {
                 switch (random() % 14) {
                 case 0: {
-                    RunRequest r = request(random() % 2 ? "bdpt" : "vcm", 1 + random() % 100);
+                    RunRequest r = run_of(random() % 2 ? "bdpt" : "vcm", 1 + random() % 100);
                     r.technique_depth = int(random() % 4);
                     r.seeds = 1 + int(random() % 2);
                     session.start(r);
@@ -311,9 +304,9 @@ TEST(Session, TakesCommandsOfSeveralThreads) {
 TEST(Session, SeveralSeedsAreRenderedOneAfterTheOther) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    RunRequest r = request("bdpt", 3);
+    RunRequest r = run_of("bdpt", 3);
     r.seeds = 3;
-    const int run = session.start(r), other = session.start(request("path", 1u << 30));
+    const int run = session.start(r), other = session.start(run_of("path", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
     RunStatus status = session.status(run);
     EXPECT_EQ(status.finished_seeds, 3);
@@ -349,7 +342,7 @@ TEST(Session, SeveralSeedsAreRenderedOneAfterTheOther) {
 TEST(Session, ReplaysTheLastPass) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    const int run = session.start(request("vcm", 1u << 30));
+    const int run = session.start(run_of("vcm", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).passes > 2; }));
     std::atomic<bool> is_done{false};
     size_t paths = 0;
@@ -377,7 +370,7 @@ TEST(SessionFailures, ARunOutlivesAPictureWithoutMemory) {
     for (const bool stops : {false, true}) {
         Session session(small_room, 1);
         ASSERT_TRUE(wait_for_scene(session));
-        const int run = session.start(request("path", 1));
+        const int run = session.start(run_of("path", 1));
         ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
         // Its reader keeps the memory, so that another picture needs new one.
         const auto first = session.snapshot(run);
@@ -425,7 +418,7 @@ TEST(SessionFailures, ARunWithoutMemoryCanBeContinued) {
     int run = 0;
     {
         const NoMemoryFor images(size_t(24 * 24) * sizeof(Rgb));
-        run = session.start(request("path", 4));
+        run = session.start(run_of("path", 4));
         ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Failed; }));
         EXPECT_EQ(session.status(run).message, "not enough memory");
     }
@@ -444,13 +437,13 @@ TEST(SessionFailures, AFailedSeedCanBeRepeated) {
     std::ofstream(file) << paths;
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    RunRequest r = request("mlt:groups=2,chains=16", 1);
+    RunRequest r = run_of("mlt:groups=2,chains=16", 1);
     r.seeds = 2;
     r.user_paths = file.string();
     const int run = session.start(r);
     ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }))
         << session.status(run).message;
-    const int other = session.start(request("path", 1u << 30));
+    const int other = session.start(run_of("path", 1u << 30));
     std::filesystem::remove(file);
     session.resume(run, {});
     ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Failed; }));
@@ -476,7 +469,7 @@ Scene slow_room() {
 TEST(Session, SavesDuringAPass) {
     Session session(slow_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    const int run = session.start(request("bdpt:max_depth=12", 1u << 30));
+    const int run = session.start(run_of("bdpt:max_depth=12", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).passes == 1; }));
     const Saved answer = saved(session, run);
     EXPECT_EQ(answer.error, "");
@@ -494,7 +487,7 @@ TEST(Session, LoadsDuringAPass) {
         },
         1);
     ASSERT_TRUE(wait_for_scene(session));
-    const int run = session.start(request("bdpt:max_depth=12", 1u << 30));
+    const int run = session.start(run_of("bdpt:max_depth=12", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).passes == 1; }));
     session.reload();
     ASSERT_TRUE(wait_for([&] { return session.scene_version() == 2; }));
@@ -506,7 +499,7 @@ TEST(Session, LoadsDuringAPass) {
 TEST(Session, ReplaysNoPixelOutsideOfTheImage) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    const int run = session.start(request("vcm", 2));
+    const int run = session.start(run_of("vcm", 2));
     ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
     for (const uint64_t pixel : {uint64_t(24 * 24), uint64_t(1) << 40}) {
         std::promise<std::string> answer;
@@ -530,7 +523,7 @@ TEST(Session, RunsBelongToTheSceneTheyAreStartedWith) {
     for (int i = 0; i < 30; ++i) {
         session.reload();
         for (int j = 0; j < 4; ++j) {
-            const int run = session.start(request("path", 1));
+            const int run = session.start(run_of("path", 1));
             ASSERT_TRUE(wait_for([&] {
                 const RunState s = session.status(run).state;
                 return s == RunState::Finished || s == RunState::Stopped;
@@ -549,7 +542,7 @@ TEST(Session, RunsBelongToTheSceneTheyAreStartedWith) {
 TEST(Session, RunsWithSeveralSeedsShowAllTheirPasses) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    RunRequest r = request("path", 1u << 30);
+    RunRequest r = run_of("path", 1u << 30);
     r.seeds = 2;
     const int run = session.start(r);
     ASSERT_TRUE(wait_for([&] {
@@ -589,7 +582,7 @@ TEST(SnapshotBudget, KeepsTheShare) {
 TEST(Session, SnapshotsWaitForTheBudget) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
-    const int run = session.start(request("path", 1u << 30));
+    const int run = session.start(run_of("path", 1u << 30));
     ASSERT_TRUE(wait_for([&] {
         const auto shown = session.snapshot(run);
         return shown && shown->passes > 1;
