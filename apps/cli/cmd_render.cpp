@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <future>
 #include <new>
+#include <thread>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -111,10 +112,8 @@ public:
         const double taken = seconds_since(begin);
         wait_ = std::max(interval_, taken / most_);
         seconds_ += taken;
-        ++calls_;
     }
-    /// Number of calls, and the seconds that they took.
-    uint64_t calls() const { return calls_; }
+    /// The seconds that all calls took.
     double seconds() const { return seconds_; }
 
 private:
@@ -123,24 +122,39 @@ private:
         return std::chrono::duration<double>(Clock::now() - t).count();
     }
     double interval_, most_, wait_ = interval_, seconds_ = 0;
-    uint64_t calls_ = 0;
     Clock::time_point last_ = Clock::now();
 };
 
-/// A file that becomes durable while the rendering goes on.
+/// Files that become durable while the rendering goes on, one after the other.
 class LaterCommit {
 public:
     /// After finish().
     void begin(std::unique_ptr<SectionWriter> file) {
-        result_ = std::async(std::launch::async, [file = std::move(file)] { file->commit(); });
+        const auto commit =
+            std::make_shared<std::packaged_task<void()>>([file = std::move(file)]() mutable {
+                // Ends here: a temporary file that could not be committed does not stay until the next checkpoint.
+                const std::unique_ptr<SectionWriter> own = std::move(file);
+                own->commit();
+            });
+        result_ = commit->get_future();
+        try {
+            thread_ = std::jthread([commit] { (*commit)(); });
+        } catch (const std::system_error&) {  // There can be no further thread.
+            (*commit)();
+        }
     }
     /// Waits for the file. Throws if it could not be written.
     void finish() {
-        if (result_.valid()) result_.get();
+        if (!result_.valid()) return;
+        result_.get();
+        ++written_;
     }
+    uint64_t written() const { return written_; }
 
 private:
     std::future<void> result_;
+    std::jthread thread_;
+    uint64_t written_ = 0;
 };
 
 /// Progress on stderr: on a terminal one line that is rewritten, otherwise new lines at growing intervals.
@@ -476,7 +490,6 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
         });
     };
     std::string stopped_by, failure;
-    std::optional<UnlimitedMemory> unlimited;
     try {
         ProgressLine line(quiet || !is_first);
         stopped_by = to_string(renderer.run(
@@ -502,9 +515,9 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
         if (renderer.film().passes() == 0 || !renderer.ended_together()) throw;
         stopped_by = "failure";
         failure = dynamic_cast<const std::bad_alloc*>(&e) ? "not enough memory" : e.what();
-        // The last pass may have taken all of it, and what there is needs some more to be written.
-        unlimited.emplace();
     }
+    // The passes may have taken all of it, and what there is needs some more to be written.
+    const UnlimitedMemory unlimited;
     const uint64_t passes = renderer.film().passes();
     if (passes == 0) throw std::runtime_error("interrupted in the first pass: nothing was written");
     renderer.gather();
@@ -516,7 +529,7 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     std::vector<std::string> failures;
     if (!saved.empty()) {
         warn_of_failures([&] { last_checkpoint.finish(); });
-        report["checkpoints"] = {{"written", checkpoints.calls()},
+        report["checkpoints"] = {{"written", last_checkpoint.written()},
                                  {"seconds", checkpoints.seconds()}};
         attempt(failures, [&] { written_state()->commit(); });
     }

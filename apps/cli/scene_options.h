@@ -22,7 +22,7 @@ struct SceneOptions {
     bool watertight = false;
     std::string resolution, crop, sensor;
     /// Limit of this process, in bytes, from the parsing of the command line on; if empty, what the machine has.
-    std::optional<uint64_t> memory;
+    std::string memory;
     int threads = 0;  ///< Of BuildOptions; set by commands that have --threads.
 
     void add_to(CLI::App& command);

@@ -132,7 +132,7 @@ struct Accelerator::Impl {
     explicit Impl(const AcceleratorOptions& o) : options(o) {
         memory.most = int64_t(std::min(options.most_bytes, size_t(INT64_MAX)));
         device = rtcNewDevice(kDevice);
-        if (!device) throw std::runtime_error("Embree: cannot create a device");
+        if (!device) throw std::runtime_error("Embree cannot start, perhaps for want of memory");
         rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &memory);
         top = new_scene();
     }

@@ -20,6 +20,7 @@
 #include "render/statistics_section.h"
 #include "sampler/pilot_seed.h"
 #include "system/available_memory.h"
+#include "system/memory_limit.h"
 
 namespace etendue {
 namespace {
@@ -190,6 +191,7 @@ double typical_radiance(const Scene& scene) {
 /// threads creates its own. TBB uses the smallest limit of all global_controls; kRoom leaves room for other renderers.
 std::unique_ptr<tbb::global_control> allow_threads(int threads) {
     constexpr size_t kRoom = 256;
+    make_room_for_threads(threads);
     if (threads <= tbb::info::default_concurrency()) return nullptr;
     return std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                  std::max(size_t(threads), kRoom));

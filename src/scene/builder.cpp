@@ -15,6 +15,7 @@
 #include "scene/preload.h"
 #include "scene/settings.h"
 #include "scene/shape_registry.h"
+#include "system/memory_limit.h"
 #include "system/threads.h"
 
 namespace etendue {
@@ -546,8 +547,10 @@ private:
 };
 
 Scene build_scene(const SceneDescription& description, const BuildOptions& options) {
+    const int threads = thread_count(options.threads);
+    make_room_for_threads(threads);
     // Embree, too, uses the threads of the arena that calls it.
-    tbb::task_arena arena(thread_count(options.threads));
+    tbb::task_arena arena(threads);
     return arena.execute([&] { return SceneBuilder(description, options).build(); });
 }
 

@@ -14,6 +14,7 @@
 #include "render/render_report.h"
 #include "render/render_request.h"
 #include "session/run.h"
+#include "system/memory_limit.h"
 #include "system/threads.h"
 
 namespace etendue {
@@ -146,6 +147,7 @@ void Session::load_scenes() {
 void Session::load_scene() {
     std::string error;
     try {
+        renew_memory_limit();
         auto scene = std::make_shared<const LoadedScene>(load_());
         const std::lock_guard lock(mutex_);
         load_error_.clear();
@@ -432,6 +434,7 @@ std::shared_ptr<Session::Run> Session::find(int id) const {
 int Session::start(const RunRequest& request) {
     const std::shared_ptr<const LoadedScene> loaded = scene_.load();
     if (!loaded) throw std::runtime_error("the scene is not loaded yet");
+    renew_memory_limit();
     const Scene& scene = loaded->scene;
     auto run = std::make_shared<Run>();
     run->loaded = loaded;

@@ -47,11 +47,15 @@ void lower(std::optional<uint64_t>& least, std::optional<uint64_t> value) {
 
 /// What a control group allows beyond what it uses. Cached files count as free, since the system drops them first.
 std::optional<uint64_t> left_in(const std::string& folder, const char* limit, const char* usage,
-                                const char* cached) {
+                                const char* cached, const char* shared) {
     const auto most = number(folder + "/" + limit), used = number(folder + "/" + usage);
     if (!most || !used) return {};
-    const uint64_t cache = entry(folder + "/memory.stat", std::string(cached) + " ").value_or(0);
-    const uint64_t kept = *used - std::min(cache, *used);
+    const auto counted = [&](const char* name) {
+        return entry(folder + "/memory.stat", std::string(name) + " ").value_or(0);
+    };
+    // Files in memory (/dev/shm) are counted as cached, but nothing else has them.
+    const uint64_t cache = counted(cached), in_memory = std::min(counted(shared), cache);
+    const uint64_t kept = *used - std::min(cache - in_memory, *used);
     return *most - std::min(kept, *most);
 }
 
@@ -69,9 +73,10 @@ void lower_by_groups(std::optional<uint64_t>& least, const std::string& proc,
         std::string path = line.substr(second + 1);
         while (true) {
             if (path == "/") path.clear();
-            lower(least, is_v2 ? left_in(base + path, "memory.max", "memory.current", "file")
-                               : left_in(base + path, "memory.limit_in_bytes",
-                                         "memory.usage_in_bytes", "total_cache"));
+            lower(least, is_v2
+                             ? left_in(base + path, "memory.max", "memory.current", "file", "shmem")
+                             : left_in(base + path, "memory.limit_in_bytes",
+                                       "memory.usage_in_bytes", "total_cache", "total_shmem"));
             if (path.empty()) break;
             path.resize(path.rfind('/') == path.npos ? 0 : path.rfind('/'));
         }

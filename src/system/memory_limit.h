@@ -13,6 +13,13 @@ void limit_memory(uint64_t bytes);
 /// The same with what the system and its control groups have now, so that what does not fit fails here, instead of the
 /// process being ended. No limit where that is unknown, or where address space says nothing about memory (sanitizers).
 void limit_memory_to_available();
+/// Sets that limit anew, where there is one, since other programs may have ended or begun.
+void renew_memory_limit();
+
+/// To be called before `threads` threads begin, which end the process where there is no memory for their stacks. The limit
+/// of limit_memory_to_available() grows by these, since it is not memory until it is used. Throws std::runtime_error where
+/// that of limit_memory() has no room for them.
+void make_room_for_threads(int threads);
 
 /// Lifts it for a while, such as for writing what there is after an allocation has failed.
 class UnlimitedMemory {

@@ -284,11 +284,12 @@ void OutputFile::commit() {
 // What is mounted, or belongs to another user in a folder such as /tmp, can be written but not replaced.
 void OutputFile::overwrite() {
     const Descriptor from(::open(temporary_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+    // From here on it is the only complete copy, which must outlive an interrupt.
+    free_slot(slot_);
     const Descriptor to(
         from.is_open() ? ::open(target_.c_str(), O_WRONLY | O_TRUNC | O_NOFOLLOW | O_CLOEXEC) : -1);
     if (to.is_open() && copy(from.get(), to.get()) && sync(to.get())) return;
     const int error = errno;
-    free_slot(slot_);
     const std::string kept = std::exchange(temporary_, {});
     fail(fmt::format("{}; its contents are in \"{}\"", reason(error), kept));
 }

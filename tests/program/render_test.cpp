@@ -144,6 +144,25 @@ TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
 }
 
 /// Passes of seconds, on one thread.
+TEST_F(RenderTest, MemoryIsLimited) {
+    for (const char* size : {"-1", "0", "4X", "much", "16E", "1.5GG"}) {
+        const ProgramResult r = run({"--memory", size, "--spp", "1"});
+        EXPECT_EQ(r.status, 1) << size;
+        EXPECT_NE(r.errors.find("--memory must be a size such as 4G or 1.5G"), std::string::npos)
+            << r.errors;
+    }
+    const ProgramResult film = run({"--memory", "0.5 GiB", "--resolution", "4000x4000"});
+    EXPECT_EQ(film.status, 1);
+    EXPECT_NE(film.errors.find("MiB are free"), std::string::npos) << film.errors;
+    const ProgramResult stacks = run({"--memory", "300M", "--threads", "64"});
+    EXPECT_EQ(stacks.status, 1);
+    EXPECT_NE(stacks.errors.find("64 threads need 512 MiB for their stacks"), std::string::npos)
+        << stacks.errors;
+    EXPECT_TRUE(has_earlier_image());
+    EXPECT_EQ(run({"--memory", "600mb", "--spp", "1"}).status, 0);
+    EXPECT_EQ(run({"--memory", "800M", "--spp", "1", "--threads", "64"}).status, 0);
+}
+
 class InterruptTest : public RenderTest {
 protected:
     Program start_long(const std::vector<std::string>& more = {}) const {

@@ -58,6 +58,9 @@ TEST(AvailableMemory, IsLimitedByControlGroupsAndThoseAroundThem) {
     files.write("cgroup/job/memory.current", "30000\n");
     files.write("cgroup/job/memory.stat", "anon 10000\nfile 20000\nfile_mapped 7\n");
     EXPECT_EQ(files.available(), 90000u);  // files that are cached can be dropped
+    files.write("cgroup/job/memory.stat", "anon 10000\nfile 20000\nshmem 15000\nfile_mapped 7\n");
+    EXPECT_EQ(files.available(), 75000u);  // but not those in memory
+    files.write("cgroup/job/memory.stat", "anon 10000\nfile 20000\n");
     files.write("cgroup/job/step/memory.max", "6000\n");
     EXPECT_EQ(files.available(), 1000u);
     files.write("cgroup/job/step/memory.current", "7000\n");
@@ -71,6 +74,8 @@ TEST(AvailableMemory, IsLimitedByOldControlGroups) {
     files.write("cgroup/memory/job/memory.usage_in_bytes", "8000\n");
     files.write("cgroup/memory/job/memory.stat", "cache 1\ntotal_cache 500\n");
     EXPECT_EQ(files.available(), 1500u);
+    files.write("cgroup/memory/job/memory.stat", "cache 1\ntotal_cache 500\ntotal_shmem 200\n");
+    EXPECT_EQ(files.available(), 1300u);
 }
 
 TEST(AvailableMemory, MessagesNameNeedAndWhatIsFree) {
