@@ -159,7 +159,7 @@ TEST_F(RenderTest, MemoryIsLimited) {
     EXPECT_NE(stacks.errors.find("64 threads need 512 MiB for their stacks"), std::string::npos)
         << stacks.errors;
     EXPECT_TRUE(has_earlier_image());
-    EXPECT_EQ(run({"--memory", "600mb", "--spp", "1"}).status, 0);
+    EXPECT_EQ(run({"--memory", "600mb", "--spp", "1", "--threads", "2"}).status, 0);
     EXPECT_EQ(run({"--memory", "800M", "--spp", "1", "--threads", "64"}).status, 0);
 }
 
