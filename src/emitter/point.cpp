@@ -20,15 +20,16 @@ public:
         : PointEmitter(p, intensity), frame_(Frame::from_normal(axis)), beam_(beam) {}
 
     Vec3 sample_direction(Vec3, Vec2 u) const override {
-        return frame_.to_world(sample_uniform_cone(u, beam_.cos_cutoff()));
+        return frame_.to_world(sample_uniform_cone(u, beam_.versine_of_cutoff()));
     }
-    float max_pdf_d() const override { return pdf_uniform_cone(beam_.cos_cutoff()); }
+    float max_pdf_d() const override { return pdf_uniform_cone(beam_.versine_of_cutoff()); }
     double power() const override { return luminance(intensity_) * beam_.integral(); }
 
 private:
-    Rgb intensity(Vec3 d) const override { return intensity_ * beam_.share(dot(d, frame_.n)); }
+    Rgb intensity(Vec3 d) const override { return intensity_ * beam_.share(versine(d, frame_.n)); }
     float pdf_direction(Vec3 d) const override {
-        return dot(d, frame_.n) > beam_.cos_cutoff() ? pdf_uniform_cone(beam_.cos_cutoff()) : 0.0f;
+        const float most = beam_.versine_of_cutoff();
+        return versine(d, frame_.n) < most ? pdf_uniform_cone(most) : 0.0f;
     }
 
     Frame frame_;
@@ -56,8 +57,9 @@ public:
     }
 
 private:
-    Rgb intensity_at(Vec2 uv, float cos_theta) const override {
-        const float share = beam_.share(cos_theta);
+    Rgb intensity_at(Vec2 uv, float) const override {
+        const Vec2 across = (uv * 2 - Vec2{1, 1}) * beam_.tan_cutoff();
+        const float share = beam_.share_on_plane(sqr(across.x) + sqr(across.y));
         return share > 0 ? peak_ * texture_.eval(TexturePoint(uv)) * share : Rgb();
     }
 
@@ -93,15 +95,15 @@ private:
 
 }  // namespace
 
-float Beam::share(float cos_theta) const {
-    if (cos_theta <= cos_cutoff_) return 0;
-    if (cos_theta >= cos_beam_) return 1;
-    const float x = (cos_theta - cos_cutoff_) / (cos_beam_ - cos_cutoff_);
+float Beam::share(float versine) const {
+    if (versine >= versine_of_cutoff_) return 0;
+    if (versine <= versine_of_beam_) return 1;
+    const float x = (versine_of_cutoff_ - versine) / (versine_of_cutoff_ - versine_of_beam_);
     switch (falloff_) {
     case Falloff::Smooth: return sqr(x) * (3 - 2 * x);
     case Falloff::Quadratic: return sqr(x);
     case Falloff::Quartic: return sqr(sqr(x));
-    default: return (cutoff_ - std::acos(cos_theta)) / (cutoff_ - beam_);
+    default: return (cutoff_ - 2 * std::asin(std::sqrt(versine / 2))) / (cutoff_ - beam_);
     }
 }
 
@@ -110,7 +112,8 @@ double Beam::integral() const {
                         : falloff_ == Falloff::Quadratic ? 1.0 / 3
                                                          : 0.5;  // of the ring
     return 2 * std::numbers::pi *
-           ((1 - double(cos_beam_)) + mean * (double(cos_beam_) - double(cos_cutoff_)));
+           (double(versine_of_beam_) +
+            mean * (double(versine_of_cutoff_) - double(versine_of_beam_)));
 }
 
 Beam read_beam(const Params& p) {

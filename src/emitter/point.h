@@ -57,17 +57,24 @@ public:
 
     Beam(float cutoff_degrees, float beam_degrees, Falloff falloff)
         : falloff_(falloff), cutoff_(cutoff_degrees * kPi / 180), beam_(beam_degrees * kPi / 180),
-          cos_cutoff_(std::cos(cutoff_)), cos_beam_(std::cos(beam_)) {}
+          versine_of_cutoff_(2 * sqr(std::sin(cutoff_ / 2))),
+          versine_of_beam_(2 * sqr(std::sin(beam_ / 2))) {}
 
-    float share(float cos_theta) const;
+    /// At an angle with the versine 1 - cos θ.
+    float share(float versine) const;
+    /// The same on the plane at the distance 1 along the axis, at the squared distance `r2` from it.
+    float share_on_plane(float r2) const {
+        const float secant = std::sqrt(1 + r2);
+        return share(r2 / (secant * (1 + secant)));
+    }
     /// Integral of share() over all directions.
     double integral() const;
-    float cos_cutoff() const { return cos_cutoff_; }
+    float versine_of_cutoff() const { return versine_of_cutoff_; }
     float tan_cutoff() const { return std::tan(cutoff_); }
 
 private:
     Falloff falloff_;
-    float cutoff_, beam_, cos_cutoff_, cos_beam_;
+    float cutoff_, beam_, versine_of_cutoff_, versine_of_beam_;
 };
 
 /// The beam of a `spot`.

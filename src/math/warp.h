@@ -45,17 +45,21 @@ inline Vec3 sample_uniform_sphere(Vec2 u) {
 }
 inline constexpr float kUniformSpherePdf = kInvPi / 4;
 
-/// Uniform in solid angle within the cone about +z whose half-angle has cosine `cos_max`.
-inline Vec3 sample_uniform_cone(Vec2 u, float cos_max) {
-    // sin² θ = (1 - cos θ)(1 + cos θ), since 1 - cos² θ cancels for narrow cones.
-    const float versine = u.x * (1 - cos_max);
+/// Uniform in solid angle within the cone about +z whose half-angle has the versine `most`, 1 - cos θ: for narrow cones,
+/// it keeps the digits that cos θ loses.
+inline Vec3 sample_uniform_cone(Vec2 u, float most) {
+    const float versine = u.x * most;
     const float r = safe_sqrt(versine * (2 - versine));
     float s, c;
     sincosf(2 * kPi * u.y, &s, &c);
     return {r * c, r * s, 1 - versine};
 }
-inline float pdf_uniform_cone(float cos_max) {
-    return kInvPi / (2 * (1 - cos_max));
+inline float pdf_uniform_cone(float most) {
+    return kInvPi / (2 * most);
+}
+/// 1 - cos of the angle between two unit vectors.
+inline float versine(Vec3 a, Vec3 b) {
+    return 0.5f * length2(a - b);
 }
 
 /// Barycentric coordinates of the second and third vertex, uniform in area.

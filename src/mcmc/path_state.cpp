@@ -99,7 +99,7 @@ void PathState::scatter(int i) {
     // An eye path that leaves the scene chooses among the emitters at infinity.
     if (before.v.is_infinite && !emitter().is_delta())
         before.eye_ /= double(measure_.scene.infinite_emitters().size());
-    x.value *= float(arrival(i)) * x.opacity;
+    x.factor = arrival(i) * double(x.opacity);
 }
 
 bool PathState::evaluate(int first, int last) {
@@ -107,7 +107,7 @@ bool PathState::evaluate(int first, int last) {
     const int k = this->last();
     for (int i = std::max(first, 1); i <= std::min(last, k - 1); ++i) {
         scatter(i);
-        if (x_[size_t(i)].value.is_zero()) return false;
+        if (x_[size_t(i)].is_black()) return false;
     }
     if (first <= 0) {
         PathVertex& x0 = x_[0];
@@ -132,9 +132,10 @@ bool PathState::evaluate(int first, int last) {
             scene.sensor().pdf_direction(xk.v.p, direction(xk.v, x_[size_t(k) - 1].v));
         xk.eye_ = measure_.unit_area * double(xk.v.pdf_fwd);
         x_[size_t(k) - 1].eye_ = double(pdf_dir / measure_.film.area()) * geometry(k, k - 1);
-        xk.value = Rgb(float(sqr(measure_.unit_area) * inverse_square(x_[size_t(k) - 1].v, xk.v) *
-                             double(pdf_dir * xk.v.pdf_fwd)));
-        if (xk.value.is_zero()) return false;
+        xk.value = Rgb(1);
+        xk.factor = sqr(measure_.unit_area) * inverse_square(x_[size_t(k) - 1].v, xk.v) *
+                    double(pdf_dir) * double(xk.v.pdf_fwd);
+        if (xk.is_black()) return false;
     }
     for (int i = std::max(first, 0); i < std::min(last, k); ++i) {
         const Vertex &a = x_[size_t(i)].v, &b = x_[size_t(i) + 1].v;
@@ -217,7 +218,7 @@ PathProduct PathState::contribution() const {
     for (const PathVertex& x : x_)
         for (int c = 0; c < 3; ++c)
             f[size_t(c)] *=
-                double(x.value[c]) *
+                double(x.value[c]) * x.factor *
                 (&x == &x_.back() ? 1.0 : double(x.attenuation[c]) * double(x.transmittance));
     return f;
 }
@@ -229,7 +230,8 @@ PathProduct PathState::flux(int i) const {
     for (int j = 0; j < i; ++j) {
         const PathVertex& x = x_[size_t(j)];
         for (int c = 0; c < 3; ++c)
-            f[size_t(c)] *= double(x.value[c]) * double(x.attenuation[c]) * double(x.transmittance);
+            f[size_t(c)] *=
+                double(x.value[c]) * x.factor * double(x.attenuation[c]) * double(x.transmittance);
     }
     return f;
 }

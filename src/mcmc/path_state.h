@@ -76,8 +76,11 @@ public:
     Vertex v;
     /// Probabilities of a delta event from either side.
     float light_pmf = 1, eye_pmf = 1;
-    /// The factor of f that belongs to this vertex, with the edge before it.
+    /// The factor of f that belongs to this vertex, with the edge before it, is value · factor: scattering or emission, and
+    /// what depends on the scene's size, which exceeds the range of float.
     Rgb value;
+    double factor = 1;
+    bool is_black() const { return value.is_zero() || !(factor > 0); }
     Rgb attenuation;          ///< On the edge to the next vertex.
     float transmittance = 1;  ///< Of the masks on this edge; 0 if the edge is blocked.
     float opacity = 1;        ///< Probability that a ray meets the surface.

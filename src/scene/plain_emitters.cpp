@@ -122,14 +122,14 @@ void replace_falloff(PlainScene& s, int index) {
     constexpr float kLeastCosine = 0.15f;
     const Params params(s.original(), index);
     const Beam beam = read_beam(params);
-    if (has(o, "texture") || beam.cos_cutoff() < kLeastCosine) return;
+    if (has(o, "texture") || 1 - beam.versine_of_cutoff() < kLeastCosine) return;
     std::vector<Rgb> pixels;
     for (int y = 0; y < kBakedSize; ++y)
         for (int x = 0; x < kBakedSize; ++x) {
             const auto on_plane = [&](int i) {
                 return beam.tan_cutoff() * (float(2 * i + 1) / kBakedSize - 1);
             };
-            pixels.emplace_back(beam.share(1 / std::sqrt(1 + sqr(on_plane(x)) + sqr(on_plane(y)))));
+            pixels.emplace_back(beam.share_on_plane(sqr(on_plane(x)) + sqr(on_plane(y))));
         }
     s.warn(o, fmt::format("Mitsuba 3 has no falloff \"{}\": it becomes an image of {}×{} pixels",
                           text(o, "falloff", ""), kBakedSize, kBakedSize));

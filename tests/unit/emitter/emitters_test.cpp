@@ -27,15 +27,15 @@ class NoContext final : public EmitterContext {
     std::function<float(const TexturePoint&)> opacity() const override { return {}; }
 };
 
-std::unique_ptr<Emitter> spot(const char* falloff) {
+std::unique_ptr<Emitter> spot(const char* falloff, double cutoff = 50, double beam = 20) {
     SceneDescription scene;
     scene.objects = {{"emitter",
                       "spot",
                       "",
                       {},
                       {{"intensity", Rgb(2), {}},
-                       {"cutoff_angle", 50.0, {}},
-                       {"beam_width", 20.0, {}},
+                       {"cutoff_angle", cutoff, {}},
+                       {"beam_width", beam, {}},
                        {"falloff", std::string(falloff), {}}},
                       {}}};
     NoContext context;
@@ -54,6 +54,32 @@ TEST(Spot, PowerIsTheIntegralOfTheIntensity) {
         // Linear in the angle: power(), which only chooses among emitters, is that of a line in the cosine.
         const double tolerance = std::string_view(falloff) == "angle" ? 0.1 : 0.01;
         EXPECT_NEAR(sum / kSamples / emitter->power(), 1, tolerance) << falloff;
+    }
+}
+
+// The cosines of such angles are 1 in a float, or a few units below it.
+TEST(Spot, OfNarrowBeamsHasOneDensity) {
+    testing::Random random(2);
+    for (const double cutoff : {0.01, 0.05, 0.3}) {
+        const auto emitter = spot("angle", cutoff, cutoff);
+        const double solid_angle = 4 * M_PI * sqr(std::sin(cutoff * M_PI / 360));
+        EXPECT_NEAR(emitter->power() / (2 * solid_angle), 1, 1e-5) << cutoff;
+        int seen = 0;
+        for (int i = 0; i < 10000; ++i) {
+            const EmissionSample s = emitter->sample_emission({}, random.next_2d());
+            const Emitter::Emission again = emitter->eval_emission({}, {}, 0, s.d);
+            EXPECT_EQ(again.pdf_d, s.pdf_d);
+            seen += s.Le.g > 0;
+            if (s.pdf_d > 0) {
+                EXPECT_NEAR(double(s.pdf_d) * solid_angle, 1, 1e-5) << cutoff;
+            }
+        }
+        EXPECT_GT(seen, 9970) << cutoff;
+        for (const double part : {0.99, 1.01}) {
+            const double angle = part * cutoff * M_PI / 180;
+            const Vec3 d{float(std::sin(angle)), 0, float(std::cos(angle))};
+            EXPECT_EQ(emitter->eval_emission({}, {}, 0, d).pdf_d > 0, part < 1) << cutoff;
+        }
     }
 }
 

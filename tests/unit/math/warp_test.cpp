@@ -60,16 +60,16 @@ TEST(Warp, UniformSphere) {
 
 TEST(Warp, UniformCones) {
     for (const float cos_max : {0.99999f, 0.9f, 0.0f, -0.7f})
-        expect_directions([&](Vec2 u) { return sample_uniform_cone(u, cos_max); },
-                          [&](float) { return pdf_uniform_cone(cos_max); }, cos_max);
+        expect_directions([&](Vec2 u) { return sample_uniform_cone(u, 1 - cos_max); },
+                          [&](float) { return pdf_uniform_cone(1 - cos_max); }, cos_max);
 }
 
 // The sun: the sine of the angle must be smooth although its cosine has few values left in a float.
 TEST(Warp, NarrowConesAreFine) {
-    const float cos_max = std::cos(0.00465f);
+    const float most = 2 * sqr(std::sin(0.00465f / 2));
     float before = 0;
     for (int i = 1; i <= 1000; ++i) {
-        const Vec3 w = sample_uniform_cone({float(i) / 1001, 0}, cos_max);
+        const Vec3 w = sample_uniform_cone({float(i) / 1001, 0}, most);
         EXPECT_GT(w.x, before);
         before = w.x;
     }
@@ -121,8 +121,8 @@ TEST(Warp, ExtremeNumbers) {
             EXPECT_NEAR(length(sample_cosine_hemisphere(u)), 1, 1e-6f);
             EXPECT_GE(sample_cosine_hemisphere(u).z, 0);
             EXPECT_NEAR(length(sample_uniform_sphere(u)), 1, 1e-6f);
-            EXPECT_NEAR(length(sample_uniform_cone(u, 0.3f)), 1, 1e-6f);
-            EXPECT_GE(sample_uniform_cone(u, 0.3f).z, 0.3f - 1e-6f);
+            EXPECT_NEAR(length(sample_uniform_cone(u, 0.7f)), 1, 1e-6f);
+            EXPECT_GE(sample_uniform_cone(u, 0.7f).z, 0.3f - 1e-6f);
             const Vec2 b = sample_uniform_triangle(u);
             EXPECT_LE(b.x + b.y, 1 + 1e-6f);
         }

@@ -150,7 +150,7 @@ TEST_P(GuidedVertex, IsBelowItsBound) {
             const float bound = z[1].max_pdf(cone, kEye);
             for (int k = 0; k < 20; ++k) {
                 const Vec3 w = Frame::from_normal(cone.axis).to_world(
-                    sample_uniform_cone(random.next_2d(), std::cos(cone.angle)));
+                    sample_uniform_cone(random.next_2d(), 2 * sqr(std::sin(cone.angle / 2))));
                 EXPECT_LE(z[1].eval(w, kEye).pdf, bound * 1.001f);
             }
         }

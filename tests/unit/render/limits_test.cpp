@@ -109,20 +109,26 @@ TEST(RenderLimits, PassesOfLongPathsAreDroppedAtOnce) {
     }
 }
 
-// Densities of vertices are relative to the size of the scene, here the square of 10⁵ rooms.
-TEST(RenderLimits, LongPathsInASmallPartOfTheSceneCount) {
-    const Scene scene =
-        build(sensor("0,0,3", "0,0,0", 8) +
-              "<shape type=\"sphere\"><float name=\"radius\" value=\"10\"/><boolean "
-              "name=\"flip_normals\" value=\"true\"/>" +
-              diffuse("1,1,1") + "</shape>" + area_lamp("1,1,1") +
-              rectangle("<translate x=\"1000000\"/>", diffuse("1,1,1")));
-    for (const char* method : {"mlt:groups=2,max_depth=60",
-                               "mps:target=path,mutations=500,precision=0.2,max_depth=60"}) {
+// Densities of vertices are relative to the size of the scene.
+TEST(RenderLimits, PathsInASmallPartOfTheSceneCount) {
+    const auto room_in = [](const std::string& camera, const char* far) {
+        return build(camera +
+                     "<shape type=\"sphere\"><float name=\"radius\" value=\"10\"/><boolean "
+                     "name=\"flip_normals\" value=\"true\"/>" +
+                     diffuse("1,1,1") + "</shape>" + area_lamp("1,1,1") +
+                     rectangle("<translate x=\"" + std::string(far) + "\"/>", diffuse("1,1,1")));
+    };
+    const Scene longer = room_in(sensor("0,0,3", "0,0,0", 8), "1000000"),
+                larger = room_in(lens_camera(8), "1000000000");
+    const std::pair<const Scene*, const char*> cases[] = {
+        {&longer, "mlt:groups=2,max_depth=60"},
+        {&longer, "mps:target=path,mutations=500,precision=0.2,max_depth=60"},
+        {&larger, "mlt:groups=2"}};
+    for (const auto& [scene, method] : cases) {
         RenderSettings settings;
         settings.integrator = IntegratorSpec::parse(method);
         settings.spp = 4;
-        Renderer renderer(scene, settings);
+        Renderer renderer(*scene, settings);
         renderer.run([](const Progress&) {}, std::atomic<bool>(false));
         EXPECT_EQ(renderer.stats().rejected, 0u) << method;
     }
