@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "integrator/path_photons.h"
+#include "integrator/seen_extent.h"
 #include "math/hash.h"
 #include "math/statistics.h"
 #include "mcmc/addresses.h"
@@ -222,12 +223,12 @@ MetropolisPhotons::Pilot MetropolisPhotons::run_pilot(const PassContext& context
 std::unique_ptr<PhotonStates>
 MetropolisPhotons::make_states(const PassContext& context,
                                const std::function<std::vector<Importon>()>& importons) {
-    constexpr float kRadius = 0.03f;  // Of the scene's.
+    constexpr float kRadius = 0.03f;  // Of what is seen.
     if (options_.target == PhotonTarget::Path)
         return path_photons(context, mapping_, user_paths_, options_.user_share);
     auto states = std::make_unique<ImportonStates>(mapping_);
     ImportonSpace& space = states->importon_space();
-    importance_.emplace(importons(), kRadius * context.scene.bounds().radius());
+    importance_.emplace(importons(), kRadius * seen_radius(context.scene));
     importance_->set_floor(importance_floor(context, mapping_, space, *importance_));
     space.importance = &*importance_;
     if (user_paths_) {

@@ -16,6 +16,7 @@
 
 #include <fmt/format.h>
 
+#include "integrator/seen_extent.h"
 #include "math/hash.h"
 #include "reuse/irradiance_cache.h"
 
@@ -88,7 +89,8 @@ public:
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         maps_pass_ = retrace_ ? pass.index : 0;
-        max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * pass.scene.bounds().radius();
+        if (!(max_radius_ > 0))
+            max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * seen_radius(pass.scene);
         if (has_maps_ && !retrace_) return;
         MapPhotons photons =
             source_->trace(pass, maps_pass_, [&] { return sample_importons(pass); });
@@ -300,7 +302,7 @@ private:
     /// level do not depend on each other, so the result does not depend on the threads.
     void fill_cache(const PassContext& pass) {
         constexpr uint32_t kCoarsest = 16, kFinest = 2;
-        const float size = pass.scene.bounds().radius();
+        const float size = seen_radius(pass.scene);
         cache_.reset(cache_error_, 0.01f * size, 0.5f * size);
         const uint64_t width = uint64_t(pass.scene.film().crop_width);
         std::vector<std::vector<IrradianceRecord>> chunks(pass.chunks(pass.pixels));
@@ -428,7 +430,7 @@ std::vector<ParamInfo> photon_map_params(const ParamInfo& paths) {
     params.push_back(
         {"radius", ParamKind::Float, "0",
          "Largest radius of a density estimate, in scene units; 0: 3 % of the radius of "
-         "the scene's bounds."});
+         "what the camera sees."});
     params.push_back({"gather_rays", ParamKind::Int, "16",
                       "Number of final gather rays for each eye path in a pass; 0: the photons are "
                       "seen directly."});

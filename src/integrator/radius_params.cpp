@@ -7,27 +7,20 @@
 
 #include <fmt/format.h>
 
+#include "integrator/seen_extent.h"
+
 namespace etendue {
 namespace {
 
 /// Radius of a disc with the area of a pixel, projected to the first surface: the median over the image. Infinite if no
 /// eye ray hits a surface.
 float pixel_radius(const Scene& scene) {
-    constexpr int kRays = 64;  // each way
-    const FilmGeometry& film = scene.film();
     std::vector<float> areas;
-    for (int row = 0; row < kRays; ++row)
-        for (int column = 0; column < kRays; ++column) {
-            const Vec2 point{(float(column) + 0.5f) * (float(film.width) / kRays),
-                             (float(row) + 0.5f) * (float(film.height) / kRays)};
-            const SensorRay ray = scene.sensor().sample_ray(point, {0.5f, 0.5f});
-            SurfaceHit hit;
-            Passage passage{scene.sensor_medium()};
-            if (!scene.intersect({ray.p, ray.d, kInf}, 0.5f, hit, passage)) continue;
-            const float to_area = abs_dot(hit.geometry.ng, ray.d) /
-                                  (scene.sensor().is_orthographic() ? 1.0f : sqr(hit.t));
-            if (to_area > 0) areas.push_back(1 / (ray.pdf_dir * to_area));
-        }
+    for_each_seen(scene, [&](const SensorRay& ray, const SurfaceHit& hit) {
+        const float to_area = abs_dot(hit.geometry.ng, ray.d) /
+                              (scene.sensor().is_orthographic() ? 1.0f : sqr(hit.t));
+        if (to_area > 0) areas.push_back(1 / (ray.pdf_dir * to_area));
+    });
     if (areas.empty()) return kInf;
     const auto median = areas.begin() + std::ptrdiff_t(areas.size() / 2);
     std::nth_element(areas.begin(), median, areas.end());
@@ -60,7 +53,7 @@ float RadiusParams::radius(const Scene& scene, uint32_t index) {
 float default_merge_radius(const Scene& scene) {
     constexpr float kPixels = 6;  // A smaller one makes caustics noisier, a larger one blurs them.
     constexpr float kOfScene = 0.01f;
-    return std::min(kPixels * pixel_radius(scene), kOfScene * scene.bounds().radius());
+    return std::min(kPixels * pixel_radius(scene), kOfScene * seen_radius(scene));
 }
 
 }  // namespace etendue

@@ -26,7 +26,7 @@ private:
 };
 
 /// Default radius of merges in the first pass: that of a disc with the area of 36 pixels as the median pixel sees the
-/// scene, but at most 1 % of the radius of the scene's bounds. So the number of photons in a disc does not grow with the
+/// scene, but at most 1 % of seen_radius(). So the number of photons in a disc does not grow with the
 /// resolution if there is one light path for each pixel, and small images are not blurred. Independent of the crop.
 float default_merge_radius(const Scene& scene);
 

@@ -113,7 +113,7 @@ std::vector<ParamInfo> sppm_params() {
     for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
                                             "that of a disc with the area of 36 pixels, as the "
                                             "median pixel sees the scene, but at most 1 % of the "
-                                            "radius of the scene's bounds."))
+                                            "radius of what the camera sees."))
         params.push_back(p);
     for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
     params.push_back({"next_event", ParamKind::Bool, "true",

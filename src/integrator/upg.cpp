@@ -18,6 +18,7 @@
 #include "integrator/bidirectional.h"
 #include "integrator/light_path_options.h"
 #include "integrator/pair_pilot.h"
+#include "integrator/seen_extent.h"
 #include "reuse/gather.h"
 #include "reuse/gather_constants.h"
 #include "reuse/gather_radius.h"
@@ -210,7 +211,7 @@ private:
     /// Chooses the radius and the density of the first pass.
     void start(const PassContext& pass) {
         const PairPilot pilot = run_pair_pilot(pass, paths_, counts(pass.scene, pass.light_paths));
-        learned_.radius.start(given_radius_, connects_, pass.scene.bounds().radius(),
+        learned_.radius.start(given_radius_, connects_, seen_radius(pass.scene),
                               pilot.pairs_per_radius2);
         density_ = PairDensity(pilot.vertices, learned_.radius.of(false),
                                kGatherConstants.correlation, pilot.multiple);

@@ -17,6 +17,7 @@
 
 #include "integrator/light_path_options.h"
 #include "integrator/markov.h"
+#include "integrator/seen_extent.h"
 #include "math/hash.h"
 #include "mcmc/whole_film.h"
 #include "reuse/gather.h"
@@ -273,7 +274,7 @@ protected:
         constexpr int kRounds = 3;
         use_roulette(pass.scene.film(), pilot);
         gathered_ = light_.count(pass.scene, paths_.depth(), LightMap::kVertexBytes);
-        const float size = pass.scene.bounds().is_empty() ? 1 : pass.scene.bounds().radius();
+        const float size = seen_radius(pass.scene);
         const float largest = kGatherConstants.largest_radius * size;
         radius_ = given_radius_ > 0 ? given_radius_
                                     : std::min(largest, size / std::sqrt(float(gathered_)));

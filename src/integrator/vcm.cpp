@@ -215,7 +215,7 @@ IntegratorEntry vcm_entry() {
     for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
                                             "that of a disc with the area of 36 pixels, as the "
                                             "median pixel sees the scene, but at most 1 % of the "
-                                            "radius of the scene's bounds. Eye vertices that the "
+                                            "radius of what the camera sees. Eye vertices that the "
                                             "film point does not determine merge within 0.3 times "
                                             "this radius."))
         params.push_back(p);

@@ -14,6 +14,15 @@
 #include "readers/file_bytes.h"
 
 namespace etendue {
+
+float size_around(const Scene& scene, std::span<const Vec3> points) {
+    constexpr float kMost = 3;
+    const float radius = scene.bounds().is_empty() ? 1 : scene.bounds().radius();
+    float extent = 0;
+    for (const Vec3& p : points) extent = std::max(extent, length(p - points[0]));
+    return extent > 0 ? std::min(radius, kMost * extent) : radius;
+}
+
 namespace {
 
 using nlohmann::json;
@@ -181,7 +190,7 @@ Nearest nearest_surface(const Scene& scene, Vec3 p, float tolerance) {
 class PathChecker {
 public:
     PathChecker(const Scene& scene, const GivenPath& given) : scene_(scene), given_(given) {
-        const float radius = scene.bounds().is_empty() ? 1 : scene.bounds().radius();
+        const float radius = size_around(scene, given.points);
         tolerance_ = kTolerance * radius;
         path_.radius = given.radius.value_or(kDisc * radius);
     }

@@ -91,4 +91,8 @@ private:
     std::vector<UserPath> paths_;
 };
 
+/// The scale of distances about a path through `points`: the radius of the scene's bounds, but at most three times the
+/// largest distance of a point from the first one, since the scene may have distant objects, too.
+float size_around(const Scene& scene, std::span<const Vec3> points);
+
 }  // namespace etendue

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "math/frame.h"
+#include "mcmc/user_paths.h"
 #include "pathspace/vertex.h"
 
 namespace etendue {
@@ -67,8 +68,7 @@ std::vector<RayPoint> trace(const Scene& scene, Vec3 o, Vec3 d, int most, Transp
 class SpecularChain {
 public:
     SpecularChain(const Scene& scene, std::span<const Vec3> given) : scene_(scene), given_(given) {
-        const float radius = scene.bounds().is_empty() ? 1 : scene.bounds().radius();
-        near_ = kNear * radius;
+        near_ = kNear * size_around(scene, given);
     }
 
     /// The surface met between two given points near the second one.

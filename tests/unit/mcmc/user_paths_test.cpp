@@ -45,6 +45,17 @@ TEST(UserPaths, AreRefusedWithAReason) {
     expect({lamp, {-0.95f, 0.2f, 0}, {0, -1, 0}}, "degrees off the law of reflection");
 }
 
+TEST(UserPaths, DoNotDependOnDistantObjects) {
+    const Scene scene = build(front_camera(16) + room() + area_lamp() +
+                              rectangle("<translate x=\"100000\"/>", kMirror));
+    EXPECT_EQ(problem(scene, {{0, 0.98f, 0}, {0.3f, -1, 0.2f}}), "");
+    const CheckedPath checked = check_user_path(
+        scene,
+        {.name = {}, .points = {{0, 0.98f, 0}, {0.3f, -1, 0.2f}}, .cones = {1}, .radius = {}});
+    ASSERT_TRUE(checked.path);
+    EXPECT_LT(checked.path->radius, 0.1f);
+}
+
 TEST(UserPaths, FilesAreReadAndWritten) {
     const std::vector<GivenPath> paths{
         {.name = "a", .points = {{0.1f, 2, 3}, {4, 5, 6}}, .cones = {2}, .radius = 0.5f},

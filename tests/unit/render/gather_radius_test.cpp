@@ -55,8 +55,9 @@ TEST(GatherRadius, DoesNotDependOnRoulette) {
 
 /// The walks before the first pass tell its radius. The size of the scene does not: something small is far away.
 TEST(GatherRadius, OfTheFirstPassFindsAboutEightPairs) {
-    const Scene scene = build(front_camera(16) + room() + area_lamp() +
-                              R"(<shape type="sphere"><point name="center" x="0" y="0" z="-30"/>
+    const Scene scene =
+        build(front_camera(16) + room() + area_lamp() +
+              R"(<shape type="sphere"><point name="center" x="0" y="0" z="-1000000"/>
                               <float name="radius" value="0.01"/><bsdf type="diffuse"/></shape>)");
     constexpr int kSeeds = 8;
     Moments pairs;
