@@ -112,18 +112,20 @@ TEST(RenderLimits, PassesOfLongPathsAreDroppedAtOnce) {
 // Densities of vertices are relative to the size of the scene.
 TEST(RenderLimits, PathsInASmallPartOfTheSceneCount) {
     const auto room_in = [](const std::string& camera, const char* far) {
-        return build(camera +
-                     "<shape type=\"sphere\"><float name=\"radius\" value=\"10\"/><boolean "
-                     "name=\"flip_normals\" value=\"true\"/>" +
-                     diffuse("1,1,1") + "</shape>" + area_lamp("1,1,1") +
-                     rectangle("<translate x=\"" + std::string(far) + "\"/>", diffuse("1,1,1")));
+        return build(
+            camera +
+            "<shape type=\"sphere\"><float name=\"radius\" value=\"10\"/><boolean "
+            "name=\"flip_normals\" value=\"true\"/>" +
+            diffuse("1,1,1") + "</shape>" + area_lamp("1,1,1") +
+            rectangle("<scale value=\"1000000\"/><translate x=\"" + std::string(far) + "\"/>",
+                      diffuse("1,1,1")));
     };
-    const Scene longer = room_in(sensor("0,0,3", "0,0,0", 8), "1000000"),
+    const Scene longer = room_in(sensor("0,0,3", "0,0,0", 8), "10000000"),
                 larger = room_in(lens_camera(8), "1000000000");
     const std::pair<const Scene*, const char*> cases[] = {
         {&longer, "mlt:groups=2,max_depth=60"},
         {&longer, "mps:target=path,mutations=500,precision=0.2,max_depth=60"},
-        {&larger, "mlt:groups=2"}};
+        {&larger, "mlt:groups=2,max_depth=60"}};
     for (const auto& [scene, method] : cases) {
         RenderSettings settings;
         settings.integrator = IntegratorSpec::parse(method);
