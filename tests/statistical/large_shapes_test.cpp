@@ -60,7 +60,7 @@ Scene box(bool of_spheres) {
 class SphereBox : public ::testing::TestWithParam<std::string> {};
 
 // Radii of merges are given, since the default ones depend on the scene's bounds. Every pass of a Markov chain is a group,
-// so that passes are independent.
+// so that passes are independent; so are those of mps where it traces its photons anew.
 TEST_P(SphereBox, LooksLikeABoxOfRectangles) {
     const std::string method = GetParam().substr(0, GetParam().find(':'));
     const bool has_groups = GetParam().ends_with("groups=1024");
@@ -79,13 +79,12 @@ const auto kMethod = [](const ::testing::TestParamInfo<std::string>& p) {
 };
 INSTANTIATE_TEST_SUITE_P(Quick, SphereBox, ::testing::Values("path", "light", "bdpt", "upg"),
                          kMethod);
-INSTANTIATE_TEST_SUITE_P(Long, SphereBox,
-                         ::testing::Values("vcm:radius=1", "sppm:radius=3", "pcbpt",
-                                           "pssmlt:chains=16,groups=1024",
-                                           "mmlt:chains=48,groups=1024",
-                                           "mlt:chains=48,groups=1024",
-                                           "mps:mutations=2000,precision=0.2,radius=3"),
-                         kMethod);
+INSTANTIATE_TEST_SUITE_P(
+    Long, SphereBox,
+    ::testing::Values("vcm:radius=1", "sppm:radius=3", "pcbpt", "pssmlt:chains=16,groups=1024",
+                      "mmlt:chains=48,groups=1024", "mlt:chains=48,groups=1024",
+                      "mps:mutations=2000,precision=0.2,radius=3,retrace=true"),
+    kMethod);
 
 }  // namespace
 }  // namespace etendue::test
