@@ -21,7 +21,7 @@ struct SceneOptions {
     bool lenient = false;
     bool watertight = false;
     std::string resolution, crop, sensor;
-    /// Limit of this process, in bytes, from the parsing of the command line on; if empty, what the machine has.
+    /// Limit of this process, such as 4G, from the parsing of the command line on; if empty, what the machine has.
     std::string memory;
     int threads = 0;  ///< Of BuildOptions; set by commands that have --threads.
 

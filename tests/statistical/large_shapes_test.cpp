@@ -59,8 +59,8 @@ Scene box(bool of_spheres) {
 
 class SphereBox : public ::testing::TestWithParam<std::string> {};
 
-// Radii of merges are given, since the default ones depend on the scene's bounds. Every pass of a Markov chain is a group,
-// so that passes are independent; so are those of mps where it traces its photons anew.
+// Radii of merges are given, since the default ones are large in small images. Passes have to be independent: each pass of
+// a Markov chain is a group, and mps traces new photons in each.
 TEST_P(SphereBox, LooksLikeABoxOfRectangles) {
     const std::string method = GetParam().substr(0, GetParam().find(':'));
     const bool has_groups = GetParam().ends_with("groups=1024");
