@@ -12,6 +12,7 @@
 #include "math/content_hash.h"
 #include "render/render_request.h"
 #include "render/statistics_section.h"
+#include "system/processor.h"
 
 namespace etendue {
 namespace {
@@ -81,6 +82,7 @@ Conditions conditions_of(const Renderer& renderer, const Scene& scene, const Sce
             {"build", hexadecimal(program_fingerprint())},
             {"C library", ::gnu_get_libc_version()},
             {"ray tracer", ray_tracer()},
+            {"processor", hexadecimal(reciprocals_of_processor())},
             {kSceneCondition, hexadecimal(source.fingerprint)},
             {"lenient", yes_or_no(source.lenient)},
             {"watertight", yes_or_no(source.watertight)},

@@ -12,7 +12,8 @@ namespace etendue {
 namespace {
 
 /// Conditions of which parts of a sum may differ: other passes, and what changes nothing but last bits.
-const std::set<std::string> kMayDiffer{"seed", "first pass", "build", "C library", "ray tracer"};
+const std::set<std::string> kMayDiffer{"seed",      "first pass", "build",
+                                       "C library", "ray tracer", "processor"};
 
 /// Adds `more` to totals of the same film.
 void add(RenderTotals& sum, const RenderTotals& more) {

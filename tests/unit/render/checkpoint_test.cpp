@@ -305,12 +305,14 @@ TEST(Checkpoint, IsRefusedWithBothValuesWhereBitsWouldDiffer) {
     PassLog log;
     Conditions changed = renderings.conditions(r, settings);
     for (auto& [name, value] : changed)
-        if (name == "scene contents" || name == "build" || name == "ray tracer") value = "other";
+        if (name == "scene contents" || name == "build" || name == "ray tracer" ||
+            name == "processor")
+            value = "other";
     try {
         CheckpointFile(renderings.file("a")).resume(r, changed, log);
         ADD_FAILURE();
     } catch (const std::runtime_error& e) {
-        for (const char* name : {"scene contents", "build", "ray tracer"})
+        for (const char* name : {"scene contents", "build", "ray tracer", "processor"})
             EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what();
     }
     fs::copy_file(of_larger.render("b", settings, 1), renderings.file("b"));
@@ -542,6 +544,30 @@ TEST(Merge, RefusesWhatDoesNotBelongTogether) {
     EXPECT_NE(overlap.find("passes 3:5 of seed 0"), std::string::npos) << overlap;
     EXPECT_NE(merge_refusal(renderings, {"a", "larger"}).find("24 x 24"), std::string::npos);
     EXPECT_NE(merge_refusal(renderings, {"a", "path"}).find("\"path:"), std::string::npos);
+}
+
+/// What changes nothing but last bits may differ.
+TEST(Merge, TakesPartsOfOtherMachines) {
+    const Scene scene = build(mixed_room(lens_camera(16)));
+    const Renderings renderings(scene);
+    RenderSettings settings = settings_of("bdpt");
+    renderings.render("a", settings, 2);
+    settings.seed = 1;
+    Renderer r(scene, settings);
+    PassLog log;
+    renderings.run(r, 2, log);
+    const auto write_with_other = [&](std::string_view condition) {
+        Conditions conditions = renderings.conditions(r, settings);
+        for (auto& [name, value] : conditions)
+            if (name == condition) value = "other";
+        written_checkpoint(renderings.file("b"), r, scene, conditions, settings, log)->commit();
+    };
+    for (const char* condition : {"build", "C library", "ray tracer", "processor"}) {
+        write_with_other(condition);
+        EXPECT_EQ(merge_refusal(renderings, {"a", "b"}), "") << condition;
+    }
+    write_with_other("scene contents");
+    EXPECT_NE(merge_refusal(renderings, {"a", "b"}).find("scene contents"), std::string::npos);
 }
 
 TEST(Merge, WarnsWhereSeedsDoNotReduceABias) {
