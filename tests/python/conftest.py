@@ -26,6 +26,7 @@ class Hits(et.Integrator):
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "long: takes minutes; chosen by -m long")
+    config.addinivalue_line("markers", "clusters: an example for clusters; chosen by -m clusters")
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,7 @@
 
 import functools
 import getpass
+import importlib
 import json
 import os
 import re
@@ -15,21 +16,36 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
 
 import etendue as et
 
+pytestmark = pytest.mark.clusters
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RUNS, SPP, SIZE = 8, 64, (48, 36)
+
+
+def absent(name: str) -> NoReturn:
+    """Skips the test; with ETENDUE_NEEDS_CLUSTERS set, it fails."""
+    if os.environ.get("ETENDUE_NEEDS_CLUSTERS"):
+        pytest.fail(f"no {name} here")
+    pytest.skip(f"no {name} here")
 
 
 def command(name: str) -> str:
     """A program, which may be one for administrators."""
     found = shutil.which(name, path=os.environ["PATH"] + ":/usr/local/sbin:/usr/sbin:/sbin")
-    return found or pytest.skip(f"no {name} here")
+    return found or absent(name)
+
+
+def package(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        absent(name)
 
 
 def merged(file: Path, integrator: str, seeds: int, spp: int, size: tuple[int, int]) -> et.Result:
@@ -101,7 +117,7 @@ def check_that_a_task_ran_again(folder: Path, killer: Killer, total: et.Result, 
 def test_dask_runs_the_task_of_a_killed_worker_again(
     scenes: Path, tmp_path: Path, importable: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    distributed = pytest.importorskip("dask.distributed")
+    distributed = package("dask.distributed")
     import cluster_task
     import dask_cluster
     import recorded_task
@@ -120,7 +136,7 @@ def test_dask_runs_the_task_of_a_killed_worker_again(
 def test_ray_runs_the_task_of_a_killed_worker_again(
     scenes: Path, tmp_path: Path, importable: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ray = pytest.importorskip("ray")
+    ray = package("ray")
     monkeypatch.setenv("RAY_worker_niceness", "0")  # Otherwise workers wait for all other tests.
     import cluster_task
     import ray_cluster
@@ -142,7 +158,7 @@ def test_ray_runs_the_task_of_a_killed_worker_again(
 
 @pytest.mark.parametrize("example", ["dask", "ray"])
 def test_the_examples_run_as_programs(scenes: Path, tmp_path: Path, example: str) -> None:
-    pytest.importorskip(example)
+    package(example)
     scene = scenes / "cornell.xml"
     subprocess.run(
         [sys.executable, EXAMPLES / f"{example}_cluster.py", scene, "path", "3"], cwd=tmp_path, check=True, timeout=300
@@ -155,7 +171,7 @@ def test_the_examples_run_as_programs(scenes: Path, tmp_path: Path, example: str
 
 
 def test_mpi_merges_the_images_of_its_processes(scenes: Path, tmp_path: Path) -> None:
-    pytest.importorskip("mpi4py")
+    package("mpi4py")
     mpirun = command("mpirun")
     scene = tmp_path / "small.xml"
     scene.write_text((scenes / "cornell.xml").read_text().replace('value="400"', 'value="24"'))
@@ -197,7 +213,7 @@ def check_tasks(folder: Path, program: str, tasks: int, spp: int) -> None:
 def test_gnu_parallel_runs_the_array(program: str, scenes: Path, tmp_path: Path) -> None:
     parallel = command("parallel")
     if "GNU" not in subprocess.run([parallel, "--version"], capture_output=True, text=True).stdout:
-        pytest.skip("no GNU parallel here")
+        absent("GNU parallel")
     for spp in (1, 2):  # The second time, the tasks go on.
         subprocess.run(
             [parallel, "-j", "2", f"SLURM_ARRAY_TASK_ID={{}} bash {ARRAY}", ":::", "0", "1", "2"],
