@@ -112,7 +112,9 @@ public:
         const double taken = seconds_since(begin);
         wait_ = std::max(interval_, taken / most_);
         seconds_ += taken;
+        ++calls_;
     }
+    int calls() const { return calls_; }
     /// The seconds that all calls took.
     double seconds() const { return seconds_; }
 
@@ -122,6 +124,7 @@ private:
         return std::chrono::duration<double>(Clock::now() - t).count();
     }
     double interval_, most_, wait_ = interval_, seconds_ = 0;
+    int calls_ = 0;
     Clock::time_point last_ = Clock::now();
 };
 
@@ -526,6 +529,9 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     const ErrorEstimate e = renderer.error();
     nlohmann::json report = to_json(renderer, s, job.settings, stopped_by, log, &e);
     if (!failure.empty()) report["failure"] = failure;
+    // How long the passes have waited.
+    if (images.calls() > 0)
+        report["images"] = {{"written", images.calls()}, {"seconds", images.seconds()}};
     std::vector<std::string> failures;
     if (!saved.empty()) {
         warn_of_failures([&] { last_checkpoint.finish(); });

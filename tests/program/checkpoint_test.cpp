@@ -77,7 +77,8 @@ TEST_P(Killed, ResumesWithTheSameBits) {
     // ETENDUE_KILLS: another number of kills; ETENDUE_SEED: the seed of the moments at which they happen.
     const char *wanted = std::getenv("ETENDUE_KILLS"), *seed_text = std::getenv("ETENDUE_SEED");
     const int kills = wanted ? std::atoi(wanted) : 5;
-    const unsigned seed = seed_text ? unsigned(std::atoi(seed_text)) : std::random_device()();
+    const unsigned seed =
+        seed_text ? unsigned(std::strtoul(seed_text, nullptr, 10)) : std::random_device()();
     SCOPED_TRACE(fmt::format("ETENDUE_SEED={}", seed));
     fmt::print("{}: ETENDUE_SEED={}\n", GetParam(), seed);
     const Arguments how = {
@@ -188,6 +189,21 @@ TEST_F(CheckpointTest, TheThirdSignalEndsTheProgramAtOnce) {
     EXPECT_GT(info("a.etd")["spp"], 0);
     for (const auto& e : fs::directory_iterator(folder.path()))
         EXPECT_FALSE(e.path().filename().string().starts_with(".")) << e.path();
+}
+
+/// The program writes what it has waited for, apart from the last image and checkpoint.
+TEST_F(CheckpointTest, StatisticsSayHowLongPassesHaveWaited) {
+    expect_run(
+        render("a.exr", {"-i", "path", "--spp", "3", "--write-every", "1e-6", "--checkpoint",
+                         path("a.etd"), "--checkpoint-every", "1e-6", "--stats", path("a.json")}));
+    const auto stats = nlohmann::json::parse(read_text(path("a.json")));
+    EXPECT_GE(stats["checkpoints"]["written"], 1);  // Less often if they take longer than passes.
+    EXPECT_GT(stats["checkpoints"]["seconds"], 0);
+    EXPECT_GE(stats["images"]["written"], 1);  // They take a hundredth of the time at most.
+    EXPECT_GT(stats["images"]["seconds"], 0);
+    expect_run(render(
+        "a.exr", {"-i", "path", "--spp", "3", "--write-every", "0", "--stats", path("a.json")}));
+    EXPECT_FALSE(nlohmann::json::parse(read_text(path("a.json"))).contains("images"));
 }
 
 TEST_F(CheckpointTest, TheImageIsWrittenWhileItRenders) {
