@@ -12,19 +12,15 @@
 namespace etendue {
 namespace {
 
-/// Radius of a disc with the area of a pixel, projected to the first surface: the median over the image. Infinite if no
-/// eye ray hits a surface.
+/// The median over the image; infinite if no eye ray meets a surface.
 float pixel_radius(const Scene& scene) {
-    std::vector<float> areas;
-    for_each_seen(scene, [&](const SensorRay& ray, const SurfaceHit& hit) {
-        const float to_area = abs_dot(hit.geometry.ng, ray.d) /
-                              (scene.sensor().is_orthographic() ? 1.0f : sqr(hit.t));
-        if (to_area > 0) areas.push_back(1 / (ray.pdf_dir * to_area));
-    });
-    if (areas.empty()) return kInf;
-    const auto median = areas.begin() + std::ptrdiff_t(areas.size() / 2);
-    std::nth_element(areas.begin(), median, areas.end());
-    return std::sqrt(*median / kPi);
+    std::vector<SeenPoint> points = seen_points(scene);
+    if (points.empty()) return kInf;
+    const auto median = points.begin() + std::ptrdiff_t(points.size() / 2);
+    std::nth_element(
+        points.begin(), median, points.end(),
+        [](const SeenPoint& a, const SeenPoint& b) { return a.pixel_radius < b.pixel_radius; });
+    return median->pixel_radius;
 }
 
 }  // namespace

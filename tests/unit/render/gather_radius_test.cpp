@@ -45,7 +45,7 @@ TEST(GatherRadius, DoesNotDependOnRoulette) {
         ratio.add(sqr(without.radius / with.radius));
         left += double(with.pairs) / double(without.pairs) / kSeeds;
     }
-    EXPECT_LT(left, 0.6) << "roulette hardly plays";
+    EXPECT_LT(left, 0.75) << "roulette hardly plays";
     const double error = std::sqrt(ratio.squared_error());
     EXPECT_LT(error, 0.06) << "too few samples";
     EXPECT_NEAR(ratio.mean(), 1, 4 * error);
@@ -79,7 +79,7 @@ TEST(GatherRadius, IsLargerWherePairsAreWorthMore) {
         return chosen(scene, "upg+bdpt:light_paths=4000", seed, 17).radius /
                chosen(scene, "upg:light_paths=4000", seed, 17).radius;
     };
-    constexpr int kSeeds = 6;
+    constexpr int kSeeds = 10;
     Moments in_the_open, behind_the_shade;
     for (uint64_t seed = 0; seed < kSeeds; ++seed) {
         in_the_open.add(relative_to_eight_pairs(open, seed));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "integrator/radius_params.h"
+#include "integrator/seen_extent.h"
 #include "test_scenes.h"
 
 namespace etendue::test {
@@ -25,6 +26,25 @@ TEST(DefaultMergeRadius, IsAtMostOnePercentOfTheScene) {
     EXPECT_EQ(default_merge_radius(scene), 0.01f * scene.bounds().radius());
     // No eye ray hits a surface.
     EXPECT_NEAR(radius(sensor("0,0,3.4", "0,0,5", 2048)), 0.01f * scene.bounds().radius(), 1e-3);
+}
+
+// A window before the camera is looked through.
+TEST(SeenExtent, IsThatBehindClearGlass) {
+    const std::string
+        window = rectangle("<scale value=\"0.06\"/><translate z=\"3.3\"/>",
+                           "<bsdf type=\"thindielectric\"/>"),
+        // Among them something behind the camera, so that the window does not extend the bounds.
+        everything = room() + area_lamp() + rectangle("<translate z=\"5\"/>", "");
+    for (const int size : {16, 2048}) {
+        const Scene open = build(front_camera(size) + everything),
+                    behind = build(front_camera(size) + everything + window);
+        EXPECT_NEAR(seen_radius(behind) / seen_radius(open), 1, 0.1);
+        EXPECT_NEAR(default_merge_radius(behind) / default_merge_radius(open), 1, 0.1);
+    }
+    // Nothing is behind the window but the sky.
+    const Scene empty = build(front_camera(16) + window + "<emitter type=\"constant\"/>");
+    EXPECT_GT(seen_radius(empty), 0.01f);
+    EXPECT_LE(seen_radius(empty), empty.bounds().radius());
 }
 
 }  // namespace
