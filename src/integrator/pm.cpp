@@ -232,8 +232,8 @@ private:
         for (int ray = 0; ray < gather_rays_; ++ray) {
             // Each ray is a separate sample. The rays of all passes are successive points of one sequence.
             Sampler of_ray = c.sampler;
-            of_ray.start(pass * uint32_t(gather_rays_) + uint32_t(ray),
-                         hash_combine(c.index, uint64_t(t)));
+            const uint64_t place = uint64_t(pass) * uint64_t(gather_rays_) + uint64_t(ray);
+            of_ray.start(uint32_t(place), hash_combine(c.index, uint64_t(t) + (place >> 32 << 8)));
             const SampleContext gather = c.with(of_ray, c.sink);
             if (extend<TransportMode::Radiance>(walk, of_ray, z) && !z[t - 1].is_delta)
                 end_gather_ray(gather, t + 1, work,

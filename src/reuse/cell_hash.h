@@ -50,8 +50,11 @@ public:
     }
 
 private:
+    /// Beyond 2^30 the distance between numbers is that of many cells, and the outermost one takes what lies there.
     static Cell cell_of_scaled(Vec3 s) {
-        return {int(std::floor(s.x)), int(std::floor(s.y)), int(std::floor(s.z))};
+        constexpr float kMost = 0x1p30f;
+        const auto cell = [](float x) { return int(clamp(std::floor(x), -kMost, kMost)); };
+        return {cell(s.x), cell(s.y), cell(s.z)};
     }
 
     float inv_width_;

@@ -81,5 +81,21 @@ TEST(PointGrid, TestsFewDistantPoints) {
     EXPECT_LT(candidates, 25 * found);
 }
 
+// Points whose cells have no numbers share the outermost ones.
+TEST(PointGrid, FindsPointsFarAway) {
+    PointGrid grid;
+    const float far = 1e12f;
+    const std::vector<PointGrid::Entry> entries = {
+        {{far, -far, far}, 0}, {{0, 0, 0}, 1}, {{-1e18f, 0, 1e18f}, 2}};
+    grid.build(entries, kRadius);
+    for (const auto& [p, index] :
+         {std::pair(Vec3{far, -far, far}, 0u), {Vec3{0, 0, 0}, 1u}, {Vec3{-1e18f, 0, 1e18f}, 2u}}) {
+        std::vector<uint32_t> found;
+        grid.for_each_near(p, kRadius,
+                           [&](const PointGrid::Entry& e) { found.push_back(e.index); });
+        EXPECT_EQ(found, std::vector{index});
+    }
+}
+
 }  // namespace
 }  // namespace etendue
