@@ -6,31 +6,20 @@
 #include <type_traits>
 #include <utility>
 
+#include "math/triangle.h"
+
 namespace etendue {
 namespace {
 
-/// Cross product of two edges of a triangle. Products of floats are exact in double, so exactly parallel edges give
-/// exactly zero, with or without fused multiply-add.
-struct EdgeProduct {
-    double x, y, z, length2;
-
-    EdgeProduct(const MeshData& mesh, const MeshData::Triangle& t) {
-        const Vec3 a = mesh.positions[t[1]] - mesh.positions[t[0]];
-        const Vec3 b = mesh.positions[t[2]] - mesh.positions[t[0]];
-        const double ax = a.x, ay = a.y, az = a.z, bx = b.x, by = b.y, bz = b.z;
-        x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx;
-        length2 = x * x + y * y + z * z;
-    }
-    /// Whether the triangle has an area in single precision.
-    bool is_valid() const { return float(length2) > 0 && std::isfinite(float(length2)); }
-};
+EdgeProduct edge_product(const MeshData& mesh, const MeshData::Triangle& t) {
+    return {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
+}
 
 /// Unit normal of a triangle, or empty where its area is zero.
 std::optional<Vec3> face_normal(const MeshData& mesh, const MeshData::Triangle& t) {
-    const EdgeProduct p(mesh, t);
-    if (!p.is_valid()) return {};
-    const double scale = 1 / std::sqrt(p.length2);
-    return Vec3{float(p.x * scale), float(p.y * scale), float(p.z * scale)};
+    const EdgeProduct p = edge_product(mesh, t);
+    if (!p.has_area()) return {};
+    return p.normal();
 }
 
 /// Unit vector from a to b.
@@ -77,7 +66,7 @@ void check_indices(const MeshData& mesh, const SourceLocation& where) {
 
 void drop_degenerate(MeshData& mesh) {
     mesh.dropped_degenerate += uint32_t(std::erase_if(
-        mesh.triangles, [&](const auto& t) { return !EdgeProduct(mesh, t).is_valid(); }));
+        mesh.triangles, [&](const auto& t) { return !edge_product(mesh, t).has_area(); }));
 }
 
 /// Removes the vertices of no triangle; the others keep their order.

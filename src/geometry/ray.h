@@ -21,16 +21,13 @@ struct RayEnd {
 };
 
 /// Moves a ray's origin off its surface, along the geometric normal to the side of `d`, by a distance that exceeds the
-/// rounding error of hit points [after Wächter & Binder 2019]. The error of points near 0 is that of points with a
-/// coordinate `least`, since it depends on where the ray came from. Scenes of the given size far from the origin need
-/// smaller offsets, just beyond the rounding of the coordinates. Where surfaces are larger than their distance from the
-/// origin, the error is that of their intersection, the slack.
-inline Vec3 offset_origin(const RayEnd& from, Vec3 d, float least, float size) {
-    constexpr float kRelative = 0x1p-16f, kRounding = 0x1p-21f;
+/// rounding of the origin's coordinates and the slack of the surface [after Wächter & Binder 2019]. The distance does not
+/// depend on the size of the scene.
+inline Vec3 offset_origin(const RayEnd& from, Vec3 d) {
+    constexpr float kRounding = 0x1p-21f;
     const Vec3 p = from.p;
-    const float scale = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), least});
-    const float offset =
-        std::max({std::min(scale, size) * kRelative, scale * kRounding, from.slack});
+    const float scale = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
+    const float offset = std::max(scale * kRounding, from.slack);
     return p + from.ng * std::copysign(offset, dot(from.ng, d));
 }
 

@@ -1,8 +1,10 @@
 #include "geometry/shape.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
-#include "math/frame.h"
+#include "math/triangle.h"
 #include "math/warp.h"
 #include "system/huge_pages.h"
 
@@ -18,7 +20,7 @@ Bounds3 TriangleMesh::bounds() const {
 
 double TriangleMesh::primitive_area(uint32_t prim) const {
     const auto [a, b, c] = triangles[prim];
-    return 0.5 * length(cross(positions[b] - positions[a], positions[c] - positions[a]));
+    return 0.5 * EdgeProduct(positions[a], positions[b], positions[c]).length;
 }
 
 double TriangleMesh::area() const {
@@ -27,18 +29,20 @@ double TriangleMesh::area() const {
     return sum;
 }
 
-void TriangleMesh::finish() {
-    face_normals.resize(triangles.size());
-    for (size_t i = 0; i < triangles.size(); ++i) {
-        const auto& [a, b, c] = triangles[i];
-        face_normals[i] =
-            normalize(cross(positions[b] - positions[a], positions[c] - positions[a]));
-    }
+size_t TriangleMesh::finish() {
+    face_normals.clear();
+    face_normals.reserve(triangles.size());
+    const size_t dropped = std::erase_if(triangles, [&](const std::array<uint32_t, 3>& t) {
+        const EdgeProduct p(positions[t[0]], positions[t[1]], positions[t[2]]);
+        if (p.has_area()) face_normals.push_back(p.normal());
+        return !p.has_area();
+    });
     prefer_huge_pages(positions);
     prefer_huge_pages(normals);
     prefer_huge_pages(uvs);
     prefer_huge_pages(triangles);
     prefer_huge_pages(face_normals);
+    return dropped;
 }
 
 namespace {
@@ -148,6 +152,11 @@ float turns(float x, float y) {
 
 }  // namespace
 
+Sphere::Sphere(Vec3 center, float radius, bool flip_normals)
+    : center_(center), radius_(radius), flip_(flip_normals) {
+    choose_axes();
+}
+
 Sphere::Sphere(const Transform& to_world, bool flip_normals) : flip_(flip_normals) {
     center_ = to_world.point({0, 0, 0});
     radius_ = length(to_world.vector({1, 0, 0}));
@@ -158,6 +167,21 @@ Sphere::Sphere(const Transform& to_world, bool flip_normals) : flip_(flip_normal
     }
     orientation_ = Transform(m);
     to_local_ = orientation_.inverse();
+    choose_axes();
+}
+
+void Sphere::choose_axes() {
+    const double cx = center_.x, cy = center_.y, cz = center_.z,
+                 distance = std::sqrt(cx * cx + cy * cy + cz * cz);
+    const Direction z = distance > 0 ? Direction{-cx / distance, -cy / distance, -cz / distance}
+                                     : Direction{0, 0, 1};
+    // [Duff et al. 2017]
+    const double sign = std::copysign(1.0, z.z), a = -1 / (sign + z.z), b = z.x * z.y * a;
+    axes_ = {
+        {{1 + sign * z.x * z.x * a, sign * b, -sign * z.x}, {b, sign + z.y * z.y * a, -z.y}, z}};
+    // The error of intersections in double.
+    constexpr double kErrors = 0x1p-49;
+    slack_ = float(kErrors * (distance + radius_));
 }
 
 Bounds3 Sphere::bounds() const {
@@ -166,37 +190,44 @@ Bounds3 Sphere::bounds() const {
 }
 
 double Sphere::area() const {
-    return 4.0 * kPi * double(radius_) * radius_;
+    return 4 * std::numbers::pi * double(radius_) * radius_;
 }
 
-SurfaceGeometry Sphere::at(Vec3 local) const {
-    const Vec3 n = normalize(orientation_.vector(local));
-    // n is unit only to within float: its error times a large radius would exceed the rounding of p.
-    const double x = n.x, y = n.y, z = n.z, to_surface = radius_ / std::sqrt(x * x + y * y + z * z);
+SurfaceGeometry Sphere::at(const Direction& v) const {
+    const auto& [s, t, w] = axes_;
+    const double x = v.x * s.x + v.y * t.x + v.z * w.x, y = v.x * s.y + v.y * t.y + v.z * w.y,
+                 z = v.x * s.z + v.y * t.z + v.z * w.z,
+                 to_unit = 1 / std::sqrt(x * x + y * y + z * z), to_surface = radius_ * to_unit;
     SurfaceGeometry g;
     g.p = {float(center_.x + to_surface * x), float(center_.y + to_surface * y),
            float(center_.z + to_surface * z)};
+    g.slack = slack_;
+    const Vec3 n{float(x * to_unit), float(y * to_unit), float(z * to_unit)};
     g.ng = g.ns = flip_ ? -n : n;
     return g;
 }
 
 SurfaceGeometry Sphere::surface(uint32_t, float u, float v, bool tangents) const {
-    float sp, cp, st, ct;
-    sincosf(2 * kPi * u, &sp, &cp);
-    sincosf(kPi * v, &st, &ct);
+    double sp, cp, st, ct;
+    sincos(2 * std::numbers::pi * u, &sp, &cp);
+    sincos(std::numbers::pi * v, &st, &ct);
     SurfaceGeometry g = at({st * cp, st * sp, ct});
-    g.uv = {u, v};
+    const Vec3 n = to_local_.vector(flip_ ? -g.ng : g.ng);
+    const float sine = std::hypot(n.x, n.y);
+    g.uv = {turns(n.x, n.y), std::atan2(sine, n.z) / kPi};
     if (tangents) {
-        g.dpdu = orientation_.vector({-st * sp, st * cp, 0}) * (2 * kPi * radius_);
-        g.dpdv = orientation_.vector({ct * cp, ct * sp, -st}) * (kPi * radius_);
+        // At a pole, where every azimuth is as good, that of 0.
+        const Vec2 azimuth = sine > 0 ? Vec2{n.x / sine, n.y / sine} : Vec2{1, 0};
+        g.dpdu = orientation_.vector({-n.y, n.x, 0}) * (2 * kPi * radius_);
+        g.dpdv = orientation_.vector({n.z * azimuth.x, n.z * azimuth.y, -sine}) * (kPi * radius_);
     }
     return g;
 }
 
 ShapeSample Sphere::sample(uint32_t, Vec2 u) const {
     const Vec3 local = sample_uniform_sphere(u);
-    const SurfaceGeometry g = at(local);
-    return {g.p, g.ng, g.ns, {turns(local.x, local.y), std::acos(clamp(local.z, -1, 1)) / kPi}, 0};
+    const SurfaceGeometry g = at({local.x, local.y, local.z});
+    return {g.p, g.ng, g.ns, parameters(local), 0, g.slack};
 }
 
 bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
@@ -215,14 +246,15 @@ bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
     if (t0 > t1) std::swap(t0, t1);
     const double t = t0 > tmin ? t0 : t1;
     if (!(t > tmin && t < tmax)) return false;
-    const Vec3 world{float((ox + t * dx) / radius_), float((oy + t * dy) / radius_),
-                     float((oz + t * dz) / radius_)};
-    hit = {t, world};
+    const double x = ox + t * dx, y = oy + t * dy, z = oz + t * dz;
+    const auto component = [&](const Direction& axis) {
+        return float((x * axis.x + y * axis.y + z * axis.z) / radius_);
+    };
+    hit = {t, {component(axes_[0]), component(axes_[1]), component(axes_[2])}};
     return true;
 }
 
-Vec2 Sphere::parameters(Vec3 local) const {
-    const Vec3 n = to_local_.vector(local);
+Vec2 Sphere::parameters(Vec3 n) const {
     // Near the poles of a large sphere, acos(n.z) would be far from the point.
     return {turns(n.x, n.y), std::atan2(std::hypot(n.x, n.y), n.z) / kPi};
 }
@@ -244,7 +276,8 @@ Bounds3 Disk::bounds() const {
 }
 
 double Disk::area() const {
-    return kPi * length(cross(to_world_.vector({1, 0, 0}), to_world_.vector({0, 1, 0})));
+    return std::numbers::pi *
+           EdgeProduct({}, to_world_.vector({1, 0, 0}), to_world_.vector({0, 1, 0})).length;
 }
 
 SurfaceGeometry Disk::surface(uint32_t, float u, float v, bool tangents) const {

@@ -63,8 +63,9 @@ public:
     std::vector<std::array<uint32_t, 3>> triangles;
     std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see finish().
 
-    /// Computes face_normals; to be called once the other arrays are final.
-    void finish();
+    /// Removes triangles whose area is zero in single precision, and computes face_normals; to be called once the other
+    /// arrays are final. Returns the number of removed triangles.
+    size_t finish();
 
     Bounds3 bounds() const override;
     double area() const override;
@@ -77,7 +78,7 @@ public:
     size_t memory_bytes() const override;
 };
 
-/// A shape that Embree intersects through a callback, in double: its slack is zero.
+/// A shape that Embree intersects through a callback, in double.
 class AnalyticShape : public Shape {
 public:
     /// An intersection at o + t·d; t is double, since `o` may be far away.
@@ -92,27 +93,35 @@ public:
     virtual Vec2 parameters(Vec3 local) const = 0;
 };
 
-/// Sphere with (u, v) = (azimuth about +z over 2π, polar angle over π).
+/// Sphere with (u, v) = (azimuth over 2π, polar angle over π) about the axis from its centre through the origin: so
+/// points near the origin, whose coordinates are finest, are found again from their parameters however large the sphere
+/// is. Its texture coordinates are the same angles about its own +z.
 class Sphere final : public AnalyticShape {
 public:
-    Sphere(Vec3 center, float radius, bool flip_normals)
-        : center_(center), radius_(radius), flip_(flip_normals) {}
+    Sphere(Vec3 center, float radius, bool flip_normals);
     /// The unit sphere under a transform of uniform scale.
     Sphere(const Transform& to_world, bool flip_normals);
 
     Bounds3 bounds() const override;
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    float slack(uint32_t) const override { return slack_; }
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;
 
 private:
-    SurfaceGeometry at(Vec3 local_unit) const;
-    Transform orientation_,
-        to_local_;  ///< Rotation alone; moves the parametrisation, not the surface.
+    struct Direction {
+        double x, y, z;
+    };
+    /// The point and its normals.
+    SurfaceGeometry at(const Direction& in_axes) const;
+    void choose_axes();
+
+    Transform orientation_, to_local_;  ///< Rotation of the texture coordinates.
+    std::array<Direction, 3> axes_;     ///< Those of the parameters; orthonormal.
     Vec3 center_;
-    float radius_;
+    float radius_, slack_;
     bool flip_;
 };
 

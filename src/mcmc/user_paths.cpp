@@ -258,8 +258,7 @@ private:
         const Vec3 d = (b.p - a.p) * (1 / distance);
         SurfaceHit hit;
         const Vec3 o =
-            shapes_[i] ? scene_.offset_origin({a.p, a.ng, scene_.surface(locations_[i]).slack}, d)
-                       : a.p;
+            shapes_[i] ? offset_origin({a.p, a.ng, scene_.surface(locations_[i]).slack}, d) : a.p;
         if (!scene_.intersect({o, d, kInf}, 0.5f, hit) || hit.t > distance - tolerance_) return;
         refuse(i + 1,
                fmt::format("cannot be reached from the point before it: {} at {} is in the way",

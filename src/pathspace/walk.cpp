@@ -232,7 +232,7 @@ Vertex& append_emitter(const WalkContext& walk, const Emitter& emitter, const Em
 void leave_emitter(const WalkContext& walk, const EmissionSample& e, Sampler& sampler, SubPath& y) {
     const Vertex& y0 = y[0];
     if (!(e.pdf_d > 0)) return;
-    const Vec3 origin = y0.has_cosine ? walk.scene.offset_origin(y0.ray_end(), e.d) : e.p;
+    const Vec3 origin = y0.has_cosine ? offset_origin(y0.ray_end(), e.d) : e.p;
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
     Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
     if (append_surface(walk, sampler, y, TransportMode::Importance, {origin, e.d, kInf}, beta,
@@ -313,7 +313,7 @@ bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubP
 
     Rgb beta = v.beta * s.weight * (1 / v.survival.value());
     const MediumId medium = v.medium_toward(s.wi);
-    const Ray ray{walk.scene.offset_origin(v.ray_end(), s.wi), s.wi, kInf};
+    const Ray ray{offset_origin(v.ray_end(), s.wi), s.wi, kInf};
     const Met met = append_surface(walk, sampler, path, mode, ray, beta, s.pdf, medium);
     if (met == Met::Surface) return true;
     if (!eye || met == Met::SurfaceEdgeOn || walk.scene.infinite_emitters().empty()) return false;

@@ -21,8 +21,7 @@ public:
             return;
         }
         // Rays start at a small offset from `from`, so the set of directions is enlarged by it.
-        const float beside =
-            length(scene_.offset_origin(e_.from.ray_end(), e_.from.ng) - e_.from.p);
+        const float beside = length(offset_origin(e_.from.ray_end(), e_.from.ng) - e_.from.p);
         const Vec3 to_center = e_.near.p - e_.from.p;
         choose({to_center, e_.near.radius + beside, double(length2(to_center)),
                 e_.from.is_guided(e_.mode) ? std::nullopt : e_.from.cosine_normal()},
@@ -43,8 +42,8 @@ public:
         } else if (const auto w = std::visit(
                        [&](const auto& p) { return p.propose(density_, sampler, stats); },
                        proposal_)) {
-            ray = Ray{e_.from.has_cosine ? scene_.offset_origin(e_.from.ray_end(), *w) : e_.from.p,
-                      *w, kInf};
+            ray = Ray{e_.from.has_cosine ? offset_origin(e_.from.ray_end(), *w) : e_.from.p, *w,
+                      kInf};
         }
         return ray && e_.near.clip(*ray) ? ray : std::nullopt;
     }

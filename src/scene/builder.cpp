@@ -341,28 +341,43 @@ private:
     void finish_emitters() {
         Bounds3 bounds = scene_.bounds_;
         bounds.extend(scene_.sensor_->lens_bounds());
-        scene_.size_ =
-            4 * bounds.radius();  // Of coordinates, unless the scene is far from the origin.
-        // The errors of points near 0, wherever their rays come from. Large scenes may have small details.
-        scene_.least_offset_ =
-            std::ldexp(1.0f, std::clamp(std::ilogb(bounds.radius()), -120, 0) - 6);
         const float radius = std::max(bounds.radius(), 1e-6f);
-        std::vector<double> powers;
         for (auto& e : scene_.emitters_) {
-            e->index = uint32_t(powers.size());
             // The margin keeps bounding discs outside all objects.
             e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);
-            powers.push_back(e->power());
             if (e->is_infinite() && !e->is_delta()) scene_.infinite_.push_back(e.get());
             scene_.has_delta_emitters_ |= e->is_delta();
         }
         if (scene_.has_media()) find_media();
-        scene_.selection_ = AliasTable(powers);
-        for (size_t i = 0; i < powers.size() && !scene_.selection_.empty(); ++i)
-            scene_.emitters_[i]->selection_pmf = scene_.selection_.pmf(uint32_t(i));
+        scene_.selection_ = AliasTable(selection_weights());
+        for (size_t i = 0; i < scene_.emitters_.size(); ++i) {
+            Emitter& e = *scene_.emitters_[i];
+            e.index = uint32_t(i);
+            if (!scene_.selection_.empty()) e.selection_pmf = scene_.selection_.pmf(e.index);
+        }
         if (scene_.selection_.empty())
             scene_.warnings_.push_back(
                 "no emitter of the scene has any power: the image will be black");
+    }
+
+    /// Weights of the choice of emitters, see Scene::sample_emitter().
+    std::vector<double> selection_weights() const {
+        std::vector<double> weights;
+        double finite = 0, infinite = 0;
+        for (const auto& e : scene_.emitters_) {
+            weights.push_back(e->power());
+            (e->is_infinite() ? infinite : finite) += weights.back();
+        }
+        if (!(finite > 0 && infinite > 0)) return weights;
+        // The power from infinity is that through the disc of the whole scene. A distant object makes it as large as
+        // one likes, a large lamp far off the power of finite emitters.
+        constexpr double kLeastShare = 0.25;
+        const double share =
+            std::clamp(infinite / (finite + infinite), kLeastShare, 1 - kLeastShare);
+        for (size_t i = 0; i < weights.size(); ++i)
+            weights[i] *=
+                scene_.emitters_[i]->is_infinite() ? share / infinite : (1 - share) / finite;
+        return weights;
     }
 
     /// The media in which emitters and the sensor lie.

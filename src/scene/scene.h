@@ -86,10 +86,6 @@ public:
     float opacity(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
     const Accelerator& accelerator() const { return accelerator_; }
-    /// The origin of a ray of direction `d` from a surface point, see etendue::offset_origin().
-    Vec3 offset_origin(const RayEnd& from, Vec3 d) const {
-        return etendue::offset_origin(from, d, least_offset_, size_);
-    }
     /// Transmittance of masks along the open segment from `a` to `b`; 0 where an opaque surface is in between.
     float transmittance(const RayEnd& a, const RayEnd& b) const;
     float transmittance_to_infinity(const RayEnd& a, Vec3 d) const;
@@ -115,7 +111,8 @@ public:
     /// Whether rays can pass from one medium into another without a vertex, through masked surfaces.
     bool has_open_boundaries() const { return has_open_boundaries_; }
 
-    /// An emitter chosen with probability proportional to its power. `u` is not used where there is only one.
+    /// An emitter chosen with probability proportional to its power, but finite emitters together and infinite emitters
+    /// together at least one time in four. `u` is not used where there is only one.
     const Emitter& sample_emitter(double u) const {
         return *emitters_[emitters_.size() == 1 ? 0u : selection_.sample(u).index];
     }
@@ -179,7 +176,6 @@ private:
     Bounds3 bounds_;
     std::vector<std::string> sensor_names_;
     size_t sensor_index_ = 0;
-    float least_offset_ = 0, size_ = kInf;  ///< Of offset_origin().
     bool has_masks_ = false;
     bool has_open_boundaries_ = false;
     bool has_delta_emitters_ = false;

@@ -53,12 +53,8 @@ std::vector<ParamInfo> mesh_params(const char* flip) {
 
 /// Converts the data of a mesh file to a mesh in world space.
 std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& warn) {
-    if (data.dropped_degenerate > 0)
-        warn(fmt::format("{}: {} triangle{} of zero area left out",
-                         params.text("filename", data.name), data.dropped_degenerate,
-                         data.dropped_degenerate == 1 ? "" : "s"));
-    for (const std::string& note : data.notes)
-        warn(fmt::format("{}: {}", params.text("filename", data.name), note));
+    const std::string name = params.text("filename", data.name);
+    for (const std::string& note : data.notes) warn(fmt::format("{}: {}", name, note));
     const Transform t = params.transform("to_world");
     const bool compute_normals = params.flag("compute_normals", true);
     bool flat = params.flag("face_normals", false) || data.face_normals;
@@ -90,7 +86,12 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
             params.fail(
                 "to_world",
                 "\"to_world\" moves a vertex of the mesh out of the range of single precision");
-    mesh->finish();
+    const size_t dropped = data.dropped_degenerate + mesh->finish();
+    if (mesh->triangles.empty())
+        params.fail("to_world", "\"to_world\" gives all triangles of the mesh zero area");
+    if (dropped > 0)
+        warn(fmt::format("{}: {} triangle{} of zero area left out", name, dropped,
+                         dropped == 1 ? "" : "s"));
     return mesh;
 }
 
@@ -144,8 +145,8 @@ std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quad
             mesh->triangles.push_back({base + tri[0], base + tri[1], base + tri[2]});
         }
     }
-    if (!(mesh->area() > 0)) params.fail("to_world", "\"to_world\" gives the shape zero area");
     mesh->finish();
+    if (mesh->triangles.empty()) params.fail("to_world", "\"to_world\" gives the shape zero area");
     return mesh;
 }
 

@@ -59,7 +59,7 @@ std::vector<RayPoint> trace(const Scene& scene, Vec3 o, Vec3 d, int most, Transp
         d = std::max_element(at.events.begin(), at.events.end(), [](const auto& a, const auto& b) {
                 return a.weight < b.weight;
             })->direction;
-        o = scene.offset_origin({at.p, at.ng, at.slack}, d);
+        o = offset_origin({at.p, at.ng, at.slack}, d);
     }
     return points;
 }
@@ -161,7 +161,7 @@ private:
             events_.push_back(event->number);
             // The next surface is found where it is expected.
             d = i == last_ ? event->direction : wanted;
-            o = scene_.offset_origin({point->p, point->ng, point->slack}, d);
+            o = offset_origin({point->p, point->ng, point->slack}, d);
         }
         const Vec3 last = normalize(given_[last_ + 1] - given_[last_]);
         plane_ = Frame::from_normal(last);
@@ -180,7 +180,7 @@ private:
             arrival.points.push_back(point->p);
             p = point->p;
             d = event->direction;
-            o = scene_.offset_origin({p, point->ng, point->slack}, d);
+            o = offset_origin({p, point->ng, point->slack}, d);
         }
         const Vec3 end = given_[last_ + 1];
         const float along = dot(d, plane_.n);

@@ -77,6 +77,15 @@ TEST(FinishMesh, DropsAndCountsTrianglesWithoutArea) {
     EXPECT_TRUE(m.normals.empty());
 }
 
+TEST(FinishMesh, KeepsTrianglesOfAnySizeWhoseAreaIsANumber) {
+    for (const float size : {1e-16f, 1e-12f, 1e10f, 1e17f}) {
+        MeshData m = bent_quad();
+        for (Vec3& p : m.positions) p *= size;
+        finish_mesh(m, {}, {});
+        EXPECT_EQ(m.triangles.size(), 2u) << size;
+    }
+}
+
 TEST(FinishMesh, DropsVerticesOfNoTriangle) {
     MeshData m = bent_quad();
     const MeshData all = m;

@@ -123,25 +123,61 @@ TEST(AnalyticShapes, ParametersOfHits) {
         }
 }
 
-// Points near the poles and the equator of large spheres are those that the ray met.
+// Near the origin of the world, points of large spheres are those that the ray met, whatever side faces the origin.
 TEST(Sphere, HitsOfLargeSpheresStayInPlace) {
     testing::Random random(5);
-    constexpr float kRadius = 1e5f;
-    const Vec3 sides[] = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
-    for (const Vec3 side : sides) {
-        const Sphere sphere(side * kRadius * -1.0f, kRadius, false);  // through the origin
-        Accelerator accelerator;
-        accelerator.add_shape(sphere);
-        accelerator.commit();
-        for (int i = 0; i < 1000; ++i) {
-            const Vec3 o = side * 50.0f + random.in_cube() * 30;
-            const Ray ray{o, normalize(random.in_cube() * 40 - o), kInf};
-            RayHit hit;
-            if (!accelerator.intersect(ray, hit)) continue;
-            const Vec3 p = sphere.surface(0, hit.u, hit.v, false).p;
-            // As exact as (u, v) in single precision allow.
-            EXPECT_LT(length(p - (ray.o + ray.d * hit.t)), 6e-7f * kRadius);
+    const Vec3 sides[] = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0},           {-1, 0, 0},
+                          {0, 1, 0}, {0, -1, 0}, {0.48f, 0.6f, 0.64f}};
+    for (const float radius : {1e5f, 6.4e6f})
+        for (const Vec3 side : sides) {
+            const Sphere sphere(side * radius * -1.0f, radius, false);  // through the origin
+            Accelerator accelerator;
+            accelerator.add_shape(sphere);
+            accelerator.commit();
+            int hits = 0;
+            for (int i = 0; i < 1000; ++i) {
+                const Vec3 o = side * 50.0f + random.in_cube() * 30;
+                const Ray ray{o, normalize(random.in_cube() * 40 - o), kInf};
+                RayHit hit;
+                if (!accelerator.intersect(ray, hit)) continue;
+                ++hits;
+                const Vec3 p = sphere.surface(0, hit.u, hit.v, false).p;
+                // Of the parameters, which are angles about the origin, and of the ray's own distance.
+                EXPECT_LT(length(p - (ray.o + ray.d * hit.t)), 2e-6f * (length(p) + hit.t));
+            }
+            EXPECT_GT(hits, 300);
         }
+}
+
+TEST(Sphere, TextureCoordinatesAreAnglesAboutItsAxis) {
+    testing::Random random(6);
+    const Sphere sphere({30, -40, 5}, 50, false);
+    for (int i = 0; i < 200; ++i) {
+        const Vec2 u = random.next_2d();
+        const SurfaceGeometry g = sphere.surface(0, u.x, u.y, true);
+        const Vec3 n = (g.p - Vec3{30, -40, 5}) / 50.0f;
+        const float phi = std::atan2(n.y, n.x) / (2 * kPi);
+        EXPECT_NEAR(g.uv.x, phi < 0 ? phi + 1 : phi, 1e-4f);
+        EXPECT_NEAR(g.uv.y, std::acos(clamp(n.z, -1, 1)) / kPi, 1e-4f);
+        const float sine = std::hypot(n.x, n.y);
+        EXPECT_LT(length(g.dpdu - Vec3{-n.y, n.x, 0} * (2 * kPi * 50)), 0.01f);
+        EXPECT_LT(length(g.dpdv - Vec3{n.z * n.x / sine, n.z * n.y / sine, -sine} * (kPi * 50)),
+                  0.02f);
+        const ShapeSample s = sphere.sample(0, u);
+        EXPECT_LT(length(sphere.surface(0, s.uv.x, s.uv.y, false).p - s.p), 1e-4f);
+    }
+}
+
+// Edges whose products are beyond single precision, and whose areas are not.
+TEST(TriangleMesh, HasNormalsInAnyUnits) {
+    for (const float size : {1e-16f, 1e-12f, 1.0f, 1e10f, 1e17f}) {
+        TriangleMesh mesh;
+        mesh.positions = {{0, 0, 0}, {size, 0, 0}, {0, 2 * size, 0}};
+        mesh.triangles = {{0, 1, 2}, {0, 1, 1}};
+        EXPECT_EQ(mesh.finish(), 1u);
+        ASSERT_EQ(mesh.triangles.size(), 1u);
+        EXPECT_EQ(mesh.face_normals[0].z, 1) << size;
+        EXPECT_NEAR(mesh.area() / (double(size) * double(size)), 1, 1e-6);
     }
 }
 

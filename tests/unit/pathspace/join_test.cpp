@@ -296,7 +296,7 @@ protected:
             const Vertex &a = *x[i], &b = *x[i + 1];
             if (a.is_infinite || b.is_infinite) continue;
             const Vec3 w = direction(a, b);
-            const float offset = length(scene.offset_origin(a.ray_end(), w) - a.p);
+            const float offset = length(offset_origin(a.ray_end(), w) - a.p);
             for (const Vertex* v : {&a, &b})
                 if (v->kind == Vertex::Kind::Surface)
                     sum += double(offset / (length(b.p - a.p) * abs_dot(v->ng, w)));

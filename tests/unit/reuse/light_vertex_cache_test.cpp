@@ -38,10 +38,8 @@ protected:
     /// itself.
     static float direction_error(const SubPath& path, int i) {
         if (path[i - 1].is_infinite) return 1e-6f;
-        const Vec3 p = path[i - 1].p;
-        const float offset =
-            0x1p-16f * std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z), 0x1p-6f});
-        return 1e-6f + offset / length(path[i].p - p);
+        const RayEnd from = path[i - 1].ray_end();
+        return 1e-6f + length(offset_origin(from, from.ng) - from.p) / length(path[i].p - from.p);
     }
 
     /// Compares the data of vertex i and of earlier vertices that joins with vertex i read.

@@ -115,7 +115,7 @@ protected:
         }
         const auto s = y0.sample(0, u, u_guide(y0), TransportMode::Importance);
         if (!s) return {};
-        return Ray{y0.has_cosine ? scene.offset_origin(y0.ray_end(), s->wi) : y0.p, s->wi, kInf};
+        return Ray{y0.has_cosine ? offset_origin(y0.ray_end(), s->wi) : y0.p, s->wi, kInf};
     }
 
     /// Whether one walk from `e.from` finds a partner.
@@ -131,7 +131,7 @@ protected:
             const Vec2 u_direction = sampler.next_2d();
             const auto s = e.from.sample(u, u_direction, u_guide(e.from), e.mode);
             if (!s || s->is_delta) return false;
-            ray = {scene.offset_origin(e.from.ray_end(), s->wi), s->wi, kInf};
+            ray = {offset_origin(e.from.ray_end(), s->wi), s->wi, kInf};
         }
         SurfaceHit hit;
         if (!scene.intersect(ray, 0, hit)) return false;

@@ -1,5 +1,6 @@
 // Limits and defaults of the scene builder.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "error_of.h"
@@ -134,6 +135,39 @@ TEST(SceneBuilder, RefusesWhatSinglePrecisionCannotHold) {
             [&, &xml = body] { build((has_camera ? "" : front_camera(4)) + room() + xml); });
         EXPECT_NE(error.find(message), std::string::npos) << error << "\nexpected: " << message;
     }
+}
+
+// However large the scene is, and with it the power of light from infinity, and however bright a lamp.
+TEST(SceneBuilder, FiniteAndInfiniteEmittersAreBothChosen) {
+    struct Share {
+        double chosen = 0, of_power = 0;
+    };
+    const auto share_of_infinity = [](const std::string& objects, float intensity) {
+        const Scene scene = build(
+            front_camera(4) + "<emitter type=\"constant\"/><emitter type=\"directional\"/>" +
+            fmt::format("<emitter type=\"point\"><rgb name=\"intensity\" value=\"{0},{0},{0}\"/>"
+                        "</emitter>",
+                        intensity) +
+            objects);
+        Share infinite;
+        double pmf = 0, power = 0;
+        for (const auto& e : scene.emitters()) {
+            pmf += double(e->selection_pmf);
+            power += e->power();
+            if (!e->is_infinite()) continue;
+            infinite.chosen += double(e->selection_pmf);
+            infinite.of_power += e->power();
+        }
+        EXPECT_NEAR(pmf, 1, 1e-6);
+        infinite.of_power /= power;
+        return infinite;
+    };
+    const std::string room = sphere("0,0,0", "1", ""), distant = sphere("1e6,0,0", "1", "");
+    EXPECT_NEAR(share_of_infinity(room + distant, 1).chosen, 0.75, 1e-6);
+    EXPECT_NEAR(share_of_infinity(room, 1e6f).chosen, 0.25, 1e-6);
+    const Share between = share_of_infinity(room, 20);
+    EXPECT_NEAR(between.chosen, between.of_power, 1e-6);
+    EXPECT_NEAR(between.of_power, 0.5, 0.2);
 }
 
 }  // namespace

@@ -133,8 +133,7 @@ TEST(Transmittance, LargeSurfacesDoNotHideThemselves) {
                            {sine * std::cos(phi), sine * std::sin(phi), cosine});
             const RayEnd end{g.p, g.ng, g.slack};
             SurfaceHit next;
-            if (scene.intersect({scene.offset_origin(end, w), w, kInf}, 0.5f, next) &&
-                next.t < 0.5f) {
+            if (scene.intersect({offset_origin(end, w), w, kInf}, 0.5f, next) && next.t < 0.5f) {
                 ++met_again;
                 reach = std::max(reach, next.t * cosine);
             }
@@ -185,6 +184,31 @@ TEST(Transmittance, LargeThinWallsBlock) {
             }
         }
         EXPECT_EQ(leaks, 0) << wall.thickness;
+    }
+}
+
+// Offsets of rays do not grow with the scene: where a small object lies far from the origin and another one at it, walls of a
+// thousandth of the small object's size still block.
+TEST(Transmittance, OffsetsDoNotDependOnOtherObjects) {
+    etendue::testing::Random random(10);
+    constexpr float kThickness = 0.01f;
+    const auto wall = [](float at) {
+        return shape("rectangle", fmt::format("<scale value=\"3\"/><translate z=\"{}\"/>"
+                                              "<translate x=\"8000\" y=\"-8000\" z=\"8000\"/>",
+                                              at));
+    };
+    const Scene scene =
+        build(front_camera(1) + kSky + wall(0) + wall(-kThickness) + sphere("0,0,0", "1", ""));
+    for (int i = 0; i < 1000; ++i) {
+        SurfaceHit hit;
+        const Vec3 o = Vec3{8000, -8000, 8004} + Vec3{2, 2, 0} * (2 * random.next_1d() - 1);
+        ASSERT_TRUE(scene.intersect({o, {0, 0, -1}, kInf}, 0.5f, hit));
+        const SurfaceGeometry& g = hit.geometry;
+        EXPECT_EQ(scene.transmittance_to_infinity({g.p, g.ng, g.slack}, {0, 0, -1}), 0);
+        SurfaceHit next;
+        ASSERT_TRUE(scene.intersect(
+            {offset_origin({g.p, g.ng, g.slack}, {0, 0, -1}), {0, 0, -1}, kInf}, 0.5f, next));
+        EXPECT_LT(next.t, 1.1f * kThickness);
     }
 }
 
