@@ -97,10 +97,18 @@ std::optional<uint64_t> memory_for_data(const std::string& proc) {
     return entry(proc + "/self/status", "VmData:");
 }
 
+std::optional<uint64_t> address_space(const std::string& proc) {
+    return entry(proc + "/self/status", "VmSize:");
+}
+
+std::optional<uint64_t> running_threads(const std::string& proc) {
+    return entry(proc + "/self/status", "Threads:");
+}
+
 std::optional<uint64_t> available_memory(const std::string& proc, const std::string& cgroup) {
     std::optional<uint64_t> least = entry(proc + "/meminfo", "MemAvailable:");
     lower_by_groups(least, proc, cgroup);
-    lower_by_limit(least, RLIMIT_AS, entry(proc + "/self/status", "VmSize:"));
+    lower_by_limit(least, RLIMIT_AS, address_space(proc));
     lower_by_limit(least, RLIMIT_DATA, memory_for_data(proc));
     return least;
 }

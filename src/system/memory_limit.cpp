@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -35,13 +36,15 @@ struct Limit {
     std::mutex mutex;
     Kind kind = Kind::None;
     rlim_t of_system = RLIM_INFINITY;  ///< Before there was another.
-    uint64_t without_stacks = 0;
+    uint64_t bytes = 0;                ///< Includes the stacks of the `begun` threads.
+    int begun = 0;
     int threads = 0;  ///< Most for which there is room.
 
-    void set(Kind new_kind, uint64_t bytes) {
+    void set(Kind new_kind, uint64_t new_bytes) {
         if (kind == Kind::None) of_system = data_limit().rlim_cur;
         kind = new_kind;
-        without_stacks = bytes;
+        bytes = new_bytes;
+        begun = threads_begun();
         apply();
     }
     void set_to_available() {
@@ -51,8 +54,33 @@ struct Limit {
         if (used && free && *used < kMostForItself) set(Kind::Available, *used + *free);
     }
     void apply() const {
-        const uint64_t stacks = kind == Kind::Available ? uint64_t(threads) * kStack : 0;
-        set_limit(std::min(rlim_t(without_stacks + stacks), of_system));
+        if (kind == Kind::None) return;
+        const uint64_t stacks = kind == Kind::Available ? uint64_t(threads - begun) * kStack : 0;
+        set_limit(std::min(rlim_t(bytes + stacks), of_system));
+    }
+    /// How many of the threads for which there is room run. Other threads are few.
+    int threads_begun() const {
+        const uint64_t others = running_threads("/proc").value_or(1) - 1;  // Than the first one.
+        return int(std::min(others, uint64_t(threads)));
+    }
+    /// Throws std::runtime_error where the limits have no room for those of so many threads that have not begun.
+    void check_stacks(int wanted) const {
+        const int further = std::max(0, wanted - threads_begun());
+        const uint64_t stacks = uint64_t(further) * kStack;
+        const auto check = [&](const char* what, decltype(RLIMIT_AS) kind_of_limit,
+                               std::optional<uint64_t> used) {
+            rlimit limit{};
+            if (!used || getrlimit(kind_of_limit, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY ||
+                *used + stacks <= limit.rlim_cur)
+                return;
+            throw std::runtime_error(fmt::format(
+                "{} {}threads need {} for their stacks, but the {} is limited to {}, of which {} "
+                "are used",
+                further, further < wanted ? "further " : "", format_bytes(stacks), what,
+                format_bytes(limit.rlim_cur), format_bytes(*used)));
+        };
+        check("memory", RLIMIT_DATA, memory_for_data("/proc"));
+        check("address space", RLIMIT_AS, address_space("/proc"));
     }
 };
 
@@ -76,7 +104,7 @@ void limit_memory(uint64_t bytes) {
 void limit_memory_to_available() {
     Limit& limit = current_limit();
     const std::scoped_lock lock(limit.mutex);
-    limit.set_to_available();
+    if (limit.kind != Limit::Kind::Given) limit.set_to_available();
 }
 
 void renew_memory_limit() {
@@ -90,19 +118,16 @@ void renew_memory_limit() {
 void make_room_for_threads(int threads) {
     Limit& limit = current_limit();
     const std::scoped_lock lock(limit.mutex);
-    if (limit.kind == Limit::Kind::None || threads <= limit.threads) return;
-    if (limit.kind == Limit::Kind::Given) {
-        const uint64_t stacks = uint64_t(threads - limit.threads) * kStack;
-        if (const auto used = memory_for_data("/proc");
-            used && *used + stacks > limit.without_stacks)
-            throw std::runtime_error(fmt::format(
-                "{} threads need {} for their stacks, but the memory is limited to {}, of which {} "
-                "are used",
-                threads, format_bytes(stacks), format_bytes(limit.without_stacks),
-                format_bytes(*used)));
-    }
-    limit.threads = threads;
+    const int before = limit.threads;
+    limit.threads = std::max(before, threads);
     limit.apply();
+    try {
+        limit.check_stacks(threads);
+    } catch (const std::runtime_error&) {
+        limit.threads = before;
+        limit.apply();
+        throw;
+    }
 }
 
 UnlimitedMemory::UnlimitedMemory() : limit_(data_limit().rlim_cur) {

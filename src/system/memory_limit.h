@@ -11,14 +11,15 @@ namespace etendue {
 void limit_memory(uint64_t bytes);
 
 /// The same with what the system and its control groups have now, so that what does not fit fails here, instead of the
-/// process being ended. No limit where that is unknown, or where address space says nothing about memory (sanitizers).
+/// process being ended. No limit where that is unknown, or where address space says nothing about memory (sanitizers). A
+/// limit of limit_memory() stays.
 void limit_memory_to_available();
 /// Sets that limit anew, where there is one, since other programs may have ended or begun.
 void renew_memory_limit();
 
 /// To be called before `threads` threads begin, which end the process where there is no memory for their stacks. The limit
-/// of limit_memory_to_available() grows by these, since it is not memory until it is used. Throws std::runtime_error where
-/// that of limit_memory() has no room for them.
+/// of limit_memory_to_available() grows by these, since a stack is not memory until it is used. Throws std::runtime_error
+/// where that of limit_memory() or one of the system has no room for those that have not begun yet.
 void make_room_for_threads(int threads);
 
 /// Lifts it for a while, such as for writing what there is after an allocation has failed.

@@ -2,9 +2,15 @@
 
 #include "system/memory_limit.h"
 
+#include <atomic>
+#include <functional>
 #include <new>
+#include <stdexcept>
+#include <string>
+#include <thread>
 #include <vector>
 
+#include <sys/mman.h>
 #include <sys/resource.h>
 
 #include <gtest/gtest.h>
@@ -95,24 +101,84 @@ TEST_F(MemoryLimit, OfTheMachineGrowsByTheStacksOfThreads) {
               "");
 }
 
-TEST_F(MemoryLimit, OfTheMachineIsRenewedWhereItIsNotGiven) {
+/// Address space that is not memory for data.
+class Reserved {
+public:
+    explicit Reserved(uint64_t bytes)
+        : bytes_(bytes), at_(mmap(nullptr, bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)) {
+        expect(at_ != MAP_FAILED, "no address space");
+    }
+    ~Reserved() { munmap(at_, bytes_); }
+    Reserved(const Reserved&) = delete;
+    Reserved& operator=(const Reserved&) = delete;
+
+private:
+    uint64_t bytes_;
+    void* at_;
+};
+
+TEST_F(MemoryLimit, OfTheMachineIsRenewed) {
     EXPECT_EQ(in_limited_memory(1024 * kMebibyte,
                                 [] {
                                     renew_memory_limit();
                                     expect(data_limit() == RLIM_INFINITY, "there was none");
+                                    uint64_t before = 0;
                                     {
-                                        std::vector<char> taken(300 * kMebibyte);
+                                        const Reserved reserved(300 * kMebibyte);
                                         limit_memory_to_available();
-                                        expect(taken.back() == 0, "");
+                                        before = data_limit();
                                     }
-                                    const uint64_t before = data_limit();
                                     renew_memory_limit();
-                                    expect(data_limit() >= before - 10 * kMebibyte, "it is lower");
-                                    limit_memory(used() + 100 * kMebibyte);
-                                    const uint64_t given = data_limit();
-                                    renew_memory_limit();
+                                    expect(data_limit() >= before + 290 * kMebibyte, "it is old");
+                                }),
+              "");
+}
+
+TEST_F(MemoryLimit, ThatIsGivenStays) {
+    const std::string error = in_limited_memory(1024 * kMebibyte, [] {
+        limit_memory(used() + 100 * kMebibyte);
+        const uint64_t given = data_limit();
+        renew_memory_limit();
+        expect(data_limit() == given, "it was renewed");
+        limit_memory_to_available();
+        expect(data_limit() == given, "it was replaced");
+        make_room_for_threads(64);  // Does not raise it.
+    });
+    EXPECT_TRUE(error.starts_with("64 threads need 512 MiB")) << error;
+}
+
+/// Threads that wait until they are destroyed.
+class Waiting {
+public:
+    explicit Waiting(int count) {
+        for (int i = 0; i < count; ++i) threads_.emplace_back([this] { ends_.wait(false); });
+    }
+    ~Waiting() {
+        ends_ = true;
+        ends_.notify_all();
+    }
+
+private:
+    std::atomic<bool> ends_{false};
+    std::vector<std::jthread> threads_;
+};
+
+TEST_F(MemoryLimit, CountsTheStacksOfRunningThreadsOnce) {
+    EXPECT_EQ(in_limited_memory(1024 * kMebibyte,
+                                [] {
                                     limit_memory_to_available();
-                                    expect(data_limit() == given, "the given one was replaced");
+                                    make_room_for_threads(64);
+                                    const Waiting threads(64);
+                                    rlimit space{};
+                                    getrlimit(RLIMIT_AS, &space);
+                                    const uint64_t left =
+                                        space.rlim_cur - address_space("/proc").value();
+                                    renew_memory_limit();
+                                    expect(data_limit() <= used() + left + 10 * kMebibyte,
+                                           "room for stacks that there are");
+                                    make_room_for_threads(64);
+                                    expect(data_limit() <= used() + left + 10 * kMebibyte,
+                                           "more room for them");
                                 }),
               "");
 }
@@ -121,10 +187,44 @@ TEST_F(MemoryLimit, HasRoomForThreadsOrSaysSo) {
     const std::string error = in_limited_memory(1024 * kMebibyte, [] {
         limit_memory(used() + 100 * kMebibyte);
         make_room_for_threads(4);
+        const Waiting threads(4);
         make_room_for_threads(64);
     });
-    EXPECT_TRUE(error.starts_with("64 threads need 480 MiB for their stacks, but the memory is "
-                                  "limited to "))
+    EXPECT_TRUE(error.starts_with(
+        "60 further threads need 480 MiB for their stacks, but the memory is limited to "))
+        << error;
+}
+
+TEST_F(MemoryLimit, OfTheSystemHasRoomForThreadsToo) {
+    const auto lower_system_limit = [] {
+        const rlimit limit{used() + 100 * kMebibyte, used() + 100 * kMebibyte};
+        setrlimit(RLIMIT_DATA, &limit);
+    };
+    const std::vector<std::function<void()>> limits = {[] {}, limit_memory_to_available,
+                                                       [] { limit_memory(4096 * kMebibyte); }};
+    for (size_t i = 0; i < limits.size(); ++i) {
+        SCOPED_TRACE(i);
+        const std::string error = in_limited_memory(1024 * kMebibyte, [&] {
+            lower_system_limit();
+            limits[i]();
+            const uint64_t before = data_limit();
+            std::string refused;
+            try {
+                make_room_for_threads(64);
+            } catch (const std::runtime_error& e) {
+                refused = e.what();
+            }
+            expect(data_limit() == before, "it changes where threads are refused");
+            make_room_for_threads(4);
+            throw std::runtime_error(refused);
+        });
+        EXPECT_TRUE(error.starts_with(
+            "64 threads need 512 MiB for their stacks, but the memory is limited to "))
+            << error;
+    }
+    const std::string error = in_limited_memory(300 * kMebibyte, [] { make_room_for_threads(64); });
+    EXPECT_TRUE(error.starts_with(
+        "64 threads need 512 MiB for their stacks, but the address space is limited to "))
         << error;
 }
 
