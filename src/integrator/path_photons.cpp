@@ -15,7 +15,6 @@
 #include "integrator/path_photons.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "math/hash.h"
@@ -177,10 +176,9 @@ private:
     double reciprocal(const PathState& x, const Deposit& d, const MapPhoton& photon, uint64_t key) {
         // Through a pinhole there is only one remainder.
         if (d.is_caustic && !has_finite_lens_) return 1 / rule_.clamped(d);
-        uint64_t place = hash_combine(place_key(photon), d.is_caustic);
         // P depends on the colour of the flux.
-        for (const PathDensity f : d.flux)
-            place = hash_combine(place, std::bit_cast<uint64_t>(double(f)));
+        const uint64_t place =
+            hash_combine(hash_combine(place_key(photon), d.is_caustic), hash_of(d.flux));
         const auto [at, is_new] = reciprocals_.try_emplace(place, 0.0);
         if (is_new) at->second = count_trials(x, d, key);
         return at->second;

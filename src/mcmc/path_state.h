@@ -11,6 +11,7 @@
 #include <functional>
 #include <optional>
 
+#include "mcmc/path_density.h"
 #include "mcmc/state.h"
 #include "mcmc/target_map.h"
 #include "mcmc/technique_choice.h"
@@ -61,13 +62,6 @@ struct PathTarget {
     /// Whether photons are stored at a vertex, for photon map proposals; by default wherever it can be connected.
     std::function<bool(const Vertex&)> stores = [](const Vertex& v) { return v.is_connectible; };
 };
-
-/// A product over the vertices of a path. Where a scene is much larger than what its paths see, each vertex has a factor
-/// of 10⁸, and fifty of them exceed the range of double.
-using PathDensity = long double;
-/// The same by colour.
-using PathProduct = std::array<PathDensity, 3>;
-PathDensity luminance(const PathProduct& f);
 
 /// A vertex of a full path.
 class PathVertex {
