@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -15,12 +16,32 @@
 
 namespace etendue {
 
-float size_around(const Scene& scene, std::span<const Vec3> points) {
-    constexpr float kMost = 3;
-    const float radius = scene.bounds().is_empty() ? 1 : scene.bounds().radius();
+namespace {
+
+/// Infinite where all points are one.
+float extent_of(std::span<const Vec3> points) {
     float extent = 0;
     for (const Vec3& p : points) extent = std::max(extent, length(p - points[0]));
-    return extent > 0 ? std::min(radius, kMost * extent) : radius;
+    return extent > 0 ? extent : kInf;
+}
+
+float radius_of(const Scene& scene) {
+    return scene.bounds().is_empty() ? 1 : scene.bounds().radius();
+}
+
+}  // namespace
+
+float size_around(const Scene& scene, std::span<const Vec3> points) {
+    constexpr float kMost = 3;
+    return std::min(radius_of(scene), kMost * extent_of(points));
+}
+
+float rounding_of(std::span<const Vec3> points) {
+    constexpr float kUlps = 8 * std::numeric_limits<float>::epsilon();
+    float most = 0;
+    for (const Vec3& p : points)
+        most = std::max({most, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+    return kUlps * most;
 }
 
 namespace {
@@ -140,9 +161,11 @@ std::string to_json(std::span<const GivenPath> paths) {
 
 namespace {
 
-/// Largest distance of a point from its surface, and default radius of the disc on an emitter, relative to the radius of the
-/// scene's bounds.
-constexpr float kTolerance = 1e-3f, kDisc = 1e-2f;
+/// Largest distance of a point from its surface, relative to the radius of the scene's bounds, and to the path's extent: a
+/// point that is moved so far stays within the default cone about a segment as long as the path.
+constexpr float kTolerance = 1e-3f, kToleranceOfExtent = 1e-2f;
+/// Default radius of the disc on an emitter, relative to size_around().
+constexpr float kDisc = 1e-2f;
 /// Largest deviation from the reflected or refracted direction, in degrees.
 constexpr double kLawTolerance = 2;
 
@@ -190,9 +213,11 @@ Nearest nearest_surface(const Scene& scene, Vec3 p, float tolerance) {
 class PathChecker {
 public:
     PathChecker(const Scene& scene, const GivenPath& given) : scene_(scene), given_(given) {
-        const float radius = size_around(scene, given.points);
-        tolerance_ = kTolerance * radius;
-        path_.radius = given.radius.value_or(kDisc * radius);
+        const float rounding = rounding_of(given.points);
+        tolerance_ = std::max(rounding, std::min(kTolerance * radius_of(scene),
+                                                 kToleranceOfExtent * extent_of(given.points)));
+        path_.radius =
+            given.radius.value_or(std::max(rounding, kDisc * size_around(scene, given.points)));
     }
 
     CheckedPath check() {
@@ -356,14 +381,8 @@ UserPaths UserPaths::load(const Scene& scene, const std::string& file) {
 
 namespace {
 
-/// Uniform in solid angle within the cone about `axis`.
 Vec3 sample_cone(Vec3 axis, float versine, Vec2 u) {
-    const float v = versine * u.x, s = safe_sqrt(v * (2 - v)), azimuth = 2 * kPi * u.y;
-    return normalize(
-        Frame::from_normal(axis).to_world({s * std::cos(azimuth), s * std::sin(azimuth), 1 - v}));
-}
-double pdf_cone(float versine) {
-    return 1 / (2 * std::numbers::pi * double(versine));
+    return normalize(Frame::from_normal(axis).to_world(sample_uniform_cone(u, versine)));
 }
 
 }  // namespace
@@ -452,13 +471,15 @@ bool UserPaths::sample(const WalkContext& walk, Sampler& sampler, SubPath& y) co
 }
 
 double UserPaths::start_density(const UserPath& path, const Vertex& y0) const {
+    constexpr float kSame = 1e-3f;  // Of the disc's radius.
     if (y0.emitter != path.emitter) return 0;
     if (!path.emitter->is_area()) return 1;
     const Vec3 n = path.points[0].ng, to = y0.p - path.points[0].p;
     const Vec3 q = y0.p - n * dot(to, n);
     SurfaceHit hit;
     if (length2(q - path.points[0].p) > sqr(path.radius) || !find_on_emitter(path, q, hit) ||
-        length2(hit.geometry.p - y0.p) > sqr(1e-3f * path.radius))
+        length2(hit.geometry.p - y0.p) >
+            sqr(std::max(kSame * path.radius, rounding_of({&y0.p, 1}))))
         return 0;
     return double(abs_dot(n, y0.ng) / (kPi * sqr(path.radius)));
 }
@@ -471,19 +492,19 @@ double UserPaths::step_density(const UserPath& path, int j, const Vertex& from, 
     if (is_delta) return p;
     const Vec3 axis = normalize(path.points[size_t(j) + 1].p - from.p);
     if (length2(direction(from, to) - axis) > 2 * point.versine) return 0;
-    return p * pdf_cone(point.versine);
+    return p * double(pdf_uniform_cone(point.versine));
 }
 
-double UserPaths::density(std::span<const Vertex* const> y) const {
-    double sum = 0;
+PathDensity UserPaths::density(std::span<const Vertex* const> y) const {
+    PathDensity sum = 0;
     for (const UserPath& path : paths_) {
         if (y.size() != path.points.size()) continue;
-        double p = start_density(path, *y[0]);
+        PathDensity p = start_density(path, *y[0]);
         for (size_t j = 0; j + 1 < y.size() && p > 0; ++j)
             p *= step_density(path, int(j), *y[j], *y[j + 1]);
         sum += p;
     }
-    return sum / double(paths_.size());
+    return sum / PathDensity(paths_.size());
 }
 
 void UserPaths::density_ratios(const SubPath& y, std::vector<double>& ratios) const {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "mcmc/path_density.h"
 #include "pathspace/walk.h"
 
 namespace etendue {
@@ -25,7 +26,7 @@ struct GivenPath {
     std::vector<Vec3> points;  ///< World space, from the emitter on.
     std::vector<float> cones;  ///< Half-angles in degrees: one for all segments, or one for each.
     std::optional<float>
-        radius;  ///< Of the disc about the first point, in scene units; empty: 1 % of the scene's.
+        radius;  ///< Of the disc about the first point, in scene units; empty: 1 % of size_around().
 };
 
 /// Reads the JSON text of `file`. Throws std::runtime_error with the file and the path or line.
@@ -74,7 +75,7 @@ public:
     bool sample(const WalkContext& walk, Sampler& sampler, SubPath& y) const;
     /// Area density with which sample() makes exactly y_0 … y_m, with the delta events at their vertices, without the
     /// effect of masks.
-    double density(std::span<const Vertex* const> y) const;
+    PathDensity density(std::span<const Vertex* const> y) const;
     /// For each i, the density with which y_0 … y_i begin a path that starts by sample() and continues as a traced one,
     /// divided by that of a traced path. The walks use no Russian roulette before vertex longest() - 1, and no guide.
     void density_ratios(const SubPath& y, std::vector<double>& ratios) const;
@@ -94,5 +95,8 @@ private:
 /// The scale of distances about a path through `points`: the radius of the scene's bounds, but at most three times the
 /// largest distance of a point from the first one, since the scene may have distant objects, too.
 float size_around(const Scene& scene, std::span<const Vec3> points);
+/// Several times the rounding of coordinates as large as the largest one of `points`: smaller distances between points and
+/// surfaces say nothing.
+float rounding_of(std::span<const Vec3> points);
 
 }  // namespace etendue

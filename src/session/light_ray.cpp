@@ -13,9 +13,6 @@
 namespace etendue {
 namespace {
 
-/// Of the scene's radius: how far from a given point its surface may be met.
-constexpr float kNear = 2e-2f;
-
 RayPoint describe(const Scene& scene, const SurfaceHit& hit, Vec3 toward_origin,
                   TransportMode mode) {
     const SceneShape& shape = *hit.shape;
@@ -68,14 +65,18 @@ std::vector<RayPoint> trace(const Scene& scene, Vec3 o, Vec3 d, int most, Transp
 class SpecularChain {
 public:
     SpecularChain(const Scene& scene, std::span<const Vec3> given) : scene_(scene), given_(given) {
-        near_ = kNear * size_around(scene, given);
+        const float size = size_around(scene, given), rounding = rounding_of(given);
+        near_ = std::max(kNear * size, rounding);
+        start_ = std::max(kStart * size, rounding);
+        close_ = kClose * size;
+        tolerance_ = std::max(kTolerance * size, rounding);
     }
 
     /// The surface met between two given points near the second one.
     std::optional<RayPoint> point_near(size_t i) const {
         const Vec3 d = normalize(given_[i] - given_[i - 1]);
-        std::optional<RayPoint> point = next_point(
-            scene_, given_[i - 1] + d * (1e-4f * near_ / kNear), d, TransportMode::Importance);
+        std::optional<RayPoint> point =
+            next_point(scene_, given_[i - 1] + d * start_, d, TransportMode::Importance);
         if (point && length(point->p - given_[i]) > near_) point.reset();
         return point;
     }
@@ -111,7 +112,7 @@ public:
                             -(du.x * best->miss.y - best->miss.x * du.y) / det};
             if (!advance(shoot, move, at, best)) break;
         }
-        if (!best || !(best->distance() <= kTolerance * near_ / kNear)) {
+        if (!best || !(best->distance() <= tolerance_)) {
             result.problem = "no points of these surfaces join the two ends";
             return result;
         }
@@ -120,8 +121,8 @@ public:
     }
 
 private:
-    /// Of the scene's radius.
-    static constexpr float kTolerance = 2e-5f;
+    /// Distances, relative to size_around().
+    static constexpr float kNear = 2e-2f, kStart = 1e-4f, kClose = 1e-7f, kTolerance = 2e-5f;
 
     struct Arrival {
         std::vector<Vec3> points;
@@ -130,7 +131,7 @@ private:
         float distance() const { return std::hypot(miss.x, miss.y); }
     };
 
-    bool is_close(const Arrival& a) const { return a.distance() <= 1e-7f * near_ / kNear; }
+    bool is_close(const Arrival& a) const { return a.distance() <= close_; }
 
     template <class Shoot>
     static bool advance(const Shoot& shoot, Vec2 move, Vec2& at, std::optional<Arrival>& best) {
@@ -149,7 +150,7 @@ private:
 
     /// Chooses at every surface the event that leads nearest to the next given point.
     bool choose_events(Vec3 d) {
-        Vec3 o = given_[first_ - 1] + d * (1e-4f * near_ / kNear);
+        Vec3 o = given_[first_ - 1] + d * start_;
         for (size_t i = first_; i <= last_; ++i) {
             const auto point = next_point(scene_, o, d, TransportMode::Importance);
             if (!point || !point->is_specular) return false;
@@ -170,7 +171,7 @@ private:
 
     std::optional<Arrival> trace(Vec3 d) const {
         Arrival arrival;
-        Vec3 o = given_[first_ - 1] + d * (1e-4f * near_ / kNear), p;
+        Vec3 o = given_[first_ - 1] + d * start_, p;
         for (const uint8_t number : events_) {
             const auto point = next_point(scene_, o, d, TransportMode::Importance);
             if (!point) return {};
@@ -192,7 +193,10 @@ private:
 
     const Scene& scene_;
     std::span<const Vec3> given_;
-    float near_;
+    float near_;       ///< How far from a given point its surface may be met.
+    float start_;      ///< Between a given point and the ray that starts there.
+    float close_;      ///< A miss that needs no further step.
+    float tolerance_;  ///< The largest miss.
     size_t first_ = 0, last_ = 0;
     std::vector<uint8_t> events_;
     Frame plane_;

@@ -39,6 +39,14 @@ inline std::string rectangle(const std::string& transform, const std::string& in
            inside + "</shape>";
 }
 
+/// Shapes and sensors, each transformed further.
+inline std::string transformed(std::string body, const std::string& transform) {
+    const std::string end = "</transform>";
+    for (size_t at = 0; (at = body.find(end, at)) != body.npos; at += transform.size() + end.size())
+        body.insert(at, transform);
+    return body;
+}
+
 inline Scene build(const std::string& body) {
     return build_scene(
         parse_mitsuba_xml("<scene version=\"3.0.0\">" + body + "</scene>", "test.xml"));

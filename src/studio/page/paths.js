@@ -410,7 +410,7 @@ export class PathEditor {
                     const given = e.target.value.split(',').map(Number);
                     path.cone = given.length === 1 ? given[0] : given;
                 })})]), ' ',
-            element('label', {}, ['disc ', element('input', {type: 'text', size: 5, value: path.radius ?? '', title: 'Radius of the disc about the first point, in scene units; empty: 1 % of the radius of the scene',
+            element('label', {}, ['disc ', element('input', {type: 'text', size: 5, value: path.radius ?? '', title: 'Radius of the disc about the first point, in scene units; empty: 1 % of the radius of the scene, but at most 3 % of the extent of the path',
                 'data-key': `radius${i}`, 'aria-label': `Radius of the disc of ${name}`, onchange: (/** @type {any} */ e) => edit(() => {
                     if (e.target.value.trim() === '') delete path.radius;
                     else path.radius = Number(e.target.value);

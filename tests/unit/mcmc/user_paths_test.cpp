@@ -6,6 +6,7 @@
 
 #include "math/statistics.h"
 #include "mcmc/numbers.h"
+#include "mcmc/path_density.h"
 #include "mcmc/pick_paths.h"
 #include "test_scenes.h"
 
@@ -49,11 +50,74 @@ TEST(UserPaths, DoNotDependOnDistantObjects) {
     const Scene scene = build(front_camera(16) + room() + area_lamp() +
                               rectangle("<translate x=\"100000\"/>", kMirror));
     EXPECT_EQ(problem(scene, {{0, 0.98f, 0}, {0.3f, -1, 0.2f}}), "");
+    EXPECT_EQ(problem(scene, {{0, 0.98f, 0}, {0.3f, -0.985f, 0.2f}}), "");
+    EXPECT_NE(problem(scene, {{0, 0.98f, 0}, {0.3f, -0.97f, 0.2f}}), "");
     const CheckedPath checked = check_user_path(
         scene,
         {.name = {}, .points = {{0, 0.98f, 0}, {0.3f, -1, 0.2f}}, .cones = {1}, .radius = {}});
     ASSERT_TRUE(checked.path);
     EXPECT_LT(checked.path->radius, 0.1f);
+}
+
+/// Where coordinates are rounded to 5e-4, for a path of 0.1.
+TEST(UserPaths, MayBeFarFromTheOrigin) {
+    const Vec3 far{5000, 4000, -3000};
+    const Scene scene = build(transformed(
+        front_camera(16) + room() + area_lamp() +
+            rectangle("<scale value=\"0.2\"/><rotate x=\"1\" angle=\"-90\"/><translate y=\"0.9\"/>",
+                      diffuse("0.7,0.7,0.7")),
+        "<rotate z=\"1\" angle=\"30\"/><translate x=\"5000\" y=\"4000\" z=\"-3000\"/>"));
+    const auto place = [&](double x, double y, double z) {
+        const double cosine = std::sqrt(0.75), sine = 0.5;
+        return Vec3{float(double(far.x) + x * cosine - y * sine),
+                    float(double(far.y) + x * sine + y * cosine), float(double(far.z) + z)};
+    };
+    const TechniqueCounts none{};
+    RenderStats stats;
+    const WalkContext walk{scene, none, stats, {}};
+    constexpr int kPaths = 40, kSamples = 50;
+    int sampled = 0;
+    for (int i = 0; i < kPaths; ++i) {
+        const double s = 0.1 * i / kPaths;
+        const CheckedPath checked = check_user_path(
+            scene, {.name = {},
+                    .points = {place(s, 0.98, 0.7 * s), place(0.06 - s / 2, 0.9, s - 0.05)},
+                    .cones = {1},
+                    .radius = {}});
+        ASSERT_TRUE(checked.path) << i << ": " << checked.problem;
+        const UserPaths paths(scene, {*checked.path});
+        SubPath y;
+        for (int k = 0; k < kSamples; ++k) {
+            Sampler sampler(SamplerKind::Independent, uint64_t(i));
+            sampler.start(0, uint64_t(k));
+            sampled += paths.sample(walk, sampler, y);
+        }
+    }
+    // Others leave the disc or the cone by rounding.
+    EXPECT_GT(sampled, 0.3 * kPaths * kSamples);
+}
+
+/// Beyond the range of double.
+TEST(UserPaths, LongOnesInLargeScenesHaveADensity) {
+    const Scene scene =
+        build(transformed(front_camera(16) + room() + area_lamp(), "<scale value=\"1000000\"/>"));
+    std::vector<Vec3> points{{0, 0.98f, 0}};
+    for (int i = 0; i < 60; ++i)
+        points.push_back({0.6f, i % 2 == 0 ? -1.0f : 1.0f, 0.1f * float(i % 3)});
+    for (Vec3& p : points) p *= 1e6f;
+    const CheckedPath checked =
+        check_user_path(scene, {.name = {}, .points = points, .cones = {1}, .radius = {}});
+    ASSERT_TRUE(checked.path) << checked.problem;
+    const UserPaths paths(scene, {*checked.path});
+    const TechniqueCounts none{};
+    RenderStats stats;
+    SubPath y;
+    Sampler sampler(SamplerKind::Independent, 0);
+    sampler.start(0, 1);
+    ASSERT_TRUE(paths.sample({scene, none, stats, {}}, sampler, y));
+    std::vector<const Vertex*> vertices;
+    for (int k = 0; k < y.size(); ++k) vertices.push_back(&y[k]);
+    EXPECT_GT(paths.density(vertices), 0);
 }
 
 TEST(UserPaths, FilesAreReadAndWritten) {
@@ -141,10 +205,13 @@ TEST(UserPaths, DensityIsThatOfTheProposals) {
                 std::vector<const Vertex*> vertices;
                 for (int k = 0; k < y.size(); ++k) vertices.push_back(&y[k]);
                 at = cell(y);
-                const double density = (is_wide ? wide : narrow).density(vertices);
+                const PathDensity density = (is_wide ? wide : narrow).density(vertices);
                 // Rounding must not put a proposal beyond the edge of its cone.
                 edges += !(density > 0);
-                value = !is_wide ? 1.0 : density > 0 ? narrow.density(vertices) / density : 0.0;
+                if (!is_wide)
+                    value = 1;
+                else if (density > 0)
+                    value = double(narrow.density(vertices) / density);
             }
             for (int k = 0; k < kCells; ++k)
                 (is_wide ? integrated : sampled)[size_t(k)].add(k == at ? value : 0.0);

@@ -18,16 +18,19 @@ namespace etendue::test {
 namespace {
 
 /// A lamp above a floor, and a mirror on the left.
+std::string mirror_room_shapes() {
+    return sensor("0,0,3", "0,-0.3,0", 16, "60") +
+           rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>",
+                     diffuse("0.5,0.5,0.5")) +
+           rectangle("<rotate x=\"1\" angle=\"90\"/><scale value=\"0.3\"/>"
+                     "<translate y=\"1\"/>",
+                     "<emitter type=\"area\"/>") +
+           rectangle("<scale value=\"2\"/><rotate y=\"1\" angle=\"90\"/><translate "
+                     "x=\"-1\"/>",
+                     "<bsdf type=\"conductor\"/>");
+}
 Scene mirror_room() {
-    return build(
-        sensor("0,0,3", "0,-0.3,0", 16, "60") +
-        rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>", diffuse("0.5,0.5,0.5")) +
-        rectangle("<rotate x=\"1\" angle=\"90\"/><scale value=\"0.3\"/>"
-                  "<translate y=\"1\"/>",
-                  "<emitter type=\"area\"/>") +
-        rectangle("<scale value=\"2\"/><rotate y=\"1\" angle=\"90\"/><translate "
-                  "x=\"-1\"/>",
-                  "<bsdf type=\"conductor\"/>"));
+    return build(mirror_room_shapes());
 }
 
 /// A slab of glass between y = 0 and y = 0.5, below a lamp and above a floor.
@@ -63,6 +66,27 @@ TEST(Snap, MirrorIsThatOfTheMirroredPoint) {
     EXPECT_EQ(check_user_path(scene, path).problem, "");
     path.points = given;
     EXPECT_NE(check_user_path(scene, path).problem, "");
+}
+
+/// Where coordinates are rounded to 5e-4, for a path of 0.1.
+TEST(Snap, MirrorMayBeFarFromTheOrigin) {
+    const Vec3 far{5000, 4000, -3000};
+    const Scene scene =
+        build(transformed(mirror_room_shapes(),
+                          "<scale value=\"0.1\"/><translate x=\"5000\" y=\"4000\" z=\"-3000\"/>"));
+    constexpr int kPaths = 40;
+    for (int i = 0; i < kPaths; ++i) {
+        const float s = 0.02f * float(i) / kPaths;
+        const Vec3 lamp{s, 0.1f, 0}, floor{0.03f - s, -0.1f, 0.04f - s};
+        const Vec3 mirrored{-0.2f - floor.x, floor.y, floor.z};
+        const float t = (-0.1f - lamp.x) / (mirrored.x - lamp.x);
+        const Vec3 expected = far + lamp + (mirrored - lamp) * t;
+        const Snapped snapped =
+            snap(scene,
+                 std::vector<Vec3>{far + lamp, expected + Vec3{0, 0.01f, -0.008f}, far + floor}, 1);
+        ASSERT_EQ(snapped.problem, "") << i;
+        EXPECT_LT(length(snapped.points[1] - expected), 4e-3f) << i;
+    }
 }
 
 TEST(Snap, SlabIsThatOfSnellsLaw) {
