@@ -9,7 +9,7 @@ struct GatherConstants {
     /// propose then lie in a thin band, and the neighbourhood still includes nearly all of a smooth surface.
     float flatness = 0.02f;
     /// Default radius of the first passes: the number of pairs that an eye path should find, and the upper limit relative
-    /// to the radius of the scene's bounds.
+    /// to the radius of what the camera sees.
     double pairs = 8;
     /// Number of pairs that an eye path should find at vertices not fixed by the film point (Vertex). Of 4 and 16,
     /// 4 has the smaller error on yard-ring, two-rooms and staircase2, and 16 on veach-ajar.

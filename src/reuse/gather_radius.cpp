@@ -29,14 +29,14 @@ double relative_variance(const Film& film) {
 
 }  // namespace
 
-void GatherRadius::start(float given, bool has_inner, float scene_radius,
+void GatherRadius::start(float given, bool has_inner, float seen_radius,
                          const std::array<double, 2>& pairs_per_radius2) {
     const GatherConstants& k = kGatherConstants;
     is_given_ = given > 0;
     has_inner_ = has_inner;
-    scene_radius_ = scene_radius;
+    seen_radius_ = seen_radius;
     const auto radius_of = [&](double wanted, double per_radius2) {
-        const float largest = k.largest_first_radius * scene_radius;
+        const float largest = k.largest_first_radius * seen_radius;
         return per_radius2 > 0 ? std::min(largest, float(std::sqrt(wanted / per_radius2)))
                                : largest;
     };
@@ -51,7 +51,7 @@ void GatherRadius::start(float given, bool has_inner, float scene_radius,
 
 void GatherRadius::grow(float& radius, double pairs, double wanted, float largest) const {
     const double factor = std::clamp(std::sqrt(wanted / pairs), 0.25, 4.0);
-    radius = std::min(largest * scene_radius_, radius * float(factor));
+    radius = std::min(largest * seen_radius_, radius * float(factor));
 }
 
 double best_factor_of_pairs(double variance, double time,

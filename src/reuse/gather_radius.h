@@ -40,10 +40,10 @@ struct VarianceAndTime {
 class GatherRadius {
 public:
     /// `given`: both radii, or 0 if they are to be chosen. `has_inner`: whether there are two; otherwise the one radius is
-    /// that of GatherConstants::pairs pairs for an eye path. `scene_radius`: that of the scene's bounds.
+    /// that of GatherConstants::pairs pairs for an eye path. `seen_radius`: that of what the camera sees, in scene units.
     /// `pairs_per_radius2`: numbers of pairs that an eye path finds, by Vertex::is_fixed_by_film, divided by the square
     /// of the radius.
-    void start(float given, bool has_inner, float scene_radius,
+    void start(float given, bool has_inner, float seen_radius,
                const std::array<double, 2>& pairs_per_radius2);
     /// Chooses the radii of the next passes, unless one was given.
     void learn(const Film& film, const RenderStats& so_far, const GatherTotals& totals);
@@ -82,7 +82,7 @@ private:
     /// Changes a radius, so that an eye path finds `wanted` pairs, not `pairs`.
     void grow(float& radius, double pairs, double wanted, float largest) const;
 
-    float scene_radius_ = 0;
+    float seen_radius_ = 0;
     std::array<float, 2> radii_{};
     bool is_given_ = false, has_inner_ = false;
     /// Of all passes, when the radii were chosen.
