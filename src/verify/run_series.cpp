@@ -58,8 +58,8 @@ private:
     std::vector<std::vector<std::pair<float, double>>> lengths_;
 };
 
-/// Calls task(i) for i < count on up to `threads` threads. If a task throws, no further tasks start and the exception
-/// is rethrown.
+/// Calls task(i) for i < count on up to `threads` threads, of which this one is the first; on fewer if there can be no further
+/// one. If a task throws, no further tasks start and the exception is rethrown.
 template <class Task>
 void for_each_in_parallel(size_t count, int threads, const Task& task) {
     std::atomic<size_t> next{0};
@@ -78,7 +78,11 @@ void for_each_in_parallel(size_t count, int threads, const Task& task) {
     };
     {
         std::vector<std::jthread> workers;
-        for (int i = 0; i < std::min(threads, int(count)); ++i) workers.emplace_back(work);
+        try {
+            for (int i = 1; i < std::min(threads, int(count)); ++i) workers.emplace_back(work);
+        } catch (const std::exception&) {  // No memory for it.
+        }
+        work();
     }
     if (error) std::rethrow_exception(error);
 }

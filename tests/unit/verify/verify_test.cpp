@@ -6,7 +6,11 @@
 
 #include <gtest/gtest.h>
 
+#include "limited_memory.h"
+#include "system/available_memory.h"
+#include "system/memory_limit.h"
 #include "test_scenes.h"
+#include "verify/run_series.h"
 
 namespace etendue::test {
 namespace {
@@ -36,6 +40,28 @@ TEST(Verify, ThrowsWhatARenderingThrows) {
     } catch (const std::runtime_error& e) {
         EXPECT_NE(std::string(e.what()).find("more than 1 MiB"), std::string::npos) << e.what();
     }
+}
+
+/// There is no memory for the stacks of 64 threads.
+TEST(Verify, RunsOnAsManyThreadsAsThereCanBe) {
+    if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers reserve memory";
+    EXPECT_EQ(
+        in_limited_memory(uint64_t(1) << 30,
+                          [] {
+                              const Scene scene = build(lit_room(8));
+                              VerifyOptions options = quick_options();
+                              options.runs = options.threads = 64;
+                              options.spp = 1;
+                              const SeriesRenderer::Report silent;
+                              SeriesRenderer series(scene, options, silent);
+                              RunSeries runs = series.begin(IntegratorSpec::parse("path"), 1, 1, 0);
+                              limit_memory(memory_for_data("/proc").value() + (uint64_t(60) << 20));
+                              series.extend(runs, 1);
+                              for (const IndependentRun& run : runs.runs)
+                                  if (run.pixels.size() != 64)
+                                      throw std::runtime_error("a run is missing");
+                          }),
+        "");
 }
 
 /// Whenever it ends, what it reports is what it would have reported of these methods anyway.
