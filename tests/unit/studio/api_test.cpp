@@ -377,6 +377,18 @@ TEST_F(ApiTest, OnlyFilesOfTheFolderAreOpened) {
     EXPECT_EQ(status("test-path-1.etd"), 422);
 }
 
+/// Also where they are empty again: the page keeps what it was told before.
+TEST_F(ApiTest, EventsSayWhatIsNoLongerSo) {
+    open();
+    finished_run();
+    const auto run = [&] { return json::parse(api->event())["runs"][0]; };
+    EXPECT_EQ(run()["message"], "");
+    EXPECT_EQ(run()["old_scene"], false);
+    EXPECT_EQ(run()["file_problem"], "");
+    reload(16);
+    EXPECT_EQ(run()["old_scene"], true);
+}
+
 /// Names of files that were edited are not kept for ever.
 TEST_F(ApiTest, EventsDoNotGrowWithTheFilesThatAreSaved) {
     open();
