@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -310,7 +311,10 @@ std::shared_ptr<Merged> merge(const nb::list& parts) {
             files.emplace_back(SectionReader(std::string(bytes.c_str(), bytes.size()),
                                              fmt::format("part {}", files.size() + 1)));
         } else {
-            files.emplace_back(names.emplace_back(nb::cast<std::string>(part)));
+            const auto name = nb::cast<std::string>(part);
+            files.emplace_back(name);
+            // The working folder may be another one when the sum is saved.
+            names.push_back(std::filesystem::absolute(name).string());
         }
     }
     if (files.empty()) throw nb::value_error("there are no parts to merge");

@@ -60,6 +60,19 @@ def test_a_sum_does_not_replace_its_parts(cornell: et.Scene, tmp_path: Path) -> 
     et.merge(parts).save(tmp_path / "sum.etd")
 
 
+def test_nor_from_another_working_folder(cornell: et.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    part = tmp_path / "a.etd"
+    et.render(cornell, "path", spp=2, progress=False).save(part)
+    monkeypatch.chdir(tmp_path)
+    merged = et.merge(["a.etd"])
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    with pytest.raises(RuntimeError, match="one of the parts"):
+        merged.save(part)
+    assert et.resume(part, cornell, spp=3, progress=False).passes == 3
+    merged.save("a.etd")
+
+
 def test_files_that_change_after_a_scene_was_built_do_not_count(tmp_path: Path) -> None:
     mesh = tmp_path / "mesh.obj"
     mesh.write_text("v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n")
