@@ -143,7 +143,6 @@ TEST_F(RenderTest, KeepsTheImageWhereALaterPassFails) {
     FAIL() << "no pass failed with light_paths=" << fits;
 }
 
-/// Passes of seconds, on one thread.
 TEST_F(RenderTest, MemoryIsLimited) {
     for (const char* size : {"-1", "0", "4X", "much", "16E", "1.5GG"}) {
         const ProgramResult r = run({"--memory", size, "--spp", "1"});
@@ -163,6 +162,23 @@ TEST_F(RenderTest, MemoryIsLimited) {
     EXPECT_EQ(run({"--memory", "800M", "--spp", "1", "--threads", "64"}).status, 0);
 }
 
+/// Where the passes succeed, so does what follows them: statistics are written even if an image is not.
+TEST_F(RenderTest, WritesBeyondTheLimitOfMemory) {
+    int fits = 400, fails = 100;  // MiB
+    while (fits - fails > 6) {
+        fs::remove(stats);
+        const int limit = (fits + fails) / 2;
+        const ProgramResult r = run({"--memory", fmt::format("{}M", limit), "--spp", "1", "-i",
+                                     "path:max_depth=2", "--resolution", "500x500", "--threads",
+                                     "2", "--aov", "albedo,normal,depth,position,uv,variance"});
+        if (fs::exists(stats)) {
+            EXPECT_EQ(r.status, 0) << limit << ": " << r.errors;
+        }
+        (r.status == 0 ? fits : fails) = limit;
+    }
+}
+
+/// Passes of seconds, on one thread.
 class InterruptTest : public RenderTest {
 protected:
     Program start_long(const std::vector<std::string>& more = {}) const {
