@@ -142,7 +142,7 @@ public:
         result_ = commit->get_future();
         try {
             thread_ = std::jthread([commit] { (*commit)(); });
-        } catch (const std::system_error&) {  // There can be no further thread.
+        } catch (const std::exception&) {  // There can be no further thread.
             (*commit)();
         }
     }
