@@ -1,6 +1,7 @@
 // Several processes render the same bits as one. They make the passes of a generation at the same time, so that these cannot
 // depend on each other.
 
+#include <fstream>
 #include <mutex>
 #include <set>
 
@@ -137,6 +138,61 @@ TEST_P(SharedRendering, HasTheSameBits) {
 
 INSTANTIATE_TEST_SUITE_P(Methods, SharedRendering, ::testing::ValuesIn(resumable_methods()),
                          name_of_method);
+
+/// Counts the bytes of pixels that a process gives to or gets from the others.
+class CountingRanks final : public Ranks {
+public:
+    CountingRanks(const Ranks& ranks, uint64_t pixels) : ranks_(ranks), pixels_(pixels) {}
+    int count() const override { return ranks_.count(); }
+    int index() const override { return ranks_.index(); }
+    void share(void* data, size_t size, std::span<const uint64_t> begins) const override {
+        if (begins.back() == pixels_) gathered += size * pixels_;
+        ranks_.share(data, size, begins);
+    }
+    void distribute(const void* from, int senders, size_t size, std::span<const uint64_t> begins,
+                    void* to) const override {
+        if (begins.back() == pixels_) exchanged += size_t(senders) * size * pixels_;
+        ranks_.distribute(from, senders, size, begins, to);
+    }
+    void broadcast(std::vector<std::byte>& bytes, int from) const override {
+        ranks_.broadcast(bytes, from);
+    }
+    std::vector<std::string> gather(std::string_view said) const override {
+        return ranks_.gather(said);
+    }
+
+    mutable uint64_t exchanged = 0, gathered = 0;
+
+private:
+    const Ranks& ranks_;
+    uint64_t pixels_;
+};
+
+/// A number that bench/ranks_model.py assumes.
+uint64_t assumed(const std::string& name) {
+    std::ifstream file(ETENDUE_SOURCE_DIR "/bench/ranks_model.py");
+    for (std::string line; std::getline(file, line);)
+        if (line.starts_with(name + " = ")) return std::stoull(line.substr(name.size() + 3));
+    return 0;
+}
+
+TEST(Ranks, ExchangeAndGatherWhatTheModelOfTheirTimeAssumes) {
+    const Scene scene = build(mixed_room(lens_camera(24)));
+    const uint64_t pixels = scene.film().pixel_count();
+    RenderSettings settings = settings_of("bdpt");
+    settings.spp = 3;
+    ThreadRanks::run(2, [&](const Ranks& ranks) {
+        const CountingRanks counting(ranks, pixels);
+        RenderSettings own = settings;
+        own.ranks = &counting;
+        Renderer r(scene, own);
+        r.run([](const Progress&) {}, std::atomic<bool>(false));
+        EXPECT_EQ(counting.exchanged, 3 * pixels * assumed("EXCHANGED"));
+        counting.gathered = 0;
+        r.gather();
+        EXPECT_EQ(counting.gathered, pixels * assumed("GATHERED"));
+    });
+}
 
 class SharedRenderings : public ::testing::Test {
 protected:
