@@ -19,4 +19,6 @@ result = et.render(et.load(file).build(), integrator, spp=int(spp), seed=world.r
 if world.rank > 0:
     world.send(result.partial(), dest=0)
 else:
-    et.merge([result.partial(), *(world.recv(source=i) for i in range(1, world.size))]).save(output)
+    total = et.merge([result.partial(), *(world.recv(source=i) for i in range(1, world.size))])
+    print(total)
+    total.save(output)

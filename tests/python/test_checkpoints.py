@@ -1,6 +1,8 @@
 """Renderings that go on from files, and sums of several."""
 
+import json
 import pickle
+import subprocess
 import warnings
 from pathlib import Path
 from typing import Any
@@ -181,6 +183,32 @@ def test_the_sum_of_8_runs_has_the_expectation_of_one_with_8_times_the_passes(
     assert abs(excess.mean()) <= ALARM_OF_1 * standard_error
     assert all(a.error is not None and b.error is not None for a, b in zip(sums, others, strict=True))
     print(f"{method}: error {np.mean([a.error for a in sums]):.4f}, of one run {np.mean([b.error for b in others]):.4f}")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "method, passes",
+    [("path", 1024), ("upg+bdpt", 300), ("pssmlt:groups=4,chains=48", 512), ("mmlt:groups=4,chains=48", 512),
+     ("mlt:groups=4,chains=48", 512)],
+    ids=lambda v: str(v).split(":")[0])
+def test_verify_finds_no_difference_from_the_sum_of_8_runs(
+    program: str, scenes: Path, tmp_path: Path, method: str, passes: int
+) -> None:
+    def run(*words: object) -> None:
+        subprocess.run([program, *map(str, words), "--quiet"], cwd=tmp_path, check=True)
+
+    scene = (scenes / "cornell.xml", "--resolution", "32x24")
+    parts = [tmp_path / f"{seed}.etd" for seed in range(8)]
+    for seed, part in enumerate(parts):
+        run("render", *scene, "-i", method, "--spp", passes, "--seed", seed, "--checkpoint", part, "-o", "part.exr")
+    run("merge", *parts, "--variance", "-o", "sum.exr")
+    run("verify", *scene, "--methods", method, "--reference", "sum.exr", "--runs", 16, "--spp", passes, "--seed", 100,
+        "--json", "verify.json")
+    found, = json.loads((tmp_path / "verify.json").read_text())["methods"]
+    assert found["verdict"] == "agrees", found
+    # An error of the image, in any channel, that would be found with a probability of 90 %.
+    print(f"{method}: an error of {100 * found['detectable']['image']:.2f} % would be found")
+    assert found["detectable"]["image"] < 0.025
 
 
 def test_results_can_be_pickled(cornell: et.Scene) -> None:

@@ -1,20 +1,17 @@
 """The examples for clusters run on this machine: Dask, Ray, MPI, Slurm and GNU parallel."""
 
 import functools
-import getpass
 import importlib
 import json
 import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -22,6 +19,8 @@ import numpy as np
 import pytest
 
 import etendue as et
+import one_machine_slurm
+from one_machine_slurm import output_of, wait_for_jobs, wait_until
 
 pytestmark = pytest.mark.clusters
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -222,96 +221,10 @@ def test_gnu_parallel_runs_the_array(program: str, scenes: Path, tmp_path: Path)
         check_tasks(tmp_path, program, 3, spp)
 
 
-SLURM_CONF = """
-ClusterName=one
-SlurmctldHost={host}(127.0.0.1)
-SlurmctldPort={ports[0]}
-SlurmdPort={ports[1]}
-SlurmUser={user}
-SlurmdUser={user}
-AuthInfo=socket={folder}/munge.socket,cred_expire=5
-StateSaveLocation={folder}/state
-SlurmdSpoolDir={folder}/spool
-SlurmctldPidFile={folder}/slurmctld.pid
-SlurmdPidFile={folder}/slurmd.pid
-ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
-SelectType=select/cons_tres
-SelectTypeParameters=CR_CPU
-MpiDefault=none
-KillWait=5
-ReturnToService=2
-SlurmdParameters=config_overrides
-NodeName={host} NodeAddr=127.0.0.1 CPUs=2
-PartitionName=all Nodes=ALL Default=YES State=UP
-"""
-
-
-def free_ports(count: int) -> list[int]:
-    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
-    ports = [s.getsockname()[1] for s in sockets]
-    for s in sockets:
-        s.close()
-    return ports
-
-
-def wait_until(done: Callable[[], object], seconds: float, what: str) -> None:
-    until = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < until, what
-        time.sleep(0.1)
-
-
 @pytest.fixture
-def slurm(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A cluster of this machine alone, whose daemons belong to the test; its folder."""
-    munged, slurmctld, slurmd = map(command, ("munged", "slurmctld", "slurmd"))
-    for name in ("sbatch", "scontrol", "sinfo", "squeue"):
-        command(name)
-    host = socket.gethostname().split(".")[0]
-    daemons: list[subprocess.Popen[bytes]] = []
-    # Names of sockets are short.
-    with tempfile.TemporaryDirectory(prefix="slurm-") as name:
-        folder = Path(name)
-        key, conf = folder / "munge.key", folder / "slurm.conf"
-        key.write_bytes(os.urandom(1024))
-        key.chmod(0o400)
-        user = getpass.getuser()
-        conf.write_text(SLURM_CONF.format(host=host, ports=free_ports(2), user=user, folder=folder))
-        for part in ("state", "spool"):
-            (folder / part).mkdir()
-        monkeypatch.setenv("SLURM_CONF", str(conf))
-        of_munge = [f"--{what}={folder}/munge.{what[:-5]}" for what in ("key-file", "pid-file", "log-file", "seed-file")]
-        commands = (
-            [munged, "--foreground", "--force", f"--socket={folder}/munge.socket", *of_munge],
-            [slurmctld, "-D"],
-            [slurmd, "-D"],
-        )
-        with (folder / "log").open("wb") as log:
-            try:
-                for words in commands:
-                    daemons.append(subprocess.Popen(words, stdout=log, stderr=log))
-                    if words[0] == munged:
-                        wait_until((folder / "munge.socket").exists, 30, "munged does not start")
-                wait_until(lambda: output_of("sinfo", "--noheader", "--format=%t") == "idle", 60, "Slurm does not start")
-                yield folder
-            finally:
-                try:
-                    output_of("scancel", "--user", user)
-                    wait_for_jobs()
-                finally:
-                    print((folder / "log").read_text())
-                    for daemon in reversed(daemons):
-                        daemon.terminate()
-                        daemon.wait()
-
-
-def output_of(*words: str) -> str:
-    return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
-
-
-def wait_for_jobs() -> None:
-    wait_until(lambda: output_of("squeue", "--noheader") == "", 240, "the jobs do not end")
+def slurm() -> Iterator[Path]:
+    with one_machine_slurm.running({name: command(name) for name in one_machine_slurm.PROGRAMS}) as folder:
+        yield folder
 
 
 def renders(folder: Path, argument: str) -> bool:

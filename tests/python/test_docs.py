@@ -1,6 +1,7 @@
 """Documentation and types."""
 
 import inspect
+import os
 import re
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import etendue as et
+import transcripts
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -64,3 +66,33 @@ def test_types_of_package_tests_and_examples() -> None:
     run = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(ROOT / "build" / "mypy"), *files[1:]],
                          capture_output=True, text=True, cwd=ROOT)
     assert run.returncode == 0, run.stdout + run.stderr
+
+
+@pytest.mark.clusters
+@pytest.mark.parametrize("page", transcripts.pages(), ids=lambda page: str(page.stem))
+def test_transcripts_are_what_the_commands_print(page: Path, program: str, tmp_path: Path) -> None:
+    old = page.read_text()
+    new, absent = transcripts.replayed(page, program, tmp_path)
+    assert not absent or not os.environ.get("ETENDUE_NEEDS_CLUSTERS"), f"missing: {', '.join(absent)}"
+    if os.environ.get("ETENDUE_RENEW"):
+        page.write_text(new)
+        return
+    assert not transcripts.difference(old, new), f"{transcripts.difference(old, new)}\nscripts/transcripts renews {page.name}"
+
+
+def test_transcripts_differ_by_more_than_times() -> None:
+    page = (
+        "    $ etendue render a.xml\n    1 spp, 2.2 s, 12 %, 15.4 s left, 0.55 Mrays/s\n"
+        "    a.exr: 8 spp in 8.5 s, 0.028 Msamples/s, 0.51 Mrays/s, relative error 0.1060\n      processor   12ab\n"
+    )
+    same = page.replace("8.5 s", "125 s").replace("0.028", "1.2").replace("1 spp, 2.2 s", "3 spp, 3 s")
+    assert not transcripts.difference(page, same)
+    other = page.replace("0.1060", "0.1061")
+    assert "0.1061" in transcripts.difference(page, other)
+    assert "8 spp" in transcripts.difference(page, page.replace("8 spp", "9 spp"))
+    # Last bits depend on the processor.
+    assert not transcripts.difference(page, other.replace("12ab", "12ac"))
+    assert "0.2" in transcripts.difference(page, other.replace("12ab", "12ac").replace("0.1061", "0.2"))
+    block, = transcripts.blocks_of(["text", *page.splitlines(), "", "    $$"])
+    assert [c.text for c in block.commands] == ["etendue render a.xml"] and len(block.commands[0].printed) == 3
+    assert block.lines() == page.splitlines()
