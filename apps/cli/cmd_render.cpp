@@ -440,9 +440,9 @@ std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) 
 
 void RenderCommand::run() const {
     std::unique_ptr<const Ranks> ranks = join_ranks();
-    if (is_first_of_strangers())
-        print_warnings({"mpirun has started several processes, each of which renders the whole "
-                        "image: this program was built without MPI (ETENDUE_MPI)"});
+    if (const std::string warning = warning_of_strangers(*ranks); !warning.empty())
+        print_warnings({warning});
+    if (scene.memory.empty()) share_available_memory(ranks->on_this_machine());
     std::optional<Silence> silence;
     if (ranks->index() > 0) silence.emplace();
     try {

@@ -1,9 +1,6 @@
 #include "scene_options.h"
 
-#include <cctype>
 #include <charconv>
-#include <cmath>
-#include <string_view>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -37,25 +34,6 @@ std::vector<int> parse_integers(const std::string& text, char separator, size_t 
     return numbers;
 }
 
-/// Bytes of a size such as 4G, 1.5 GiB, 800mb or 1000000; all units are powers of 1024.
-uint64_t parse_size(const std::string& text) {
-    constexpr double kMost = 0x1p62;
-    constexpr std::string_view kPrefixes = "KMGTPE";
-    double bytes = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), bytes);
-    std::string unit(end, text.data() + text.size());
-    unit.erase(0, unit.find_first_not_of(' '));
-    for (char& c : unit) c = char(std::toupper(static_cast<unsigned char>(c)));
-    if (const size_t n = unit.empty() ? unit.npos : kPrefixes.find(unit[0]); n != unit.npos) {
-        bytes = std::ldexp(bytes, 10 * int(n + 1));
-        unit.erase(0, unit.starts_with(std::string{unit[0], 'I', 'B'}) ? 2 : 1);
-    }
-    if (error != std::errc() || !(bytes >= 1 && bytes < kMost) || (unit != "" && unit != "B"))
-        throw std::runtime_error(
-            fmt::format("--memory must be a size such as 4G or 1.5G, but is \"{}\"", text));
-    return uint64_t(bytes);
-}
-
 }  // namespace
 
 void SceneOptions::add_to(CLI::App& command) {
@@ -83,7 +61,7 @@ void SceneOptions::add_reading_options(CLI::App& command) {
         if (memory.empty())
             limit_memory_to_available();
         else
-            limit_memory(parse_size(memory));
+            limit_memory(parse_memory_size(memory, "--memory"));
     });
 }
 

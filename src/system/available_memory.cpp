@@ -105,16 +105,19 @@ std::optional<uint64_t> running_threads(const std::string& proc) {
     return entry(proc + "/self/status", "Threads:");
 }
 
-std::optional<uint64_t> available_memory(const std::string& proc, const std::string& cgroup) {
+std::optional<uint64_t> available_memory(const std::string& proc, const std::string& cgroup,
+                                         int sharers) {
     std::optional<uint64_t> least = entry(proc + "/meminfo", "MemAvailable:");
     lower_by_groups(least, proc, cgroup);
+    if (least) *least /= uint64_t(sharers);
+    // Limits of the process leave nothing to others.
     lower_by_limit(least, RLIMIT_AS, address_space(proc));
     lower_by_limit(least, RLIMIT_DATA, memory_for_data(proc));
     return least;
 }
 
-std::optional<uint64_t> available_memory() {
-    return available_memory("/proc", "/sys/fs/cgroup");
+std::optional<uint64_t> available_memory(int sharers) {
+    return available_memory("/proc", "/sys/fs/cgroup", sharers);
 }
 
 std::string format_bytes(uint64_t bytes) {

@@ -10,11 +10,13 @@
 namespace etendue {
 
 /// Bytes that this process can still use: the least of what the system has, what its control groups allow, and what its
-/// limits of address space and of memory for data leave. Empty where the system does not tell.
-std::optional<uint64_t> available_memory();
+/// limits of address space and of memory for data leave. Empty where the system does not tell. What others can use, too, is
+/// divided by `sharers`, the number of processes that ask for it at the same time.
+std::optional<uint64_t> available_memory(int sharers = 1);
 
 /// The same from other files: `proc` stands for /proc, `cgroup` for /sys/fs/cgroup.
-std::optional<uint64_t> available_memory(const std::string& proc, const std::string& cgroup);
+std::optional<uint64_t> available_memory(const std::string& proc, const std::string& cgroup,
+                                         int sharers = 1);
 
 /// Bytes of private memory that this process can write, used or not.
 std::optional<uint64_t> memory_for_data(const std::string& proc);

@@ -1,10 +1,14 @@
 #include "system/memory_limit.h"
 
 #include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include <sys/resource.h>
 
@@ -39,6 +43,7 @@ struct Limit {
     uint64_t bytes = 0;                ///< Includes the stacks of the `begun` threads.
     int begun = 0;
     int threads = 0;  ///< Most for which there is room.
+    int sharers = 1;  ///< Processes that divide what is available.
 
     void set(Kind new_kind, uint64_t new_bytes) {
         if (kind == Kind::None) of_system = data_limit().rlim_cur;
@@ -48,10 +53,15 @@ struct Limit {
         apply();
     }
     void set_to_available() {
-        const auto used = memory_for_data("/proc"), free = available_memory();
+        const auto used = memory_for_data("/proc"), free = available_memory(sharers);
         // Sanitizers reserve many terabytes.
         constexpr uint64_t kMostForItself = uint64_t(1) << 40;
         if (used && free && *used < kMostForItself) set(Kind::Available, *used + *free);
+    }
+    void renew() {
+        if (kind != Kind::Available) return;
+        set_limit(of_system);  // What is available is at most what a limit leaves.
+        set_to_available();
     }
     void apply() const {
         if (kind == Kind::None) return;
@@ -101,6 +111,32 @@ void limit_memory(uint64_t bytes) {
     limit.set(Limit::Kind::Given, bytes);
 }
 
+void unlimit_memory() {
+    Limit& limit = current_limit();
+    const std::scoped_lock lock(limit.mutex);
+    if (limit.kind == Limit::Kind::None) return;
+    set_limit(limit.of_system);
+    limit.kind = Limit::Kind::None;
+}
+
+uint64_t parse_memory_size(const std::string& text, const std::string& option) {
+    constexpr double kMost = 0x1p62;
+    constexpr std::string_view kPrefixes = "KMGTPE";
+    double bytes = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), bytes);
+    std::string unit(end, text.data() + text.size());
+    unit.erase(0, unit.find_first_not_of(' '));
+    for (char& c : unit) c = char(std::toupper(static_cast<unsigned char>(c)));
+    if (const size_t n = unit.empty() ? unit.npos : kPrefixes.find(unit[0]); n != unit.npos) {
+        bytes = std::ldexp(bytes, 10 * int(n + 1));
+        unit.erase(0, unit.starts_with(std::string{unit[0], 'I', 'B'}) ? 2 : 1);
+    }
+    if (error != std::errc() || !(bytes >= 1 && bytes < kMost) || (unit != "" && unit != "B"))
+        throw std::runtime_error(
+            fmt::format("{} must be a size such as 4G or 1.5G, but is \"{}\"", option, text));
+    return uint64_t(bytes);
+}
+
 void limit_memory_to_available() {
     Limit& limit = current_limit();
     const std::scoped_lock lock(limit.mutex);
@@ -110,9 +146,14 @@ void limit_memory_to_available() {
 void renew_memory_limit() {
     Limit& limit = current_limit();
     const std::scoped_lock lock(limit.mutex);
-    if (limit.kind != Limit::Kind::Available) return;
-    set_limit(limit.of_system);  // What is available is at most what a limit leaves.
-    limit.set_to_available();
+    limit.renew();
+}
+
+void share_available_memory(int processes) {
+    Limit& limit = current_limit();
+    const std::scoped_lock lock(limit.mutex);
+    limit.sharers = processes;
+    limit.renew();
 }
 
 void make_room_for_threads(int threads) {

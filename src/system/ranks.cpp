@@ -2,11 +2,12 @@
 
 #include "system/ranks.h"
 
+#include <cstdlib>
+
 #ifdef ETENDUE_MPI
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 #include <exception>
 #include <stdexcept>
 #include <thread>
@@ -60,6 +61,12 @@ public:
         MPI_Comm_size(MPI_COMM_WORLD, &count_);
         MPI_Comm_rank(MPI_COMM_WORLD, &index_);
         MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN);
+        MPI_Comm machine;
+        check(MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, index_, MPI_INFO_NULL,
+                                  &machine),
+              "MPI_Comm_split_type");
+        MPI_Comm_size(machine, &on_this_machine_);
+        MPI_Comm_free(&machine);
     }
     /// MPI is not finished if the work was not: finishing would wait for the others.
     ~MpiRanks() override {
@@ -68,6 +75,7 @@ public:
 
     int count() const override { return count_; }
     int index() const override { return index_; }
+    int on_this_machine() const override { return on_this_machine_; }
 
     void share(void* data, size_t size, std::span<const uint64_t> begins) const override {
         const ElementType type(size);
@@ -137,7 +145,7 @@ private:
         wait_for(request, "MPI_Ibcast");
     }
 
-    int count_ = 1, index_ = 0;
+    int count_ = 1, index_ = 0, on_this_machine_ = 1;
 };
 
 /// Whether something that starts processes of MPI has started this one.
@@ -159,15 +167,9 @@ std::unique_ptr<const Ranks> join_ranks() {
     return std::make_unique<MpiRanks>();
 }
 
-bool is_first_of_strangers() {
-    return false;
-}
-
 }  // namespace etendue
 
 #else
-
-#include <cstdlib>
 
 namespace etendue {
 
@@ -175,14 +177,44 @@ std::unique_ptr<const Ranks> join_ranks() {
     return std::make_unique<Ranks>();
 }
 
-bool is_first_of_strangers() {
-    const auto number = [](const char* variable) {
-        const char* const text = std::getenv(variable);
-        return text ? std::atoi(text) : 0;
-    };
-    return number("OMPI_COMM_WORLD_SIZE") > 1 && number("OMPI_COMM_WORLD_RANK") == 0;
-}
-
 }  // namespace etendue
 
 #endif
+
+namespace etendue {
+namespace {
+
+#ifdef ETENDUE_MPI
+constexpr const char* kWhyAlone =
+    "they are not started for the MPI with which this program was built: use its mpirun, or srun "
+    "--mpi=pmix";
+#else
+constexpr const char* kWhyAlone = "this program was built without MPI (ETENDUE_MPI)";
+#endif
+
+/// What starts several processes, and the environment variables with their number and that of this process. Those of Slurm
+/// are also set where another one has started the process within a step.
+struct Launcher {
+    const char *name, *count, *index;
+};
+constexpr Launcher kLaunchers[] = {
+    {"mpirun", "OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"},
+    {"mpirun", "PMI_SIZE", "PMI_RANK"},
+    {"srun", "SLURM_STEP_NUM_TASKS", "SLURM_PROCID"},
+};
+
+}  // namespace
+
+std::string warning_of_strangers(const Ranks& joined) {
+    if (joined.count() > 1) return "";
+    for (const Launcher& l : kLaunchers) {
+        const char *const count = std::getenv(l.count), *const index = std::getenv(l.index);
+        if (!count || !index) continue;
+        if (std::atoi(count) < 2 || std::atoi(index) != 0) return "";
+        return std::string(l.name) + " has started " + count +
+               " processes, each of which renders an image of its own: " + kWhyAlone;
+    }
+    return "";
+}
+
+}  // namespace etendue

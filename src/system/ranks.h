@@ -21,7 +21,8 @@ class Ranks {
 public:
     virtual ~Ranks() = default;
     virtual int count() const { return 1; }
-    virtual int index() const { return 0; }  ///< Number of this process.
+    virtual int index() const { return 0; }            ///< Number of this process.
+    virtual int on_this_machine() const { return 1; }  ///< How many of them run on this machine.
 
     /// Elements begins[r] … begins[r+1]-1 of `data` are those of process r; afterwards, every process has all of them.
     /// Elements have `size` bytes.
@@ -76,8 +77,8 @@ inline const Ranks kAlone;
 /// called once. The object must live until all of them have finished their work; if one ends before, they are all ended.
 std::unique_ptr<const Ranks> join_ranks();
 
-/// Whether mpirun has started several processes that join_ranks() cannot connect, since the program was built without MPI.
-/// True in the first of them alone.
-bool is_first_of_strangers();
+/// Says that mpirun, srun or the like has started several processes which do not belong to `joined` (of join_ranks()), but
+/// each render alone, and why. Empty if that is not so, and in all of them but the first.
+std::string warning_of_strangers(const Ranks& joined);
 
 }  // namespace etendue

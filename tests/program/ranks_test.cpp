@@ -148,6 +148,35 @@ TEST_F(RanksTest, EndByTheErrorAndByTime) {
     EXPECT_NEAR(info("timed")["seconds"].get<double>(), 2, 1);
 }
 
+/// The limit of the memory for data, in bytes.
+double data_limit(pid_t process) {
+    const std::string text = read_text("/proc/" + std::to_string(process) + "/limits"),
+                      mark = "Max data size";
+    const size_t at = text.find(mark);
+    return at == std::string::npos ? 0 : std::stod(text.substr(at + mark.size()));
+}
+
+TEST_F(RanksTest, DivideTheMemoryOfTheirMachine) {
+    const auto limits = [&](int ranks, const Arguments& more) {
+        fs::remove(path("a.etd"));
+        Arguments how = {"--time", "600", "--quiet", "--checkpoint-every", "1e-6"};
+        how.insert(how.end(), more.begin(), more.end());
+        const Program job = start(render("a", how), ranks);
+        wait_for_file("a.etd");
+        std::vector<double> found;
+        for (const pid_t rank : ranks_of_job()) found.push_back(data_limit(rank));
+        job.send(SIGUSR1);
+        job.wait();
+        return found;
+    };
+    const std::vector<double> alone = limits(1, {}), together = limits(3, {}),
+                              given = limits(2, {"--memory", "1G"});
+    ASSERT_EQ(alone.size(), 1u);
+    ASSERT_EQ(together.size(), 3u);
+    for (const double limit : together) EXPECT_LT(limit, 0.6 * alone[0]);
+    EXPECT_EQ(given, (std::vector<double>{0x1p30, 0x1p30}));
+}
+
 /// How often a text occurs.
 int count(const std::string& text, const std::string& part) {
     int n = 0;

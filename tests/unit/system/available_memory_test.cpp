@@ -31,8 +31,9 @@ public:
         fs::create_directories((folder_ / name).parent_path());
         std::ofstream(folder_ / name) << text;
     }
-    std::optional<uint64_t> available() const {
-        return available_memory((folder_ / "proc").string(), (folder_ / "cgroup").string());
+    std::optional<uint64_t> available(int sharers = 1) const {
+        return available_memory((folder_ / "proc").string(), (folder_ / "cgroup").string(),
+                                sharers);
     }
 
 private:
@@ -76,6 +77,25 @@ TEST(AvailableMemory, IsLimitedByOldControlGroups) {
     EXPECT_EQ(files.available(), 1500u);
     files.write("cgroup/memory/job/memory.stat", "cache 1\ntotal_cache 500\ntotal_shmem 200\n");
     EXPECT_EQ(files.available(), 1300u);
+}
+
+TEST(AvailableMemory, OfTheMachineIsDivided) {
+    SystemFiles files;
+    EXPECT_EQ(files.available(4), 200u * 1024);
+    files.write("proc/self/cgroup", "0::/job\n");
+    files.write("cgroup/job/memory.max", "100000\n");
+    files.write("cgroup/job/memory.current", "30000\n");
+    EXPECT_EQ(files.available(4), 17500u);
+}
+
+TEST(AvailableMemory, OfTheProcessIsNotDivided) {
+    if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers reserve memory";
+    const std::string error = in_limited_memory(uint64_t(64) << 20, [] {
+        // Far more than what the process may have.
+        const uint64_t alone = available_memory(1).value(), shared = available_memory(2).value();
+        if (shared + (4 << 20) < alone) throw std::runtime_error("it was divided");
+    });
+    EXPECT_EQ(error, "");
 }
 
 TEST(AvailableMemory, MessagesNameNeedAndWhatIsFree) {

@@ -183,6 +183,41 @@ TEST_F(MemoryLimit, CountsTheStacksOfRunningThreadsOnce) {
               "");
 }
 
+TEST_F(MemoryLimit, OfTheMachineIsSharedByItsProcesses) {
+    EXPECT_EQ(in_limited_memory(uint64_t(1) << 50,
+                                [] {
+                                    limit_memory_to_available();
+                                    const uint64_t own = used(), whole = data_limit() - own;
+                                    share_available_memory(4);
+                                    const uint64_t share = data_limit() - own;
+                                    expect(share < whole / 3, "too much");
+                                    expect(share > whole / 5, "too little");
+                                    renew_memory_limit();
+                                    expect(data_limit() - own < whole / 3, "no longer shared");
+                                    limit_memory(own + 100 * kMebibyte);
+                                    const uint64_t given = data_limit();
+                                    share_available_memory(4);
+                                    expect(data_limit() == given, "the given one is divided");
+                                }),
+              "");
+}
+
+TEST_F(MemoryLimit, CanBeEnded) {
+    EXPECT_EQ(in_limited_memory(1024 * kMebibyte,
+                                [] {
+                                    const uint64_t before = data_limit();
+                                    unlimit_memory();
+                                    expect(data_limit() == before, "there was none");
+                                    limit_memory(used() + 100 * kMebibyte);
+                                    limit_memory(used() + 50 * kMebibyte);
+                                    expect(!can_allocate(80 * kMebibyte), "there is more");
+                                    unlimit_memory();
+                                    expect(data_limit() == before, "it was not ended");
+                                    expect(can_allocate(200 * kMebibyte), "it was not ended");
+                                }),
+              "");
+}
+
 TEST_F(MemoryLimit, HasRoomForThreadsOrSaysSo) {
     const std::string error = in_limited_memory(1024 * kMebibyte, [] {
         limit_memory(used() + 100 * kMebibyte);
