@@ -125,7 +125,8 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     const bool second = !has_groups() && passes_ % 2 == 1;
     const size_t g = has_groups() ? passes_ % group_sums_.size() : 0;
     float* const group = has_groups() ? group_sums_[g].data() : nullptr;
-    // All memory is allocated before anything changes, so that a failure leaves the totals unchanged.
+    // All memory is allocated before anything changes, so that a failure leaves the totals unchanged. From then on nothing
+    // throws, apart from the exchange with other processes, which end then.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks), pass_sum(chunks);
     for (std::vector<double>* list : {&pass_means_, &pair_errors_})
         if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);

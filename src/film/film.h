@@ -97,7 +97,7 @@ public:
     /// Hints that a splat at `point` may follow.
     void prefetch_splat(Vec2 point) const { pass_.prefetch_splat(point); }
     /// Adds the pass to the totals. `splat_factor`: the factor of splats in the groups' sums, from which errors are
-    /// estimated.
+    /// estimated. If this throws, for want of memory, the totals are unchanged.
     void end_pass(double splat_factor = 1);
     /// Discards the pass; the totals are unchanged.
     void drop_pass() { pass_.clear(); }

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
+#include <new>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 namespace etendue {
 
@@ -15,12 +18,21 @@ inline uint64_t film_chunks(uint64_t count) {
     return (count + kFilmChunk - 1) / kFilmChunk;
 }
 
-/// Calls `body(chunk, begin, end)` in parallel for the chunks first … last-1 of [0, count).
+/// Calls `body(chunk, begin, end)` in parallel for the chunks first … last-1 of [0, count). Throws nothing if `body` does not,
+/// even where there is no memory for parallel tasks: the calling thread then does their work.
 template <class Body>
 void for_film_chunks(uint64_t count, uint64_t first, uint64_t last, const Body& body) {
-    tbb::parallel_for(first, last, [&](uint64_t chunk) {
-        body(chunk, chunk * kFilmChunk, std::min(count, (chunk + 1) * kFilmChunk));
-    });
+    std::atomic<uint64_t> next{first};
+    const auto work = [&] {
+        for (uint64_t chunk; (chunk = next.fetch_add(1, std::memory_order_relaxed)) < last;)
+            body(chunk, chunk * kFilmChunk, std::min(count, (chunk + 1) * kFilmChunk));
+    };
+    const uint64_t threads = uint64_t(tbb::this_task_arena::max_concurrency());
+    try {
+        tbb::parallel_for(uint64_t(0), std::min(threads, last - first), [&](uint64_t) { work(); });
+    } catch (const std::bad_alloc&) {
+    }
+    work();
 }
 /// The same for all chunks.
 template <class Body>

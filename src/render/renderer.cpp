@@ -264,6 +264,9 @@ struct Renderer::Workers {
             if (w.sums) taken.push_back(std::move(w.sums));
         return taken;
     }
+    void drop_sums() {
+        for (Workspace& w : spaces) w.sums.reset();
+    }
 
     std::unique_ptr<tbb::global_control> allowed;
     tbb::task_arena arena;
@@ -348,7 +351,7 @@ public:
         r_.integrator_->prepare(context());
         // These paths do not count.
         r_.workers_->take_stats();
-        r_.workers_->take_sums();
+        r_.workers_->drop_sums();
     }
     void trace() {
         r_.film_.begin_pass(r_.light_paths_,
@@ -445,9 +448,10 @@ struct Renderer::Round {
     int passes = 0;  ///< Number of passes that it asks for: one of each of the first processes.
     int made =
         0;  ///< Number of them that can be added: those before the first one that is missing.
-    bool is_incomplete = false;        ///< Whether any is missing.
-    std::exception_ptr failure;        ///< Of this process, or what another one says.
-    uint64_t rejected_before = 0;      ///< Of the film.
+    bool is_incomplete = false;                   ///< Whether any is missing.
+    std::exception_ptr failure;                   ///< Of this process, or what another one says.
+    uint64_t rejected_before = 0;                 ///< Of the film.
+    std::vector<std::unique_ptr<PassSums>> sums;  ///< Of the pass of a process that renders alone.
     std::vector<std::string> results;  ///< Statistics and sums of the pass of each process.
 };
 
@@ -457,10 +461,10 @@ void Renderer::drop_pass() {
         if (techniques_) techniques_->drop_pass();
     });
     workers_->take_stats();
-    workers_->take_sums();
+    workers_->drop_sums();
 }
 
-void Renderer::trace_own_pass(const Round& round, const std::atomic<bool>& drop) {
+void Renderer::trace_own_pass(Round& round, const std::atomic<bool>& drop) {
     const auto passes = uint32_t(film_.passes());
     const int rank = settings_.ranks->index();
     has_last_pass_ = false;
@@ -474,10 +478,13 @@ void Renderer::trace_own_pass(const Round& round, const std::atomic<bool>& drop)
     is_prepared_ = true;
     if (rank >= round.passes) return;
     Pass(*this, passes + uint32_t(rank), drop).trace();
-    if (settings_.ranks->count() == 1)
+    if (settings_.ranks->count() == 1) {
+        // From the end of the film's pass to that of add_pass(), nothing may fail, so that all of them have the same passes.
+        round.sums = workers_->take_sums();
         film_.end_pass(integrator_->splat_error_factor());
-    else
+    } else {
         film_.finish_pass();
+    }
     if (techniques_) techniques_->end_pass();
 }
 
@@ -492,7 +499,6 @@ Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atom
     if (LearningStep::of(uint32_t(film_.passes())).pass == 0) gather();
 
     auto outcome = Outcome::Good;
-    std::string failure;
     try {
         workers_->arena.execute([&] { trace_own_pass(round, drop); });
     } catch (const PassDropped&) {
@@ -500,9 +506,13 @@ Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atom
     } catch (...) {
         outcome = Outcome::Failed;
         round.failure = std::current_exception();
-        failure = what_of(round.failure);
     }
     if (outcome != Outcome::Good) drop_pass();
+    if (ranks.count() == 1) {
+        round.made = outcome == Outcome::Good ? 1 : 0;
+        round.is_incomplete = round.made == 0;
+        return round;
+    }
 
     const std::vector<Outcome> outcomes = ranks.gather_values(outcome);
     const auto first_bad = std::find_if(outcomes.begin(), outcomes.end(),
@@ -510,7 +520,8 @@ Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atom
     round.made = std::min(round.passes, int(first_bad - outcomes.begin()));
     round.is_incomplete = first_bad != outcomes.end();
     if (std::find(outcomes.begin(), outcomes.end(), Outcome::Failed) != outcomes.end()) {
-        const std::vector<std::string> failures = ranks.gather(failure);
+        const std::vector<std::string> failures =
+            ranks.gather(round.failure ? what_of(round.failure) : "");
         for (size_t r = 0; r < failures.size() && !round.failure; ++r)
             if (!failures[r].empty())
                 round.failure = std::make_exception_ptr(
@@ -525,7 +536,6 @@ Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atom
 
 void Renderer::exchange(Round& round) {
     const Ranks& ranks = *settings_.ranks;
-    if (ranks.count() == 1) return;
     LearnedState own;
     if (ranks.index() < round.made) {
         own.put(workers_->take_stats());
@@ -535,7 +545,7 @@ void Renderer::exchange(Round& round) {
         for (const auto& s : sums) s->save(own);
     } else {
         workers_->take_stats();
-        workers_->take_sums();
+        workers_->drop_sums();
     }
     round.results =
         ranks.gather({reinterpret_cast<const char*>(own.bytes().data()), own.bytes().size()});
@@ -546,7 +556,7 @@ void Renderer::add_pass(Round& round, int rank) {
     if (settings_.ranks->count() == 1) {
         stats_ += workers_->take_stats();
         stats_.rejected += film_.rejected() - round.rejected_before;
-        integrator_->collect(workers_->take_sums());
+        integrator_->collect(round.sums);
         has_last_pass_ = true;
         return;
     }

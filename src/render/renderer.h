@@ -158,7 +158,7 @@ private:
     struct Round;
     /// Traces the pass of this process, and exchanges what all of them have made.
     Round make_round(const RenderLimits& limits, const std::atomic<bool>& drop);
-    void trace_own_pass(const Round& round, const std::atomic<bool>& drop);
+    void trace_own_pass(Round& round, const std::atomic<bool>& drop);
     void drop_pass();
     void exchange(Round& round);
     void add_pass(Round& round, int rank);

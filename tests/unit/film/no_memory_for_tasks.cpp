@@ -1,0 +1,57 @@
+// Replaces the functions of TBB's library by which its headers allocate tasks.
+
+#include "no_memory_for_tasks.h"
+
+#include <dlfcn.h>
+
+#include <atomic>
+#include <new>
+
+#include <tbb/parallel_for.h>
+
+namespace {
+
+std::atomic<long> left{0};  ///< Allocations up to the one that fails; 0 or less: none.
+
+void count_allocation() {
+    if (left.fetch_sub(1) == 1) throw std::bad_alloc();
+}
+template <class Function>
+Function* original(const char* name) {
+    return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));
+}
+
+}  // namespace
+
+namespace tbb::detail::r1 {
+
+void* allocate(d1::small_object_pool*& pool, std::size_t size, const d1::execution_data& data) {
+    using Original = void*(d1::small_object_pool*&, std::size_t, const d1::execution_data&);
+    static auto* const next = original<Original>(
+        "_ZN3tbb6detail2r18allocateERPNS0_2d117small_object_poolEmRKNS2_14execution_dataE");
+    count_allocation();
+    return next(pool, size, data);
+}
+void* allocate(d1::small_object_pool*& pool, std::size_t size) {
+    using Original = void*(d1::small_object_pool*&, std::size_t);
+    static auto* const next =
+        original<Original>("_ZN3tbb6detail2r18allocateERPNS0_2d117small_object_poolEm");
+    count_allocation();
+    return next(pool, size);
+}
+
+}  // namespace tbb::detail::r1
+
+namespace etendue::test {
+
+NoMemoryForTask::NoMemoryForTask(long n) {
+    left = n;
+}
+NoMemoryForTask::~NoMemoryForTask() {
+    left = 0;
+}
+bool NoMemoryForTask::has_failed() const {
+    return left <= 0;
+}
+
+}  // namespace etendue::test
