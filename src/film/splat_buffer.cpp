@@ -21,6 +21,13 @@ int64_t empty(std::atomic<int64_t>& cell) {
     return n;
 }
 
+void add_to(Rgb& sum, int channel, double value) {
+    sum[channel] += float(value);
+}
+void add_to(SplatBuffer::Sum& sum, int channel, double value) {
+    sum[size_t(channel)] += value;
+}
+
 }  // namespace
 
 SplatBuffer::SplatBuffer(uint64_t pixels, double typical_radiance)
@@ -77,7 +84,8 @@ double SplatBuffer::take(uint64_t cell, size_t digits) {
     return units;
 }
 
-void SplatBuffer::fold_into(std::span<Rgb> sums) {
+template <class To>
+void SplatBuffer::fold(std::span<To> sums) {
     size_t digits = kDigits;
     while (digits > 1 && !owned_[digits - 1]) --digits;
     for_film_chunks(sums.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
@@ -86,10 +94,12 @@ void SplatBuffer::fold_into(std::span<Rgb> sums) {
                 const uint64_t cell = i * 3 + uint64_t(c);
                 const double units =
                     digits == 1 ? double(empty(lowest_[cell])) : take(cell, digits);
-                sums[i][c] += float(units * unit_);
+                add_to(sums[i], c, units * unit_);
             }
     });
 }
+template void SplatBuffer::fold(std::span<Rgb> sums);
+template void SplatBuffer::fold(std::span<Sum> sums);
 
 void SplatBuffer::clear() {
     const auto clear = [&](Cell* cells) {

@@ -39,7 +39,10 @@ public:
     uint64_t rejected() const { return rejected_.load(std::memory_order_relaxed); }
     void prefetch(uint64_t pixel) const { __builtin_prefetch(&lowest_[pixel * 3], 1); }
     /// Adds every sum to `sums`, rounded once, and clears the buffer.
-    void fold_into(std::span<Rgb> sums);
+    void fold_into(std::span<Rgb> sums) { fold(sums); }
+    /// The same with the sums of many passes.
+    using Sum = std::array<double, 3>;
+    void fold_into(std::span<Sum> sums) { fold(sums); }
     void clear();
 
 private:
@@ -70,6 +73,8 @@ private:
     Cell* higher(size_t digit);
     /// Returns the sum in units, rounded once, and sets the cell to 0.
     double take(uint64_t cell, size_t digits);
+    template <class To>
+    void fold(std::span<To> sums);
 
     double unit_, units_per_radiance_;
     std::vector<Cell> lowest_;

@@ -25,8 +25,21 @@ struct TechniqueImages::Layer {
     Technique technique;  ///< Gathers that drop either vertex share an image; drops_eye is false.
     bool is_folded = false;  ///< Whether a finished pass has contributed to it.
     SplatBuffer pass_weighted, pass_unweighted;
-    std::vector<Rgb> weighted, unweighted;
+    std::vector<SplatBuffer::Sum> weighted, unweighted;
 };
+
+namespace {
+
+std::vector<Rgb> mean_of(const std::vector<SplatBuffer::Sum>& sums, uint64_t passes) {
+    std::vector<Rgb> mean;
+    mean.reserve(sums.size());
+    const double scale = passes > 0 ? 1 / double(passes) : 0.0;
+    for (const auto& s : sums)
+        mean.emplace_back(float(s[0] * scale), float(s[1] * scale), float(s[2] * scale));
+    return mean;
+}
+
+}  // namespace
 
 TechniqueImages::TechniqueImages(const FilmGeometry& geometry, const ReconstructionFilter& filter,
                                  int max_edges, double typical_radiance)
@@ -39,7 +52,7 @@ TechniqueImages::~TechniqueImages() = default;
 
 size_t TechniqueImages::memory_bytes(uint64_t pixels, int max_edges) {
     const size_t layers = triangle_index({Strategy::Hit, 0, max_edges + 2}) / 2;
-    return layers * pixels * 2 * (3 * sizeof(int64_t) + sizeof(Rgb));
+    return layers * pixels * 2 * (3 * sizeof(int64_t) + sizeof(SplatBuffer::Sum));
 }
 
 TechniqueImages::Layer* TechniqueImages::layer(const Technique& q) {
@@ -99,7 +112,7 @@ void TechniqueImages::save(SectionWriter& to) const {
 void TechniqueImages::add_saved(SectionReader& from) {
     from.open("techniques");
     const auto passes = from.get<uint64_t>(), count = from.get<uint64_t>();
-    std::vector<Rgb> saved;
+    std::vector<SplatBuffer::Sum> saved;
     std::vector<const Layer*> known;
     for (uint64_t i = 0; i < count; ++i) {
         const auto strategy = from.get<uint32_t>();
@@ -113,9 +126,10 @@ void TechniqueImages::add_saved(SectionReader& from) {
                                   max_edges_));
         known.push_back(l);
         l->is_folded = true;
-        for (std::vector<Rgb>* sums : {&l->weighted, &l->unweighted}) {
+        for (auto* sums : {&l->weighted, &l->unweighted}) {
             from.get(saved, geometry_.pixel_count(), "pixels");
-            for (size_t p = 0; p < saved.size(); ++p) (*sums)[p] += saved[p];
+            for (size_t p = 0; p < saved.size(); ++p)
+                for (size_t c = 0; c < 3; ++c) (*sums)[p][c] += saved[p][c];
         }
     }
     from.finish();
@@ -124,14 +138,10 @@ void TechniqueImages::add_saved(SectionReader& from) {
 
 std::vector<TechniqueImages::Entry> TechniqueImages::images() const {
     std::vector<Entry> out;
-    const float scale = passes_ > 0 ? 1 / float(passes_) : 0.0f;
-    for (const Layer* l : layers_) {
-        if (!l || !l->is_folded) continue;
-        Entry e{l->technique, l->weighted, l->unweighted};
-        for (Rgb& c : e.weighted) c *= scale;
-        for (Rgb& c : e.unweighted) c *= scale;
-        out.push_back(std::move(e));
-    }
+    for (const Layer* l : layers_)
+        if (l && l->is_folded)
+            out.push_back(
+                {l->technique, mean_of(l->weighted, passes_), mean_of(l->unweighted, passes_)});
     return out;
 }
 
