@@ -247,7 +247,10 @@ MeshData parse_serialized(std::string_view bytes, const std::string& name, int s
 MeshData read_serialized(const std::string& path, int shape_index, const MeshOptions& options) {
     const auto close = [](std::FILE* f) { std::fclose(f); };
     const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
-    if (!file || fseeko(file.get(), 0, SEEK_END) != 0) throw UnreadableFile(path);
+    if (!file) throw UnreadableFile(path);
+    // What cannot be read may say that it is empty.
+    if (std::fgetc(file.get()) == EOF && std::ferror(file.get())) throw UnreadableFile(path);
+    if (fseeko(file.get(), 0, SEEK_END) != 0) throw UnreadableFile(path);
     const auto read = [&](uint64_t begin, uint64_t size) {
         if (!MemoryWatch().add(size)) throw std::bad_alloc();
         std::string bytes(size, '\0');

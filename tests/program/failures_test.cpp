@@ -166,7 +166,7 @@ TEST_F(FailuresTest, FilesThatCannotBeReadAreNamedWithTheirPlace) {
                line, name, why);
     };
     const char *const error = "Input/output error", *const is_folder = "it is a folder";
-    for (const char* type : {"obj", "ply"})
+    for (const char* type : {"obj", "ply", "serialized"})
         expect_in_xml(mesh(type, std::string("unreadable.") + type), 4,
                       std::string("unreadable.") + type, error);
     expect_in_xml("<include filename=\"unreadable.xml\"/>", 3, "unreadable.xml", error);
