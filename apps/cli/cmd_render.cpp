@@ -49,7 +49,9 @@ struct RenderCommand {
     RenderRequest request;
     std::string output = "out.exr", techniques, preview, stats, checkpoint, resume, passes;
     std::vector<std::string> aovs;
-    double checkpoint_every = 60, write_every = 60;
+    static constexpr double kCheckpointEvery = 60;
+    std::optional<double> checkpoint_every;
+    double write_every = 60;
     unsigned grace = 20;
     int technique_depth = 6;
     bool quiet = false;
@@ -475,9 +477,11 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     };
     LaterCommit last_checkpoint;
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
-    constexpr double kMostForImages = 0.01;
-    Timer checkpoints(saved.empty() ? 0 : checkpoint_every),
-        images(is_in_place() ? 0 : write_every, kMostForImages);
+    // An interval that is given for checkpoints is kept, if they take less time than it.
+    constexpr double kMostOfTime = 0.01;
+    Timer checkpoints(saved.empty() ? 0 : checkpoint_every.value_or(kCheckpointEvery),
+                      checkpoint_every ? 1 : kMostOfTime),
+        images(is_in_place() ? 0 : write_every, kMostOfTime);
     // What fails now may succeed later, and is no reason to end.
     const auto warn_of_failures = [](const auto& task) {
         std::vector<std::string> problems;
@@ -580,8 +584,9 @@ void add_render_command(CLI::App& app) {
         "File in which the state of the rendering is saved, to go on from it (--resume) or "
         "to merge it with others (etendue merge)");
     c.add_option("--checkpoint-every", command->checkpoint_every,
-                 "Seconds between two checkpoints; 0: only at the end")
-        ->capture_default_str()
+                 "Seconds between two checkpoints; 0: only at the end. The default is longer if "
+                 "checkpoints would take more than a hundredth of the time")
+        ->default_str(fmt::format("{}", RenderCommand::kCheckpointEvery))
         ->check(CLI::Range(0.0, 1e9));
     c.add_option(
         "--resume", command->resume,

@@ -58,6 +58,24 @@ protected:
         EXPECT_EQ(r.status, 0) << r.errors;
         return nlohmann::json::parse(r.output);
     }
+    /// In the test's folder, with a preloaded library: see io_faults.cpp for the variables.
+    Program start_with(const std::string& variables, const Arguments& arguments) const {
+        Arguments shell = {
+            "-c",
+            fmt::format("cd '{}'; LD_PRELOAD='{}' ETENDUE_FAULT_MARK='{}' {} exec \"$0\" \"$@\"",
+                        folder.path().string(), ETENDUE_IO_FAULTS, path("mark"), variables),
+            ETENDUE_PROGRAM};
+        shell.insert(shell.end(), arguments.begin(), arguments.end());
+        return Program("/bin/bash", shell, folder.path());
+    }
+    /// Whether the fault has happened; forgets it.
+    bool was_faulty() const { return fs::remove(path("mark")); }
+    int hidden_files(const std::string& of) const {
+        int count = 0;
+        for (const auto& e : fs::directory_iterator(path(of)))
+            count += e.path().filename().string().starts_with(".");
+        return count;
+    }
     void wait_for_start(const Program& program) const {
         for (int i = 0; i < 3000 && !program.catches_interrupts(); ++i) wait(0.01);
     }
@@ -135,7 +153,8 @@ INSTANTIATE_TEST_SUITE_P(
                       "pm:light_paths=20000,gather_rays=2",
                       "mps:mutations=4000,precision=0.2,gather_rays=2", "pssmlt:groups=4,chains=32",
                       "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
-                      "upg+pssmlt:groups=4,chains=32"),
+                      "upg+pssmlt:groups=4,chains=32", "bdpt:connections=cache", "bdpt:eorr=true",
+                      "mps:target=path,mutations=4000,precision=0.2,gather_rays=2"),
     [](const auto& p) {
         std::string name = p.param;
         std::replace_if(
@@ -465,17 +484,13 @@ TEST_F(CheckpointTest, IsWholeWhateverCallFails) {
             fs::copy_file(path("faulty/one.etd"), path("faulty/a.etd"),
                           fs::copy_options::overwrite_existing);
             fs::remove(path("a.exr"));
-            Arguments shell = {"-c",
-                               fmt::format("LD_PRELOAD='{}' ETENDUE_FAULT={}:{} exec \"$0\" \"$@\"",
-                                           ETENDUE_IO_FAULTS, fault, n),
-                               ETENDUE_PROGRAM};
-            const Arguments rest = arguments("a", "3");
-            shell.insert(shell.end(), rest.begin(), rest.end());
-            const ProgramResult r = Program("/bin/bash", shell, folder.path()).wait();
+            const ProgramResult r =
+                start_with(fmt::format("ETENDUE_FAULT={}:{}", fault, n), arguments("a", "3"))
+                    .wait();
             const uint64_t passes = info("faulty/a.etd")["spp"];
             EXPECT_TRUE(passes == 1 || passes == 3) << passes;
             old_ones += passes == 1;
-            is_reached = r.signal == SIGKILL || r.status != 0;
+            is_reached = was_faulty();
             if (r.signal != SIGKILL) {
                 EXPECT_EQ(r.status, passes == 3 ? 0 : 1) << r.errors;
                 const bool is_told =
@@ -489,7 +504,7 @@ TEST_F(CheckpointTest, IsWholeWhateverCallFails) {
             expect_run(arguments("a", "3"));
             EXPECT_EQ(bits("faulty/a.etd"), expected);
         }
-        EXPECT_GT(old_ones, 3);
+        EXPECT_GT(old_ones, 8);
         // All but that where the file cannot be made, which is found before the first pass.
         if (std::string(fault) == "fail") {
             EXPECT_EQ(images, n - 1);
@@ -507,23 +522,80 @@ TEST_F(CheckpointTest, AfterAFailureTheNextOneIsTriedInTime) {
     faulty.push_back(path("faulty/a.etd"));
     expect_run(render("whole.exr", whole));
     int warned = 0;
-    // The first call is that of the check before the first pass; the next ones belong to the first checkpoint.
-    for (int n = 2; n <= 5; ++n) {
+    // The first two calls are those of the check before the first pass; the next ones belong to the first checkpoint.
+    for (int n = 3; n <= 6; ++n) {
         SCOPED_TRACE(n);
         fs::remove(path("faulty/a.etd"));
-        Arguments shell = {"-c",
-                           fmt::format("LD_PRELOAD='{}' ETENDUE_FAULT=fail:{} exec \"$0\" \"$@\"",
-                                       ETENDUE_IO_FAULTS, n),
-                           ETENDUE_PROGRAM};
-        const Arguments rest = render("a.exr", faulty);
-        shell.insert(shell.end(), rest.begin(), rest.end());
-        const ProgramResult r = Program("/bin/bash", shell, folder.path()).wait();
+        const ProgramResult r =
+            start_with(fmt::format("ETENDUE_FAULT=fail:{}", n), render("a.exr", faulty)).wait();
         EXPECT_EQ(r.status, 0) << r.errors;
         warned += r.errors.find("warning: cannot write") != std::string::npos;
         EXPECT_EQ(bits("faulty/a.etd"), bits("whole.etd"));
         EXPECT_EQ(pixels("a.exr"), pixels("whole.exr"));
     }
     EXPECT_EQ(warned, 4);
+}
+
+/// A checkpoint becomes durable in a thread of its own, or at once.
+TEST_F(CheckpointTest, IsWrittenWhereThereIsNoFurtherThread) {
+    const auto arguments = [&](const std::string& name) {
+        return render(name + ".exr",
+                      {"-i", "path", "--spp", "6", "--checkpoint", path(name + ".etd"),
+                       "--checkpoint-every", "1e-6", "--stats", path("stats.json")});
+    };
+    expect_run(arguments("whole"));
+    const ProgramResult r = start_with("ETENDUE_NO_THREADS=1", arguments("a")).wait();
+    EXPECT_TRUE(was_faulty());
+    EXPECT_EQ(r.status, 0);
+    EXPECT_EQ(r.errors, "");
+    EXPECT_EQ(bits("a.etd"), bits("whole.etd"));
+    EXPECT_GT(nlohmann::json::parse(read_text(path("stats.json")))["checkpoints"]["written"], 0);
+}
+
+/// The next checkpoint would need the room that it takes.
+TEST_F(CheckpointTest, AFileThatDoesNotBecomeDurableIsRemovedAtOnce) {
+    fs::create_directory(path("faulty"));
+    const Program program =
+        start_with("ETENDUE_FAULT=fail:1 ETENDUE_FAULT_CALL=fsync",
+                   render("a.exr", {"-i", "path", "--time", "600", "--checkpoint",
+                                    path("faulty/a.etd"), "--checkpoint-every", "4"}));
+    wait_for_file("mark");
+    ASSERT_TRUE(was_faulty());
+    const auto begin = Clock::now();
+    while (hidden_files("faulty") > 0 && seconds_since(begin) < 3) wait(0.01);
+    EXPECT_EQ(hidden_files("faulty"), 0);
+    EXPECT_FALSE(fs::exists(path("faulty/a.etd")));
+    program.interrupt();
+    const ProgramResult r = program.wait();
+    EXPECT_EQ(r.status, 0);
+    EXPECT_NE(r.errors.find("warning: cannot write"), std::string::npos) << r.errors;
+    EXPECT_GT(info("faulty/a.etd")["spp"], 0);
+}
+
+/// With a clock a thousand times as fast and writes that take five milliseconds longer, a checkpoint takes more than five
+/// seconds.
+TEST_F(CheckpointTest, TakesAHundredthOfTheTimeUnlessItsIntervalIsGiven) {
+    constexpr double kSeconds = 6000;
+    fs::create_directory(path("faulty"));
+    const auto checkpoints = [&](const Arguments& more) {
+        Arguments all = {"-i",           "path",
+                         "--time",       fmt::format("{}", kSeconds),
+                         "--stats",      path("stats.json"),
+                         "--threads",    "1",
+                         "--checkpoint", path("faulty/a.etd")};
+        all.insert(all.end(), more.begin(), more.end());
+        const ProgramResult r =
+            start_with("ETENDUE_CLOCK=1000 ETENDUE_SLOW_WRITE=5", render("a.exr", all)).wait();
+        EXPECT_EQ(r.status, 0) << r.errors;
+        fs::remove(path("faulty/a.etd"));
+        return nlohmann::json::parse(read_text(path("stats.json")))["checkpoints"];
+    };
+    const auto by_default = checkpoints({}), given = checkpoints({"--checkpoint-every", "60"});
+    EXPECT_GE(by_default["written"], 1);
+    EXPECT_GT(given["written"], 4 * by_default["written"].get<int>());
+    EXPECT_GT(given["seconds"], 0.05 * kSeconds);
+    // The last of them may have taken more than those before it.
+    EXPECT_LT(by_default["seconds"], 0.04 * kSeconds);
 }
 
 /// Whatever fails, the image is the old one or the new one, and the new one is somewhere.
@@ -545,19 +617,13 @@ TEST_F(CheckpointTest, AnImageIsWholeWhateverCallFails) {
             SCOPED_TRACE(fmt::format("{}:{}", fault, ++n));
             ASSERT_LT(n, 100);
             std::ofstream(image, std::ios::binary) << old;
-            Arguments shell = {
-                "-c",
-                fmt::format("cd '{}'; LD_PRELOAD='{}' ETENDUE_FAULT={}:{} exec \"$0\" \"$@\"",
-                            folder.path().string(), ETENDUE_IO_FAULTS, fault, n),
-                ETENDUE_PROGRAM};
-            const Arguments rest = arguments("2");
-            shell.insert(shell.end(), rest.begin(), rest.end());
-            const ProgramResult r = Program("/bin/bash", shell, folder.path()).wait();
-            is_reached = r.signal == SIGKILL || r.status != 0;
+            const ProgramResult r =
+                start_with(fmt::format("ETENDUE_FAULT={}:{}", fault, n), arguments("2")).wait();
+            is_reached = was_faulty();
             // The folder may fail to become durable, when the new file is there already.
             const std::string left = read_text(image);
             EXPECT_TRUE(left == old || left == expected);
-            if (!is_reached) {
+            if (r.status == 0) {
                 EXPECT_EQ(left, expected);
             }
             if (r.signal == SIGKILL) continue;
