@@ -220,6 +220,24 @@ TEST_F(InterruptTest, ThePassIsDroppedAfterTheGrace) {
     EXPECT_NE(r.errors.find("interrupted in the first pass"), std::string::npos) << r.errors;
 }
 
+TEST_F(InterruptTest, APassThatIsDroppedAfterTheGraceLeavesTheFirst) {
+    const std::string checkpoint = folder.path() / "a.etd";
+    const Program program =
+        start_long({"--grace", "1", "--checkpoint", checkpoint, "--checkpoint-every", "1e-6"});
+    // It is written between the first pass and the next one.
+    for (int i = 0; i < 6000 && !fs::exists(checkpoint); ++i) wait(0.01);
+    const auto begin = Clock::now();
+    program.interrupt();
+    const ProgramResult r = program.wait();
+    EXPECT_LT(Clock::now() - begin, std::chrono::seconds(3));
+    EXPECT_EQ(r.status, 0) << r.errors;
+    EXPECT_EQ(report()["spp"], 1);
+    EXPECT_EQ(report()["stopped_by"], "interrupted");
+    const std::vector<float> pixels = read_image(image).data;
+    ASSERT_EQ(run({"-i", "bdpt", "--resolution", "900x700", "--spp", "1"}).status, 0);
+    EXPECT_TRUE(read_image(image).data == pixels);
+}
+
 TEST_F(InterruptTest, ThePassesBeforeTheDroppedOneAreWritten) {
     const Program program = start({"-i", "bdpt", "--resolution", "150x100", "--threads", "1",
                                    "--time", "600", "--grace", "0"});

@@ -349,6 +349,34 @@ TEST_F(OutputFiles, FilesThatCannotBeReplacedAreOverwritten) {
               0);
 }
 
+/// The temporary file is then the only complete copy.
+TEST_F(OutputFiles, AnInterruptWhileAFileIsOverwrittenKeepsItsContents) {
+    if (::geteuid() != 0) GTEST_SKIP() << "only root can have files of several users";
+    put("a", "old");
+    fs::permissions(folder_, fs::perms(01777));
+    fs::permissions(file("a"), fs::perms(0666));
+    const std::string text(10000, 'x');
+    EXPECT_EQ(in_child(true,
+                       [&] {
+                           OutputFile out(file("a"));
+                           out.write(text);
+                           // The signal comes when a part of the file is overwritten.
+                           std::signal(SIGXFSZ, [](int) {
+                               remove_temporary_files();
+                               ::_exit(7);
+                           });
+                           const rlimit small = {4096, 4096};
+                           if (setrlimit(RLIMIT_FSIZE, &small) != 0) return 1;
+                           out.commit();
+                           return 0;
+                       }),
+              7);
+    EXPECT_EQ(text_of(file("a")), text.substr(0, 4096));
+    const Names left = names();
+    ASSERT_EQ(left.size(), 2u);
+    EXPECT_EQ(text_of(file(left[0])), text);
+}
+
 /// A file of another owner or group, which only root can give to them.
 TEST_F(OutputFiles, RightsOfAGroupAreNotGivenToAnother) {
     put("a", "old");
