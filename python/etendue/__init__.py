@@ -13,7 +13,8 @@ Images are arrays of shape (H, W, 3), float32, in linear RGB with the primaries 
 the same seed, images are bit-identical to those of the program `etendue`.
 
 Errors: SceneError, a ValueError, for the contents of a scene; ValueError, TypeError and IndexError for other arguments;
-RuntimeError for files, and for names and parameters of integrators. The messages are those of the program.
+RuntimeError for files, and for names and parameters of integrators. The messages are those of the program. If a pass of a
+rendering fails, the RenderError, a RuntimeError, has the result of the passes before it.
 """
 
 from ._cpu import check_cpu as _check_cpu
@@ -24,7 +25,8 @@ from . import core
 from ._etendue import Description, Scene, SceneError, __version__
 from ._images import Diff, diff, read_image, tonemap, write_image
 from ._integrator import Integrator
-from ._render import FilmView, Progress, Result, merge, render, resume
+from ._memory import limit_memory
+from ._render import FilmView, Progress, RenderError, Result, merge, render, resume
 from ._reports import CompareReport, VerifyReport, compare, verify
 from ._scenes import (load, load_dict, load_string, look_at, plugins, rotate, scale, translate)
 from ._show import show
@@ -32,7 +34,8 @@ from ._show import show
 SceneError.__module__ = "etendue"
 
 __all__ = [
-    "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Progress", "Result", "Scene", "SceneError",
-    "VerifyReport", "compare", "core", "diff", "load", "load_dict", "load_string", "look_at", "merge", "plugins", "read_image",
-    "render", "resume", "rotate", "scale", "show", "tonemap", "translate", "verify", "write_image",
+    "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Progress", "RenderError", "Result", "Scene",
+    "SceneError", "VerifyReport", "compare", "core", "diff", "limit_memory", "load", "load_dict", "load_string", "look_at",
+    "merge", "plugins", "read_image", "render", "resume", "rotate", "scale", "show", "tonemap", "translate", "verify",
+    "write_image",
 ]

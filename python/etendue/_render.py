@@ -98,8 +98,8 @@ class Result:
         self._aov_names = tuple(aovs)
         self._cache: dict[str, Any] = {}
         self.stopped_by = stopped_by
-        """Why the rendering ended: "samples", "time", "error", "interrupted" (Ctrl-C), "callback" (it returned False); of
-        merge(): "merged"."""
+        """Why the rendering ended: "samples", "time", "error", "interrupted" (Ctrl-C), "callback" (it returned False); of a
+        RenderError: "failure"; of merge(): "merged"."""
 
     def _cached(self, name: str, make: Callable[[], Any]) -> Any:
         if name not in self._cache:
@@ -255,6 +255,26 @@ class Result:
         return f"<figure>{image_html(self.image, title=text)}<figcaption>{text}</figcaption></figure>"
 
 
+class RenderError(RuntimeError):
+    """A pass has failed, but there are passes before it:
+
+        try:
+            result = et.render(scene, "vcm", spp=4096)
+        except et.RenderError as e:
+            result = e.result
+
+    Its __cause__ is what the pass raised, such as a MemoryError.
+    """
+
+    def __init__(self, message: str, result: Result):
+        super().__init__(message)
+        self.result = result
+        """The result of the passes before the one that failed. Result.save() of an .etd file and resume() go on from it."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.result)
+
+
 class _Bar:
     """A progress bar of tqdm, if tqdm is installed."""
 
@@ -325,7 +345,9 @@ def render(
 
     Raises RuntimeError for an unknown integrator, parameter or layer, and in a process forked from one that had built or
     rendered a scene (use the start method "spawn"); ValueError for another sampler or filter mode, and for limits that
-    are not above 0.
+    are not above 0. If a pass fails, for example for want of memory, raises RenderError, whose result is that of the
+    passes before it. If it is the first pass, raises what the pass raised: a RuntimeError, a MemoryError, or the exception
+    of an Integrator.
     """
     _etendue.check_aovs(list(aovs))
     depth = 6 if techniques is True else int(techniques)
@@ -361,7 +383,7 @@ def resume(
     spp, time, error: limits, which count from the first pass. The others are those of render().
 
     Raises RuntimeError, with all differences, if the bits would not be the same: another scene, another build of this
-    package.
+    package, another kind of processor. Raises RenderError if a pass fails.
     """
     _etendue.check_aovs(list(aovs))
     of = _etendue.read_checkpoint(fspath(file))
@@ -412,6 +434,20 @@ def _run(
 
         widget = LiveView()
 
+    # Whether an exception is that of a function which is called between passes. It ends no pass.
+    is_own = False
+
+    def guarded(call: Callable[[], object]) -> Callable[[], object]:
+        def guarded_call() -> object:
+            nonlocal is_own
+            try:
+                return call()
+            except BaseException:
+                is_own = True
+                raise
+
+        return guarded_call
+
     def between_passes() -> object:
         now = rendering.now()
         assert now is not None
@@ -425,7 +461,17 @@ def _run(
     interval = 0.0 if callback is not None else 0.5
     bar = _Bar(rendering, progress)
     try:
-        stopped_by = rendering.run(bar.update, between_passes if wants_calls else None, interval)
+        stopped_by = rendering.run(guarded(bar.update), guarded(between_passes) if wants_calls else None, interval)
+    except Exception as failure:
+        if is_own or rendering.passes == 0:
+            raise
+        n = rendering.passes
+        why = "not enough memory" if isinstance(failure, MemoryError) else str(failure) or type(failure).__name__
+        raise RenderError(
+            f"pass {n + 1} failed: {why}; the result of the {'pass' if n == 1 else f'{n} passes'} before it is in "
+            "RenderError.result",
+            Result(rendering, "failure", aovs),
+        ) from failure
     finally:
         bar.close()
     if rendering.passes == 0:

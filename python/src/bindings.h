@@ -89,6 +89,7 @@ std::string json_text(const Json& json) {
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+void bind_memory(nb::module_& m);
 void bind_description(nb::module_& m);
 void bind_render(nb::module_& m);
 void bind_reports(nb::module_& m);

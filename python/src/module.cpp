@@ -5,6 +5,7 @@ NB_MODULE(_etendue, m) {
     m.doc() = "The compiled part of etendue.";
     m.attr("__version__") = ETENDUE_VERSION;
     watch_forks();
+    bind_memory(m);
     bind_description(m);
     bind_images(m);
     bind_techniques(m);

@@ -6,8 +6,11 @@
 #include <mutex>
 #include <stdexcept>
 
+#include <nanobind/stl/string.h>
+
 #include "bindings.h"
 #include "description/fingerprint.h"
+#include "system/memory_limit.h"
 
 namespace etendue::python {
 namespace {
@@ -43,6 +46,23 @@ void use_threads() {
             "threads do not exist here. Use the start method \"spawn\" or \"forkserver\": "
             "multiprocessing.get_context(\"spawn\")");
     has_used_threads = true;
+}
+
+void bind_memory(nb::module_& m) {
+    using namespace nb::literals;
+    m.def(
+        "limit_memory",
+        [](const std::string& size) {
+            uint64_t bytes = 0;
+            try {
+                bytes = parse_memory_size(size, "size");
+            } catch (const std::runtime_error& e) {
+                throw nb::value_error(e.what());
+            }
+            limit_memory(bytes);
+        },
+        "size"_a);
+    m.def("unlimit_memory", &unlimit_memory);
 }
 
 void watch_forks() {

@@ -123,18 +123,22 @@ public:
             background.call(call);
         };
         StopReason reason = StopReason::Samples;
-        background.run(
-            [&] {
-                reason = renderer_.run(
-                    [&](const Progress& p) {
-                        progress(p);
-                        if (asked_to_stop) background.stop = true;
-                    },
-                    background.stop, background.drop);
-            },
-            [&] {
+        const auto render = [&] {
+            reason = renderer_.run(
+                [&](const Progress& p) {
+                    progress(p);
+                    if (asked_to_stop) background.stop = true;
+                },
+                background.stop, background.drop);
+        };
+        try {
+            background.run(render, [&] {
                 if (!tick.is_none()) tick();
             });
+        } catch (...) {
+            stopped_by_ = "failure";
+            throw;
+        }
         stopped_by_ = asked_to_stop && !background.interrupted && reason == StopReason::Interrupted
                           ? "callback"
                           : to_string(reason);

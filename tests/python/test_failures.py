@@ -1,0 +1,166 @@
+"""Passes that fail, and limits of memory."""
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import etendue as et
+from conftest import Hits
+from etendue import core
+
+
+class Fails(Hits):
+    """Fails as soon as it is told to."""
+
+    error: Exception | None = None
+
+    def sample(self, c: core.Sample) -> None:
+        if Fails.error is not None:
+            raise Fails.error
+        super().sample(c)
+
+
+def fail_after(passes: int, error: Exception, scene: et.Scene) -> None:
+    """Renders with an integrator that fails after so many passes."""
+
+    def callback(p: et.Progress) -> None:
+        if p.passes == passes:
+            Fails.error = error
+
+    Fails.error = error if passes == 0 else None
+    try:
+        et.render(scene, Fails(), spp=6, callback=callback, progress=False)
+    finally:
+        Fails.error = None
+
+
+def test_a_pass_beyond_a_limit_of_memory_leaves_those_before_it(scenes: Path, tmp_path: Path) -> None:
+    scene = et.load(scenes / "cornell.xml").build(resolution=(32, 16))
+
+    def render(light_paths: int, spp: int, seed: int = 0) -> et.Result:
+        return et.render(scene, f"vcm:memory=1,light_paths={light_paths}", spp=spp, seed=seed, progress=False)
+
+    def fits(light_paths: int) -> bool:
+        try:
+            render(light_paths, 1)
+        except RuntimeError as e:
+            assert not isinstance(e, et.RenderError)
+            return False
+        return True
+
+    # The most light paths that the first pass has room for. A later one has more vertices.
+    low, high = 1, 1 << 16
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    for seed in range(20):
+        try:
+            render(low, 100, seed)
+        except et.RenderError as e:
+            error = e
+            break
+        except RuntimeError:
+            pass
+    else:
+        pytest.fail(f"no pass failed with light_paths={low}")
+    result = error.result
+    assert 0 < result.passes < 100
+    assert f"pass {result.passes + 1} failed: " in str(error) and "need more than 1 MiB" in str(error)
+    assert isinstance(error, RuntimeError) and type(error.__cause__) is RuntimeError
+    assert result.stopped_by == result.stats["stopped_by"] == "failure"
+    np.testing.assert_array_equal(result.image, render(low, result.passes, seed).image)
+    result.save(tmp_path / "a.exr")
+    result.save(tmp_path / "a.etd")
+    # It goes on, and fails again.
+    with pytest.raises(et.RenderError, match="need more than 1 MiB") as again:
+        et.resume(tmp_path / "a.etd", scene, spp=100, progress=False)
+    assert again.value.result.passes == result.passes
+
+
+def test_integrators_in_python_that_fail(cornell: et.Scene) -> None:
+    with pytest.raises(ZeroDivisionError, match="at once"):
+        fail_after(0, ZeroDivisionError("at once"), cornell)
+    for passes in (1, 4):
+        with pytest.raises(et.RenderError, match=rf"pass {passes + 1} failed: later; the result of the .*pass") as e:
+            fail_after(passes, ZeroDivisionError("later"), cornell)
+        assert type(e.value.__cause__) is ZeroDivisionError
+        assert e.value.result.passes == passes
+        np.testing.assert_array_equal(
+            e.value.result.image, et.render(cornell, Hits(), spp=passes, progress=False).image)
+    with pytest.raises(et.RenderError, match="pass 3 failed: not enough memory"):
+        fail_after(2, MemoryError(), cornell)
+
+
+def test_the_error_takes_its_result_to_other_processes(cornell: et.Scene) -> None:
+    with pytest.raises(et.RenderError) as e:
+        fail_after(2, ValueError("later"), cornell)
+    copy = pickle.loads(pickle.dumps(e.value))
+    assert type(copy) is et.RenderError and str(copy) == str(e.value)
+    assert copy.result.stopped_by == "failure"
+    np.testing.assert_array_equal(copy.result.image, e.value.result.image)
+
+
+LIMITED = """
+import re
+import numpy as np
+import etendue as et
+
+def more(mebibytes):
+    data = int(re.search(r"VmData:\\s+(\\d+)", open("/proc/self/status").read()).group(1))
+    return f"{data // 1024 + mebibytes} M"
+
+class Greedy(et.Integrator):
+    is_full = False
+    def counts(self, light_paths):
+        return et.core.Counts(hit=1)
+    def sample(self, c):
+        if Greedy.is_full:
+            bytearray(1 << 30)
+
+def fill(p):
+    Greedy.is_full = p.passes == 2
+
+d = et.load({scene!r})
+scene = d.build(resolution=(16, 16), threads=2)
+et.render(scene, "bdpt", spp=1, threads=2)
+et.limit_memory(more(400))
+try:
+    et.render(d.build(resolution=(4000, 4000), threads=2), threads=2)
+except RuntimeError as e:
+    print(e)
+try:
+    et.render(scene, Greedy(), spp=8, callback=fill)
+except et.RenderError as e:
+    print(e, "/", type(e.__cause__).__name__, e.result.passes)
+    et.limit_memory(None)
+    e.result.save({image!r})
+print(len(bytearray(1 << 30)))
+et.limit_memory(1 << 40)
+"""
+
+
+def test_the_memory_of_the_process_is_limited(scenes: Path, tmp_path: Path) -> None:
+    image = tmp_path / "a.exr"
+    code = LIMITED.format(scene=str(scenes / "cornell.xml"), image=str(image))
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+    lines = result.stdout.splitlines()
+    assert "an image of 4000 x 4000 pixels needs" in lines[0] and "MiB are free" in lines[0]
+    assert lines[1].startswith("pass 3 failed: not enough memory") and lines[1].endswith(" / MemoryError 2")
+    assert lines[2] == str(1 << 30)
+    assert et.read_image(image).shape == (16, 16, 3)
+
+
+@pytest.mark.parametrize("size", ["4X", "much", "", "-1", "1.5GG", 0, -5])
+def test_what_is_no_size_of_memory(size: int | str) -> None:
+    with pytest.raises(ValueError, match="size must be a size such as 4G or 1.5G"):
+        et.limit_memory(size)
+
+
+def test_less_memory_than_there_is_taken() -> None:
+    with pytest.raises(RuntimeError, match="the memory cannot be limited to 1 MiB"):
+        et.limit_memory("1M")
