@@ -4,6 +4,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,7 +35,13 @@ struct SceneHandle : std::enable_shared_from_this<SceneHandle> {
     Scene scene;
     uint64_t fingerprint;  ///< scene_fingerprint(); files may change after the scene was built.
     bool lenient = false, watertight = false;  ///< As it was built.
-    Film film;  ///< For film points of single paths; never rendered into.
+
+    /// For film points of single paths; never rendered into. It takes memory from the first call on.
+    const Film& film();
+
+private:
+    std::once_flag film_made_;
+    std::unique_ptr<Film> film_;
 };
 using ScenePtr = std::shared_ptr<SceneHandle>;
 

@@ -23,8 +23,7 @@ std::atomic<bool> has_used_threads{false}, has_lost_threads{false};
 }  // namespace
 
 SceneHandle::SceneHandle(SceneDescription d, Scene s)
-    : description(std::move(d)), scene(std::move(s)), fingerprint(scene_fingerprint(description)),
-      film(scene.film(), scene.filter()) {
+    : description(std::move(d)), scene(std::move(s)), fingerprint(scene_fingerprint(description)) {
     const std::scoped_lock lock(scenes_mutex);
     scenes.emplace(&scene, this);
 }
@@ -32,6 +31,12 @@ SceneHandle::SceneHandle(SceneDescription d, Scene s)
 SceneHandle::~SceneHandle() {
     const std::scoped_lock lock(scenes_mutex);
     scenes.erase(&scene);
+}
+
+const Film& SceneHandle::film() {
+    std::call_once(film_made_,
+                   [&] { film_ = std::make_unique<Film>(scene.film(), scene.filter()); });
+    return *film_;
 }
 
 ScenePtr SceneHandle::of(const Scene& scene) {

@@ -74,7 +74,7 @@ PathPtr trace(const ScenePtr& scene, std::optional<std::pair<int, int>> pixel, u
     Sampler sampler(sampler_named(sampler_name, "sampler"), seed);
     sampler.start(pass, pixel ? pixel_index(scene->scene, *pixel) : path);
     if (pixel)
-        trace_eye_path(walk, scene->film, pixel_index(scene->scene, *pixel), sampler, out->own);
+        trace_eye_path(walk, scene->film(), pixel_index(scene->scene, *pixel), sampler, out->own);
     else
         trace_light_path(walk, sampler, out->own);
     return out;

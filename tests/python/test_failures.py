@@ -111,7 +111,7 @@ import etendue as et
 
 def more(mebibytes):
     data = int(re.search(r"VmData:\\s+(\\d+)", open("/proc/self/status").read()).group(1))
-    return f"{data // 1024 + mebibytes} M"
+    return str(data // 1024 + mebibytes) + " M"
 
 class Greedy(et.Integrator):
     is_full = False
