@@ -512,6 +512,28 @@ TEST_F(CheckpointTest, IsWholeWhateverCallFails) {
     }
 }
 
+/// Servers of files may say only in the end that there is no room.
+TEST_F(CheckpointTest, AFileThatCannotBeClosedOrMovedInIsNotTaken) {
+    const auto arguments = [&](const char* spp) {
+        return render("a.exr", {"-i", "path", "--spp", spp, "--checkpoint", path("faulty/a.etd"),
+                                "--checkpoint-every", "0", "--resume", "auto"});
+    };
+    expect_run(arguments("1"));
+    const std::string before = read_text(path("faulty/a.etd"));
+    // The first file that is closed is that of the check before the first pass.
+    for (const auto& [variables, why] :
+         {std::pair{"ETENDUE_FAULT=fail:2 ETENDUE_FAULT_CALL=close", "Disk quota exceeded"},
+          std::pair{"ETENDUE_FAULT=fail:1 ETENDUE_FAULT_CALL=lseek", "No space left on device"}}) {
+        SCOPED_TRACE(variables);
+        const ProgramResult r = start_with(variables, arguments("3")).wait();
+        EXPECT_TRUE(was_faulty());
+        EXPECT_EQ(r.status, 1);
+        EXPECT_NE(r.errors.find(why), std::string::npos) << r.errors;
+        EXPECT_TRUE(read_text(path("faulty/a.etd")) == before);
+        EXPECT_EQ(hidden_files("faulty"), 0);
+    }
+}
+
 /// The disk has room again a moment later.
 TEST_F(CheckpointTest, AfterAFailureTheNextOneIsTriedInTime) {
     const Arguments how = {"-i",   "path",        "--spp", "6", "--checkpoint-every",
