@@ -112,14 +112,9 @@ def run(blocks: list[Block], program: str, folder: Path) -> None:
     assert len(parts) == len(commands), text
     for c, part in zip(commands, parts, strict=True):
         *printed, status = part.rstrip("\n").splitlines()
-        c.printed = "\n".join(line for line in printed if is_shown(line)).rstrip("\n").splitlines()
+        c.printed = "\n".join(printed).rstrip("\n").splitlines()
         # The manual shows messages of the program, but no other failures.
         assert status == "0" or (c.printed or [""])[-1].startswith("etendue: "), f"$ {c.text}\n{part}"
-
-
-def is_shown(line: str) -> bool:
-    """Not what Ray says about itself."""
-    return not re.match(r"\d{4}-\d\d-\d\d [\d:,]+\s+\w+ |.*\bray\b.*\bFutureWarning|  warnings\.warn\(", line)
 
 
 def replayed(page: Path, program: str, folder: Path) -> tuple[str, list[str]]:
