@@ -6,6 +6,7 @@
 // ETENDUE_FAULT_MARK=FILE is made when that happens, or when a thread cannot be made
 // ETENDUE_SLOW_WRITE=MS   each write takes so many milliseconds longer
 // ETENDUE_NO_THREADS=1    std::thread finds no further thread
+// ETENDUE_NO_THREADS=memory  or no memory for its state
 // ETENDUE_CLOCK=N         the monotonic clock is N times as fast
 
 #include <dlfcn.h>
@@ -22,6 +23,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <new>
 
 namespace {
 
@@ -138,6 +140,20 @@ int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*
     }
     using Function = int(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*);
     return next<Function>("pthread_create")(thread, attributes, start, argument);
+}
+
+/// std::thread::_M_start_thread(_State_ptr, void (*)()), after the state was allocated.
+void start_thread(void* thread, void* state, void (*depend)()) __asm__(
+    "_ZNSt6thread15_M_start_threadESt10unique_ptrINS_6_StateESt14default_deleteIS1_EEPFvvE");
+void start_thread(void* thread, void* state, void (*depend)()) {
+    const char* const fault = std::getenv("ETENDUE_NO_THREADS");
+    if (fault && std::strcmp(fault, "memory") == 0) {
+        leave_mark();
+        throw std::bad_alloc();
+    }
+    next<void(void*, void*, void (*)())>(
+        "_ZNSt6thread15_M_start_threadESt10unique_ptrINS_6_StateESt14default_deleteIS1_EEPFvvE")(
+        thread, state, depend);
 }
 
 int clock_gettime(clockid_t clock, timespec* time) noexcept {

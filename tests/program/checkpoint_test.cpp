@@ -566,12 +566,17 @@ TEST_F(CheckpointTest, IsWrittenWhereThereIsNoFurtherThread) {
                        "--checkpoint-every", "1e-6", "--stats", path("stats.json")});
     };
     expect_run(arguments("whole"));
-    const ProgramResult r = start_with("ETENDUE_NO_THREADS=1", arguments("a")).wait();
-    EXPECT_TRUE(was_faulty());
-    EXPECT_EQ(r.status, 0);
-    EXPECT_EQ(r.errors, "");
-    EXPECT_EQ(bits("a.etd"), bits("whole.etd"));
-    EXPECT_GT(nlohmann::json::parse(read_text(path("stats.json")))["checkpoints"]["written"], 0);
+    for (const std::string lack : {"1", "memory"}) {
+        SCOPED_TRACE(lack);
+        fs::remove(path("a.etd"));
+        const ProgramResult r = start_with("ETENDUE_NO_THREADS=" + lack, arguments("a")).wait();
+        EXPECT_TRUE(was_faulty());
+        EXPECT_EQ(r.status, 0);
+        EXPECT_EQ(r.errors, "");
+        EXPECT_EQ(bits("a.etd"), bits("whole.etd"));
+        const auto report = nlohmann::json::parse(read_text(path("stats.json")));
+        EXPECT_GT(report["checkpoints"]["written"], 0);
+    }
 }
 
 /// The next checkpoint would need the room that it takes.
