@@ -125,6 +125,18 @@ TEST_F(FailuresTest, CommandsWithoutResultsEndAtTheFirstSignal) {
     EXPECT_FALSE(fs::exists(stats));
 }
 
+TEST_F(FailuresTest, ProcessesThatSrunStartsWithoutMpiAreNoticedOnce) {
+    for (const char* index : {"0", "1"}) {
+        const ProgramResult r =
+            run(render({"--spp", "1", "--quiet"}),
+                fmt::format("export SLURM_STEP_NUM_TASKS=2 SLURM_PROCID={};", index));
+        EXPECT_EQ(r.status, 0);
+        EXPECT_EQ(r.errors.find("warning: srun has started 2 processes") != std::string::npos,
+                  *index == '0')
+            << r.errors;
+    }
+}
+
 TEST_F(FailuresTest, FullDisksAreNamedAndKeepTheOldImage) {
     ASSERT_EQ(run(render({"--spp", "1"})).status, 0);
     const std::string before = read_text(image);
