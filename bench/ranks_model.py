@@ -3,7 +3,7 @@
 Passes are independent within a generation. Generations end after 1, 4, 16, 64 ... passes. Each rank renders whole passes. After
 each of them, a round, the ranks exchange its pixels. Before each generation, they gather the sums of the film and the learned
 state. They do the same for a checkpoint and for an image, which the first rank writes while the others wait;
-both are due once a minute, images less often if they would take more than 1 % of the time.
+both are due once a minute, or less often if they would take more than 1 % of the time.
 
 Assumptions: a pass takes half the time on twice as many cores; a rank sends and receives at the full rate of its network; passes
 take different times, normally distributed, and all ranks wait for the slowest one in each round; all costs grow with the number
@@ -16,8 +16,8 @@ import statistics
 # Bytes of a pixel; tests/unit/render/ranks_test.cpp counts them.
 EXCHANGED = 12  # Of a pass: three floats.
 GATHERED = 60  # Of the film: sums of values and of squares, the luminance of a pass, squares of luminance.
-CHECKPOINT_SECONDS = IMAGE_SECONDS = 60  # Between two of them.
-IMAGE_SHARE = 0.01  # Of the time, at most.
+INTERVAL = 60  # Seconds between two checkpoints, or two images.
+MOST_OF_TIME = 0.01  # That they take; otherwise there are fewer of them.
 SMALLEST_JITTER = 0.03
 
 
@@ -42,9 +42,9 @@ class Job:
         gather = (others * self.film_bytes + (ranks > 1) * self.learned_bytes) / self.bytes_a_second
         rounds = sum(math.ceil(size / ranks) for size in generations(passes))
         rendering = rounds * round_ + sum(1 for _ in generations(passes)) * gather
-        checkpoint, image = gather + self.checkpoint_seconds, gather + self.image_seconds
-        writing = (checkpoint / max(CHECKPOINT_SECONDS, round_)
-                   + image / max(IMAGE_SECONDS, image / IMAGE_SHARE, round_))
+        # Seconds of writing by second of rendering.
+        writing = sum(seconds / max(INTERVAL, seconds / MOST_OF_TIME, round_)
+                      for seconds in (gather + self.checkpoint_seconds, gather + self.image_seconds) if seconds > 0)
         return rendering * (1 + writing)
 
     def efficiency(self, ranks, passes):
