@@ -317,8 +317,8 @@ Vec2 film_offset(SamplerKind kind, uint64_t seed, uint32_t pass) {
 }
 
 bool Renderer::sample_again(uint64_t index, Workspace& work, ContributionSink& sink) const {
-    if (!has_last_pass_) return false;
-    const Numbers place = numbers(uint32_t(film_.passes() - 1));
+    if (!kept_pass_) return false;
+    const Numbers place = numbers(*kept_pass_);
     const float splat_scale = light_paths_ > 0 ? float(1.0 / double(light_paths_)) : 0.0f;
     work.is_observed = true;
     work.sums = integrator_->make_sums();
@@ -335,8 +335,8 @@ class Renderer::Pass {
 public:
     /// The pass that follows `passes` others.
     Pass(Renderer& renderer, uint32_t passes, const std::atomic<bool>& drop)
-        : r_(renderer), drop_(drop), index_(uint32_t(r_.settings_.first_pass) + passes),
-          numbers_(r_.numbers(passes)),
+        : r_(renderer), drop_(drop), passes_(passes),
+          index_(uint32_t(r_.settings_.first_pass) + passes), numbers_(r_.numbers(passes)),
           splat_scale_(r_.light_paths_ > 0 ? float(1.0 / double(r_.light_paths_)) : 0.0f) {}
 
     void learn() {
@@ -358,8 +358,11 @@ public:
                             film_offset(r_.settings_.sampler, numbers_.seed,
                                         r_.integrator_->eye_paths_of(numbers_.pass)));
         r_.integrator_->trace(context());
+        r_.kept_pass_ = passes_;
+        const std::function<void()>& meanwhile = r_.settings_.meanwhile;
         for_each_sample(r_.film_.sample_count(),
                         [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
+                            if (meanwhile && c.index % kChunk == 0) meanwhile();
                             sink.begin(c.index, c.light_paths);
                             r_.integrator_->sample(c, work);
                             sink.end();
@@ -439,7 +442,7 @@ private:
 
     Renderer& r_;
     const std::atomic<bool>& drop_;
-    uint32_t index_;
+    uint32_t passes_, index_;
     Numbers numbers_;
     float splat_scale_;
 };
@@ -462,12 +465,13 @@ void Renderer::drop_pass() {
     });
     workers_->take_stats();
     workers_->drop_sums();
+    kept_pass_.reset();
 }
 
 void Renderer::trace_own_pass(Round& round, const std::atomic<bool>& drop) {
     const auto passes = uint32_t(film_.passes());
     const int rank = settings_.ranks->index();
-    has_last_pass_ = false;
+    kept_pass_.reset();
     // If a discarded pass is traced again, its learning step is not repeated.
     if (learned_steps_ == LearningStep::of(passes).number) {
         Pass(*this, passes, drop).learn();
@@ -557,9 +561,9 @@ void Renderer::add_pass(Round& round, int rank) {
         stats_ += workers_->take_stats();
         stats_.rejected += film_.rejected() - round.rejected_before;
         integrator_->collect(round.sums);
-        has_last_pass_ = true;
         return;
     }
+    kept_pass_.reset();
     const auto* const bytes =
         reinterpret_cast<const std::byte*>(round.results[size_t(rank)].data());
     LearnedState result(std::vector<std::byte>(bytes, bytes + round.results[size_t(rank)].size()));
@@ -603,7 +607,7 @@ void Renderer::load_learned_state(std::vector<std::byte> bytes) {
     state.get(learned_steps_);
     state.get(is_prepared_);
     integrator_->load(state);
-    has_last_pass_ = false;
+    kept_pass_.reset();
 }
 
 void Renderer::save_sums(SectionWriter& to) const {

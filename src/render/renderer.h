@@ -46,6 +46,9 @@ struct RenderSettings : RenderOptions {
     PathSelection
         shown;  ///< Paths that are added to the image. Other paths are sampled, but not added.
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
+    /// If not empty, called by the threads of a pass again and again while its samples are traced. It may call
+    /// Renderer::sample_again(), and must not throw exceptions.
+    std::function<void()> meanwhile;
     /// The processes that render the image together, each of them by a Renderer with these settings. They must outlive it.
     const Ranks* ranks = &kAlone;
 };
@@ -113,9 +116,12 @@ public:
                    const std::atomic<bool>& interrupted,
                    const std::atomic<bool>& drop = kNeverDrop);
 
-    /// Traces sample `index` of the last pass again (see Film::sample_pixel()), with the data that the integrator keeps
-    /// of that pass, such as its light paths. Its contributions go to `sink`, its sub-paths to `work`. Must not run
-    /// during run(). Returns false if no pass was made, or if the integrator has the data of a discarded pass.
+    /// The pass whose data the integrator has, such as its light paths; the first one is 0. It is the last one or, in
+    /// RenderSettings::meanwhile, that in flight. Empty if no pass was made, or if the pass was discarded. Must not run
+    /// during run(), except in RenderSettings::meanwhile of this or another renderer that waits for it.
+    std::optional<uint32_t> kept_pass() const { return kept_pass_; }
+    /// Traces sample `index` of kept_pass() again (see Film::sample_pixel()). Its contributions go to `sink`, its sub-paths
+    /// to `work`. May be called where kept_pass() may. Returns false if there is no such pass.
     bool sample_again(uint64_t index, Workspace& work, ContributionSink& sink) const;
 
     /// With several processes: makes the film and the learned state of this one complete. To be called by all of them after
@@ -180,8 +186,7 @@ private:
     std::unique_ptr<Workers> workers_;
     uint64_t learned_steps_ = 0;  ///< Number of calls of Integrator::learn().
     bool is_prepared_ = false;    ///< Whether Integrator::prepare() has followed the last of them.
-    bool has_last_pass_ =
-        false;            ///< Whether the integrator has the data of the last finished pass.
+    std::optional<uint32_t> kept_pass_;
     int last_rank_ = -1;  ///< The process whose state is that after the last pass; -1: of each.
     bool ended_together_ = true;
     RenderStats stats_;

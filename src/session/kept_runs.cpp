@@ -196,7 +196,7 @@ std::shared_ptr<Session::Run> Session::load_run(const std::string& name) {
         if (!fits)
             throw std::runtime_error(
                 fmt::format("its technique images need more than {} MiB", kTechniqueBytes >> 20));
-        run->settings = settings_of(s.request, IntegratorSpec::parse(header.integrator));
+        run->settings = answering(settings_of(s.request, IntegratorSpec::parse(header.integrator)));
         auto renderer = std::make_unique<Renderer>(loaded->scene, run->settings);
         run->conditions = conditions_of(*renderer, loaded->scene, loaded->source, run->settings);
         file.resume(*renderer, run->conditions, run->log);

@@ -169,19 +169,20 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
 
 Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths) {
     check_pixel(renderer.film().geometry(), pixel);
-    if (renderer.film().passes() == 0) throw std::runtime_error("no pass is finished yet");
+    const std::optional<uint32_t> pass = renderer.kept_pass();
+    if (!pass)
+        throw std::runtime_error(
+            renderer.film().passes() == 0
+                ? "no pass is finished yet"
+                : "the light paths of the last pass are gone, because the pass after it was "
+                  "discarded or the run was opened from a file; continue the run for another pass");
     Replay result;
     Workspace work;
     PathRecorder recorder(renderer.film(), pixel, most_paths, work, result);
-    bool has_pass = true;
     renderer.film().for_each_sample_of(pixel, [&](uint64_t index, float h) {
-        recorder.begin(uint32_t(renderer.film().passes()) - 1, false, 0, h);
-        has_pass = has_pass && renderer.sample_again(index, work, recorder);
+        recorder.begin(*pass, false, 0, h);
+        renderer.sample_again(index, work, recorder);
     });
-    if (!has_pass)
-        throw std::runtime_error(
-            "the light paths of the last pass are gone, because the pass after it was discarded or "
-            "the run was opened from a file; continue the run for another pass");
     result.passes = 1;
     sort_by_luminance(result);
     return result;

@@ -1,7 +1,7 @@
 #pragma once
 // The paths that contributed to a pixel, traced again. Random numbers have addresses, so nothing is recorded during the
-// rendering. What pixels share, such as light paths, is not traced again: a method that shares data has them until its
-// next pass, so only the paths of the last pass can be traced.
+// rendering. What pixels share, such as light paths, is not traced again: a method that shares data has those of one pass,
+// the last one or that in flight.
 
 #include <string>
 #include <vector>
@@ -48,15 +48,15 @@ struct Replay {
 /// Which passes of an integrator can be traced again.
 enum class ReplayedPasses {
     Any,
-    Last,  ///< Pixels share data, or paths depend on what was learned.
+    Last,  ///< Pixels share data, or paths depend on what was learned: see replay_last().
     None,  ///< Paths are states of Markov chains, or are not kept.
 };
 ReplayedPasses replayed_passes(const IntegratorSpec& integrator);
 /// Joins pass no Russian roulette before shadow rays. The sum therefore agrees with the image on average, and exactly if
 /// the image was rendered with roulette=0. Throws std::runtime_error unless any pass can be traced again.
 Replay replay(const Scene& scene, const ReplayRequest& request);
-/// Contributions with t ≥ 2 in the last pass, with Russian roulette before shadow rays. Must not run during
-/// renderer.run(). Throws std::runtime_error if the pass cannot be traced again.
+/// Contributions with t ≥ 2 in Renderer::kept_pass(), with Russian roulette before shadow rays. May be called where that
+/// may. Throws std::runtime_error if there is no such pass.
 Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths);
 
 }  // namespace etendue

@@ -206,6 +206,38 @@ void Session::execute_commands() {
     }
 }
 
+void Session::ask(std::function<void()> question) {
+    {
+        const std::lock_guard lock(mutex_);
+        questions_.push_back(std::move(question));
+        has_questions_ = true;
+    }
+    post([this] { answer_questions(); });
+}
+
+void Session::answer_questions() noexcept {
+    while (has_questions_.load(std::memory_order_relaxed)) {
+        std::function<void()> question;
+        {
+            const std::lock_guard lock(mutex_);
+            if (questions_.empty()) return;
+            question = std::move(questions_.front());
+            questions_.pop_front();
+            has_questions_ = !questions_.empty();
+        }
+        try {
+            question();
+        } catch (...) {
+            // An answer for which there is no memory.
+        }
+    }
+}
+
+RenderSettings Session::answering(RenderSettings settings) {
+    settings.meanwhile = [this] { answer_questions(); };
+    return settings;
+}
+
 std::shared_ptr<Session::Run> Session::next_run() const {
     std::shared_ptr<Run> next;
     for (const auto& run : runs_)
@@ -444,7 +476,7 @@ int Session::start(const RunRequest& request) {
     s.request.technique_depth =
         request.seeds > 1 ? 0 : fitting_depth(scene, request.technique_depth);
     RenderSettings& settings = run->settings;
-    settings = settings_of(s.request, scene);
+    settings = answering(settings_of(s.request, scene));
     if (!request.user_paths.empty()) settings.integrator.params["user_paths"] = request.user_paths;
     s.request.integrator = settings.integrator.to_string();
     run->integrator = make_integrator(settings.integrator);
@@ -653,7 +685,7 @@ void Session::replay_last(int id, uint64_t pixel, size_t most_paths,
         const std::lock_guard lock(mutex_);
         return find(id);
     }();
-    post([run, pixel, most_paths, done = std::move(done)] {
+    ask([run, pixel, most_paths, done = std::move(done)] {
         Replay replay;
         try {
             if (run->totals) throw std::runtime_error("the run can only be looked at");

@@ -183,8 +183,8 @@ public:
     std::shared_ptr<const TechniqueSnapshot> techniques(int run);
     /// The finished renderings of a run with several seeds; empty for other runs.
     std::shared_ptr<const SeedSeries> seed_series(int run) const;
-    /// Calls `done` in the session's thread with the paths of a pixel of the last pass, at most `most_paths`, or with an
-    /// error.
+    /// Calls `done` in a thread of the session with the paths of a pixel, at most `most_paths`, or with an error. They are
+    /// those of the last pass or, while its samples are traced, of the pass in flight, whose end is not waited for.
     void replay_last(int run, uint64_t pixel, size_t most_paths,
                      std::function<void(const Replay&, const std::string& error)> done);
     /// Charges processor time, in seconds, that was spent on a snapshot outside the session.
@@ -200,6 +200,11 @@ private:
     /// Posts a part of the work of a run.
     void post(const std::shared_ptr<Run>& run, std::function<void(Run&)> work);
     void execute_commands();
+    /// Calls `question`, which changes no run, in a thread of the session, while a pass is traced or between passes.
+    void ask(std::function<void()> question);
+    void answer_questions() noexcept;
+    /// Settings of a rendering whose threads answer questions.
+    RenderSettings answering(RenderSettings settings);
     /// Carries out a part of the work of a run. An exception ends the run, which keeps its passes.
     template <class Work>
     void guard(Run& run, const Work& work) noexcept;
@@ -251,7 +256,7 @@ private:
     mutable std::mutex mutex_;  ///< Guards all members below, and the status of runs.
     std::condition_variable wake_;
     std::string load_error_;
-    std::deque<std::function<void()>> commands_;
+    std::deque<std::function<void()>> commands_, questions_;
     std::vector<std::shared_ptr<Run>> runs_;
     std::vector<KeptRun> kept_;
     SnapshotBudget budget_;
@@ -262,7 +267,8 @@ private:
 
     std::atomic<bool> turn_over_{false};  ///< The current turn ends after its pass.
     std::atomic<bool> drop_{false};       ///< The current pass is to be discarded.
-    int turn_of_ = 0;                     ///< Id of the run whose turn it is; 0: none.
+    std::atomic<bool> has_questions_{false};
+    int turn_of_ = 0;  ///< Id of the run whose turn it is; 0: none.
     uint64_t turns_ = 0;
     /// Writes files, and reads runs. Outlives the threads.
     Workers writer_{1, Workers::AtEnd::FinishAll};

@@ -206,8 +206,16 @@ class LastReplayOf : public ::testing::TestWithParam<const char*> {};
 TEST_P(LastReplayOf, SumsToTheLastPass) {
     const Scene scene = room_with_ball();
     constexpr int kPasses = 6;
-    const RenderSettings settings = settings_of(GetParam());
+    RenderSettings settings = settings_of(GetParam());
+    std::vector<Rgb> in_flight;
+    const Renderer* made = nullptr;
+    settings.meanwhile = [&] {
+        if (made->kept_pass() != uint32_t(kPasses - 1)) return;
+        for (uint64_t pixel = 0; pixel < scene.film().pixel_count(); ++pixel)
+            in_flight.push_back(replay_last(*made, pixel, 1).sum);
+    };
     Renderer renderer(scene, settings);
+    made = &renderer;
     EXPECT_THROW(replay_last(renderer, 0, 10), std::runtime_error);
     const auto sums = [&](uint64_t passes) {
         RenderLimits limits;
@@ -223,8 +231,10 @@ TEST_P(LastReplayOf, SumsToTheLastPass) {
     const std::vector<Rgb> before = sums(kPasses - 1), after = sums(kPasses);
     size_t paths = 0;
     bool has_pairs = false;
+    ASSERT_EQ(in_flight.size(), before.size());
     for (uint64_t pixel = 0; pixel < before.size(); ++pixel) {
         const Replay last = replay_last(renderer, pixel, 100000);
+        EXPECT_EQ(last.sum, in_flight[pixel]) << "otherwise while the pass is traced";
         const Rgb expected = after[pixel] - before[pixel];
         for (int c = 0; c < 3; ++c)
             ASSERT_NEAR(last.sum[c], expected[c], 2e-4f * (1 + after[pixel][c])) << pixel;

@@ -496,6 +496,23 @@ TEST(Session, LoadsDuringAPass) {
     session.stop_all(true);
 }
 
+/// A pass in flight is traced again while it is traced, so that the answer does not wait for its end: the number of
+/// finished passes is then the index of the pass.
+TEST(Session, ReplaysDuringAPass) {
+    Session session(slow_room, 1);
+    ASSERT_TRUE(wait_for_scene(session));
+    const int run = session.start(run_of("vcm:max_depth=12", 1u << 30));
+    ASSERT_TRUE(wait_for([&] { return session.status(run).passes == 1; }));
+    std::promise<std::pair<uint32_t, uint64_t>> answer;
+    session.replay_last(run, 20100, 10, [&](const Replay& r, const std::string&) {
+        answer.set_value({r.paths.empty() ? 0 : r.paths.front().pass, session.status(run).passes});
+    });
+    const auto [pass, finished] = answer.get_future().get();
+    EXPECT_EQ(pass, 1u);
+    EXPECT_EQ(finished, 1u);
+    session.stop_all(true);
+}
+
 TEST(Session, ReplaysNoPixelOutsideOfTheImage) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));
