@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <new>
 #include <optional>
 #include <stdexcept>
 
@@ -22,6 +21,7 @@
 #include "path_lengths.h"
 #include "render/render_request.h"
 #include "scene_options.h"
+#include "system/failure.h"
 #include "system/output_file.h"
 
 namespace etendue {
@@ -239,10 +239,9 @@ void CompareCommand::run() const {
             failures += comparison->failures.size();
             writer.add(*comparison);
             ++compared;
-        } catch (const std::exception& e) {
+        } catch (...) {
             if (scenes.size() == 1) throw;
-            const bool is_memory = dynamic_cast<const std::bad_alloc*>(&e) != nullptr;
-            const std::string why = is_memory ? "not enough memory" : e.what();
+            const std::string why = caught();
             ++failures;
             writer.add_failure(scenes[i], why);
             message("warning: {}: {}\n", scenes[i], why);

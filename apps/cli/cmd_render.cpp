@@ -35,6 +35,7 @@
 #include "scene_options.h"
 #include "system/available_memory.h"
 #include "system/descriptor.h"
+#include "system/failure.h"
 #include "system/memory_limit.h"
 #include "system/output_file.h"
 #include "system/ranks.h"
@@ -285,14 +286,9 @@ std::unique_ptr<Renderer> make_renderer(const Scene& s, const RenderSettings& se
 /// Calls `task`. Adds the reason to `failures` if it fails.
 template <class Task>
 bool attempt(std::vector<std::string>& failures, const Task& task) {
-    try {
-        task();
-        return true;
-    } catch (const std::bad_alloc&) {
-        failures.push_back("not enough memory");
-    } catch (const std::exception& e) {
-        failures.push_back(e.what());
-    }
+    std::string failure = failure_of(task);
+    if (failure.empty()) return true;
+    failures.push_back(std::move(failure));
     return false;
 }
 

@@ -15,6 +15,7 @@ from . import _etendue
 from ._etendue import Scene
 from ._html import image_html, png_of
 from ._integrator import Integrator
+from ._progress import harmless
 
 Image = NDArray[np.float32]
 
@@ -428,11 +429,11 @@ def _run(
     progress: bool | None,
     live: bool,
 ) -> Result:
-    widget: Any = None
+    update_view: Callable[..., None] | None = None
     if live:
         from ._show import LiveView
 
-        widget = LiveView()
+        update_view = harmless(LiveView().update)
 
     # Whether an exception is that of a function which is called between passes. It ends no pass.
     is_own = False
@@ -451,8 +452,8 @@ def _run(
     def between_passes() -> object:
         now = rendering.now()
         assert now is not None
-        if widget is not None:
-            widget.update(rendering.image())
+        if update_view is not None:
+            update_view(rendering.image())
         if callback is None:
             return None
         return callback(Progress(*now, film=FilmView(rendering), _rendering=rendering))
@@ -461,7 +462,7 @@ def _run(
     interval = 0.0 if callback is not None else 0.5
     bar = _Bar(rendering, progress)
     try:
-        stopped_by = rendering.run(guarded(bar.update), guarded(between_passes) if wants_calls else None, interval)
+        stopped_by = rendering.run(guarded(harmless(bar.update)), guarded(between_passes) if wants_calls else None, interval)
     except Exception as failure:
         if is_own or rendering.passes == 0:
             raise
@@ -473,10 +474,10 @@ def _run(
             Result(rendering, "failure", aovs),
         ) from failure
     finally:
-        bar.close()
+        harmless(bar.close)()
     if rendering.passes == 0:
         raise KeyboardInterrupt("interrupted in the first pass")
     result = Result(rendering, stopped_by, aovs)
-    if widget is not None:
-        widget.update(result.image, is_last=True)
+    if update_view is not None:
+        update_view(result.image, is_last=True)
     return result

@@ -15,6 +15,7 @@ from . import _etendue
 from ._etendue import Description, Scene
 from ._html import auto_exposure, frame_of, image_html, table_html
 from ._integrator import Integrator
+from ._progress import harmless
 from ._scenes import load
 
 SceneLike = Scene | Description | str | PathLike[str]
@@ -37,11 +38,17 @@ def _status(progress: bool | None) -> tuple[Callable[[str], None] | None, Callab
     if progress is False or (progress is None and not sys.stderr.isatty()):
         return None, lambda: None
 
+    @harmless
     def show(text: str) -> None:
         sys.stderr.write(f"\r{text}\033[K")
         sys.stderr.flush()
 
-    return show, lambda: show("") or sys.stderr.write("\r") and None
+    @harmless
+    def clear() -> None:
+        sys.stderr.write("\r\033[K")
+        sys.stderr.flush()
+
+    return show, clear
 
 
 class CompareReport:

@@ -16,6 +16,7 @@
 #include "compare/default_reference.h"
 #include "compare/report.h"
 #include "render/render_request.h"
+#include "system/failure.h"
 #include "values.h"
 #include "verify/report_json.h"
 #include "verify/verify.h"
@@ -156,10 +157,8 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
                     out->all.push_back(compare(
                         scene.scene, *reference, jobs[i].settings,
                         [&](const std::string& text) { status.set(text); }, stop));
-                } catch (const std::bad_alloc&) {
-                    fail(i, "not enough memory");
-                } catch (const std::runtime_error& e) {
-                    fail(i, e.what());
+                } catch (...) {
+                    fail(i, caught());
                 }
         },
         listener);

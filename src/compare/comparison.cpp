@@ -10,6 +10,7 @@
 #include "compare/memory.h"
 #include "image/flip.h"
 #include "render/warnings.h"
+#include "system/failure.h"
 
 namespace etendue {
 namespace {
@@ -24,13 +25,7 @@ struct MethodRun {
     /// Calls `task`. If it fails, the method gets no further turns, and the others go on.
     template <class Task>
     void attempt(const Task& task) {
-        try {
-            if (failure.empty()) task();
-        } catch (const std::bad_alloc&) {
-            failure = "not enough memory";
-        } catch (const std::runtime_error& e) {
-            failure = e.what();
-        }
+        if (failure.empty()) failure = failure_of(task);
     }
 };
 
@@ -281,7 +276,11 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
         m.flip_map = std::move(flip.map);
         if (settings.technique_depth == 0 || interrupted.load()) continue;
         progress(fmt::format("{}: technique images", m.name()));
-        render_techniques(scene, settings, m, interrupted);
+        const std::string failure =
+            failure_of([&] { render_techniques(scene, settings, m, interrupted); });
+        if (!failure.empty())
+            out.failures.push_back(
+                fmt::format("technique images of {} failed: {}", m.name(), failure));
     }
     std::erase_if(out.methods, [](const Method& m) { return m.runs.empty(); });
     if (out.methods.empty() && !out.failures.empty()) throw std::runtime_error(out.failures[0]);

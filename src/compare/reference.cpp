@@ -8,6 +8,7 @@
 #include "image/image_io.h"
 #include "math/content_hash.h"
 #include "render/warnings.h"
+#include "system/failure.h"
 
 namespace etendue {
 namespace {
@@ -156,12 +157,10 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
     r.pixels = mean_of(r.first, r.second);
     if (mean > 0) r.mean_relative_error = std::sqrt(variance) / mean;
     r.warnings = warnings(stats);
-    try {
-        write_reference(r, stats);
-    } catch (const std::runtime_error& e) {
-        // It serves this comparison all the same.
-        r.warnings.push_back(fmt::format("the reference cannot be kept: {}", e.what()));
-    }
+    // Otherwise, it serves this comparison all the same.
+    const std::string failure = failure_of([&] { write_reference(r, stats); });
+    if (!failure.empty())
+        r.warnings.push_back(fmt::format("the reference cannot be kept: {}", failure));
     if (!damage.empty()) r.warnings.push_back(damage);
     return r;
 }

@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <exception>
-#include <new>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -20,6 +19,7 @@
 #include "render/statistics_section.h"
 #include "sampler/pilot_seed.h"
 #include "system/available_memory.h"
+#include "system/failure.h"
 #include "system/memory_limit.h"
 
 namespace etendue {
@@ -199,18 +199,6 @@ std::unique_ptr<tbb::global_control> allow_threads(int threads) {
 
 /// Exception that ends a pass which is to be discarded.
 struct PassDropped {};
-
-std::string what_of(const std::exception_ptr& failure) {
-    try {
-        std::rethrow_exception(failure);
-    } catch (const std::bad_alloc&) {
-        return "not enough memory";
-    } catch (const std::exception& e) {
-        if (*e.what() != '\0') return e.what();
-    } catch (...) {
-    }
-    return "a failure without a name";
-}
 
 /// Throws if several processes cannot render together.
 void check_ranks(const RenderSettings& settings, const Integrator& integrator) {
@@ -525,7 +513,8 @@ Renderer::Round Renderer::make_round(const RenderLimits& limits, const std::atom
     round.is_incomplete = first_bad != outcomes.end();
     if (std::find(outcomes.begin(), outcomes.end(), Outcome::Failed) != outcomes.end()) {
         const std::vector<std::string> failures =
-            ranks.gather(round.failure ? what_of(round.failure) : "");
+            ranks.gather(round.failure ? failure_of([&] { std::rethrow_exception(round.failure); })
+                                       : std::string());
         for (size_t r = 0; r < failures.size() && !round.failure; ++r)
             if (!failures[r].empty())
                 round.failure = std::make_exception_ptr(

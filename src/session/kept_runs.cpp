@@ -1,7 +1,6 @@
 // Runs of a session that are kept in a folder.
 
 #include <algorithm>
-#include <new>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 #include "session/file_version.h"
 #include "session/run.h"
 #include "session/run_record.h"
+#include "system/failure.h"
 #include "system/threads.h"
 
 namespace etendue {
@@ -19,23 +19,6 @@ namespace {
 constexpr double kMostForFiles = 0.01;
 
 constexpr const char* kTooMany = "too many files wait to be written; try again";
-
-/// What is being caught, in words.
-std::string caught() noexcept {
-    try {
-        try {
-            throw;
-        } catch (const std::bad_alloc&) {
-            return "not enough memory";
-        } catch (const std::exception& e) {
-            return e.what();
-        } catch (...) {
-            return "unknown failure";
-        }
-    } catch (const std::bad_alloc&) {
-        return "no memory";  // short enough to need none
-    }
-}
 
 Estimator estimator_named(const std::string& name) {
     for (const Estimator e : {Estimator::Unbiased, Estimator::Consistent, Estimator::Biased})

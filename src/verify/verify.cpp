@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <new>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "render/warnings.h"
+#include "system/failure.h"
 #include "verify/comparisons.h"
 #include "verify/error_slope.h"
 #include "verify/sample_plan.h"
@@ -80,10 +80,8 @@ bool attempt(const IntegratorSpec& method, VerifyReport& report, const Task& tas
         return true;
     } catch (const VerifyInterrupted&) {
         report.interrupted = true;
-    } catch (const std::bad_alloc&) {
-        report.failures.push_back(method.to_string() + ": not enough memory");
-    } catch (const std::runtime_error& e) {
-        report.failures.push_back(fmt::format("{}: {}", method.to_string(), e.what()));
+    } catch (...) {
+        report.failures.push_back(fmt::format("{}: {}", method.to_string(), caught()));
     }
     return false;
 }

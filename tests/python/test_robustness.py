@@ -1,7 +1,9 @@
 """Arguments that are wrong, objects that outlive others, threads, forks, and files that cannot be written."""
 
 import gc
+import io
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -14,8 +16,8 @@ import numpy as np
 import pytest
 
 import etendue as et
-from conftest import ROOT
-from etendue import _etendue
+from conftest import ROOT, Hits
+from etendue import _etendue, _render, _show
 
 
 @pytest.mark.parametrize("shape", [(8, 8), (8, 8, 0), (8, 8, 1), (8, 8, 2), (8, 8, 4), (0, 0, 3), (8, 0, 3), (8, 8, 3, 1)])
@@ -228,10 +230,23 @@ def test_other_threads_run_while_images_are_computed(tmp_path: Path, scenes: Pat
         "load_string": lambda: et.load_string(long),
         "pilot": lambda: _etendue.Rendering(scene, "upg+pssmlt", 1, None, None, 0, "sobol", "spread", 1, 0, 0),
     }
-    for name, task in tasks.items():
-        ticks, seconds = _ticks_during(task)
-        # A thread that waits for the GIL gets none in all that time.
-        assert ticks > 5 or seconds < 0.02, (name, ticks, seconds)
+    # Images of many pixels, and little else, so that a pass takes little time.
+    large = np.resize(image, (1500, 2000, 3))
+    et.write_image(tmp_path / "large.exr", large)
+    codes = et.tonemap(large)
+    sky = {"type": "scene", "sensor": {"type": "perspective"}, "sky": {"type": "constant"}}
+    empty = et.render(et.load_dict(sky).build(resolution=(2000, 1500)), "path", spp=2, progress=False)
+    tasks |= {
+        "tonemap": lambda: et.tonemap(large),
+        "read": lambda: et.read_image(tmp_path / "large.exr"),
+        "png": lambda: _etendue.png(codes),
+        "image": empty._rendering.image,
+        "variance": empty._rendering.variance,
+        "half_width": empty._rendering.half_width,
+    }
+    measured = {name: _ticks_during(task) for name, task in tasks.items()}
+    # A thread that waits for the GIL gets none in all that time.
+    assert not {name: m for name, m in measured.items() if m[0] <= 5 and m[1] >= 0.02}, measured
 
 
 def _child(code: str) -> str:
@@ -239,6 +254,45 @@ def _child(code: str) -> str:
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, env=os.environ)
     assert result.returncode == 0, result.stderr
     return result.stdout
+
+
+COMMA = """
+import locale, sys
+import numpy as np
+import etendue as et
+
+if sys.argv[1]:
+    locale.setlocale(locale.LC_ALL, sys.argv[1])
+    assert locale.localeconv()["decimal_point"] == ","
+folder = sys.argv[2]
+for name in sys.argv[3:]:
+    scene = et.load(name, lenient=True).build(resolution=(8, 6))
+    result = et.render(scene, "bdpt:roulette=0.25,max_depth=5", spp=1, threads=1, progress=False)
+    print(name, result.image.tobytes().hex(), result.stats["mean_luminance"])
+    result.save(folder + "/a.exr")
+    result.save(folder + "/a.pfm")
+    print(et.read_image(folder + "/a.pfm").tobytes().hex() == result.image.tobytes().hex())
+print(et.read_image(folder + "/half.pfm"), dict(et.diff(result.image, result.image * 0.5)))
+print(et.verify(scene, ["bdpt:roulette=0.5"], spp=1, runs=8, lengths=(1, 2), alpha=0.001, threads=1, progress=False).data["methods"][0]["image"])
+"""
+
+
+def test_numbers_do_not_depend_on_the_locale(tmp_path: Path) -> None:
+    made = subprocess.run(["localedef", "-i", "de_DE", "-f", "UTF-8", str(tmp_path / "de_DE.UTF-8")],
+                          capture_output=True, check=False) if shutil.which("localedef") else None
+    if made is None or not (tmp_path / "de_DE.UTF-8").exists():
+        pytest.skip("no locale with a decimal comma can be made here")
+    (tmp_path / "half.pfm").write_bytes(b"Pf\n1 1\n-0.5\n" + np.float32(0.75).tobytes())
+    formats = ROOT / "tests" / "scenes" / "formats"
+    names = ["gltf/materials.gltf", "mitsuba3/shapes.xml", "mitsuba06/media.xml", "pbrt3/materials.pbrt", "pbrt4/lights.pbrt"]
+    out = [
+        subprocess.run([sys.executable, "-c", COMMA, name, str(tmp_path), *[str(formats / n) for n in names]],
+                       capture_output=True, text=True, timeout=300, check=False,
+                       env={**os.environ, "LOCPATH": str(tmp_path)})
+        for name in ("", "de_DE.UTF-8")
+    ]
+    assert out[0].returncode == 0 == out[1].returncode, (out[0].stderr, out[1].stderr)
+    assert out[0].stdout == out[1].stdout
 
 
 THREADS = """
@@ -352,3 +406,56 @@ def test_reports_keep_what_does_not_fail(cornell: et.Scene, tmp_path: Path) -> N
     with pytest.warns(RuntimeWarning, match="1 MiB"):
         verified = et.verify(cornell, ["path", fails], spp=1, runs=8, lengths=(1, 2), progress=False)
     assert [m["method"] for m in verified.data["methods"]] == ["path"]
+
+
+class Raises(Hits):
+    """Fails in samples from a column on."""
+
+    def __init__(self, column: int) -> None:
+        super().__init__()
+        self.column = column
+
+    def sample(self, c: et.core.Sample) -> None:
+        if c.pixel[0] >= self.column:
+            raise LookupError("no such path")
+        super().sample(c)
+
+
+def test_reports_keep_what_does_not_raise(cornell: et.Scene, demo: et.Scene, tmp_path: Path) -> None:
+    def compare(methods: list[str | et.Integrator], **more: Any) -> et.CompareReport:
+        return et.compare([cornell, demo], methods, spp=1, reference_spp=2, references=tmp_path, techniques=0,
+                          progress=False, **more)
+
+    with pytest.warns(RuntimeWarning, match="no such path"):
+        report = compare([Raises(20), "path"])
+    assert [[m["name"] for m in scene["methods"]] for scene in report.data] == [["path"]] * 2
+    # The reference of the second scene fails, which has more columns than the first one.
+    with pytest.warns(RuntimeWarning, match="(?s)demo.xml could not be compared.*no such path"):
+        report = compare(["path"], reference_method=Raises(36))
+    assert [Path(scene["file"]).name for scene in report.data] == ["cornell.xml"]
+    with pytest.warns(RuntimeWarning, match="no such path"):
+        verified = et.verify(cornell, ["path", Raises(20)], spp=1, runs=8, lengths=(1, 2), progress=False)
+    assert [m["method"] for m in verified.data["methods"]] == ["path"]
+
+
+class _Closed(io.StringIO):
+    """A standard error that is gone."""
+
+    def write(self, text: str) -> int:
+        raise BrokenPipeError("gone")
+
+
+def test_what_shows_the_progress_may_fail(cornell: et.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> None:
+        raise BrokenPipeError("gone")
+
+    with monkeypatch.context() as patch, pytest.warns(RuntimeWarning, match="cannot be shown: gone"):
+        patch.setattr(sys, "stderr", _Closed())
+        report = et.compare(cornell, ["path"], spp=1, reference_spp=2, references=tmp_path, techniques=0, progress=True)
+        verified = et.verify(cornell, ["path"], spp=1, runs=8, lengths=(1, 2), progress=True)
+    assert len(report.data) == len(verified.data["methods"]) == 1
+    for shows in _render._Bar, _show.LiveView:
+        monkeypatch.setattr(shows, "update", fail)
+    monkeypatch.setattr(_render._Bar, "close", fail)
+    with pytest.warns(RuntimeWarning, match="cannot be shown: gone"):
+        assert et.render(cornell, "path", spp=64, progress=True, live=True).passes == 64
