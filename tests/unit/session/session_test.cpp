@@ -503,13 +503,19 @@ TEST(Session, ReplaysDuringAPass) {
     ASSERT_TRUE(wait_for_scene(session));
     const int run = session.start(run_of("vcm:max_depth=12", 1u << 30));
     ASSERT_TRUE(wait_for([&] { return session.status(run).passes == 1; }));
-    std::promise<std::pair<uint32_t, uint64_t>> answer;
-    session.replay_last(run, 20100, 10, [&](const Replay& r, const std::string&) {
-        answer.set_value({r.paths.empty() ? 0 : r.paths.front().pass, session.status(run).passes});
-    });
-    const auto [pass, finished] = answer.get_future().get();
+    uint32_t pass = 0;
+    while (pass == 0) {  // until the second pass is traced
+        std::promise<std::pair<uint32_t, uint64_t>> answer;
+        session.replay_last(run, 20100, 10, [&](const Replay& r, const std::string& error) {
+            EXPECT_EQ(error, "");
+            answer.set_value(
+                {r.paths.empty() ? 0 : r.paths.front().pass, session.status(run).passes});
+        });
+        const auto [of_pass, finished] = answer.get_future().get();
+        ASSERT_EQ(finished, 1u);
+        pass = of_pass;
+    }
     EXPECT_EQ(pass, 1u);
-    EXPECT_EQ(finished, 1u);
     session.stop_all(true);
 }
 
