@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <locale>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -88,6 +89,7 @@ void replace_mixture(PlainScene& s, int index) {
     std::string text = mixture.find("weights") ? *mixture.find("weights")->as<std::string>() : "";
     std::replace(text.begin(), text.end(), ',', ' ');
     std::istringstream in(text);
+    in.imbue(std::locale::classic());  // not that of the program around this library
     std::vector<double> weights;
     for (double w; in >> w;) weights.push_back(w);
     std::vector<int> materials;

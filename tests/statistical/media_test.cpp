@@ -36,13 +36,33 @@ Rgb through_ink(float distance) {
 class MediaOfEnds : public ::testing::TestWithParam<std::string> {
 protected:
     /// Few light paths reach the small image.
-    static uint64_t passes() { return GetParam() == "light" ? 1 << 15 : 1024; }
+    static uint64_t passes() { return GetParam() == "light" ? 1 << 15 : 2048; }
+    static Tiles tiles(const Scene& scene, uint64_t seed) {
+        TileOptions options{.passes = passes(), .tiles = 2, .seed = seed};
+        const std::string& method = GetParam();
+        // Each pass has chains of its own, so that passes are independent.
+        if (method.ends_with("mlt")) {
+            options.passes = 512;
+            return render_tiles(scene, fmt::format("{}:chains=16,groups=512", method), options);
+        }
+        if (!method.starts_with("ppm")) return render_tiles(scene, method, options);
+        // The passes of `ppm` have the same eye paths, so that only other seeds show its spread.
+        Tiles of_seeds(2);
+        options.passes = 64;
+        for (uint64_t i = 0; i < 64; ++i) {
+            options.seed = 100 * seed + i;
+            const Tiles one = render_tiles(scene, method, options);
+            for (size_t k = 0; k < one.values.size(); ++k)
+                of_seeds.values[k].add(one.values[k].mean());
+        }
+        return of_seeds;
+    }
     /// The same image of a scene with ink, and of one without it and with a darker emitter.
-    void expect_same(const std::string& ink, const std::string& clear) const {
-        expect_same_image(
-            render_tiles(build(ink), GetParam(), {.passes = passes(), .tiles = 2}),
-            render_tiles(build(clear), GetParam(), {.passes = passes(), .tiles = 2, .seed = 5}),
-            0.2, GetParam());
+    void expect_same(const std::string& ink, const std::string& clear,
+                     double resolution = 0.2) const {
+        const Tiles absorbed = tiles(build(ink), 1);
+        EXPECT_GT(absorbed.values.back().mean(), 0);
+        expect_same_image(absorbed, tiles(build(clear), 5), resolution, GetParam());
     }
 };
 
@@ -50,14 +70,32 @@ TEST_P(MediaOfEnds, PointInABall) {
     expect_same(view_of_wall() + kBall + bulb(Rgb(20)), view_of_wall() + bulb(through_ink(1) * 20));
 }
 
-// The lamp is so small that all rays pass nearly the same distance in the ball.
+// A wall in the shadow of a disc, and a floor that lights it: all light comes along light paths, photons, or connections to
+// them. No path meets the ball twice.
+TEST_P(MediaOfEnds, PointInABallThatLightsAFloor) {
+    const std::string corner =
+        view_of_wall() +
+        rectangle("<scale value=\"2,0.75,1\"/><rotate x=\"1\" angle=\"-90\"/>"
+                  "<translate value=\"0,-2,-2.25\"/>",
+                  diffuse("0.9")) +
+        "<shape type=\"disk\"><transform name=\"to_world\"><scale value=\"0.8\"/><translate "
+        "z=\"-1.1\"/></transform>" +
+        diffuse("0") + "</shape>";
+    // Few splats reach the wall. Light paths that start outside of the ink are up to seven times as bright.
+    expect_same(corner + kBall + bulb(Rgb(20)), corner + bulb(through_ink(1) * 20),
+                GetParam() == "light" ? 1 : 0.3);
+}
+
+// The lamp is so small that all rays pass nearly the same distance in the ball: its points are nearer to the wall than the
+// centre by 2/3 of the radius, on the mean over what the wall sees of it.
 TEST_P(MediaOfEnds, LampInABall) {
     const auto lamp = [](Rgb factor) {
         return sphere("0,0,0", "0.02",
                       diffuse("0") + "<emitter type=\"area\">" + rgb("radiance", factor * 20000) +
                           "</emitter>");
     };
-    expect_same(view_of_wall() + kBall + lamp(Rgb(1)), view_of_wall() + lamp(through_ink(0.98f)));
+    expect_same(view_of_wall() + kBall + lamp(Rgb(1)),
+                view_of_wall() + lamp(through_ink(1 - 0.02f * 2 / 3)));
 }
 
 TEST_P(MediaOfEnds, SensorInABall) {
@@ -78,13 +116,22 @@ TEST_P(MediaOfEnds, LampAcrossTheSurface) {
     };
     const Scene half = scene(kBall);
     ASSERT_EQ(half.emitter(0).medium, kSeveralMedia);
-    expect_same_image(render_tiles(half, GetParam(), {.passes = passes(), .tiles = 2}),
+    if (GetParam().starts_with("ppm"))
+        GTEST_SKIP() << "its density estimate is wide at the foot of the wall";
+    expect_same_image(tiles(half, 1),
                       render_tiles(half, "path", {.passes = 4096, .tiles = 2, .seed = 5}), 0.2,
                       GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(All, MediaOfEnds,
-                         ::testing::Values("path", "light", "bdpt", "vcm", "upg+bdpt", "mlt"),
+                         ::testing::Values("path", "light", "bdpt", "bdpt:connections=cache",
+                                           "pcbpt", "vcm", "upg+bdpt",
+                                           "sppm:light_paths=700,radius=0.5", "pssmlt", "mmlt",
+                                           "mlt"),
+                         name_of_integrator);
+INSTANTIATE_TEST_SUITE_P(Long, MediaOfEnds,
+                         ::testing::Values("ppm:light_paths=1000,radius=0.5", "pm", "mps",
+                                           "mps:target=path", "upg+pssmlt"),
                          name_of_integrator);
 
 }  // namespace

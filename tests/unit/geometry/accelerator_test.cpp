@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "geometry/ray_tracer.h"
 #include "random.h"
 
 namespace etendue {
@@ -55,6 +56,14 @@ TEST(Accelerator, ClosedMeshesHaveNoGaps) {
         missed += !accelerator.intersect(ray, hit) || !accelerator.occluded(ray);
     }
     EXPECT_EQ(missed, 0);
+}
+
+/// Images of different machines are the same to the bit only with the same instruction set, which checkpoints name.
+TEST(RayTracer, NamesItsInstructionSet) {
+    EXPECT_TRUE(ray_tracer().starts_with("Embree ")) << ray_tracer();
+#if defined(__x86_64__)
+    EXPECT_NE(ray_tracer().find(", isa="), std::string::npos) << ray_tracer();
+#endif
 }
 
 }  // namespace

@@ -487,6 +487,41 @@ TEST_P(Paths, ThatAreNotFiniteAreCounted) {
     }
 }
 
+/// In a closed sphere no ray is lost and all points see each other. There, bidirectional mutations rarely propose what cannot
+/// be a new path, whatever is traced.
+TEST(Bidirectional, FewProposalsAreVoid) {
+    PathPasses passes(
+        build(sensor("0,0,0.99", "0,0,0", kPixels, "172") +
+              "<shape type=\"sphere\"><boolean name=\"flip_normals\" value=\"true\"/>" +
+              diffuse("0.5,0.5,0.5") + "</shape>" +
+              "<emitter type=\"point\"><point name=\"position\" value=\"0.3,0.5,0\"/></emitter>"));
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    PathMutations alone;
+    alone.weights.fill(0);
+    alone.weights[PathMutations::Bidirectional] = 1;
+    const auto space = passes.space(alone);
+    const auto x = space->make_state(), y = space->make_state();
+    int proposals = 0, is_void = 0;
+    for (uint64_t i = 0; i < 40000; ++i) {
+        space->draw(0, hash_combine(14, i), c, *x);
+        if (!(x->target > 0)) continue;
+        const Proposal p = space->propose(0, *x, hash_combine(15, i), c, *y);
+        const auto &before = static_cast<const PathState&>(*x),
+                   &after = static_cast<const PathState&>(*y);
+        const auto is_same = [&] {
+            if (before.last() != after.last()) return false;
+            for (int k = 0; k <= before.last(); ++k)
+                if (!(before[k].v.p == after[k].v.p)) return false;
+            return true;
+        };
+        ++proposals;
+        is_void += p.has_failed || is_same();
+    }
+    EXPECT_GT(proposals, 5000);
+    EXPECT_LT(is_void, 0.06 * proposals) << is_void << " of " << proposals;
+}
+
 /// A light path that ends without a direction does not hit the lens along its last ray.
 TEST(PathBuilder, HitsTheLensByNewDirections) {
     // From a lamp through rough glass, whose sampling sometimes fails, to a wide lens. The lens is nearer to the glass than
