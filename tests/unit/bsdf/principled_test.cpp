@@ -140,7 +140,6 @@ TEST(Principled, HasTheClosedFormValueAtNormalIncidence) {
     }
 }
 
-// α along ∂p/∂u is the larger one [Burley 2012, §5.4].
 // As in KHR_materials_specular: F0 = R0 · weight · color, of which the luminance counts.
 TEST(Principled, ReflectanceMayBeGiven) {
     const Vec3 n{0, 0, 1};
@@ -173,6 +172,30 @@ TEST(Principled, ReflectanceMayBeGiven) {
     EXPECT_NEAR(sqr((lobe.eta - 1) / (lobe.eta + 1)), 0.01f, 1e-6f);
 }
 
+// What converters to glTF write for a diffuse material: an index of 1000 without specular colour. The diffuse part of
+// roughness 1 sends back more than an ideal one: along the normal n it reflects ∫ 2 c (1 + (c + 1/2) (1 - c)⁵) dc = 1 + 1/28
+// of the base colour, c being the cosine of the other direction [Burley 2012, §5.3].
+TEST(Principled, WithoutSpecularColorIsDiffuse) {
+    const Vec3 n{0, 0, 1};
+    const Rgb base(0.2f, 0.6f, 0.3f);
+    TestMaterials m;
+    ComponentArena arena;
+    const Material& material = m.make(
+        "principled",
+        {{"base_color", base}, {"roughness", 1.0}, {"eta", 1000.0}, {"specular_color", Rgb(0)}});
+    const Bsdf bsdf = material.bsdf(plane_point(n), arena);
+    constexpr int kSteps = 4000;
+    Rgb albedo;
+    for (int i = 0; i < kSteps; ++i) {
+        const float c = (float(i) + 0.5f) / kSteps;
+        const Vec3 wi{std::sqrt(1 - sqr(c)), 0, c};
+        albedo +=
+            bsdf.eval(n, wi, TransportMode::Radiance).f * (2 * kPi / kSteps);  // times the cosine
+    }
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(albedo[c], base[c] * (1 + 1 / 28.0f), 1e-4f);
+}
+
+// α along ∂p/∂u is the larger one [Burley 2012, §5.4].
 TEST(Principled, AnisotropyStretchesHighlightsAlongU) {
     PrincipledLobe lobe = opaque();
     lobe.metallic = 1;
