@@ -11,7 +11,7 @@ namespace {
 /// where Embree is slower by half; against a light one, normalised figures err on the low side.
 TriangleMesh make_room() {
     constexpr uint32_t kColumns = 316, kRows = kColumns / 2;
-    TriangleMesh mesh;
+    TriangleMesh::Arrays mesh;
     for (uint32_t row = 0; row <= kRows; ++row)
         for (uint32_t column = 0; column < kColumns; ++column) {
             const float theta = kPi * float(row) / float(kRows);
@@ -28,8 +28,7 @@ TriangleMesh make_room() {
             mesh.triangles.push_back({a, b, a + kColumns});
             mesh.triangles.push_back({b, b + kColumns, a + kColumns});
         }
-    mesh.finish();
-    return mesh;
+    return TriangleMesh(std::move(mesh));
 }
 
 Accelerator make_accelerator(const TriangleMesh& mesh) {

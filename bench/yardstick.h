@@ -14,7 +14,7 @@ inline constexpr double kPeerRays = 9.1e6;
 class Yardstick {
 public:
     Yardstick();
-    size_t triangles() const { return mesh_.triangles.size(); }
+    size_t triangles() const { return mesh_.faces().size(); }
     /// Rays a second, half of them closest hits and half occlusion.
     double rays_per_second(int threads, double seconds) const {
         return rays_.replay(threads, seconds);

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <bit>
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 
@@ -164,16 +165,16 @@ struct Accelerator::Impl {
         RTCGeometry geometry;
         if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape)) {
             geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-            // Copied, not shared: Embree reads 16 bytes per vertex, beyond the end of a packed array.
-            auto* p = static_cast<Vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX,
-                                                                 0, RTC_FORMAT_FLOAT3, sizeof(Vec3),
-                                                                 mesh->positions.size()));
-            auto* t = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                              3 * sizeof(uint32_t), mesh->triangles.size());
-            if (!p || !t) check();
-            std::copy(mesh->positions.begin(), mesh->positions.end(), p);
-            std::copy(mesh->triangles.begin(), mesh->triangles.end(),
-                      static_cast<std::array<uint32_t, 3>*>(t));
+            // Embree reads 16 bytes of a vertex, so the points must not end an array.
+            using Vertex = TriangleMesh::Vertex;
+            using Face = TriangleMesh::Face;
+            static_assert(offsetof(Vertex, p) == 0 && sizeof(Vertex) >= 16);
+            static_assert(offsetof(Face, vertices) == 0);
+            rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                       mesh->vertices().data(), 0, sizeof(Vertex),
+                                       mesh->vertices().size());
+            rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                       mesh->faces().data(), 0, sizeof(Face), mesh->faces().size());
         } else {
             geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
             rtcSetGeometryUserPrimitiveCount(geometry, 1);

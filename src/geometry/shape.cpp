@@ -12,37 +12,50 @@ namespace etendue {
 
 // ---- TriangleMesh
 
+TriangleMesh::TriangleMesh(Arrays arrays)
+    : second_uvs_(std::move(arrays.second_uvs)), colors_(std::move(arrays.colors)),
+      alphas_(std::move(arrays.alphas)), has_normals_(!arrays.normals.empty()),
+      has_uvs_(!arrays.uvs.empty()) {
+    faces_.reserve(arrays.triangles.size());
+    for (const Triangle& t : arrays.triangles) {
+        const EdgeProduct p(arrays.positions[t[0]], arrays.positions[t[1]], arrays.positions[t[2]]);
+        if (p.has_area()) faces_.push_back({t, p.normal()});
+    }
+    arrays.triangles = {};
+    vertices_.resize(arrays.positions.size());
+    for (size_t i = 0; i < vertices_.size(); ++i)
+        vertices_[i] = {arrays.positions[i], has_normals_ ? arrays.normals[i] : Vec3{},
+                        has_uvs_ ? arrays.uvs[i] : Vec2{}};
+    prefer_huge_pages(vertices_);
+    prefer_huge_pages(faces_);
+}
+
+TriangleMesh::Arrays TriangleMesh::arrays() const {
+    Arrays a{.second_uvs = second_uvs_, .colors = colors_, .alphas = alphas_};
+    for (const Vertex& v : vertices_) {
+        a.positions.push_back(v.p);
+        if (has_normals_) a.normals.push_back(v.n);
+        if (has_uvs_) a.uvs.push_back(v.uv);
+    }
+    for (const Face& f : faces_) a.triangles.push_back(f.vertices);
+    return a;
+}
+
 Bounds3 TriangleMesh::bounds() const {
     Bounds3 b;
-    for (Vec3 p : positions) b.extend(p);
+    for (const Vertex& v : vertices_) b.extend(v.p);
     return b;
 }
 
 double TriangleMesh::primitive_area(uint32_t prim) const {
-    const auto [a, b, c] = triangles[prim];
-    return 0.5 * EdgeProduct(positions[a], positions[b], positions[c]).length;
+    const auto [a, b, c] = faces_[prim].vertices;
+    return 0.5 * EdgeProduct(vertices_[a].p, vertices_[b].p, vertices_[c].p).length;
 }
 
 double TriangleMesh::area() const {
     double sum = 0;
-    for (uint32_t i = 0; i < triangles.size(); ++i) sum += primitive_area(i);
+    for (uint32_t i = 0; i < faces_.size(); ++i) sum += primitive_area(i);
     return sum;
-}
-
-size_t TriangleMesh::finish() {
-    face_normals.clear();
-    face_normals.reserve(triangles.size());
-    const size_t dropped = std::erase_if(triangles, [&](const std::array<uint32_t, 3>& t) {
-        const EdgeProduct p(positions[t[0]], positions[t[1]], positions[t[2]]);
-        if (p.has_area()) face_normals.push_back(p.normal());
-        return !p.has_area();
-    });
-    prefer_huge_pages(positions);
-    prefer_huge_pages(normals);
-    prefer_huge_pages(uvs);
-    prefer_huge_pages(triangles);
-    prefer_huge_pages(face_normals);
-    return dropped;
 }
 
 namespace {
@@ -77,46 +90,44 @@ float interpolate(float a, float b, float c, double u, double v) {
 }  // namespace
 
 float TriangleMesh::slack(uint32_t prim) const {
-    const auto [a, b, c] = triangles[prim];
-    return triangle_slack(positions[b] - positions[a], positions[c] - positions[a]);
+    const auto [a, b, c] = faces_[prim].vertices;
+    return triangle_slack(vertices_[b].p - vertices_[a].p, vertices_[c].p - vertices_[a].p);
 }
 
 SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tangents) const {
-    // Clang 14 cannot capture structured bindings.
-    const std::array<uint32_t, 3>& corners = triangles[prim];
-    const uint32_t ia = corners[0], ib = corners[1], ic = corners[2];
-    const Vec3 a = positions[ia], b = positions[ib], c = positions[ic], e1 = b - a, e2 = c - a;
+    const Face& face = faces_[prim];
+    const uint32_t ia = face.vertices[0], ib = face.vertices[1], ic = face.vertices[2];
+    const Vertex &a = vertices_[ia], &b = vertices_[ib], &c = vertices_[ic];
+    const Vec3 e1 = b.p - a.p, e2 = c.p - a.p;
     const float w = 1 - u - v;
     SurfaceGeometry g;
-    g.p = {interpolate(a.x, b.x, c.x, u, v), interpolate(a.y, b.y, c.y, u, v),
-           interpolate(a.z, b.z, c.z, u, v)};
+    g.p = {interpolate(a.p.x, b.p.x, c.p.x, u, v), interpolate(a.p.y, b.p.y, c.p.y, u, v),
+           interpolate(a.p.z, b.p.z, c.p.z, u, v)};
     g.slack = triangle_slack(e1, e2);
-    g.ng = face_normals[prim];
+    g.ng = face.ng;
     g.ns = g.ng;
-    if (!normals.empty()) {
-        const Vec3 n = normals[ia] * w + normals[ib] * u + normals[ic] * v;
+    if (has_normals_) {
+        const Vec3 n = a.n * w + b.n * u + c.n * v;
         const float len2 = length2(n);
         if (len2 > 0) {
             g.ns = n * (1.0f / std::sqrt(len2));
             if (dot(g.ng, g.ns) < 0) g.ng = -g.ng;
         }
     }
-    if (!colors.empty()) g.color = colors[ia] * w + colors[ib] * u + colors[ic] * v;
-    if (!alphas.empty()) g.alpha = alphas[ia] * w + alphas[ib] * u + alphas[ic] * v;
-    const auto mean = [&](const std::vector<Vec2>& of) -> Vec2 {
-        const Vec2 a2 = of[ia], b2 = of[ib], c2 = of[ic];
-        return {a2.x * w + b2.x * u + c2.x * v, a2.y * w + b2.y * u + c2.y * v};
+    if (!colors_.empty()) g.color = colors_[ia] * w + colors_[ib] * u + colors_[ic] * v;
+    if (!alphas_.empty()) g.alpha = alphas_[ia] * w + alphas_[ib] * u + alphas_[ic] * v;
+    const auto mean = [&](Vec2 of_a, Vec2 of_b, Vec2 of_c) -> Vec2 {
+        return {of_a.x * w + of_b.x * u + of_c.x * v, of_a.y * w + of_b.y * u + of_c.y * v};
     };
-    if (!second_uvs.empty()) g.second_uv = mean(second_uvs);
-    if (uvs.empty()) {
+    if (!second_uvs_.empty()) g.second_uv = mean(second_uvs_[ia], second_uvs_[ib], second_uvs_[ic]);
+    if (!has_uvs_) {
         g.uv = {u, v};
         if (tangents) g.dpdu = e1, g.dpdv = e2;
         return g;
     }
-    g.uv = mean(uvs);
+    g.uv = mean(a.uv, b.uv, c.uv);
     if (tangents) {
-        const Vec2 ta = uvs[ia], tb = uvs[ib], tc = uvs[ic];
-        const Vec2 d1 = tb - ta, d2 = tc - ta;
+        const Vec2 d1 = b.uv - a.uv, d2 = c.uv - a.uv;
         const float det = d1.x * d2.y - d1.y * d2.x;
         if (det != 0) {
             const float inv = 1 / det;
@@ -134,10 +145,9 @@ ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
 }
 
 size_t TriangleMesh::memory_bytes() const {
-    return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) +
-           (uvs.size() + second_uvs.size()) * sizeof(Vec2) + colors.size() * sizeof(Vec3) +
-           alphas.size() * sizeof(float) +
-           triangles.size() * (sizeof(triangles[0]) + sizeof(face_normals[0]));
+    return vertices_.size() * sizeof(Vertex) + faces_.size() * sizeof(Face) +
+           second_uvs_.size() * sizeof(Vec2) + colors_.size() * sizeof(Vec3) +
+           alphas_.size() * sizeof(float);
 }
 
 // ---- Sphere

@@ -54,28 +54,52 @@ public:
 
 class TriangleMesh final : public Shape {
 public:
-    std::vector<Vec3> positions;
-    std::vector<Vec3> normals;     ///< Empty, or one unit vector per vertex.
-    std::vector<Vec2> uvs;         ///< Empty, or one per vertex.
-    std::vector<Vec2> second_uvs;  ///< The same.
-    std::vector<Vec3> colors;      ///< Empty, or one per vertex.
-    std::vector<float> alphas;     ///< Of the colours; empty, or one per vertex.
-    std::vector<std::array<uint32_t, 3>> triangles;
-    std::vector<Vec3> face_normals;  ///< Unit, one per triangle; see finish().
+    using Triangle = std::array<uint32_t, 3>;  ///< Indices of vertices.
+    struct Arrays {
+        std::vector<Vec3> positions{};
+        std::vector<Vec3> normals{};     ///< Empty, or one unit vector per vertex.
+        std::vector<Vec2> uvs{};         ///< Empty, or one per vertex.
+        std::vector<Vec2> second_uvs{};  ///< The same.
+        std::vector<Vec3> colors{};      ///< Empty, or one per vertex.
+        std::vector<float> alphas{};     ///< Of the colours; empty, or one per vertex.
+        std::vector<Triangle> triangles{};
+    };
+    /// What a hit reads of a vertex, and of a triangle, lies together: a hit takes few cache lines. Embree reads points and
+    /// indices in place.
+    struct alignas(32) Vertex {
+        Vec3 p, n;  ///< n is a unit vector if the mesh has normals.
+        Vec2 uv;
+    };
+    struct Face {
+        Triangle vertices;
+        Vec3 ng;  ///< Unit normal.
+    };
 
-    /// Removes triangles whose area is zero in single precision, and computes face_normals; to be called once the other
-    /// arrays are final. Returns the number of removed triangles.
-    size_t finish();
+    /// Leaves out triangles whose area is zero in single precision.
+    explicit TriangleMesh(Arrays arrays);
+
+    const std::vector<Vertex>& vertices() const { return vertices_; }
+    const std::vector<Face>& faces() const { return faces_; }
+    /// The arrays of the mesh, copied.
+    Arrays arrays() const;
 
     Bounds3 bounds() const override;
     double area() const override;
-    size_t primitive_count() const override { return triangles.size(); }
+    size_t primitive_count() const override { return faces_.size(); }
     double primitive_area(uint32_t prim) const override;
     /// (u, v) are the barycentric coordinates of the second and third vertex.
     SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const override;
     float slack(uint32_t prim) const override;
     ShapeSample sample(uint32_t prim, Vec2 u) const override;
     size_t memory_bytes() const override;
+
+private:
+    std::vector<Vertex> vertices_;
+    std::vector<Face> faces_;
+    std::vector<Vec2> second_uvs_;
+    std::vector<Vec3> colors_;
+    std::vector<float> alphas_;
+    bool has_normals_, has_uvs_;
 };
 
 /// A shape that Embree intersects through a callback, in double.

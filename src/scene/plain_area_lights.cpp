@@ -38,28 +38,29 @@ float distance_of_back(const Shape& front) {
 }
 
 MeshData back_of(const TriangleMesh& front, float distance) {
+    TriangleMesh::Arrays arrays = front.arrays();
     MeshData back;
-    std::vector<Vec3> normals(front.positions.size());
-    for (uint32_t i = 0; i < front.triangles.size(); ++i) {
+    std::vector<Vec3> normals(arrays.positions.size());
+    for (uint32_t i = 0; i < arrays.triangles.size(); ++i) {
         const Vec3 ng = front.surface(i, 1.0f / 3, 1.0f / 3, false).ng;
-        const auto& [a, b, c] = front.triangles[i];
+        const auto& [a, b, c] = arrays.triangles[i];
         for (const uint32_t vertex : {a, b, c})
             normals[vertex] = normals[vertex] + ng * float(front.primitive_area(i));
         // The winding of a front that is mirrored or flipped may be against its normals. That of its back is not.
-        const bool agrees = dot(front.face_normals[i], ng) > 0;
+        const bool agrees = dot(front.faces()[i].ng, ng) > 0;
         back.triangles.push_back(agrees ? MeshData::Triangle{a, c, b}
                                         : MeshData::Triangle{a, b, c});
     }
-    back.positions = front.positions;
+    back.positions = std::move(arrays.positions);
     for (size_t i = 0; i < normals.size(); ++i)
         if (length2(normals[i]) > 0)
             back.positions[i] = back.positions[i] - normalize(normals[i]) * distance;
-    for (const Vec3 n : front.normals) back.normals.push_back(-n);
-    back.face_normals = front.normals.empty();
-    back.uvs = front.uvs;
-    back.second_uvs = front.second_uvs;
-    back.colors = front.colors;
-    back.alphas = front.alphas;
+    for (const Vec3 n : arrays.normals) back.normals.push_back(-n);
+    back.face_normals = arrays.normals.empty();
+    back.uvs = std::move(arrays.uvs);
+    back.second_uvs = std::move(arrays.second_uvs);
+    back.colors = std::move(arrays.colors);
+    back.alphas = std::move(arrays.alphas);
     return back;
 }
 

@@ -64,7 +64,6 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     flat = data.normals.empty();
     if (flat && !compute_normals && t.determinant3() < 0) flip = !flip;
     if (flat && params.flag("flip_flat_normals", false)) flip = !flip;
-    auto mesh = std::make_unique<TriangleMesh>();
     if (!t.is_identity()) {
         for (Vec3& p : data.positions) p = t.point(p);
         for (Vec3& n : data.normals) n = normalize(t.normal(n));
@@ -74,22 +73,19 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
         if (flat)
             for (auto& tri : data.triangles) std::swap(tri[1], tri[2]);
     }
-    mesh->positions = std::move(data.positions);
-    mesh->normals = std::move(data.normals);
-    mesh->uvs = std::move(data.uvs);
-    mesh->second_uvs = std::move(data.second_uvs);
-    mesh->colors = std::move(data.colors);
-    mesh->alphas = std::move(data.alphas);
-    mesh->triangles = std::move(data.triangles);
-    for (Vec3 p : mesh->positions)
+    for (Vec3 p : data.positions)
         if (!is_finite(p))
             params.fail(
                 "to_world",
                 "\"to_world\" moves a vertex of the mesh out of the range of single precision");
-    const size_t dropped = data.dropped_degenerate + mesh->finish();
-    if (mesh->triangles.empty())
+    const size_t given = data.triangles.size() + data.dropped_degenerate;
+    auto mesh = std::make_unique<TriangleMesh>(TriangleMesh::Arrays{
+        std::move(data.positions), std::move(data.normals), std::move(data.uvs),
+        std::move(data.second_uvs), std::move(data.colors), std::move(data.alphas),
+        std::move(data.triangles)});
+    if (mesh->faces().empty())
         params.fail("to_world", "\"to_world\" gives all triangles of the mesh zero area");
-    if (dropped > 0)
+    if (const size_t dropped = given - mesh->faces().size())
         warn(fmt::format("{}: {} triangle{} of zero area left out", name, dropped,
                          dropped == 1 ? "" : "s"));
     return mesh;
@@ -133,20 +129,20 @@ std::unique_ptr<Shape> make_quads(const std::vector<std::array<Corner, 4>>& quad
     const Transform t = params.transform("to_world");
     // A mirroring transform reverses the winding, but must not reverse the documented normal of the shape.
     const bool turn = (t.determinant3() < 0) != params.flag("flip_normals", false);
-    auto mesh = std::make_unique<TriangleMesh>();
+    TriangleMesh::Arrays arrays;
     for (const auto& q : quads) {
-        const auto base = uint32_t(mesh->positions.size());
+        const auto base = uint32_t(arrays.positions.size());
         for (const Corner& c : q) {
-            mesh->positions.push_back(t.point(c.p));
-            mesh->uvs.push_back(c.uv);
+            arrays.positions.push_back(t.point(c.p));
+            arrays.uvs.push_back(c.uv);
         }
-        for (std::array<uint32_t, 3> tri : {std::array<uint32_t, 3>{0, 1, 2}, {0, 2, 3}}) {
+        for (TriangleMesh::Triangle tri : {TriangleMesh::Triangle{0, 1, 2}, {0, 2, 3}}) {
             if (turn) std::swap(tri[1], tri[2]);
-            mesh->triangles.push_back({base + tri[0], base + tri[1], base + tri[2]});
+            arrays.triangles.push_back({base + tri[0], base + tri[1], base + tri[2]});
         }
     }
-    mesh->finish();
-    if (mesh->triangles.empty()) params.fail("to_world", "\"to_world\" gives the shape zero area");
+    auto mesh = std::make_unique<TriangleMesh>(std::move(arrays));
+    if (mesh->faces().empty()) params.fail("to_world", "\"to_world\" gives the shape zero area");
     return mesh;
 }
 

@@ -50,9 +50,13 @@ struct Part {
     Bounds3 bounds;                ///< Of what cells are measured by.
     float size = 0;                ///< Of the shape, in world space for one place.
 
-    std::span<const Vec3> positions() const { return given ? given->positions : own.positions; }
-    std::span<const Triangle> triangles() const { return given ? given->triangles : own.triangles; }
-    size_t coarsest_count() const { return coarse.empty() ? triangles().size() : coarse.size(); }
+    size_t vertex_count() const { return given ? given->vertices().size() : own.positions.size(); }
+    Vec3 position(size_t i) const { return given ? given->vertices()[i].p : own.positions[i]; }
+    size_t triangle_count() const { return given ? given->faces().size() : own.triangles.size(); }
+    const Triangle& triangle(size_t i) const {
+        return given ? given->faces()[i].vertices : own.triangles[i];
+    }
+    size_t coarsest_count() const { return coarse.empty() ? triangle_count() : coarse.size(); }
     void replace(Mesh mesh) {
         given = nullptr;
         own = std::move(mesh);
@@ -60,11 +64,11 @@ struct Part {
 };
 
 /// Index of the vertex that stands for each vertex if all in a cell of a grid are merged.
-std::vector<uint32_t> merged_vertices(std::span<const Vec3> positions, Vec3 origin, float cell) {
+std::vector<uint32_t> merged_vertices(const Part& part, Vec3 origin, float cell) {
     std::unordered_map<uint64_t, uint32_t> cells;
-    std::vector<uint32_t> merged(positions.size());
-    for (size_t i = 0; i < positions.size(); ++i) {
-        const Vec3 at = (positions[i] - origin) * (1 / cell);
+    std::vector<uint32_t> merged(part.vertex_count());
+    for (size_t i = 0; i < merged.size(); ++i) {
+        const Vec3 at = (part.position(i) - origin) * (1 / cell);
         uint64_t key = 0;
         for (int axis = 0; axis < 3; ++axis)
             key = key << 21 | (uint64_t(std::max(0.0f, at[axis])) & 0x1fffff);
@@ -76,9 +80,10 @@ std::vector<uint32_t> merged_vertices(std::span<const Vec3> positions, Vec3 orig
 /// The triangles of a mesh whose vertices are merged, without those that collapse.
 std::vector<Triangle> merged_triangles(const Part& part, int cells) {
     const std::vector<uint32_t> merged =
-        merged_vertices(part.positions(), part.bounds.lo, 2 * part.bounds.radius() / float(cells));
+        merged_vertices(part, part.bounds.lo, 2 * part.bounds.radius() / float(cells));
     std::vector<Triangle> out;
-    for (const Triangle& t : part.triangles()) {
+    for (size_t i = 0; i < part.triangle_count(); ++i) {
+        const Triangle& t = part.triangle(i);
         const uint32_t a = merged[t[0]], b = merged[t[1]], c = merged[t[2]];
         if (a != b && b != c && c != a) out.push_back({a, b, c});
     }
@@ -86,16 +91,16 @@ std::vector<Triangle> merged_triangles(const Part& part, int cells) {
 }
 
 /// The mesh with these of its triangles, and only the vertices that they use.
-Mesh part_of(std::span<const Vec3> positions, std::vector<Triangle> triangles) {
+Mesh mesh_of(const Part& part, std::vector<Triangle> triangles) {
     constexpr uint32_t kUnused = ~0u;
     Mesh out;
-    std::vector<uint32_t> index(positions.size(), kUnused);
+    std::vector<uint32_t> index(part.vertex_count(), kUnused);
     for (Triangle& t : triangles)
         for (uint32_t& vertex : t) {
             uint32_t& to = index[vertex];
             if (to == kUnused) {
                 to = uint32_t(out.positions.size());
-                out.positions.push_back(positions[vertex]);
+                out.positions.push_back(part.position(vertex));
             }
             vertex = to;
         }
@@ -197,10 +202,10 @@ std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles) 
     constexpr size_t kSmall = 2400, kSmallest = 12;
     const auto merge = [&](size_t larger_than, int cells, const auto& use) {
         for (Part& part : parts)
-            if (part.triangles().size() > larger_than) use(part, merged_triangles(part, cells));
+            if (part.triangle_count() > larger_than) use(part, merged_triangles(part, cells));
     };
     const auto simplify = [](Part& part, std::vector<Triangle> triangles) {
-        part.replace(part_of(part.positions(), std::move(triangles)));
+        part.replace(mesh_of(part, std::move(triangles)));
     };
     int cells = kFinest;
     for (; has_too_many(most_triangles) && cells >= kCoarsest; cells /= 2)
@@ -227,29 +232,30 @@ std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles) 
         merge(kSmall, cells,
               [](Part& part, std::vector<Triangle> coarse) { part.coarse = std::move(coarse); });
 
-    const auto append = [](std::vector<uint32_t>& to, std::span<const Triangle> from) {
-        to.reserve(3 * from.size());
-        for (const Triangle& t : from) to.insert(to.end(), t.begin(), t.end());
+    const auto append = [](std::vector<uint32_t>& to, const Triangle& t) {
+        to.insert(to.end(), t.begin(), t.end());
     };
     std::vector<DrawnShape> drawn;
     for (size_t i = 0; i < parts.size(); ++i) {
         const Part& part = parts[i];
-        if (part.triangles().empty() || places[i].empty()) continue;
+        if (part.triangle_count() == 0 || places[i].empty()) continue;
         DrawnShape& to = drawn.emplace_back();
         to.shape = uint32_t(i);
         to.name = scene.shapes()[i].name;
         to.places = places[i];
         describe(scene, to);
-        for (const Vec3 p : part.positions()) to.bounds.extend(p);
-        to.positions.reserve(3 * part.positions().size());
-        for (const Vec3 p : part.positions())
+        for (size_t k = 0; k < part.vertex_count(); ++k) to.bounds.extend(part.position(k));
+        to.positions.reserve(3 * part.vertex_count());
+        for (size_t k = 0; k < part.vertex_count(); ++k)
             for (int axis = 0; axis < 3; ++axis) {
+                const Vec3 p = part.position(k);
                 const float extent = to.bounds.hi[axis] - to.bounds.lo[axis];
                 const float at = extent > 0 ? (p[axis] - to.bounds.lo[axis]) / extent : 0.0f;
                 to.positions.push_back(uint16_t(std::lround(at * 65535)));
             }
-        append(to.triangles, part.triangles());
-        append(to.coarse_triangles, part.coarse);
+        to.triangles.reserve(3 * part.triangle_count());
+        for (size_t k = 0; k < part.triangle_count(); ++k) append(to.triangles, part.triangle(k));
+        for (const Triangle& t : part.coarse) append(to.coarse_triangles, t);
     }
     return drawn;
 }

@@ -404,10 +404,8 @@ TEST(AreaEmitter, CanBeChosenThoughItsTextureIsNearlyBlack) {
         }
         Rgb mean() const override { return Rgb(0.2f); }
     } needle;
-    TriangleMesh mesh;
-    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    mesh.triangles = {{0, 1, 2}};
-    mesh.finish();
+    const TriangleMesh mesh(
+        {.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, .triangles = {{0, 1, 2}}});
     const auto emitter = make_area_emitter(mesh, TextureRef(&needle), false, 0);
     EXPECT_GT(emitter->power(), 0);
 }

@@ -12,7 +12,7 @@ namespace {
 
 /// A closed mesh about the origin, with triangles of all shapes.
 TriangleMesh closed_mesh(int rows, int columns, float radius) {
-    TriangleMesh mesh;
+    TriangleMesh::Arrays mesh;
     testing::Random random(1);
     const auto add = [&](float theta, float phi) {
         const float r = radius * random.between(0.7f, 1.3f);
@@ -35,8 +35,7 @@ TriangleMesh closed_mesh(int rows, int columns, float radius) {
             if (i + 1 < rows)
                 mesh.triangles.push_back({at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)});
         }
-    mesh.finish();
-    return mesh;
+    return TriangleMesh(std::move(mesh));
 }
 
 // No ray slips through between triangles that share an edge.
@@ -49,8 +48,8 @@ TEST(Accelerator, ClosedMeshesHaveNoGaps) {
     int missed = 0;
     RayHit hit;
     for (int i = 0; i < 300000; ++i) {
-        const auto& t = mesh.triangles[random.bits() % mesh.triangles.size()];
-        const Vec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]];
+        const auto& t = mesh.faces()[random.bits() % mesh.faces().size()].vertices;
+        const Vec3 a = mesh.vertices()[t[0]].p, b = mesh.vertices()[t[1]].p;
         const Vec3 o = random.in_cube() * 0.3f;
         const Ray ray{o, normalize(a + (b - a) * random.between(0.01f, 0.99f) - o), kInf};
         missed += !accelerator.intersect(ray, hit) || !accelerator.occluded(ray);

@@ -66,11 +66,9 @@ TEST(TriangleMesh, PointsLieOnTheSurface) {
     testing::Random random(3);
     for (const float size : kRadii)
         for (int turn = 0; turn < 20; ++turn) {
-            TriangleMesh mesh;
-            for (int i = 0; i < 3; ++i) mesh.positions.push_back(random.in_cube() * size);
-            mesh.triangles = {{0, 1, 2}};
-            mesh.finish();
-            const Vec3 a = mesh.positions[0], b = mesh.positions[1], c = mesh.positions[2];
+            const Vec3 a = random.in_cube() * size, b = random.in_cube() * size,
+                       c = random.in_cube() * size;
+            const TriangleMesh mesh({.positions = {a, b, c}, .triangles = {{0, 1, 2}}});
             const double e[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z},
                          f[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
             double n[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
@@ -171,27 +169,26 @@ TEST(Sphere, TextureCoordinatesAreAnglesAboutItsAxis) {
 // Edges whose products are beyond single precision, and whose areas are not.
 TEST(TriangleMesh, HasNormalsInAnyUnits) {
     for (const float size : {1e-16f, 1e-12f, 1.0f, 1e10f, 1e17f}) {
-        TriangleMesh mesh;
-        mesh.positions = {{0, 0, 0}, {size, 0, 0}, {0, 2 * size, 0}};
-        mesh.triangles = {{0, 1, 2}, {0, 1, 1}};
-        EXPECT_EQ(mesh.finish(), 1u);
-        ASSERT_EQ(mesh.triangles.size(), 1u);
-        EXPECT_EQ(mesh.face_normals[0].z, 1) << size;
+        const TriangleMesh mesh({.positions = {{0, 0, 0}, {size, 0, 0}, {0, 2 * size, 0}},
+                                 .triangles = {{0, 1, 1}, {0, 1, 2}}});
+        ASSERT_EQ(mesh.faces().size(), 1u);
+        EXPECT_EQ(mesh.faces()[0].ng.z, 1) << size;
         EXPECT_NEAR(mesh.area() / (double(size) * double(size)), 1, 1e-6);
     }
 }
 
 // The hierarchy may not take more memory than it is given, and says so.
 TEST(Accelerator, MemoryIsBounded) {
-    TriangleMesh mesh;
+    TriangleMesh::Arrays arrays;
     for (int i = 0; i < 300; ++i)
-        for (int j = 0; j < 300; ++j) mesh.positions.push_back({float(i), float(j), float(i % 7)});
+        for (int j = 0; j < 300; ++j)
+            arrays.positions.push_back({float(i), float(j), float(i % 7)});
     for (uint32_t i = 0; i + 1 < 300; ++i)
         for (uint32_t j = 0; j + 1 < 300; ++j) {
-            mesh.triangles.push_back({i * 300 + j, i * 300 + j + 1, i * 300 + j + 300});
-            mesh.triangles.push_back({i * 300 + j + 1, i * 300 + j + 301, i * 300 + j + 300});
+            arrays.triangles.push_back({i * 300 + j, i * 300 + j + 1, i * 300 + j + 300});
+            arrays.triangles.push_back({i * 300 + j + 1, i * 300 + j + 301, i * 300 + j + 300});
         }
-    mesh.finish();
+    const TriangleMesh mesh(std::move(arrays));
     const auto make = [&](size_t most) {
         Accelerator accelerator({.most_bytes = most});
         accelerator.add_shape(mesh);
@@ -200,7 +197,6 @@ TEST(Accelerator, MemoryIsBounded) {
     };
     const size_t needed = make(memory_of_machine());
     EXPECT_GT(needed, size_t(1) << 20);
-    // Neither a copy of the mesh nor the hierarchy may exceed the bound.
     for (const size_t most : {size_t(1) << 16, needed / 2}) {
         try {
             make(most);
