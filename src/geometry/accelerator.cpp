@@ -1,7 +1,9 @@
 #include "geometry/accelerator.h"
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
@@ -70,6 +72,23 @@ void occluded_callback(const RTCOccludedFunctionNArguments* args) {
         ray->tfar = -kInf;
 }
 
+/// Embree inverts the matrix M of an instance in float, with an error of up to 2^-23 |M⁻¹| |M| |M⁻¹| [Higham 2002, §14.1]: the
+/// largest sum of a row.
+float error_of_inverse(const Transform& to_world) {
+    constexpr double kErrors = 0x1p-23;
+    const Transform inverse = to_world.inverse();
+    const Transform::Matrix &m = to_world.matrix(), &m1 = inverse.matrix();
+    double most = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        double sum = 0;
+        for (size_t j = 0; j < 3; ++j)
+            for (size_t k = 0; k < 3; ++k)
+                for (size_t l = 0; l < 3; ++l) sum += std::fabs(m1[i][j] * m[j][k] * m1[k][l]);
+        most = std::max(most, sum);
+    }
+    return float(kErrors * most);
+}
+
 /// What Embree allocates, and how much it may.
 struct MemoryBudget {
     std::atomic<int64_t> bytes{0};
@@ -121,6 +140,7 @@ struct Accelerator::Impl {
     std::vector<RTCScene> groups;
     struct Instance {
         Transform to_world;
+        float error;                           ///< See Accelerator::instance_error().
         std::pair<uint32_t, uint32_t> shapes;  ///< Of its group.
     };
     std::vector<std::pair<uint32_t, uint32_t>> group_shapes;  ///< Indices [first, second).
@@ -233,7 +253,7 @@ uint32_t Accelerator::add_instance(uint32_t group, const Transform& to_world) {
     impl_->check();
     impl_->shape_of_geom.resize(id + 1);
     impl_->shape_of_geom[id] = uint32_t(impl_->instances.size());
-    impl_->instances.push_back({to_world, impl_->group_shapes[group]});
+    impl_->instances.push_back({to_world, error_of_inverse(to_world), impl_->group_shapes[group]});
     return uint32_t(impl_->instances.size() - 1);
 }
 
@@ -292,6 +312,10 @@ size_t Accelerator::instance_count() const {
 
 std::pair<uint32_t, uint32_t> Accelerator::instance_shapes(uint32_t instance) const {
     return impl_->instances[instance].shapes;
+}
+
+float Accelerator::instance_error(uint32_t instance) const {
+    return impl_->instances[instance].error;
 }
 
 const Transform& Accelerator::instance_transform(uint32_t instance) const {

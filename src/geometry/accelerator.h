@@ -32,7 +32,7 @@ struct AcceleratorOptions {
     /// Lets no ray pass between adjacent triangles. Otherwise about one ray in millions does, where it meets an edge to
     /// within rounding, and rays are 10 to 20 % faster.
     bool is_watertight = false;
-    /// What the hierarchy may take, with copies of the meshes.
+    /// What the hierarchy may take, without the meshes.
     size_t most_bytes = memory_of_machine();
 };
 
@@ -60,6 +60,9 @@ public:
 
     size_t instance_count() const;
     const Transform& instance_transform(uint32_t instance) const;
+    /// Bound of the error of a ray that Embree transforms to the space of the instance, in units of that space: relative to
+    /// the largest coordinate of its origin plus the largest one of the instance's translation.
+    float instance_error(uint32_t instance) const;
     /// The indices [first, second) of the shapes that the instance shows.
     std::pair<uint32_t, uint32_t> instance_shapes(uint32_t instance) const;
     size_t memory_bytes() const;

@@ -72,7 +72,8 @@ public:
     };
     struct Face {
         Triangle vertices;
-        Vec3 ng;  ///< Unit normal.
+        Vec3 ng;      ///< Unit normal.
+        float slack;  ///< As SurfaceGeometry::slack.
     };
 
     /// Leaves out triangles whose area is zero in single precision.
@@ -89,7 +90,7 @@ public:
     double primitive_area(uint32_t prim) const override;
     /// (u, v) are the barycentric coordinates of the second and third vertex.
     SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const override;
-    float slack(uint32_t prim) const override;
+    float slack(uint32_t prim) const override { return faces_[prim].slack; }
     ShapeSample sample(uint32_t prim, Vec2 u) const override;
     size_t memory_bytes() const override;
 

@@ -256,7 +256,7 @@ double sum_of_flux(const std::vector<GuideSample>& samples) {
 void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& records,
                     const PlacedDensity& importance, const GuideLearning& learning, uint64_t seed,
                     Guide& guide) {
-    constexpr double kByPower = 0.3;
+    constexpr double kUnguided = 0.3;
     std::vector<GuideSample> finite;
     std::map<uint32_t, std::vector<GuideSample>> at_infinity;  // by Emitter::index
     std::vector<double> by_emitter(scene.emitters().size());
@@ -286,8 +286,8 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
     guide.emission_gain = float(gain / sum);
     if (!scene.has_emitter_choice()) return;
     for (size_t i = 0; i < by_emitter.size(); ++i)
-        by_emitter[i] = kByPower * double(scene.emitters()[i]->selection_pmf) +
-                        (1 - kByPower) * by_emitter[i] / sum;
+        by_emitter[i] = kUnguided * double(scene.emitters()[i]->selection_pmf) +
+                        (1 - kUnguided) * by_emitter[i] / sum;
     guide.set_emission(std::move(by_emitter));
 }
 

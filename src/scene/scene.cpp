@@ -21,15 +21,20 @@ float largest_term(const Transform& t, Vec3 p) {
     return float(most);
 }
 
-/// Transforms the geometry of an instance's shape to world space.
-void transform_geometry(const Transform& t, SurfaceGeometry& g) {
+float largest_coordinate(Vec3 p) {
+    return std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
+}
+
+/// Transforms the geometry of an instance's shape to world space. `error`: see Accelerator::instance_error().
+void transform_geometry(const Transform& t, float error, SurfaceGeometry& g) {
     const float side = t.determinant3() < 0 ? -1.0f : 1.0f;
     g.p = t.point(g.p);
     const Vec3 ng = t.normal(g.ng);
     const float to_world = 1 / length(ng);  // of distances along the normal
     // Embree transforms rays in float, with terms that may be larger than the coordinates.
     constexpr float kErrors = 0x1p-21f;
-    g.slack = (g.slack + kErrors * largest_term(t.inverse(), g.p)) * to_world;
+    const float reach = largest_coordinate(g.p) + largest_coordinate(t.point({0, 0, 0}));
+    g.slack = (g.slack + kErrors * largest_term(t.inverse(), g.p) + error * reach) * to_world;
     g.ng = ng * (to_world * side);
     g.ns = normalize(t.normal(g.ns)) * side;
     g.dpdu = t.vector(g.dpdu);
@@ -76,7 +81,8 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
     else
         g = s.shape->surface(at.prim, at.u, at.v, s.needs_tangents);
     if (at.instance != kNoInstance)
-        transform_geometry(accelerator_.instance_transform(at.instance), g);
+        transform_geometry(accelerator_.instance_transform(at.instance),
+                           accelerator_.instance_error(at.instance), g);
     return g;
 }
 

@@ -99,6 +99,13 @@ const LargeShape kLargeShapes[] = {
     {"instance of a rectangle",
      instance(shape("rectangle", kTurnedSquare + "<translate x=\"3000\" y=\"2000\" z=\"-700\"/>"),
               "<translate x=\"-3000\" y=\"-2000\" z=\"700\"/>")},
+    {"thin triangles",
+     shape("rectangle", "<scale x=\"0.01\" y=\"4\"/><rotate x=\"1\" y=\"0.3\" angle=\"23\"/>"
+                        "<rotate y=\"1\" z=\"0.4\" angle=\"71\"/>")},
+    {"instance that is stretched aslant",
+     instance(shape("rectangle", ""), "<rotate x=\"1\" y=\"0.3\" angle=\"23\"/><scale y=\"30\"/>"
+                                      "<rotate y=\"1\" z=\"0.4\" angle=\"71\"/>"
+                                      "<translate x=\"1\" y=\"2\" z=\"-3\"/>")},
     {"instance of a sphere",
      instance("<shape type=\"sphere\"><point name=\"center\" value=\"0,-10,0\"/><float "
               "name=\"radius\" value=\"10\"/></shape>",
