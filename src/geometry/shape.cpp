@@ -39,9 +39,12 @@ float triangle_slack(Vec3 e1, Vec3 e2) {
             along_e1 += n * e1[i];
             along_e2 += n * e2[i];
         }
-        if (n2 > 0)
-            tilt =
-                std::max(tilt, std::max(std::fabs(along_e1), std::fabs(along_e2)) / std::sqrt(n2));
+        if (!(n2 > 0)) continue;
+        // No more than the height of the triangle: where it has next to none, N can be anything.
+        const double height = std::sqrt(n2) / longest;
+        tilt = std::max(
+            tilt,
+            std::min(std::max(std::fabs(along_e1), std::fabs(along_e2)) / std::sqrt(n2), height));
     }
     return kErrors * longest + float(tilt);
 }
