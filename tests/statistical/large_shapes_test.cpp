@@ -67,6 +67,7 @@ TEST_P(SphereBox, LooksLikeABoxOfRectangles) {
     const uint64_t passes = method == "mps"    ? 512
                             : has_groups       ? 1024
                             : method == "sppm" ? 16384
+                            : method == "upg"  ? 4096
                                                : 2048;
     expect_same_image(
         render_tiles(box(true), GetParam(), {.passes = passes, .tiles = 2}),
