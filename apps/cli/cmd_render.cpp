@@ -102,7 +102,8 @@ private:
     }
 };
 
-/// Something that is done every so many seconds, or less often if it would take a larger share of the time.
+/// Something that is done every so many seconds, or less often if it would take a larger share of the time: but one call that
+/// took long, such as one that waited for a disk, postpones the next one by no more than a quarter of an hour.
 class Timer {
 public:
     explicit Timer(double interval, double most = 1) : interval_(interval), most_(most) {}
@@ -113,7 +114,7 @@ public:
         task();
         last_ = Clock::now();
         const double taken = seconds_since(begin);
-        wait_ = std::max(interval_, taken / most_);
+        wait_ = std::max(interval_, std::min(taken / most_, kLongestWait));
         seconds_ += taken;
         ++calls_;
     }
@@ -126,6 +127,7 @@ private:
     static double seconds_since(Clock::time_point t) {
         return std::chrono::duration<double>(Clock::now() - t).count();
     }
+    static constexpr double kLongestWait = 900;
     double interval_, most_, wait_ = interval_, seconds_ = 0;
     int calls_ = 0;
     Clock::time_point last_ = Clock::now();

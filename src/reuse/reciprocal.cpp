@@ -11,8 +11,7 @@ namespace {
 /// The trials of one pair: rays from PairEvent::from, by the proposal with the least mass.
 class Trials {
 public:
-    Trials(const Scene& scene, const PairEvent& event)
-        : scene_(scene), e_(event), density_{event.from, event.mode} {
+    explicit Trials(const PairEvent& event) : e_(event), density_{event.from, event.mode} {
         if (e_.from.is_infinite) {
             const auto half_height =
                 e_.bound == TrialBound::Slab ? std::optional(e_.near.half_height) : std::nullopt;
@@ -81,7 +80,6 @@ private:
             take_if_less(RegionProposal<SeenBand>::make(SeenBand(view), density_));
     }
 
-    const Scene& scene_;
     const PairEvent& e_;
     WalkDensity density_;
     DirectionProposal proposal_;
@@ -115,7 +113,7 @@ bool Neighbourhood::clip(Ray& ray) const {
 double reciprocal_probability(const Scene& scene, const PairEvent& event, Sampler& sampler,
                               Vertex& scratch, RenderStats& stats) {
     constexpr uint64_t kRunaway = 10'000'000;
-    const Trials trials(scene, event);
+    const Trials trials(event);
     ComponentArena arena;
     SurfaceHit hit;
     for (uint64_t n = 1; n <= kRunaway; ++n) {

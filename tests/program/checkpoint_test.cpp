@@ -605,27 +605,27 @@ TEST_F(CheckpointTest, AFileThatDoesNotBecomeDurableIsRemovedAtOnce) {
 /// With a clock a thousand times as fast and writes that take five milliseconds longer, a checkpoint takes more than five
 /// seconds.
 TEST_F(CheckpointTest, TakesAHundredthOfTheTimeUnlessItsIntervalIsGiven) {
-    constexpr double kSeconds = 6000;
     fs::create_directory(path("faulty"));
+    // The clock runs a hundred times as fast, and each checkpoint takes several of its seconds.
     const auto checkpoints = [&](const Arguments& more) {
         Arguments all = {"-i",           "path",
-                         "--time",       fmt::format("{}", kSeconds),
+                         "--time",       "600",
                          "--stats",      path("stats.json"),
                          "--threads",    "1",
                          "--checkpoint", path("faulty/a.etd")};
         all.insert(all.end(), more.begin(), more.end());
         const ProgramResult r =
-            start_with("ETENDUE_CLOCK=1000 ETENDUE_SLOW_WRITE=5", render("a.exr", all)).wait();
+            start_with("ETENDUE_CLOCK=100 ETENDUE_SLOW_WRITE=20", render("a.exr", all)).wait();
         EXPECT_EQ(r.status, 0) << r.errors;
         fs::remove(path("faulty/a.etd"));
-        return nlohmann::json::parse(read_text(path("stats.json")))["checkpoints"];
+        return nlohmann::json::parse(read_text(path("stats.json")))["checkpoints"]["written"]
+            .get<int>();
     };
-    const auto by_default = checkpoints({}), given = checkpoints({"--checkpoint-every", "60"});
-    EXPECT_GE(by_default["written"], 1);
-    EXPECT_GT(given["written"], 4 * by_default["written"].get<int>());
-    EXPECT_GT(given["seconds"], 0.05 * kSeconds);
-    // The last of them may have taken more than those before it.
-    EXPECT_LT(by_default["seconds"], 0.04 * kSeconds);
+    // The first one, after a minute, perhaps a second, and the one at the end.
+    const int by_default = checkpoints({});
+    EXPECT_GE(by_default, 1);
+    EXPECT_LE(by_default, 3);
+    EXPECT_GE(checkpoints({"--checkpoint-every", "6"}), 7);
 }
 
 /// Whatever fails, the image is the old one or the new one, and the new one is somewhere.

@@ -68,11 +68,17 @@ def blocks_of(lines: list[str]) -> list[Block]:
     return found
 
 
-def missing(block: Block, where: Callable[[str], str | None]) -> list[str]:
+def missing(block: Block, program: str, where: Callable[[str], str | None]) -> list[str]:
     """Programs and packages that its commands need and that are not here."""
+    if any(re.search(r"mpirun .*etendue ", c.text) for c in block.commands) and not has_mpi(program):
+        return ["etendue with MPI"]
     words = {word for c in block.commands for word in re.findall(r"\w+", c.text)}
     programs = [p for word in PROGRAMS.keys() & words for p in PROGRAMS[word] if not where(p)]
     return programs + [p for word in PACKAGES.keys() & words for p in [PACKAGES[word]] if not is_package(p)]
+
+
+def has_mpi(program: str) -> bool:
+    return "libmpi" in subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
 
 
 def is_package(name: str) -> bool:
@@ -122,7 +128,7 @@ def replayed(page: Path, program: str, folder: Path) -> tuple[str, list[str]]:
     lines = page.read_text().splitlines()
     blocks, absent = [], set()
     for block in blocks_of(lines):
-        lacks = missing(block, place_of)
+        lacks = missing(block, program, place_of)
         absent.update(lacks)
         if not lacks:
             blocks.append(block)
@@ -148,16 +154,16 @@ def without_times(page: str) -> list[str]:
     return kept
 
 
-def hash_of_processor(page: str) -> str:
-    found = re.search(r"^ +processor +(\S+)$", page, re.MULTILINE)
-    return found[1] if found else ""
+def what_bits_depend_on(page: str) -> list[str]:
+    """Libraries and processor, as info prints them."""
+    return re.findall(r"^ +(?:C library|ray tracer|processor) +.*$", page, re.MULTILINE)
 
 
 def difference(old: str, new: str) -> str:
-    """What is not the same, apart from times. Numbers with decimals may differ by 2 % where the processors do, on which last bits
-    depend."""
+    """What is not the same, apart from times. Numbers with decimals may differ by 2 % where libraries or processors do, on which
+    last bits depend."""
     a, b = without_times(old), without_times(new)
-    if hash_of_processor(old) != hash_of_processor(new):
+    if what_bits_depend_on(old) != what_bits_depend_on(new):
         a, b = like(a, b)
     return "\n".join(difflib.unified_diff(a, b, "manual", "here", n=1, lineterm=""))
 
