@@ -1,6 +1,9 @@
 """What shows the progress of work."""
 
 import functools
+import inspect
+import signal
+import traceback
 import warnings
 from collections.abc import Callable
 from typing import Any, ParamSpec
@@ -8,8 +11,23 @@ from typing import Any, ParamSpec
 P = ParamSpec("P")
 
 
+def _code(handler: Any) -> Any:
+    """What runs when the object is called; None if it is not written in Python."""
+    while isinstance(handler, functools.partial):
+        handler = handler.func
+    return getattr(handler if inspect.isroutine(handler) else type(handler).__call__, "__code__", None)
+
+
+def _is_of_signal_handler(e: Exception) -> bool:
+    """Whether a handler of signals has raised it, which Python calls in the midst of whatever runs."""
+    handlers = [_code(h) for s in signal.valid_signals() if callable(h := signal.getsignal(s))]
+    return any(frame.f_code in handlers for frame, _ in traceback.walk_tb(e.__traceback__))
+
+
 def harmless(show: Callable[P, Any]) -> Callable[P, None]:
-    """`show`, which is called no more after it has raised an exception: a rendering is worth more than what is shown of it."""
+    """`show`, which is called no more after it has raised an exception: a rendering is worth more than what is shown of it.
+    Exceptions of signal handlers are those of the caller.
+    """
     fails = False
 
     @functools.wraps(show)
@@ -20,6 +38,8 @@ def harmless(show: Callable[P, Any]) -> Callable[P, None]:
         try:
             show(*args, **kwargs)
         except Exception as e:
+            if _is_of_signal_handler(e):
+                raise
             fails = True
             warnings.warn(f"the progress cannot be shown: {e}", RuntimeWarning, stacklevel=2)
 

@@ -348,7 +348,7 @@ def render(
     rendered a scene (use the start method "spawn"); ValueError for another sampler or filter mode, and for limits that
     are not above 0. If a pass fails, for example for want of memory, raises RenderError, whose result is that of the
     passes before it. If it is the first pass, raises what the pass raised: a RuntimeError, a MemoryError, or the exception
-    of an Integrator.
+    of an Integrator. Exceptions of signal handlers are passed to the caller.
     """
     _etendue.check_aovs(list(aovs))
     depth = 6 if techniques is True else int(techniques)
@@ -435,20 +435,6 @@ def _run(
 
         update_view = harmless(LiveView().update)
 
-    # Whether an exception is that of a function which is called between passes. It ends no pass.
-    is_own = False
-
-    def guarded(call: Callable[[], object]) -> Callable[[], object]:
-        def guarded_call() -> object:
-            nonlocal is_own
-            try:
-                return call()
-            except BaseException:
-                is_own = True
-                raise
-
-        return guarded_call
-
     def between_passes() -> object:
         now = rendering.now()
         assert now is not None
@@ -462,9 +448,9 @@ def _run(
     interval = 0.0 if callback is not None else 0.5
     bar = _Bar(rendering, progress)
     try:
-        stopped_by = rendering.run(guarded(harmless(bar.update)), guarded(between_passes) if wants_calls else None, interval)
+        stopped_by = rendering.run(harmless(bar.update), between_passes if wants_calls else None, interval)
     except Exception as failure:
-        if is_own or rendering.passes == 0:
+        if not rendering.pass_failed or rendering.passes == 0:
             raise
         n = rendering.passes
         why = "not enough memory" if isinstance(failure, MemoryError) else str(failure) or type(failure).__name__

@@ -14,7 +14,12 @@ struct Background::State {
     const std::function<void()>* callback = nullptr;  ///< To be called.
     bool is_done = false;
     std::exception_ptr failure;
+    std::exception_ptr ending;  ///< What end_task() was called with.
 };
+
+namespace {
+thread_local Background* current = nullptr;  ///< The one whose task this thread runs.
+}
 
 void Background::call(const std::function<void()>& callback) {
     std::unique_lock lock(state_->mutex);
@@ -27,6 +32,7 @@ void Background::run(const std::function<void()>& task, const std::function<void
     State state;
     state_ = &state;
     std::thread thread([&] {
+        current = this;
         try {
             task();
         } catch (...) {
@@ -80,7 +86,15 @@ void Background::run(const std::function<void()>& task, const std::function<void
     }
     state_ = nullptr;
     if (raised) std::rethrow_exception(raised);
+    if (state.ending) std::rethrow_exception(state.ending);
+    task_failed = state.failure != nullptr;
     if (state.failure) std::rethrow_exception(state.failure);
+}
+
+void Background::end_task() {
+    if (!current) return;
+    if (!current->state_->ending) current->state_->ending = std::current_exception();
+    current->stop = current->drop = true;
 }
 
 }  // namespace etendue::python

@@ -78,6 +78,8 @@ public:
     std::atomic<bool> drop{false};
     /// Whether Ctrl-C ended the task.
     bool interrupted = false;
+    /// Whether run() throws an exception of the task, and not one of callbacks, ticks or signal handlers.
+    bool task_failed = false;
 
     /// Calls `callback` in the calling thread, with the GIL; the task waits until it is done. Called by the task.
     void call(const std::function<void()>& callback);
@@ -85,7 +87,22 @@ public:
     /// callbacks and ticks end the task, and go on to the caller.
     void run(const std::function<void()>& task, const std::function<void()>& tick);
 
+    /// Calls `call`, which calls objects of Python for the task, with the GIL. What they raise that is no Exception, such as
+    /// SystemExit, ends the task of this thread, and goes on to the caller even where the task would survive it.
+    template <class Call>
+    static auto calling_objects(const Call& call) {
+        try {
+            return call();
+        } catch (const nb::python_error& e) {
+            if (!e.matches(PyExc_Exception)) end_task();
+            throw;
+        }
+    }
+
 private:
+    /// With the exception that is being handled, if this thread runs a task.
+    static void end_task();
+
     struct State;
     State* state_ = nullptr;
 };

@@ -124,11 +124,12 @@ public:
             Sample& of;
             ~Expiry() { of.expire(); }
         } expiry{*sample};
-        object_->attr("sample")(sample);
+        Background::calling_objects([&] { object_->attr("sample")(sample); });
     }
     TechniqueCounts counts(const Scene&, uint64_t light_paths) const override {
         const nb::gil_scoped_acquire gil;
-        return nb::cast<TechniqueCounts>(object_->attr("counts")(light_paths));
+        return Background::calling_objects(
+            [&] { return nb::cast<TechniqueCounts>(object_->attr("counts")(light_paths)); });
     }
     uint64_t light_paths(const Scene& scene) const override {
         return traces_light_paths_ ? scene.film().pixel_count() : 0;

@@ -137,6 +137,7 @@ public:
             });
         } catch (...) {
             stopped_by_ = "failure";
+            pass_failed_ = background.task_failed;
             throw;
         }
         stopped_by_ = asked_to_stop && !background.interrupted && reason == StopReason::Interrupted
@@ -158,6 +159,9 @@ public:
         return renderer_;
     }
     const Film& film() const { return renderer().film(); }
+    /// Whether what run() has thrown is the failure of a pass, and not an exception of what is called between passes or of a
+    /// signal handler.
+    bool pass_failed() const { return pass_failed_; }
     /// Whether the film may still change.
     bool is_running() const { return is_running_; }
 
@@ -217,6 +221,7 @@ private:
     std::atomic<std::thread::id> reader_{};  ///< The thread of a callback that runs.
     PassLog log_;
     std::string stopped_by_;
+    bool pass_failed_ = false;
 };
 using RenderingPtr = std::shared_ptr<Rendering>;
 
@@ -425,6 +430,7 @@ void bind_render(nb::module_& m) {
             "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a, "first_pass"_a)
         .def("run", &Rendering::run, "tick"_a.none(), "callback"_a.none(), "interval"_a)
         .def("now", &Rendering::now)
+        .def_prop_ro("pass_failed", &Rendering::pass_failed)
         .def_prop_ro("scene", &Rendering::scene_pointer)
         .def_prop_ro("passes",
                      [](const Rendering& r) {

@@ -1,8 +1,12 @@
-"""Passes that fail, and limits of memory."""
+"""Passes that fail, exceptions that end a rendering, and limits of memory."""
 
+import functools
 import pickle
+import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +14,7 @@ import pytest
 
 import etendue as et
 from conftest import Hits
-from etendue import core
+from etendue import _render, _show, core
 
 
 class Fails(Hits):
@@ -102,6 +106,76 @@ def test_the_error_takes_its_result_to_other_processes(cornell: et.Scene) -> Non
     assert type(copy) is et.RenderError and str(copy) == str(e.value)
     assert copy.result.stopped_by == "failure"
     np.testing.assert_array_equal(copy.result.image, e.value.result.image)
+
+
+class _Late(Exception):
+    pass
+
+
+def _raise_late(*_: object) -> None:
+    raise _Late("the time is over")
+
+
+class _Handler:
+    def method(self, *_: object) -> None:
+        raise _Late("the time is over")
+
+    def __call__(self, *_: object) -> None:
+        _raise_late()
+
+
+@pytest.fixture(params=[_raise_late, _Handler().method, _Handler(), functools.partial(_raise_late, 1)],
+                ids=["function", "method", "object", "partial"])
+def alarm(request: pytest.FixtureRequest) -> Iterator[Callable[[float], None]]:
+    """Sets a timer whose signal handler raises an exception."""
+
+    def set_timer(seconds: float) -> None:
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+
+    before = signal.signal(signal.SIGALRM, request.param)
+    yield set_timer
+    set_timer(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def test_exceptions_of_signal_handlers_end_the_rendering(cornell: et.Scene, alarm: Callable[[float], None]) -> None:
+    passes: list[int] = []
+    alarm(0.3)
+    with pytest.raises(_Late, match="^the time is over$"):
+        et.render(cornell, "path", time=5, progress=False, callback=lambda p: passes.append(p.passes))
+    assert passes
+
+
+@pytest.mark.parametrize("shows", [_show.LiveView, _render._Bar])
+def test_so_they_do_while_the_progress_is_shown(
+    cornell: et.Scene, monkeypatch: pytest.MonkeyPatch, alarm: Callable[[float], None], shows: type
+) -> None:
+    def draw(*_: object, **__: object) -> None:
+        alarm(0.05)
+        while True:
+            time.sleep(0.001)
+
+    monkeypatch.setattr(shows, "update", draw)
+    with pytest.raises(_Late, match="^the time is over$"):
+        et.render(cornell, "path", time=5, progress=False, live=True)
+
+
+def test_what_is_no_failure_of_an_integrator_ends_reports(cornell: et.Scene, tmp_path: Path) -> None:
+    for leaves in SystemExit("leaves"), KeyboardInterrupt("leaves"), GeneratorExit("leaves"):
+        class Leaves(Hits):
+            def sample(self, c: core.Sample) -> None:
+                raise leaves
+
+        with pytest.raises(type(leaves), match="leaves"):
+            et.render(cornell, Leaves(), spp=1, progress=False)
+        with pytest.raises(type(leaves), match="leaves"):
+            et.compare(cornell, [Leaves(), "path"], spp=1, reference_spp=2, references=tmp_path, techniques=0,
+                       progress=False)
+        with pytest.raises(type(leaves), match="leaves"):
+            et.compare(cornell, ["path"], spp=1, reference_spp=2, reference_method=Leaves(), references=tmp_path, techniques=0,
+                       progress=False)
+        with pytest.raises(type(leaves), match="leaves"):
+            et.verify(cornell, ["path", Leaves()], spp=1, runs=8, lengths=(1, 2), progress=False)
 
 
 LIMITED = """
