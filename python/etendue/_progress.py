@@ -2,8 +2,6 @@
 
 import functools
 import inspect
-import signal
-import traceback
 import warnings
 from collections.abc import Callable
 from typing import Any, ParamSpec
@@ -20,6 +18,9 @@ def _code(handler: Any) -> Any:
 
 def _is_of_signal_handler(e: Exception) -> bool:
     """Whether a handler of signals has raised it, which Python calls in the midst of whatever runs."""
+    import signal
+    import traceback
+
     handlers = [_code(h) for s in signal.valid_signals() if callable(h := signal.getsignal(s))]
     return any(frame.f_code in handlers for frame, _ in traceback.walk_tb(e.__traceback__))
 
