@@ -59,7 +59,7 @@ void Yardstick::trace_path(uint64_t index) const {
         const Vec2 u_lamp = sampler.next_2d();
         // A square lamp in the upper half.
         const Vec3 lamp{0.4f * (u_lamp.x - 0.5f), 1.2f, 0.4f * (u_lamp.y - 0.5f)};
-        const Vec3 o = offset_origin({g.p, n, g.slack}, n, 0x1p-6f, 8);
+        const Vec3 o = offset_origin({g.p, n, g.slack}, n);
         accelerator_.occluded({o, lamp - o, 1});
         const Vec3 wi = sample_cosine_hemisphere(sampler.next_2d());
         ray = {o, Frame::from_normal(n).to_world(wi), kInf};
