@@ -61,6 +61,11 @@ public:
     virtual EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const = 0;
     /// False where the sampled point sends no light to `from`.
     virtual bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const = 0;
+    /// Emitters with large tables: ask for the memory that sample_direct() reads for `u` at any point, first for that where
+    /// a search begins, then for that where it ends.
+    enum class Fetch : uint8_t { Begin, End };
+    virtual void fetch_direct(FinePoint /*u*/, Fetch /*what*/) const {}
+    virtual bool has_large_tables() const { return false; }
     /// Emitted power in W, weighted by luminance; emitters are chosen proportionally to it.
     virtual double power() const = 0;
 

@@ -40,6 +40,12 @@ public:
         distribution_.for_each_large_array([](const auto& a) { prefer_huge_pages(a); });
     }
 
+    void fetch_direct(FinePoint u, Fetch what) const override {
+        if (what == Fetch::Begin) return distribution_.fetch_guide(u);
+        const Texels at = texels(place_of(distribution_.sample(u)));
+        for (const Rgb* row : {at.above, at.below}) fetch(row[at.left]), fetch(row[at.right]);
+    }
+    bool has_large_tables() const override { return true; }
     double power() const override {
         return 4 * std::numbers::pi * std::numbers::pi * sqr(double(scene_radius())) * mean_;
     }
@@ -50,13 +56,18 @@ private:
     // sampled point, not of the rounded direction, which may lie in the next cell.
     Sample sample_arrival(FinePoint u) const override {
         const auto s = distribution_.sample(u);
-        Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};
-        if (uv.x >= 1) uv.x -= 1;
+        const Vec2 uv = place_of(s);
         float sp, cp, ct, sin_theta;
         sincosf(2 * kPi * uv.x, &sp, &cp);
         sincosf(kPi * uv.y, &sin_theta, &ct);
         return {normalize(to_world_.vector({sp * sin_theta, ct, -cp * sin_theta})), radiance(uv),
                 density(s.pdf, {uv, sin_theta})};
+    }
+    /// The point of the image.
+    Vec2 place_of(const PiecewiseConstant2D::Sample& s) const {
+        Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};
+        if (uv.x >= 1) uv.x -= 1;
+        return uv;
     }
     float pdf_direction(Vec3 d) const override { return pdf(to_place(d)); }
     Rgb radiance(Vec3 d) const override { return radiance(to_place(d).uv); }
@@ -81,13 +92,22 @@ private:
         return in_square * cell_v_derivative(at.uv.y) / (2 * kPi * kPi * at.sin_theta);
     }
 
-    Rgb radiance(Vec2 uv) const {
+    /// The four pixels around a point, and the weights of those on the right and of those below.
+    struct Texels {
+        const Rgb *above, *below;  ///< Rows.
+        size_t left, right;        ///< Columns.
+        float fx, fy;
+    };
+    Texels texels(Vec2 uv) const {
         const float x = uv.x * float(width_) - 0.5f, y = uv.y * float(height_) - 0.5f;
         const int x0 = int(std::floor(x)), y0 = int(std::floor(y));
-        const float fx = x - float(x0), fy = y - float(y0);
-        const size_t left = size_t(wrap(x0)), right = size_t(wrap(x0 + 1));
-        const Rgb *above = row(y0), *below = row(y0 + 1);
-        return lerp(fy, lerp(fx, above[left], above[right]), lerp(fx, below[left], below[right]));
+        return {row(y0),       row(y0 + 1),  size_t(wrap(x0)), size_t(wrap(x0 + 1)),
+                x - float(x0), y - float(y0)};
+    }
+    Rgb radiance(Vec2 uv) const {
+        const Texels t = texels(uv);
+        return lerp(t.fy, lerp(t.fx, t.above[t.left], t.above[t.right]),
+                    lerp(t.fx, t.below[t.left], t.below[t.right]));
     }
 
     /// From image coordinate v to the y of distribution_, in [0, 1); piecewise linear.

@@ -119,6 +119,10 @@ LocalRay local_ray(const Transform& to_local, Vec3 o, Vec3 d) {
 float interpolate(float a, float b, float c, double u, double v) {
     return float(a + u * (double(b) - a) + v * (double(c) - a));
 }
+Vec3 interpolate(Vec3 a, Vec3 b, Vec3 c, float u, float v) {
+    return {interpolate(a.x, b.x, c.x, u, v), interpolate(a.y, b.y, c.y, u, v),
+            interpolate(a.z, b.z, c.z, u, v)};
+}
 
 }  // namespace
 
@@ -129,18 +133,15 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
     const Vec3 e1 = b.p - a.p, e2 = c.p - a.p;
     const float w = 1 - u - v;
     SurfaceGeometry g;
-    g.p = {interpolate(a.p.x, b.p.x, c.p.x, u, v), interpolate(a.p.y, b.p.y, c.p.y, u, v),
-           interpolate(a.p.z, b.p.z, c.p.z, u, v)};
+    g.p = interpolate(a.p, b.p, c.p, u, v);
     g.slack = face.slack;
     g.ng = face.ng;
     g.ns = g.ng;
     if (has_normals_) {
         const Vec3 n = a.n * w + b.n * u + c.n * v;
+        if (dot(g.ng, n) < 0) g.ng = -g.ng;
         const float len2 = length2(n);
-        if (len2 > 0) {
-            g.ns = n * (1.0f / std::sqrt(len2));
-            if (dot(g.ng, g.ns) < 0) g.ng = -g.ng;
-        }
+        if (len2 > 0) g.ns = n * (1.0f / std::sqrt(len2));
     }
     if (!colors_.empty()) g.color = colors_[ia] * w + colors_[ib] * u + colors_[ic] * v;
     if (!alphas_.empty()) g.alpha = alphas_[ia] * w + alphas_[ib] * u + alphas_[ic] * v;
@@ -167,9 +168,15 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
 }
 
 ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
-    const Vec2 b = sample_uniform_triangle(u);
-    const SurfaceGeometry g = surface(prim, b.x, b.y, false);
-    return {g.p, g.ng, g.ns, b, prim, g.slack};
+    const Vec2 at = sample_uniform_triangle(u);
+    const Face& face = faces_[prim];
+    const Vertex &a = vertices_[face.vertices[0]], &b = vertices_[face.vertices[1]],
+                 &c = vertices_[face.vertices[2]];
+    // As surface() turns it.
+    const bool is_turned =
+        has_normals_ && dot(face.ng, a.n * (1 - at.x - at.y) + b.n * at.x + c.n * at.y) < 0;
+    return {interpolate(a.p, b.p, c.p, at.x, at.y), is_turned ? -face.ng : face.ng, at, prim,
+            face.slack};
 }
 
 size_t TriangleMesh::memory_bytes() const {
@@ -265,7 +272,7 @@ SurfaceGeometry Sphere::surface(uint32_t, float u, float v, bool tangents) const
 ShapeSample Sphere::sample(uint32_t, Vec2 u) const {
     const Vec3 local = sample_uniform_sphere(u);
     const SurfaceGeometry g = at({local.x, local.y, local.z});
-    return {g.p, g.ng, g.ns, parameters(local), 0, g.slack};
+    return {g.p, g.ng, parameters(local), 0, g.slack};
 }
 
 bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
@@ -334,7 +341,7 @@ SurfaceGeometry Disk::surface(uint32_t, float u, float v, bool tangents) const {
 
 ShapeSample Disk::sample(uint32_t, Vec2 u) const {
     const Vec2 d = sample_uniform_disk(u);
-    return {to_world_.point({d.x, d.y, 0}), ng_, ng_, {std::hypot(d.x, d.y), turns(d.x, d.y)}, 0};
+    return {to_world_.point({d.x, d.y, 0}), ng_, {std::hypot(d.x, d.y), turns(d.x, d.y)}, 0};
 }
 
 bool Disk::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
@@ -401,7 +408,7 @@ SurfaceGeometry Cylinder::surface(uint32_t, float u, float v, bool tangents) con
 
 ShapeSample Cylinder::sample(uint32_t, Vec2 u) const {
     const SurfaceGeometry g = surface(0, u.x, u.y, false);
-    return {g.p, g.ng, g.ns, g.uv, 0};
+    return {g.p, g.ng, g.uv, 0};
 }
 
 bool Cylinder::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {

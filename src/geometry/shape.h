@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "math/bounds.h"
+#include "math/fetch.h"
 #include "math/transform.h"
 #include "math/vec.h"
 
@@ -30,7 +31,7 @@ struct SurfaceGeometry {
 
 /// A point drawn from a shape's surface.
 struct ShapeSample {
-    Vec3 p, ng, ns;
+    Vec3 p, ng;
     Vec2 uv;  ///< Parameters within the primitive, as in RayHit.
     uint32_t prim;
     float slack = 0;  ///< As SurfaceGeometry::slack.
@@ -93,6 +94,12 @@ public:
     float slack(uint32_t prim) const override { return faces_[prim].slack; }
     ShapeSample sample(uint32_t prim, Vec2 u) const override;
     size_t memory_bytes() const override;
+
+    /// Asks for the memory that surface() reads. The second function reads what the first one has asked for.
+    void fetch_face(uint32_t prim) const { fetch(faces_[prim]); }
+    void fetch_vertices(uint32_t prim) const {
+        for (const uint32_t i : faces_[prim].vertices) fetch(vertices_[i]);
+    }
 
 private:
     std::vector<Vertex> vertices_;

@@ -53,6 +53,10 @@ public:
             if (cache_.vertices()[i].is_connectible) connectible_.push_back(i);
     }
 
+    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        return paths_.trace_eye_paths(c, z, counts(c[0].scene, c[0].light_paths), stats);
+    }
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         if (!uses_cache_) return paths_.add_sample(c, n, work);

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "pathspace/eye_paths.h"
+
 namespace etendue {
 
 std::vector<ParamInfo> Bidirectional::params() {
@@ -56,23 +58,18 @@ void Bidirectional::trace_further_light_paths(const SampleContext& c, const Tech
     }
 }
 
-namespace {
-
-void start_eye_path(const SampleContext& c, const WalkContext& walk, SubPath& z) {
-    c.sampler.seek(Stream::Eye, 0);
-    const Film::PixelSample at = c.film_sample(c.sampler.next_2d_if(c.needs_film_number()));
-    const Vec2 u_lens = c.sampler.next_2d_if(c.scene.sensor().has_finite_lens());
-    etendue::start_eye_path(walk, at, u_lens, c.sampler, z);
-}
-
-}  // namespace
-
 void Bidirectional::trace_eye_path(const SampleContext& c, const TechniqueCounts& counts,
                                    Workspace& work, const LearnedPlaces* learned) const {
-    const WalkContext walk = eye_walk(c.scene, counts, work.stats, learned);
-    start_eye_path(c, walk, work.z);
-    while (extend<TransportMode::Radiance>(walk, c.sampler, work.z)) {
-    }
+    if (work.has_eye_path) return;
+    etendue::trace_eye_paths(eye_walk(c.scene, counts, work.stats, learned), {&c, 1}, {&work.z, 1});
+}
+
+bool Bidirectional::trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                                    const TechniqueCounts& counts, RenderStats& stats,
+                                    const LearnedPlaces* learned) const {
+    const PhaseTimer timer(stats, &PhaseSeconds::eye_paths);
+    etendue::trace_eye_paths(eye_walk(c[0].scene, counts, stats, learned), c, z);
+    return true;
 }
 
 void Bidirectional::add_sample(const SampleContext& c, const TechniqueCounts& counts,
@@ -136,9 +133,7 @@ void Bidirectional::add_technique(const SampleContext& c, const TechniqueCounts&
             return;
         }
     }
-    start_eye_path(c, eye, z);
-    while (extend<TransportMode::Radiance>(eye, c.sampler, z)) {
-    }
+    etendue::trace_eye_paths(eye, {&c, 1}, {&z, 1});
     if (z.size() < t) return;
     if (s == 0)
         add_hits(c, counts, t, work, factor);

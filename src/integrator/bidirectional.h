@@ -73,7 +73,11 @@ public:
     /// Where there are more light paths than samples: traces the others of this sample, for C(s,1) and C(s,0) alone.
     void trace_further_light_paths(const SampleContext& c, const TechniqueCounts& counts,
                                    Workspace& work, const LearnedPlaces* learned) const;
-    /// Traces the eye sub-path work.z.
+    /// For Integrator::trace_eye_paths().
+    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         const TechniqueCounts& counts, RenderStats& stats,
+                         const LearnedPlaces* learned = nullptr) const;
+    /// Traces the eye sub-path work.z, unless it has been traced.
     void trace_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
                         const LearnedPlaces* learned = nullptr) const;
     /// Whether z_{t-1} can be joined to a light sub-path without exceeding the maximum path length.

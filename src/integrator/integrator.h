@@ -48,6 +48,13 @@ public:
     /// Takes the sums of all workers at the end of a pass, which another process may have made. Passes come in order.
     virtual void collect(std::span<const std::unique_ptr<PassSums>>) {}
 
+    /// Traces the eye sub-path z[i] of each sample c[i] of a pass, which takes less time than one by one
+    /// (walk_in_turns()). sample() then finds that of its sample in `work.z`, with `work.has_eye_path`. False where it
+    /// traces that itself. `stats` receives what is counted.
+    virtual bool trace_eye_paths(std::span<const SampleContext> /*c*/, std::span<SubPath> /*z*/,
+                                 RenderStats& /*stats*/) const {
+        return false;
+    }
     /// Traces sample `context.index` and reports its contributions.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
     /// Number of samples of each strategy per eye sub-path, as counted in the weights, for a pass with `light_paths`.

@@ -7,6 +7,7 @@
 #include "integrator/path.h"
 
 #include "integrator/guiding.h"
+#include "pathspace/eye_paths.h"
 
 namespace etendue {
 namespace {
@@ -22,11 +23,16 @@ public:
         guiding_.train(pass, depth_, GuidedWalks::Eye);
     }
 
+    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        const Scene& scene = c[0].scene;
+        etendue::trace_eye_paths({scene, counts(scene, 0), stats, depth_.walk()}, c, z);
+        return true;
+    }
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, 0);
-        const WalkContext walk{c.scene, counts, work.stats, depth_.walk()};
-        SubPath& z = work.z;
-        start_eye_path(walk, c.film, c.index, c.sampler, z);
+        const SubPath& z = work.z;
+        if (!work.has_eye_path) trace_eye_paths({&c, 1}, {&work.z, 1}, work.stats);
         for (int t = 2; t <= z.size(); ++t) {
             for_each_hit(c.scene, z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution); });
@@ -34,7 +40,6 @@ public:
             if (const auto j = join_next_event(c.scene, z, t, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add(*j, j->contribution * Tr);
-            extend<TransportMode::Radiance>(walk, c.sampler, z);
         }
     }
 

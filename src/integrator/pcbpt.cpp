@@ -55,6 +55,10 @@ public:
         make_records(pass, n);
     }
 
+    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        return paths_.trace_eye_paths(c, z, counts(c[0].scene, c[0].light_paths), stats);
+    }
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         const SubPath& z = work.z;

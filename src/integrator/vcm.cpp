@@ -81,6 +81,10 @@ public:
         loaded_ = {};
     }
 
+    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        return paths_.trace_eye_paths(c, z, counts(c[0].scene, c[0].light_paths), stats, &density_);
+    }
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);

@@ -113,7 +113,7 @@ void PiecewiseConstant1D::Steps::add(std::span<const float> values, double sum) 
 PiecewiseConstant1D::Sample PiecewiseConstant1D::Steps::sample(double u, size_t r) const {
     const double scaled = u * kOne;
     const uint32_t at = uint32_t(scaled);
-    const Guide& start = guide[r * size_t(guides) + size_t(uint64_t(at) * uint64_t(guides) >> 31)];
+    const Guide& start = guide[guide_of(u, r)];
     int k = 0;
     while (k < kCellsInGuide && start.edge[k + 1] <= at) ++k;
     int cell = int(start.first) + k;

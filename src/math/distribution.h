@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "math/fetch.h"
 #include "math/vec.h"
 
 namespace etendue {
@@ -89,6 +90,12 @@ private:
             return cell + 1 < cells ? row[cell + 1] : kOne;
         }
         Sample sample(double u, size_t row) const;
+        /// Asks for the memory where sample() begins.
+        void fetch_guide(double u, size_t row) const { fetch(guide[guide_of(u, row)]); }
+        size_t guide_of(double u, size_t row) const {
+            const uint64_t at = uint32_t(u * kOne);
+            return row * size_t(guides) + size_t(at * uint64_t(guides) >> 31);
+        }
         float pdf(float x, size_t row) const;
         size_t memory_bytes() const {
             return lower.capacity() * sizeof(lower[0]) + guide.capacity() * sizeof(guide[0]);
@@ -108,6 +115,10 @@ public:
         float pdf;
     };
     Sample sample(FinePoint u) const;
+    /// Asks for the memory of the row where sample() begins.
+    void fetch_guide(FinePoint u) const {
+        rows_.fetch_guide(u.x, size_t(marginal_.sample(u.y).cell));
+    }
     float pdf(Vec2 uv) const;
     double integral() const { return marginal_.integral(); }
     size_t memory_bytes() const { return rows_.memory_bytes() + marginal_.steps_.memory_bytes(); }

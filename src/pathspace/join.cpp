@@ -60,16 +60,42 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
                 .needs_test = false};
 }
 
+namespace {
+
+/// The emitter of a next event at z_last, and the numbers for its point.
+struct EmitterChoice {
+    const Emitter* emitter;
+    FinePoint u;
+};
+EmitterChoice choose_emitter(const Scene& scene, int last, Sampler& sampler, uint32_t draw) {
+    sampler.seek(Stream::Connection, uint32_t(last));
+    const Emitter& emitter =
+        scene.sample_emitter(rotated(sampler.next_1d_fine_if(scene.has_emitter_choice()), draw));
+    return {&emitter, rotated(sampler.next_2d_fine(), draw)};
+}
+
+}  // namespace
+
+void fetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks) {
+    if (!scene.has_large_emitter_tables()) return;
+    for (const auto what : {Emitter::Fetch::Begin, Emitter::Fetch::End})
+        for (const WalkInTurn& w : walks)
+            for (int last = 1; last < w.path->size(); ++last) {
+                if (!(*w.path)[last].is_connectible) continue;
+                const EmitterChoice chosen = choose_emitter(scene, last, *w.sampler, 0);
+                chosen.emitter->fetch_direct(chosen.u, what);
+            }
+}
+
 std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,
                                     const TechniqueCounts& counts, uint32_t draw) {
     const int last = t - 1;
     const Vertex& v = z[last];
     if (!v.is_connectible || !scene.has_emitters()) return {};
-    sampler.seek(Stream::Connection, uint32_t(last));
-    const Emitter& emitter =
-        scene.sample_emitter(rotated(sampler.next_1d_fine_if(scene.has_emitter_choice()), draw));
+    const auto [chosen, u] = choose_emitter(scene, last, sampler, draw);
+    const Emitter& emitter = *chosen;
     DirectSample d;
-    if (!emitter.sample_direct(v.p, rotated(sampler.next_2d_fine(), draw), d)) return {};
+    if (!emitter.sample_direct(v.p, u, d)) return {};
     const BsdfEval f = v.eval(d.wi, TransportMode::Radiance);
     if (f.f.is_zero()) return {};
 

@@ -10,7 +10,7 @@
 
 namespace etendue {
 
-/// Time spent on samples by phase, in seconds of one thread. Only every kTimedSamples-th sample is timed.
+/// Time spent on samples by phase, in seconds of one thread.
 struct PhaseSeconds {
     double light_paths = 0;  ///< Including their techniques with t ≤ 1.
     double eye_paths = 0;    ///< Including all their joins.
@@ -26,9 +26,15 @@ struct PhaseSeconds {
 
 /// Counters of one worker; merged at the end of a pass.
 struct RenderStats {
+    /// Every kTimedSamples-th sample is timed.
     static constexpr int kTimedSamples = 8;
     PhaseSeconds phases;
-    bool is_timed = false;  ///< Whether the current sample is timed.
+    int stands_for =
+        0;  ///< Number of samples for whose time that of the current one stands; 0: it is not timed.
+    /// The number for sample `index`.
+    static int samples_timed_by(uint64_t index) {
+        return index % kTimedSamples == 0 ? kTimedSamples : 0;
+    }
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
     uint64_t walk_rays = 0, shadow_rays = 0, visible = 0;
     uint64_t joins_skipped = 0;           ///< By Russian roulette before the shadow ray.
@@ -53,20 +59,20 @@ struct RenderStats {
 class PhaseTimer {
 public:
     PhaseTimer(RenderStats& stats, double PhaseSeconds::*phase)
-        : seconds_(stats.is_timed ? &(stats.phases.*phase) : nullptr) {
-        if (seconds_) begin_ = Clock::now();
+        : seconds_(stats.phases.*phase), stands_for_(stats.stands_for) {
+        if (stands_for_ > 0) begin_ = Clock::now();
     }
     ~PhaseTimer() {
-        if (seconds_)
-            *seconds_ += RenderStats::kTimedSamples *
-                         std::chrono::duration<double>(Clock::now() - begin_).count();
+        if (stands_for_ > 0)
+            seconds_ += stands_for_ * std::chrono::duration<double>(Clock::now() - begin_).count();
     }
     PhaseTimer(const PhaseTimer&) = delete;
     PhaseTimer& operator=(const PhaseTimer&) = delete;
 
 private:
     using Clock = std::chrono::steady_clock;
-    double* seconds_;
+    double& seconds_;
+    int stands_for_;
     Clock::time_point begin_;
 };
 

@@ -1,6 +1,7 @@
 #include "pathspace/walk.h"
 
 #include <algorithm>
+#include <array>
 
 #include "guide/guide.h"
 
@@ -66,63 +67,79 @@ bool next_is_fixed_by_film(const Vertex& v, bool is_delta, const Scene& scene) {
            (v.is_fixed_by_film && is_delta && !scene.sensor().has_finite_lens());
 }
 
-/// Result of tracing a ray.
-enum class Met { Surface, Nothing, SurfaceEdgeOn };
-
-/// Traces a ray from the last vertex and appends the surface vertex that it hits. `beta` is the throughput along the
-/// ray and is multiplied by absorption; `pdf_sa` is the density of the direction, or the probability of a delta event.
-Met append_surface(const WalkContext& walk, Sampler& sampler, SubPath& path, TransportMode mode,
-                   const Ray& ray, Rgb& beta, float pdf_sa, MediumId medium) {
+/// Traces the ray of the step from the last vertex.
+void trace(const WalkContext& walk, Sampler& sampler, SubPath& path, Step& step) {
     const Scene& scene = walk.scene;
     ++walk.stats.walk_rays;
-    SurfaceHit hit;
     const float u = sampler.next_1d_if(scene.has_masks());
-    Passage passage{medium};
-    const bool found = scene.intersect(ray, u, hit, passage);
+    Passage passage{step.medium};
+    step.found = scene.find(step.ray, u, step.hit, passage);
     Flight& flight = path.flight;  // by member: a vector copy stalls on stores of members
-    flight.o = ray.o;
-    flight.d = ray.d;
-    flight.length = found ? hit.t : kInf;
-    flight.beta = beta;
-    flight.pdf_sa = pdf_sa;
-    flight.medium = medium;
-    beta *= passage.attenuation;
-    if (!found) return Met::Nothing;
+    flight.o = step.ray.o;
+    flight.d = step.ray.d;
+    flight.length = step.found ? step.hit.t : kInf;
+    flight.beta = step.beta;
+    flight.pdf_sa = step.pdf_sa;
+    flight.medium = step.medium;
+    step.beta *= passage.attenuation;
+    step.medium = passage.medium;
+}
+
+/// Appends the surface vertex where the ray of the step ends; false where it hits the surface edge-on.
+bool append_surface(const WalkContext& walk, SubPath& path, TransportMode mode, const Step& step) {
+    const Ray& ray = step.ray;
+    const SurfaceHit& hit = step.hit;
     ++walk.stats.vertices;
     Vertex& v = path.append();
     v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
-    v.medium = passage.medium;
+    v.medium = step.medium;
     if (const Guide* guide = walk.counts.guide; guide && guide->has_cells()) {
         path.cell = &guide->surfaces.cell(v.p);
         if (guide->guides_surfaces()) v.set_guide(*path.cell, mode, walk.counts.uses_light_paths());
     }
     v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
-    v.beta = beta;
+    v.beta = step.beta;
     // hit.t is the distance from the offset origin of the ray; densities need the distance between the vertices.
     const Vertex& previous = path[path.size() - 2];
-    v.is_fixed_by_film = next_is_fixed_by_film(previous, previous.is_delta, scene);
+    v.is_fixed_by_film = next_is_fixed_by_film(previous, previous.is_delta, walk.scene);
     const float inv_dist2 = previous.is_infinite ? 1.0f : 1 / length2(v.p - previous.p);
-    v.pdf_fwd = pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
+    v.pdf_fwd = step.pdf_sa * (abs_dot(v.ng, ray.d) * inv_dist2);
     v.to_predecessor = previous.has_cosine && !previous.is_infinite
                            ? abs_dot(previous.ng, ray.d) * inv_dist2
                            : inv_dist2;
-    if (v.pdf_fwd > 0) return Met::Surface;
+    if (v.pdf_fwd > 0) return true;
     path.truncate(path.size() - 1);
-    return Met::SurfaceEdgeOn;
+    return false;
 }
 
 /// Appends the vertex at infinity of an eye path that left the scene; it belongs to all emitters at infinity.
-void append_escape(const Scene& scene, SubPath& path, Vec3 d, Rgb beta, float pdf) {
+void append_escape(const Scene& scene, SubPath& path, const Step& step) {
     Vertex& v = path.append();
     const Vertex& previous = path[path.size() - 2];
     v.is_fixed_by_film = next_is_fixed_by_film(previous, previous.is_delta, scene);
     v.kind = Vertex::Kind::Emitter;
     v.is_infinite = true;
-    v.p = d;
-    v.ng = -d;
-    v.wo = -d;
-    v.beta = beta;
-    v.pdf_fwd = pdf;
+    v.p = step.ray.d;
+    v.ng = -step.ray.d;
+    v.wo = -step.ray.d;
+    v.beta = step.beta;
+    v.pdf_fwd = step.pdf_sa;
+}
+
+/// Appends the vertex where the ray of the step ends, if there is one.
+bool append_end(const WalkContext& walk, SubPath& path, TransportMode mode, const Step& step) {
+    if (step.found) return append_surface(walk, path, mode, step);
+    if (mode == TransportMode::Importance || walk.scene.infinite_emitters().empty()) return false;
+    append_escape(walk.scene, path, step);
+    return true;
+}
+
+/// Makes the step.
+bool take(const WalkContext& walk, Sampler& sampler, SubPath& path, TransportMode mode,
+          Step& step) {
+    trace(walk, sampler, path, step);
+    if (step.found) walk.scene.complete(step.hit);
+    return append_end(walk, path, mode, step);
 }
 
 }  // namespace
@@ -157,8 +174,11 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u
     start_eye_path(walk, at, walk.scene.sensor().sample_ray(at.point, u_lens), sampler, z);
 }
 
-void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
-                    Sampler& sampler, SubPath& z) {
+namespace {
+
+/// Makes z_0.
+void append_lens(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
+                 SubPath& z) {
     ++walk.stats.eye_paths;
     z.clear();
     z.film = at.point;
@@ -172,13 +192,24 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const 
     lens.is_connectible = true;
     lens.is_infinite = walk.scene.sensor().is_orthographic();
     lens.p = lens.is_infinite ? -ray.d : ray.p;
+}
 
-    const Ray start{ray.p, ray.d, kInf};
-    Rgb beta(1);
-    const Met met = append_surface(walk, sampler, z, TransportMode::Radiance, start, beta,
-                                   ray.pdf_dir, walk.scene.sensor_medium());
-    if (met == Met::Nothing && !walk.scene.infinite_emitters().empty())
-        append_escape(walk.scene, z, ray.d, beta, ray.pdf_dir);
+/// The step from the lens.
+void leave_lens(const WalkContext& walk, const SensorRay& ray, Step& step) {
+    step.ray = {ray.p, ray.d, kInf};
+    step.beta = Rgb(1);
+    step.pdf_sa = ray.pdf_dir;
+    step.medium = walk.scene.sensor_medium();
+}
+
+}  // namespace
+
+void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
+                    Sampler& sampler, SubPath& z) {
+    append_lens(walk, at, ray, z);
+    Step step;
+    leave_lens(walk, ray, step);
+    take(walk, sampler, z, TransportMode::Radiance, step);
 }
 
 namespace {
@@ -232,11 +263,13 @@ Vertex& append_emitter(const WalkContext& walk, const Emitter& emitter, const Em
 void leave_emitter(const WalkContext& walk, const EmissionSample& e, Sampler& sampler, SubPath& y) {
     const Vertex& y0 = y[0];
     if (!(e.pdf_d > 0)) return;
-    const Vec3 origin = y0.has_cosine ? offset_origin(y0.ray_end(), e.d) : e.p;
     const float cosine = y0.has_cosine ? abs_dot(e.ng, e.d) : 1.0f;
-    Rgb beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
-    if (append_surface(walk, sampler, y, TransportMode::Importance, {origin, e.d, kInf}, beta,
-                       e.pdf_d, y0.medium_toward(e.d)) == Met::Surface)
+    Step step;
+    step.ray = {y0.has_cosine ? offset_origin(y0.ray_end(), e.d) : e.p, e.d, kInf};
+    step.beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
+    step.pdf_sa = e.pdf_d;
+    step.medium = y0.medium_toward(e.d);
+    if (take(walk, sampler, y, TransportMode::Importance, step))
         y[1].next_event_ratio = next_event_ratio(y[0], e.d, walk.counts.guide);
 }
 
@@ -300,25 +333,32 @@ std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sa
     return s;
 }
 
+namespace {
+
+/// Leaves the last vertex by the event `s`.
 template <TransportMode mode>
-bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubPath& path) {
-    constexpr bool eye = mode == TransportMode::Radiance;
+void leave(const BsdfSample& s, SubPath& path, Step& step) {
     const int last = path.size() - 1;
     Vertex& v = path[last];
     v.is_delta = s.is_delta;
     v.event = s.event;
     if (last >= 1) path[last - 1].pdf_rev = s.pdf_rev * v.to_predecessor;
-    if (eye) path.eta2 *= sqr(s.eta);
+    if (mode == TransportMode::Radiance) path.eta2 *= sqr(s.eta);
     path.gain *= s.gain;
 
-    Rgb beta = v.beta * s.weight * (1 / v.survival.value());
-    const MediumId medium = v.medium_toward(s.wi);
-    const Ray ray{offset_origin(v.ray_end(), s.wi), s.wi, kInf};
-    const Met met = append_surface(walk, sampler, path, mode, ray, beta, s.pdf, medium);
-    if (met == Met::Surface) return true;
-    if (!eye || met == Met::SurfaceEdgeOn || walk.scene.infinite_emitters().empty()) return false;
-    append_escape(walk.scene, path, s.wi, beta, s.pdf);
-    return true;
+    step.ray = {offset_origin(v.ray_end(), s.wi), s.wi, kInf};
+    step.beta = v.beta * s.weight * (1 / v.survival.value());
+    step.pdf_sa = s.pdf;
+    step.medium = v.medium_toward(s.wi);
+}
+
+}  // namespace
+
+template <TransportMode mode>
+bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubPath& path) {
+    Step step;
+    leave<mode>(s, path, step);
+    return take(walk, sampler, path, mode, step);
 }
 
 template <TransportMode mode>
@@ -331,6 +371,44 @@ void close(const WalkContext& walk, SubPath& path) {
     path[last].weight_sum = level_sum<side>(path, last - 2, path[last - 1].weight_sum, walk.counts);
 }
 
+void start_eye_path_in_turn(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
+                            WalkInTurn& z) {
+    const SensorRay ray = walk.scene.sensor().sample_ray(at.point, u_lens);
+    append_lens(walk, at, ray, *z.path);
+    leave_lens(walk, ray, z.step);
+}
+
+template <TransportMode mode>
+void walk_in_turns(const WalkContext& walk, std::span<WalkInTurn> walks) {
+    const Scene& scene = walk.scene;
+    std::array<WalkInTurn*, kMostWalksInTurn> active;
+    size_t count = 0;
+    for (WalkInTurn& w : walks) active[count++] = &w;
+    while (count > 0) {
+        const std::span<WalkInTurn*> all(active.data(), count);
+        for (WalkInTurn* w : all) {
+            trace(walk, *w->sampler, *w->path, w->step);
+            if (w->step.found) scene.fetch_primitive(w->step.hit);
+        }
+        for (WalkInTurn* w : all)
+            if (w->step.found) scene.fetch_vertices(w->step.hit);
+        for (WalkInTurn* w : all)
+            if (w->step.found) {
+                scene.complete(w->step.hit);
+                scene.fetch_images(w->step.hit);
+            }
+        count = 0;
+        for (WalkInTurn* w : all) {
+            if (!append_end(walk, *w->path, mode, w->step)) continue;
+            close<mode>(walk, *w->path);
+            const auto s = sample_scattering<mode>(walk, *w->sampler, *w->path);
+            if (!s) continue;
+            leave<mode>(*s, *w->path, w->step);
+            active[count++] = w;
+        }
+    }
+}
+
 constexpr auto kRadiance = TransportMode::Radiance, kImportance = TransportMode::Importance;
 template std::optional<BsdfSample> sample_scattering<kRadiance>(const WalkContext&, Sampler&,
                                                                 SubPath&);
@@ -338,6 +416,7 @@ template std::optional<BsdfSample> sample_scattering<kImportance>(const WalkCont
                                                                   SubPath&);
 template bool append<kRadiance>(const WalkContext&, Sampler&, const BsdfSample&, SubPath&);
 template bool append<kImportance>(const WalkContext&, Sampler&, const BsdfSample&, SubPath&);
+template void walk_in_turns<kRadiance>(const WalkContext&, std::span<WalkInTurn>);
 template void close<kRadiance>(const WalkContext&, SubPath&);
 template void close<kImportance>(const WalkContext&, SubPath&);
 

@@ -2,6 +2,8 @@
 // The walk, which makes all sub-paths, from either end. A step samples a direction, appends the vertex in that
 // direction, and updates the sums of MIS weights that are then known.
 
+#include <span>
+
 #include "pathspace/mis.h"
 #include "pathspace/render_stats.h"
 #include "pathspace/vertex.h"
@@ -30,6 +32,16 @@ struct WalkContext {
     RenderStats& stats;
     WalkOptions options;
     const LearnedPlaces* learned = nullptr;
+};
+
+/// A step of a walk: the ray that leaves its last vertex, and what the ray meets.
+struct Step {
+    Ray ray;
+    Rgb beta;         ///< Throughput along the ray; once it is traced, at its end.
+    float pdf_sa;     ///< Density of its direction, or the probability of a delta event.
+    MediumId medium;  ///< At its origin; once it is traced, at its end.
+    bool found;       ///< Whether it has met a surface, at `hit`.
+    SurfaceHit hit;
 };
 
 /// Makes z_0 on the lens and, if the ray hits a surface, z_1. The film point is that of the sample `index`. If the
@@ -79,6 +91,20 @@ bool extend(const WalkContext& walk, Sampler& sampler, SubPath& path) {
     close<mode>(walk, path);
     return true;
 }
+
+/// One of several walks that are made in turns: while one of them computes, the memory that the others wait for comes.
+struct WalkInTurn {
+    Sampler* sampler;
+    SubPath* path;
+    Step step;
+};
+inline constexpr size_t kMostWalksInTurn = 16;
+/// Makes z_0 on the lens, and the step to z_1 that is to be taken.
+void start_eye_path_in_turn(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
+                            WalkInTurn& z);
+/// Takes the first steps, and goes on by extend() until each walk has ended.
+template <TransportMode mode>
+void walk_in_turns(const WalkContext& walk, std::span<WalkInTurn> walks);
 
 /// Walks whole sub-paths.
 inline void trace_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {

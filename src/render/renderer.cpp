@@ -348,13 +348,14 @@ public:
         r_.integrator_->trace(context());
         r_.kept_pass_ = passes_;
         const std::function<void()>& meanwhile = r_.settings_.meanwhile;
-        for_each_sample(r_.film_.sample_count(),
-                        [&](const SampleContext& c, Workspace& work, FilmSink& sink) {
-                            if (meanwhile && c.index % kChunk == 0) meanwhile();
-                            sink.begin(c.index, c.light_paths);
-                            r_.integrator_->sample(c, work);
-                            sink.end();
-                        });
+        const uint64_t count = r_.film_.sample_count();
+        tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
+            if (meanwhile) meanwhile();
+            SamplesInTurn samples(*this, chunk);
+            const uint64_t end = std::min(count, (chunk + 1) * kChunk);
+            for (uint64_t i = chunk * kChunk; i < end; i += SamplesInTurn::kMost)
+                samples.make(i, std::min(end, i + SamplesInTurn::kMost));
+        });
     }
 
 private:
@@ -365,6 +366,7 @@ private:
     Workspace& workspace() const {
         Workspace& work = r_.workers_->spaces.local();
         work.is_observed = r_.settings_.observer != nullptr;
+        work.has_eye_path = false;
         if (!work.sums) work.sums = r_.integrator_->make_sums();
         return work;
     }
@@ -372,7 +374,63 @@ private:
         return {r_.film_, r_.techniques_.get(), r_.settings_, splat_scale_, work};
     }
 
-    /// Calls use(context, work, sink) for the samples 0 … count-1 of the pass.
+    SampleContext sample_context(uint64_t index, uint64_t chunk, Sampler& sampler,
+                                 ContributionSink& sink) const {
+        return {r_.scene_,    r_.film_, r_.film_.expected(),
+                index,        chunk,    r_.light_paths_,
+                splat_scale_, sampler,  sink};
+    }
+
+    /// Makes samples of a chunk, whose eye paths are traced in turns.
+    class SamplesInTurn {
+    public:
+        static constexpr uint64_t kMost = 8;
+
+        SamplesInTurn(const Pass& pass, uint64_t chunk)
+            : pass_(pass), chunk_(chunk), work_(pass.workspace()), sink_(pass.receivers(work_)) {
+            samplers_.reserve(kMost);
+            contexts_.reserve(kMost);
+        }
+
+        /// Makes the samples begin … end-1.
+        void make(uint64_t begin, uint64_t end) {
+            const Integrator& integrator = *pass_.r_.integrator_;
+            samplers_.clear();
+            contexts_.clear();
+            for (uint64_t i = begin; i < end; ++i) {
+                Sampler& sampler =
+                    samplers_.emplace_back(pass_.r_.settings_.sampler, pass_.numbers_.seed);
+                sampler.start(pass_.numbers_.pass, i);
+                contexts_.push_back(pass_.sample_context(i, chunk_, sampler, sink_));
+            }
+            pass_.go_on();
+            work_.stats.stands_for = 1;
+            work_.eye_paths.resize(kMost);
+            const bool has_eye_paths = integrator.trace_eye_paths(
+                contexts_, std::span(work_.eye_paths).first(contexts_.size()), work_.stats);
+            for (size_t i = 0; i < contexts_.size(); ++i) {
+                const SampleContext& c = contexts_[i];
+                pass_.go_on();
+                work_.stats.stands_for = RenderStats::samples_timed_by(c.index);
+                if (has_eye_paths) std::swap(work_.z, work_.eye_paths[i]);
+                work_.has_eye_path = has_eye_paths;
+                sink_.begin(c.index, c.light_paths);
+                integrator.sample(c, work_);
+                sink_.end();
+            }
+            work_.has_eye_path = false;
+        }
+
+    private:
+        const Pass& pass_;
+        uint64_t chunk_;
+        Workspace& work_;
+        FilmSink sink_;
+        std::vector<Sampler> samplers_;
+        std::vector<SampleContext> contexts_;
+    };
+
+    /// Calls use(context, work) for the samples 0 … count-1 of the pass, which have no eye paths.
     template <class Use>
     void for_each_sample(uint64_t count, const Use& use) const {
         tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
@@ -383,49 +441,45 @@ private:
             for (uint64_t i = chunk * kChunk; i < end; ++i) {
                 go_on();
                 sampler.start(numbers_.pass, i);
-                work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
-                use(SampleContext{r_.scene_, r_.film_, r_.film_.expected(), i, chunk,
-                                  r_.light_paths_, splat_scale_, sampler, sink},
-                    work, sink);
+                work.stats.stands_for = RenderStats::samples_timed_by(i);
+                use(sample_context(i, chunk, sampler, sink), work);
             }
         });
     }
 
     PassContext context() const {
-        return {.scene = r_.scene_,
-                .film = r_.film_,
-                .index = index_,
-                .light_paths = r_.light_paths_,
-                .pixels = r_.scene_.film().pixel_count(),
-                .seed = numbers_.seed,
-                .for_each_sample =
-                    [this](uint64_t count, const PassContext::Use& use) {
-                        for_each_sample(count, [&](const SampleContext& c, Workspace& work,
-                                                   FilmSink&) { use(c, work); });
-                    },
-                .chunks = chunks,
-                .for_each_other_path =
-                    [this](uint64_t count, const PassContext::Task& task) {
-                        tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
-                            go_on();
-                            Sampler sampler(r_.settings_.sampler,
-                                            pilot_seed(numbers_.seed, PilotUse::OtherPaths));
-                            Workspace& work = workspace();
-                            work.stats.is_timed = i % RenderStats::kTimedSamples == 0;
-                            task(i, sampler, work);
-                        });
-                    },
-                .for_each_chain =
-                    [this](uint64_t count, const PassContext::ChainTask& task) {
-                        tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
-                            go_on();
-                            Workspace& work = workspace();
-                            FilmSplats splats(receivers(work));
-                            work.is_observed = splats.needs_joins();
-                            task(i, splats, work);
-                        });
-                    },
-                .forget_statistics = [this] { r_.workers_->take_stats(); }};
+        return {
+            .scene = r_.scene_,
+            .film = r_.film_,
+            .index = index_,
+            .light_paths = r_.light_paths_,
+            .pixels = r_.scene_.film().pixel_count(),
+            .seed = numbers_.seed,
+            .for_each_sample = [this](uint64_t count,
+                                      const PassContext::Use& use) { for_each_sample(count, use); },
+            .chunks = chunks,
+            .for_each_other_path =
+                [this](uint64_t count, const PassContext::Task& task) {
+                    tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                        go_on();
+                        Sampler sampler(r_.settings_.sampler,
+                                        pilot_seed(numbers_.seed, PilotUse::OtherPaths));
+                        Workspace& work = workspace();
+                        work.stats.stands_for = RenderStats::samples_timed_by(i);
+                        task(i, sampler, work);
+                    });
+                },
+            .for_each_chain =
+                [this](uint64_t count, const PassContext::ChainTask& task) {
+                    tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                        go_on();
+                        Workspace& work = workspace();
+                        FilmSplats splats(receivers(work));
+                        work.is_observed = splats.needs_joins();
+                        task(i, splats, work);
+                    });
+                },
+            .forget_statistics = [this] { r_.workers_->take_stats(); }};
     }
 
     Renderer& r_;

@@ -186,6 +186,7 @@ private:
                          ? models_.default_material(emitters.empty() ? Rgb(0.5f) : Rgb(0))
                          : models_.make_material(materials[0].object);
         s.needs_tangents = !materials.empty() && s.material->needs_tangents();
+        if (!materials.empty()) s.images = models_.images_of(materials[0].object);
         read_media(p, s);
         if (!s.material->is_opaque()) {
             scene_.has_masks_ = true;
@@ -347,6 +348,7 @@ private:
             e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);
             if (e->is_infinite() && !e->is_delta()) scene_.infinite_.push_back(e.get());
             scene_.has_delta_emitters_ |= e->is_delta();
+            scene_.has_large_emitter_tables_ |= e->has_large_tables();
         }
         if (scene_.has_media()) find_media();
         scene_.selection_ = AliasTable(selection_weights());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -54,6 +55,22 @@ const Material* ModelBuilder::make_material(int index) {
     if (!made) return materials_[index] = stand_in(index);
     models_.materials.push_back(std::move(made));
     return materials_[index] = models_.materials.back().get();
+}
+
+std::vector<const BitmapTexture*> ModelBuilder::images_of(int index) const {
+    std::vector<const BitmapTexture*> images;
+    std::vector<int> objects{index};
+    std::set<int> known{index};
+    while (!objects.empty()) {
+        const int object = objects.back();
+        objects.pop_back();
+        if (const auto it = textures_.find(object); it != textures_.end())
+            if (const auto* image = dynamic_cast<const BitmapTexture*>(it->second))
+                images.push_back(image);
+        for (const SceneObject::Child& c : plugins_.params(object).object().children)
+            if (known.insert(c.object).second) objects.push_back(c.object);
+    }
+    return images;
 }
 
 const Material* ModelBuilder::stand_in(int index) {

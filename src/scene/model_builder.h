@@ -10,6 +10,7 @@
 #include "emitter/emitter.h"
 #include "scene/plugin_lookup.h"
 #include "scene/scene.h"
+#include "texture/bitmap.h"
 #include "texture/texture_cache.h"
 
 namespace etendue {
@@ -32,6 +33,8 @@ public:
     const Texture* make_texture(int index);
     const Material* make_material(int index);
     MediumId make_medium(int index);
+    /// The images among the textures that have been made for the object `index` and those nested in it, each once.
+    std::vector<const BitmapTexture*> images_of(int index) const;
     /// Constructs all emitters of the object and returns the first one. With `on_shape` it must be an area emitter;
     /// `material` is that of the shape.
     const Emitter* make_emitters(int index, const Shape* on_shape = nullptr,

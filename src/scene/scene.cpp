@@ -62,6 +62,10 @@ float opacity_of(const SceneShape& shape, const SurfaceGeometry& g) {
     return shape.material->opacity({g.uv, g.color, g.p, {}, {}, g.alpha, g.second_uv});
 }
 
+bool is_opaque(const SurfaceHit& hit) {
+    return hit.shape->material->is_opaque();
+}
+
 /// The medium beyond a surface that a ray along `d` passes.
 MediumId medium_beyond(const SurfaceHit& hit, Vec3 d, MediumId before) {
     return hit.shape->is_interface ? hit.shape->medium_toward(hit.geometry.ng, d) : before;
@@ -76,7 +80,7 @@ Scene::Scene(Scene&&) noexcept = default;
 SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
     const SceneShape& s = shapes_[at.shape];
     SurfaceGeometry g;
-    if (const auto* mesh = s.is_mesh ? static_cast<const TriangleMesh*>(s.shape) : nullptr)
+    if (const TriangleMesh* mesh = s.mesh())
         g = mesh->TriangleMesh::surface(at.prim, at.u, at.v, s.needs_tangents);
     else
         g = s.shape->surface(at.prim, at.u, at.v, s.needs_tangents);
@@ -90,24 +94,30 @@ float Scene::opacity(const SurfaceLocation& at) const {
     return opacity_of(shapes_[at.shape], surface(at));
 }
 
-void Scene::fill_hit(const RayHit& raw, SurfaceHit& hit) const {
-    // In place: a vector copy would stall on the stores that have just written its members.
-    ::new (&hit.geometry) SurfaceGeometry(surface(raw));
+/// Everything but the geometry.
+void Scene::locate(const RayHit& raw, SurfaceHit& hit) const {
     hit.shape = &shapes_[raw.shape];
     hit.location = raw;
     hit.t = raw.t;
 }
 
-template <class Passes>
-Ray Scene::for_each_surface(Ray ray, const Passes& passes) const {
+void Scene::complete(SurfaceHit& hit) const {
+    // In place: a vector copy would stall on the stores that have just written its members.
+    ::new (&hit.geometry) SurfaceGeometry(surface(hit.location));
+}
+
+template <class Stops, class Passes>
+Ray Scene::for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const {
     RayHit raw;
     SurfaceHit hit;
     const float length_d = length(ray.d);
     float skipped =
         0;  // distance from the last surface to the ray's origin, which is offset from it
     while (ray.tmax > 0 && accelerator_.intersect(ray, raw)) {
-        fill_hit(raw, hit);
+        locate(raw, hit);
         hit.t = hit.t * length_d + skipped;
+        if (stops(hit)) return ray;
+        complete(hit);
         if (!passes(hit)) return ray;
         const Vec3 p = hit.geometry.p, o = offset_origin(ray_end(hit.geometry), ray.d);
         skipped = dot(o - p, ray.d) / length_d;
@@ -119,29 +129,53 @@ Ray Scene::for_each_surface(Ray ray, const Passes& passes) const {
 }
 
 bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
+    const bool found = find(ray, u, hit, passage);
+    if (found) complete(hit);
+    return found;
+}
+
+void Scene::fetch_images(const SurfaceHit& hit) const {
+    const SurfaceGeometry& g = hit.geometry;
+    for (const BitmapTexture* image : hit.shape->images)
+        image->fetch({g.uv, g.color, g.p, {}, {}, g.alpha, g.second_uv});
+}
+
+bool Scene::find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
     if (!has_masks_) {
         RayHit raw;
         const bool found = accelerator_.intersect(ray, raw);
-        if (found) fill_hit(raw, hit);
+        if (found) locate(raw, hit);
         if (passage.medium != kVacuum)
             passage.attenuation = attenuation(passage.medium, found ? hit.t : kInf);
         return found;
     }
     float travelled = 0;
     bool found = false;
-    for_each_surface(ray, [&](const SurfaceHit& next) {
-        hit = next;
-        travelled += next.t;
+    // Geometry is needed where a surface may let the ray pass.
+    for_each_surface(
+        ray,
+        [&](const SurfaceHit& next) {
+            travelled += next.t;
+            passage.attenuation *= attenuation(passage.medium, next.t);
+            found = is_opaque(next);
+            if (found) hit = next;
+            return found;
+        },
+        [&](const SurfaceHit& next) {
+            const float opacity = opacity_of(*next.shape, next.geometry);
+            found = u < opacity;
+            if (found) {
+                hit = next;
+                return false;
+            }
+            u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
+            passage.medium = medium_beyond(next, ray.d, passage.medium);
+            return true;
+        });
+    if (found)
         hit.t = travelled;
-        passage.attenuation *= attenuation(passage.medium, next.t);
-        const float opacity = opacity_of(*next.shape, next.geometry);
-        found = u < opacity;
-        if (found) return false;
-        u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
-        passage.medium = medium_beyond(next, ray.d, passage.medium);
-        return true;
-    });
-    if (!found) passage.attenuation *= attenuation(passage.medium, kInf);
+    else
+        passage.attenuation *= attenuation(passage.medium, kInf);
     return found;
 }
 
@@ -152,20 +186,31 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit) const {
 
 float Scene::masked_transmittance(const Ray& ray) const {
     float Tr = 1;
-    for_each_surface(ray, [&](const SurfaceHit& hit) {
-        Tr *= 1 - opacity_of(*hit.shape, hit.geometry);
-        return Tr > 0;
-    });
+    for_each_surface(
+        ray,
+        [&](const SurfaceHit& hit) {
+            if (is_opaque(hit)) Tr = 0;
+            return Tr == 0;
+        },
+        [&](const SurfaceHit& hit) {
+            Tr *= 1 - opacity_of(*hit.shape, hit.geometry);
+            return Tr > 0;
+        });
     return Tr;
 }
 
 Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
     Rgb product(1);
-    const Ray rest = for_each_surface(ray, [&](const SurfaceHit& hit) {
-        product *= attenuation(medium, hit.t);
-        medium = medium_beyond(hit, ray.d, medium);
-        return !hit.shape->material->is_opaque();
-    });
+    const Ray rest = for_each_surface(
+        ray,
+        [&](const SurfaceHit& hit) {
+            product *= attenuation(medium, hit.t);
+            return is_opaque(hit);
+        },
+        [&](const SurfaceHit& hit) {
+            medium = medium_beyond(hit, ray.d, medium);
+            return true;
+        });
     return product * attenuation(medium, std::max(0.0f, rest.tmax) * length(ray.d));
 }
 
@@ -219,13 +264,17 @@ MediumId Scene::medium_around(const RayEnd& at) const {
             if (dot(d, at.ng) < 0) d = -d;
             MediumId medium = kVacuum;
             bool votes_here = true;
-            for_each_surface({offset_origin(at, d), d, kInf}, [&](const SurfaceHit& hit) {
-                if (hit.shape->is_interface) {
+            for_each_surface(
+                {offset_origin(at, d), d, kInf},
+                [&](const SurfaceHit& hit) {
+                    votes_here = through_opaque || hit.shape->is_interface || !is_opaque(hit);
+                    return !votes_here;
+                },
+                [&](const SurfaceHit& hit) {
+                    if (!hit.shape->is_interface) return true;
                     medium = hit.shape->medium_toward(hit.geometry.ng, -d);
                     return false;
-                }
-                return votes_here = through_opaque || !hit.shape->material->is_opaque();
-            });
+                });
             if (votes_here) *end++ = medium;
         }
         if (end != votes.begin()) break;

@@ -16,6 +16,7 @@
 #include "geometry/accelerator.h"
 #include "math/distribution.h"
 #include "sensor/sensor.h"
+#include "texture/bitmap.h"
 
 namespace etendue {
 
@@ -33,9 +34,14 @@ struct SceneShape {
     /// Whether interior or exterior are given; otherwise both sides have the medium of the walk.
     bool is_interface = false;
     bool is_mesh = false;
-    bool needs_tangents = false;  ///< Whether the material uses dpdu and dpdv.
+    bool needs_tangents = false;               ///< Whether the material uses dpdu and dpdv.
+    std::vector<const BitmapTexture*> images;  ///< That the material reads.
     std::string name;
 
+    /// nullptr for other shapes.
+    const TriangleMesh* mesh() const {
+        return is_mesh ? static_cast<const TriangleMesh*>(shape) : nullptr;
+    }
     /// The medium of an interface with normal `ng` on the side of `d`.
     MediumId medium_toward(Vec3 ng, Vec3 d) const { return dot(ng, d) < 0 ? interior : exterior; }
 };
@@ -78,6 +84,18 @@ public:
     /// The nearest surface; false where there is none. Masked surfaces let the ray pass with probability 1 - opacity,
     /// decided by `u`, which is rescaled at each one. `passage` tracks the media bounded by masked surfaces.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
+    /// The parts of intersect(), for several rays in turns, so that the memory that one of them waits for comes while the
+    /// others compute. find() makes everything but `hit.geometry`, which complete() adds. Before it, fetch_primitive() and
+    /// fetch_vertices() ask for what complete() reads; after it, fetch_images() for what the material reads.
+    bool find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
+    void complete(SurfaceHit& hit) const;
+    void fetch_primitive(const SurfaceHit& hit) const {
+        if (const TriangleMesh* mesh = hit.shape->mesh()) mesh->fetch_face(hit.location.prim);
+    }
+    void fetch_vertices(const SurfaceHit& hit) const {
+        if (const TriangleMesh* mesh = hit.shape->mesh()) mesh->fetch_vertices(hit.location.prim);
+    }
+    void fetch_images(const SurfaceHit& hit) const;
     /// The same without media.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit) const;
     /// Geometry of a surface point.
@@ -119,6 +137,8 @@ public:
     const Emitter& emitter(uint32_t index) const { return *emitters_[index]; }
     bool has_emitters() const { return !selection_.empty(); }
     bool has_emitter_choice() const { return emitters_.size() > 1; }
+    /// Whether any emitter has, see Emitter::fetch_direct().
+    bool has_large_emitter_tables() const { return has_large_emitter_tables_; }
     /// Whether any emitter is delta.
     bool has_delta_emitters() const { return has_delta_emitters_; }
 
@@ -149,14 +169,15 @@ public:
 
 private:
     friend class SceneBuilder;
-    void fill_hit(const RayHit& raw, SurfaceHit& hit) const;
+    void locate(const RayHit& raw, SurfaceHit& hit) const;
     Ray segment(const RayEnd& a, const RayEnd& b) const;
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;
-    /// Calls `passes(hit)` for the surfaces along a ray in order, until it returns false or there are no more; returns
-    /// the rest of the ray. `hit.t` is the distance from the previous surface.
-    template <class Passes>
-    Ray for_each_surface(Ray ray, const Passes& passes) const;
+    /// For the surfaces along a ray in order: calls `stops(hit)` without the geometry, and unless that returns true,
+    /// `passes(hit)` with it, until that returns false or there are no more surfaces; returns the rest of the ray. `hit.t`
+    /// is the distance from the previous surface.
+    template <class Stops, class Passes>
+    Ray for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const;
 
     std::string file_;
     std::vector<std::unique_ptr<Shape>> owned_shapes_;
@@ -179,6 +200,7 @@ private:
     bool has_masks_ = false;
     bool has_open_boundaries_ = false;
     bool has_delta_emitters_ = false;
+    bool has_large_emitter_tables_ = false;
     MediumId sensor_medium_ = kVacuum;
     std::vector<std::string> warnings_;
     Statistics statistics_;

@@ -19,6 +19,7 @@
 
 #include "color/srgb.h"
 #include "description/resolve_file.h"
+#include "math/fetch.h"
 #include "system/huge_pages.h"
 #include "texture/texture_cache.h"
 
@@ -125,9 +126,13 @@ BitmapTexture::Footprint BitmapTexture::footprint(Vec2 uv) const {
 }
 
 template <class Texels>
+inline const auto& BitmapTexture::first_value(const Texels& texels, int x, int y) const {
+    return texels[(size_t(y) * image_->width + x) * image_->channels + first_channel_];
+}
+
+template <class Texels>
 inline Rgb BitmapTexture::texel(const Texels& texels, int x, int y) const {
-    const auto* p =
-        texels.data() + (size_t(y) * image_->width + x) * image_->channels + first_channel_;
+    const auto* p = &first_value(texels, x, y);
     const auto value = [&](int c) {
         if constexpr (std::is_same_v<Texels, std::vector<uint8_t>>)
             return decode_[p[c]];
@@ -163,6 +168,17 @@ inline Rgb BitmapTexture::filtered(const Texels& texels, const Footprint& f) con
 Rgb BitmapTexture::eval(const TexturePoint& at) const {
     return std::visit([&](const auto& texels) { return filtered(texels, footprint(uv(at))); },
                       image_->data);
+}
+
+void BitmapTexture::fetch(const TexturePoint& at) const {
+    const Footprint f = footprint(uv(at));
+    std::visit(
+        [&](const auto& texels) {
+            for (const int y : {f.y.i0, f.y.i1})
+                for (const int x : {f.x.i0, f.x.i1})
+                    if (x != kOutside && y != kOutside) etendue::fetch(first_value(texels, x, y));
+        },
+        image_->data);
 }
 
 float BitmapTexture::eval_scalar(const TexturePoint& at) const {

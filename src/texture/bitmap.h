@@ -41,6 +41,8 @@ public:
     Rgb eval(const TexturePoint& at) const override;
     float eval_scalar(const TexturePoint& at) const override;
     Vec2 gradient(const TexturePoint& at) const override;
+    /// Asks for the memory that these functions read at `at`.
+    void fetch(const TexturePoint& at) const;
     Rgb mean() const override { return mean_; }
     void resolution(int& width, int& height) const override;
     size_t memory_bytes() const override { return sizeof(*this); }
@@ -52,6 +54,8 @@ private:
         return options_.is_of_second_uv ? at.second_uv : at.uv;
     }
     Footprint footprint(Vec2 uv) const;
+    template <class Texels>
+    const auto& first_value(const Texels& texels, int x, int y) const;
     template <class Texels>
     Rgb texel(const Texels& texels, int x, int y) const;
     template <class Texels>
