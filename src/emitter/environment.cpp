@@ -41,9 +41,13 @@ public:
     }
 
     void fetch_direct(FinePoint u, Fetch what) const override {
-        if (what == Fetch::Begin) return distribution_.fetch_guide(u);
-        const Texels at = texels(place_of(distribution_.sample(u)));
-        for (const Rgb* row : {at.above, at.below}) fetch(row[at.left]), fetch(row[at.right]);
+        if (what == Fetch::Begin) return distribution_.fetch_row(u);
+        // The corners of a cell are the centres of four pixels.
+        const auto [x, y] = distribution_.cell(u);
+        for (const Rgb* above_or_below : {row(y - 1), row(y)}) {
+            fetch(above_or_below[x]);
+            fetch(above_or_below[wrap(x + 1)]);
+        }
     }
     bool has_large_tables() const override { return true; }
     double power() const override {
@@ -56,18 +60,13 @@ private:
     // sampled point, not of the rounded direction, which may lie in the next cell.
     Sample sample_arrival(FinePoint u) const override {
         const auto s = distribution_.sample(u);
-        const Vec2 uv = place_of(s);
+        Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};
+        if (uv.x >= 1) uv.x -= 1;
         float sp, cp, ct, sin_theta;
         sincosf(2 * kPi * uv.x, &sp, &cp);
         sincosf(kPi * uv.y, &sin_theta, &ct);
         return {normalize(to_world_.vector({sp * sin_theta, ct, -cp * sin_theta})), radiance(uv),
                 density(s.pdf, {uv, sin_theta})};
-    }
-    /// The point of the image.
-    Vec2 place_of(const PiecewiseConstant2D::Sample& s) const {
-        Vec2 uv{s.uv.x + 0.5f / float(width_), to_image_v(s.uv.y)};
-        if (uv.x >= 1) uv.x -= 1;
-        return uv;
     }
     float pdf_direction(Vec3 d) const override { return pdf(to_place(d)); }
     Rgb radiance(Vec3 d) const override { return radiance(to_place(d).uv); }
@@ -92,22 +91,13 @@ private:
         return in_square * cell_v_derivative(at.uv.y) / (2 * kPi * kPi * at.sin_theta);
     }
 
-    /// The four pixels around a point, and the weights of those on the right and of those below.
-    struct Texels {
-        const Rgb *above, *below;  ///< Rows.
-        size_t left, right;        ///< Columns.
-        float fx, fy;
-    };
-    Texels texels(Vec2 uv) const {
+    Rgb radiance(Vec2 uv) const {
         const float x = uv.x * float(width_) - 0.5f, y = uv.y * float(height_) - 0.5f;
         const int x0 = int(std::floor(x)), y0 = int(std::floor(y));
-        return {row(y0),       row(y0 + 1),  size_t(wrap(x0)), size_t(wrap(x0 + 1)),
-                x - float(x0), y - float(y0)};
-    }
-    Rgb radiance(Vec2 uv) const {
-        const Texels t = texels(uv);
-        return lerp(t.fy, lerp(t.fx, t.above[t.left], t.above[t.right]),
-                    lerp(t.fx, t.below[t.left], t.below[t.right]));
+        const float fx = x - float(x0), fy = y - float(y0);
+        const size_t left = size_t(wrap(x0)), right = size_t(wrap(x0 + 1));
+        const Rgb *above = row(y0), *below = row(y0 + 1);
+        return lerp(fy, lerp(fx, above[left], above[right]), lerp(fx, below[left], below[right]));
     }
 
     /// From image coordinate v to the y of distribution_, in [0, 1); piecewise linear.

@@ -110,23 +110,25 @@ void PiecewiseConstant1D::Steps::add(std::span<const float> values, double sum) 
     }
 }
 
-PiecewiseConstant1D::Sample PiecewiseConstant1D::Steps::sample(double u, size_t r) const {
-    const double scaled = u * kOne;
-    const uint32_t at = uint32_t(scaled);
-    const Guide& start = guide[guide_of(u, r)];
+PiecewiseConstant1D::Steps::Found PiecewiseConstant1D::Steps::find(double u, size_t r) const {
+    const uint32_t at = uint32_t(u * kOne);
+    const Guide& start = guide_of(u, r);
     int k = 0;
     while (k < kCellsInGuide && start.edge[k + 1] <= at) ++k;
+    if (k < kCellsInGuide) return {int(start.first) + k, start.edge[k], start.edge[k + 1]};
     int cell = int(start.first) + k;
     uint32_t begin = start.edge[k], end = 0;
-    if (k < kCellsInGuide) {
-        end = start.edge[k + 1];
-    } else {
-        const uint32_t* row = &lower[r * size_t(cells)];
-        while ((end = upper(row, cell)) <= at) ++cell, begin = end;
-    }
-    const uint32_t width = end - begin;
-    const float f = std::min(float((scaled - begin) / width), kOneMinusEpsilon);
-    return {point_in_cell(cell, f, cells), float(width) * (float(cells) / float(kOne)), cell};
+    const uint32_t* row = &lower[r * size_t(cells)];
+    while ((end = upper(row, cell)) <= at) ++cell, begin = end;
+    return {cell, begin, end};
+}
+
+PiecewiseConstant1D::Sample PiecewiseConstant1D::Steps::sample(double u, size_t r) const {
+    const Found found = find(u, r);
+    const uint32_t width = found.end - found.begin;
+    const float f = std::min(float((u * kOne - found.begin) / width), kOneMinusEpsilon);
+    return {point_in_cell(found.cell, f, cells), float(width) * (float(cells) / float(kOne)),
+            found.cell};
 }
 
 float PiecewiseConstant1D::Steps::pdf(float x, size_t r) const {

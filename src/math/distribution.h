@@ -89,12 +89,17 @@ private:
         uint32_t upper(const uint32_t* row, int cell) const {
             return cell + 1 < cells ? row[cell + 1] : kOne;
         }
+        /// The cell where `u` lies, between two values of the distribution function.
+        struct Found {
+            int cell;
+            uint32_t begin, end;
+        };
+        Found find(double u, size_t row) const;
         Sample sample(double u, size_t row) const;
-        /// Asks for the memory where sample() begins.
-        void fetch_guide(double u, size_t row) const { fetch(guide[guide_of(u, row)]); }
-        size_t guide_of(double u, size_t row) const {
+        /// Where find() begins.
+        const Guide& guide_of(double u, size_t row) const {
             const uint64_t at = uint32_t(u * kOne);
-            return row * size_t(guides) + size_t(at * uint64_t(guides) >> 31);
+            return guide[row * size_t(guides) + size_t(at * uint64_t(guides) >> 31)];
         }
         float pdf(float x, size_t row) const;
         size_t memory_bytes() const {
@@ -115,10 +120,16 @@ public:
         float pdf;
     };
     Sample sample(FinePoint u) const;
-    /// Asks for the memory of the row where sample() begins.
-    void fetch_guide(FinePoint u) const {
-        rows_.fetch_guide(u.x, size_t(marginal_.sample(u.y).cell));
+    /// The cell that sample() falls in.
+    struct Cell {
+        int x, y;
+    };
+    Cell cell(FinePoint u) const {
+        const int y = row(u);
+        return {rows_.find(u.x, size_t(y)).cell, y};
     }
+    /// Asks for the memory that cell() and sample() read of the row.
+    void fetch_row(FinePoint u) const { fetch(rows_.guide_of(u.x, size_t(row(u)))); }
     float pdf(Vec2 uv) const;
     double integral() const { return marginal_.integral(); }
     size_t memory_bytes() const { return rows_.memory_bytes() + marginal_.steps_.memory_bytes(); }
@@ -130,6 +141,8 @@ public:
     }
 
 private:
+    int row(FinePoint u) const { return marginal_.steps_.find(u.y, 0).cell; }
+
     PiecewiseConstant1D::Steps rows_;
     PiecewiseConstant1D marginal_;
 };

@@ -1,5 +1,5 @@
 // Images do not depend on where the scene lies: 10⁴ units from the origin, where positions are rounded to a thousandth of
-// the scene's size, and with an object at the origin, so that the bounds of the scene say nothing about what is seen.
+// the scene's size; nor on an object at the origin, with which the bounds of the scene say nothing about what is seen.
 
 #include "lit_room.h"
 #include "render_tiles.h"
@@ -39,12 +39,23 @@ Tiles render_independently(const Scene& scene, const std::string& integrator, ui
     return tiles;
 }
 
+void expect_same_image_far_away(const std::string& integrator, bool has_sky,
+                                bool has_object_at_origin) {
+    const Scene near = lit_room({.has_sky = has_sky}),
+                far = lit_room({.origin = {10000, -20000, 5000},
+                                .has_object_at_origin = has_object_at_origin,
+                                .has_sky = has_sky});
+    expect_same_image(render_independently(far, integrator, 1000),
+                      render_independently(near, integrator, 1), effort_for(integrator).resolution,
+                      integrator);
+}
+
 TEST_P(FarScene, HasTheSameImage) {
-    const Scene near = lit_room({}),
-                far = lit_room({.origin = {10000, -20000, 5000}, .has_object_at_origin = true});
-    expect_same_image(render_independently(far, GetParam(), 1000),
-                      render_independently(near, GetParam(), 1), effort_for(GetParam()).resolution,
-                      GetParam());
+    expect_same_image_far_away(GetParam(), true, false);
+}
+
+TEST_P(FarScene, HasTheSameImageWhateverIsAtTheOrigin) {
+    expect_same_image_far_away(GetParam(), false, true);
 }
 
 INSTANTIATE_TEST_SUITE_P(Long, FarScene, ::testing::ValuesIn(all_integrators()),

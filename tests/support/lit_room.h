@@ -14,11 +14,12 @@
 namespace etendue::test {
 
 /// Factors, relative to the units of the scene below, and where its origin lies, in units of its length. A small object
-/// may lie at the origin of the world.
+/// may lie at the origin of the world. Light paths from the sky hardly ever hit a small part of a scene, so then there
+/// should be none.
 struct Units {
     float radiance = 1, length = 1;
     Vec3 origin{};
-    bool has_object_at_origin = false;
+    bool has_object_at_origin = false, has_sky = true;
 };
 inline void PrintTo(const Units& u, std::ostream* out) {
     *out << "radiance * " << u.radiance << ", length * " << u.length;
@@ -68,8 +69,10 @@ inline Scene lit_room(Units u) {
         ball({0.4f, -0.65f, 0.3f}, 0.3f, kRoughGlass) + ball({0.1f, 0.2f, -0.1f}, 0.2f, kGlass) +
         "<emitter type=\"point\"><point name=\"position\" value=\"" + at({0.3f, 0.1f, 0.7f}) +
         "\"/>" + scaled_rgb("intensity", {0.3f, 0.5f, 0.4f}, u.radiance * sqr(u.length)) +
-        "</emitter><emitter type=\"constant\">" +
-        scaled_rgb("radiance", {0.3f, 0.4f, 0.5f}, u.radiance) + "</emitter>" +
+        "</emitter>" +
+        (u.has_sky ? "<emitter type=\"constant\">" +
+                         scaled_rgb("radiance", {0.3f, 0.4f, 0.5f}, u.radiance) + "</emitter>"
+                   : "") +
         (u.has_object_at_origin ? sphere("0,0,0", "0.01", diffuse("0.5,0.5,0.5")) : ""));
 }
 
