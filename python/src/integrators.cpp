@@ -79,7 +79,7 @@ private:
     void renew(PathPtr& path, SubPath& sub_path) {
         if (path) path->at = nullptr;
         path = std::make_shared<Path>(sub_path, counts_);
-        work_->stats.stands_for = 0;
+        work_->stats.time_factor = 0;
     }
 
     ScenePtr scene_;

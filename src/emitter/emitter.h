@@ -61,11 +61,12 @@ public:
     virtual EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const = 0;
     /// False where the sampled point sends no light to `from`.
     virtual bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const = 0;
-    /// Emitters with large tables: ask for the memory that sample_direct() reads for `u` at any point, first for that where
-    /// a search begins, then for that where it ends.
-    enum class Fetch : uint8_t { Begin, End };
-    virtual void fetch_direct(FinePoint /*u*/, Fetch /*what*/) const {}
+    /// Whether sample_direct() reads tables that the processor's caches do not hold.
     virtual bool has_large_tables() const { return false; }
+    /// Asks for the memory that sample_direct() reads there for `u` at any point: of the search in the tables, or, once the
+    /// former has come, of its result.
+    enum class Tables : uint8_t { Search, Result };
+    virtual void prefetch_direct(FinePoint /*u*/, Tables /*part*/) const {}
     /// Emitted power in W, weighted by luminance; emitters are chosen proportionally to it.
     virtual double power() const = 0;
 

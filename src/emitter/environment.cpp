@@ -40,13 +40,13 @@ public:
         distribution_.for_each_large_array([](const auto& a) { prefer_huge_pages(a); });
     }
 
-    void fetch_direct(FinePoint u, Fetch what) const override {
-        if (what == Fetch::Begin) return distribution_.fetch_row(u);
+    void prefetch_direct(FinePoint u, Tables part) const override {
+        if (part == Tables::Search) return distribution_.prefetch_row(u);
         // The corners of a cell are the centres of four pixels.
         const auto [x, y] = distribution_.cell(u);
         for (const Rgb* above_or_below : {row(y - 1), row(y)}) {
-            fetch(above_or_below[x]);
-            fetch(above_or_below[wrap(x + 1)]);
+            prefetch(above_or_below[x]);
+            prefetch(above_or_below[wrap(x + 1)]);
         }
     }
     bool has_large_tables() const override { return true; }

@@ -27,6 +27,12 @@ public:
         distribution_.for_each_large_array([](const auto& a) { prefer_huge_pages(a); });
     }
 
+    bool has_large_tables() const override { return true; }
+    void prefetch_direct(FinePoint u, Tables part) const override {
+        if (part == Tables::Search) return distribution_.prefetch_row(u);
+        const auto [x, y] = distribution_.cell(u);
+        prefetch(pixels_[size_t(y) * size_t(size_) + size_t(x)]);
+    }
     double power() const override {
         return 4 * std::numbers::pi * std::numbers::pi * sqr(double(scene_radius())) * mean_;
     }

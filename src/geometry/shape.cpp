@@ -139,9 +139,11 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
     g.ns = g.ng;
     if (has_normals_) {
         const Vec3 n = a.n * w + b.n * u + c.n * v;
-        if (dot(g.ng, n) < 0) g.ng = -g.ng;
         const float len2 = length2(n);
-        if (len2 > 0) g.ns = n * (1.0f / std::sqrt(len2));
+        if (len2 > 0) {
+            g.ns = n * (1.0f / std::sqrt(len2));
+            g.ng = turned(face.ng, g.ns);
+        }
     }
     if (!colors_.empty()) g.color = colors_[ia] * w + colors_[ib] * u + colors_[ic] * v;
     if (!alphas_.empty()) g.alpha = alphas_[ia] * w + alphas_[ib] * u + alphas_[ic] * v;
@@ -172,11 +174,9 @@ ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
     const Face& face = faces_[prim];
     const Vertex &a = vertices_[face.vertices[0]], &b = vertices_[face.vertices[1]],
                  &c = vertices_[face.vertices[2]];
-    // As surface() turns it.
-    const bool is_turned =
-        has_normals_ && dot(face.ng, a.n * (1 - at.x - at.y) + b.n * at.x + c.n * at.y) < 0;
-    return {interpolate(a.p, b.p, c.p, at.x, at.y), is_turned ? -face.ng : face.ng, at, prim,
-            face.slack};
+    const Vec3 n = a.n * (1 - at.x - at.y) + b.n * at.x + c.n * at.y;
+    return {interpolate(a.p, b.p, c.p, at.x, at.y), has_normals_ ? turned(face.ng, n) : face.ng, at,
+            prim, face.slack};
 }
 
 size_t TriangleMesh::memory_bytes() const {

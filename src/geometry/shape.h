@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "math/bounds.h"
-#include "math/fetch.h"
+#include "math/prefetch.h"
 #include "math/transform.h"
 #include "math/vec.h"
 
@@ -96,12 +96,15 @@ public:
     size_t memory_bytes() const override;
 
     /// Asks for the memory that surface() reads. The second function reads what the first one has asked for.
-    void fetch_face(uint32_t prim) const { fetch(faces_[prim]); }
-    void fetch_vertices(uint32_t prim) const {
-        for (const uint32_t i : faces_[prim].vertices) fetch(vertices_[i]);
+    void prefetch_face(uint32_t prim) const { prefetch(faces_[prim]); }
+    void prefetch_vertices(uint32_t prim) const {
+        for (const uint32_t i : faces_[prim].vertices) prefetch(vertices_[i]);
     }
 
 private:
+    /// The normal of the face on the side of the vertex normals, whose mean at the point is `n`.
+    static Vec3 turned(Vec3 ng, Vec3 n) { return dot(ng, n) < 0 ? -ng : ng; }
+
     std::vector<Vertex> vertices_;
     std::vector<Face> faces_;
     std::vector<Vec2> second_uvs_;

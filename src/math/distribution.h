@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "math/fetch.h"
+#include "math/prefetch.h"
 #include "math/vec.h"
 
 namespace etendue {
@@ -129,7 +129,7 @@ public:
         return {rows_.find(u.x, size_t(y)).cell, y};
     }
     /// Asks for the memory that cell() and sample() read of the row.
-    void fetch_row(FinePoint u) const { fetch(rows_.guide_of(u.x, size_t(row(u)))); }
+    void prefetch_row(FinePoint u) const { prefetch(rows_.guide_of(u.x, size_t(row(u)))); }
     float pdf(Vec2 uv) const;
     double integral() const { return marginal_.integral(); }
     size_t memory_bytes() const { return rows_.memory_bytes() + marginal_.steps_.memory_bytes(); }

@@ -60,6 +60,7 @@ void PathState::copy(const PathState& from) {
     edges = from.edges;
     splats = from.splats;
     film = from.film;
+    choices = from.choices;
     large_step_density_ = from.large_step_density_;
 }
 
@@ -91,8 +92,7 @@ void PathState::scatter(int i) {
     } else {
         const BsdfEval e = x.v.bsdf.eval(to_light, to_eye, TransportMode::Importance);
         x.value = e.f;
-        pdf_light = e.pdf;
-        if (!e.f.is_zero()) pdf_eye = x.v.bsdf.eval(to_eye, to_light, TransportMode::Radiance).pdf;
+        pdf_light = e.pdf, pdf_eye = e.pdf_rev;
     }
     after.light_ = pdf_light * geometry(i, i + 1);
     before.eye_ = pdf_eye * geometry(i, i - 1);
@@ -172,16 +172,14 @@ bool PathState::trace_edge(int i, RenderStats& stats) {
     return Tr > 0;
 }
 
-PathDensity PathState::density(int s) const {
-    const int n = size();
-    if (s == 0 ? emitter().is_delta() : s < n && !is_connected_at(s - 1)) return 0;
-    PathDensity p = 1;
-    for (int i = 0; i < s; ++i) p *= s == 1 ? next_event() : light(i);
-    return p * eye_density(s);
+bool PathState::is_sampled_by(int s) const {
+    return s == 0 ? !emitter().is_delta() : s == size() || is_connected_at(s - 1);
 }
 
-PathDensity PathState::eye_density(int s) const {
+PathDensity PathState::density(int s) const {
+    if (!is_sampled_by(s)) return 0;
     PathDensity p = 1;
+    for (int i = 0; i < s; ++i) p *= s == 1 ? next_event() : light(i);
     for (int i = s; i <= last(); ++i) p *= eye(i);
     return p;
 }
@@ -198,18 +196,26 @@ PathDensity PathState::density(const UserPaths& paths, int s) const {
     return p * paths.density(light);
 }
 
-PathDensity PathState::independent_path_density() const {
+PathDensity PathState::independent_path_density() {
     const int k = last();
-    PathDensity T = 0;
-    for (int s = 0; s <= k + 1; ++s)
-        if (const double p = target_.techniques.pmf(k, s); p > 0) T += p * density(s);
+    // Of the eye sub-paths x_s … x_k.
+    eye_densities_.resize(size_t(k) + 2);
+    eye_densities_.back() = 1;
+    for (int s = k; s >= 0; --s) eye_densities_[size_t(s)] = eye(s) * eye_densities_[size_t(s) + 1];
+    PathDensity T = 0, of_light = 1;
+    for (int s = 0; s <= k + 1; ++s) {
+        if (const double p = target_.techniques.pmf(k, s); p > 0 && is_sampled_by(s))
+            T += p * (s == 1 ? next_event() : of_light) * eye_densities_[size_t(s)];
+        if (s <= k) of_light *= light(s);
+    }
     T *= target_.lengths.pmf(k);
     const UserSteps& user = target_.user;
     if (!user.paths) return T;
     PathDensity T_user = 0;
     for (int s = 2; s <= std::min(k, user.paths->longest()); ++s)
         if (const PathDensity p = density(*user.paths, s); p > 0)
-            T_user += p * UserSteps::pmf(s, k + 1 - s, measure_.shortest) * eye_density(s);
+            T_user +=
+                p * UserSteps::pmf(s, k + 1 - s, measure_.shortest) * eye_densities_[size_t(s)];
     return (1 - user.share) * T + user.share * T_user;
 }
 
@@ -238,6 +244,7 @@ PathProduct PathState::flux(int i) const {
 
 void PathState::set_black() {
     target = 0;
+    choices.reset();
     splats.clear();
 }
 

@@ -63,6 +63,29 @@ struct PathTarget {
     std::function<bool(const Vertex&)> stores = [](const Vertex& v) { return v.is_connectible; };
 };
 
+/// Mutations in path space, and their weights: one of those that can change a path is chosen in proportion.
+/// That of UserPath must be 0 if the target has no user paths.
+struct PathMutations {
+    enum Kind : int {
+        Bidirectional,
+        Lens,
+        Caustic,
+        MultiChain,
+        GlossyLens,
+        GlossyCaustic,
+        LensSubpath,
+        UserPath,
+        PhotonMap,
+        kCount
+    };
+    static constexpr std::array<const char*, kCount> kNames{
+        "bidirectional",  "lens",         "caustic",   "multi_chain", "glossy_lens",
+        "glossy_caustic", "lens_subpath", "user_path", "photon_map"};
+    std::array<double, kCount> weights{1, 4, 4, 4, 4, 4, 0.5, 0, 0};
+};
+/// Probability of each mutation at a path.
+using MutationChoices = std::array<double, PathMutations::kCount>;
+
 /// A vertex of a full path.
 class PathVertex {
 public:
@@ -119,6 +142,8 @@ public:
     double geometry_from_light(int i) const { return geometry(i - 1, i) * met_from_light(i); }
     double geometry_from_eye(int i) const { return geometry(i + 1, i) * met_from_eye(i); }
     Vec2 film{};
+    /// Set by PathSpace where it is needed.
+    std::optional<MutationChoices> choices;
 
     void clear() {
         x_.clear();
@@ -155,10 +180,10 @@ public:
     void load(LearnedState& from) override;
 
 private:
+    /// Whether C(s, k+1-s) can sample the path.
+    bool is_sampled_by(int s) const;
     /// Density of the path as a large step.
-    PathDensity independent_path_density() const;
-    /// Density with which an eye sub-path samples x_s … x_k.
-    PathDensity eye_density(int s) const;
+    PathDensity independent_path_density();
     /// Without masks.
     double geometry(int from, int to) const;
     /// Probability that a ray from x_{i-1} to x_i, or from x_{i+1} to x_i, passes the masks of the edge and meets x_i.
@@ -177,6 +202,7 @@ private:
     std::vector<PathVertex> x_;
     ComponentArena arena_;
     PathDensity large_step_density_ = 0;
+    std::vector<PathDensity> eye_densities_;  ///< Of independent_path_density().
 };
 
 }  // namespace etendue

@@ -69,10 +69,14 @@ LengthChoice::LengthChoice(int shortest, int longest, const TechniqueLight& ligh
         energy_[size_t(k - shortest)] += value;
         sum += value;
     }
-    if (!(sum > 0)) return;
-    by_energy_ = 1 - kUniform;
-    for (double& e : energy_) e /= sum;
-    fit_ratio();
+    if (sum > 0) {
+        by_energy_ = 1 - kUniform;
+        for (double& e : energy_) e /= sum;
+        fit_ratio();
+    }
+    constexpr int kTabulated = 64;
+    for (int k = shortest; k <= std::min(longest, shortest + kTabulated); ++k)
+        pmf_.push_back(computed_pmf(k));
 }
 
 void LengthChoice::fit_ratio() {
@@ -99,6 +103,11 @@ double LengthChoice::geometric(int k) const {
 }
 
 double LengthChoice::pmf(int k) const {
+    const size_t i = size_t(k - shortest_);
+    return i < pmf_.size() ? pmf_[i] : computed_pmf(k);
+}
+
+double LengthChoice::computed_pmf(int k) const {
     const size_t i = size_t(k - shortest_);
     return by_energy_ * (i < energy_.size() ? energy_[i] : 0.0) + (1 - by_energy_) * geometric(k);
 }

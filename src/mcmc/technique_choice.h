@@ -46,11 +46,13 @@ public:
 private:
     void fit_ratio();
     double geometric(int k) const;
+    double computed_pmf(int k) const;
 
     int shortest_, longest_;
     double ratio_ = 0.75;  ///< Of the probabilities of successive lengths of the geometric part.
     double by_energy_ = 0;
     std::vector<double> energy_;  ///< Shares of the light, from the shortest length on.
+    std::vector<double> pmf_;     ///< Of the shortest lengths.
 };
 
 }  // namespace etendue

@@ -1,24 +1,48 @@
 #include "pathspace/eye_paths.h"
 
 #include <array>
+#include <cassert>
 
 namespace etendue {
+namespace {
+
+/// Where the eye path of a sample starts.
+struct EyeStart {
+    Film::PixelSample at;
+    SensorRay ray;
+
+    explicit EyeStart(const SampleContext& c) {
+        const Sensor& sensor = c.scene.sensor();
+        c.sampler.seek(Stream::Eye, 0);
+        at = c.film_sample(c.sampler.next_2d_if(c.needs_film_number()));
+        ray = sensor.sample_ray(at.point, c.sampler.next_2d_if(sensor.has_finite_lens()));
+    }
+};
+
+}  // namespace
+
+void trace_eye_path(const WalkContext& walk, const SampleContext& c, SubPath& z) {
+    const EyeStart start(c);
+    start_eye_path(walk, start.at, start.ray, c.sampler, z);
+    while (extend<TransportMode::Radiance>(walk, c.sampler, z)) {
+    }
+}
 
 void trace_eye_paths(const WalkContext& walk, std::span<const SampleContext> c,
                      std::span<SubPath> z) {
-    std::array<WalkInTurn, kMostWalksInTurn> walks;
+    if (c.size() == 1) return trace_eye_path(walk, c[0], z[0]);
+    assert(c.size() <= kWalksInTurn && c.size() == z.size());
+    std::array<WalkInTurn, kWalksInTurn> walks;
     for (size_t i = 0; i < c.size(); ++i) {
-        Sampler& sampler = c[i].sampler;
-        walks[i].sampler = &sampler;
-        walks[i].path = &z[i];
-        sampler.seek(Stream::Eye, 0);
-        const Film::PixelSample at = c[i].film_sample(sampler.next_2d_if(c[i].needs_film_number()));
-        const Vec2 u_lens = sampler.next_2d_if(walk.scene.sensor().has_finite_lens());
-        start_eye_path_in_turn(walk, at, u_lens, walks[i]);
+        WalkInTurn& w = walks[i];
+        w.sampler = &c[i].sampler;
+        w.path = &z[i];
+        const EyeStart start(c[i]);
+        begin_eye_path(walk, start.at, start.ray, c[i].sampler, z[i], w.step);
     }
     const std::span all(walks.data(), c.size());
     walk_in_turns<TransportMode::Radiance>(walk, all);
-    if (c.size() > 1 && walk.counts.next_event > 0) fetch_next_events(walk.scene, all);
+    if (walk.counts.next_event > 0) prefetch_next_events(walk.scene, all);
 }
 
 }  // namespace etendue

@@ -7,8 +7,9 @@
 
 namespace etendue {
 
-/// Traces the eye sub-path z[i] of each sample c[i]; at most kMostWalksInTurn of them, whose walks are made in turns. They
-/// are the same as one by one.
+/// Traces the eye sub-path of a sample.
+void trace_eye_path(const WalkContext& walk, const SampleContext& c, SubPath& z);
+/// Traces the eye sub-path z[i] of each sample c[i], at most kWalksInTurn of them: the same paths in less time.
 void trace_eye_paths(const WalkContext& walk, std::span<const SampleContext> c,
                      std::span<SubPath> z);
 

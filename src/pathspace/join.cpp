@@ -76,14 +76,16 @@ EmitterChoice choose_emitter(const Scene& scene, int last, Sampler& sampler, uin
 
 }  // namespace
 
-void fetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks) {
-    if (!scene.has_large_emitter_tables()) return;
-    for (const auto what : {Emitter::Fetch::Begin, Emitter::Fetch::End})
+void prefetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks) {
+    if (!scene.has_large_emitter_tables() || !scene.has_emitters()) return;
+    // Later ones would displace those of the first vertices before they are read.
+    constexpr int kMostVertices = 8;
+    for (const auto part : {Emitter::Tables::Search, Emitter::Tables::Result})
         for (const WalkInTurn& w : walks)
-            for (int last = 1; last < w.path->size(); ++last) {
-                if (!(*w.path)[last].is_connectible) continue;
-                const EmitterChoice chosen = choose_emitter(scene, last, *w.sampler, 0);
-                chosen.emitter->fetch_direct(chosen.u, what);
+            for (int i = 1; i < std::min(w.path->size(), kMostVertices); ++i) {
+                if (!(*w.path)[i].is_connectible) continue;
+                const EmitterChoice chosen = choose_emitter(scene, i, *w.sampler, 0);
+                chosen.emitter->prefetch_direct(chosen.u, part);
             }
 }
 

@@ -41,8 +41,8 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
 /// each of them alone has the density of the technique.
 std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,
                                     const TechniqueCounts& counts, uint32_t draw = 0);
-/// Asks for the memory that the next events of several eye paths read at their emitters.
-void fetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks);
+/// Asks for the memory that the next events of several eye paths read of their emitters.
+void prefetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks);
 /// C(s,t), t ≥ 2; for s = 1, y_0 comes from emission sampling (Strategy::Connect, not NextEvent).
 std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
                                  int t, const TechniqueCounts& counts);

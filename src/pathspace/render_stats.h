@@ -26,13 +26,11 @@ struct PhaseSeconds {
 
 /// Counters of one worker; merged at the end of a pass.
 struct RenderStats {
-    /// Every kTimedSamples-th sample is timed.
-    static constexpr int kTimedSamples = 8;
     PhaseSeconds phases;
-    int stands_for =
-        0;  ///< Number of samples for whose time that of the current one stands; 0: it is not timed.
-    /// The number for sample `index`.
-    static int samples_timed_by(uint64_t index) {
+    int time_factor = 0;  ///< Of the seconds of the current sample; 0: it is not timed.
+    /// Every seventh sample is timed: where samples are made in turns of eight (kWalksInTurn), each place as often.
+    static int time_factor_of(uint64_t index) {
+        constexpr int kTimedSamples = 7;
         return index % kTimedSamples == 0 ? kTimedSamples : 0;
     }
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
@@ -59,12 +57,12 @@ struct RenderStats {
 class PhaseTimer {
 public:
     PhaseTimer(RenderStats& stats, double PhaseSeconds::*phase)
-        : seconds_(stats.phases.*phase), stands_for_(stats.stands_for) {
-        if (stands_for_ > 0) begin_ = Clock::now();
+        : seconds_(stats.phases.*phase), time_factor_(stats.time_factor) {
+        if (time_factor_ > 0) begin_ = Clock::now();
     }
     ~PhaseTimer() {
-        if (stands_for_ > 0)
-            seconds_ += stands_for_ * std::chrono::duration<double>(Clock::now() - begin_).count();
+        if (time_factor_ > 0)
+            seconds_ += time_factor_ * std::chrono::duration<double>(Clock::now() - begin_).count();
     }
     PhaseTimer(const PhaseTimer&) = delete;
     PhaseTimer& operator=(const PhaseTimer&) = delete;
@@ -72,7 +70,7 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
     double& seconds_;
-    int stands_for_;
+    int time_factor_;
     Clock::time_point begin_;
 };
 

@@ -67,7 +67,7 @@ bool next_is_fixed_by_film(const Vertex& v, bool is_delta, const Scene& scene) {
            (v.is_fixed_by_film && is_delta && !scene.sensor().has_finite_lens());
 }
 
-/// Traces the ray of the step from the last vertex.
+/// Traces the ray of the step, which leaves the last vertex.
 void trace(const WalkContext& walk, Sampler& sampler, SubPath& path, Step& step) {
     const Scene& scene = walk.scene;
     ++walk.stats.walk_rays;
@@ -126,20 +126,15 @@ void append_escape(const Scene& scene, SubPath& path, const Step& step) {
     v.pdf_fwd = step.pdf_sa;
 }
 
-/// Appends the vertex where the ray of the step ends, if there is one.
-bool append_end(const WalkContext& walk, SubPath& path, TransportMode mode, const Step& step) {
-    if (step.found) return append_surface(walk, path, mode, step);
+/// Appends the vertex where the ray of the step ends; false where there is none.
+bool append_end(const WalkContext& walk, SubPath& path, TransportMode mode, Step& step) {
+    if (step.found) {
+        walk.scene.complete(step.hit);
+        return append_surface(walk, path, mode, step);
+    }
     if (mode == TransportMode::Importance || walk.scene.infinite_emitters().empty()) return false;
     append_escape(walk.scene, path, step);
     return true;
-}
-
-/// Makes the step.
-bool take(const WalkContext& walk, Sampler& sampler, SubPath& path, TransportMode mode,
-          Step& step) {
-    trace(walk, sampler, path, step);
-    if (step.found) walk.scene.complete(step.hit);
-    return append_end(walk, path, mode, step);
 }
 
 }  // namespace
@@ -174,11 +169,8 @@ void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, Vec2 u
     start_eye_path(walk, at, walk.scene.sensor().sample_ray(at.point, u_lens), sampler, z);
 }
 
-namespace {
-
-/// Makes z_0.
-void append_lens(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
-                 SubPath& z) {
+void begin_eye_path(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
+                    Sampler& sampler, SubPath& z, Step& step) {
     ++walk.stats.eye_paths;
     z.clear();
     z.film = at.point;
@@ -192,24 +184,19 @@ void append_lens(const WalkContext& walk, const Film::PixelSample& at, const Sen
     lens.is_connectible = true;
     lens.is_infinite = walk.scene.sensor().is_orthographic();
     lens.p = lens.is_infinite ? -ray.d : ray.p;
-}
 
-/// The step from the lens.
-void leave_lens(const WalkContext& walk, const SensorRay& ray, Step& step) {
     step.ray = {ray.p, ray.d, kInf};
     step.beta = Rgb(1);
     step.pdf_sa = ray.pdf_dir;
     step.medium = walk.scene.sensor_medium();
+    trace(walk, sampler, z, step);
 }
-
-}  // namespace
 
 void start_eye_path(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
                     Sampler& sampler, SubPath& z) {
-    append_lens(walk, at, ray, z);
     Step step;
-    leave_lens(walk, ray, step);
-    take(walk, sampler, z, TransportMode::Radiance, step);
+    begin_eye_path(walk, at, ray, sampler, z, step);
+    append_end(walk, z, TransportMode::Radiance, step);
 }
 
 namespace {
@@ -269,7 +256,8 @@ void leave_emitter(const WalkContext& walk, const EmissionSample& e, Sampler& sa
     step.beta = e.Le * (cosine / (y0.pdf_fwd * e.pdf_d));
     step.pdf_sa = e.pdf_d;
     step.medium = y0.medium_toward(e.d);
-    if (take(walk, sampler, y, TransportMode::Importance, step))
+    trace(walk, sampler, y, step);
+    if (append_end(walk, y, TransportMode::Importance, step))
         y[1].next_event_ratio = next_event_ratio(y[0], e.d, walk.counts.guide);
 }
 
@@ -358,7 +346,8 @@ template <TransportMode mode>
 bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubPath& path) {
     Step step;
     leave<mode>(s, path, step);
-    return take(walk, sampler, path, mode, step);
+    trace(walk, sampler, path, step);
+    return append_end(walk, path, mode, step);
 }
 
 template <TransportMode mode>
@@ -371,41 +360,44 @@ void close(const WalkContext& walk, SubPath& path) {
     path[last].weight_sum = level_sum<side>(path, last - 2, path[last - 1].weight_sum, walk.counts);
 }
 
-void start_eye_path_in_turn(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
-                            WalkInTurn& z) {
-    const SensorRay ray = walk.scene.sensor().sample_ray(at.point, u_lens);
-    append_lens(walk, at, ray, *z.path);
-    leave_lens(walk, ray, z.step);
+template <TransportMode mode>
+bool begin_step(const WalkContext& walk, Sampler& sampler, SubPath& path, Step& step) {
+    const auto s = sample_scattering<mode>(walk, sampler, path);
+    if (!s) return false;
+    leave<mode>(*s, path, step);
+    trace(walk, sampler, path, step);
+    return true;
+}
+
+template <TransportMode mode>
+bool end_step(const WalkContext& walk, SubPath& path, Step& step) {
+    if (!append_end(walk, path, mode, step)) return false;
+    close<mode>(walk, path);
+    return true;
 }
 
 template <TransportMode mode>
 void walk_in_turns(const WalkContext& walk, std::span<WalkInTurn> walks) {
     const Scene& scene = walk.scene;
-    std::array<WalkInTurn*, kMostWalksInTurn> active;
+    std::array<WalkInTurn*, kWalksInTurn> going;
     size_t count = 0;
-    for (WalkInTurn& w : walks) active[count++] = &w;
+    for (WalkInTurn& w : walks) going[count++] = &w;
     while (count > 0) {
-        const std::span<WalkInTurn*> all(active.data(), count);
+        const std::span<WalkInTurn*> all(going.data(), count);
+        for (const WalkInTurn* w : all)
+            if (w->step.found) scene.prefetch_primitive(w->step.hit);
+        for (const WalkInTurn* w : all)
+            if (w->step.found) scene.prefetch_vertices(w->step.hit);
         for (WalkInTurn* w : all) {
-            trace(walk, *w->sampler, *w->path, w->step);
-            if (w->step.found) scene.fetch_primitive(w->step.hit);
+            if (!w->step.found) continue;
+            scene.complete(w->step.hit);
+            scene.prefetch_images(w->step.hit);
         }
-        for (WalkInTurn* w : all)
-            if (w->step.found) scene.fetch_vertices(w->step.hit);
-        for (WalkInTurn* w : all)
-            if (w->step.found) {
-                scene.complete(w->step.hit);
-                scene.fetch_images(w->step.hit);
-            }
         count = 0;
-        for (WalkInTurn* w : all) {
-            if (!append_end(walk, *w->path, mode, w->step)) continue;
-            close<mode>(walk, *w->path);
-            const auto s = sample_scattering<mode>(walk, *w->sampler, *w->path);
-            if (!s) continue;
-            leave<mode>(*s, *w->path, w->step);
-            active[count++] = w;
-        }
+        for (WalkInTurn* w : all)
+            if (end_step<mode>(walk, *w->path, w->step) &&
+                begin_step<mode>(walk, *w->sampler, *w->path, w->step))
+                going[count++] = w;
     }
 }
 
@@ -416,6 +408,10 @@ template std::optional<BsdfSample> sample_scattering<kImportance>(const WalkCont
                                                                   SubPath&);
 template bool append<kRadiance>(const WalkContext&, Sampler&, const BsdfSample&, SubPath&);
 template bool append<kImportance>(const WalkContext&, Sampler&, const BsdfSample&, SubPath&);
+template bool begin_step<kRadiance>(const WalkContext&, Sampler&, SubPath&, Step&);
+template bool begin_step<kImportance>(const WalkContext&, Sampler&, SubPath&, Step&);
+template bool end_step<kRadiance>(const WalkContext&, SubPath&, Step&);
+template bool end_step<kImportance>(const WalkContext&, SubPath&, Step&);
 template void walk_in_turns<kRadiance>(const WalkContext&, std::span<WalkInTurn>);
 template void close<kRadiance>(const WalkContext&, SubPath&);
 template void close<kImportance>(const WalkContext&, SubPath&);

@@ -34,12 +34,12 @@ struct WalkContext {
     const LearnedPlaces* learned = nullptr;
 };
 
-/// A step of a walk: the ray that leaves its last vertex, and what the ray meets.
+/// A step of a walk under way: the ray that has left its last vertex, and what the ray has met.
 struct Step {
     Ray ray;
-    Rgb beta;         ///< Throughput along the ray; once it is traced, at its end.
+    Rgb beta;         ///< Throughput at the end of the ray.
     float pdf_sa;     ///< Density of its direction, or the probability of a delta event.
-    MediumId medium;  ///< At its origin; once it is traced, at its end.
+    MediumId medium;  ///< At its end.
     bool found;       ///< Whether it has met a surface, at `hit`.
     SurfaceHit hit;
 };
@@ -83,28 +83,35 @@ bool append(const WalkContext& walk, Sampler& sampler, const BsdfSample& s, SubP
 template <TransportMode mode>
 void close(const WalkContext& walk, SubPath& path);
 
+/// The two parts of a step of the walk; false where the walk ends. The first one samples a direction and traces its ray, the
+/// second one appends the vertex where the ray ends.
+template <TransportMode mode>
+bool begin_step(const WalkContext& walk, Sampler& sampler, SubPath& path, Step& step);
+template <TransportMode mode>
+bool end_step(const WalkContext& walk, SubPath& path, Step& step);
 /// One step of the walk; false where it ends.
 template <TransportMode mode>
 bool extend(const WalkContext& walk, Sampler& sampler, SubPath& path) {
-    const auto s = sample_scattering<mode>(walk, sampler, path);
-    if (!s || !append<mode>(walk, sampler, *s, path)) return false;
-    close<mode>(walk, path);
-    return true;
+    Step step;
+    return begin_step<mode>(walk, sampler, path, step) && end_step<mode>(walk, path, step);
 }
 
-/// One of several walks that are made in turns: while one of them computes, the memory that the others wait for comes.
+/// One of several walks that are made in turns.
 struct WalkInTurn {
     Sampler* sampler;
     SubPath* path;
-    Step step;
+    Step step;  ///< Begun.
 };
-inline constexpr size_t kMostWalksInTurn = 16;
-/// Makes z_0 on the lens, and the step to z_1 that is to be taken.
-void start_eye_path_in_turn(const WalkContext& walk, const Film::PixelSample& at, Vec2 u_lens,
-                            WalkInTurn& z);
-/// Takes the first steps, and goes on by extend() until each walk has ended.
+/// As many as a worker makes in turns: enough that memory has come when it is read, and few enough that all of their vertices
+/// stay in the caches.
+inline constexpr size_t kWalksInTurn = 8;
+/// Ends the steps of at most kWalksInTurn walks, and goes on with them as extend() does until all have ended. While one of
+/// them computes, the memory that the others wait for comes: group prefetching [Chen et al. 2007].
 template <TransportMode mode>
 void walk_in_turns(const WalkContext& walk, std::span<WalkInTurn> walks);
+/// Makes z_0 on the lens, and begins the step to z_1.
+void begin_eye_path(const WalkContext& walk, const Film::PixelSample& at, const SensorRay& ray,
+                    Sampler& sampler, SubPath& z, Step& step);
 
 /// Walks whole sub-paths.
 inline void trace_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {

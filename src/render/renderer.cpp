@@ -353,8 +353,8 @@ public:
             if (meanwhile) meanwhile();
             SamplesInTurn samples(*this, chunk);
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
-            for (uint64_t i = chunk * kChunk; i < end; i += SamplesInTurn::kMost)
-                samples.make(i, std::min(end, i + SamplesInTurn::kMost));
+            for (uint64_t i = chunk * kChunk; i < end; i += kWalksInTurn)
+                samples.make(i, std::min(end, i + kWalksInTurn));
         });
     }
 
@@ -384,12 +384,10 @@ private:
     /// Makes samples of a chunk, whose eye paths are traced in turns.
     class SamplesInTurn {
     public:
-        static constexpr uint64_t kMost = 8;
-
         SamplesInTurn(const Pass& pass, uint64_t chunk)
             : pass_(pass), chunk_(chunk), work_(pass.workspace()), sink_(pass.receivers(work_)) {
-            samplers_.reserve(kMost);
-            contexts_.reserve(kMost);
+            samplers_.reserve(kWalksInTurn);
+            contexts_.reserve(kWalksInTurn);
         }
 
         /// Makes the samples begin … end-1.
@@ -404,14 +402,14 @@ private:
                 contexts_.push_back(pass_.sample_context(i, chunk_, sampler, sink_));
             }
             pass_.go_on();
-            work_.stats.stands_for = 1;
-            work_.eye_paths.resize(kMost);
+            work_.stats.time_factor = 1;
+            work_.eye_paths.resize(kWalksInTurn);
             const bool has_eye_paths = integrator.trace_eye_paths(
                 contexts_, std::span(work_.eye_paths).first(contexts_.size()), work_.stats);
             for (size_t i = 0; i < contexts_.size(); ++i) {
                 const SampleContext& c = contexts_[i];
                 pass_.go_on();
-                work_.stats.stands_for = RenderStats::samples_timed_by(c.index);
+                work_.stats.time_factor = RenderStats::time_factor_of(c.index);
                 if (has_eye_paths) std::swap(work_.z, work_.eye_paths[i]);
                 work_.has_eye_path = has_eye_paths;
                 sink_.begin(c.index, c.light_paths);
@@ -441,7 +439,7 @@ private:
             for (uint64_t i = chunk * kChunk; i < end; ++i) {
                 go_on();
                 sampler.start(numbers_.pass, i);
-                work.stats.stands_for = RenderStats::samples_timed_by(i);
+                work.stats.time_factor = RenderStats::time_factor_of(i);
                 use(sample_context(i, chunk, sampler, sink), work);
             }
         });
@@ -465,7 +463,7 @@ private:
                         Sampler sampler(r_.settings_.sampler,
                                         pilot_seed(numbers_.seed, PilotUse::OtherPaths));
                         Workspace& work = workspace();
-                        work.stats.stands_for = RenderStats::samples_timed_by(i);
+                        work.stats.time_factor = RenderStats::time_factor_of(i);
                         task(i, sampler, work);
                     });
                 },

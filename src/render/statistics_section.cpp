@@ -6,10 +6,10 @@ namespace {
 /// All numbers of the statistics; a new one does not compile until it is here.
 template <class Stats, class Use>
 void for_each_number(Stats& s, const Use& use) {
-    auto& [phases, stands_for, eye_paths, light_paths, vertices, walk_rays, shadow_rays, visible,
+    auto& [phases, time_factor, eye_paths, light_paths, vertices, walk_rays, shadow_rays, visible,
            joins_skipped, pairs, visible_pairs, trials, trial_rays, pairs_by_trials,
            bounds_exceeded, runaways, rejected] = s;
-    (void)stands_for;  // Of the current sample.
+    (void)time_factor;  // Of the current sample.
     auto& [of_light_paths, of_eye_paths, of_connections, of_records] = phases;
     use(of_light_paths), use(of_eye_paths), use(of_connections), use(of_records);
     use(eye_paths), use(light_paths), use(vertices), use(walk_rays), use(shadow_rays);

@@ -123,6 +123,7 @@ private:
         scene_.images_ = std::move(models.images);
         scene_.textures_ = std::move(models.textures);
         scene_.materials_ = std::move(models.materials);
+        scene_.images_of_materials_ = std::move(models.images_of_materials);
         scene_.emitters_ = std::move(models.emitters);
         scene_.media_ = std::move(models.media);
     }

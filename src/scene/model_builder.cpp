@@ -57,8 +57,10 @@ const Material* ModelBuilder::make_material(int index) {
     return materials_[index] = models_.materials.back().get();
 }
 
-std::vector<const BitmapTexture*> ModelBuilder::images_of(int index) const {
-    std::vector<const BitmapTexture*> images;
+std::span<const BitmapTexture* const> ModelBuilder::images_of(int index) {
+    const auto [entry, is_new] = models_.images_of_materials.try_emplace(index);
+    std::vector<const BitmapTexture*>& images = entry->second;
+    if (!is_new) return images;
     std::vector<int> objects{index};
     std::set<int> known{index};
     while (!objects.empty()) {

@@ -20,6 +20,7 @@ struct Models {
     std::unique_ptr<TextureCache> images = std::make_unique<TextureCache>();
     std::vector<std::unique_ptr<Texture>> textures;
     std::vector<std::unique_ptr<Material>> materials;
+    ImagesOfMaterials images_of_materials;
     std::vector<std::unique_ptr<Emitter>> emitters;
     std::vector<Rgb> media;  ///< Extinction, by MediumId.
 };
@@ -33,8 +34,8 @@ public:
     const Texture* make_texture(int index);
     const Material* make_material(int index);
     MediumId make_medium(int index);
-    /// The images among the textures that have been made for the object `index` and those nested in it, each once.
-    std::vector<const BitmapTexture*> images_of(int index) const;
+    /// The images among the textures that have been made for the material `index` and for what is nested in it.
+    std::span<const BitmapTexture* const> images_of(int index);
     /// Constructs all emitters of the object and returns the first one. With `on_shape` it must be an area emitter;
     /// `material` is that of the shape.
     const Emitter* make_emitters(int index, const Shape* on_shape = nullptr,

@@ -99,11 +99,14 @@ void Scene::locate(const RayHit& raw, SurfaceHit& hit) const {
     hit.shape = &shapes_[raw.shape];
     hit.location = raw;
     hit.t = raw.t;
+    hit.has_geometry = false;
 }
 
 void Scene::complete(SurfaceHit& hit) const {
+    if (hit.has_geometry) return;
     // In place: a vector copy would stall on the stores that have just written its members.
     ::new (&hit.geometry) SurfaceGeometry(surface(hit.location));
+    hit.has_geometry = true;
 }
 
 template <class Stops, class Passes>
@@ -134,10 +137,10 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage
     return found;
 }
 
-void Scene::fetch_images(const SurfaceHit& hit) const {
+void Scene::prefetch_images(const SurfaceHit& hit) const {
     const SurfaceGeometry& g = hit.geometry;
     for (const BitmapTexture* image : hit.shape->images)
-        image->fetch({g.uv, g.color, g.p, {}, {}, g.alpha, g.second_uv});
+        image->prefetch({g.uv, g.color, g.p, {}, {}, g.alpha, g.second_uv});
 }
 
 bool Scene::find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,6 +28,9 @@ inline constexpr MediumId kVacuum = -1;
 /// Emitter::medium of an emitter that lies in more than one.
 inline constexpr MediumId kSeveralMedia = -2;
 
+/// The images that the material of an object of the description reads; a map, since shapes refer to its entries.
+using ImagesOfMaterials = std::map<int, std::vector<const BitmapTexture*>>;
+
 struct SceneShape {
     const Shape* shape = nullptr;
     const Material* material = nullptr;
@@ -34,8 +39,8 @@ struct SceneShape {
     /// Whether interior or exterior are given; otherwise both sides have the medium of the walk.
     bool is_interface = false;
     bool is_mesh = false;
-    bool needs_tangents = false;               ///< Whether the material uses dpdu and dpdv.
-    std::vector<const BitmapTexture*> images;  ///< That the material reads.
+    bool needs_tangents = false;                   ///< Whether the material uses dpdu and dpdv.
+    std::span<const BitmapTexture* const> images;  ///< Those that the material reads.
     std::string name;
 
     /// nullptr for other shapes.
@@ -55,6 +60,7 @@ struct Passage {
 /// Intersection of a ray with the scene, at distance t.
 struct SurfaceHit {
     SurfaceGeometry geometry;
+    bool has_geometry;  ///< Whether `geometry` is known, see Scene::find().
     const SceneShape* shape;
     SurfaceLocation location;
     float t;
@@ -84,20 +90,21 @@ public:
     /// The nearest surface; false where there is none. Masked surfaces let the ray pass with probability 1 - opacity,
     /// decided by `u`, which is rescaled at each one. `passage` tracks the media bounded by masked surfaces.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
-    /// The parts of intersect(), for several rays in turns, so that the memory that one of them waits for comes while the
-    /// others compute. find() makes everything but `hit.geometry`, which complete() adds. Before it, fetch_primitive() and
-    /// fetch_vertices() ask for what complete() reads; after it, fetch_images() for what the material reads.
-    bool find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
-    void complete(SurfaceHit& hit) const;
-    void fetch_primitive(const SurfaceHit& hit) const {
-        if (const TriangleMesh* mesh = hit.shape->mesh()) mesh->fetch_face(hit.location.prim);
-    }
-    void fetch_vertices(const SurfaceHit& hit) const {
-        if (const TriangleMesh* mesh = hit.shape->mesh()) mesh->fetch_vertices(hit.location.prim);
-    }
-    void fetch_images(const SurfaceHit& hit) const;
     /// The same without media.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit) const;
+    /// The two parts of intersect(): find() leaves out the geometry of most hits, and complete() adds it. In between,
+    /// several rays can ask for the memory that complete() reads: first prefetch_primitive(), then prefetch_vertices(),
+    /// which reads what the former asked for; and after it for what the material reads.
+    bool find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
+    void complete(SurfaceHit& hit) const;
+    void prefetch_primitive(const SurfaceHit& hit) const {
+        if (const TriangleMesh* mesh = hit.shape->mesh()) mesh->prefetch_face(hit.location.prim);
+    }
+    void prefetch_vertices(const SurfaceHit& hit) const {
+        if (const TriangleMesh* mesh = hit.shape->mesh())
+            mesh->prefetch_vertices(hit.location.prim);
+    }
+    void prefetch_images(const SurfaceHit& hit) const;
     /// Geometry of a surface point.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
     /// Probability that a ray meets the surface there.
@@ -137,7 +144,7 @@ public:
     const Emitter& emitter(uint32_t index) const { return *emitters_[index]; }
     bool has_emitters() const { return !selection_.empty(); }
     bool has_emitter_choice() const { return emitters_.size() > 1; }
-    /// Whether any emitter has, see Emitter::fetch_direct().
+    /// Whether an emitter has large tables, see Emitter::prefetch_direct().
     bool has_large_emitter_tables() const { return has_large_emitter_tables_; }
     /// Whether any emitter is delta.
     bool has_delta_emitters() const { return has_delta_emitters_; }
@@ -184,6 +191,7 @@ private:
     std::unique_ptr<TextureCache> images_;
     std::vector<std::unique_ptr<Texture>> textures_;
     std::vector<std::unique_ptr<Material>> materials_;
+    ImagesOfMaterials images_of_materials_;
     std::vector<std::unique_ptr<Emitter>> emitters_;
     std::vector<SceneShape> shapes_;  ///< By the accelerator's shape index.
     std::vector<Rgb> media_;          ///< Extinction σ_t, 1/length.

@@ -19,7 +19,7 @@
 
 #include "color/srgb.h"
 #include "description/resolve_file.h"
-#include "math/fetch.h"
+#include "math/prefetch.h"
 #include "system/huge_pages.h"
 #include "texture/texture_cache.h"
 
@@ -170,13 +170,14 @@ Rgb BitmapTexture::eval(const TexturePoint& at) const {
                       image_->data);
 }
 
-void BitmapTexture::fetch(const TexturePoint& at) const {
+void BitmapTexture::prefetch(const TexturePoint& at) const {
     const Footprint f = footprint(uv(at));
     std::visit(
         [&](const auto& texels) {
             for (const int y : {f.y.i0, f.y.i1})
                 for (const int x : {f.x.i0, f.x.i1})
-                    if (x != kOutside && y != kOutside) etendue::fetch(first_value(texels, x, y));
+                    if (x != kOutside && y != kOutside)
+                        etendue::prefetch(first_value(texels, x, y));
         },
         image_->data);
 }

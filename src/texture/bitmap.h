@@ -42,7 +42,7 @@ public:
     float eval_scalar(const TexturePoint& at) const override;
     Vec2 gradient(const TexturePoint& at) const override;
     /// Asks for the memory that these functions read at `at`.
-    void fetch(const TexturePoint& at) const;
+    void prefetch(const TexturePoint& at) const;
     Rgb mean() const override { return mean_; }
     void resolution(int& width, int& height) const override;
     size_t memory_bytes() const override { return sizeof(*this); }
