@@ -84,9 +84,8 @@ bool PathSpace::draw_user_path(PathBuilder& builder, Sampler& sampler) const {
     return s + t <= longest + 1 && builder.sample_eye_path(t);
 }
 
-MutationChoices PathSpace::choices(const PathState& x) const {
-    if (x.choices) return *x.choices;
-    MutationChoices p{};
+PathSpace::Choices PathSpace::choices(const PathState& x) const {
+    Choices p{};
     double sum = 0;
     for (size_t i = 0; i < p.size(); ++i)
         if (options_.weights[i] > 0 && mutations_[i]->suits(x)) sum += p[i] = options_.weights[i];
@@ -95,9 +94,8 @@ MutationChoices PathSpace::choices(const PathState& x) const {
     return p;
 }
 
-PathDensity PathSpace::Q(Kind kind, const PathState& x, const PathState& y,
+PathDensity PathSpace::Q(Kind kind, const Choices& at_x, const PathState& x, const PathState& y,
                          const MutationWay& way) const {
-    const MutationChoices at_x = choices(x);
     const auto density = [&](Kind of) {
         return at_x[of] > 0 ? at_x[of] * mutations_[of]->Q(x, y, way) : PathDensity(0);
     };
@@ -116,7 +114,7 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
     sampler.start(0, 0);
     sampler.seek(Stream::Selection, addresses::kKind);
     double u = double(sampler.next_1d());
-    const MutationChoices p = choices(x);
+    const Choices p = choices(x);
     int chosen = 0;
     for (size_t i = 0; i < p.size(); u -= p[i], ++i) {
         if (p[i] > 0) chosen = int(i);
@@ -134,8 +132,7 @@ Proposal PathSpace::propose(int, const ChainState& from, uint64_t key, const Cha
     expect_announced(x, y, way);
     y.finish(c.work.stats);
     if (!(y.target > 0)) return proposal;
-    y.choices = choices(y);
-    const PathDensity there = Q(kind, x, y, way), back = Q(kind, y, x, way.back());
+    const PathDensity there = Q(kind, p, x, y, way), back = Q(kind, choices(y), y, x, way.back());
     proposal.Q_ratio =
         there > 0 ? double(back * y.large_step_density() / (there * x.large_step_density())) : 0.0;
     return proposal;

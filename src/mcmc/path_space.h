@@ -6,6 +6,27 @@
 
 namespace etendue {
 
+/// Mutations in path space, and their weights: one of those that can change a path is chosen in proportion.
+/// That of UserPath must be 0 if the target has no user paths.
+struct PathMutations {
+    enum Kind : int {
+        Bidirectional,
+        Lens,
+        Caustic,
+        MultiChain,
+        GlossyLens,
+        GlossyCaustic,
+        LensSubpath,
+        UserPath,
+        PhotonMap,
+        kCount
+    };
+    static constexpr std::array<const char*, kCount> kNames{
+        "bidirectional",  "lens",         "caustic",   "multi_chain", "glossy_lens",
+        "glossy_caustic", "lens_subpath", "user_path", "photon_map"};
+    std::array<double, kCount> weights{1, 4, 4, 4, 4, 4, 0.5, 0, 0};
+};
+
 class PathSpace final : public StateSpace {
 public:
     PathSpace(PathTarget target, const PathMutations& mutations, TechniqueCounts counts);
@@ -26,9 +47,12 @@ public:
 private:
     using Kind = PathMutations::Kind;
     bool draw_user_path(PathBuilder& builder, Sampler& sampler) const;
-    MutationChoices choices(const PathState& x) const;
-    /// Q of all proposals that make y from x in this way; `x.choices` are known.
-    PathDensity Q(Kind kind, const PathState& x, const PathState& y, const MutationWay& way) const;
+    /// Probability of each mutation at a state.
+    using Choices = std::array<double, PathMutations::kCount>;
+    Choices choices(const PathState& x) const;
+    /// `at_x` is choices(x).
+    PathDensity Q(Kind kind, const Choices& at_x, const PathState& x, const PathState& y,
+                  const MutationWay& way) const;
 
     PathTarget target_;
     PathMutations options_;

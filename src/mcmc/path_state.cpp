@@ -60,7 +60,6 @@ void PathState::copy(const PathState& from) {
     edges = from.edges;
     splats = from.splats;
     film = from.film;
-    choices = from.choices;
     large_step_density_ = from.large_step_density_;
 }
 
@@ -244,7 +243,6 @@ PathProduct PathState::flux(int i) const {
 
 void PathState::set_black() {
     target = 0;
-    choices.reset();
     splats.clear();
 }
 

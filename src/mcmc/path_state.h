@@ -63,29 +63,6 @@ struct PathTarget {
     std::function<bool(const Vertex&)> stores = [](const Vertex& v) { return v.is_connectible; };
 };
 
-/// Mutations in path space, and their weights: one of those that can change a path is chosen in proportion.
-/// That of UserPath must be 0 if the target has no user paths.
-struct PathMutations {
-    enum Kind : int {
-        Bidirectional,
-        Lens,
-        Caustic,
-        MultiChain,
-        GlossyLens,
-        GlossyCaustic,
-        LensSubpath,
-        UserPath,
-        PhotonMap,
-        kCount
-    };
-    static constexpr std::array<const char*, kCount> kNames{
-        "bidirectional",  "lens",         "caustic",   "multi_chain", "glossy_lens",
-        "glossy_caustic", "lens_subpath", "user_path", "photon_map"};
-    std::array<double, kCount> weights{1, 4, 4, 4, 4, 4, 0.5, 0, 0};
-};
-/// Probability of each mutation at a path.
-using MutationChoices = std::array<double, PathMutations::kCount>;
-
 /// A vertex of a full path.
 class PathVertex {
 public:
@@ -142,8 +119,6 @@ public:
     double geometry_from_light(int i) const { return geometry(i - 1, i) * met_from_light(i); }
     double geometry_from_eye(int i) const { return geometry(i + 1, i) * met_from_eye(i); }
     Vec2 film{};
-    /// Set by PathSpace where it is needed.
-    std::optional<MutationChoices> choices;
 
     void clear() {
         x_.clear();
