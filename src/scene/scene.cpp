@@ -21,10 +21,6 @@ float largest_term(const Transform& t, Vec3 p) {
     return float(most);
 }
 
-float largest_coordinate(Vec3 p) {
-    return std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
-}
-
 /// Transforms the geometry of an instance's shape to world space. `error`: see Accelerator::instance_error().
 void transform_geometry(const Transform& t, float error, SurfaceGeometry& g) {
     const float side = t.determinant3() < 0 ? -1.0f : 1.0f;
