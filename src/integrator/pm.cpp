@@ -90,7 +90,7 @@ public:
         pass_ = pass.index;
         maps_pass_ = retrace_ ? pass.index : 0;
         if (!(max_radius_ > 0))
-            max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * seen_radius(pass.scene);
+            max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * seen_extent(pass.scene).radius;
         if (has_maps_ && !retrace_) return;
         MapPhotons photons =
             source_->trace(pass, maps_pass_, [&] { return sample_importons(pass); });
@@ -302,7 +302,7 @@ private:
     /// level do not depend on each other, so the result does not depend on the threads.
     void fill_cache(const PassContext& pass) {
         constexpr uint32_t kCoarsest = 16, kFinest = 2;
-        const float size = seen_radius(pass.scene);
+        const float size = seen_extent(pass.scene).radius;
         cache_.reset(cache_error_, 0.01f * size, 0.5f * size);
         const uint64_t width = uint64_t(pass.scene.film().crop_width);
         std::vector<std::vector<IrradianceRecord>> chunks(pass.chunks(pass.pixels));

@@ -211,7 +211,7 @@ private:
     /// Chooses the radius and the density of the first pass.
     void start(const PassContext& pass) {
         const PairPilot pilot = run_pair_pilot(pass, paths_, counts(pass.scene, pass.light_paths));
-        learned_.radius.start(given_radius_, connects_, seen_radius(pass.scene),
+        learned_.radius.start(given_radius_, connects_, seen_extent(pass.scene).radius,
                               pilot.pairs_per_radius2);
         density_ = PairDensity(pilot.vertices, learned_.radius.of(false),
                                kGatherConstants.correlation, pilot.multiple);

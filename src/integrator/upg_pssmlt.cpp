@@ -274,7 +274,7 @@ protected:
         constexpr int kRounds = 3;
         use_roulette(pass.scene.film(), pilot);
         gathered_ = light_.count(pass.scene, paths_.depth(), LightMap::kVertexBytes);
-        const float size = seen_radius(pass.scene);
+        const float size = seen_extent(pass.scene).radius;
         const float largest = kGatherConstants.largest_radius * size;
         radius_ = given_radius_ > 0 ? given_radius_
                                     : std::min(largest, size / std::sqrt(float(gathered_)));
