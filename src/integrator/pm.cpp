@@ -232,8 +232,9 @@ private:
         for (int ray = 0; ray < gather_rays_; ++ray) {
             // Each ray is a separate sample. The rays of all passes are successive points of one sequence.
             Sampler of_ray = c.sampler;
-            const uint64_t place = uint64_t(pass) * uint64_t(gather_rays_) + uint64_t(ray);
-            of_ray.start(uint32_t(place), hash_combine(c.index, uint64_t(t) + (place >> 32 << 8)));
+            const uint64_t number = uint64_t(pass) * uint64_t(gather_rays_) + uint64_t(ray);
+            const uint64_t high_half = number >> 32;  // A sequence has no more than 2^32 points.
+            of_ray.start(uint32_t(number), hash_combine(c.index, uint64_t(t) + (high_half << 8)));
             const SampleContext gather = c.with(of_ray, c.sink);
             if (extend<TransportMode::Radiance>(walk, of_ray, z) && !z[t - 1].is_delta)
                 end_gather_ray(gather, t + 1, work,
