@@ -1,5 +1,4 @@
 #include "render/renderer.h"
-#include "system/threads.h"
 
 #include <algorithm>
 #include <array>
@@ -14,13 +13,12 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
+#include "film/thread_arena.h"
 #include "render/statistics_section.h"
 #include "sampler/pilot_seed.h"
 #include "system/available_memory.h"
 #include "system/failure.h"
-#include "system/memory_limit.h"
 
 namespace etendue {
 namespace {
@@ -191,7 +189,6 @@ double typical_radiance(const Scene& scene) {
 /// threads creates its own. TBB uses the smallest limit of all global_controls; kRoom leaves room for other renderers.
 std::unique_ptr<tbb::global_control> allow_threads(int threads) {
     constexpr size_t kRoom = 256;
-    make_room_for_threads(threads);
     if (threads <= tbb::info::default_concurrency()) return nullptr;
     return std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                  std::max(size_t(threads), kRoom));
@@ -236,7 +233,7 @@ const FilmGeometry& fitting_film(const Scene& scene, const RenderSettings& setti
 }  // namespace
 
 struct Renderer::Workers {
-    explicit Workers(int threads) : allowed(allow_threads(threads)), arena(thread_count(threads)) {}
+    explicit Workers(int threads) : allowed(allow_threads(threads)), arena(threads) {}
 
     /// Returns the sum of all workers' statistics and resets them.
     RenderStats take_stats() {
@@ -257,7 +254,7 @@ struct Renderer::Workers {
     }
 
     std::unique_ptr<tbb::global_control> allowed;
-    tbb::task_arena arena;
+    ThreadArena arena;
     tbb::enumerable_thread_specific<Workspace> spaces;
 };
 

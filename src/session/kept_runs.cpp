@@ -4,13 +4,12 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
+#include "film/thread_arena.h"
 #include "session/file_version.h"
 #include "session/run.h"
 #include "session/run_record.h"
 #include "system/failure.h"
-#include "system/threads.h"
 
 namespace etendue {
 namespace {
@@ -174,7 +173,7 @@ std::shared_ptr<Session::Run> Session::load_run(const std::string& name) {
     s.state = RunState::Stopped;
     const bool is_own = load_record(file.sections(), s);
     const bool fits = technique_images_fit(loaded->scene, header.technique_depth);
-    tbb::task_arena arena(thread_count(threads_));
+    ThreadArena arena(threads_);
     try {
         if (!fits)
             throw std::runtime_error(

@@ -9,13 +9,12 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <tbb/task_arena.h>
 
+#include "film/thread_arena.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
 #include "session/run.h"
 #include "system/memory_limit.h"
-#include "system/threads.h"
 
 namespace etendue {
 namespace {
@@ -412,7 +411,7 @@ void Session::show(Run& run) noexcept {
     const double before = process_cpu_seconds();
     run.is_wanted = false;
     try {
-        tbb::task_arena arena(thread_count(threads_));
+        ThreadArena arena(threads_);
         if (const auto last = run.snapshot.load();
             !last || last->passes != passes || run.shown_seeds != run.seeds.count()) {
             const std::shared_ptr<Snapshot> snapshot = run.pool.take();
