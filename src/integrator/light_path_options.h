@@ -2,6 +2,7 @@
 // Number of light paths in a pass, and their memory limit.
 
 #include "integrator/integrator.h"
+#include "math/statistics.h"
 
 namespace etendue {
 
@@ -16,5 +17,8 @@ struct LightPathOptions {
     /// On a large film, pilot paths determine how many light paths fit into the memory.
     uint64_t count(const Scene& scene, const DepthOptions& depth, uint64_t vertex_bytes) const;
 };
+
+/// Number of vertices of light paths, from pilot paths that no pass traces.
+Moments light_path_length(const Scene& scene, const DepthOptions& depth);
 
 }  // namespace etendue
