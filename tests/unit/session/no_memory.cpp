@@ -2,18 +2,14 @@
 
 #include "no_memory.h"
 
-#include <atomic>
 #include <cstdlib>
 #include <new>
 
-namespace {
-
-std::atomic<size_t> failing_size{0};  ///< 0: none.
-
-}  // namespace
+std::atomic<size_t> etendue::test::size_without_memory{0};
 
 void* operator new(size_t size) {
-    if (size > 0 && size == failing_size.load(std::memory_order_relaxed)) throw std::bad_alloc();
+    if (size > 0 && size == etendue::test::size_without_memory.load(std::memory_order_relaxed))
+        throw std::bad_alloc();
     if (void* p = std::malloc(size > 0 ? size : 1)) return p;
     throw std::bad_alloc();
 }
@@ -27,14 +23,3 @@ void operator delete(void* p) noexcept {
 void operator delete(void* p, size_t) noexcept {
     std::free(p);
 }
-
-namespace etendue::test {
-
-NoMemoryFor::NoMemoryFor(size_t size) {
-    failing_size = size;
-}
-NoMemoryFor::~NoMemoryFor() {
-    failing_size = 0;
-}
-
-}  // namespace etendue::test
