@@ -25,7 +25,8 @@ public:
     /// 16, 64 …. What is learned holds for a generation of passes, until the next call. From each call on, the random
     /// numbers are independent of all earlier ones. Therefore no pass uses learned data that depend on its own random
     /// numbers, and learning causes no bias. Without error_groups(), the passes of a generation are independent of each
-    /// other: what trace() keeps for later ones is a function of the seed.
+    /// other: what trace() keeps for later ones is a function of the seed. If it throws an exception, it is called again,
+    /// and learns the same as if the first call had not been made.
     virtual void learn(const LearnContext&) {}
     /// Traces paths of its own from which it learns. Called after learn(), by one thread. Nothing of this is left if it
     /// throws an exception; then it is called again.

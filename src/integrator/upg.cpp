@@ -48,12 +48,16 @@ public:
 
     void learn(const LearnContext& pass) override {
         paths_.learn(pass);
-        if (connects_) learned_.weight_scale.learn(learned_.gathers);
-        learned_.roulette.learn(learned_.gathers);
-        if (pass.film.passes() == 0) return;  // see prepare()
-        learned_.radius.learn(pass.film, pass.so_far, learned_.gathers);
-        if (connects_) learned_.next_events.learn(learned_.radius.observed(), learned_.gathers);
-        density_ = PairDensity(cells(), learned_.radius.of(false), kGatherConstants.correlation);
+        // Where memory ends, all is as it was, since this is called again and would learn from its own changes.
+        Learned next = learned_;
+        if (connects_) next.weight_scale.learn(next.gathers);
+        next.roulette.learn(next.gathers);
+        if (pass.film.passes() > 0) {  // see prepare()
+            next.radius.learn(pass.film, pass.so_far, next.gathers);
+            if (connects_) next.next_events.learn(next.radius.observed(), next.gathers);
+            density_ = PairDensity(cells(), next.radius.of(false), kGatherConstants.correlation);
+        }
+        learned_ = next;
     }
     void save(LearnedState& to) const override {
         paths_.save(to);
@@ -211,10 +215,11 @@ private:
     /// Chooses the radius and the density of the first pass.
     void start(const PassContext& pass) {
         const PairPilot pilot = run_pair_pilot(pass, paths_, counts(pass.scene, pass.light_paths));
-        learned_.radius.start(given_radius_, connects_, seen_radius(pass.scene),
-                              pilot.pairs_per_radius2);
-        density_ = PairDensity(pilot.vertices, learned_.radius.of(false),
-                               kGatherConstants.correlation, pilot.multiple);
+        GatherRadius radius;
+        radius.start(given_radius_, connects_, seen_radius(pass.scene), pilot.pairs_per_radius2);
+        density_ = PairDensity(pilot.vertices, radius.of(false), kGatherConstants.correlation,
+                               pilot.multiple);
+        learned_.radius = radius;
     }
 
     static constexpr uint64_t kVertexBytes = LightVertexCache::kVertexBytes +

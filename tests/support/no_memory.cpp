@@ -6,9 +6,13 @@
 #include <new>
 
 std::atomic<size_t> etendue::test::size_without_memory{0};
+std::atomic<long> etendue::test::blocks_with_memory{0};
 
 void* operator new(size_t size) {
-    if (size > 0 && size == etendue::test::size_without_memory.load(std::memory_order_relaxed))
+    using namespace etendue::test;
+    if (size > 0 && size == size_without_memory.load(std::memory_order_relaxed))
+        throw std::bad_alloc();
+    if (blocks_with_memory.load(std::memory_order_relaxed) > 0 && --blocks_with_memory == 0)
         throw std::bad_alloc();
     if (void* p = std::malloc(size > 0 ? size : 1)) return p;
     throw std::bad_alloc();
