@@ -2,6 +2,7 @@
 
 #include "film/parallel_chunks.h"
 #include "math/statistics.h"
+#include "system/make_room.h"
 
 namespace etendue {
 namespace {
@@ -128,8 +129,7 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     // All memory is allocated before anything changes, so that a failure leaves the totals unchanged. From then on nothing
     // throws, apart from the exchange with other processes, which end then.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks), pass_sum(chunks);
-    for (std::vector<double>* list : {&pass_means_, &pair_errors_})
-        if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);
+    make_room(pass_means_), make_room(pair_errors_);
     ++passes_;
     if (group) ++group_passes_[g];
     const auto mean_of = [&](uint64_t i) { return moments_[i].luminance_sum() / float(passes_); };
