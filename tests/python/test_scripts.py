@@ -1,0 +1,48 @@
+"""Scripts and measurements, with stand-ins for the programs that they run."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def write_program(file: Path, text: str) -> None:
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(f"#!/bin/bash\n{text}")
+    file.chmod(0o755)
+
+
+KILLED = """
+[ RUN      ] Methods/Killed.ResumesWithTheSameBits/path_guide_on
+path:guide=on: ETENDUE_SEED=11
+path:guide=on: 2 kills, 1 resumes
+[       OK ] Methods/Killed.ResumesWithTheSameBits/path_guide_on (12 ms)
+[ RUN      ] Methods/Killed.ResumesWithTheSameBits/upg_bdpt
+upg+bdpt: ETENDUE_SEED=12
+upg+bdpt: 2 kills, 2 resumes
+/a/tests/program/checkpoint_test.cpp:150: Failure
+Expected equality of these values:
+  bits("killed.etd")
+  bits("whole.etd")
+Google Test trace:
+/a/tests/program/checkpoint_test.cpp:100: ETENDUE_SEED=12
+[  FAILED  ] Methods/Killed.ResumesWithTheSameBits/upg_bdpt, where GetParam() = 0x55 pointing to "upg+bdpt" (9 ms)
+[ RUN      ] Methods/Killed.ResumesWithTheSameBits/vcm
+vcm: ETENDUE_SEED=13
+"""
+
+
+def test_chaos_tells_bits_that_differ_and_tests_that_crash(tmp_path: Path) -> None:
+    write_program(tmp_path / "etendue", "echo etendue 1")
+    write_program(tmp_path / "tests" / "program_tests", f"echo '{KILLED}'; kill -SEGV $$")
+    report = tmp_path / "chaos.json"
+    chaos = [sys.executable, str(ROOT / "scripts" / "chaos")]
+    run = subprocess.run([*chaos, "2", str(tmp_path), "-o", str(report)], capture_output=True, text=True)
+    assert run.returncode != 0, run.stdout
+    methods = json.loads(report.read_text())["methods"]
+    assert [(m["method"], m["seed"], m["kills"], m["same_bits"]) for m in methods] == [
+        ("path:guide=on", 11, 2, True), ("upg+bdpt", 12, 2, False), ("vcm", 13, 0, False)]
+    table = subprocess.run([*chaos, "--table", str(report)], capture_output=True, text=True, check=True).stdout
+    assert "| `upg+bdpt` | 2 | 2 | 12 | **no** |" in table
