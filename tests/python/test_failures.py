@@ -5,6 +5,7 @@ import pickle
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -176,6 +177,21 @@ def test_what_is_no_failure_of_an_integrator_ends_reports(cornell: et.Scene, tmp
                        progress=False)
         with pytest.raises(type(leaves), match="leaves"):
             et.verify(cornell, ["path", Leaves()], spp=1, runs=8, lengths=(1, 2), progress=False)
+
+
+def test_verifications_call_an_integrator_on_one_thread(cornell: et.Scene) -> None:
+    """On others, what is no Exception, such as SystemExit, would not end them."""
+    threads: set[int] = set()
+
+    class Leaves(Hits):
+        def sample(self, c: core.Sample) -> None:
+            threads.add(threading.get_ident())
+            if len(threads) > 1:
+                raise SystemExit("from another thread")
+            super().sample(c)
+
+    report = et.verify(cornell, ["path", Leaves()], spp=1, runs=8, lengths=(1, 2), threads=4, progress=False)
+    assert len(report.verdicts) == 2 and len(threads) == 1
 
 
 LIMITED = """
