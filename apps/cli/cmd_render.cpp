@@ -32,6 +32,7 @@
 #include "render/renderer.h"
 #include "render/scene_integrator.h"
 #include "render/warnings.h"
+#include "render/writing_pace.h"
 #include "scene_options.h"
 #include "system/available_memory.h"
 #include "system/descriptor.h"
@@ -102,19 +103,18 @@ private:
     }
 };
 
-/// Something that is done every so many seconds, or less often if it would take a larger share of the time: but one call that
-/// took long, such as one that waited for a disk, postpones the next one by no more than a quarter of an hour.
+/// When a file that is written beside the passes is due; never if its interval is 0.
 class Timer {
 public:
-    explicit Timer(double interval, double most = 1) : interval_(interval), most_(most) {}
-    bool is_due() const { return interval_ > 0 && seconds_since(last_) >= wait_; }
+    explicit Timer(const WritingPace& pace) : pace_(pace) {}
+    bool is_due() const { return pace_.interval > 0 && seconds_since(last_) >= wait_; }
     template <class Task>
     void call(const Task& task) {
         const Clock::time_point begin = Clock::now();
         task();
         last_ = Clock::now();
         const double taken = seconds_since(begin);
-        wait_ = std::max(interval_, std::min(taken / most_, kLongestWait));
+        wait_ = pace_.wait_after(taken);
         seconds_ += taken;
         ++calls_;
     }
@@ -127,8 +127,8 @@ private:
     static double seconds_since(Clock::time_point t) {
         return std::chrono::duration<double>(Clock::now() - t).count();
     }
-    static constexpr double kLongestWait = 900;
-    double interval_, most_, wait_ = interval_, seconds_ = 0;
+    WritingPace pace_;
+    double wait_ = pace_.interval, seconds_ = 0;
     int calls_ = 0;
     Clock::time_point last_ = Clock::now();
 };
@@ -476,10 +476,10 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     LaterCommit last_checkpoint;
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
     // An interval that is given for checkpoints is kept, if they take less time than it.
-    constexpr double kMostOfTime = 0.01;
-    Timer checkpoints(saved.empty() ? 0 : checkpoint_every.value_or(kCheckpointEvery),
-                      checkpoint_every ? 1 : kMostOfTime),
-        images(is_in_place() ? 0 : write_every, kMostOfTime);
+    Timer checkpoints(
+        WritingPace::of_checkpoints(saved.empty() ? 0 : checkpoint_every.value_or(kCheckpointEvery),
+                                    checkpoint_every ? 1 : WritingPace::kMostOfTime));
+    Timer images(WritingPace::of_checkpoints(is_in_place() ? 0 : write_every));
     // What fails now may succeed later, and is no reason to end.
     const auto warn_of_failures = [](const auto& task) {
         std::vector<std::string> problems;

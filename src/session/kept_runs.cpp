@@ -15,9 +15,6 @@
 namespace etendue {
 namespace {
 
-/// Files take at most this share of the time of a run.
-constexpr double kMostForFiles = 0.01;
-
 constexpr const char* kTooMany = "too many files wait to be written; try again";
 
 Estimator estimator_named(const std::string& name) {
@@ -44,7 +41,7 @@ RenderRequest request_of(const CheckpointHeader& header) {
 
 void Session::wait_for_next_file(Run& run, double seconds) const {
     using Clock = std::chrono::steady_clock;
-    const std::chrono::duration<double> wait(std::max(keep_every_, seconds / kMostForFiles));
+    const std::chrono::duration<double> wait(pace_.wait_after(seconds));
     run.next_file = Clock::now() + std::chrono::duration_cast<Clock::duration>(wait);
 }
 

@@ -80,7 +80,7 @@ IntervalKind interval_kind(Estimator estimator, SamplerKind sampler, bool has_gr
 Session::Session(Load load, int threads, RunKeeping keeping)
     : load_(std::move(load)), threads_(threads),
       folder_(keeping.folder.empty() ? std::nullopt : std::optional<RunFolder>(keeping.folder)),
-      keep_every_(keeping.every) {
+      pace_(WritingPace::of_checkpoints(keeping.every)) {
     thread_ = std::thread([this] { work(); });
     try {
         loader_ = std::thread([this] { load_scenes(); });

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "render/render_request.h"
+#include "render/writing_pace.h"
 #include "session/loaded_scene.h"
 #include "session/replay.h"
 #include "session/run_folder.h"
@@ -248,7 +249,7 @@ private:
     const Load load_;
     const int threads_;
     const std::optional<RunFolder> folder_;
-    const double keep_every_;
+    const WritingPace pace_;  ///< Of the files of a run.
     SharedSlot<const LoadedScene> scene_;
     std::atomic<uint64_t> scene_version_{0}, kept_version_{0};
     std::atomic<uint64_t> revision_{1};

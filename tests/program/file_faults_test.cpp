@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "checkpoint_test.h"
+#include "wait_for.h"
 
 namespace etendue::test {
 namespace {
@@ -204,6 +205,24 @@ TEST_F(FileFaults, ASlowCheckpointTakesAHundredthOfTheTimeUnlessItsIntervalIsGiv
     EXPECT_GE(by_default, 1);
     EXPECT_LE(by_default, 3);
     EXPECT_GE(checkpoints({"--checkpoint-every", "6"}), 7);
+}
+
+/// A file of a run that takes long postpones the next one by a quarter of an hour, and not by a hundred times as long.
+TEST_F(FileFaults, ASlowFileOfTheStudioIsFollowedByAnother) {
+    fs::create_directory(path("faulty"));
+    // The clock runs a thousand times as fast, and each file takes more than a hundred of its seconds.
+    const Program program =
+        start_with("ETENDUE_CLOCK=1000 ETENDUE_SLOW_WRITE=100",
+                   {"studio", scene, "-i", "path", "--resolution", "16x12", "--threads", "1", "-o",
+                    folder.path().string(), "--runs", path("faulty")});
+    const auto kept = [&] { return read_text(path("faulty/cornell-path-1.etd")); };
+    EXPECT_TRUE(wait_for([&] { return !kept().empty(); })) << program.errors();
+    const std::string first = kept();
+    const auto begin = Clock::now();
+    EXPECT_TRUE(wait_for([&] { return kept() != first; })) << program.errors();
+    EXPECT_LT(seconds_since(begin), 7);  // A second; without the limit, more than ten.
+    program.interrupt();
+    EXPECT_EQ(program.wait().status, 0);
 }
 
 /// Whatever fails, the image is the old one or the new one, and the new one is somewhere.
