@@ -479,7 +479,7 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     Timer checkpoints(
         WritingPace::of_checkpoints(saved.empty() ? 0 : checkpoint_every.value_or(kCheckpointEvery),
                                     checkpoint_every ? 1 : WritingPace::kMostOfTime));
-    Timer images(WritingPace::of_checkpoints(is_in_place() ? 0 : write_every));
+    Timer images(WritingPace{is_in_place() ? 0 : write_every});
     // What fails now may succeed later, and is no reason to end.
     const auto warn_of_failures = [](const auto& task) {
         std::vector<std::string> problems;
@@ -583,7 +583,8 @@ void add_render_command(CLI::App& app) {
         "to merge it with others (etendue merge)");
     c.add_option("--checkpoint-every", command->checkpoint_every,
                  "Seconds between two checkpoints; 0: only at the end. The default is longer if "
-                 "checkpoints would take more than a hundredth of the time")
+                 "checkpoints would take more than a hundredth of the time, but a quarter of an "
+                 "hour at most")
         ->default_str(fmt::format("{}", RenderCommand::kCheckpointEvery))
         ->check(CLI::Range(0.0, 1e9));
     c.add_option(

@@ -185,26 +185,31 @@ TEST_F(FileFaults, AFileThatDoesNotBecomeDurableIsRemovedAtOnce) {
 
 TEST_F(FileFaults, ASlowCheckpointTakesAHundredthOfTheTimeUnlessItsIntervalIsGiven) {
     fs::create_directory(path("faulty"));
-    // The clock runs a hundred times as fast, and each checkpoint takes several of its seconds.
-    const auto checkpoints = [&](const Arguments& more) {
-        Arguments all = {"-i",           "path",
-                         "--time",       "600",
-                         "--stats",      path("stats.json"),
-                         "--threads",    "1",
-                         "--checkpoint", path("faulty/a.etd")};
+    // How many files were written beside the passes, and not at the end.
+    const auto written = [&](const std::string& what, const std::string& variables,
+                             const Arguments& more) {
+        Arguments all = {"-i", "path", "--threads", "1", "--stats", path("stats.json")};
         all.insert(all.end(), more.begin(), more.end());
-        const ProgramResult r =
-            start_with("ETENDUE_CLOCK=100 ETENDUE_SLOW_WRITE=20", render("a.exr", all)).wait();
+        const std::string image = what == "images" ? "faulty/a.exr" : "a.exr";
+        const ProgramResult r = start_with(variables, render(image, all)).wait();
         EXPECT_EQ(r.status, 0) << r.errors;
         fs::remove(path("faulty/a.etd"));
-        return nlohmann::json::parse(read_text(path("stats.json")))["checkpoints"]["written"]
-            .get<int>();
+        return nlohmann::json::parse(read_text(path("stats.json")))[what]["written"].get<int>();
     };
-    // The first one, after a minute, perhaps a second, and the one at the end.
-    const int by_default = checkpoints({});
+    // The clock runs a hundred times as fast, and each file takes several of its seconds. The first one comes after a minute,
+    // and perhaps a second and a third.
+    const std::string slow = "ETENDUE_CLOCK=100 ETENDUE_SLOW_WRITE=20", file = path("faulty/a.etd");
+    const int by_default = written("checkpoints", slow, {"--time", "600", "--checkpoint", file});
     EXPECT_GE(by_default, 1);
     EXPECT_LE(by_default, 3);
-    EXPECT_GE(checkpoints({"--checkpoint-every", "6"}), 7);
+    EXPECT_GE(written("checkpoints", slow,
+                      {"--time", "600", "--checkpoint", file, "--checkpoint-every", "6"}),
+              7);
+    // Each file takes 50 s of its clock or more, a hundredth of more than the whole time. Checkpoints come every 15 minutes
+    // nevertheless, but images do not.
+    const std::string slower = "ETENDUE_CLOCK=1000 ETENDUE_SLOW_WRITE=50";
+    EXPECT_GE(written("checkpoints", slower, {"--time", "4000", "--checkpoint", file}), 2);
+    EXPECT_EQ(written("images", slower, {"--time", "4000"}), 1);
 }
 
 /// A file of a run that takes long postpones the next one by a quarter of an hour, and not by a hundred times as long.

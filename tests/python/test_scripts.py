@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -46,3 +48,17 @@ def test_chaos_tells_bits_that_differ_and_tests_that_crash(tmp_path: Path) -> No
         ("path:guide=on", 11, 2, True), ("upg+bdpt", 12, 2, False), ("vcm", 13, 0, False)]
     table = subprocess.run([*chaos, "--table", str(report)], capture_output=True, text=True, check=True).stdout
     assert "| `upg+bdpt` | 2 | 2 | 12 | **no** |" in table
+
+
+def test_the_model_of_ranks_has_the_pace_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "bench"))
+    import ranks_model
+
+    pace = (ROOT / "src" / "render" / "writing_pace.h").read_text()
+    assert f"kMostOfTime = {ranks_model.MOST_OF_TIME};" in pace
+    assert f"{{interval, most, {ranks_model.LONGEST_WAIT}}}" in pace
+    # The share of the time for a file: less than one a minute takes, a hundredth, and one every quarter of an hour.
+    for seconds, of_checkpoints, of_images in [(0.3, 0.005, 0.005), (3, 0.01, 0.01), (90, 0.1, 0.01)]:
+        for kind, share in [("checkpoint_seconds", of_checkpoints), ("image_seconds", of_images)]:
+            job = ranks_model.Job(pass_seconds=1, jitter=0, **{kind: seconds})
+            assert job.seconds(1, 1000) == pytest.approx(1000 * (1 + share))
