@@ -516,7 +516,7 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
             },
             interrupts.stop, interrupts.drop));
     } catch (const std::exception& e) {
-        // The passes before this one are complete and can be written.
+        // The passes before it are complete and can be written.
         if (renderer.film().passes() == 0 || !renderer.ended_together()) throw;
         stopped_by = "failure";
         failure = dynamic_cast<const std::bad_alloc*>(&e) ? "not enough memory" : e.what();
@@ -547,8 +547,8 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     print_warnings(warnings(renderer.stats()));
     if (!failure.empty())
         failures.insert(failures.begin(),
-                        fmt::format("pass {} failed: {}; {} contains the {} before it", passes + 1,
-                                    failure, output,
+                        fmt::format("{}: {}; {} contains the {} before it",
+                                    renderer.place_of_failure(), failure, output,
                                     passes == 1 ? "pass" : fmt::format("{} passes", passes)));
     if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
     if (quiet) return;

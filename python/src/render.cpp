@@ -109,14 +109,19 @@ public:
         };
         RecentError recent;
         const auto progress = [&](const Progress& p) {
+            {
+                // Whatever fails after it, this pass is complete.
+                const std::scoped_lock lock(mutex_);
+                const auto error = now_ ? std::get<4>(*now_) : std::nullopt;
+                now_ = Now{p.passes, p.seconds, p.fraction, p.rays_per_second, error};
+            }
             log_.add(p.seconds, renderer_.stats().pairs);
             const bool calls = !callback.is_none() && p.seconds - last >= interval;
             // Callbacks may stop the rendering by its error, and are told that of this pass.
             const ErrorEstimate error = calls ? p.error() : recent.update(p);
             {
                 const std::scoped_lock lock(mutex_);
-                now_ = Now{p.passes, p.seconds, p.fraction, p.rays_per_second,
-                           error.valid ? std::optional(error.relative_rms) : std::nullopt};
+                std::get<4>(*now_) = error.valid ? std::optional(error.relative_rms) : std::nullopt;
             }
             if (!calls) return;
             last = p.seconds;
@@ -137,7 +142,7 @@ public:
             });
         } catch (...) {
             stopped_by_ = "failure";
-            pass_failed_ = background.task_failed;
+            place_of_failure_ = background.task_failed ? renderer_.place_of_failure() : "";
             throw;
         }
         stopped_by_ = asked_to_stop && !background.interrupted && reason == StopReason::Interrupted
@@ -159,9 +164,9 @@ public:
         return renderer_;
     }
     const Film& film() const { return renderer().film(); }
-    /// Whether what run() has thrown is the failure of a pass, and not an exception of what is called between passes or of a
-    /// signal handler.
-    bool pass_failed() const { return pass_failed_; }
+    /// As Renderer::place_of_failure(). Empty if what run() has thrown is an exception of the caller, such as one of the
+    /// callback or of a signal handler.
+    std::string place_of_failure() const { return place_of_failure_; }
     /// Whether the film may still change.
     bool is_running() const { return is_running_; }
 
@@ -221,7 +226,7 @@ private:
     std::atomic<std::thread::id> reader_{};  ///< The thread of a callback that runs.
     PassLog log_;
     std::string stopped_by_;
-    bool pass_failed_ = false;
+    std::string place_of_failure_;
 };
 using RenderingPtr = std::shared_ptr<Rendering>;
 
@@ -430,7 +435,7 @@ void bind_render(nb::module_& m) {
             "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a, "first_pass"_a)
         .def("run", &Rendering::run, "tick"_a.none(), "callback"_a.none(), "interval"_a)
         .def("now", &Rendering::now)
-        .def_prop_ro("pass_failed", &Rendering::pass_failed)
+        .def_prop_ro("place_of_failure", &Rendering::place_of_failure)
         .def_prop_ro("scene", &Rendering::scene_pointer)
         .def_prop_ro("passes",
                      [](const Rendering& r) {

@@ -645,6 +645,11 @@ const ErrorEstimate& RecentError::update(const Progress& progress) {
     return last_;
 }
 
+std::string Renderer::place_of_failure() const {
+    return pass_failed_ ? fmt::format("pass {} failed", film_.passes() + 1)
+                        : fmt::format("after pass {}", film_.passes());
+}
+
 int Renderer::round_size(const RenderLimits& limits) const {
     const uint64_t passes = film_.passes(), all = kMostPasses - settings_.first_pass,
                    end =
@@ -670,7 +675,7 @@ StopReason Renderer::run(const RenderLimits& limits,
     const double before = seconds_;
     const Ranks& ranks = *settings_.ranks;
     check_limits(limits, settings_.first_pass);
-    ended_together_ = false;
+    ended_together_ = pass_failed_ = false;
     const auto end = [&](StopReason reason) {
         ended_together_ = true;
         return reason;
@@ -723,7 +728,7 @@ StopReason Renderer::run(const RenderLimits& limits,
             if (const auto reason = reached(limits, found)) return end(*reason);
         }
         if (round.failure) {
-            ended_together_ = true;
+            ended_together_ = pass_failed_ = true;
             std::rethrow_exception(round.failure);
         }
         if (round.is_incomplete) return end(StopReason::Interrupted);

@@ -138,6 +138,20 @@ TEST_P(DropPass, WhereASampleThrows) {
     expect_as_undisturbed(r, 5);
 }
 
+TEST_P(DropPass, SaysWhatHasFailed) {
+    hooks.sample = [](uint32_t pass, uint64_t) {
+        if (pass == 3) throw std::runtime_error("a bad sample");
+    };
+    Renderer r = renderer();
+    EXPECT_THROW(run(r), std::runtime_error);
+    EXPECT_EQ(r.place_of_failure(), "pass 4 failed");
+    hooks.sample = [](uint32_t, uint64_t) {};
+    const auto fail = [](const Progress&) { throw std::bad_alloc(); };
+    EXPECT_THROW(r.run(fail, interrupted), std::bad_alloc);
+    EXPECT_EQ(r.place_of_failure(), "after pass 4");
+    EXPECT_EQ(r.film().passes(), 4u);
+}
+
 TEST_P(DropPass, WhereAPassCannotBegin) {
     for (auto* moment : {&hooks.trace, &hooks.end_of_trace}) {
         *moment = [](uint32_t pass) {
