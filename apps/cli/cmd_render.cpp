@@ -515,11 +515,11 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
                 });
             },
             interrupts.stop, interrupts.drop));
-    } catch (const std::exception& e) {
+    } catch (...) {
         // The passes before it are complete and can be written.
         if (renderer.film().passes() == 0 || !renderer.ended_together()) throw;
         stopped_by = "failure";
-        failure = dynamic_cast<const std::bad_alloc*>(&e) ? "not enough memory" : e.what();
+        failure = caught();
     }
     // The passes may have taken all of it, and what there is needs some more to be written.
     const UnlimitedMemory unlimited;

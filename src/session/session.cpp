@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <future>
-#include <new>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -14,6 +13,7 @@
 #include "render/render_report.h"
 #include "render/render_request.h"
 #include "session/run.h"
+#include "system/failure.h"
 #include "system/memory_limit.h"
 #include "system/threads.h"
 
@@ -118,12 +118,8 @@ template <class Work>
 void Session::guard(Run& run, const Work& work) noexcept {
     try {
         work();
-    } catch (const std::bad_alloc&) {
-        finish_turn(run, RunState::Failed, "not enough memory");
-    } catch (const std::exception& e) {
-        finish_turn(run, RunState::Failed, e.what());
     } catch (...) {
-        finish_turn(run, RunState::Failed, "unknown failure");
+        finish_turn(run, RunState::Failed, caught());
     }
 }
 
@@ -145,8 +141,7 @@ void Session::load_scenes() {
 }
 
 void Session::load_scene() {
-    std::string error;
-    try {
+    std::string error = failure_of([&] {
         renew_memory_limit();
         auto scene = std::make_shared<const LoadedScene>(load_());
         const std::lock_guard lock(mutex_);
@@ -154,13 +149,7 @@ void Session::load_scene() {
         for (const auto& run : runs_) request_stop(run);
         scene_.store(std::move(scene));
         ++scene_version_;
-    } catch (const std::bad_alloc&) {
-        error = "not enough memory";
-    } catch (const std::exception& e) {
-        error = e.what();
-    } catch (...) {
-        error = "the scene cannot be loaded";
-    }
+    });
     if (!error.empty()) {
         const std::lock_guard lock(mutex_);
         load_error_.swap(error);
@@ -309,20 +298,14 @@ bool Session::finish_seed(Run& run) {
     return !is_last;
 }
 
-void Session::finish_turn(Run& run, RunState state, const char* message) noexcept {
+void Session::finish_turn(Run& run, RunState state, std::string message) noexcept {
     // The last image of a run is shown whatever the budget, since no other follows.
     if (state != RunState::Rendering) show(run);
-    std::string text;
-    try {
-        text = message;
-    } catch (const std::bad_alloc&) {
-        text = "no memory";  // short enough to need none
-    }
     {
         const std::lock_guard lock(mutex_);
         if (turn_of_ == run.status.id) turn_of_ = 0;
         if (state != RunState::Rendering) run.status.state = state;
-        run.status.message.swap(text);
+        run.status.message.swap(message);
     }
     if (state != RunState::Rendering) keep(run);
     changed();
@@ -563,14 +546,9 @@ void Session::remove(int id) {
 void Session::write(const std::shared_ptr<const Snapshot>& snapshot, const std::string& file,
                     bool replaces, const std::function<void(const Saved&)>& done) {
     const bool is_taken = writer_.post([snapshot, file, replaces, done] {
-        try {
-            etendue::save(*snapshot, file, replaces);
-        } catch (const std::bad_alloc&) {
-            return done({"not enough memory", 0});
-        } catch (const std::exception& e) {
-            return done({e.what(), 0});
-        }
-        done({{}, snapshot->passes});
+        std::string error = failure_of([&] { etendue::save(*snapshot, file, replaces); });
+        const uint64_t passes = error.empty() ? snapshot->passes : 0;
+        done({std::move(error), passes});
     });
     if (!is_taken) done({"too many images wait to be saved; try again", 0});
 }
@@ -687,16 +665,12 @@ void Session::replay_last(int id, uint64_t pixel, size_t most_paths,
     }();
     ask([run, pixel, most_paths, done = std::move(done)] {
         Replay replay;
-        try {
+        const std::string error = failure_of([&] {
             if (run->totals) throw std::runtime_error("the run can only be looked at");
             if (!run->renderer) throw std::runtime_error("no pass is finished yet");
             replay = etendue::replay_last(*run->renderer, pixel, most_paths);
-        } catch (const std::bad_alloc&) {
-            return done({}, "not enough memory");
-        } catch (const std::exception& e) {
-            return done({}, e.what());
-        }
-        done(replay, {});
+        });
+        done(replay, error);
     });
 }
 

@@ -219,7 +219,7 @@ private:
     /// earlier ones stay.
     void show(Run& run) noexcept;
     void fill(Run& run, Snapshot& snapshot);
-    void finish_turn(Run& run, RunState state, const char* message = "") noexcept;
+    void finish_turn(Run& run, RunState state, std::string message = {}) noexcept;
     /// Keeps the image of a finished seed. Returns whether another seed follows.
     bool finish_seed(Run& run);
     /// Shows the last image of a run that is to be stopped.
