@@ -109,19 +109,19 @@ public:
         };
         RecentError recent;
         const auto progress = [&](const Progress& p) {
-            {
-                // Whatever fails after it, this pass is complete.
-                const std::scoped_lock lock(mutex_);
-                const auto error = now_ ? std::get<4>(*now_) : std::nullopt;
-                now_ = Now{p.passes, p.seconds, p.fraction, p.rays_per_second, error};
-            }
-            log_.add(p.seconds, renderer_.stats().pairs);
             const bool calls = !callback.is_none() && p.seconds - last >= interval;
-            // Callbacks may stop the rendering by its error, and are told that of this pass.
-            const ErrorEstimate error = calls ? p.error() : recent.update(p);
+            std::optional<double> relative_error;
+            try {
+                log_.add(p.seconds, renderer_.stats().pairs);
+                // Callbacks may stop the rendering by its error, and are told that of this pass.
+                const ErrorEstimate error = calls ? p.error() : recent.update(p);
+                if (error.valid) relative_error = error.relative_rms;
+            } catch (const std::exception&) {
+                // The pass is made, though some of its figures may be missing.
+            }
             {
                 const std::scoped_lock lock(mutex_);
-                std::get<4>(*now_) = error.valid ? std::optional(error.relative_rms) : std::nullopt;
+                now_ = Now{p.passes, p.seconds, p.fraction, p.rays_per_second, relative_error};
             }
             if (!calls) return;
             last = p.seconds;
@@ -158,12 +158,18 @@ public:
     /// The film and all else of the renderer. Passes change them, so that they can be read in callbacks and after the
     /// rendering only.
     const Renderer& renderer() const {
-        if (is_running_ && reader_ != std::this_thread::get_id())
+        if (!is_readable())
             throw std::runtime_error("the rendering is running: its images and statistics can be "
                                      "read in callbacks, and when it has ended");
         return renderer_;
     }
     const Film& film() const { return renderer().film(); }
+    /// Those of the film; where it cannot be read, as of now().
+    uint64_t passes() const {
+        if (is_readable()) return renderer_.film().passes();
+        const auto last = now();
+        return last ? std::get<0>(*last) : 0;
+    }
     /// As Renderer::place_of_failure(). Empty if what run() has thrown is an exception of the caller, such as one of the
     /// callback or of a signal handler.
     std::string place_of_failure() const { return place_of_failure_; }
@@ -205,6 +211,7 @@ public:
     const RenderSettings& settings() const { return settings_; }
 
 private:
+    bool is_readable() const { return !is_running_ || reader_ == std::this_thread::get_id(); }
     Conditions conditions() const {
         Conditions all =
             conditions_of(renderer_, scene_->scene,
@@ -437,11 +444,7 @@ void bind_render(nb::module_& m) {
         .def("now", &Rendering::now)
         .def_prop_ro("place_of_failure", &Rendering::place_of_failure)
         .def_prop_ro("scene", &Rendering::scene_pointer)
-        .def_prop_ro("passes",
-                     [](const Rendering& r) {
-                         const auto now = r.now();
-                         return now ? std::get<0>(*now) : 0;
-                     })
+        .def_prop_ro("passes", &Rendering::passes)
         .def_prop_ro("seconds", [](const Rendering& r) { return r.renderer().seconds(); })
         .def_prop_ro("estimator",
                      [](const Rendering& r) {
