@@ -119,6 +119,11 @@ def _raise_late(*_: object) -> None:
     raise _Late("the time is over")
 
 
+def _raise_late_once(*_: object) -> None:
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    _raise_late()
+
+
 class _Handler:
     def method(self, *_: object) -> None:
         raise _Late("the time is over")
@@ -127,8 +132,8 @@ class _Handler:
         _raise_late()
 
 
-@pytest.fixture(params=[_raise_late, _Handler().method, _Handler(), functools.partial(_raise_late, 1)],
-                ids=["function", "method", "object", "partial"])
+@pytest.fixture(params=[_raise_late, _Handler().method, _Handler(), functools.partial(_raise_late, 1), _raise_late_once],
+                ids=["function", "method", "object", "partial", "once"])
 def alarm(request: pytest.FixtureRequest) -> Iterator[Callable[[float], None]]:
     """Sets a timer whose signal handler raises an exception."""
 
