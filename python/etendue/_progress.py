@@ -48,6 +48,12 @@ def harmless(show: Callable[P, Any]) -> Callable[P, None]:
             if _is_of(e, handlers):
                 raise
             fails = True
-            warnings.warn(f"the progress cannot be shown: {e}", RuntimeWarning, stacklevel=2)
+            text = f"the progress cannot be shown: {e}"
+            try:
+                warnings.warn(text, RuntimeWarning, stacklevel=2)
+            except RuntimeWarning:  # Warnings are errors here (-W error), but this one ends no rendering.
+                with warnings.catch_warnings():
+                    warnings.simplefilter("always")
+                    warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     return shown

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -166,6 +167,20 @@ def test_so_they_do_while_the_progress_is_shown(
     monkeypatch.setattr(shows, "update", draw)
     with pytest.raises(_Late, match="^the time is over$"):
         et.render(cornell, "path", time=5, progress=False, live=True)
+
+
+def test_the_progress_ends_nothing_where_warnings_are_errors(cornell: et.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(bar: _render._Bar) -> None:
+        raise ValueError("no terminal")
+
+    monkeypatch.setattr(_render._Bar, "update", fail)
+    monkeypatch.setattr(_render._Bar, "close", fail)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("error")
+        assert et.render(cornell, "path", spp=2, progress=False).passes == 2
+        with pytest.raises(et.RenderError, match="pass 3 failed: later"):
+            fail_after(2, ValueError("later"), cornell)
+    assert len(told) == 4 and {str(w.message) for w in told} == {"the progress cannot be shown: no terminal"}
 
 
 def test_what_is_no_failure_of_an_integrator_ends_reports(cornell: et.Scene, tmp_path: Path) -> None:
