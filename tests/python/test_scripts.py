@@ -1,5 +1,8 @@
 """Scripts and measurements, with stand-ins for the programs that they run."""
 
+import argparse
+import importlib.machinery
+import importlib.util
 import json
 import subprocess
 import sys
@@ -62,3 +65,15 @@ def test_the_model_of_ranks_has_the_pace_of_the_program(monkeypatch: pytest.Monk
         for kind, share in [("checkpoint_seconds", of_checkpoints), ("image_seconds", of_images)]:
             job = ranks_model.Job(pass_seconds=1, jitter=0, **{kind: seconds})
             assert job.seconds(1, 1000) == pytest.approx(1000 * (1 + share))
+
+
+def test_what_checkpoints_cost_is_measured_after_every_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "bench"))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    loader = importlib.machinery.SourceFileLoader("checkpoint_cost", str(ROOT / "bench" / "checkpoint_cost"))
+    checkpoint_cost = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(checkpoint_cost)
+    stats = {"checkpoints": {"written": 2, "seconds": 0.1}}
+    monkeypatch.setattr(checkpoint_cost, "render", lambda *_: stats)
+    with pytest.raises(SystemExit, match="path: 2 checkpoints between 4 passes"):
+        checkpoint_cost.measure_method(None, "path", argparse.Namespace(passes=4), tmp_path)
