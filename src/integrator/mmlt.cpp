@@ -93,15 +93,14 @@ private:
 }  // namespace
 
 IntegratorEntry mmlt_entry() {
-    std::vector<ParamInfo> params{depth_params()[0]};
-    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
-    params.push_back({"lengths", ParamKind::Int, "10",
-                      "Number of classes of path lengths, 1 to 64, from three edges on; each has "
-                      "its own chains. The last class contains all longer paths."});
     return {{"integrator", "mmlt",
              "Multiplexed Metropolis light transport: each state is one path of one technique, and "
              "each path length has its own chains. Unbiased.",
-             params},
+             concat({{depth_params()[0]},
+                     MarkovIntegrator::params(),
+                     {{"lengths", ParamKind::Int, "10",
+                       "Number of classes of path lengths, 1 to 64, from three edges on; each has "
+                       "its own chains. The last class contains all longer paths."}}})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MmltIntegrator>(p);
             }};

@@ -56,11 +56,9 @@ private:
 }  // namespace
 
 IntegratorEntry path_entry() {
-    std::vector<ParamInfo> params = depth_params();
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     return {{"integrator", "path",
              "Path tracing with next event estimation and MIS, the simplest method. Unbiased.",
-             params},
+             concat({depth_params(), Guiding::params()})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PathIntegrator>(p);
             }};

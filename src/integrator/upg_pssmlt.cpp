@@ -326,24 +326,22 @@ private:
 }  // namespace
 
 IntegratorEntry upg_pssmlt_entry() {
-    std::vector<ParamInfo> params = sub_path_params();
-    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
-    params.push_back(
-        {"light_paths", ParamKind::Int, "0",
-         "Number of light paths in a pass to gather from. 0: one for each pixel, or as "
-         "many as fit into `memory`."});
-    params.push_back(
-        {"memory", ParamKind::Int, "6144", "Largest memory for light vertices, in MiB."});
-    params.push_back({"radius", ParamKind::Float, "0",
-                      "Largest distance between the vertices of a pair, in scene units; 0: chosen "
-                      "so that an eye path finds about two pairs."});
-    return {{"integrator", "upg+pssmlt",
-             "Unbiased photon gathering combined with Markov chains in the primary sample space "
-             "of bidirectional path tracing. Unbiased.",
-             params},
-            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-                return std::make_unique<UpgPssmltIntegrator>(p);
-            }};
+    return {
+        {"integrator", "upg+pssmlt",
+         "Unbiased photon gathering combined with Markov chains in the primary sample space "
+         "of bidirectional path tracing. Unbiased.",
+         concat({sub_path_params(),
+                 MarkovIntegrator::params(),
+                 {{"light_paths", ParamKind::Int, "0",
+                   "Number of light paths in a pass to gather from. 0: one for each pixel, or "
+                   "as many as fit into `memory`."},
+                  {"memory", ParamKind::Int, "6144", "Largest memory for light vertices, in MiB."},
+                  {"radius", ParamKind::Float, "0",
+                   "Largest distance between the vertices of a pair, in scene units; 0: chosen "
+                   "so that an eye path finds about two pairs."}}})},
+        [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+            return std::make_unique<UpgPssmltIntegrator>(p);
+        }};
 }
 
 }  // namespace etendue

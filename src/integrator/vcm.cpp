@@ -208,37 +208,35 @@ private:
     LightVertexGrid grid_;
 };
 
+std::vector<ParamInfo> vcm_params() {
+    return concat(
+        {Bidirectional::params(),
+         radius_params("Merging radius of the first pass, in scene units; 0: that of a disc with "
+                       "the area of 36 pixels, as the median pixel sees the scene, but at most 1 % "
+                       "of the radius of what the camera sees. Eye vertices that the film point "
+                       "does not determine merge within 0.3 times this radius."),
+         LightPathOptions::params(),
+         {{"continuation", ParamKind::Float, "0.25",
+           "Probability, in (0, 1], with which an eye path continues after its first vertex that "
+           "is not a mirror or clear glass. Merges at this vertex make most of the image, so the "
+           "rest of the path is worth less than its cost. The MIS weights know this probability. "
+           "Has no effect with exact=true or merges=false."}},
+         Guiding::params(),
+         {{"connections", ParamKind::Bool, "true",
+           "Whether sub-paths are connected to each other, to emitters and to the lens.", true},
+          {"merges", ParamKind::Bool, "true", "Whether vertices are merged.", true},
+          {"exact", ParamKind::Bool, "false",
+           "Whether merges form true paths, with a shadow ray and the BSDFs at both ends; the "
+           "probability of a pair is still that of a disc [Bekaert et al. 2003].",
+           true}}});
+}
+
 }  // namespace
 
 IntegratorEntry vcm_entry() {
-    std::vector<ParamInfo> params = Bidirectional::params();
-    for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
-                                            "that of a disc with the area of 36 pixels, as the "
-                                            "median pixel sees the scene, but at most 1 % of the "
-                                            "radius of what the camera sees. Eye vertices that the "
-                                            "film point does not determine merge within 0.3 times "
-                                            "this radius."))
-        params.push_back(p);
-    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
-    params.push_back(
-        {"continuation", ParamKind::Float, "0.25",
-         "Probability, in (0, 1], with which an eye path continues after its first vertex that is "
-         "not a mirror or clear glass. Merges at this vertex make most of the image, so the rest "
-         "of "
-         "the path is worth less than its cost. The MIS weights know this probability. Has no "
-         "effect with exact=true or merges=false."});
-    params.push_back({"connections", ParamKind::Bool, "true",
-                      "Whether sub-paths are connected to each other, to emitters and to the lens.",
-                      true});
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
-    params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged.", true});
-    params.push_back(
-        {"exact", ParamKind::Bool, "false",
-         "Whether merges form true paths, with a shadow ray and the BSDFs at both ends; the "
-         "probability of a pair is still that of a disc [Bekaert et al. 2003].",
-         true});
     return {{"integrator", "vcm",
-             "Vertex connection and merging. Consistent; biased with a fixed radius.", params},
+             "Vertex connection and merging. Consistent; biased with a fixed radius.",
+             vcm_params()},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<VcmIntegrator>(p);
             }};
