@@ -40,7 +40,7 @@ public:
         : paths_(p, Guiding(p)), given_radius_(p.number("radius")), connects_(connects), light_(p),
           bound_(p.choice("bound", kBounds)),
           flatness_(bound_ == TrialBound::Slab ? kGatherConstants.flatness : 1.0f),
-          rule_(p.choice("drop", kRules)), clamps_(p.flag("clamp")) {
+          rule_(p.choice("drop", kRules)) {
         if (!(given_radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));
@@ -128,8 +128,7 @@ public:
         n.pairs = {.disc = kPi * sqr(learned_.radius.of(true)),
                    .inner_disc = kPi * sqr(learned_.radius.of(false)),
                    .min_edges = 3,
-                   .rule = rule_,
-                   .clamps = clamps_};
+                   .rule = rule_};
         n.guide = paths_.guiding().guide();
         return n;
     }
@@ -228,7 +227,6 @@ private:
     TrialBound bound_;
     float flatness_;  ///< Half the height of a neighbourhood, divided by its radius.
     PairRule rule_;
-    bool clamps_;
 
     struct Learned {
         GatherRadius radius;
@@ -247,27 +245,23 @@ private:
 };
 
 std::vector<ParamInfo> upg_params() {
-    std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back(
-        {"radius", ParamKind::Float, "0",
-         "Largest distance between the vertices of a pair, in scene units; 0: such that an "
-         "eye path finds about eight pairs. upg+bdpt then chooses it from earlier "
-         "passes, for the least product of variance and time, and has a smaller one for vertices "
-         "that the lens does not see directly, by mirrors, or by clear glass."});
-    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
-    params.push_back(
-        {"bound", ParamKind::String, "slab",
-         "Directions that Bernoulli trials propose: slab (pairs lie near the tangent plane), cone "
-         "(in a ball) or box (in a ball; boxes of random numbers at diffuse vertices).",
-         true});
-    params.push_back({"drop", ParamKind::String, "gloss",
-                      "Vertex of a pair that is dropped: gloss (the one sampled from the less "
-                      "glossy vertex), eye, light, or both (one path for each).",
-                      true});
-    params.push_back({"clamp", ParamKind::Bool, "true",
-                      "Whether the weights limit the probability of a pair to 1.", true});
-    return params;
+    return concat(
+        {Bidirectional::params(),
+         {{"radius", ParamKind::Float, "0",
+           "Largest distance between the vertices of a pair, in scene units; 0: such that an "
+           "eye path finds about eight pairs. upg+bdpt then chooses it from earlier "
+           "passes, for the least product of variance and time, and has a smaller one for vertices "
+           "that the lens does not see directly, by mirrors, or by clear glass."}},
+         LightPathOptions::params(),
+         Guiding::params(),
+         {{"bound", ParamKind::String, "slab",
+           "Directions that Bernoulli trials propose: slab (pairs lie near the tangent plane), "
+           "cone (in a ball) or box (in a ball; boxes of random numbers at diffuse vertices).",
+           true},
+          {"drop", ParamKind::String, "gloss",
+           "Vertex of a pair that is dropped: gloss (the one sampled from the less "
+           "glossy vertex), eye, light, or both (one path for each).",
+           true}}});
 }
 
 }  // namespace

@@ -257,8 +257,7 @@ public:
         n.pairs = {.disc = kPi * sqr(radius_),
                    .inner_disc = kPi * sqr(radius_),
                    .min_edges = kShortest,
-                   .rule = PairRule::Gloss,
-                   .clamps = true};
+                   .rule = PairRule::Gloss};
         return n;
     }
     std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }

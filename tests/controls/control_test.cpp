@@ -121,7 +121,7 @@ std::vector<Planted> planted() {
         {"UniformDenominator", divided_room, by_paper, Image | Lengths, 0, 512},
         {"CapOfTrials", small_sphere() + room() + area_lamp(),
          "upg+bdpt:radius=0.6,bound=cone,roulette=0", Lengths, 0},
-        {"DiscProbability", lit_room, "upg+bdpt:radius=0.3,clamp=false,roulette=0", Lengths, 0},
+        {"DiscProbability", lit_room, "upg+bdpt:radius=0.3,roulette=0", Lengths, 0},
         {"ClampInEstimator", lit_room, "upg+bdpt:radius=0.5,roulette=0", Lengths, 0},
         {"RouletteOfPairs", lit_room, "upg+bdpt:radius=0.3", Lengths, 0},
         {"PredicatesDiffer", lit_room, "upg+bdpt:radius=0.2,roulette=0", Lengths, 0},

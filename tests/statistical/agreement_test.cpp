@@ -225,8 +225,7 @@ TEST(GatherChoices, AgreeWithPathTracing) {
     const Scene scene = build(mixed_room(front_camera(kAgreementSize)));
     const Tiles path = indirect_tiles(scene, "path", 400, 1);
     uint64_t seed = 5;
-    for (const char* choice :
-         {"bound=box", "bound=cone", "drop=eye", "drop=light", "drop=both", "clamp=false"})
+    for (const char* choice : {"bound=box", "bound=cone", "drop=eye", "drop=light", "drop=both"})
         expect_same_image(
             indirect_tiles(scene, fmt::format("upg+bdpt:radius=0.12,{}", choice), 192, seed++),
             path, 0.08, choice);
