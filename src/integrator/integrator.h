@@ -83,6 +83,8 @@ struct IntegratorSpec {
     /// Makes an integrator that is not in the registry; otherwise empty.
     std::function<std::unique_ptr<Integrator>(const std::map<std::string, std::string>& params)>
         make = nullptr;
+    /// The guide of an integrator with guide=on, which then learns none; otherwise empty. For tests.
+    std::shared_ptr<const Guide> guide = nullptr;
 
     /// Throws std::runtime_error with one clear message.
     static IntegratorSpec parse(const std::string& text);
@@ -117,12 +119,14 @@ public:
     int integer(const char* name, int low, int high) const;
     float number(const char* name, float low, float high) const;
     const std::string& integrator() const { return integrator_; }
+    const std::shared_ptr<const Guide>& given_guide() const { return guide_; }
 
 private:
     [[noreturn]] void refuse_choice(const char* name, const std::vector<std::string>& known) const;
     const std::string& text(const char* name) const;
     std::map<std::string, std::string> values_;
     std::string integrator_;
+    std::shared_ptr<const Guide> guide_;
 };
 
 struct IntegratorEntry {

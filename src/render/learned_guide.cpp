@@ -37,7 +37,7 @@ GuidedWalks guided_walks(const std::string& method) {
 
 IntegratorParams guided_params(IntegratorSpec& spec) {
     std::string& guide = spec.params["guide"];
-    if (guide != "random" && guide != "hp02") guide = "on";
+    if (guide != "hp02") guide = "on";
     return {spec, integrator_entry(spec.name).info};
 }
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "sample_densities.h"
+#include "spec_of.h"
 #include "test_scenes.h"
 #include "verify/verify.h"
 
@@ -165,7 +166,7 @@ Findings findings(const Planted& planted, SamplerKind sampler) {
     options.spp = planted.spp;
     options.threads = 1;
     options.sampler = sampler;
-    const VerifyReport report = verify(scene, {IntegratorSpec::parse(planted.method)}, options);
+    const VerifyReport report = verify(scene, {spec_of(scene, planted.method)}, options);
     const MethodReport& m = report.methods.front();
     Findings found;
     for (const auto* parts : {&m.image, &m.tiles})
