@@ -45,7 +45,7 @@ uint64_t LightPathOptions::count(const Scene& scene, const DepthOptions& depth,
         vertices.add(double(y.size()));
     }
     // N paths have m N ± s √N vertices.
-    const double most = double(memory) / std::max(double(vertex_bytes), 1.0),
+    const double most = double(memory) / double(vertex_bytes),
                  m = std::max(kReserve * vertices.mean(), 1.0),
                  s = kSpread * std::sqrt(vertices.variance());
     const double root = (std::sqrt(sqr(s) + 4 * m * most) - s) / (2 * m);

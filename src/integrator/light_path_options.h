@@ -12,8 +12,8 @@ struct LightPathOptions {
     static std::vector<ParamInfo> params();
     explicit LightPathOptions(const IntegratorParams& params);
 
-    /// Number of light paths N_L. `vertex_bytes` is the memory of a stored light vertex, or 0 if the pass stores none.
-    /// On a large film, pilot paths determine how many light paths fit into the memory.
+    /// Number of light paths N_L. `vertex_bytes` is the memory of a stored light vertex. On a large film, pilot paths
+    /// determine how many light paths fit into the memory.
     uint64_t count(const Scene& scene, const DepthOptions& depth, uint64_t vertex_bytes) const;
 };
 

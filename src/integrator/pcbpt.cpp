@@ -18,7 +18,7 @@
 
 #include <fmt/format.h>
 
-#include "integrator/bidirectional.h"
+#include "integrator/bdpt.h"
 #include "math/rotated.h"
 #include "reuse/importance_records.h"
 
@@ -51,7 +51,7 @@ public:
     void prepare(const PassContext& pass) override { paths_.train(pass); }
     void trace(const PassContext& pass) override {
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
-        trace_light_paths(pass, n);
+        store_light_paths(pass, n);
         make_records(pass, n);
     }
 
@@ -59,7 +59,7 @@ public:
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         const SubPath& z = work.z;
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work);
+        trace_eye_path(c, paths_.eye_walk(c.scene, n, work.stats), work.z);
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
             if (!paths_.is_joinable(z, t)) continue;
@@ -103,11 +103,11 @@ private:
     /// Number M of stored light paths.
     uint64_t kept(uint64_t light_paths) const { return std::min(light_paths_, light_paths); }
 
-    void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
+    void store_light_paths(const PassContext& pass, const TechniqueCounts& n) {
         const uint64_t M = kept(pass.light_paths);
         compact_.begin(pass.chunks(pass.light_paths), kVertexBytes, memory_,
                        paths_.guiding().guide());
-        paths_.trace_light_paths(pass, n, M, compact_);
+        trace_light_paths(paths_, pass, n, M, compact_);
         compact_.assemble();
         // The memory of the pass before is freed, since its paths had other lengths.
         stored_.clear();

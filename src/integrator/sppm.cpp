@@ -9,6 +9,7 @@
 
 #include <stdexcept>
 
+#include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/photon_mapping.h"
 #include "integrator/radius_params.h"
@@ -31,7 +32,7 @@ public:
         pass_ = pass.index;
         radius_ = radius_params_.radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
-        mapping_.paths().trace_light_paths(pass, {}, pass.light_paths, cache_);
+        trace_light_paths(mapping_.paths(), pass, {}, pass.light_paths, cache_);
         cache_.assemble();
         grid_.build(cache_, radius_, mapping_.shortest() - 1);
     }

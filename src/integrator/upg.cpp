@@ -15,7 +15,7 @@
 
 #include <fmt/format.h>
 
-#include "integrator/bidirectional.h"
+#include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/pair_pilot.h"
 #include "integrator/seen_extent.h"
@@ -23,6 +23,7 @@
 #include "reuse/gather_constants.h"
 #include "reuse/gather_radius.h"
 #include "reuse/gather_weight_scale.h"
+#include "reuse/next_event_count.h"
 
 namespace etendue {
 namespace {
@@ -81,8 +82,8 @@ public:
     void trace(const PassContext& pass) override {
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
-        paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                 cache_, &density_);
+        trace_light_paths(paths_, pass, counts(pass.scene, pass.light_paths), pass.light_paths,
+                          cache_, &density_);
         cache_.assemble();
         inner_grid_.build(cache_, learned_.radius.of(false));
         if (has_two_grids()) seen_grid_.build(cache_, learned_.radius.of(true));
@@ -91,6 +92,7 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
+        const SubPath &y = work.y, &z = work.z;
         const GatherSearch search{.c = c,
                                   .n = n,
                                   .cache = cache_,
@@ -104,13 +106,15 @@ public:
                                   .work = work};
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work, &density_);
-        for (int t = 2; t <= work.z.size(); ++t) {
+        trace_eye_path(c, paths_.eye_walk(c.scene, n, work.stats, &density_), work.z);
+        for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
-            if (!paths_.is_joinable(work.z, t)) continue;
+            if (!paths_.is_joinable(z, t)) continue;
             if (connects_) {
-                observe(c, t, paths_.add_next_events(c, n, t, work), work);  // C(1,t)
-                paths_.add_connections(c, n, t, work);                       // C(s,t), s ≥ 2
+                add_next_events(c, n, t, work);  // C(1,t)
+                const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
+                for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
+                    paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
             }
             search.for_each_pair(
                 t, [&](const GatherPair& pair) { gather(c, n, search, pair, work); });  // U(s,t)
@@ -154,6 +158,26 @@ private:
         return inner_grid_.points().is_empty() ? loaded_ : inner_grid_.points().counts();
     }
 
+    /// Adds C(1,t), with several next events where the film point fixes z_{t-1}, and records these for later passes.
+    void add_next_events(const SampleContext& c, const TechniqueCounts& n, int t,
+                         Workspace& work) const {
+        const SubPath& z = work.z;
+        NextEventDraws draws;
+        draws.count = z[t - 1].is_fixed_by_film ? uint32_t(n.repeated_next_event) : 1;
+        for (uint32_t i = 0; i < draws.count; ++i) {
+            const auto join = join_next_event(c.scene, z, t, c.sampler, n, i);
+            const auto value = paths_.add(c, join, work, 1 / float(draws.count), i);
+            if (!join) continue;
+            NextEventDraw& draw = draws.draws[i];
+            draw = {.contribution = luminance(join->contribution), .weight = join->mis_weight};
+            if (value && draw.contribution > 0) draw.passed = luminance(*value) / draw.contribution;
+        }
+        const float pixel = c.expected_of_pixel();
+        if (z[t - 1].is_fixed_by_film && pixel > 0)
+            NextEventCount::observe(draws.span(), double(std::fabs(z.film_weight) / pixel),
+                                    GatherSums::of(work));
+    }
+
     /// Adds the join U(s,t) of a pair: one of its vertices is dropped, and the other is joined to the predecessor of
     /// the dropped one by a shadow ray. r estimates 1/p_c by Bernoulli trials.
     void gather(const SampleContext& c, const TechniqueCounts& n, const GatherSearch& search,
@@ -178,15 +202,6 @@ private:
             observe(c, pair, *join, work.stats.trials - trials, r, seen, search, work);
         }
         c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.survival));
-    }
-
-    /// Records the next events of z_{t-1} for later passes.
-    static void observe(const SampleContext& c, int t, const NextEventDraws& draws,
-                        Workspace& work) {
-        const float pixel = c.expected_of_pixel();
-        if (work.z[t - 1].is_fixed_by_film && pixel > 0)
-            NextEventCount::observe(draws.span(), double(std::fabs(work.z.film_weight) / pixel),
-                                    GatherSums::of(work));
     }
 
     /// Records a visible pair for later passes. `seen`: the transmittance of the join, divided by its survival probability

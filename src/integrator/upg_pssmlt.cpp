@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/markov.h"
 #include "integrator/seen_extent.h"
@@ -75,13 +76,6 @@ struct Gathering {
         for (int t = 2; t <= work.z.size(); ++t)
             if (paths.is_joinable(work.z, t)) use(t);
     }
-    void trace_eye_path(const SampleContext& c, Workspace& work) const {
-        paths.trace_eye_path(c, counts, work, &density);
-    }
-    /// Joins of bidirectional path tracing.
-    void add_sample(const SampleContext& c, Workspace& work) const {
-        paths.add_sample(c, counts, work, &density);
-    }
 
     /// Traces N_L light paths, whose random numbers are functions of `key`.
     void trace(const PassContext& pass, uint64_t key, LightMap& map, float radius) const {
@@ -119,7 +113,9 @@ double mean_pairs(const PassContext& pass, const Gathering& gathering, const Lig
         NoSink sink;
         const SampleContext c =
             whole.sample.with(sampler, sink).with_light_paths(gathering.light_paths);
-        gathering.trace_eye_path(c, work);
+        trace_eye_path(
+            c, gathering.paths.eye_walk(c.scene, gathering.counts, work.stats, &gathering.density),
+            work.z);
         const uint64_t before = work.stats.pairs;
         const GatherSearch search = gathering.search(c, map, work);
         gathering.for_each_place(work,
@@ -154,7 +150,7 @@ public:
         : PrimarySpace(
               1,
               [&gathering](int, const SampleContext& c, Workspace& work) {
-                  gathering.add_sample(c, work);
+                  add_bdpt_sample(gathering.paths, c, gathering.counts, work, &gathering.density);
               },
               map),
           gathering_(gathering), light_(light) {}

@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "integrator/bidirectional.h"
+#include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/radius_params.h"
 #include "reuse/gather.h"
@@ -74,8 +74,8 @@ public:
         radius_ = radius_params_.radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
-        paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                 cache_, &density_);
+        trace_light_paths(paths_, pass, counts(pass.scene, pass.light_paths), pass.light_paths,
+                          cache_, &density_);
         cache_.assemble();
         if (merges_) grid_.build(cache_, reach() * radius_, first_merge());
         loaded_ = {};
@@ -83,15 +83,18 @@ public:
 
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
+        const SubPath &y = work.y, &z = work.z;
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work, &density_);
-        for (int t = 2; t <= work.z.size(); ++t) {
+        trace_eye_path(c, paths_.eye_walk(c.scene, n, work.stats, &density_), work.z);
+        for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
-            if (!paths_.is_joinable(work.z, t)) continue;
+            if (!paths_.is_joinable(z, t)) continue;
             if (connects_) {
-                paths_.add_next_events(c, n, t, work);  // C(1,t)
-                paths_.add_connections(c, n, t, work);  // C(s,t), s ≥ 2
+                paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
+                const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
+                for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
+                    paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
             }
             if (is_exact_)
                 gather(c, n, t, work);  // U(s,t)

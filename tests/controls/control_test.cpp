@@ -135,7 +135,7 @@ std::vector<Planted> planted() {
         {"EmissionNotInHits", front_camera(kSize) + room() + lamp_in_smooth_glass(),
          "bdpt:roulette=0,guide=random", Lengths, 0},
         {"EmissionPmfNotInNextEvent", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
-        {"CachedGuideLost", lit_room, "bdpt:connections=cache,roulette=0,guide=random", Lengths, 0},
+        {"CachedGuideLost", lit_room, "vcm:merges=false,roulette=0,guide=random", Lengths, 0},
         {"TrialsWithoutGuide", lit_room, "upg+bdpt:radius=0.3,roulette=0,guide=random", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},

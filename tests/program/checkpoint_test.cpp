@@ -156,7 +156,7 @@ INSTANTIATE_TEST_SUITE_P(
                       "pm:light_paths=20000,gather_rays=2",
                       "mps:mutations=4000,precision=0.2,gather_rays=2", "pssmlt:groups=4,chains=32",
                       "mmlt:groups=4,chains=48", "mlt:groups=4,chains=48",
-                      "upg+pssmlt:groups=4,chains=32", "bdpt:connections=cache", "bdpt:eorr=true",
+                      "upg+pssmlt:groups=4,chains=32", "bdpt:eorr=true",
                       "mps:target=path,mutations=4000,precision=0.2,gather_rays=2"),
     [](const auto& p) {
         std::string name = p.param;
