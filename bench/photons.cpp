@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 
 #include "compare/error_statistics.h"
-#include "integrator/bidirectional.h"
+#include "integrator/bdpt.h"
 #include "reuse/light_vertex_grid.h"
 #include "support.h"
 
@@ -101,8 +101,8 @@ public:
             whole_->trace(pass);
         } else {
             cache_.begin(pass.chunks(pass.light_paths), 0, UINT64_MAX);
-            paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                     cache_);
+            trace_light_paths(paths_, pass, counts(pass.scene, pass.light_paths), pass.light_paths,
+                              cache_);
             cache_.assemble();
             grid_.build(cache_, radius_);
         }
@@ -113,7 +113,7 @@ public:
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         const SubPath &y = work.y, &z = work.z;
         cache_.restore(c.scene, c.index, work.y);
-        paths_.trace_eye_path(c, n, work);
+        trace_eye_path(c, paths_.eye_walk(c.scene, n, work.stats), work.z);
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);
             if (!paths_.is_joinable(z, t)) continue;
@@ -260,14 +260,15 @@ public:
     /// Light paths, and nothing else.
     void trace(uint64_t light_paths) {
         const PassContext pass = context(light_paths);
+        const TechniqueCounts n = counts(light_paths);
         pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
-            paths_.trace_light_path(c, counts(light_paths), work);
+            trace_light_path(paths_.light_walk(c.scene, n, work.stats), c.sampler, work.y);
         });
     }
     void keep(uint64_t light_paths, LightVertexCache& kept) {
         const PassContext pass = context(light_paths);
         kept.begin(pass.chunks(light_paths), 0, UINT64_MAX);
-        paths_.trace_light_paths(pass, counts(light_paths), light_paths, kept);
+        trace_light_paths(paths_, pass, counts(light_paths), light_paths, kept);
         kept.assemble();
     }
     /// Eye vertices that search for photons, in the order of a pass; of every eighth chunk.

@@ -3,7 +3,8 @@
 Passes are independent within a generation. Generations end after 1, 4, 16, 64 ... passes. Each rank renders whole passes. After
 each of them, a round, the ranks exchange its pixels. Before each generation, they gather the sums of the film and the learned
 state. They do the same for a checkpoint and for an image, which the first rank writes while the others wait;
-both are due once a minute, or less often if they would take more than 1 % of the time.
+both are due once a minute, or less often if they would take more than 1 % of the time. A checkpoint is due at least every
+quarter of an hour.
 
 Assumptions: a pass takes half the time on twice as many cores; a rank sends and receives at the full rate of its network; passes
 take different times, normally distributed, and all ranks wait for the slowest one in each round; all costs grow with the number
@@ -18,6 +19,7 @@ EXCHANGED = 12  # Of a pass: three floats.
 GATHERED = 60  # Of the film: sums of values and of squares, the luminance of a pass, squares of luminance.
 INTERVAL = 60  # Seconds between two checkpoints, or two images.
 MOST_OF_TIME = 0.01  # That they take; otherwise there are fewer of them.
+LONGEST_WAIT = 900  # Seconds to the next checkpoint.
 SMALLEST_JITTER = 0.03
 
 
@@ -43,8 +45,9 @@ class Job:
         rounds = sum(math.ceil(size / ranks) for size in generations(passes))
         rendering = rounds * round_ + sum(1 for _ in generations(passes)) * gather
         # Seconds of writing by second of rendering.
-        writing = sum(seconds / max(INTERVAL, seconds / MOST_OF_TIME, round_)
-                      for seconds in (gather + self.checkpoint_seconds, gather + self.image_seconds) if seconds > 0)
+        writing = sum(seconds / max(INTERVAL, min(seconds / MOST_OF_TIME, longest), round_)
+                      for seconds, longest in ((gather + self.checkpoint_seconds, LONGEST_WAIT), (gather + self.image_seconds, math.inf))
+                      if seconds > 0)
         return rendering * (1 + writing)
 
     def efficiency(self, ranks, passes):

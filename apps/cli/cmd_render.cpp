@@ -32,6 +32,7 @@
 #include "render/renderer.h"
 #include "render/scene_integrator.h"
 #include "render/warnings.h"
+#include "render/writing_pace.h"
 #include "scene_options.h"
 #include "system/available_memory.h"
 #include "system/descriptor.h"
@@ -102,19 +103,18 @@ private:
     }
 };
 
-/// Something that is done every so many seconds, or less often if it would take a larger share of the time: but one call that
-/// took long, such as one that waited for a disk, postpones the next one by no more than a quarter of an hour.
+/// When a file that is written beside the passes is due; never if its interval is 0.
 class Timer {
 public:
-    explicit Timer(double interval, double most = 1) : interval_(interval), most_(most) {}
-    bool is_due() const { return interval_ > 0 && seconds_since(last_) >= wait_; }
+    explicit Timer(const WritingPace& pace) : pace_(pace) {}
+    bool is_due() const { return pace_.interval > 0 && seconds_since(last_) >= wait_; }
     template <class Task>
     void call(const Task& task) {
         const Clock::time_point begin = Clock::now();
         task();
         last_ = Clock::now();
         const double taken = seconds_since(begin);
-        wait_ = std::max(interval_, std::min(taken / most_, kLongestWait));
+        wait_ = pace_.wait_after(taken);
         seconds_ += taken;
         ++calls_;
     }
@@ -127,8 +127,8 @@ private:
     static double seconds_since(Clock::time_point t) {
         return std::chrono::duration<double>(Clock::now() - t).count();
     }
-    static constexpr double kLongestWait = 900;
-    double interval_, most_, wait_ = interval_, seconds_ = 0;
+    WritingPace pace_;
+    double wait_ = pace_.interval, seconds_ = 0;
     int calls_ = 0;
     Clock::time_point last_ = Clock::now();
 };
@@ -476,10 +476,10 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     LaterCommit last_checkpoint;
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
     // An interval that is given for checkpoints is kept, if they take less time than it.
-    constexpr double kMostOfTime = 0.01;
-    Timer checkpoints(saved.empty() ? 0 : checkpoint_every.value_or(kCheckpointEvery),
-                      checkpoint_every ? 1 : kMostOfTime),
-        images(is_in_place() ? 0 : write_every, kMostOfTime);
+    Timer checkpoints(
+        WritingPace::of_checkpoints(saved.empty() ? 0 : checkpoint_every.value_or(kCheckpointEvery),
+                                    checkpoint_every ? 1 : WritingPace::kMostOfTime));
+    Timer images(WritingPace{is_in_place() ? 0 : write_every});
     // What fails now may succeed later, and is no reason to end.
     const auto warn_of_failures = [](const auto& task) {
         std::vector<std::string> problems;
@@ -515,11 +515,11 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
                 });
             },
             interrupts.stop, interrupts.drop));
-    } catch (const std::exception& e) {
-        // The passes before this one are complete and can be written.
+    } catch (...) {
+        // The passes before it are complete and can be written.
         if (renderer.film().passes() == 0 || !renderer.ended_together()) throw;
         stopped_by = "failure";
-        failure = dynamic_cast<const std::bad_alloc*>(&e) ? "not enough memory" : e.what();
+        failure = caught();
     }
     // The passes may have taken all of it, and what there is needs some more to be written.
     const UnlimitedMemory unlimited;
@@ -547,8 +547,8 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     print_warnings(warnings(renderer.stats()));
     if (!failure.empty())
         failures.insert(failures.begin(),
-                        fmt::format("pass {} failed: {}; {} contains the {} before it", passes + 1,
-                                    failure, output,
+                        fmt::format("{}: {}; {} contains the {} before it",
+                                    renderer.place_of_failure(), failure, output,
                                     passes == 1 ? "pass" : fmt::format("{} passes", passes)));
     if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
     if (quiet) return;
@@ -583,7 +583,8 @@ void add_render_command(CLI::App& app) {
         "to merge it with others (etendue merge)");
     c.add_option("--checkpoint-every", command->checkpoint_every,
                  "Seconds between two checkpoints; 0: only at the end. The default is longer if "
-                 "checkpoints would take more than a hundredth of the time")
+                 "checkpoints would take more than a hundredth of the time, but a quarter of an "
+                 "hour at most")
         ->default_str(fmt::format("{}", RenderCommand::kCheckpointEvery))
         ->check(CLI::Range(0.0, 1e9));
     c.add_option(

@@ -3,11 +3,12 @@
 
 #include <cstdio>
 #include <exception>
-#include <new>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
+
+#include "system/failure.h"
 
 namespace etendue {
 
@@ -25,13 +26,7 @@ void message(fmt::format_string<T...> format, T&&... arguments) noexcept {
 
 /// Prints what the exception says that is being handled, as the reason why the program ends.
 inline void print_failure() noexcept {
-    try {
-        throw;
-    } catch (const std::bad_alloc&) {
-        message("etendue: not enough memory\n");
-    } catch (const std::exception& e) {
-        message("etendue: {}\n", e.what());
-    }
+    message("etendue: {}\n", caught());
 }
 
 inline void print_warnings(const std::vector<std::string>& warnings) noexcept {

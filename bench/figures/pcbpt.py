@@ -209,20 +209,18 @@ def phases(runs, seconds):
 
 # -------------------------------------------------------------------------- figures 16, 18: time
 
-# bdpt:connections=cache has other weights, so that its inner paths give a different image.
-INNER_METHODS = {"bdpt": "bdpt", "bdpt, EORR": "bdpt:eorr=true", "pcbpt": "pcbpt"}
-ALL_METHODS = INNER_METHODS | {"bdpt, cache": "bdpt:connections=cache"}
+TIMED_METHODS = {"bdpt": "bdpt", "bdpt, EORR": "bdpt:eorr=true", "pcbpt": "pcbpt"}
 
 
 def inner(runs, seconds):
     """Fig. 16: errors of inner paths alone."""
-    results, rows = _sweep(runs, runs.available(*INTERIORS), INNER_METHODS, seconds, head="method",
+    results, rows = _sweep(runs, runs.available(*INTERIORS), TIMED_METHODS, seconds, head="method",
                            repeats=2, paths="inner")
     rows[0].append("bdpt's L1 over its")
     for row in rows[1:]:
         base = next(r for r in rows[1:] if r[0] == row[0])
         row.append(base[5] / row[5])
-    figure = _plot_sweep(results, INNER_METHODS, over=("seconds",))
+    figure = _plot_sweep(results, TIMED_METHODS, over=("seconds",))
     paper = {"L1 of BDPT over that of PCBPT": {"Living Room": 6.4, "Kitchen": 1.6, "Apartment": 2.4,
                                                "Plant": 1.7}}
     return Figure(results, rows, figure, paper)
@@ -230,7 +228,7 @@ def inner(runs, seconds):
 
 def convergence(runs, seconds):
     """Fig. 18: errors of all paths against time."""
-    results, rows = _sweep(runs, runs.available(*INTERIORS), ALL_METHODS, seconds, head="method",
+    results, rows = _sweep(runs, runs.available(*INTERIORS), TIMED_METHODS, seconds, head="method",
                            repeats=2)
     rows[0] += [f"speed-up, {name}" for name in ERRORS.values()]
     methods = [m for c in results.values() for m in c["methods"]]
@@ -238,7 +236,7 @@ def convergence(runs, seconds):
         base = results[row[0]]["methods"][0]
         m["speed_up"] = {e: speed_up(base, m, e) for e in ERRORS}
         row += m["speed_up"].values()
-    figure = _plot_sweep(results, ALL_METHODS, over=("seconds",))
+    figure = _plot_sweep(results, TIMED_METHODS, over=("seconds",))
     paper = {"times of BDPT and PCBPT for the same L1": {"Kitchen": 3.4, "Apartment": 3.1,
                                                          "Living Room": 1.6, "Plants": 1.9},
              "EORR": {"Kitchen": "4.5 % less time", "Living Room": "17 % more time"}}

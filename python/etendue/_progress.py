@@ -16,13 +16,18 @@ def _code(handler: Any) -> Any:
     return getattr(handler if inspect.isroutine(handler) else type(handler).__call__, "__code__", None)
 
 
-def _is_of_signal_handler(e: Exception) -> bool:
-    """Whether a handler of signals has raised it, which Python calls in the midst of whatever runs."""
+def _signal_handlers() -> list[Any]:
+    """What runs at signals."""
     import signal
+
+    return [_code(h) for s in signal.valid_signals() if callable(h := signal.getsignal(s))]
+
+
+def _is_of(e: Exception, codes: list[Any]) -> bool:
+    """Whether one of these has raised it. Python calls handlers of signals in the midst of whatever runs."""
     import traceback
 
-    handlers = [_code(h) for s in signal.valid_signals() if callable(h := signal.getsignal(s))]
-    return any(frame.f_code in handlers for frame, _ in traceback.walk_tb(e.__traceback__))
+    return any(frame.f_code in codes for frame, _ in traceback.walk_tb(e.__traceback__))
 
 
 def harmless(show: Callable[P, Any]) -> Callable[P, None]:
@@ -36,12 +41,19 @@ def harmless(show: Callable[P, Any]) -> Callable[P, None]:
         nonlocal fails
         if fails:
             return
+        handlers = _signal_handlers()  # Now, since one may remove itself when it is called.
         try:
             show(*args, **kwargs)
         except Exception as e:
-            if _is_of_signal_handler(e):
+            if _is_of(e, handlers):
                 raise
             fails = True
-            warnings.warn(f"the progress cannot be shown: {e}", RuntimeWarning, stacklevel=2)
+            text = f"the progress cannot be shown: {e}"
+            try:
+                warnings.warn(text, RuntimeWarning, stacklevel=2)
+            except RuntimeWarning:  # Warnings are errors here (-W error), but this one ends no rendering.
+                with warnings.catch_warnings():
+                    warnings.simplefilter("always")
+                    warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     return shown

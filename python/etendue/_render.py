@@ -257,20 +257,20 @@ class Result:
 
 
 class RenderError(RuntimeError):
-    """A pass has failed, but there are passes before it:
+    """A rendering has failed, in a pass or between passes, but there are passes before it:
 
         try:
             result = et.render(scene, "vcm", spp=4096)
         except et.RenderError as e:
             result = e.result
 
-    Its __cause__ is what the pass raised, such as a MemoryError.
+    Its __cause__ is what was raised, such as a MemoryError.
     """
 
     def __init__(self, message: str, result: Result):
         super().__init__(message)
         self.result = result
-        """The result of the passes before the one that failed. Result.save() of an .etd file and resume() go on from it."""
+        """The result of the passes before the failure. Result.save() of an .etd file and resume() go on from it."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (str(self), self.result)
@@ -450,13 +450,13 @@ def _run(
     try:
         stopped_by = rendering.run(harmless(bar.update), between_passes if wants_calls else None, interval)
     except Exception as failure:
-        if not rendering.pass_failed or rendering.passes == 0:
+        if not rendering.place_of_failure or rendering.passes == 0:
             raise
         n = rendering.passes
         why = "not enough memory" if isinstance(failure, MemoryError) else str(failure) or type(failure).__name__
         raise RenderError(
-            f"pass {n + 1} failed: {why}; the result of the {'pass' if n == 1 else f'{n} passes'} before it is in "
-            "RenderError.result",
+            f"{rendering.place_of_failure}: {why}; the result of the {'pass' if n == 1 else f'{n} passes'} before it "
+            "is in RenderError.result",
             Result(rendering, "failure", aovs),
         ) from failure
     finally:

@@ -288,7 +288,7 @@ def verify(
         better.
     tiles: number of tiles along each side of the image, 1 to 64.
     seed: seed of all random numbers. sampler: "sobol" or "independent".
-    threads: number of runs rendered at the same time; 0 for one per core.
+    threads: number of runs rendered at the same time; 0 for one per core. Those of an Integrator come one after the other.
     progress: shows a status line; None: on terminals.
 
     Ctrl-C ends the verification. The report contains the comparisons that are then possible, and data["interrupted"] is

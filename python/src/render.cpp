@@ -109,14 +109,19 @@ public:
         };
         RecentError recent;
         const auto progress = [&](const Progress& p) {
-            log_.add(p.seconds, renderer_.stats().pairs);
             const bool calls = !callback.is_none() && p.seconds - last >= interval;
-            // Callbacks may stop the rendering by its error, and are told that of this pass.
-            const ErrorEstimate error = calls ? p.error() : recent.update(p);
+            std::optional<double> relative_error;
+            try {
+                log_.add(p.seconds, renderer_.stats().pairs);
+                // Callbacks may stop the rendering by its error, and are told that of this pass.
+                const ErrorEstimate error = calls ? p.error() : recent.update(p);
+                if (error.valid) relative_error = error.relative_rms;
+            } catch (const std::exception&) {
+                // The pass is made, though some of its figures may be missing.
+            }
             {
                 const std::scoped_lock lock(mutex_);
-                now_ = Now{p.passes, p.seconds, p.fraction, p.rays_per_second,
-                           error.valid ? std::optional(error.relative_rms) : std::nullopt};
+                now_ = Now{p.passes, p.seconds, p.fraction, p.rays_per_second, relative_error};
             }
             if (!calls) return;
             last = p.seconds;
@@ -137,7 +142,7 @@ public:
             });
         } catch (...) {
             stopped_by_ = "failure";
-            pass_failed_ = background.task_failed;
+            place_of_failure_ = background.task_failed ? renderer_.place_of_failure() : "";
             throw;
         }
         stopped_by_ = asked_to_stop && !background.interrupted && reason == StopReason::Interrupted
@@ -153,15 +158,21 @@ public:
     /// The film and all else of the renderer. Passes change them, so that they can be read in callbacks and after the
     /// rendering only.
     const Renderer& renderer() const {
-        if (is_running_ && reader_ != std::this_thread::get_id())
+        if (!is_readable())
             throw std::runtime_error("the rendering is running: its images and statistics can be "
                                      "read in callbacks, and when it has ended");
         return renderer_;
     }
     const Film& film() const { return renderer().film(); }
-    /// Whether what run() has thrown is the failure of a pass, and not an exception of what is called between passes or of a
-    /// signal handler.
-    bool pass_failed() const { return pass_failed_; }
+    /// Those of the film; where it cannot be read, as of now().
+    uint64_t passes() const {
+        if (is_readable()) return renderer_.film().passes();
+        const auto last = now();
+        return last ? std::get<0>(*last) : 0;
+    }
+    /// As Renderer::place_of_failure(). Empty if what run() has thrown is an exception of the caller, such as one of the
+    /// callback or of a signal handler.
+    std::string place_of_failure() const { return place_of_failure_; }
     /// Whether the film may still change.
     bool is_running() const { return is_running_; }
 
@@ -200,6 +211,7 @@ public:
     const RenderSettings& settings() const { return settings_; }
 
 private:
+    bool is_readable() const { return !is_running_ || reader_ == std::this_thread::get_id(); }
     Conditions conditions() const {
         Conditions all =
             conditions_of(renderer_, scene_->scene,
@@ -221,7 +233,7 @@ private:
     std::atomic<std::thread::id> reader_{};  ///< The thread of a callback that runs.
     PassLog log_;
     std::string stopped_by_;
-    bool pass_failed_ = false;
+    std::string place_of_failure_;
 };
 using RenderingPtr = std::shared_ptr<Rendering>;
 
@@ -430,13 +442,9 @@ void bind_render(nb::module_& m) {
             "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a, "first_pass"_a)
         .def("run", &Rendering::run, "tick"_a.none(), "callback"_a.none(), "interval"_a)
         .def("now", &Rendering::now)
-        .def_prop_ro("pass_failed", &Rendering::pass_failed)
+        .def_prop_ro("place_of_failure", &Rendering::place_of_failure)
         .def_prop_ro("scene", &Rendering::scene_pointer)
-        .def_prop_ro("passes",
-                     [](const Rendering& r) {
-                         const auto now = r.now();
-                         return now ? std::get<0>(*now) : 0;
-                     })
+        .def_prop_ro("passes", &Rendering::passes)
         .def_prop_ro("seconds", [](const Rendering& r) { return r.renderer().seconds(); })
         .def_prop_ro("estimator",
                      [](const Rendering& r) {

@@ -262,20 +262,21 @@ private:
 MaterialEntry coatedconductor_entry() {
     return {
         {"bsdf", "coatedconductor", "Metal below a dielectric coat.",
-         concat(roughness_params(),
-                {{"coat_alpha", ParamKind::Texture, "0", "Roughness of the coat; 0 is smooth."},
-                 {"material", ParamKind::String, "none", "Named metal, or none for reflectance 1."},
-                 {"eta", ParamKind::Texture, "0", "Real part of the metal's index."},
-                 {"k", ParamKind::Texture, "1", "Imaginary part of the metal's index."},
-                 {"reflectance", ParamKind::Texture, "",
-                  "Reflectance of the metal at normal incidence in air, instead of material, eta "
-                  "and k."},
-                 {"int_ior", ParamKind::FloatOrName, "bk7",
-                  "Index of refraction of the coat, at least that outside."},
-                 {"ext_ior", ParamKind::FloatOrName, "air", "Index of refraction outside."},
-                 {"thickness", ParamKind::Float, "0",
-                  "Optical thickness of the coat: its thickness times its absorption "
-                  "coefficient."}})},
+         concat(
+             {roughness_params(),
+              {{"coat_alpha", ParamKind::Texture, "0", "Roughness of the coat; 0 is smooth."},
+               {"material", ParamKind::String, "none", "Named metal, or none for reflectance 1."},
+               {"eta", ParamKind::Texture, "0", "Real part of the metal's index."},
+               {"k", ParamKind::Texture, "1", "Imaginary part of the metal's index."},
+               {"reflectance", ParamKind::Texture, "",
+                "Reflectance of the metal at normal incidence in air, instead of material, eta "
+                "and k."},
+               {"int_ior", ParamKind::FloatOrName, "bk7",
+                "Index of refraction of the coat, at least that outside."},
+               {"ext_ior", ParamKind::FloatOrName, "air", "Index of refraction outside."},
+               {"thickness", ParamKind::Float, "0",
+                "Optical thickness of the coat: its thickness times its absorption "
+                "coefficient."}}})},
         make_material<CoatedConductor>};
 }
 

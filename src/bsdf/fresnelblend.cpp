@@ -72,11 +72,11 @@ private:
 
 MaterialEntry fresnelblend_entry() {
     return {{"bsdf", "fresnelblend", "Glossy coat over a diffuse base [Ashikhmin & Shirley 2000].",
-             concat({{"diffuse_reflectance", ParamKind::Texture, "0.5",
-                      "Albedo of the base, in [0, 1]."},
-                     {"specular_reflectance", ParamKind::Texture, "0.5",
-                      "Reflectance of the coat at normal incidence, in [0, 1]."}},
-                    roughness_params())},
+             concat({{{"diffuse_reflectance", ParamKind::Texture, "0.5",
+                       "Albedo of the base, in [0, 1]."},
+                      {"specular_reflectance", ParamKind::Texture, "0.5",
+                       "Reflectance of the coat at normal incidence, in [0, 1]."}},
+                     roughness_params()})},
             make_material<FresnelBlend>};
 }
 

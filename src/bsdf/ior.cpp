@@ -156,9 +156,4 @@ std::vector<ParamInfo> roughness_params() {
              "Accepted; visible normals are always sampled."}};
 }
 
-std::vector<ParamInfo> concat(std::vector<ParamInfo> a, const std::vector<ParamInfo>& b) {
-    a.insert(a.end(), b.begin(), b.end());
-    return a;
-}
-
 }  // namespace etendue

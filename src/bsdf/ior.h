@@ -50,7 +50,4 @@ private:
 };
 std::vector<ParamInfo> roughness_params();
 
-/// `a` followed by `b`.
-std::vector<ParamInfo> concat(std::vector<ParamInfo> a, const std::vector<ParamInfo>& b);
-
 }  // namespace etendue

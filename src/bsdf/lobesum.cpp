@@ -89,24 +89,24 @@ private:
 }  // namespace
 
 MaterialEntry lobesum_entry() {
-    return {
-        {"bsdf", "lobesum", "Sum of diffuse, glossy and specular lobes, each with its own factor.",
-         concat(
-             {{"diffuse_reflectance", ParamKind::Texture, "0.25",
-               "Albedo of the diffuse reflection."},
-              {"diffuse_transmittance", ParamKind::Texture, "0",
-               "Albedo of the diffuse transmission."},
-              {"glossy_reflectance", ParamKind::Texture, "0.25",
-               "Factor on the reflection of rough facets."},
-              {"glossy_transmittance", ParamKind::Texture, "0",
-               "Factor on the transmission of rough facets."},
-              {"specular_reflectance", ParamKind::Texture, "0", "Factor on the mirror reflection."},
-              {"specular_transmittance", ParamKind::Texture, "0",
-               "Factor on the clear transmission."},
-              {"eta", ParamKind::Float, "1.5",
-               "Index of refraction below the surface divided by that above it."}},
-             roughness_params())},
-        make_material<LobeSum>};
+    return {{"bsdf", "lobesum",
+             "Sum of diffuse, glossy and specular lobes, each with its own factor.",
+             concat({{{"diffuse_reflectance", ParamKind::Texture, "0.25",
+                       "Albedo of the diffuse reflection."},
+                      {"diffuse_transmittance", ParamKind::Texture, "0",
+                       "Albedo of the diffuse transmission."},
+                      {"glossy_reflectance", ParamKind::Texture, "0.25",
+                       "Factor on the reflection of rough facets."},
+                      {"glossy_transmittance", ParamKind::Texture, "0",
+                       "Factor on the transmission of rough facets."},
+                      {"specular_reflectance", ParamKind::Texture, "0",
+                       "Factor on the mirror reflection."},
+                      {"specular_transmittance", ParamKind::Texture, "0",
+                       "Factor on the clear transmission."},
+                      {"eta", ParamKind::Float, "1.5",
+                       "Index of refraction below the surface divided by that above it."}},
+                     roughness_params()})},
+            make_material<LobeSum>};
 }
 
 }  // namespace etendue

@@ -72,7 +72,7 @@ private:
 
 MaterialEntry roughconductor_entry() {
     return {{"bsdf", "roughconductor", "Rough metal [Walter et al. 2007].",
-             concat(roughness_params(), conductor_params())},
+             concat({roughness_params(), conductor_params()})},
             make_material<RoughConductor>};
 }
 

@@ -115,7 +115,7 @@ private:
 MaterialEntry roughdielectric_entry() {
     return {{"bsdf", "roughdielectric",
              "Rough boundary between two dielectrics [Walter et al. 2007].",
-             concat(roughness_params(), dielectric_params())},
+             concat({roughness_params(), dielectric_params()})},
             make_material<RoughDielectric>};
 }
 

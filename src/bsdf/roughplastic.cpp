@@ -81,12 +81,13 @@ private:
 
 MaterialEntry roughplastic_entry() {
     return {{"bsdf", "roughplastic", "Rough dielectric coat over a diffuse base.",
-             concat(PlasticParams::table(), {{"distribution", ParamKind::String, "beckmann",
-                                              "Distribution of facet normals: beckmann or ggx."},
-                                             {"alpha", ParamKind::Texture, "0.1",
-                                              "Roughness of the coat: RMS slope of its facets."},
-                                             {"sample_visible", ParamKind::Bool, "true",
-                                              "Accepted; visible normals are always sampled."}})},
+             concat({PlasticParams::table(),
+                     {{"distribution", ParamKind::String, "beckmann",
+                       "Distribution of facet normals: beckmann or ggx."},
+                      {"alpha", ParamKind::Texture, "0.1",
+                       "Roughness of the coat: RMS slope of its facets."},
+                      {"sample_visible", ParamKind::Bool, "true",
+                       "Accepted; visible normals are always sampled."}}})},
             make_material<RoughPlastic>};
 }
 

@@ -40,6 +40,12 @@ bool accepts(ParamKind kind, ParamType type) {
 
 }  // namespace
 
+std::vector<ParamInfo> concat(std::initializer_list<std::vector<ParamInfo>> tables) {
+    std::vector<ParamInfo> all;
+    for (const auto& table : tables) all.insert(all.end(), table.begin(), table.end());
+    return all;
+}
+
 const char* kind_name(ParamKind kind) {
     constexpr const char* names[] = {"boolean", "integer",   "float",   "string", "vector",
                                      "colour",  "transform", "texture", "object", "number or name"};

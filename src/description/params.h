@@ -36,6 +36,9 @@ struct ParamInfo {
     bool is_experimental = false;  ///< For comparisons with other methods and figures only.
 };
 
+/// The parameters of all tables, in order.
+std::vector<ParamInfo> concat(std::initializer_list<std::vector<ParamInfo>> tables);
+
 /// One plug-in of one category, as `etendue list` prints it and check_params() uses it.
 struct PluginInfo {
     const char* category;

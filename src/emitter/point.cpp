@@ -198,16 +198,14 @@ EmitterEntry spot_entry() {
 namespace {
 
 std::vector<ParamInfo> projector_params() {
-    std::vector<ParamInfo> all = {
-        {"irradiance", ParamKind::Texture, "1",
-         "Texture of the image plane at the distance 1; the irradiance there, in W/m², is π times "
-         "its value. Its upper edge is that of +y, its left edge that of +x."},
-        {"scale", ParamKind::Float, "1", "Factor on the irradiance."},
-        {"to_world", ParamKind::Transform, "identity",
-         "Similarity: its origin is the position, and its +z axis the middle of the image."}};
-    const std::vector<ParamInfo> view = view_params("that of the texture");
-    all.insert(all.end(), view.begin(), view.end());
-    return all;
+    return concat(
+        {{{"irradiance", ParamKind::Texture, "1",
+           "Texture of the image plane at the distance 1; the irradiance there, in W/m², is π "
+           "times its value. Its upper edge is that of +y, its left edge that of +x."},
+          {"scale", ParamKind::Float, "1", "Factor on the irradiance."},
+          {"to_world", ParamKind::Transform, "identity",
+           "Similarity: its origin is the position, and its +z axis the middle of the image."}},
+         view_params("that of the texture")});
 }
 
 }  // namespace

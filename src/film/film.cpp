@@ -2,6 +2,7 @@
 
 #include "film/parallel_chunks.h"
 #include "math/statistics.h"
+#include "system/make_room.h"
 
 namespace etendue {
 namespace {
@@ -102,7 +103,7 @@ void Film::complete() {
 }
 
 void Film::keep_luminance(std::span<const Rgb> eye) {
-    for_film_chunks(eye.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+    for_film_chunks(eye.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) previous_[i] = luminance(eye[i]);
     });
 }
@@ -128,12 +129,11 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     // All memory is allocated before anything changes, so that a failure leaves the totals unchanged. From then on nothing
     // throws, apart from the exchange with other processes, which end then.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks), pass_sum(chunks);
-    for (std::vector<double>* list : {&pass_means_, &pair_errors_})
-        if (list->size() == list->capacity()) list->reserve(2 * list->size() + 16);
+    make_room(pass_means_), make_room(pair_errors_);
     ++passes_;
     if (group) ++group_passes_[g];
     const auto mean_of = [&](uint64_t i) { return moments_[i].luminance_sum() / float(passes_); };
-    for_own_chunks([&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    for_own_chunks([&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) {
             const Rgb v = pass[i - first];
             Moments& m = moments_[i];
@@ -156,7 +156,7 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     pass_means_.push_back(sum_of_chunks(luminance_sum) / double(n));
     if (!second) return;
     const double mean = sum_of_chunks(total) / double(n);
-    for_own_chunks([&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    for_own_chunks([&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) {
             // Half the squared difference of two passes estimates the variance of one pass, even if its samples are
             // correlated.
@@ -174,7 +174,7 @@ void Film::renew_expected() {
     const uint64_t n = geometry_.pixel_count();
     std::vector<double> total(film_chunks(n));
     std::vector<float>& expected = expected_.pixels_;
-    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) {
             expected[i] = moments_[i].luminance_sum() / float(passes_);
             total[chunk] += double(expected[i]);
@@ -183,7 +183,7 @@ void Film::renew_expected() {
     double mean = 0;
     for (const double t : total) mean += t;
     mean /= double(n);
-    for_film_chunks(n, [&](uint64_t, uint64_t begin, uint64_t end) {
+    for_film_chunks(n, [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i)
             expected[i] = std::max(expected[i], float(0.1 * mean));
     });
@@ -239,14 +239,14 @@ ErrorEstimate Film::group_error() const {
     const uint64_t n = moments_.size(), chunks = film_chunks(n);
     const size_t pairs = group_sums_.size() / 2;
     std::vector<double> luminance_sum(chunks), error_sum(chunks * pairs);
-    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i)
             luminance_sum[chunk] += double(moments_[i].luminance_sum());
     });
     double mean = 0;
     for (const double sum : luminance_sum) mean += sum;
     mean /= double(passes_) * double(n);
-    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) {
             const double y = double(moments_[i].luminance_sum()) / double(passes_);
             const double scale2 = y * y + 0.01 * mean * mean;
@@ -297,7 +297,7 @@ void Film::renew_error2_of_pass() {
     const uint64_t pixels = moments_.size(), chunks = film_chunks(pixels);
     const double mean = mean_luminance().mean;
     std::vector<double> error_sum(chunks);
-    for_film_chunks(pixels, [&](uint64_t chunk, uint64_t begin, uint64_t end) {
+    for_film_chunks(pixels, [&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) error_sum[chunk] += error2_of_pass(i, mean);
     });
     double error2 = 0;

@@ -74,7 +74,7 @@ void Film::load(SectionReader& from) {
 void Film::merge(const Film& other) {
     if (other.moments_.size() != moments_.size() || other.group_sums_.size() != group_sums_.size())
         throw std::runtime_error("films of other sizes or groups of passes cannot be added");
-    for_film_chunks(moments_.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+    for_film_chunks(moments_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) {
             for (int c = 0; c < 3; ++c) {
                 moments_[i].sum[c] += other.moments_[i].sum[c];

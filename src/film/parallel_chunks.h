@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <new>
+#include <type_traits>
 
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -18,10 +19,12 @@ inline uint64_t film_chunks(uint64_t count) {
     return (count + kFilmChunk - 1) / kFilmChunk;
 }
 
-/// Calls `body(chunk, begin, end)` in parallel for the chunks first … last-1 of [0, count). Throws nothing if `body` does not,
-/// even where there is no memory for parallel tasks: the calling thread then does their work.
+/// Calls `body(chunk, begin, end)`, which must be noexcept, in parallel for the chunks first … last-1 of [0, count). Throws
+/// nothing, even where there is no memory for parallel tasks: the calling thread then does their work.
 template <class Body>
 void for_film_chunks(uint64_t count, uint64_t first, uint64_t last, const Body& body) {
+    static_assert(std::is_nothrow_invocable_v<const Body&, uint64_t, uint64_t, uint64_t>,
+                  "what it throws would be taken for the want of memory for a task");
     std::atomic<uint64_t> next{first};
     const auto work = [&] {
         for (uint64_t chunk; (chunk = next.fetch_add(1, std::memory_order_relaxed)) < last;)

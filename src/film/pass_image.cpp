@@ -32,7 +32,7 @@ void PassImage::reject_if_not_finite(Rgb& value) {
 
 std::span<const Rgb> PassImage::finish_eye() {
     std::vector<Rgb>& values = grid_ ? samples_ : pixels_;
-    for_film_chunks(values.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+    for_film_chunks(values.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) reject_if_not_finite(values[i]);
     });
     if (grid_) spread();
@@ -65,7 +65,7 @@ void PassImage::spread() {
 std::span<const Rgb> PassImage::finish() {
     if (!splats_) return pixels_;
     splats_->fold_into(pixels_);
-    for_film_chunks(pixels_.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+    for_film_chunks(pixels_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) reject_if_not_finite(pixels_[i]);
     });
     return pixels_;
@@ -73,7 +73,7 @@ std::span<const Rgb> PassImage::finish() {
 
 void PassImage::clear() {
     const auto clear = [](std::vector<Rgb>& values) {
-        for_film_chunks(values.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+        for_film_chunks(values.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
             std::fill(values.begin() + ptrdiff_t(begin), values.begin() + ptrdiff_t(end), Rgb());
         });
     };

@@ -88,7 +88,7 @@ template <class To>
 void SplatBuffer::fold(std::span<To> sums) {
     size_t digits = kDigits;
     while (digits > 1 && !owned_[digits - 1]) --digits;
-    for_film_chunks(sums.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+    for_film_chunks(sums.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i)
             for (int c = 0; c < 3; ++c) {
                 const uint64_t cell = i * 3 + uint64_t(c);
@@ -103,7 +103,7 @@ template void SplatBuffer::fold(std::span<Sum> sums);
 
 void SplatBuffer::clear() {
     const auto clear = [&](Cell* cells) {
-        for_film_chunks(lowest_.size(), [&](uint64_t, uint64_t begin, uint64_t end) {
+        for_film_chunks(lowest_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
             for (uint64_t i = begin; i < end; ++i) cells[i].store(0, std::memory_order_relaxed);
         });
     };

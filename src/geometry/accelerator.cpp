@@ -76,8 +76,7 @@ void occluded_callback(const RTCOccludedFunctionNArguments* args) {
 /// largest sum of a row.
 float error_of_inverse(const Transform& to_world) {
     constexpr double kErrors = 0x1p-23;
-    const Transform inverse = to_world.inverse();
-    const Transform::Matrix &m = to_world.matrix(), &m1 = inverse.matrix();
+    const Transform::Matrix &m = to_world.matrix(), &m1 = to_world.inverse_matrix();
     double most = 0;
     for (size_t i = 0; i < 3; ++i) {
         double sum = 0;
@@ -138,11 +137,6 @@ struct Accelerator::Impl {
     RTCDevice device = nullptr;
     RTCScene top = nullptr;
     std::vector<RTCScene> groups;
-    struct Instance {
-        Transform to_world;
-        float error;                           ///< See Accelerator::instance_error().
-        std::pair<uint32_t, uint32_t> shapes;  ///< Of its group.
-    };
     std::vector<std::pair<uint32_t, uint32_t>> group_shapes;  ///< Indices [first, second).
     /// By geometry id of the top-level scene: index of the shape, or of the instance.
     std::vector<uint32_t> shape_of_geom;
@@ -253,7 +247,9 @@ uint32_t Accelerator::add_instance(uint32_t group, const Transform& to_world) {
     impl_->check();
     impl_->shape_of_geom.resize(id + 1);
     impl_->shape_of_geom[id] = uint32_t(impl_->instances.size());
-    impl_->instances.push_back({to_world, error_of_inverse(to_world), impl_->group_shapes[group]});
+    impl_->instances.push_back({to_world, error_of_inverse(to_world),
+                                largest_coordinate(to_world.point({0, 0, 0})),
+                                impl_->group_shapes[group]});
     return uint32_t(impl_->instances.size() - 1);
 }
 
@@ -310,16 +306,8 @@ size_t Accelerator::instance_count() const {
     return impl_->instances.size();
 }
 
-std::pair<uint32_t, uint32_t> Accelerator::instance_shapes(uint32_t instance) const {
-    return impl_->instances[instance].shapes;
-}
-
-float Accelerator::instance_error(uint32_t instance) const {
-    return impl_->instances[instance].error;
-}
-
-const Transform& Accelerator::instance_transform(uint32_t instance) const {
-    return impl_->instances[instance].to_world;
+const Accelerator::Instance& Accelerator::instance(uint32_t index) const {
+    return impl_->instances[index];
 }
 
 size_t Accelerator::memory_bytes() const {

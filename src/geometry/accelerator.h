@@ -39,6 +39,16 @@ struct AcceleratorOptions {
 /// Shapes are added, then committed once; queries are thread-safe after that.
 class Accelerator {
 public:
+    /// A group at its place.
+    struct Instance {
+        Transform to_world;
+        /// Bound of the error of a ray that Embree transforms to the space of the instance, in units of that space: relative
+        /// to the largest coordinate of its origin plus `translation`.
+        float error;
+        float translation;                     ///< The largest coordinate of what `to_world` adds.
+        std::pair<uint32_t, uint32_t> shapes;  ///< Indices [first, second) of what it shows.
+    };
+
     explicit Accelerator(const AcceleratorOptions& options = {});
     ~Accelerator();
     Accelerator(Accelerator&&) noexcept;
@@ -59,12 +69,7 @@ public:
     bool occluded(const Ray& ray) const;
 
     size_t instance_count() const;
-    const Transform& instance_transform(uint32_t instance) const;
-    /// Bound of the error of a ray that Embree transforms to the space of the instance, in units of that space: relative to
-    /// the largest coordinate of its origin plus the largest one of the instance's translation.
-    float instance_error(uint32_t instance) const;
-    /// The indices [first, second) of the shapes that the instance shows.
-    std::pair<uint32_t, uint32_t> instance_shapes(uint32_t instance) const;
+    const Instance& instance(uint32_t index) const;
     size_t memory_bytes() const;
 
 private:

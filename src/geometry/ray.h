@@ -25,10 +25,8 @@ struct RayEnd {
 /// depend on the size of the scene.
 inline Vec3 offset_origin(const RayEnd& from, Vec3 d) {
     constexpr float kRounding = 0x1p-21f;
-    const Vec3 p = from.p;
-    const float scale = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
-    const float offset = std::max(scale * kRounding, from.slack);
-    return p + from.ng * std::copysign(offset, dot(from.ng, d));
+    const float offset = std::max(largest_coordinate(from.p) * kRounding, from.slack);
+    return from.p + from.ng * std::copysign(offset, dot(from.ng, d));
 }
 
 }  // namespace etendue

@@ -1,169 +1,130 @@
 // Bidirectional path tracing [Veach & Guibas 1994; Lafortune & Willems 1993]: all techniques C(s,t), combined by the power
-// heuristic. Unbiased. Joins with a small contribution pass Russian roulette before their shadow ray. The loop over s and t
-// is that of Bidirectional::add_sample(), which methods with chains use, too.
-//
-// An eye vertex is connected to the light path of its own pixel, or to C random vertices of the light vertex cache,
-// which holds the V connectible vertices y_i, i ≥ 1, of all light paths of the pass [Davidovič et al. 2014]. In the
-// latter case the contribution of each connection C(s,t), s, t ≥ 2, is multiplied by V/(C·N_L), and the weights count
-// C·N_L/V̄ samples. V̄ is the mean of V; V itself cannot be used in the weights, because it depends on the paths.
+// heuristic. Unbiased. The eye path of a pixel is connected to one light path. Joins with a small contribution pass Russian
+// roulette before their shadow ray (Bidirectional::add()).
 
 #include "integrator/bdpt.h"
-
-#include <array>
-#include <cmath>
-
-#include "integrator/bidirectional.h"
-#include "integrator/light_path_options.h"
 
 namespace etendue {
 namespace {
 
-constexpr std::array<Choice<bool>, 2> kUsesCache{{{"path", false}, {"cache", true}}};
+/// Traces the light path y of this sample, and adds C(s,1) and C(s,0). Where samples share a light path, the first of them
+/// adds these.
+void trace_light_path(const Bidirectional& paths, const SampleContext& c, const TechniqueCounts& n,
+                      Workspace& work, const LearnedPlaces* learned) {
+    const PhaseTimer timer(work.stats, &PhaseSeconds::light_paths);
+    const WalkContext walk = paths.light_walk(c.scene, n, work.stats, learned);
+    const bool adds = c.index < c.light_paths;
+    Sampler sampler = c.sampler;
+    if (!adds) sampler.start(c.own_light_path());
+    SubPath& y = work.y;
+    if (!start_light_path(walk, sampler, y)) return;
+    for (int s = 1; s <= y.size() && s <= paths.max_depth(); ++s) {
+        if (adds) paths.add(c, join_splat(c.scene, y, s, sampler, n), work);  // C(s,1)
+        if (s >= 2) extend<TransportMode::Importance>(walk, sampler, y);
+        if (adds) paths.add(c, join_hit_lens(c.scene, y, s, n), work);  // C(s+1,0)
+    }
+}
+
+/// Where there are more light paths than samples: traces the others of this sample, for C(s,1) and C(s,0) alone.
+void trace_further_light_paths(const Bidirectional& paths, const SampleContext& c,
+                               const TechniqueCounts& n, Workspace& work,
+                               const LearnedPlaces* learned) {
+    if (c.is_of_whole_film) return;
+    const uint64_t samples = c.film.sample_count();
+    for (uint64_t path = c.index + samples; path < c.light_paths; path += samples) {
+        Sampler sampler = c.sampler;
+        sampler.start(path);
+        trace_light_path(paths, c.with(sampler, c.sink), n, work, learned);
+    }
+}
+
+}  // namespace
+
+void add_bdpt_joins(const Bidirectional& paths, const SampleContext& c, const TechniqueCounts& n,
+                    Workspace& work, const LearnedPlaces* learned) {
+    const SubPath &y = work.y, &z = work.z;
+    const bool has_light_path = n.uses_light_paths();
+    if (has_light_path) {
+        trace_further_light_paths(paths, c, n, work, learned);
+        trace_light_path(paths, c, n, work, learned);
+    }
+    const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+    for (int t = 2; t <= z.size(); ++t) {
+        paths.add_hits(c, n, t, work);  // C(0,t)
+        if (!paths.is_joinable(z, t)) continue;
+        paths.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
+        if (!has_light_path) continue;
+        const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
+        for (int s = 2; s <= y.size() && s + t - 1 <= paths.max_depth(); ++s)
+            paths.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
+    }
+}
+
+void add_bdpt_sample(const Bidirectional& paths, const SampleContext& c, const TechniqueCounts& n,
+                     Workspace& work, const LearnedPlaces* learned) {
+    trace_eye_path(paths.eye_walk(c.scene, n, work.stats, learned), c, work.z);
+    add_bdpt_joins(paths, c, n, work, learned);
+}
+
+void trace_light_paths(const Bidirectional& paths, const PassContext& pass,
+                       const TechniqueCounts& n, uint64_t kept, LightVertexCache& cache,
+                       const LearnedPlaces* learned) {
+    pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
+        trace_light_path(paths, c, n, work, learned);
+        if (c.index < kept) cache.add(c.chunk, work.y);
+    });
+}
+
+namespace {
 
 class BdptIntegrator final : public Integrator {
 public:
     explicit BdptIntegrator(const IntegratorParams& p)
-        : paths_(p, Guiding(p)), uses_cache_(p.choice("connections", kUsesCache)),
-          given_draws_(p.integer("cache_draws", 0, 1024)), light_(p) {}
+        : paths_(p, Guiding(p)),
+          given_light_paths_(uint64_t(p.integer("light_paths", 0, 1 << 30))) {}
 
     void learn(const LearnContext& pass) override { paths_.learn(pass); }
-    void save(LearnedState& to) const override {
-        paths_.save(to);
-        to.put(draws_);
-        to.put(count_);
-    }
-    void load(LearnedState& from) override {
-        paths_.load(from);
-        from.get(draws_);
-        from.get(count_);
-    }
-    void prepare(const PassContext& pass) override {
-        paths_.train(pass);
-        if (uses_cache_ && draws_ == 0) choose_draws(pass);
-    }
-    void trace(const PassContext& pass) override {
-        if (!uses_cache_) return;
-        cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
-                     paths_.guiding().guide());
-        paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                 cache_);
-        cache_.assemble();
-        connectible_.clear();
-        for (uint32_t i = 0; i < cache_.vertices().size(); ++i)
-            if (cache_.vertices()[i].is_connectible) connectible_.push_back(i);
-    }
+    void save(LearnedState& to) const override { paths_.save(to); }
+    void load(LearnedState& from) override { paths_.load(from); }
+    void prepare(const PassContext& pass) override { paths_.train(pass); }
 
-    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
                          RenderStats& stats) const override {
-        return paths_.trace_eye_paths(c, z, counts(c[0].scene, c[0].light_paths), stats);
+        paths_.trace_eye_paths(c, counts(c[0].scene, c[0].light_paths), z, stats);
     }
     void sample(const SampleContext& c, Workspace& work) const override {
-        const TechniqueCounts n = counts(c.scene, c.light_paths);
-        if (!uses_cache_) return paths_.add_sample(c, n, work);
-        const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work);
-        for (int t = 2; t <= work.z.size(); ++t) {
-            paths_.add_hits(c, n, t, work);  // C(0,t)
-            if (!paths_.is_joinable(work.z, t)) continue;
-            paths_.add_next_events(c, n, t, work);  // C(1,t)
-            connect_to_cache(c, n, t, work);        // C(s,t), s ≥ 2
-        }
+        add_bdpt_joins(paths_, c, counts(c.scene, c.light_paths), work);
     }
 
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n = Bidirectional::counts(scene, light_paths);
-        if (uses_cache_) n.connect = count_;
         n.guide = paths_.guiding().guide();
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
-        return light_.count(scene, paths_.depth(),
-                            uses_cache_ ? paths_.vertex_bytes(kVertexBytes) : 0);
+        return given_light_paths_ > 0 ? given_light_paths_ : scene.film().pixel_count();
     }
-    uint64_t light_path_memory() const override { return uses_cache_ ? light_.memory : 0; }
-    bool samples_alone() const override { return !uses_cache_ && !paths_.guiding().is_on(); }
+    bool samples_alone() const override { return !paths_.guiding().is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        std::vector<std::pair<std::string, double>> figures = paths_.guiding().figures();
-        if (!uses_cache_) return figures;
-        figures.push_back({"cache_draws", draws_});
-        figures.push_back({"cached_vertices", connectible_.size()});
-        figures.push_back({"cache_bytes", cache_.memory_bytes() +
-                                              connectible_.capacity() * sizeof(connectible_[0])});
-        return figures;
+        return paths_.guiding().figures();
     }
 
 private:
-    /// Sets C to the given value, or to the mean number of connectible vertices of pilot light paths, which do not
-    /// contribute to the film.
-    void choose_draws(const PassContext& pass) {
-        constexpr uint64_t kPilotPaths = 8192;
-        const TechniqueCounts n = counts(pass.scene, pass.light_paths);
-        std::vector<int> found(kPilotPaths);
-        pass.for_each_other_path(kPilotPaths, [&](uint64_t i, Sampler& sampler, Workspace& work) {
-            sampler.start(0, i);
-            trace_light_path(paths_.light_walk(pass.scene, n, work.stats), sampler, work.y);
-            for (int s = 2; s <= work.y.size(); ++s) found[i] += work.y[s - 1].is_connectible;
-        });
-        double vertices = 0;
-        for (const int v : found) vertices += double(v) / kPilotPaths;
-        draws_ = given_draws_ > 0 ? given_draws_ : std::max(1, int(std::lround(vertices)));
-        count_ = vertices > 0 ? float(draws_ / vertices) : 1.0f;
-    }
-
-    /// Connects z_{t-1} to `draws_` random vertices of the cache.
-    void connect_to_cache(const SampleContext& c, const TechniqueCounts& n, int t,
-                          Workspace& work) const {
-        if (connectible_.empty()) return;
-        const PhaseTimer timer(work.stats, &PhaseSeconds::connections);
-        const float factor =
-            float(double(connectible_.size()) / (double(draws_) * double(c.light_paths)));
-        for (int i = 0; i < draws_; ++i) {
-            c.sampler.seek(Stream::Selection, join_number(0, t, uint32_t(i)));
-            const double u = stratum(i, draws_, c.sampler.next_1d_unstructured());
-            const uint32_t vertex = connectible_[size_t(u * double(connectible_.size()))];
-            const int s = cache_.depth(vertex) + 1;
-            if (s + t - 1 > paths_.max_depth()) continue;
-            cache_.restore_first(c.scene, vertex, s, work.is_observed, work.y);
-            paths_.add(c, join_connect(c.scene, work.y, s, work.z, t, n), work, factor,
-                       uint32_t(i) + 1);
-        }
-    }
-
-    /// Memory per vertex: in the cache and in the list of connectible vertices.
-    static constexpr uint64_t kVertexBytes = LightVertexCache::kVertexBytes + 2 * sizeof(uint32_t);
-    /// Value of count_ before the pilot has run; it differs from the counts of all other methods.
-    static constexpr float kUnknownCount = 0.5f;
-
     Bidirectional paths_;
-    bool uses_cache_;
-    int given_draws_;
-    LightPathOptions light_;
-    int draws_ = 0;                ///< C; 0 before the first pass.
-    float count_ = kUnknownCount;  ///< C·N_L/V̄
-
-    // Of the pass.
-    LightVertexCache cache_;
-    std::vector<uint32_t> connectible_;
+    uint64_t given_light_paths_;  ///< 0: one for each pixel.
 };
 
 }  // namespace
 
 IntegratorEntry bdpt_entry() {
-    std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back(
-        {"connections", ParamKind::String, "path",
-         "Light vertices to which eye vertices are connected: path (those of the pixel's own light "
-         "path) or cache (random vertices of all light paths of the pass).",
-         true});
-    params.push_back({"cache_draws", ParamKind::Int, "0",
-                      "Number of connections from each eye vertex to the cache, at most 1024; 0: "
-                      "as many as a light path has connectible vertices on average.",
-                      true});
-    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     return {{"integrator", "bdpt",
-             "Bidirectional path tracing with all connections and MIS. Unbiased.", params},
+             "Bidirectional path tracing with all connections and MIS. Unbiased.",
+             concat({Bidirectional::params(),
+                     {{"light_paths", ParamKind::Int, "0",
+                       "Number of light paths in a pass; pixel i connects to light path i modulo "
+                       "light_paths. 0: one for each pixel."}},
+                     Guiding::params()})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<BdptIntegrator>(p);
             }};

@@ -1,9 +1,10 @@
 #pragma once
-// Common parts of the bidirectional integrators: both walks, and the Russian roulette before shadow rays.
+// Common parts of the bidirectional integrators: their options, both walks, and what adds a join: Russian roulette, the
+// shadow ray and the sink. bdpt.cpp has the loops over s and t.
 
 #include "integrator/guiding.h"
+#include "pathspace/eye_paths.h"
 #include "reuse/light_vertex_cache.h"
-#include "reuse/next_event_count.h"
 
 namespace etendue {
 
@@ -66,33 +67,15 @@ public:
                 learned};
     }
 
-    /// Traces the light sub-path work.y, which is the light path c.own_light_path(). Adds C(s,1) and C(s,0) if this
-    /// sample is the first one that uses this light path.
-    void trace_light_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                          const LearnedPlaces* learned = nullptr) const;
-    /// Where there are more light paths than samples: traces the others of this sample, for C(s,1) and C(s,0) alone.
-    void trace_further_light_paths(const SampleContext& c, const TechniqueCounts& counts,
-                                   Workspace& work, const LearnedPlaces* learned) const;
     /// For Integrator::trace_eye_paths().
-    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
-                         const TechniqueCounts& counts, RenderStats& stats,
+    void trace_eye_paths(std::span<const SampleContext> c, const TechniqueCounts& counts,
+                         std::span<SubPath> z, RenderStats& stats,
                          const LearnedPlaces* learned = nullptr) const;
-    /// Traces the eye sub-path work.z, unless it has been traced.
-    void trace_eye_path(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                        const LearnedPlaces* learned = nullptr) const;
     /// Whether z_{t-1} can be joined to a light sub-path without exceeding the maximum path length.
     bool is_joinable(const SubPath& z, int t) const {
         return z[t - 1].is_connectible && t <= depth_.max_depth;
     }
 
-    /// Traces the light paths of the pass, adds C(s,1) and C(s,0), and stores the first `kept` paths in `cache`. The
-    /// caller has called cache.begin().
-    void trace_light_paths(const PassContext& pass, const TechniqueCounts& counts, uint64_t kept,
-                           LightVertexCache& cache, const LearnedPlaces* learned = nullptr) const;
-
-    /// Adds all techniques of one sample of bidirectional path tracing.
-    void add_sample(const SampleContext& c, const TechniqueCounts& counts, Workspace& work,
-                    const LearnedPlaces* learned = nullptr) const;
     /// Adds C(0,t).
     void add_hits(const SampleContext& c, const TechniqueCounts& counts, int t,
                   const Workspace& work, float factor = 1) const {
@@ -100,15 +83,6 @@ public:
             for_each_hit(c.scene, work.z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution * factor); });
     }
-    /// Adds C(1,t), and returns its next events.
-    NextEventDraws add_next_events(const SampleContext& c, const TechniqueCounts& counts, int t,
-                                   Workspace& work) const;
-    /// Adds C(s,t), s ≥ 2, with the light sub-path work.y.
-    void add_connections(const SampleContext& c, const TechniqueCounts& counts, int t,
-                         Workspace& work) const;
-    /// Adds only C(s,t), times `factor`. Traces sub-paths of s and t vertices.
-    void add_technique(const SampleContext& c, const TechniqueCounts& counts, int s, int t,
-                       float factor, Workspace& work) const;
 
     /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several
     /// joins of the same technique, `draw` distinguishes them.

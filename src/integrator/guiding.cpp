@@ -5,7 +5,6 @@
 #include <chrono>
 #include <map>
 
-#include "guide/random_guide.h"
 #include "math/hash.h"
 #include "sampler/pilot_seed.h"
 
@@ -298,8 +297,7 @@ std::vector<ParamInfo> Guiding::params() {
         {"guide", ParamKind::String, "off",
          "Learned directions for the walks: off, on, or auto (on, unless the training shows "
          "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
-         "alone, by footprints of photons [Hey & Purgathofer 2002]. random is a useless guide "
-         "for tests."},
+         "alone, by footprints of photons [Hey & Purgathofer 2002]."},
         {"guide_walks", ParamKind::Int, "100000",
          "Number of light walks, and of eye walks, that train the guide before the first pass. A "
          "refit traces as many, before the first of passes 1, 4, 16, 64 … at which the image has "
@@ -310,14 +308,12 @@ std::vector<ParamInfo> Guiding::params() {
 }
 
 Guiding::Guiding(const IntegratorParams& p) {
-    constexpr std::array<Choice<Mode>, 5> kModes{{{"off", Mode::Off},
-                                                  {"on", Mode::On},
-                                                  {"auto", Mode::Auto},
-                                                  {"hp02", Mode::Footprints},
-                                                  {"random", Mode::Random}}};
+    constexpr std::array<Choice<Mode>, 4> kModes{
+        {{"off", Mode::Off}, {"on", Mode::On}, {"auto", Mode::Auto}, {"hp02", Mode::Footprints}}};
     mode_ = p.choice("guide", kModes);
     walks_ = uint64_t(p.integer("guide_walks", 256, 1 << 20));
     has_roulette_ = p.flag("guide_roulette");
+    given_ = p.given_guide();
 }
 
 bool Guiding::gains_little(const Guide& guide, GuidedWalks walks) {
@@ -344,7 +340,7 @@ bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
     // Neither what emission gains nor adjoint-driven roulette depends on them. In the scenes of docs/guiding.md, one of the
     // two gains 2.9 nats, or both at most 0.3: on veach-bidir, where guided directions make a sample worse.
     constexpr float kLeastGain = 0.5f;
-    const bool has_gains = mode_ == Mode::On || mode_ == Mode::Auto;
+    const bool has_gains = mode_ != Mode::Footprints && !given_;
     return joins_both(walks) && has_gains &&
            std::max(guide.surfaces.gain(TransportMode::Radiance),
                     guide.surfaces.gain(TransportMode::Importance)) < kLeastGain;
@@ -364,17 +360,8 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     const uint64_t seed = pilot_seed(pass.seed, PilotUse::Guide, passes);
     // The pass may be dropped at any time, and traced again: nothing may be left of this training then.
     std::unique_ptr<Guide> next;
-    if (mode_ == Mode::Random) {
-        constexpr float kKappa = 1000;
-        const Bounds3& bounds = pass.scene.bounds();
-        std::vector<double> pmf;
-        std::vector<uint32_t> at_infinity;
-        for (const auto& e : pass.scene.emitters()) {
-            pmf.push_back(double(e->selection_pmf));
-            if (e->is_infinite() && !e->is_delta()) at_infinity.push_back(e->index);
-        }
-        next = std::make_unique<Guide>(random_guide(bounds.center(), bounds.radius(),
-                                                    std::move(pmf), at_infinity, kKappa, seed));
+    if (given_) {
+        next = std::make_unique<Guide>(*given_);
     } else if (passes == 0) {
         for (int round = 0; round < kRounds; ++round) {
             if (next) next->make_teacher();

@@ -35,7 +35,7 @@ public:
     void add_figures(std::vector<std::pair<std::string, double>>& figures) const;
 
 private:
-    enum class Mode { Off, On, Auto, Footprints, Random };
+    enum class Mode { Off, On, Auto, Footprints };
     /// `teacher` guides the walks that train; `for_roulette`: whether they are joined, so that their contributions can be
     /// learned.
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
@@ -46,8 +46,9 @@ private:
     bool gains_nothing(const Guide& guide, GuidedWalks walks) const;
 
     Mode mode_ = Mode::Off;
-    uint64_t walks_ = 0;         ///< Of each kind, in training.
-    bool has_roulette_ = false;  ///< The option; see Guide::has_roulette.
+    uint64_t walks_ = 0;                  ///< Of each kind, in training.
+    bool has_roulette_ = false;           ///< The option; see Guide::has_roulette.
+    std::shared_ptr<const Guide> given_;  ///< See IntegratorSpec::guide.
     std::unique_ptr<Guide> guide_;
     uint64_t refits_ =
         0;  ///< Logarithm to base 8 of the samples over the walks, at the last call of train().

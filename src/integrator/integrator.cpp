@@ -65,7 +65,7 @@ std::string IntegratorSpec::to_string() const {
 }
 
 IntegratorParams::IntegratorParams(const IntegratorSpec& spec, const PluginInfo& info)
-    : integrator_(spec.name) {
+    : integrator_(spec.name), guide_(spec.guide) {
     std::vector<std::string> known;
     for (const ParamInfo& p : info.params) {
         values_[p.name] = p.fallback;

@@ -25,7 +25,8 @@ public:
     /// 16, 64 …. What is learned holds for a generation of passes, until the next call. From each call on, the random
     /// numbers are independent of all earlier ones. Therefore no pass uses learned data that depend on its own random
     /// numbers, and learning causes no bias. Without error_groups(), the passes of a generation are independent of each
-    /// other: what trace() keeps for later ones is a function of the seed.
+    /// other: what trace() keeps for later ones is a function of the seed. If it throws an exception, it is called again,
+    /// and learns the same as if the first call had not been made.
     virtual void learn(const LearnContext&) {}
     /// Traces paths of its own from which it learns. Called after learn(), by one thread. Nothing of this is left if it
     /// throws an exception; then it is called again.
@@ -48,14 +49,11 @@ public:
     /// Takes the sums of all workers at the end of a pass, which another process may have made. Passes come in order.
     virtual void collect(std::span<const std::unique_ptr<PassSums>>) {}
 
-    /// Traces the eye sub-path z[i] of each sample c[i] of a pass, which takes less time than one by one
-    /// (walk_in_turns()). sample() then finds that of its sample in `work.z`, with `work.has_eye_path`. False where it
-    /// traces that itself. `stats` receives what is counted.
-    virtual bool trace_eye_paths(std::span<const SampleContext> /*c*/, std::span<SubPath> /*z*/,
-                                 RenderStats& /*stats*/) const {
-        return false;
-    }
-    /// Traces sample `context.index` and reports its contributions.
+    /// Traces the eye sub-path z[i] of each sample c[i], at most kWalksInTurn of them, for integrators whose eye paths do
+    /// not depend on joins. `stats` receives what is counted.
+    virtual void trace_eye_paths(std::span<const SampleContext> /*c*/, std::span<SubPath> /*z*/,
+                                 RenderStats& /*stats*/) const {}
+    /// Traces sample `context.index` and reports its contributions. `work.z` is what trace_eye_paths() has made of it.
     virtual void sample(const SampleContext& context, Workspace& work) const = 0;
     /// Number of samples of each strategy per eye sub-path, as counted in the weights, for a pass with `light_paths`.
     virtual TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const = 0;
@@ -90,6 +88,8 @@ struct IntegratorSpec {
     /// Makes an integrator that is not in the registry; otherwise empty.
     std::function<std::unique_ptr<Integrator>(const std::map<std::string, std::string>& params)>
         make = nullptr;
+    /// The guide of an integrator with guide=on, which then learns none; otherwise empty. For tests.
+    std::shared_ptr<const Guide> guide = nullptr;
 
     /// Throws std::runtime_error with one clear message.
     static IntegratorSpec parse(const std::string& text);
@@ -124,12 +124,14 @@ public:
     int integer(const char* name, int low, int high) const;
     float number(const char* name, float low, float high) const;
     const std::string& integrator() const { return integrator_; }
+    const std::shared_ptr<const Guide>& given_guide() const { return guide_; }
 
 private:
     [[noreturn]] void refuse_choice(const char* name, const std::vector<std::string>& known) const;
     const std::string& text(const char* name) const;
     std::map<std::string, std::string> values_;
     std::string integrator_;
+    std::shared_ptr<const Guide> guide_;
 };
 
 struct IntegratorEntry {

@@ -64,12 +64,10 @@ private:
 }  // namespace
 
 IntegratorEntry light_entry() {
-    std::vector<ParamInfo> params = depth_params();
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     return {{"integrator", "light",
              "Light tracing: connects light paths to the lens. Unbiased for the paths that it can "
              "make.",
-             params},
+             concat({depth_params(), Guiding::params()})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<LightIntegrator>(p);
             }};

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "math/statistics.h"
 #include "sampler/pilot_seed.h"
 
 namespace etendue {
@@ -28,10 +27,20 @@ uint64_t LightPathOptions::count(const Scene& scene, const DepthOptions& depth,
     // If this many vertices per path fit into the memory, no pilot is needed: hardly any scene has more on average.
     constexpr uint64_t kManyVertices = 24;
     if (pixels * kManyVertices * vertex_bytes <= memory) return pixels;
-    constexpr uint64_t kPilotPaths = 4096;
     constexpr double kReserve = 1.1;
     // Of the spread of the sum over the paths of a pass: that of none of thousands of passes is so large.
     constexpr double kSpread = 6;
+    const Moments vertices = light_path_length(scene, depth);
+    // N paths have m N ± s √N vertices.
+    const double most = double(memory) / double(vertex_bytes),
+                 m = std::max(kReserve * vertices.mean(), 1.0),
+                 s = kSpread * std::sqrt(vertices.variance());
+    const double root = (std::sqrt(sqr(s) + 4 * m * most) - s) / (2 * m);
+    return std::clamp(uint64_t(sqr(root)), uint64_t(1), pixels);
+}
+
+Moments light_path_length(const Scene& scene, const DepthOptions& depth) {
+    constexpr uint64_t kPilotPaths = 4096;
     const TechniqueCounts none;
     RenderStats stats;
     const WalkContext walk{
@@ -44,12 +53,7 @@ uint64_t LightPathOptions::count(const Scene& scene, const DepthOptions& depth,
         trace_light_path(walk, sampler, y);
         vertices.add(double(y.size()));
     }
-    // N paths have m N ± s √N vertices.
-    const double most = double(memory) / std::max(double(vertex_bytes), 1.0),
-                 m = std::max(kReserve * vertices.mean(), 1.0),
-                 s = kSpread * std::sqrt(vertices.variance());
-    const double root = (std::sqrt(sqr(s) + 4 * m * most) - s) / (2 * m);
-    return std::clamp(uint64_t(sqr(root)), uint64_t(1), pixels);
+    return vertices;
 }
 
 }  // namespace etendue

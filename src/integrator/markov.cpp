@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "integrator/bdpt.h"
+
 namespace etendue {
 namespace {
 
@@ -56,8 +58,9 @@ PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
                                                      const Bidirectional& paths) const {
     // The counts of bidirectional path tracing alone; those of derived classes may depend on an earlier begin().
     const TechniqueCounts n = MarkovIntegrator::counts(scene, 0);
-    return
-        [&paths, n](int, const SampleContext& c, Workspace& work) { paths.add_sample(c, n, work); };
+    return [&paths, n](int, const SampleContext& c, Workspace& work) {
+        add_bdpt_sample(paths, c, n, work);
+    };
 }
 
 void MarkovIntegrator::use_roulette(const FilmGeometry& film, const Pilot& pilot) {
@@ -76,7 +79,7 @@ void MarkovIntegrator::trace(const PassContext& pass) {
             const TechniqueCounts n = direct_counts(pass.scene, pass.light_paths);
             pilot_ = run_pilot(pass, bidirectional_sample(pass.scene, pilot_paths_),
                                [&](int, const SampleContext& c, Workspace& work) {
-                                   direct_.add_sample(c, n, work);
+                                   add_bdpt_sample(direct_, c, n, work);
                                });
         }
         Chains chains = begin(pass, *pilot_);
@@ -137,8 +140,13 @@ TechniqueCounts MarkovIntegrator::direct_counts(const Scene& scene, uint64_t lig
                                       : TechniqueCounts{.hit = 1, .next_event = 1};
 }
 
+void MarkovIntegrator::trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                                       RenderStats& stats) const {
+    direct_.trace_eye_paths(c, direct_counts(c[0].scene, c[0].light_paths), z, stats);
+}
+
 void MarkovIntegrator::sample(const SampleContext& c, Workspace& work) const {
-    direct_.add_sample(c, direct_counts(c.scene, c.light_paths), work);
+    add_bdpt_joins(direct_, c, direct_counts(c.scene, c.light_paths), work);
 }
 
 std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {

@@ -33,6 +33,8 @@ public:
         groups_->commit();
         has_begun_ = true;
     }
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const final;
     void sample(const SampleContext& context, Workspace& work) const final;
 
     /// The counts of the chains' techniques.

@@ -228,7 +228,7 @@ MetropolisPhotons::make_states(const PassContext& context,
         return path_photons(context, mapping_, user_paths_, options_.user_share);
     auto states = std::make_unique<ImportonStates>(mapping_);
     ImportonSpace& space = states->importon_space();
-    importance_.emplace(importons(), kRadius * seen_radius(context.scene));
+    importance_.emplace(importons(), kRadius * seen_extent(context.scene).radius);
     importance_->set_floor(importance_floor(context, mapping_, space, *importance_));
     space.importance = &*importance_;
     if (user_paths_) {

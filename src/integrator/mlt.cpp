@@ -52,20 +52,18 @@ private:
 }  // namespace
 
 IntegratorEntry mlt_entry() {
-    std::vector<ParamInfo> params{depth_params()[0]};
-    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
-    params.push_back(
-        {"user_paths", ParamKind::String, "",
-         "JSON file of important light sub-paths, which `etendue paths` makes and "
-         "checks; large steps and the start-up follow them, and proposals near them are mixed with "
-         "bidirectional mutations."});
-    params.push_back({"user_ratio", ParamKind::Float, "1",
-                      "Number of proposals near user paths for each bidirectional mutation, and of "
-                      "large steps that follow them for each other one, 0.01 to 100."});
     return {{"integrator", "mlt",
              "Metropolis light transport on paths: mutations replace a part of a path, or move it "
              "slightly. Unbiased.",
-             params},
+             concat({{depth_params()[0]},
+                     MarkovIntegrator::params(),
+                     {{"user_paths", ParamKind::String, "",
+                       "JSON file of important light sub-paths, which `etendue paths` makes and "
+                       "checks; large steps and the start-up follow them, and proposals near them "
+                       "are mixed with bidirectional mutations."},
+                      {"user_ratio", ParamKind::Float, "1",
+                       "Number of proposals near user paths for each bidirectional mutation, and "
+                       "of large steps that follow them for each other one, 0.01 to 100."}}})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MltIntegrator>(p);
             }};

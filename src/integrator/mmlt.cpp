@@ -70,7 +70,7 @@ protected:
             c.sampler.seek(Stream::Selection, addresses::kKind);
             const double u_length = c.sampler.next_1d_fine_if(choice->has_length_choice(k));
             const auto q = choice->choose(k, u_length, c.sampler.next_1d_fine());
-            paths_.add_technique(c, n, q.s, q.t, float(1 / q.pmf), work);
+            add_technique(c, n, q.s, q.t, float(1 / q.pmf), work);
         };
         std::vector<ClassPlan> classes_plan = plan(pilot, classes);
         return {std::make_unique<PrimarySpace>(classes, std::move(sample), pilot.map),
@@ -78,6 +78,33 @@ protected:
     }
 
 private:
+    /// Adds only C(s,t), times `factor`. Traces sub-paths of s and t vertices.
+    void add_technique(const SampleContext& c, const TechniqueCounts& n, int s, int t, float factor,
+                       Workspace& work) const {
+        const auto add = [&](const std::optional<Join>& j) { paths_.add(c, j, work, factor); };
+        SubPath &y = work.y, &z = work.z;
+        const int rr_depth = paths_.depth().rr_depth;
+        // The last flight of C(s,0) ends on the lens. Its ray also hits the surface behind the lens, which is not needed.
+        const WalkContext light{c.scene, n, work.stats, {s, rr_depth}};
+        const WalkContext eye{c.scene, n, work.stats, {t, rr_depth}};
+        if (s >= 2) {
+            if (!start_light_path(light, c.sampler, y)) return;
+            // The loop must not take another step, since that would overwrite y.flight.
+            while (y.size() < s && extend<TransportMode::Importance>(light, c.sampler, y)) {
+            }
+            if (t == 0 && y.size() >= s - 1) return add(join_hit_lens(c.scene, y, s - 1, n));
+            if (y.size() < s) return;
+            if (t == 1) return add(join_splat(c.scene, y, s, c.sampler, n));
+        }
+        trace_eye_path(eye, c, z);
+        if (z.size() < t) return;
+        if (s == 0)
+            paths_.add_hits(c, n, t, work, factor);
+        else if (paths_.is_joinable(z, t))
+            add(s == 1 ? join_next_event(c.scene, z, t, c.sampler, n)
+                       : join_connect(c.scene, y, s, z, t, n));
+    }
+
     std::vector<ClassPlan> plan(const Pilot& pilot, int classes) const {
         std::vector<double> b(size_t(classes), 0.0), cost;
         for (const auto& [technique, value] : pilot.by_technique)
@@ -93,15 +120,14 @@ private:
 }  // namespace
 
 IntegratorEntry mmlt_entry() {
-    std::vector<ParamInfo> params{depth_params()[0]};
-    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
-    params.push_back({"lengths", ParamKind::Int, "10",
-                      "Number of classes of path lengths, 1 to 64, from three edges on; each has "
-                      "its own chains. The last class contains all longer paths."});
     return {{"integrator", "mmlt",
              "Multiplexed Metropolis light transport: each state is one path of one technique, and "
              "each path length has its own chains. Unbiased.",
-             params},
+             concat({{depth_params()[0]},
+                     MarkovIntegrator::params(),
+                     {{"lengths", ParamKind::Int, "10",
+                       "Number of classes of path lengths, 1 to 64, from three edges on; each has "
+                       "its own chains. The last class contains all longer paths."}}})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MmltIntegrator>(p);
             }};

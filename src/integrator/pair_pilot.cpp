@@ -57,7 +57,7 @@ PairPilot run_pair_pilot(const PassContext& pass, const Bidirectional& paths,
     for (size_t i = 0; i < light.size(); ++i) entries[i] = {light[i].p, uint32_t(i)};
     // A radius at which most eye paths find pairs, and cells in which most places that the lens sees have several
     // vertices.
-    const float radius = seen_radius(pass.scene) / std::sqrt(float(walks));
+    const float radius = seen_extent(pass.scene).radius / std::sqrt(float(walks));
     PointGrid grid;
     grid.build(entries, 2 * radius);
     pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace&) {

@@ -23,16 +23,14 @@ public:
         guiding_.train(pass, depth_, GuidedWalks::Eye);
     }
 
-    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
                          RenderStats& stats) const override {
         const Scene& scene = c[0].scene;
         etendue::trace_eye_paths({scene, counts(scene, 0), stats, depth_.walk()}, c, z);
-        return true;
     }
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts counts = this->counts(c.scene, 0);
         const SubPath& z = work.z;
-        if (!work.has_eye_path) trace_eye_paths({&c, 1}, {&work.z, 1}, work.stats);
         for (int t = 2; t <= z.size(); ++t) {
             for_each_hit(c.scene, z, t, counts,
                          [&](const Join& j) { c.sink.add(j, j.contribution); });
@@ -61,11 +59,9 @@ private:
 }  // namespace
 
 IntegratorEntry path_entry() {
-    std::vector<ParamInfo> params = depth_params();
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
     return {{"integrator", "path",
              "Path tracing with next event estimation and MIS, the simplest method. Unbiased.",
-             params},
+             concat({depth_params(), Guiding::params()})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PathIntegrator>(p);
             }};

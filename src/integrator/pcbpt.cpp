@@ -18,7 +18,7 @@
 
 #include <fmt/format.h>
 
-#include "integrator/bidirectional.h"
+#include "integrator/bdpt.h"
 #include "math/rotated.h"
 #include "reuse/importance_records.h"
 
@@ -51,19 +51,18 @@ public:
     void prepare(const PassContext& pass) override { paths_.train(pass); }
     void trace(const PassContext& pass) override {
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
-        trace_light_paths(pass, n);
+        store_light_paths(pass, n);
         make_records(pass, n);
     }
 
-    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
                          RenderStats& stats) const override {
-        return paths_.trace_eye_paths(c, z, counts(c[0].scene, c[0].light_paths), stats);
+        paths_.trace_eye_paths(c, counts(c[0].scene, c[0].light_paths), z, stats);
     }
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         const SubPath& z = work.z;
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work);
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
             if (!paths_.is_joinable(z, t)) continue;
@@ -107,11 +106,11 @@ private:
     /// Number M of stored light paths.
     uint64_t kept(uint64_t light_paths) const { return std::min(light_paths_, light_paths); }
 
-    void trace_light_paths(const PassContext& pass, const TechniqueCounts& n) {
+    void store_light_paths(const PassContext& pass, const TechniqueCounts& n) {
         const uint64_t M = kept(pass.light_paths);
         compact_.begin(pass.chunks(pass.light_paths), kVertexBytes, memory_,
                        paths_.guiding().guide());
-        paths_.trace_light_paths(pass, n, M, compact_);
+        trace_light_paths(paths_, pass, n, M, compact_);
         compact_.assemble();
         // The memory of the pass before is freed, since its paths had other lengths.
         stored_.clear();
@@ -259,49 +258,50 @@ private:
     std::vector<ImportanceRecords::Chunk> record_chunks_;
 };
 
+std::vector<ParamInfo> pcbpt_params() {
+    return concat(
+        {Bidirectional::params(),
+         {{"light_paths", ParamKind::Int, "100",
+           "M: number of light paths of a pass to whose vertices eye vertices may be connected."},
+          {"memory", ParamKind::Int, "6144",
+           "Largest memory for these light paths in MiB, and also for the importance records."},
+          {"connections", ParamKind::Float, "0",
+           "K: average number of connections of each eye vertex, at most 1024; 0: chosen so that "
+           "connections and records together cost as much as the connections of bdpt, but at "
+           "least 0.125."},
+          {"record_fraction", ParamKind::Float, "0.001",
+           "Number of eye paths that create importance records, divided by the number of pixels; "
+           "in [0, 1]."},
+          {"neighbours", ParamKind::Int, "6",
+           "Number of records between which the probability mass function is interpolated, 1 to "
+           "16."},
+          {"uniform", ParamKind::Float, "0.5",
+           "Fraction of connections that are drawn uniformly, in [0.001, 1]."}},
+         Guiding::params(),
+         {{"weights", ParamKind::String, "upper",
+           "Count of a connection in the weights: upper (1, since all pixels share the light "
+           "paths) or standard (M).",
+           true},
+          {"direct", ParamKind::String, "next_event",
+           "How C(1,t) is made: stored (connections to the y_0 of the stored light paths), "
+           "next_event, or both.",
+           true},
+          {"cache", ParamKind::Bool, "true",
+           "Whether the probability mass function is interpolated from records; false evaluates "
+           "it at every eye vertex, which is slow.",
+           true},
+          {"pmf", ParamKind::String, "weighted",
+           "What the probability mass function is proportional to: contribution, or weighted "
+           "(contribution times MIS weight).",
+           true}}});
+}
+
 }  // namespace
 
 IntegratorEntry pcbpt_entry() {
-    std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back(
-        {"light_paths", ParamKind::Int, "100",
-         "M: number of light paths of a pass to whose vertices eye vertices may be connected."});
-    params.push_back(
-        {"memory", ParamKind::Int, "6144",
-         "Largest memory for these light paths in MiB, and also for the importance records."});
-    params.push_back(
-        {"connections", ParamKind::Float, "0",
-         "K: average number of connections of each eye vertex, at most 1024; 0: chosen so that "
-         "connections and records together cost as much as the connections of bdpt, but at least "
-         "0.125."});
-    params.push_back(
-        {"record_fraction", ParamKind::Float, "0.001",
-         "Number of eye paths that create importance records, divided by the number of pixels; in "
-         "[0, 1]."});
-    params.push_back({"neighbours", ParamKind::Int, "6",
-                      "Number of records between which the probability mass function is "
-                      "interpolated, 1 to 16."});
-    params.push_back({"uniform", ParamKind::Float, "0.5",
-                      "Fraction of connections that are drawn uniformly, in [0.001, 1]."});
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
-    params.push_back({"weights", ParamKind::String, "upper",
-                      "Count of a connection in the weights: upper (1, since all pixels share the "
-                      "light paths) or standard (M).",
-                      true});
-    params.push_back({"direct", ParamKind::String, "next_event",
-                      "How C(1,t) is made: stored (connections to the y_0 of the stored light "
-                      "paths), next_event, or both.",
-                      true});
-    params.push_back({"cache", ParamKind::Bool, "true",
-                      "Whether the probability mass function is interpolated from records; false "
-                      "evaluates it at every eye vertex, which is slow.",
-                      true});
-    params.push_back({"pmf", ParamKind::String, "weighted",
-                      "What the probability mass function is proportional to: contribution, or "
-                      "weighted (contribution times MIS weight).",
-                      true});
     return {{"integrator", "pcbpt",
-             "Bidirectional path tracing with probabilistic connections. Unbiased.", params},
+             "Bidirectional path tracing with probabilistic connections. Unbiased.",
+             pcbpt_params()},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PcbptIntegrator>(p);
             }};

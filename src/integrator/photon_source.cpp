@@ -24,8 +24,11 @@ MapPhotons TracedPhotons::trace(const PassContext& context, uint32_t pass,
     std::vector<std::vector<MapPhoton>> chunks(context.chunks(context.light_paths));
     PhotonMemory memory(max_bytes_);
     context.for_each_light_path([&](const SampleContext& c, Workspace& work) {
+        const PhaseTimer timer(work.stats, &PhaseSeconds::light_paths);
+        const TechniqueCounts no_joins;
         c.sampler.start(pass, c.index);
-        mapping_.paths().trace_light_path(c, {}, work);
+        trace_light_path(mapping_.paths().light_walk(c.scene, no_joins, work.stats), c.sampler,
+                         work.y);
         memory.add(uint64_t(work.y.size()));
         for_each_photon(mapping_, work.y, [&](MapPhoton photon) {
             photon.power *= c.splat_scale;

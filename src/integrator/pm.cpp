@@ -90,7 +90,7 @@ public:
         pass_ = pass.index;
         maps_pass_ = retrace_ ? pass.index : 0;
         if (!(max_radius_ > 0))
-            max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * seen_radius(pass.scene);
+            max_radius_ = radius_ > 0 ? radius_ : kDefaultRadius * seen_extent(pass.scene).radius;
         if (has_maps_ && !retrace_) return;
         MapPhotons photons =
             source_->trace(pass, maps_pass_, [&] { return sample_importons(pass); });
@@ -232,8 +232,9 @@ private:
         for (int ray = 0; ray < gather_rays_; ++ray) {
             // Each ray is a separate sample. The rays of all passes are successive points of one sequence.
             Sampler of_ray = c.sampler;
-            const uint64_t place = uint64_t(pass) * uint64_t(gather_rays_) + uint64_t(ray);
-            of_ray.start(uint32_t(place), hash_combine(c.index, uint64_t(t) + (place >> 32 << 8)));
+            const uint64_t number = uint64_t(pass) * uint64_t(gather_rays_) + uint64_t(ray);
+            const uint64_t high_half = number >> 32;  // A sequence has no more than 2^32 points.
+            of_ray.start(uint32_t(number), hash_combine(c.index, uint64_t(t) + (high_half << 8)));
             const SampleContext gather = c.with(of_ray, c.sink);
             if (extend<TransportMode::Radiance>(walk, of_ray, z) && !z[t - 1].is_delta)
                 end_gather_ray(gather, t + 1, work,
@@ -302,7 +303,7 @@ private:
     /// level do not depend on each other, so the result does not depend on the threads.
     void fill_cache(const PassContext& pass) {
         constexpr uint32_t kCoarsest = 16, kFinest = 2;
-        const float size = seen_radius(pass.scene);
+        const float size = seen_extent(pass.scene).radius;
         cache_.reset(cache_error_, 0.01f * size, 0.5f * size);
         const uint64_t width = uint64_t(pass.scene.film().crop_width);
         std::vector<std::vector<IrradianceRecord>> chunks(pass.chunks(pass.pixels));

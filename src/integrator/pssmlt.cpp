@@ -31,12 +31,10 @@ protected:
 }  // namespace
 
 IntegratorEntry pssmlt_entry() {
-    std::vector<ParamInfo> params = sub_path_params();
-    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
     return {{"integrator", "pssmlt",
              "Metropolis light transport in the primary sample space of bidirectional path "
              "tracing. Unbiased.",
-             params},
+             concat({sub_path_params(), MarkovIntegrator::params()})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PssmltIntegrator>(p);
             }};

@@ -1,29 +1,13 @@
 #include "integrator/radius_params.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
-#include <vector>
 
 #include <fmt/format.h>
 
 #include "integrator/seen_extent.h"
 
 namespace etendue {
-namespace {
-
-/// The median over the image; infinite if no eye ray meets a surface.
-float pixel_radius(const Scene& scene) {
-    std::vector<SeenPoint> points = seen_points(scene);
-    if (points.empty()) return kInf;
-    const auto median = points.begin() + std::ptrdiff_t(points.size() / 2);
-    std::nth_element(
-        points.begin(), median, points.end(),
-        [](const SeenPoint& a, const SeenPoint& b) { return a.pixel_radius < b.pixel_radius; });
-    return median->pixel_radius;
-}
-
-}  // namespace
 
 std::vector<ParamInfo> radius_params(const char* doc) {
     return {{"radius", ParamKind::Float, "0", doc},
@@ -49,7 +33,8 @@ float RadiusParams::radius(const Scene& scene, uint32_t index) {
 float default_merge_radius(const Scene& scene) {
     constexpr float kPixels = 6;  // A smaller one makes caustics noisier, a larger one blurs them.
     constexpr float kOfScene = 0.01f;
-    return std::min(kPixels * pixel_radius(scene), kOfScene * seen_radius(scene));
+    const SeenExtent seen = seen_extent(scene);
+    return std::min(kPixels * seen.pixel_radius, kOfScene * seen.radius);
 }
 
 }  // namespace etendue

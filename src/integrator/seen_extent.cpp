@@ -1,6 +1,7 @@
 #include "integrator/seen_extent.h"
 
 #include <algorithm>
+#include <vector>
 
 #include "pathspace/walk.h"
 
@@ -14,7 +15,10 @@ float median(std::vector<float> values) {
     return *middle;
 }
 
-}  // namespace
+struct SeenPoint {
+    Vec3 p;
+    float pixel_radius;
+};
 
 std::vector<SeenPoint> seen_points(const Scene& scene) {
     constexpr int kRays = 64;  // each way
@@ -48,11 +52,8 @@ std::vector<SeenPoint> seen_points(const Scene& scene) {
     return points;
 }
 
-float seen_radius(const Scene& scene) {
-    constexpr float kMost = 3;
-    const float radius = scene.bounds().is_empty() ? 1 : scene.bounds().radius();
-    const std::vector<SeenPoint> points = seen_points(scene);
-    if (points.empty()) return radius;
+/// Median distance of the points from their middle.
+float median_distance(const std::vector<SeenPoint>& points) {
     Vec3 middle;
     for (const int axis : {0, 1, 2}) {
         std::vector<float> coordinates;
@@ -61,8 +62,20 @@ float seen_radius(const Scene& scene) {
     }
     std::vector<float> distances;
     for (const SeenPoint& at : points) distances.push_back(length(at.p - middle));
-    const float seen = kMost * median(std::move(distances));
-    return seen > 0 ? std::min(radius, seen) : radius;
+    return median(std::move(distances));
+}
+
+}  // namespace
+
+SeenExtent seen_extent(const Scene& scene) {
+    constexpr float kMost = 3;
+    const float radius = scene.bounds().is_empty() ? 1 : scene.bounds().radius();
+    const std::vector<SeenPoint> points = seen_points(scene);
+    if (points.empty()) return {radius, kInf};
+    std::vector<float> pixel_radii;
+    for (const SeenPoint& at : points) pixel_radii.push_back(at.pixel_radius);
+    const float seen = kMost * median_distance(points);
+    return {seen > 0 ? std::min(radius, seen) : radius, median(std::move(pixel_radii))};
 }
 
 }  // namespace etendue

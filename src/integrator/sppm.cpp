@@ -9,6 +9,7 @@
 
 #include <stdexcept>
 
+#include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/photon_mapping.h"
 #include "integrator/radius_params.h"
@@ -31,7 +32,7 @@ public:
         pass_ = pass.index;
         radius_ = radius_params_.radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory);
-        mapping_.paths().trace_light_paths(pass, {}, pass.light_paths, cache_);
+        trace_light_paths(mapping_.paths(), pass, {}, pass.light_paths, cache_);
         cache_.assemble();
         grid_.build(cache_, radius_, mapping_.shortest() - 1);
     }
@@ -109,17 +110,14 @@ private:
 };
 
 std::vector<ParamInfo> sppm_params() {
-    std::vector<ParamInfo> params = PhotonMapping::params();
-    for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
-                                            "that of a disc with the area of 36 pixels, as the "
-                                            "median pixel sees the scene, but at most 1 % of the "
-                                            "radius of what the camera sees."))
-        params.push_back(p);
-    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
-    params.push_back({"next_event", ParamKind::Bool, "true",
-                      "Whether direct light is computed by shadow rays; otherwise by photons, and "
-                      "at glossy surfaces by chance hits."});
-    return params;
+    return concat({PhotonMapping::params(),
+                   radius_params("Merging radius of the first pass, in scene units; 0: that of a "
+                                 "disc with the area of 36 pixels, as the median pixel sees the "
+                                 "scene, but at most 1 % of the radius of what the camera sees."),
+                   LightPathOptions::params(),
+                   {{"next_event", ParamKind::Bool, "true",
+                     "Whether direct light is computed by shadow rays; otherwise by photons, and "
+                     "at glossy surfaces by chance hits."}}});
 }
 
 }  // namespace
@@ -136,14 +134,13 @@ IntegratorEntry sppm_entry() {
 }
 
 IntegratorEntry ppm_entry() {
-    std::vector<ParamInfo> all = sppm_params();
-    all.push_back({"eye_paths", ParamKind::Int, "16",
-                   "Number of eye paths of each pixel, at least 1; pass i uses eye path i modulo "
-                   "eye_paths."});
     return {{"integrator", "ppm",
              "Progressive photon mapping: all passes share a fixed set of eye paths. Consistent "
              "for the light that these eye paths see; biased with a fixed radius.",
-             all},
+             concat({sppm_params(),
+                     {{"eye_paths", ParamKind::Int, "16",
+                       "Number of eye paths of each pixel, at least 1; pass i uses eye path i "
+                       "modulo eye_paths."}}})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 const int eye_paths = p.integer("eye_paths");
                 if (eye_paths < 1) throw std::runtime_error("ppm: eye_paths must be 1 or more");

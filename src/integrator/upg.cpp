@@ -15,7 +15,7 @@
 
 #include <fmt/format.h>
 
-#include "integrator/bidirectional.h"
+#include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/pair_pilot.h"
 #include "integrator/seen_extent.h"
@@ -23,6 +23,7 @@
 #include "reuse/gather_constants.h"
 #include "reuse/gather_radius.h"
 #include "reuse/gather_weight_scale.h"
+#include "reuse/next_event_count.h"
 
 namespace etendue {
 namespace {
@@ -40,7 +41,7 @@ public:
         : paths_(p, Guiding(p)), given_radius_(p.number("radius")), connects_(connects), light_(p),
           bound_(p.choice("bound", kBounds)),
           flatness_(bound_ == TrialBound::Slab ? kGatherConstants.flatness : 1.0f),
-          rule_(p.choice("drop", kRules)), clamps_(p.flag("clamp")) {
+          rule_(p.choice("drop", kRules)) {
         if (!(given_radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));
@@ -48,12 +49,16 @@ public:
 
     void learn(const LearnContext& pass) override {
         paths_.learn(pass);
-        if (connects_) learned_.weight_scale.learn(learned_.gathers);
-        learned_.roulette.learn(learned_.gathers);
-        if (pass.film.passes() == 0) return;  // see prepare()
-        learned_.radius.learn(pass.film, pass.so_far, learned_.gathers);
-        if (connects_) learned_.next_events.learn(learned_.radius.observed(), learned_.gathers);
-        density_ = PairDensity(cells(), learned_.radius.of(false), kGatherConstants.correlation);
+        // Where memory ends, all is as it was, since this is called again and would learn from its own changes.
+        Learned next = learned_;
+        if (connects_) next.weight_scale.learn(next.gathers);
+        next.roulette.learn(next.gathers);
+        if (pass.film.passes() > 0) {  // see prepare()
+            next.radius.learn(pass.film, pass.so_far, next.gathers);
+            if (connects_) next.next_events.learn(next.radius.observed(), next.gathers);
+            density_ = PairDensity(cells(), next.radius.of(false), kGatherConstants.correlation);
+        }
+        learned_ = next;
     }
     void save(LearnedState& to) const override {
         paths_.save(to);
@@ -81,20 +86,21 @@ public:
     void trace(const PassContext& pass) override {
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
-        paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                 cache_, &density_);
+        trace_light_paths(paths_, pass, counts(pass.scene, pass.light_paths), pass.light_paths,
+                          cache_, &density_);
         cache_.assemble();
         inner_grid_.build(cache_, learned_.radius.of(false));
         if (has_two_grids()) seen_grid_.build(cache_, learned_.radius.of(true));
         loaded_ = {};
     }
 
-    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
                          RenderStats& stats) const override {
-        return paths_.trace_eye_paths(c, z, counts(c[0].scene, c[0].light_paths), stats, &density_);
+        paths_.trace_eye_paths(c, counts(c[0].scene, c[0].light_paths), z, stats, &density_);
     }
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
+        const SubPath &y = work.y, &z = work.z;
         const GatherSearch search{.c = c,
                                   .n = n,
                                   .cache = cache_,
@@ -108,13 +114,14 @@ public:
                                   .work = work};
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work, &density_);
-        for (int t = 2; t <= work.z.size(); ++t) {
+        for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
-            if (!paths_.is_joinable(work.z, t)) continue;
+            if (!paths_.is_joinable(z, t)) continue;
             if (connects_) {
-                observe(c, t, paths_.add_next_events(c, n, t, work), work);  // C(1,t)
-                paths_.add_connections(c, n, t, work);                       // C(s,t), s ≥ 2
+                add_next_events(c, n, t, work);  // C(1,t)
+                const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
+                for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
+                    paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
             }
             search.for_each_pair(
                 t, [&](const GatherPair& pair) { gather(c, n, search, pair, work); });  // U(s,t)
@@ -132,8 +139,7 @@ public:
         n.pairs = {.disc = kPi * sqr(learned_.radius.of(true)),
                    .inner_disc = kPi * sqr(learned_.radius.of(false)),
                    .min_edges = 3,
-                   .rule = rule_,
-                   .clamps = clamps_};
+                   .rule = rule_};
         n.guide = paths_.guiding().guide();
         return n;
     }
@@ -157,6 +163,26 @@ private:
     /// Number of light vertices by cell, in the previous pass.
     CellCounts cells() const {
         return inner_grid_.points().is_empty() ? loaded_ : inner_grid_.points().counts();
+    }
+
+    /// Adds C(1,t), with several next events where the film point fixes z_{t-1}, and records these for later passes.
+    void add_next_events(const SampleContext& c, const TechniqueCounts& n, int t,
+                         Workspace& work) const {
+        const SubPath& z = work.z;
+        NextEventDraws draws;
+        draws.count = z[t - 1].is_fixed_by_film ? uint32_t(n.repeated_next_event) : 1;
+        for (uint32_t i = 0; i < draws.count; ++i) {
+            const auto join = join_next_event(c.scene, z, t, c.sampler, n, i);
+            const auto value = paths_.add(c, join, work, 1 / float(draws.count), i);
+            if (!join) continue;
+            NextEventDraw& draw = draws.draws[i];
+            draw = {.contribution = luminance(join->contribution), .weight = join->mis_weight};
+            if (value && draw.contribution > 0) draw.passed = luminance(*value) / draw.contribution;
+        }
+        const float pixel = c.expected_of_pixel();
+        if (z[t - 1].is_fixed_by_film && pixel > 0)
+            NextEventCount::observe(draws.span(), double(std::fabs(z.film_weight) / pixel),
+                                    GatherSums::of(work));
     }
 
     /// Adds the join U(s,t) of a pair: one of its vertices is dropped, and the other is joined to the predecessor of
@@ -185,15 +211,6 @@ private:
         c.sink.add(*join, *value * (float(r) * c.splat_scale / pair.survival));
     }
 
-    /// Records the next events of z_{t-1} for later passes.
-    static void observe(const SampleContext& c, int t, const NextEventDraws& draws,
-                        Workspace& work) {
-        const float pixel = c.expected_of_pixel();
-        if (work.z[t - 1].is_fixed_by_film && pixel > 0)
-            NextEventCount::observe(draws.span(), double(std::fabs(work.z.film_weight) / pixel),
-                                    GatherSums::of(work));
-    }
-
     /// Records a visible pair for later passes. `seen`: the transmittance of the join, divided by its survival probability
     /// in Russian roulette.
     void observe(const SampleContext& c, const GatherPair& pair, const Join& join, uint64_t trials,
@@ -215,10 +232,12 @@ private:
     /// Chooses the radius and the density of the first pass.
     void start(const PassContext& pass) {
         const PairPilot pilot = run_pair_pilot(pass, paths_, counts(pass.scene, pass.light_paths));
-        learned_.radius.start(given_radius_, connects_, seen_radius(pass.scene),
-                              pilot.pairs_per_radius2);
-        density_ = PairDensity(pilot.vertices, learned_.radius.of(false),
-                               kGatherConstants.correlation, pilot.multiple);
+        GatherRadius radius;
+        radius.start(given_radius_, connects_, seen_extent(pass.scene).radius,
+                     pilot.pairs_per_radius2);
+        density_ = PairDensity(pilot.vertices, radius.of(false), kGatherConstants.correlation,
+                               pilot.multiple);
+        learned_.radius = radius;
     }
 
     static constexpr uint64_t kVertexBytes = LightVertexCache::kVertexBytes +
@@ -232,7 +251,6 @@ private:
     TrialBound bound_;
     float flatness_;  ///< Half the height of a neighbourhood, divided by its radius.
     PairRule rule_;
-    bool clamps_;
 
     struct Learned {
         GatherRadius radius;
@@ -251,27 +269,23 @@ private:
 };
 
 std::vector<ParamInfo> upg_params() {
-    std::vector<ParamInfo> params = Bidirectional::params();
-    params.push_back(
-        {"radius", ParamKind::Float, "0",
-         "Largest distance between the vertices of a pair, in scene units; 0: such that an "
-         "eye path finds about eight pairs. upg+bdpt then chooses it from earlier "
-         "passes, for the least product of variance and time, and has a smaller one for vertices "
-         "that the lens does not see directly, by mirrors, or by clear glass."});
-    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
-    params.push_back(
-        {"bound", ParamKind::String, "slab",
-         "Directions that Bernoulli trials propose: slab (pairs lie near the tangent plane), cone "
-         "(in a ball) or box (in a ball; boxes of random numbers at diffuse vertices).",
-         true});
-    params.push_back({"drop", ParamKind::String, "gloss",
-                      "Vertex of a pair that is dropped: gloss (the one sampled from the less "
-                      "glossy vertex), eye, light, or both (one path for each).",
-                      true});
-    params.push_back({"clamp", ParamKind::Bool, "true",
-                      "Whether the weights limit the probability of a pair to 1.", true});
-    return params;
+    return concat(
+        {Bidirectional::params(),
+         {{"radius", ParamKind::Float, "0",
+           "Largest distance between the vertices of a pair, in scene units; 0: such that an "
+           "eye path finds about eight pairs. upg+bdpt then chooses it from earlier "
+           "passes, for the least product of variance and time, and has a smaller one for vertices "
+           "that the lens does not see directly, by mirrors, or by clear glass."}},
+         LightPathOptions::params(),
+         Guiding::params(),
+         {{"bound", ParamKind::String, "slab",
+           "Directions that Bernoulli trials propose: slab (pairs lie near the tangent plane), "
+           "cone (in a ball) or box (in a ball; boxes of random numbers at diffuse vertices).",
+           true},
+          {"drop", ParamKind::String, "gloss",
+           "Vertex of a pair that is dropped: gloss (the one sampled from the less "
+           "glossy vertex), eye, light, or both (one path for each).",
+           true}}});
 }
 
 }  // namespace

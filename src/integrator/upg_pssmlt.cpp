@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/markov.h"
 #include "integrator/seen_extent.h"
@@ -75,13 +76,6 @@ struct Gathering {
         for (int t = 2; t <= work.z.size(); ++t)
             if (paths.is_joinable(work.z, t)) use(t);
     }
-    void trace_eye_path(const SampleContext& c, Workspace& work) const {
-        paths.trace_eye_path(c, counts, work, &density);
-    }
-    /// Joins of bidirectional path tracing.
-    void add_sample(const SampleContext& c, Workspace& work) const {
-        paths.add_sample(c, counts, work, &density);
-    }
 
     /// Traces N_L light paths, whose random numbers are functions of `key`.
     void trace(const PassContext& pass, uint64_t key, LightMap& map, float radius) const {
@@ -119,7 +113,9 @@ double mean_pairs(const PassContext& pass, const Gathering& gathering, const Lig
         NoSink sink;
         const SampleContext c =
             whole.sample.with(sampler, sink).with_light_paths(gathering.light_paths);
-        gathering.trace_eye_path(c, work);
+        trace_eye_path(
+            gathering.paths.eye_walk(c.scene, gathering.counts, work.stats, &gathering.density), c,
+            work.z);
         const uint64_t before = work.stats.pairs;
         const GatherSearch search = gathering.search(c, map, work);
         gathering.for_each_place(work,
@@ -154,7 +150,7 @@ public:
         : PrimarySpace(
               1,
               [&gathering](int, const SampleContext& c, Workspace& work) {
-                  gathering.add_sample(c, work);
+                  add_bdpt_sample(gathering.paths, c, gathering.counts, work, &gathering.density);
               },
               map),
           gathering_(gathering), light_(light) {}
@@ -257,8 +253,7 @@ public:
         n.pairs = {.disc = kPi * sqr(radius_),
                    .inner_disc = kPi * sqr(radius_),
                    .min_edges = kShortest,
-                   .rule = PairRule::Gloss,
-                   .clamps = true};
+                   .rule = PairRule::Gloss};
         return n;
     }
     std::unique_ptr<PassSums> make_sums() const override { return std::make_unique<GatherSums>(); }
@@ -274,7 +269,7 @@ protected:
         constexpr int kRounds = 3;
         use_roulette(pass.scene.film(), pilot);
         gathered_ = light_.count(pass.scene, paths_.depth(), LightMap::kVertexBytes);
-        const float size = seen_radius(pass.scene);
+        const float size = seen_extent(pass.scene).radius;
         const float largest = kGatherConstants.largest_radius * size;
         radius_ = given_radius_ > 0 ? given_radius_
                                     : std::min(largest, size / std::sqrt(float(gathered_)));
@@ -326,24 +321,22 @@ private:
 }  // namespace
 
 IntegratorEntry upg_pssmlt_entry() {
-    std::vector<ParamInfo> params = sub_path_params();
-    for (const ParamInfo& p : MarkovIntegrator::params()) params.push_back(p);
-    params.push_back(
-        {"light_paths", ParamKind::Int, "0",
-         "Number of light paths in a pass to gather from. 0: one for each pixel, or as "
-         "many as fit into `memory`."});
-    params.push_back(
-        {"memory", ParamKind::Int, "6144", "Largest memory for light vertices, in MiB."});
-    params.push_back({"radius", ParamKind::Float, "0",
-                      "Largest distance between the vertices of a pair, in scene units; 0: chosen "
-                      "so that an eye path finds about two pairs."});
-    return {{"integrator", "upg+pssmlt",
-             "Unbiased photon gathering combined with Markov chains in the primary sample space "
-             "of bidirectional path tracing. Unbiased.",
-             params},
-            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-                return std::make_unique<UpgPssmltIntegrator>(p);
-            }};
+    return {
+        {"integrator", "upg+pssmlt",
+         "Unbiased photon gathering combined with Markov chains in the primary sample space "
+         "of bidirectional path tracing. Unbiased.",
+         concat({sub_path_params(),
+                 MarkovIntegrator::params(),
+                 {{"light_paths", ParamKind::Int, "0",
+                   "Number of light paths in a pass to gather from. 0: one for each pixel, or "
+                   "as many as fit into `memory`."},
+                  {"memory", ParamKind::Int, "6144", "Largest memory for light vertices, in MiB."},
+                  {"radius", ParamKind::Float, "0",
+                   "Largest distance between the vertices of a pair, in scene units; 0: chosen "
+                   "so that an eye path finds about two pairs."}}})},
+        [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+            return std::make_unique<UpgPssmltIntegrator>(p);
+        }};
 }
 
 }  // namespace etendue

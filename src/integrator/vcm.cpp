@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "integrator/bidirectional.h"
+#include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/radius_params.h"
 #include "reuse/gather.h"
@@ -74,28 +74,30 @@ public:
         radius_ = radius_params_.radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
                      paths_.guiding().guide());
-        paths_.trace_light_paths(pass, counts(pass.scene, pass.light_paths), pass.light_paths,
-                                 cache_, &density_);
+        trace_light_paths(paths_, pass, counts(pass.scene, pass.light_paths), pass.light_paths,
+                          cache_, &density_);
         cache_.assemble();
         if (merges_) grid_.build(cache_, reach() * radius_, first_merge());
         loaded_ = {};
     }
 
-    bool trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
                          RenderStats& stats) const override {
-        return paths_.trace_eye_paths(c, z, counts(c[0].scene, c[0].light_paths), stats, &density_);
+        paths_.trace_eye_paths(c, counts(c[0].scene, c[0].light_paths), z, stats, &density_);
     }
     void sample(const SampleContext& c, Workspace& work) const override {
         const TechniqueCounts n = counts(c.scene, c.light_paths);
+        const SubPath &y = work.y, &z = work.z;
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
-        paths_.trace_eye_path(c, n, work, &density_);
-        for (int t = 2; t <= work.z.size(); ++t) {
+        for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
-            if (!paths_.is_joinable(work.z, t)) continue;
+            if (!paths_.is_joinable(z, t)) continue;
             if (connects_) {
-                paths_.add_next_events(c, n, t, work);  // C(1,t)
-                paths_.add_connections(c, n, t, work);  // C(s,t), s ≥ 2
+                paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
+                const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
+                for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
+                    paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
             }
             if (is_exact_)
                 gather(c, n, t, work);  // U(s,t)
@@ -212,37 +214,35 @@ private:
     LightVertexGrid grid_;
 };
 
+std::vector<ParamInfo> vcm_params() {
+    return concat(
+        {Bidirectional::params(),
+         radius_params("Merging radius of the first pass, in scene units; 0: that of a disc with "
+                       "the area of 36 pixels, as the median pixel sees the scene, but at most 1 % "
+                       "of the radius of what the camera sees. Eye vertices that the film point "
+                       "does not determine merge within 0.3 times this radius."),
+         LightPathOptions::params(),
+         {{"continuation", ParamKind::Float, "0.25",
+           "Probability, in (0, 1], with which an eye path continues after its first vertex that "
+           "is not a mirror or clear glass. Merges at this vertex make most of the image, so the "
+           "rest of the path is worth less than its cost. The MIS weights know this probability. "
+           "Has no effect with exact=true or merges=false."}},
+         Guiding::params(),
+         {{"connections", ParamKind::Bool, "true",
+           "Whether sub-paths are connected to each other, to emitters and to the lens.", true},
+          {"merges", ParamKind::Bool, "true", "Whether vertices are merged.", true},
+          {"exact", ParamKind::Bool, "false",
+           "Whether merges form true paths, with a shadow ray and the BSDFs at both ends; the "
+           "probability of a pair is still that of a disc [Bekaert et al. 2003].",
+           true}}});
+}
+
 }  // namespace
 
 IntegratorEntry vcm_entry() {
-    std::vector<ParamInfo> params = Bidirectional::params();
-    for (const ParamInfo& p : radius_params("Merging radius of the first pass, in scene units; 0: "
-                                            "that of a disc with the area of 36 pixels, as the "
-                                            "median pixel sees the scene, but at most 1 % of the "
-                                            "radius of what the camera sees. Eye vertices that the "
-                                            "film point does not determine merge within 0.3 times "
-                                            "this radius."))
-        params.push_back(p);
-    for (const ParamInfo& p : LightPathOptions::params()) params.push_back(p);
-    params.push_back(
-        {"continuation", ParamKind::Float, "0.25",
-         "Probability, in (0, 1], with which an eye path continues after its first vertex that is "
-         "not a mirror or clear glass. Merges at this vertex make most of the image, so the rest "
-         "of "
-         "the path is worth less than its cost. The MIS weights know this probability. Has no "
-         "effect with exact=true or merges=false."});
-    params.push_back({"connections", ParamKind::Bool, "true",
-                      "Whether sub-paths are connected to each other, to emitters and to the lens.",
-                      true});
-    for (const ParamInfo& p : Guiding::params()) params.push_back(p);
-    params.push_back({"merges", ParamKind::Bool, "true", "Whether vertices are merged.", true});
-    params.push_back(
-        {"exact", ParamKind::Bool, "false",
-         "Whether merges form true paths, with a shadow ray and the BSDFs at both ends; the "
-         "probability of a pair is still that of a disc [Bekaert et al. 2003].",
-         true});
     return {{"integrator", "vcm",
-             "Vertex connection and merging. Consistent; biased with a fixed radius.", params},
+             "Vertex connection and merging. Consistent; biased with a fixed radius.",
+             vcm_params()},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<VcmIntegrator>(p);
             }};

@@ -34,6 +34,7 @@ public:
     Transform inverse() const;
 
     const Matrix& matrix() const { return m_; }
+    const Matrix& inverse_matrix() const { return inv_; }
     double determinant3() const;  ///< Of the upper 3×3 part; negative where handedness changes.
     bool is_invertible() const { return invertible_; }
     bool is_identity() const;

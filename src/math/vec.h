@@ -1,6 +1,7 @@
 #pragma once
 // Two- and three-component vectors of float; plain data, all operations inline.
 
+#include <algorithm>
 #include <cmath>
 
 namespace etendue {
@@ -81,6 +82,11 @@ constexpr Vec3 min(Vec3 a, Vec3 b) {
 }
 constexpr Vec3 max(Vec3 a, Vec3 b) {
     return {a.x > b.x ? a.x : b.x, a.y > b.y ? a.y : b.y, a.z > b.z ? a.z : b.z};
+}
+
+/// The largest magnitude of a coordinate.
+inline float largest_coordinate(Vec3 a) {
+    return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)});
 }
 
 /// √max(x, 0): negative x are results of cancellation.

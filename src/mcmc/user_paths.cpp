@@ -39,8 +39,7 @@ float size_around(const Scene& scene, std::span<const Vec3> points) {
 float rounding_of(std::span<const Vec3> points) {
     constexpr float kUlps = 8 * std::numeric_limits<float>::epsilon();
     float most = 0;
-    for (const Vec3& p : points)
-        most = std::max({most, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+    for (const Vec3& p : points) most = std::max(most, largest_coordinate(p));
     return kUlps * most;
 }
 

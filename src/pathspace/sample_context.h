@@ -28,8 +28,6 @@ struct Workspace {
     SubPath pair;                    ///< The stored light path of a merge or gather.
     Vertex scratch;
     std::vector<float> masses;  ///< Of light vertices, for one eye vertex.
-    /// Whether z is the eye sub-path of the sample that is to be made, see Integrator::trace_eye_paths().
-    bool has_eye_path = false;
     bool is_observed =
         false;  ///< Whether whole sub-paths must be restored, for a ContributionObserver.
     RenderStats stats;

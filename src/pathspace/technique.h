@@ -82,7 +82,8 @@ struct PairModel {
     /// Least m of an x_m where vertices are merged. 2: next events make all direct light, with less noise.
     int first_merge = 1;
     PairRule rule = PairRule::Gloss;
-    bool clamps = true;  ///< Whether weights clamp probabilities to 1 [Qin et al. 2015, eq. 24].
+    /// Whether weights clamp probabilities to 1 [Qin et al. 2015, eq. 24]. An estimator that divides by them does not.
+    bool clamps = true;
 
     float disc_of(bool is_fixed_by_film) const { return is_fixed_by_film ? disc : inner_disc; }
     /// Approximate probability of finding a pair whose dropped vertex has the area density `pdf` [ibid., eq. 24].

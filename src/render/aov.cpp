@@ -5,10 +5,9 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
+#include "film/thread_arena.h"
 #include "pathspace/walk.h"
-#include "system/threads.h"
 
 namespace etendue {
 namespace {
@@ -57,7 +56,7 @@ std::vector<std::vector<Rgb>> average_first_hits(const Scene& scene, size_t laye
                                                  const FirstHitValue& value) {
     std::vector<std::vector<Rgb>> images(layers, std::vector<Rgb>(scene.film().pixel_count()));
     const Film film(scene.film(), scene.filter());
-    tbb::task_arena arena(thread_count(threads));
+    ThreadArena arena(threads);
     arena.execute([&] {
         tbb::parallel_for(0, scene.film().crop_height, [&](int row) {
             SubPath z;

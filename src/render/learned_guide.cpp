@@ -6,12 +6,11 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
+#include "film/thread_arena.h"
 #include "math/hash.h"
 #include "render/aov.h"
 #include "render/renderer.h"
-#include "system/threads.h"
 
 namespace etendue {
 namespace {
@@ -37,7 +36,7 @@ GuidedWalks guided_walks(const std::string& method) {
 
 IntegratorParams guided_params(IntegratorSpec& spec) {
     std::string& guide = spec.params["guide"];
-    if (guide != "random" && guide != "hp02") guide = "on";
+    if (guide != "hp02") guide = "on";
     return {spec, integrator_entry(spec.name).info};
 }
 
@@ -47,7 +46,7 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
     Guiding guiding(params);
     const DepthOptions depth = DepthOptions::from(params);
     const Film film(scene.film(), scene.filter());
-    tbb::task_arena arena(thread_count(threads));
+    ThreadArena arena(threads);
     const auto for_each = [&](uint64_t count, const PassContext::Task& task) {
         tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
             Sampler sampler(SamplerKind::Independent, seed);

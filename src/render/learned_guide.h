@@ -43,7 +43,7 @@ struct GuidedPlace {
 
 class LearnedGuide {
 public:
-    /// Trains as a rendering by `spec` with guide=on (or guide=random, if it has this) does before its first pass. Throws
+    /// Trains as a rendering by `spec` with guide=on (or guide=hp02, if it has this) does before its first pass. Throws
     /// std::runtime_error where the method has no guide, or the scene nothing to learn from.
     LearnedGuide(const Scene& scene, IntegratorSpec spec, uint64_t seed, int threads);
 

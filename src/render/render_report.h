@@ -9,6 +9,7 @@
 #include "image/image.h"
 #include "render/aov.h"
 #include "render/renderer.h"
+#include "system/make_room.h"
 
 namespace etendue {
 
@@ -22,7 +23,9 @@ struct PassLog {
         for (const double s : more_seconds) seconds.push_back(s), seconds_before_ += s;
         for (const uint64_t p : more_pairs) pairs.push_back(p), pairs_before_ += p;
     }
+    /// Appends a pass. Where there is no memory for it, the next one has its numbers, too.
     void add(double seconds_so_far, uint64_t pairs_so_far) {
+        make_room(seconds), make_room(pairs);
         seconds.push_back(seconds_so_far - seconds_before_);
         pairs.push_back(pairs_so_far - pairs_before_);
         seconds_before_ = seconds_so_far;

@@ -1,5 +1,4 @@
 #include "render/renderer.h"
-#include "system/threads.h"
 
 #include <algorithm>
 #include <array>
@@ -14,13 +13,12 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
+#include "film/thread_arena.h"
 #include "render/statistics_section.h"
 #include "sampler/pilot_seed.h"
 #include "system/available_memory.h"
 #include "system/failure.h"
-#include "system/memory_limit.h"
 
 namespace etendue {
 namespace {
@@ -191,7 +189,6 @@ double typical_radiance(const Scene& scene) {
 /// threads creates its own. TBB uses the smallest limit of all global_controls; kRoom leaves room for other renderers.
 std::unique_ptr<tbb::global_control> allow_threads(int threads) {
     constexpr size_t kRoom = 256;
-    make_room_for_threads(threads);
     if (threads <= tbb::info::default_concurrency()) return nullptr;
     return std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                  std::max(size_t(threads), kRoom));
@@ -236,7 +233,7 @@ const FilmGeometry& fitting_film(const Scene& scene, const RenderSettings& setti
 }  // namespace
 
 struct Renderer::Workers {
-    explicit Workers(int threads) : allowed(allow_threads(threads)), arena(thread_count(threads)) {}
+    explicit Workers(int threads) : allowed(allow_threads(threads)), arena(threads) {}
 
     /// Returns the sum of all workers' statistics and resets them.
     RenderStats take_stats() {
@@ -257,7 +254,7 @@ struct Renderer::Workers {
     }
 
     std::unique_ptr<tbb::global_control> allowed;
-    tbb::task_arena arena;
+    ThreadArena arena;
     tbb::enumerable_thread_specific<Workspace> spaces;
 };
 
@@ -312,9 +309,10 @@ bool Renderer::sample_again(uint64_t index, Workspace& work, ContributionSink& s
     work.sums = integrator_->make_sums();
     Sampler sampler(settings_.sampler, place.seed);
     sampler.start(place.pass, index);
-    integrator_->sample({scene_, film_, film_.expected(), index, index / kChunk, light_paths_,
-                         splat_scale, sampler, sink},
-                        work);
+    const SampleContext c{scene_,       film_,       film_.expected(), index, index / kChunk,
+                          light_paths_, splat_scale, sampler,          sink};
+    integrator_->trace_eye_paths({&c, 1}, {&work.z, 1}, work.stats);
+    integrator_->sample(c, work);
     return true;
 }
 
@@ -366,7 +364,6 @@ private:
     Workspace& workspace() const {
         Workspace& work = r_.workers_->spaces.local();
         work.is_observed = r_.settings_.observer != nullptr;
-        work.has_eye_path = false;
         if (!work.sums) work.sums = r_.integrator_->make_sums();
         return work;
     }
@@ -404,19 +401,17 @@ private:
             pass_.go_on();
             work_.stats.time_factor = 1;
             work_.eye_paths.resize(kWalksInTurn);
-            const bool has_eye_paths = integrator.trace_eye_paths(
+            integrator.trace_eye_paths(
                 contexts_, std::span(work_.eye_paths).first(contexts_.size()), work_.stats);
             for (size_t i = 0; i < contexts_.size(); ++i) {
                 const SampleContext& c = contexts_[i];
                 pass_.go_on();
                 work_.stats.time_factor = RenderStats::time_factor_of(c.index);
-                if (has_eye_paths) std::swap(work_.z, work_.eye_paths[i]);
-                work_.has_eye_path = has_eye_paths;
+                std::swap(work_.z, work_.eye_paths[i]);
                 sink_.begin(c.index, c.light_paths);
                 integrator.sample(c, work_);
                 sink_.end();
             }
-            work_.has_eye_path = false;
         }
 
     private:
@@ -697,6 +692,11 @@ const ErrorEstimate& RecentError::update(const Progress& progress) {
     return last_;
 }
 
+std::string Renderer::place_of_failure() const {
+    return pass_failed_ ? fmt::format("pass {} failed", film_.passes() + 1)
+                        : fmt::format("after pass {}", film_.passes());
+}
+
 int Renderer::round_size(const RenderLimits& limits) const {
     const uint64_t passes = film_.passes(), all = kMostPasses - settings_.first_pass,
                    end =
@@ -722,7 +722,7 @@ StopReason Renderer::run(const RenderLimits& limits,
     const double before = seconds_;
     const Ranks& ranks = *settings_.ranks;
     check_limits(limits, settings_.first_pass);
-    ended_together_ = false;
+    ended_together_ = pass_failed_ = false;
     const auto end = [&](StopReason reason) {
         ended_together_ = true;
         return reason;
@@ -775,7 +775,7 @@ StopReason Renderer::run(const RenderLimits& limits,
             if (const auto reason = reached(limits, found)) return end(*reason);
         }
         if (round.failure) {
-            ended_together_ = true;
+            ended_together_ = pass_failed_ = true;
             std::rethrow_exception(round.failure);
         }
         if (round.is_incomplete) return end(StopReason::Interrupted);

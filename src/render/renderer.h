@@ -131,6 +131,8 @@ public:
     /// Whether the last run() has ended in all processes. Otherwise it has thrown an exception in this one alone: the others
     /// wait for it in vain, so it must end.
     bool ended_together() const { return ended_together_ || settings_.ranks->count() == 1; }
+    /// Where the last run() has thrown an exception: "pass 4 failed" or, if it was no pass that threw it, "after pass 3".
+    std::string place_of_failure() const;
 
     const Film& film() const { return film_; }
     uint64_t light_paths() const { return light_paths_; }  ///< Number of light paths in a pass.
@@ -188,7 +190,7 @@ private:
     bool is_prepared_ = false;    ///< Whether Integrator::prepare() has followed the last of them.
     std::optional<uint32_t> kept_pass_;
     int last_rank_ = -1;  ///< The process whose state is that after the last pass; -1: of each.
-    bool ended_together_ = true;
+    bool ended_together_ = true, pass_failed_ = false;  ///< In the last run().
     RenderStats stats_;
     double seconds_ = 0;
 };

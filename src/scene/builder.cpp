@@ -6,17 +6,15 @@
 #include <map>
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include "description/resolve_file.h"
 #include "film/filter.h"
+#include "film/thread_arena.h"
 #include "scene/model_builder.h"
 #include "scene/plugin_lookup.h"
 #include "scene/preload.h"
 #include "scene/settings.h"
 #include "scene/shape_registry.h"
-#include "system/memory_limit.h"
-#include "system/threads.h"
 
 namespace etendue {
 
@@ -565,10 +563,8 @@ private:
 };
 
 Scene build_scene(const SceneDescription& description, const BuildOptions& options) {
-    const int threads = thread_count(options.threads);
-    make_room_for_threads(threads);
     // Embree, too, uses the threads of the arena that calls it.
-    tbb::task_arena arena(threads);
+    ThreadArena arena(options.threads);
     return arena.execute([&] { return SceneBuilder(description, options).build(); });
 }
 

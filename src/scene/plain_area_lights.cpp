@@ -1,7 +1,6 @@
 #include "scene/plain_area_lights.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <set>
 
@@ -27,10 +26,7 @@ std::optional<float> radius_of(const Shape& shape) {
 
 float distance_of_back(const Shape& front) {
     const Bounds3 b = front.bounds();
-    float largest = 0;
-    for (const Vec3 corner : {b.lo, b.hi})
-        largest =
-            std::max({largest, std::fabs(corner.x), std::fabs(corner.y), std::fabs(corner.z)});
+    const float largest = std::max(largest_coordinate(b.lo), largest_coordinate(b.hi));
     // Small shapes far from the origin are turned inside out by more than this.
     const float distance = std::min(kRelativeDistance * largest, kMostOfSize * length(b.hi - b.lo));
     const std::optional<float> radius = radius_of(front);

@@ -10,31 +10,29 @@
 namespace etendue {
 namespace {
 
-/// Largest magnitude among the terms of the coordinates of `t`.point(p).
-float largest_term(const Transform& t, Vec3 p) {
+/// Largest magnitude among the terms of the coordinates of the point to which `m` maps `p`.
+float largest_term(const Transform::Matrix& m, Vec3 p) {
     double most = 0;
-    for (int i = 0; i < 3; ++i) {
-        const auto& row = t.matrix()[size_t(i)];
+    for (size_t i = 0; i < 3; ++i) {
+        const auto& row = m[i];
         most = std::max({most, std::fabs(row[0] * p.x), std::fabs(row[1] * p.y),
                          std::fabs(row[2] * p.z), std::fabs(row[3])});
     }
     return float(most);
 }
 
-float largest_coordinate(Vec3 p) {
-    return std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
-}
-
-/// Transforms the geometry of an instance's shape to world space. `error`: see Accelerator::instance_error().
-void transform_geometry(const Transform& t, float error, SurfaceGeometry& g) {
+/// Transforms the geometry of an instance's shape to world space.
+void transform_geometry(const Accelerator::Instance& instance, SurfaceGeometry& g) {
+    const Transform& t = instance.to_world;
     const float side = t.determinant3() < 0 ? -1.0f : 1.0f;
     g.p = t.point(g.p);
     const Vec3 ng = t.normal(g.ng);
     const float to_world = 1 / length(ng);  // of distances along the normal
     // Embree transforms rays in float, with terms that may be larger than the coordinates.
     constexpr float kErrors = 0x1p-21f;
-    const float reach = largest_coordinate(g.p) + largest_coordinate(t.point({0, 0, 0}));
-    g.slack = (g.slack + kErrors * largest_term(t.inverse(), g.p) + error * reach) * to_world;
+    const float reach = largest_coordinate(g.p) + instance.translation;
+    g.slack = (g.slack + kErrors * largest_term(t.inverse_matrix(), g.p) + instance.error * reach) *
+              to_world;
     g.ng = ng * (to_world * side);
     g.ns = normalize(t.normal(g.ns)) * side;
     g.dpdu = t.vector(g.dpdu);
@@ -84,9 +82,7 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
         g = mesh->TriangleMesh::surface(at.prim, at.u, at.v, s.needs_tangents);
     else
         g = s.shape->surface(at.prim, at.u, at.v, s.needs_tangents);
-    if (at.instance != kNoInstance)
-        transform_geometry(accelerator_.instance_transform(at.instance),
-                           accelerator_.instance_error(at.instance), g);
+    if (at.instance != kNoInstance) transform_geometry(accelerator_.instance(at.instance), g);
     return g;
 }
 

@@ -172,23 +172,20 @@ std::unique_ptr<Sensor> make(const Params& params, const SensorContext& context,
     return make_perspective(camera, rigid(params), context.filter_radius);
 }
 
-std::vector<ParamInfo> shared_params(std::vector<ParamInfo> more) {
-    std::vector<ParamInfo> all = {
-        {"to_world", ParamKind::Transform, "identity",
-         "Camera-to-world transform; the camera looks along +z, with +x to the left and +y up."}};
-    const std::vector<ParamInfo> view = view_params("that of the film");
-    all.insert(all.end(), view.begin(), view.end());
-    more.insert(more.begin(),
-                {{"principal_point_offset_x", ParamKind::Float, "0",
-                  "Shift of the image centre, as a fraction of the width."},
-                 {"principal_point_offset_y", ParamKind::Float, "0",
-                  "Shift of the image centre, as a fraction of the height."},
-                 {"near_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
-                 {"far_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
-                 {"shutter_open", ParamKind::Float, "0", "Accepted; nothing moves."},
-                 {"shutter_close", ParamKind::Float, "0", "Accepted; nothing moves."}});
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+std::vector<ParamInfo> shared_params(const std::vector<ParamInfo>& more) {
+    return concat(
+        {{{"to_world", ParamKind::Transform, "identity",
+           "Camera-to-world transform; the camera looks along +z, with +x to the left and +y up."}},
+         view_params("that of the film"),
+         {{"principal_point_offset_x", ParamKind::Float, "0",
+           "Shift of the image centre, as a fraction of the width."},
+          {"principal_point_offset_y", ParamKind::Float, "0",
+           "Shift of the image centre, as a fraction of the height."},
+          {"near_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
+          {"far_clip", ParamKind::Float, "", "Accepted; rays are not clipped."},
+          {"shutter_open", ParamKind::Float, "0", "Accepted; nothing moves."},
+          {"shutter_close", ParamKind::Float, "0", "Accepted; nothing moves."}},
+         more});
 }
 
 }  // namespace

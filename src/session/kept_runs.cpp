@@ -4,19 +4,15 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
+#include "film/thread_arena.h"
 #include "session/file_version.h"
 #include "session/run.h"
 #include "session/run_record.h"
 #include "system/failure.h"
-#include "system/threads.h"
 
 namespace etendue {
 namespace {
-
-/// Files take at most this share of the time of a run.
-constexpr double kMostForFiles = 0.01;
 
 constexpr const char* kTooMany = "too many files wait to be written; try again";
 
@@ -44,7 +40,7 @@ RenderRequest request_of(const CheckpointHeader& header) {
 
 void Session::wait_for_next_file(Run& run, double seconds) const {
     using Clock = std::chrono::steady_clock;
-    const std::chrono::duration<double> wait(std::max(keep_every_, seconds / kMostForFiles));
+    const std::chrono::duration<double> wait(pace_.wait_after(seconds));
     run.next_file = Clock::now() + std::chrono::duration_cast<Clock::duration>(wait);
 }
 
@@ -174,7 +170,7 @@ std::shared_ptr<Session::Run> Session::load_run(const std::string& name) {
     s.state = RunState::Stopped;
     const bool is_own = load_record(file.sections(), s);
     const bool fits = technique_images_fit(loaded->scene, header.technique_depth);
-    tbb::task_arena arena(thread_count(threads_));
+    ThreadArena arena(threads_);
     try {
         if (!fits)
             throw std::runtime_error(

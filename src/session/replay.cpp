@@ -145,9 +145,10 @@ Replay replay(const Scene& scene, const ReplayRequest& request) {
         recorder.begin(pass, is_for_splats, splat_scale, h);
         sampler.start(pass, index);
         // Chunks matter only to integrators that share light paths.
-        integrator->sample(
-            {scene, film, film.expected(), index, 0, light_paths, splat_scale, sampler, recorder},
-            work);
+        const SampleContext c{scene,       film,        film.expected(), index,   0,
+                              light_paths, splat_scale, sampler,         recorder};
+        integrator->trace_eye_paths({&c, 1}, {&work.z, 1}, work.stats);
+        integrator->sample(c, work);
     };
     for (uint32_t i = 0; i < request.passes && has_time(); ++i, ++result.passes) {
         const uint32_t pass = request.first_pass + i;

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "system/descriptor.h"
+#include "system/failure.h"
 
 namespace etendue {
 namespace {
@@ -57,8 +58,8 @@ std::vector<KeptRun> RunFolder::list(const LoadedScene& scene) const {
             file.run.integrator = header.integrator;
             file.run.seed = header.ranges.front().seed;
             file.run.passes = header.passes();
-        } catch (const std::exception& e) {
-            file.run.problem = e.what();
+        } catch (...) {
+            file.run.problem = caught();
         }
         found.push_back(std::move(file));
     }

@@ -143,7 +143,7 @@ Places places_of(const Scene& scene) {
     const auto count = uint32_t(accelerator.instance_count());
     const auto for_each = [&](const auto& use) {
         for (uint32_t i = 0; i < count; ++i) {
-            const auto [first, end] = accelerator.instance_shapes(i);
+            const auto [first, end] = accelerator.instance(i).shapes;
             for (uint32_t shape = first; shape < end; ++shape) use(i, shape);
         }
     };
@@ -158,7 +158,7 @@ Places places_of(const Scene& scene) {
         const size_t step = std::max((instances[shape] + kMostPlaces - 1) / kMostPlaces,
                                      (all + kMostPlacesInAll - 1) / kMostPlacesInAll);
         if (seen[shape]++ % step == 0)
-            places.of[shape].push_back(to_place(accelerator.instance_transform(i)));
+            places.of[shape].push_back(to_place(accelerator.instance(i).to_world));
     });
     for (size_t shape = 0; shape < places.first_of_groups; ++shape)
         places.of[shape] = {to_place(Transform())};

@@ -4,18 +4,17 @@
 
 #include <algorithm>
 #include <future>
-#include <new>
 #include <stdexcept>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <tbb/task_arena.h>
 
+#include "film/thread_arena.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
 #include "session/run.h"
+#include "system/failure.h"
 #include "system/memory_limit.h"
-#include "system/threads.h"
 
 namespace etendue {
 namespace {
@@ -80,7 +79,7 @@ IntervalKind interval_kind(Estimator estimator, SamplerKind sampler, bool has_gr
 Session::Session(Load load, int threads, RunKeeping keeping)
     : load_(std::move(load)), threads_(threads),
       folder_(keeping.folder.empty() ? std::nullopt : std::optional<RunFolder>(keeping.folder)),
-      keep_every_(keeping.every) {
+      pace_(WritingPace::of_checkpoints(keeping.every)) {
     thread_ = std::thread([this] { work(); });
     try {
         loader_ = std::thread([this] { load_scenes(); });
@@ -118,12 +117,8 @@ template <class Work>
 void Session::guard(Run& run, const Work& work) noexcept {
     try {
         work();
-    } catch (const std::bad_alloc&) {
-        finish_turn(run, RunState::Failed, "not enough memory");
-    } catch (const std::exception& e) {
-        finish_turn(run, RunState::Failed, e.what());
     } catch (...) {
-        finish_turn(run, RunState::Failed, "unknown failure");
+        finish_turn(run, RunState::Failed, caught());
     }
 }
 
@@ -145,8 +140,7 @@ void Session::load_scenes() {
 }
 
 void Session::load_scene() {
-    std::string error;
-    try {
+    std::string error = failure_of([&] {
         renew_memory_limit();
         auto scene = std::make_shared<const LoadedScene>(load_());
         const std::lock_guard lock(mutex_);
@@ -154,13 +148,7 @@ void Session::load_scene() {
         for (const auto& run : runs_) request_stop(run);
         scene_.store(std::move(scene));
         ++scene_version_;
-    } catch (const std::bad_alloc&) {
-        error = "not enough memory";
-    } catch (const std::exception& e) {
-        error = e.what();
-    } catch (...) {
-        error = "the scene cannot be loaded";
-    }
+    });
     if (!error.empty()) {
         const std::lock_guard lock(mutex_);
         load_error_.swap(error);
@@ -309,20 +297,14 @@ bool Session::finish_seed(Run& run) {
     return !is_last;
 }
 
-void Session::finish_turn(Run& run, RunState state, const char* message) noexcept {
+void Session::finish_turn(Run& run, RunState state, std::string message) noexcept {
     // The last image of a run is shown whatever the budget, since no other follows.
     if (state != RunState::Rendering) show(run);
-    std::string text;
-    try {
-        text = message;
-    } catch (const std::bad_alloc&) {
-        text = "no memory";  // short enough to need none
-    }
     {
         const std::lock_guard lock(mutex_);
         if (turn_of_ == run.status.id) turn_of_ = 0;
         if (state != RunState::Rendering) run.status.state = state;
-        run.status.message.swap(text);
+        run.status.message.swap(message);
     }
     if (state != RunState::Rendering) keep(run);
     changed();
@@ -412,7 +394,7 @@ void Session::show(Run& run) noexcept {
     const double before = process_cpu_seconds();
     run.is_wanted = false;
     try {
-        tbb::task_arena arena(thread_count(threads_));
+        ThreadArena arena(threads_);
         if (const auto last = run.snapshot.load();
             !last || last->passes != passes || run.shown_seeds != run.seeds.count()) {
             const std::shared_ptr<Snapshot> snapshot = run.pool.take();
@@ -563,14 +545,9 @@ void Session::remove(int id) {
 void Session::write(const std::shared_ptr<const Snapshot>& snapshot, const std::string& file,
                     bool replaces, const std::function<void(const Saved&)>& done) {
     const bool is_taken = writer_.post([snapshot, file, replaces, done] {
-        try {
-            etendue::save(*snapshot, file, replaces);
-        } catch (const std::bad_alloc&) {
-            return done({"not enough memory", 0});
-        } catch (const std::exception& e) {
-            return done({e.what(), 0});
-        }
-        done({{}, snapshot->passes});
+        std::string error = failure_of([&] { etendue::save(*snapshot, file, replaces); });
+        const uint64_t passes = error.empty() ? snapshot->passes : 0;
+        done({std::move(error), passes});
     });
     if (!is_taken) done({"too many images wait to be saved; try again", 0});
 }
@@ -687,16 +664,12 @@ void Session::replay_last(int id, uint64_t pixel, size_t most_paths,
     }();
     ask([run, pixel, most_paths, done = std::move(done)] {
         Replay replay;
-        try {
+        const std::string error = failure_of([&] {
             if (run->totals) throw std::runtime_error("the run can only be looked at");
             if (!run->renderer) throw std::runtime_error("no pass is finished yet");
             replay = etendue::replay_last(*run->renderer, pixel, most_paths);
-        } catch (const std::bad_alloc&) {
-            return done({}, "not enough memory");
-        } catch (const std::exception& e) {
-            return done({}, e.what());
-        }
-        done(replay, {});
+        });
+        done(replay, error);
     });
 }
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "render/render_request.h"
+#include "render/writing_pace.h"
 #include "session/loaded_scene.h"
 #include "session/replay.h"
 #include "session/run_folder.h"
@@ -218,7 +219,7 @@ private:
     /// earlier ones stay.
     void show(Run& run) noexcept;
     void fill(Run& run, Snapshot& snapshot);
-    void finish_turn(Run& run, RunState state, const char* message = "") noexcept;
+    void finish_turn(Run& run, RunState state, std::string message = {}) noexcept;
     /// Keeps the image of a finished seed. Returns whether another seed follows.
     bool finish_seed(Run& run);
     /// Shows the last image of a run that is to be stopped.
@@ -248,7 +249,7 @@ private:
     const Load load_;
     const int threads_;
     const std::optional<RunFolder> folder_;
-    const double keep_every_;
+    const WritingPace pace_;  ///< Of the files of a run.
     SharedSlot<const LoadedScene> scene_;
     std::atomic<uint64_t> scene_version_{0}, kept_version_{0};
     std::atomic<uint64_t> revision_{1};

@@ -30,7 +30,7 @@ Estimate estimate(const Film::Moments& m, int channel, double n) {
 /// Calls use(pixel, channel) for all, in parallel.
 template <class Use>
 void for_each_channel(uint64_t pixels, const Use& use) {
-    for_film_chunks(pixels, [&](uint64_t, uint64_t begin, uint64_t end) {
+    for_film_chunks(pixels, [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i)
             for (int c = 0; c < 3; ++c) use(i, c);
     });

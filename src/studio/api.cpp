@@ -1,6 +1,5 @@
 #include "studio/api.h"
 
-#include <algorithm>
 #include <array>
 #include <filesystem>
 
@@ -363,8 +362,7 @@ void Api::probe(const Request& request, const Done& done) {
         }
         const Vec3 origin = to_vec(body.value("origin", json()), "origin"),
                    direction = to_vec(body.value("direction", json()), "direction");
-        const float largest =
-            std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
+        const float largest = largest_coordinate(direction);
         if (!(largest > 0)) throw ApiError(422, "\"direction\" must not be zero");
         // The square of a small number may be zero.
         const Vec3 d =

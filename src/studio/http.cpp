@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "system/failure.h"
+
 namespace etendue {
 namespace {
 
@@ -65,8 +67,8 @@ Reply Reply::current_exception() {
         return error(e.status, e.what());
     } catch (const std::bad_alloc&) {
         return error(503, "not enough memory");
-    } catch (const std::exception& e) {
-        return error(422, e.what());
+    } catch (...) {
+        return error(422, caught());
     }
 }
 

@@ -101,10 +101,6 @@ std::optional<uint64_t> address_space(const std::string& proc) {
     return entry(proc + "/self/status", "VmSize:");
 }
 
-std::optional<uint64_t> running_threads(const std::string& proc) {
-    return entry(proc + "/self/status", "Threads:");
-}
-
 std::optional<uint64_t> available_memory(const std::string& proc, const std::string& cgroup,
                                          int sharers) {
     std::optional<uint64_t> least = entry(proc + "/meminfo", "MemAvailable:");

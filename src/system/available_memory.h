@@ -22,8 +22,6 @@ std::optional<uint64_t> available_memory(const std::string& proc, const std::str
 std::optional<uint64_t> memory_for_data(const std::string& proc);
 /// Bytes of address space that this process has.
 std::optional<uint64_t> address_space(const std::string& proc);
-/// Threads that this process has now.
-std::optional<uint64_t> running_threads(const std::string& proc);
 
 /// "1.5 GiB", "12 MiB", ...
 std::string format_bytes(uint64_t bytes);

@@ -1,6 +1,7 @@
 #include "system/memory_limit.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include <pthread.h>
 #include <sys/resource.h>
 
 #include <fmt/format.h>
@@ -40,16 +42,17 @@ struct Limit {
     std::mutex mutex;
     Kind kind = Kind::None;
     rlim_t of_system = RLIM_INFINITY;  ///< Before there was another.
-    uint64_t bytes = 0;                ///< Includes the stacks of the `begun` threads.
+    uint64_t bytes = 0;                ///< Includes the stacks of the `begun` workers.
     int begun = 0;
-    int threads = 0;  ///< Most for which there is room.
-    int sharers = 1;  ///< Processes that divide what is available.
+    int workers = 0;             ///< Most for which there is room.
+    int sharers = 1;             ///< Processes that divide what is available.
+    std::atomic<int> stacks{0};  ///< Of workers that run now.
 
     void set(Kind new_kind, uint64_t new_bytes) {
         if (kind == Kind::None) of_system = data_limit().rlim_cur;
         kind = new_kind;
         bytes = new_bytes;
-        begun = threads_begun();
+        begun = stacks;
         apply();
     }
     void set_to_available() {
@@ -65,29 +68,25 @@ struct Limit {
     }
     void apply() const {
         if (kind == Kind::None) return;
-        const uint64_t stacks = kind == Kind::Available ? uint64_t(threads - begun) * kStack : 0;
-        set_limit(std::min(rlim_t(bytes + stacks), of_system));
+        const int further = kind == Kind::Available ? std::max(0, workers - begun) : 0;
+        set_limit(std::min(rlim_t(bytes + uint64_t(further) * kStack), of_system));
     }
-    /// How many of the threads for which there is room run. Other threads are few.
-    int threads_begun() const {
-        const uint64_t others = running_threads("/proc").value_or(1) - 1;  // Than the first one.
-        return int(std::min(others, uint64_t(threads)));
-    }
-    /// Throws std::runtime_error where the limits have no room for those of so many threads that have not begun.
+    /// Throws std::runtime_error where the limits have no room for those of so many workers that have not begun.
     void check_stacks(int wanted) const {
-        const int further = std::max(0, wanted - threads_begun());
-        const uint64_t stacks = uint64_t(further) * kStack;
+        const int further = wanted - stacks;
+        if (further <= 0) return;
+        const uint64_t room = uint64_t(further) * kStack;
         const auto check = [&](const char* what, decltype(RLIMIT_AS) kind_of_limit,
                                std::optional<uint64_t> used) {
             rlimit limit{};
             if (!used || getrlimit(kind_of_limit, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY ||
-                *used + stacks <= limit.rlim_cur)
+                *used + room <= limit.rlim_cur)
                 return;
             throw std::runtime_error(fmt::format(
-                "{} {}threads need {} for their stacks, but the {} is limited to {}, of which {} "
-                "are used",
-                further, further < wanted ? "further " : "", format_bytes(stacks), what,
-                format_bytes(limit.rlim_cur), format_bytes(*used)));
+                "{} further threads need {} for their stacks, but the {} is limited to {}, of "
+                "which {} are used",
+                further, format_bytes(room), what, format_bytes(limit.rlim_cur),
+                format_bytes(*used)));
         };
         check("memory", RLIMIT_DATA, memory_for_data("/proc"));
         check("address space", RLIMIT_AS, address_space("/proc"));
@@ -96,6 +95,9 @@ struct Limit {
 
 Limit& current_limit() {
     static Limit limit;
+    // A forked process has none of its parent's workers.
+    [[maybe_unused]] static const int forks =
+        pthread_atfork(nullptr, nullptr, [] { limit.stacks = 0; });
     return limit;
 }
 
@@ -159,16 +161,24 @@ void share_available_memory(int processes) {
 void make_room_for_threads(int threads) {
     Limit& limit = current_limit();
     const std::scoped_lock lock(limit.mutex);
-    const int before = limit.threads;
-    limit.threads = std::max(before, threads);
+    const int before = limit.workers, wanted = threads - 1;
+    limit.workers = std::max(before, wanted);
     limit.apply();
     try {
-        limit.check_stacks(threads);
+        limit.check_stacks(wanted);
     } catch (const std::runtime_error&) {
-        limit.threads = before;
+        limit.workers = before;
         limit.apply();
         throw;
     }
+}
+
+WorkerStack::WorkerStack() {
+    ++current_limit().stacks;
+}
+
+WorkerStack::~WorkerStack() {
+    --current_limit().stacks;
 }
 
 UnlimitedMemory::UnlimitedMemory() : limit_(data_limit().rlim_cur) {

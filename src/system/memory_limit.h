@@ -25,10 +25,21 @@ void renew_memory_limit();
 /// Does so too. From now on, `processes` of this machine, each of which calls this, divide what is available.
 void share_available_memory(int processes);
 
-/// To be called before `threads` threads begin, which end the process where there is no memory for their stacks. The limit
-/// of limit_memory_to_available() grows by these, since a stack is not memory until it is used. Throws std::runtime_error
-/// where that of limit_memory() or one of the system has no room for those that have not begun yet.
+/// To be called before `threads` threads work together, of which the caller is one. The others are workers, which end the
+/// process where there is no memory for their stacks. The limit of limit_memory_to_available() grows by these, since a
+/// stack is not memory until it is used. Throws std::runtime_error where that of limit_memory() or one of the system has no
+/// room for the stacks of the workers that have not begun yet.
 void make_room_for_threads(int threads);
+
+/// Exists in each worker that has begun, until it ends. Other threads do not count, since their stacks are of no use to
+/// workers.
+class WorkerStack {
+public:
+    WorkerStack();
+    ~WorkerStack();
+    WorkerStack(const WorkerStack&) = delete;
+    WorkerStack& operator=(const WorkerStack&) = delete;
+};
 
 /// Lifts it for a while, such as for writing what there is after an allocation has failed.
 class UnlimitedMemory {

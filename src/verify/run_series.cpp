@@ -148,8 +148,8 @@ SeriesRenderer::SeriesRenderer(const Scene& scene, const VerifyOptions& options,
                                                          scene.film().crop_height})},
       cut_offs_(size_t(options.longest) + 1) {}
 
-int SeriesRenderer::threads() const {
-    return thread_count(options_.threads);
+int SeriesRenderer::threads(const IntegratorSpec& spec) const {
+    return spec.make ? 1 : thread_count(options_.threads);
 }
 
 uint64_t SeriesRenderer::pilot_spp() const {
@@ -226,7 +226,7 @@ RunSeries SeriesRenderer::begin(const IntegratorSpec& spec, uint64_t stream,
     if (spp) {
         series.spp = *spp;
     } else {
-        const double share = seconds * std::min(threads(), options_.runs) / options_.runs;
+        const double share = seconds * std::min(threads(spec), options_.runs) / options_.runs;
         const double pass = seconds_a_pass(spec, seed(series, uint64_t(options_.runs), 0));
         series.spp = std::max(uint64_t(1), uint64_t(share / pass));
     }
@@ -243,7 +243,7 @@ void SeriesRenderer::extend(RunSeries& series, uint64_t renderings) const {
     while (series.renderings < wanted) {
         const auto begin = Clock::now();
         std::vector<IndependentRun> more(runs);
-        for_each_in_parallel(runs, threads(), [&](size_t i) {
+        for_each_in_parallel(runs, threads(series.spec), [&](size_t i) {
             more[i] = render(series.spec, seed(series, i, series.renderings), series.spp);
             const std::scoped_lock lock(mutex);
             ++done;

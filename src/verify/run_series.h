@@ -96,7 +96,8 @@ private:
     IndependentRun render(const IntegratorSpec& spec, uint64_t seed, uint64_t spp) const;
     double seconds_a_pass(const IntegratorSpec& spec, uint64_t seed) const;
     uint64_t pilot_spp() const;
-    int threads() const;
+    /// Number of runs of a method at the same time. Objects of Python work on one thread, that of the caller.
+    int threads(const IntegratorSpec& spec) const;
 
     const Scene& scene_;
     const VerifyOptions& options_;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "sample_densities.h"
+#include "spec_of.h"
 #include "test_scenes.h"
 #include "verify/verify.h"
 
@@ -121,7 +122,7 @@ std::vector<Planted> planted() {
         {"UniformDenominator", divided_room, by_paper, Image | Lengths, 0, 512},
         {"CapOfTrials", small_sphere() + room() + area_lamp(),
          "upg+bdpt:radius=0.6,bound=cone,roulette=0", Lengths, 0},
-        {"DiscProbability", lit_room, "upg+bdpt:radius=0.3,clamp=false,roulette=0", Lengths, 0},
+        {"DiscProbability", lit_room, "upg+bdpt:radius=0.3,roulette=0", Lengths, 0},
         {"ClampInEstimator", lit_room, "upg+bdpt:radius=0.5,roulette=0", Lengths, 0},
         {"RouletteOfPairs", lit_room, "upg+bdpt:radius=0.3", Lengths, 0},
         {"PredicatesDiffer", lit_room, "upg+bdpt:radius=0.2,roulette=0", Lengths, 0},
@@ -134,7 +135,7 @@ std::vector<Planted> planted() {
         {"EmissionNotInHits", front_camera(kSize) + room() + lamp_in_smooth_glass(),
          "bdpt:roulette=0,guide=random", Lengths, 0},
         {"EmissionPmfNotInNextEvent", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
-        {"CachedGuideLost", lit_room, "bdpt:connections=cache,roulette=0,guide=random", Lengths, 0},
+        {"CachedGuideLost", lit_room, "vcm:merges=false,roulette=0,guide=random", Lengths, 0},
         {"TrialsWithoutGuide", lit_room, "upg+bdpt:radius=0.3,roulette=0,guide=random", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},
@@ -165,7 +166,7 @@ Findings findings(const Planted& planted, SamplerKind sampler) {
     options.spp = planted.spp;
     options.threads = 1;
     options.sampler = sampler;
-    const VerifyReport report = verify(scene, {IntegratorSpec::parse(planted.method)}, options);
+    const VerifyReport report = verify(scene, {spec_of(scene, planted.method)}, options);
     const MethodReport& m = report.methods.front();
     Findings found;
     for (const auto* parts : {&m.image, &m.tiles})

@@ -96,3 +96,19 @@ def test_transcripts_differ_by_more_than_times() -> None:
     block, = transcripts.blocks_of(["text", *page.splitlines(), "", "    $$"])
     assert [c.text for c in block.commands] == ["etendue render a.xml"] and len(block.commands[0].printed) == 3
     assert block.lines() == page.splitlines()
+
+
+def test_what_follows_in_the_folder_of_a_transcript_that_is_left_is_left(
+    program: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(transcripts.PROGRAMS, "absent", ("absent",))
+    old = (
+        "# One\n\n    $ echo absent\n    old\n\ntext\n\n    $ echo new\n    old\n\n"
+        "# Two\n\n    $ echo new\n    old\n\ntext\n\n    $ echo absent\n    old\n\ntext\n\n    $ echo new\n    old\n\n"
+        "# Three\n\n    $ echo new; ls\n    old\n"
+    )
+    page = tmp_path / "page.md"
+    page.write_text(old)
+    one, two, three = old.split("# T")
+    expected = "# T".join([one, two.replace("old", "new", 1), three.replace("old", "new\n    examples\n    scenes")])
+    assert transcripts.replayed(page, program, tmp_path) == (expected, ["absent"])

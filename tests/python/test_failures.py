@@ -1,11 +1,15 @@
 """Passes that fail, exceptions that end a rendering, and limits of memory."""
 
 import functools
+import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -116,6 +120,11 @@ def _raise_late(*_: object) -> None:
     raise _Late("the time is over")
 
 
+def _raise_late_once(*_: object) -> None:
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    _raise_late()
+
+
 class _Handler:
     def method(self, *_: object) -> None:
         raise _Late("the time is over")
@@ -124,8 +133,8 @@ class _Handler:
         _raise_late()
 
 
-@pytest.fixture(params=[_raise_late, _Handler().method, _Handler(), functools.partial(_raise_late, 1)],
-                ids=["function", "method", "object", "partial"])
+@pytest.fixture(params=[_raise_late, _Handler().method, _Handler(), functools.partial(_raise_late, 1), _raise_late_once],
+                ids=["function", "method", "object", "partial", "once"])
 def alarm(request: pytest.FixtureRequest) -> Iterator[Callable[[float], None]]:
     """Sets a timer whose signal handler raises an exception."""
 
@@ -160,6 +169,20 @@ def test_so_they_do_while_the_progress_is_shown(
         et.render(cornell, "path", time=5, progress=False, live=True)
 
 
+def test_the_progress_ends_nothing_where_warnings_are_errors(cornell: et.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(bar: _render._Bar) -> None:
+        raise ValueError("no terminal")
+
+    monkeypatch.setattr(_render._Bar, "update", fail)
+    monkeypatch.setattr(_render._Bar, "close", fail)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("error")
+        assert et.render(cornell, "path", spp=2, progress=False).passes == 2
+        with pytest.raises(et.RenderError, match="pass 3 failed: later"):
+            fail_after(2, ValueError("later"), cornell)
+    assert len(told) == 4 and {str(w.message) for w in told} == {"the progress cannot be shown: no terminal"}
+
+
 def test_what_is_no_failure_of_an_integrator_ends_reports(cornell: et.Scene, tmp_path: Path) -> None:
     for leaves in SystemExit("leaves"), KeyboardInterrupt("leaves"), GeneratorExit("leaves"):
         class Leaves(Hits):
@@ -176,6 +199,21 @@ def test_what_is_no_failure_of_an_integrator_ends_reports(cornell: et.Scene, tmp
                        progress=False)
         with pytest.raises(type(leaves), match="leaves"):
             et.verify(cornell, ["path", Leaves()], spp=1, runs=8, lengths=(1, 2), progress=False)
+
+
+def test_verifications_call_an_integrator_on_one_thread(cornell: et.Scene) -> None:
+    """On others, what is no Exception, such as SystemExit, would not end them."""
+    threads: set[int] = set()
+
+    class Leaves(Hits):
+        def sample(self, c: core.Sample) -> None:
+            threads.add(threading.get_ident())
+            if len(threads) > 1:
+                raise SystemExit("from another thread")
+            super().sample(c)
+
+    report = et.verify(cornell, ["path", Leaves()], spp=1, runs=8, lengths=(1, 2), threads=4, progress=False)
+    assert len(report.verdicts) == 2 and len(threads) == 1
 
 
 LIMITED = """
@@ -227,6 +265,70 @@ def test_the_memory_of_the_process_is_limited(scenes: Path, tmp_path: Path) -> N
     assert lines[1].startswith("pass 3 failed: not enough memory") and lines[1].endswith(" / MemoryError 2")
     assert lines[2] == str(1 << 30)
     assert et.read_image(image).shape == (16, 16, 3)
+
+
+NO_MEMORY = """
+#include <cstdlib>
+#include <new>
+#include <unistd.h>
+
+// There is none for blocks of SIZE bytes while FILE exists.
+void* operator new(std::size_t size) {
+    if (size == SIZE && access(FILE, F_OK) == 0) throw std::bad_alloc();
+    if (void* p = std::malloc(size ? size : 1)) return p;
+    throw std::bad_alloc();
+}
+"""
+WITHOUT_MEMORY = """
+import pathlib
+import numpy as np
+import etendue as et
+
+missing = pathlib.Path({file!r})
+scene = et.load({scene!r}).build(resolution=(600, 500))
+errors = {{}}
+
+def callback(p):
+    assert p.film.passes == p.passes
+    errors[p.passes] = p.error
+    if p.passes == 5:
+        missing.touch()
+
+def render(error):
+    try:
+        return et.render(scene, "mlt:groups=6,chains=24,mutations=0.1", spp=8, error=error, callback=callback)
+    finally:
+        missing.unlink(missing_ok=True)
+
+# The error of the image tells whether it goes on.
+try:
+    render(1e-9)
+except et.RenderError as e:
+    print(e)
+    r = e.result
+    assert r.passes == r.stats["spp"] == 6, r.passes
+    np.testing.assert_allclose(r.film.sums / r.film.passes, r.image, rtol=1e-5)
+assert set(errors) == set(range(1, 6))
+# It is only told.
+r = render(None)
+assert r.passes == 8 and len(r.stats["pass_seconds"]) == 8 and r.error is not None
+assert set(errors) == set(range(1, 9)) and errors[6] is errors[7] is None
+"""
+
+
+def test_what_fails_between_passes_belongs_to_none(scenes: Path, tmp_path: Path) -> None:
+    compiler = shutil.which("c++")
+    if compiler is None:
+        pytest.skip("there is no compiler")
+    # Of the film's 74 chunks of pixels, for three pairs of groups, as Film::error() adds up.
+    file, source, library = tmp_path / "missing", tmp_path / "no_memory.cpp", tmp_path / "no_memory.so"
+    source.write_text(NO_MEMORY.replace("SIZE", str(74 * 3 * 8)).replace("FILE", f'"{file}"'))
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", str(library), str(source)], check=True)
+    code = WITHOUT_MEMORY.format(file=str(file), scene=str(scenes / "cornell.xml"))
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300,
+                            env=os.environ | {"LD_PRELOAD": str(library)})
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith("after pass 6: not enough memory; the result of the 6 passes before it is in")
 
 
 @pytest.mark.parametrize("size", ["4X", "much", "", "-1", "1.5GG", 0, -5])

@@ -124,13 +124,16 @@ def run(blocks: list[Block], program: str, folder: Path) -> None:
 
 
 def replayed(page: Path, program: str, folder: Path) -> tuple[str, list[str]]:
-    """The page with what its commands print here, and what was missing for some of them, which are left as they are."""
+    """The page with what its commands print here, and what was missing for some of them, which are left as they are
+    with those that follow in their folder."""
     lines = page.read_text().splitlines()
-    blocks, absent = [], set()
+    blocks, absent, is_left = [], set(), False
     for block in blocks_of(lines):
         lacks = missing(block, program, place_of)
         absent.update(lacks)
-        if not lacks:
+        # Those that follow it need its folder, and what it leaves there.
+        is_left = bool(lacks) or (is_left and not block.begins_folder)
+        if not is_left:
             blocks.append(block)
     with ExitStack() as stack:
         if any("sbatch" in c.text for block in blocks for c in block.commands):

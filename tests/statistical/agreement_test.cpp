@@ -158,10 +158,9 @@ protected:
                           "bdpt against path");
         expect_same_image(indirect_tiles(scene, "upg+bdpt:radius=0.12", factor * c.passes, 4), path,
                           resolution, "upg+bdpt against path");
-        for (const char* method :
-             {"pcbpt:connections=2,record_fraction=0.02", "bdpt:connections=cache"})
-            expect_same_image(indirect_tiles(scene, method, factor * c.passes, 5), path,
-                              1.5 * resolution, std::string(method) + " against path");
+        expect_same_image(
+            indirect_tiles(scene, "pcbpt:connections=2,record_fraction=0.02", factor * c.passes, 5),
+            path, 1.5 * resolution, "pcbpt against path");
         if (c.light)
             expect_same_image(indirect_tiles(scene, "light", 2 * factor * c.passes, 3), path,
                               2 * resolution, "light against path");
@@ -225,8 +224,7 @@ TEST(GatherChoices, AgreeWithPathTracing) {
     const Scene scene = build(mixed_room(front_camera(kAgreementSize)));
     const Tiles path = indirect_tiles(scene, "path", 400, 1);
     uint64_t seed = 5;
-    for (const char* choice :
-         {"bound=box", "bound=cone", "drop=eye", "drop=light", "drop=both", "clamp=false"})
+    for (const char* choice : {"bound=box", "bound=cone", "drop=eye", "drop=light", "drop=both"})
         expect_same_image(
             indirect_tiles(scene, fmt::format("upg+bdpt:radius=0.12,{}", choice), 192, seed++),
             path, 0.08, choice);

@@ -154,7 +154,7 @@ TEST(ClosedForm, FurnaceByNumberOfLightPaths) {
                                                    : ""));
         for (const int light_paths :
              {kFurnaceSize * kFurnaceSize / 4, 4 * kFurnaceSize * kFurnaceSize, 150})
-            for (const char* integrator : {"bdpt", "bdpt:connections=cache", "vcm:merges=false"}) {
+            for (const char* integrator : {"bdpt", "vcm:merges=false"}) {
                 IntegratorSpec with = IntegratorSpec::parse(integrator);
                 with.params["light_paths"] = std::to_string(light_paths);
                 const std::string spec = with.to_string();

@@ -30,10 +30,6 @@ std::vector<std::string> methods() {
         if (has("chains")) spec.params["chains"] = "4";
         if (has("groups")) spec.params["groups"] = "8";
         all.push_back(spec.to_string());
-        if (spec.name == "bdpt") {
-            spec.params["connections"] = "cache";
-            all.push_back(spec.to_string());
-        }
     }
     return all;
 }

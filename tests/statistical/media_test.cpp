@@ -124,8 +124,7 @@ TEST_P(MediaOfEnds, LampAcrossTheSurface) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, MediaOfEnds,
-                         ::testing::Values("path", "light", "bdpt", "bdpt:connections=cache",
-                                           "pcbpt", "vcm", "upg+bdpt",
+                         ::testing::Values("path", "light", "bdpt", "pcbpt", "vcm", "upg+bdpt",
                                            "sppm:light_paths=700,radius=0.5", "pssmlt", "mmlt",
                                            "mlt"),
                          name_of_integrator);

@@ -143,7 +143,6 @@ INSTANTIATE_TEST_SUITE_P(
                       TechniqueCase{"gathers", "perspective", "upg+bdpt:radius=0.4,", 3},
                       TechniqueCase{"merges", "perspective", "vcm:radius=0.35,", 3, 3},
                       TechniqueCase{"exact_merges", "perspective", "vcm:exact=true,radius=0.2,", 2},
-                      TechniqueCase{"cache", "perspective", "bdpt:connections=cache,"},
                       TechniqueCase{"stored", "perspective",
                                     "pcbpt:direct=stored,uniform=0.1,connections=1.5,"},
                       TechniqueCase{"stored_standard", "thinlens",

@@ -85,7 +85,7 @@ inline std::vector<std::string> all_integrators() {
                       : name == "mps" ? "mps:mutations=2000,precision=0.2"
                                       : name);
     }
-    all.insert(all.end(), {"bdpt:eorr=true", "bdpt:connections=cache", "vcm:exact=true",
+    all.insert(all.end(), {"bdpt:eorr=true", "vcm:exact=true",
                            "pm:light_paths=2000,cache_error=0.3,cache_rays=32"});
     return all;
 }

@@ -9,6 +9,7 @@
 
 #include "math/statistics.h"
 #include "render/renderer.h"
+#include "spec_of.h"
 
 namespace etendue::test {
 
@@ -49,7 +50,7 @@ struct TileOptions {
 /// The integrator's image from `passes` passes; their spread is measured between batches of consecutive ones.
 inline Tiles render_tiles(const Scene& scene, const std::string& integrator, const TileOptions& o) {
     RenderSettings settings;
-    settings.integrator = IntegratorSpec::parse(integrator);
+    settings.integrator = spec_of(scene, integrator);
     settings.seed = o.seed;
     settings.threads = 1;
     settings.spp = o.passes;

@@ -4,17 +4,16 @@
 
 #include <dlfcn.h>
 
-#include <atomic>
 #include <new>
 
 #include <tbb/parallel_for.h>
 
+std::atomic<long> etendue::test::tasks_with_memory{0};
+
 namespace {
 
-std::atomic<long> left{0};  ///< Allocations up to the one that fails; 0 or less: none.
-
 void count_allocation() {
-    if (left.fetch_sub(1) == 1) throw std::bad_alloc();
+    if (etendue::test::tasks_with_memory.fetch_sub(1) == 1) throw std::bad_alloc();
 }
 template <class Function>
 Function* original(const char* name) {
@@ -41,17 +40,3 @@ void* allocate(d1::small_object_pool*& pool, std::size_t size) {
 }
 
 }  // namespace tbb::detail::r1
-
-namespace etendue::test {
-
-NoMemoryForTask::NoMemoryForTask(long n) {
-    left = n;
-}
-NoMemoryForTask::~NoMemoryForTask() {
-    left = 0;
-}
-bool NoMemoryForTask::has_failed() const {
-    return left <= 0;
-}
-
-}  // namespace etendue::test

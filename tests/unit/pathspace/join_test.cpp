@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include "guide/random_guide.h"
 #include "path_ends.h"
 #include "pathspace/path_pdfs.h"
+#include "random_guide.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -110,14 +110,7 @@ protected:
         if (extra() == Extra::Guided || extra() == Extra::GuidedMerges) {
             // The density of a lobe changes by κ dθ, which enlarges the difference of directions that Tally describes.
             constexpr float kKappa = 10;
-            std::vector<double> pmf;
-            std::vector<uint32_t> at_infinity;
-            for (const auto& e : scene.emitters()) {
-                pmf.push_back(double(e->selection_pmf));
-                if (e->is_infinite() && !e->is_delta()) at_infinity.push_back(e->index);
-            }
-            guide = random_guide(scene.bounds().center(), scene.bounds().radius(), pmf, at_infinity,
-                                 kKappa, 3);
+            guide = test::random_guide(scene, kKappa, 3);
             counts.guide = &guide;
         }
     }

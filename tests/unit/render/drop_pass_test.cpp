@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "no_memory.h"
 #include "render/renderer.h"
 #include "system/section_file.h"
 #include "test_scenes.h"
@@ -21,6 +22,8 @@ public:
         std::function<void(uint32_t pass, uint64_t index)> sample = [](uint32_t, uint64_t) {};
         /// Before each group of paths that prepare() makes.
         std::function<void(uint32_t pass)> other_paths = [](uint32_t) {};
+        /// The block of memory that learn() does not get before pass 4, from 1; 0: it gets all.
+        long block_of_learn = 0;
     };
     Disturbed(const std::string& name, Hooks& hooks)
         : inner_(make_integrator(IntegratorSpec::parse(name))), hooks_(hooks) {}
@@ -28,6 +31,7 @@ public:
     void learn(const LearnContext& context) override {
         EXPECT_EQ(context.index, context.film.passes());
         learned_.push_back(context.index);
+        const NoMemoryForBlock missing(context.index == 4 ? hooks_.block_of_learn : 0);
         inner_->learn(context);
     }
     bool is_learning() const override { return inner_->is_learning(); }
@@ -50,6 +54,10 @@ public:
     std::unique_ptr<PassSums> make_sums() const override { return inner_->make_sums(); }
     void collect(std::span<const std::unique_ptr<PassSums>> sums) override {
         inner_->collect(sums);
+    }
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        inner_->trace_eye_paths(c, z, stats);
     }
     void sample(const SampleContext& context, Workspace& work) const override {
         hooks_.sample(pass_, context.index);
@@ -134,6 +142,20 @@ TEST_P(DropPass, WhereASampleThrows) {
     expect_as_undisturbed(r, 5);
 }
 
+TEST_P(DropPass, SaysWhatHasFailed) {
+    hooks.sample = [](uint32_t pass, uint64_t) {
+        if (pass == 3) throw std::runtime_error("a bad sample");
+    };
+    Renderer r = renderer();
+    EXPECT_THROW(run(r), std::runtime_error);
+    EXPECT_EQ(r.place_of_failure(), "pass 4 failed");
+    hooks.sample = [](uint32_t, uint64_t) {};
+    const auto fail = [](const Progress&) { throw std::bad_alloc(); };
+    EXPECT_THROW(r.run(fail, interrupted), std::bad_alloc);
+    EXPECT_EQ(r.place_of_failure(), "after pass 4");
+    EXPECT_EQ(r.film().passes(), 4u);
+}
+
 TEST_P(DropPass, WhereAPassCannotBegin) {
     for (auto* moment : {&hooks.trace, &hooks.end_of_trace}) {
         *moment = [](uint32_t pass) {
@@ -196,6 +218,29 @@ TEST_P(DropPass, LearnsOnceBeforeAPassThatIsTracedAgain) {
     hooks.sample = [](uint32_t, uint64_t) {};
     run(r);
     EXPECT_EQ(disturbed.learned(), (std::vector<uint32_t>{0, 1, 4}));
+}
+
+TEST_P(DropPass, WhereThereIsNoMemoryToLearn) {
+    int failures = 0;
+    for (bool is_reached = true; is_reached; failures += is_reached) {
+        SCOPED_TRACE(failures);
+        ASSERT_LT(failures, 100);
+        hooks.block_of_learn = failures + 1;
+        Renderer r = renderer();
+        try {
+            run(r);
+            is_reached = false;
+        } catch (const std::bad_alloc&) {
+            EXPECT_EQ(r.film().passes(), 4u);
+        }
+        hooks.block_of_learn = 0;
+        EXPECT_EQ(run(r), StopReason::Samples);
+        expect_as_undisturbed(r, 5);
+    }
+    // The variance of the film, its relative values, what is learned of places, and more.
+    if (std::string(GetParam()) == "upg+bdpt") {
+        EXPECT_GE(failures, 3);
+    }
 }
 
 TEST_P(DropPass, WhereItsStateIsSavedAfterwards) {

@@ -187,6 +187,40 @@ TEST(LearnedGuides, AreThoseOfARendering) {
     }
 }
 
+std::vector<float> numbers_of(const GuideCell& cell) {
+    std::vector<float> all;
+    for (const GuideCell::Field& field : cell.fields) {
+        for (int k = 0; k < field.mixture.size(); ++k) {
+            const GuideMixture::Lobe l = field.mixture.lobe(k);
+            all.insert(all.end(), {l.mean.x, l.mean.y, l.mean.z, l.inv_r, l.kappa, l.weight});
+        }
+        all.insert(all.end(), field.training_share.begin(), field.training_share.end());
+    }
+    return all;
+}
+
+/// Walks that train have to find the light, whatever guided directions must gain to pay in a method: all methods learn from
+/// the same walks.
+TEST(LearnedGuides, DoNotDependOnWhatAMethodMustGain) {
+    const Scene scene = test::build(test::front_camera(kSize) + test::room() + test::area_lamp());
+    const std::string options = ":guide_walks=20000,guide_roulette=false,max_depth=8,rr_depth=2";
+    const LearnedGuide eye = learn(scene, "path" + options), both = learn(scene, "bdpt" + options);
+    std::printf("%g %g\n", eye.guide().surfaces.gain(TransportMode::Radiance),
+                both.guide().surfaces.gain(TransportMode::Radiance));
+    const auto &cells = eye.guide().surfaces.cells(), &others = both.guide().surfaces.cells();
+    ASSERT_EQ(cells.size(), others.size());
+    float most = 0, most_of_others = 0;
+    for (size_t i = 0; i < cells.size(); ++i) {
+        EXPECT_EQ(numbers_of(cells[i]), numbers_of(others[i])) << i;
+        most = std::max(most, cells[i].field(TransportMode::Radiance).share[0]);
+        most_of_others =
+            std::max(most_of_others, others[i].field(TransportMode::Radiance).share[0]);
+    }
+    // By its own shares, the second one would have had other walks.
+    EXPECT_GT(most, 0.2f);
+    EXPECT_EQ(most_of_others, 0);
+}
+
 /// Where emission alone gains, a method that joins both walks has no guide at surfaces.
 TEST(LearnedGuides, AreUsedWhereTheyGain) {
     // Most of the light of a lamp at the open front is lost.

@@ -86,7 +86,6 @@ TEST_P(LightPathMemory, SufficesForTheirNumber) {
 INSTANTIATE_TEST_SUITE_P(Methods, LightPathMemory,
                          ::testing::Values("vcm:alpha=1", "vcm:guide=on,guide_walks=8000",
                                            "upg:max_depth=8", "upg+bdpt:guide=on,guide_walks=8000",
-                                           "bdpt:connections=cache,guide=on,guide_walks=8000",
                                            "sppm:max_depth=2", "ppm:max_depth=8"),
                          [](const auto& p) {
                              const std::string name = p.param;

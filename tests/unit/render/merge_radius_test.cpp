@@ -38,13 +38,13 @@ TEST(SeenExtent, IsThatBehindClearGlass) {
     for (const int size : {16, 2048}) {
         const Scene open = build(front_camera(size) + everything),
                     behind = build(front_camera(size) + everything + window);
-        EXPECT_NEAR(seen_radius(behind) / seen_radius(open), 1, 0.1);
+        EXPECT_NEAR(seen_extent(behind).radius / seen_extent(open).radius, 1, 0.1);
         EXPECT_NEAR(default_merge_radius(behind) / default_merge_radius(open), 1, 0.1);
     }
     // Nothing is behind the window but the sky.
     const std::string sky = "<emitter type=\"constant\"/>",
                       distant = sphere("0,0,-1e6", "0.01", diffuse("0.5,0.5,0.5"));
-    const float seen = seen_radius(build(front_camera(16) + window + sky + distant));
+    const float seen = seen_extent(build(front_camera(16) + window + sky + distant)).radius;
     EXPECT_GT(seen, 0.01f);
     EXPECT_LT(seen, 1);
 }

@@ -1,10 +1,16 @@
 // Paths outside of samples have random numbers that no sample of a pass has.
 
+#include <atomic>
 #include <mutex>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "integrator/light_path_options.h"
+#include "math/statistics.h"
+#include "pathspace/walk.h"
 #include "render/renderer.h"
 #include "sampler/pilot_seed.h"
 #include "test_scenes.h"
@@ -14,8 +20,18 @@ namespace {
 
 constexpr uint64_t kLightPaths = 400;  // more than pixels
 
+/// Makes no image.
+class Collector : public Integrator {
+public:
+    void save(LearnedState&) const override {}
+    void load(LearnedState&) override {}
+    void sample(const SampleContext&, Workspace&) const override {}
+    TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
+    Estimator estimator() const override { return Estimator::Unbiased; }
+};
+
 /// Collects a random number of each path.
-class NumberCollector final : public Integrator {
+class NumberCollector final : public Collector {
 public:
     void trace(const PassContext& pass) override {
         pass.for_each_light_path(
@@ -25,12 +41,8 @@ public:
             add(sampler, others);
         });
     }
-    void save(LearnedState&) const override {}
-    void load(LearnedState&) override {}
     void sample(const SampleContext& c, Workspace&) const override { add(c.sampler, samples); }
-    TechniqueCounts counts(const Scene&, uint64_t) const override { return {}; }
     uint64_t light_paths(const Scene&) const override { return kLightPaths; }
-    Estimator estimator() const override { return Estimator::Unbiased; }
 
     mutable std::set<double> samples, others;
 
@@ -57,6 +69,75 @@ TEST(PilotNumbers, AreNotThoseOfSamples) {
         EXPECT_EQ(numbers.others.size(), 2 * kLightPaths);
         for (const double u : numbers.others) EXPECT_FALSE(numbers.samples.contains(u));
     }
+}
+
+/// Notes the numbers of vertices of the first light paths of a pass.
+class LengthCollector final : public Collector {
+public:
+    explicit LengthCollector(const DepthOptions& depth) : depth_(depth) {}
+    void trace(const PassContext& pass) override {
+        pass.for_each_light_path([&](const SampleContext& c, Workspace& work) {
+            const TechniqueCounts none;
+            const WalkContext walk{c.scene, none, work.stats, {depth_.max_depth, depth_.rr_depth}};
+            trace_light_path(walk, c.sampler, work.y);
+            lengths[c.index] = work.y.size();
+        });
+    }
+    uint64_t light_paths(const Scene&) const override { return lengths.size(); }
+
+    std::vector<int> lengths = std::vector<int>(4096);
+
+private:
+    DepthOptions depth_;
+};
+
+/// The number of light paths, which may depend on how long they are, is not chosen by those of a pass.
+TEST(PilotNumbers, OfTheLightPathCountAreNotThoseOfAPass) {
+    const DepthOptions depth{10, 2};
+    const Scene scene = build(front_camera(4) + room() + area_lamp());
+    RenderSettings settings;
+    settings.sampler = SamplerKind::Independent;
+    settings.seed = 0;
+    settings.spp = 1;
+    auto integrator = std::make_unique<LengthCollector>(depth);
+    const LengthCollector& collected = *integrator;
+    Renderer renderer(scene, settings, std::move(integrator));
+    renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+    Moments of_pass;
+    for (const int length : collected.lengths) of_pass.add(length);
+    const Moments of_pilot = light_path_length(scene, depth);
+    ASSERT_EQ(of_pilot.count(), of_pass.count());
+    EXPECT_NEAR(of_pilot.mean(), of_pass.mean(), 0.1);
+    EXPECT_NE(of_pilot.mean(), of_pass.mean());
+    EXPECT_NE(of_pilot.variance(), of_pass.variance());
+}
+
+/// The mean number of vertices of a light path, by which connections to a cache are weighted, is not that of the paths in it:
+/// from seed to seed, the two vary independently.
+TEST(PilotNumbers, OfACacheAreNotThoseOfItsPaths) {
+    constexpr int kLightPaths = 8192, kSeeds = 40;
+    const Scene scene = build(front_camera(4) + room() + area_lamp());
+    Moments of_pilot, of_pass, differences;
+    for (int seed = 0; seed < kSeeds; ++seed) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse(
+            "bdpt:connections=cache,cache_draws=1,light_paths=" + std::to_string(kLightPaths));
+        settings.sampler = SamplerKind::Independent;
+        settings.seed = uint64_t(seed);
+        settings.spp = 1;
+        Renderer renderer(scene, settings);
+        renderer.run([](const Progress&) {}, std::atomic<bool>(false));
+        double vertices = 0;
+        for (const auto& [name, value] : renderer.integrator().figures())
+            if (name == "cached_vertices") vertices = value;
+        const double pilot = 1 / double(renderer.integrator().counts(scene, kLightPaths).connect),
+                     pass = vertices / kLightPaths;
+        of_pilot.add(pilot);
+        of_pass.add(pass);
+        differences.add(pilot - pass);
+    }
+    EXPECT_NEAR(of_pilot.mean(), of_pass.mean(), 0.05 * of_pass.mean());
+    EXPECT_GT(differences.variance(), 0.5 * (of_pilot.variance() + of_pass.variance()));
 }
 
 TEST(PilotNumbers, DifferByUse) {

@@ -252,6 +252,10 @@ public:
     void collect(std::span<const std::unique_ptr<PassSums>> sums) override {
         inner_->collect(sums);
     }
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        inner_->trace_eye_paths(c, z, stats);
+    }
     void sample(const SampleContext& c, Workspace& work) const override { inner_->sample(c, work); }
     TechniqueCounts counts(const Scene& scene, uint64_t n) const override {
         return inner_->counts(scene, n);

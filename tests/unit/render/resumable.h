@@ -23,7 +23,6 @@ inline const std::vector<const char*>& resumable_methods() {
         "light:guide=on,guide_walks=2000",
         "bdpt",
         "bdpt:eorr=true",
-        "bdpt:connections=cache",
         "bdpt:guide=on,guide_walks=2000",
         "vcm:radius=0.3",
         "vcm:exact=true",

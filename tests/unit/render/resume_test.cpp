@@ -32,6 +32,10 @@ public:
         inner_->collect(sums);
     }
     uint32_t eye_paths_of(uint32_t pass) const override { return inner_->eye_paths_of(pass); }
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        inner_->trace_eye_paths(c, z, stats);
+    }
     void sample(const SampleContext& context, Workspace& work) const override {
         inner_->sample(context, work);
     }

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "guide/random_guide.h"
 #include "pathspace/walk.h"
+#include "random_guide.h"
 #include "reuse/light_vertex_cache.h"
 #include "test_scenes.h"
 
@@ -96,7 +96,7 @@ protected:
         "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>");
     /// Lobes wide enough that the offset of a ray hardly changes densities.
     const Guide guide =
-        random_guide(scene.bounds().center(), scene.bounds().radius(), {1, 1, 1}, {}, 5, 7);
+        test::random_guide(scene.bounds().center(), scene.bounds().radius(), {1, 1, 1}, {}, 5, 7);
     const TechniqueCounts counts{.hit = 1,
                                  .next_event = 1,
                                  .connect = 1,
@@ -174,7 +174,7 @@ INSTANTIATE_TEST_SUITE_P(Walks, KeptLightPaths, ::testing::Bool(),
 /// Where light paths have a guide of emission alone, their vertices need no memory for it.
 TEST(KeptLightPathsOfEmission, NeedNoMemoryForTheGuide) {
     const Scene scene = test::build(test::front_camera(8) + test::room() + test::area_lamp());
-    Guide guide = random_guide({}, 1, {1}, {}, 5, 7);
+    Guide guide = test::random_guide({}, 1, {1}, {}, 5, 7);
     const auto add_path = [&] {
         const TechniqueCounts counts{.hit = 1, .connect = 1, .guide = &guide};
         Sampler sampler(SamplerKind::Independent, 9);

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "guide/random_guide.h"
 #include "math/statistics.h"
+#include "random_guide.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -77,8 +77,8 @@ protected:
                             test::sphere("0.5,0.3,-0.2", "0.45", given().bsdf))),
           film(scene.film(), scene.filter()), sampler(SamplerKind::Independent, 5) {
         if (const Guided guided = std::get<Guided>(GetParam()); guided != Guided::No)
-            guide = random_guide({}, 1.7f, std::vector<double>(scene.emitters().size(), 1), {},
-                                 guided == Guided::Wide ? 20.0f : 1000.0f, 3);
+            guide = test::random_guide({}, 1.7f, std::vector<double>(scene.emitters().size(), 1),
+                                       {}, guided == Guided::Wide ? 20.0f : 1000.0f, 3);
         guide.has_roulette = std::get<Guided>(GetParam()) == Guided::Wide;
     }
 

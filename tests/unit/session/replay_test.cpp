@@ -93,6 +93,10 @@ INSTANTIATE_TEST_SUITE_P(Methods, ReplayOf, ::testing::ValuesIn(methods_alone())
 class OwnIntegrator final : public Integrator {
 public:
     explicit OwnIntegrator(bool samples_alone) : samples_alone_(samples_alone) {}
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        path_->trace_eye_paths(c, z, stats);
+    }
     void sample(const SampleContext& c, Workspace& work) const override { path_->sample(c, work); }
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         return path_->counts(scene, light_paths);
@@ -191,10 +195,9 @@ TEST(Replay, KnowsWhichPassesCanBeTraced) {
     const auto passes = [](const char* text) {
         return replayed_passes(IntegratorSpec::parse(text));
     };
-    for (const char* alone :
-         {"path", "bdpt:roulette=0", "light", "bdpt:connections=path", "path:guide=off"})
+    for (const char* alone : {"path", "bdpt:roulette=0", "light", "path:guide=off"})
         EXPECT_EQ(passes(alone), ReplayedPasses::Any) << alone;
-    for (const char* shared : {"vcm", "upg", "pcbpt", "path:guide=on", "bdpt:connections=cache"})
+    for (const char* shared : {"vcm", "upg", "pcbpt", "path:guide=on"})
         EXPECT_EQ(passes(shared), ReplayedPasses::Last) << shared;
     for (const char* none : {"mlt", "pssmlt", "pm"})
         EXPECT_EQ(passes(none), ReplayedPasses::None) << none;
@@ -269,9 +272,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values("vcm:roulette=0,radius=0.3", "vcm:roulette=0.3,radius=0.3",
                       "upg:roulette=0,radius=0.3", "upg:roulette=0.3,radius=0.3",
                       "upg+bdpt:roulette=0,radius=0.3", "upg+bdpt:roulette=0.3,radius=0.3",
-                      "pcbpt:roulette=0", "pcbpt:roulette=0.3", "pcbpt:eorr=true",
-                      "bdpt:connections=cache,roulette=0", "bdpt:connections=cache,roulette=0.3",
-                      "path:guide=on", "sppm:radius=0.3"));
+                      "pcbpt:roulette=0", "pcbpt:roulette=0.3", "pcbpt:eorr=true", "path:guide=on",
+                      "sppm:radius=0.3"));
 
 }  // namespace
 }  // namespace etendue::test

@@ -196,6 +196,12 @@ TEST(Session, FailureToLoadIsKept) {
     EXPECT_TRUE(wait_for([&] { return session.status(run).state == RunState::Stopped; }));
 }
 
+TEST(Session, FailureToLoadIsKeptEvenWithoutAText) {
+    Session session([]() -> LoadedScene { throw std::runtime_error(""); }, 1);
+    ASSERT_TRUE(wait_for([&] { return !session.is_loading() && !session.load_error().empty(); }));
+    EXPECT_EQ(session.load_error(), "a failure without a name");
+}
+
 TEST(Session, StoppedRunsShowTheirLastPass) {
     Session session(small_room, 1);
     ASSERT_TRUE(wait_for_scene(session));

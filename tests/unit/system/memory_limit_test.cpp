@@ -4,10 +4,12 @@
 
 #include <atomic>
 #include <functional>
+#include <latch>
 #include <new>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <variant>
 #include <vector>
 
 #include <sys/mman.h>
@@ -94,9 +96,10 @@ TEST_F(MemoryLimit, OfTheMachineGrowsByTheStacksOfThreads) {
                                     limit_memory_to_available();
                                     const uint64_t before = data_limit();
                                     make_room_for_threads(64);
-                                    expect(data_limit() == before + 512 * kMebibyte, "no room");
+                                    // The caller has a stack.
+                                    expect(data_limit() == before + 504 * kMebibyte, "no room");
                                     make_room_for_threads(16);
-                                    expect(data_limit() == before + 512 * kMebibyte, "less room");
+                                    expect(data_limit() == before + 504 * kMebibyte, "less room");
                                 }),
               "");
 }
@@ -144,14 +147,22 @@ TEST_F(MemoryLimit, ThatIsGivenStays) {
         expect(data_limit() == given, "it was replaced");
         make_room_for_threads(64);  // Does not raise it.
     });
-    EXPECT_TRUE(error.starts_with("64 threads need 512 MiB")) << error;
+    EXPECT_TRUE(error.starts_with("63 further threads need 504 MiB")) << error;
 }
 
-/// Threads that wait until they are destroyed.
+/// Threads that wait until they are destroyed. Each has an `Owned`.
+template <class Owned>
 class Waiting {
 public:
     explicit Waiting(int count) {
-        for (int i = 0; i < count; ++i) threads_.emplace_back([this] { ends_.wait(false); });
+        std::latch begun(count + 1);
+        for (int i = 0; i < count; ++i)
+            threads_.emplace_back([&] {
+                [[maybe_unused]] const Owned owned;
+                begun.count_down();
+                ends_.wait(false);
+            });
+        begun.arrive_and_wait();
     }
     ~Waiting() {
         ends_ = true;
@@ -162,13 +173,15 @@ private:
     std::atomic<bool> ends_{false};
     std::vector<std::jthread> threads_;
 };
+using Workers = Waiting<WorkerStack>;
+using OtherThreads = Waiting<std::monostate>;
 
 TEST_F(MemoryLimit, CountsTheStacksOfRunningThreadsOnce) {
     EXPECT_EQ(in_limited_memory(1024 * kMebibyte,
                                 [] {
                                     limit_memory_to_available();
                                     make_room_for_threads(64);
-                                    const Waiting threads(64);
+                                    const Workers workers(63);
                                     rlimit space{};
                                     getrlimit(RLIMIT_AS, &space);
                                     const uint64_t left =
@@ -222,12 +235,54 @@ TEST_F(MemoryLimit, HasRoomForThreadsOrSaysSo) {
     const std::string error = in_limited_memory(1024 * kMebibyte, [] {
         limit_memory(used() + 100 * kMebibyte);
         make_room_for_threads(4);
-        const Waiting threads(4);
+        const Workers workers(3);
         make_room_for_threads(64);
     });
     EXPECT_TRUE(error.starts_with(
         "60 further threads need 480 MiB for their stacks, but the memory is limited to "))
         << error;
+}
+
+/// Threads that do other things, such as those of a Python program, need their stacks themselves.
+TEST_F(MemoryLimit, HasNoRoomInTheStacksOfOtherThreads) {
+    const std::string error = in_limited_memory(1024 * kMebibyte, [] {
+        const OtherThreads threads(64);
+        limit_memory(used() + 100 * kMebibyte);
+        make_room_for_threads(64);
+    });
+    EXPECT_TRUE(error.starts_with(
+        "63 further threads need 504 MiB for their stacks, but the memory is limited to "))
+        << error;
+}
+
+TEST_F(MemoryLimit, HasNoRoomInTheStacksOfWorkersThatEnded) {
+    const std::string error = in_limited_memory(1024 * kMebibyte, [] {
+        const OtherThreads threads(64);
+        limit_memory(used() + 100 * kMebibyte);
+        { const Workers workers(3); }
+        make_room_for_threads(64);
+    });
+    EXPECT_TRUE(error.starts_with("63 further threads need 504 MiB")) << error;
+}
+
+/// The stacks of its parent's workers are not its own.
+TEST_F(MemoryLimit, HasNoRoomInTheStacksOfAnotherProcess) {
+    const Workers workers(63);
+    const std::string error = in_limited_memory(1024 * kMebibyte, [] {
+        limit_memory(used() + 100 * kMebibyte);
+        make_room_for_threads(64);
+    });
+    EXPECT_TRUE(error.starts_with("63 further threads need 504 MiB")) << error;
+}
+
+/// One thread needs no further one, whatever the memory.
+TEST_F(MemoryLimit, HasRoomForTheCaller) {
+    EXPECT_EQ(in_limited_memory(1024 * kMebibyte,
+                                [] {
+                                    limit_memory(used() + 4 * kMebibyte);
+                                    make_room_for_threads(1);
+                                }),
+              "");
 }
 
 TEST_F(MemoryLimit, OfTheSystemHasRoomForThreadsToo) {
@@ -254,12 +309,12 @@ TEST_F(MemoryLimit, OfTheSystemHasRoomForThreadsToo) {
             throw std::runtime_error(refused);
         });
         EXPECT_TRUE(error.starts_with(
-            "64 threads need 512 MiB for their stacks, but the memory is limited to "))
+            "63 further threads need 504 MiB for their stacks, but the memory is limited to "))
             << error;
     }
     const std::string error = in_limited_memory(300 * kMebibyte, [] { make_room_for_threads(64); });
     EXPECT_TRUE(error.starts_with(
-        "64 threads need 512 MiB for their stacks, but the address space is limited to "))
+        "63 further threads need 504 MiB for their stacks, but the address space is limited to "))
         << error;
 }
 

@@ -42,9 +42,8 @@ TEST_P(Observer, GetsTheBitsOfARenderingWithoutOne) {
         "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>");
     std::vector<IntegratorSpec> specs;
     for (const IntegratorEntry& e : integrator_registry()) specs.push_back({e.info.name, {}});
-    for (const char* text :
-         {"bdpt:roulette=0", "bdpt:connections=cache", "bdpt:eorr=true", "vcm:exact=true",
-          "pcbpt:direct=both", "pcbpt:cache=false", "upg+bdpt:roulette=0"})
+    for (const char* text : {"bdpt:roulette=0", "bdpt:eorr=true", "vcm:exact=true",
+                             "pcbpt:direct=both", "pcbpt:cache=false", "upg+bdpt:roulette=0"})
         specs.push_back(IntegratorSpec::parse(text));
     int compared = 0;
     for (const IntegratorSpec& spec : specs) {

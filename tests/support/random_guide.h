@@ -1,12 +1,20 @@
-#include "guide/random_guide.h"
+#pragma once
+// A guide that knows nothing and is sure of it: with it, too, everything must be unbiased.
 
+#include <utility>
+#include <vector>
+
+#include "guide/guide.h"
 #include "math/hash.h"
 #include "math/warp.h"
+#include "scene/scene.h"
 
-namespace etendue {
+namespace etendue::test {
 
-Guide random_guide(Vec3 center, float radius, std::vector<double> emission,
-                   const std::vector<uint32_t>& at_infinity, float kappa, uint64_t seed) {
+/// `emission`: weights of the emitters, which it changes where they are positive; `at_infinity`: indices of the emitters
+/// at infinity whose directions it guides; `kappa`: of all lobes.
+inline Guide random_guide(Vec3 center, float radius, std::vector<double> emission,
+                          const std::vector<uint32_t>& at_infinity, float kappa, uint64_t seed) {
     // The squares of a walk's weights grow by 1/(1 − share) at each vertex where the guide has little of the density. Most
     // walks would have infinite variance with a half.
     constexpr float kShare = 0.25f;
@@ -40,4 +48,16 @@ Guide random_guide(Vec3 center, float radius, std::vector<double> emission,
     return guide;
 }
 
-}  // namespace etendue
+/// For all emitters of a scene.
+inline Guide random_guide(const Scene& scene, float kappa, uint64_t seed) {
+    std::vector<double> pmf;
+    std::vector<uint32_t> at_infinity;
+    for (const auto& e : scene.emitters()) {
+        pmf.push_back(double(e->selection_pmf));
+        if (e->is_infinite() && !e->is_delta()) at_infinity.push_back(e->index);
+    }
+    const Bounds3& bounds = scene.bounds();
+    return random_guide(bounds.center(), bounds.radius(), std::move(pmf), at_infinity, kappa, seed);
+}
+
+}  // namespace etendue::test

@@ -2,18 +2,18 @@
 
 #include "no_memory.h"
 
-#include <atomic>
 #include <cstdlib>
 #include <new>
 
-namespace {
-
-std::atomic<size_t> failing_size{0};  ///< 0: none.
-
-}  // namespace
+std::atomic<size_t> etendue::test::size_without_memory{0};
+std::atomic<long> etendue::test::blocks_with_memory{0};
 
 void* operator new(size_t size) {
-    if (size > 0 && size == failing_size.load(std::memory_order_relaxed)) throw std::bad_alloc();
+    using namespace etendue::test;
+    if (size > 0 && size == size_without_memory.load(std::memory_order_relaxed))
+        throw std::bad_alloc();
+    if (blocks_with_memory.load(std::memory_order_relaxed) > 0 && --blocks_with_memory == 0)
+        throw std::bad_alloc();
     if (void* p = std::malloc(size > 0 ? size : 1)) return p;
     throw std::bad_alloc();
 }
@@ -27,14 +27,3 @@ void operator delete(void* p) noexcept {
 void operator delete(void* p, size_t) noexcept {
     std::free(p);
 }
-
-namespace etendue::test {
-
-NoMemoryFor::NoMemoryFor(size_t size) {
-    failing_size = size;
-}
-NoMemoryFor::~NoMemoryFor() {
-    failing_size = 0;
-}
-
-}  // namespace etendue::test

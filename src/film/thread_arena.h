@@ -1,0 +1,33 @@
+#pragma once
+
+#include <tbb/task_arena.h>
+#include <tbb/task_scheduler_observer.h>
+
+namespace etendue {
+
+/// Threads of parallel loops: the caller of execute(), and workers of TBB, for whose stacks there is memory.
+class ThreadArena {
+public:
+    /// Has thread_count(wanted) threads. Throws std::runtime_error where their stacks do not fit into the memory.
+    explicit ThreadArena(int wanted);
+
+    /// Returns task(), whose parallel loops have these threads.
+    template <class Task>
+    decltype(auto) execute(const Task& task) {
+        return arena_.execute(task);
+    }
+
+private:
+    /// Counts the workers that have begun.
+    class Observer final : public tbb::task_scheduler_observer {
+    public:
+        explicit Observer(tbb::task_arena& arena);
+        ~Observer() override;
+        void on_scheduler_entry(bool is_worker) override;
+    };
+
+    tbb::task_arena arena_;
+    Observer observer_;
+};
+
+}  // namespace etendue

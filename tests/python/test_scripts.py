@@ -1,0 +1,79 @@
+"""Scripts and measurements, with stand-ins for the programs that they run."""
+
+import argparse
+import importlib.machinery
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def write_program(file: Path, text: str) -> None:
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(f"#!/bin/bash\n{text}")
+    file.chmod(0o755)
+
+
+KILLED = """
+[ RUN      ] Methods/Killed.ResumesWithTheSameBits/path_guide_on
+path:guide=on: ETENDUE_SEED=11
+path:guide=on: 2 kills, 1 resumes
+[       OK ] Methods/Killed.ResumesWithTheSameBits/path_guide_on (12 ms)
+[ RUN      ] Methods/Killed.ResumesWithTheSameBits/upg_bdpt
+upg+bdpt: ETENDUE_SEED=12
+upg+bdpt: 2 kills, 2 resumes
+/a/tests/program/checkpoint_test.cpp:150: Failure
+Expected equality of these values:
+  bits("killed.etd")
+  bits("whole.etd")
+Google Test trace:
+/a/tests/program/checkpoint_test.cpp:100: ETENDUE_SEED=12
+[  FAILED  ] Methods/Killed.ResumesWithTheSameBits/upg_bdpt, where GetParam() = 0x55 pointing to "upg+bdpt" (9 ms)
+[ RUN      ] Methods/Killed.ResumesWithTheSameBits/vcm
+vcm: ETENDUE_SEED=13
+"""
+
+
+def test_chaos_tells_bits_that_differ_and_tests_that_crash(tmp_path: Path) -> None:
+    write_program(tmp_path / "etendue", "echo etendue 1")
+    write_program(tmp_path / "tests" / "program_tests", f"echo '{KILLED}'; kill -SEGV $$")
+    report = tmp_path / "chaos.json"
+    chaos = [sys.executable, str(ROOT / "scripts" / "chaos")]
+    run = subprocess.run([*chaos, "2", str(tmp_path), "-o", str(report)], capture_output=True, text=True)
+    assert run.returncode != 0, run.stdout
+    methods = json.loads(report.read_text())["methods"]
+    assert [(m["method"], m["seed"], m["kills"], m["same_bits"]) for m in methods] == [
+        ("path:guide=on", 11, 2, True), ("upg+bdpt", 12, 2, False), ("vcm", 13, 0, False)]
+    table = subprocess.run([*chaos, "--table", str(report)], capture_output=True, text=True, check=True).stdout
+    assert "| `upg+bdpt` | 2 | 2 | 12 | **no** |" in table
+
+
+def test_the_model_of_ranks_has_the_pace_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "bench"))
+    import ranks_model
+
+    pace = (ROOT / "src" / "render" / "writing_pace.h").read_text()
+    assert f"kMostOfTime = {ranks_model.MOST_OF_TIME};" in pace
+    assert f"{{interval, most, {ranks_model.LONGEST_WAIT}}}" in pace
+    # The share of the time for a file: less than one a minute takes, a hundredth, and one every quarter of an hour.
+    for seconds, of_checkpoints, of_images in [(0.3, 0.005, 0.005), (3, 0.01, 0.01), (90, 0.1, 0.01)]:
+        for kind, share in [("checkpoint_seconds", of_checkpoints), ("image_seconds", of_images)]:
+            job = ranks_model.Job(pass_seconds=1, jitter=0, **{kind: seconds})
+            assert job.seconds(1, 1000) == pytest.approx(1000 * (1 + share))
+
+
+def test_what_checkpoints_cost_is_measured_after_every_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "bench"))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    loader = importlib.machinery.SourceFileLoader("checkpoint_cost", str(ROOT / "bench" / "checkpoint_cost"))
+    checkpoint_cost = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(checkpoint_cost)
+    stats = {"checkpoints": {"written": 2, "seconds": 0.1}}
+    monkeypatch.setattr(checkpoint_cost, "render", lambda *_: stats)
+    with pytest.raises(SystemExit, match="path: 2 checkpoints between 4 passes"):
+        checkpoint_cost.measure_method(None, "path", argparse.Namespace(passes=4), tmp_path)
