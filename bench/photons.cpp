@@ -108,12 +108,16 @@ public:
         }
         begin_of_samples_ = processor_seconds();
     }
+    void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
+                         RenderStats& stats) const override {
+        if (is_whole_) return whole_->trace_eye_paths(c, z, stats);
+        paths_.trace_eye_paths(c, counts(c[0].scene, c[0].light_paths), z, stats);
+    }
     void sample(const SampleContext& c, Workspace& work) const override {
         if (is_whole_) return whole_->sample(c, work);
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         const SubPath &y = work.y, &z = work.z;
         cache_.restore(c.scene, c.index, work.y);
-        trace_eye_path(c, paths_.eye_walk(c.scene, n, work.stats), work.z);
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);
             if (!paths_.is_joinable(z, t)) continue;
