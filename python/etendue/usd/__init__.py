@@ -18,10 +18,9 @@ from ._cameras import add_camera
 from ._context import Context, Options
 from ._stage import diagnostics, open_stage, time_code
 from ._traversal import add_prims
+from ._write import write_xml
 
-__all__ = ["EXTENSIONS", "load"]
-
-EXTENSIONS = (".usd", ".usda", ".usdc", ".usdz")
+__all__ = ["load", "write_xml"]
 
 
 def load(
@@ -48,9 +47,8 @@ def load(
     with diagnostics(name, notes):
         stage = open_stage(name, options, notes)
         context = Context(name, stage, time_code(stage, options), options, notes)
-        sensor = add_camera(context)
+        add_camera(context)
         add_prims(context)
-        scene = {"type": "scene", **sensor(), **context.objects}
     for note in notes:
         warnings.warn(note, stacklevel=stacklevel)
-    return load_dict(scene, context.folder)
+    return load_dict({"type": "scene", **context.objects}, context.folder)

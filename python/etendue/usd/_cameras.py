@@ -1,27 +1,25 @@
 """Cameras: the chosen one becomes the sensor of the scene."""
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdRender
 
 from .._scenes import look_at
-from ._context import Context, Object, path_of, unscaled
+from ._context import Context, Matrix, Object, path_of, unscaled
 
 HEIGHT = 720  # Of images whose resolution no file gives, in pixels.
 
 
-def add_camera(context: Context) -> Callable[[], dict[str, Object]]:
-    """Sets the exposure of the scene; returns what makes the sensor after the bounds of the scene are known."""
+def add_camera(context: Context) -> None:
+    """Adds the sensor, and sets the exposure of the scene."""
     camera = _choose(context)
     if camera is None:
-        return lambda: {"sensor": _default_sensor(context)}
-    prim = camera.GetPrim()
-    context.exposure = _exposure(context, camera)
-    made = _sensor(context, prim)
-    return lambda: {path_of(prim): made}
+        context.objects["sensor"] = _default_sensor(context)
+        return
+    context.exposure = float(camera.ComputeLinearExposureScale(context.time))
+    context.objects[path_of(camera)] = _sensor(context, camera.GetPrim())
 
 
 def _choose(context: Context) -> Any:
@@ -40,10 +38,6 @@ def _choose(context: Context) -> Any:
     if len(cameras) > 1:
         context.warn(cameras[0], f"the first of {len(cameras)} cameras is used")
     return UsdGeom.Camera(cameras[0]) if cameras else None
-
-
-def _exposure(context: Context, camera: Any) -> float:
-    return float(camera.ComputeLinearExposureScale(context.time))
 
 
 def _film(context: Context, aspect: float) -> Object:
@@ -72,7 +66,7 @@ def _sensor(context: Context, prim: Any) -> Object:
             context.fail(prim, f"{name} is {value}, but must be positive")
     film = _film(context, width / height)
     offsets = {
-        "principal_point_offset_x": -float(context.get(prim, "horizontalApertureOffset", 0)) / width,
+        "principal_point_offset_x": float(context.get(prim, "horizontalApertureOffset", 0)) / width,
         "principal_point_offset_y": float(context.get(prim, "verticalApertureOffset", 0)) / height,
     }
     if context.get(prim, "projection") == "orthographic":
@@ -94,12 +88,19 @@ def _sensor(context: Context, prim: Any) -> Object:
 
 def _default_sensor(context: Context) -> Object:
     """Sees the whole scene."""
-    context.bounds.add_stage(context)
-    lo, hi = context.bounds.lo, context.bounds.hi
-    if not np.all(np.isfinite(lo)):
-        lo, hi = -np.ones(3), np.ones(3)
+    lo, hi = _bounds(context)
     context.notes.append(f"{context.file}: there is no camera: one is added that sees the whole scene")
     middle, radius, fov = (lo + hi) / 2, max(float(np.linalg.norm(hi - lo)) / 2, 1e-6), 45.0
     eye = middle + np.array([0.5, 0.4, 1]) / math.hypot(0.5, 0.4, 1) * radius / math.sin(math.radians(fov) / 2)
     return {"type": "perspective", "to_world": look_at(tuple(eye), tuple(middle)), "fov": fov, "fov_axis": "y",
             "film": _film(context, 16 / 9)}
+
+
+def _bounds(context: Context) -> tuple[Matrix, Matrix]:
+    """Corners of the box around the stage, in the space of the scene."""
+    cache = UsdGeom.BBoxCache(context.time, list(context.options.purposes))
+    box = cache.ComputeWorldBound(context.stage.GetPseudoRoot()).ComputeAlignedRange()
+    if box.IsEmpty():
+        return -np.ones(3), np.ones(3)
+    corners = np.array([box.GetCorner(i) for i in range(8)]) @ context.root[:3, :3].T
+    return corners.min(0), corners.max(0)

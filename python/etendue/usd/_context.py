@@ -1,17 +1,21 @@
 """What all parts of the reader share: the stage, the options, the objects read so far, and messages."""
 
+import hashlib
 import os
-from dataclasses import dataclass, field
+import tempfile
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Usd, UsdGeom
+from pxr import Gf, UsdGeom
 
 from .._etendue import SceneError
 
 Matrix = NDArray[np.float64]
 Object = dict[str, Any]  # An object in the format of et.load_dict().
+
+_folder: tempfile.TemporaryDirectory[str] | None = None
 
 
 @dataclass
@@ -49,7 +53,6 @@ class Context:
         self.transforms = UsdGeom.XformCache(time)
         self.unit = UsdGeom.GetStageMetersPerUnit(stage)  # One unit of the stage in metres.
         self.exposure = 1.0  # Factor on all emission, since the film has none.
-        self.bounds = Bounds()
         if not self.unit > 0:
             raise SceneError(f"{file}: metersPerUnit is {self.unit}, but must be positive")
         self.is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
@@ -78,6 +81,18 @@ class Context:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(self.time) if attribute else None
         return default if value is None else value
+
+    def unpacked(self, image: Object) -> str:
+        """The name of a file with the bytes of an image, for parameters that cannot hold them. It exists as long as the process."""
+        global _folder
+        if _folder is None:
+            _folder = tempfile.TemporaryDirectory(prefix="etendue-usd-")
+        digest = hashlib.sha256(image["bytes"]).hexdigest()[:16]
+        name = os.path.join(_folder.name, digest + os.path.splitext(image["name"].rstrip("]"))[1])
+        if not os.path.exists(name):
+            with open(name, "wb") as f:
+                f.write(image["bytes"])
+        return name
 
     def stage_matrix(self, prim: Any) -> Matrix:
         """From the space of a prim to that of the stage."""
@@ -111,24 +126,6 @@ def is_authored(prim: Any, name: str) -> bool:
     return bool(attribute) and attribute.HasAuthoredValue()
 
 
-@dataclass
-class Bounds:
-    """The bounding box of what has been read, in the space of the scene."""
-
-    lo: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.inf))
-    hi: NDArray[np.float64] = field(default_factory=lambda: np.full(3, -np.inf))
-
-    def add_stage(self, context: Context) -> None:
-        """Extends the box by the world bounds that USD computes."""
-        purposes = [str(p) for p in context.options.purposes]
-        cache = UsdGeom.BBoxCache(context.time, purposes, useExtentsHint=False)
-        box = cache.ComputeWorldBound(context.stage.GetPseudoRoot()).ComputeAlignedRange()
-        if box.IsEmpty():
-            return
-        corners = np.array([box.GetCorner(i) for i in range(8)]) @ context.root[:3, :3].T
-        self.lo, self.hi = np.minimum(self.lo, corners.min(0)), np.maximum(self.hi, corners.max(0))
-
-
 def unscaled(m: Matrix) -> Matrix | None:
     """The position and the directions of a transform without its scale; None where it has no inverse."""
     rotation = Gf.Matrix4d(m.T.tolist())
@@ -139,6 +136,3 @@ def unscaled(m: Matrix) -> Matrix | None:
     made[:3, 3] = m[:3, 3]
     return made
 
-
-__all__ = ["Bounds", "Context", "Matrix", "Object", "Options", "Usd", "array", "column_matrix", "is_authored", "path_of", "rgb",
-           "unscaled"]

@@ -37,7 +37,7 @@ def _axis(context: Context, prim: Any) -> Matrix:
 
 
 def _sphere(context: Context, prim: Any) -> list[tuple[str, Object]]:
-    return [("", {"type": "sphere", "radius": 1.0, "to_world": scale(_size(context, prim, "radius"))})]
+    return [("", {"type": "sphere", "radius": _size(context, prim, "radius"), "to_world": np.eye(4)})]
 
 
 def _cube(context: Context, prim: Any) -> list[tuple[str, Object]]:
@@ -60,8 +60,7 @@ def _cylinder(context: Context, prim: Any) -> list[tuple[str, Object]]:
     if bottom != top:
         return _revolved(context, prim, bottom, top, height)
     axis = _axis(context, prim)
-    side = {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0, 1], "radius": 1.0,
-            "to_world": axis @ translate(z=-height / 2) @ scale(bottom, bottom, height)}
+    side = {"type": "cylinder", "p0": [0, 0, -height / 2], "p1": [0, 0, height / 2], "radius": bottom, "to_world": axis}
     return [("", side)] + _caps(axis, bottom, top, height)
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import UsdLux
 
-from .._scenes import scale, translate
-from ._context import Context, Matrix, Object, column_matrix, is_authored, rgb, unscaled
+from .._scenes import scale
+from ._context import Context, Matrix, Object, is_authored, rgb, unscaled
 from ._textures import image_source
 
 WIDEST_SUN = 1.0  # Degrees from which a warning says that shadows are sharp.
@@ -124,7 +124,7 @@ def _sphere(context: Context, prim: Any, to_scene: Matrix) -> Object:
         return _spot(context, prim, to_scene, area / 4)
     if light_input(context, prim, "treatAsPoint", False):
         return {"type": "point", "position": to_scene[:3, 3], "intensity": rgb(_intensity(context, prim, area, area / 4))}
-    return _area_light(context, prim, {"type": "sphere", "radius": 1.0, "to_world": to_scene @ scale(radius)}, area)
+    return _area_light(context, prim, {"type": "sphere", "radius": radius, "to_world": to_scene}, area)
 
 
 def _intensity(context: Context, prim: Any, area: float, visible_area: float) -> NDArray[np.float64]:
@@ -141,10 +141,8 @@ def _cylinder(context: Context, prim: Any, to_scene: Matrix) -> Object:
     area = length * x * math.pi * (3 * (a + b) - math.sqrt((3 * a + b) * (a + 3 * b)))
     if _cone(context, prim) is not None:
         context.warn(prim, "the shaping of a cylinder has no effect")
-    along_x = np.roll(np.eye(4), 1, axis=0)[[0, 1, 2, 3]]
-    along_x = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-    to_world = to_scene @ along_x @ translate(z=-length / 2) @ scale(radius, radius, length)
-    return _area_light(context, prim, {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0, 1], "radius": 1.0, "to_world": to_world}, area)
+    shape = {"type": "cylinder", "p0": [-length / 2, 0, 0], "p1": [length / 2, 0, 0], "radius": radius, "to_world": to_scene}
+    return _area_light(context, prim, shape, area)
 
 
 def _distant(context: Context, prim: Any, to_scene: Matrix) -> Object:
@@ -181,7 +179,7 @@ def _spot(context: Context, prim: Any, to_scene: Matrix, area: float) -> Object:
 
 def _dome(context: Context, prim: Any, to_scene: Matrix) -> Object | None:
     radiance = rgb(emitted(context, prim))
-    if UsdLux.LightAPI(prim) and prim.GetRelationship("portals").GetTargets():
+    if prim.GetRelationship("portals").GetTargets():
         context.warn(prim, "portals have no effect: the whole dome shines")
     asset = light_input(context, prim, "texture:file")
     image = image_source(context, prim, asset) if asset else None
@@ -211,5 +209,3 @@ def _pole(context: Context, prim: Any) -> Matrix:
 
 _MAKERS = {"RectLight": _rect, "DiskLight": _disk, "SphereLight": _sphere, "CylinderLight": _cylinder, "DistantLight": _distant,
            "DomeLight": _dome, "DomeLight_1": _dome}
-
-__all__ = ["column_matrix", "emitted", "is_normalized", "light", "light_input"]

@@ -6,7 +6,7 @@ from typing import Any
 from pxr import UsdGeom, UsdShade
 
 from ._context import Context, Object, path_of, rgb
-from ._networks import Inputs, luminance, product
+from ._networks import Inputs, product
 from ._surface_models import MODELS, Model
 
 
@@ -118,5 +118,3 @@ def _surface(context: Context, shader: Any, model: Model) -> Material:
         context.warn(shader, f"inputs:{name} has no effect")
     return made
 
-
-__all__ = ["Material", "bound_material", "luminance"]

@@ -75,8 +75,7 @@ def _parts(context: Context, prim: Any, topology: Topology) -> list[Part]:
     """GeomSubsets of the family materialBind, and the rest of the mesh."""
     rest = np.ones(len(topology.counts), bool)
     holes = array(context.get(prim, "holeIndices"), 1, np.int64)
-    for name, indices in (("holeIndices", holes),):
-        _check_faces(context, prim, name, indices, topology)
+    _check_faces(context, prim, "holeIndices", holes, topology)
     is_hole = np.zeros(len(rest), bool)
     is_hole[holes] = True
     parts = []

@@ -8,10 +8,10 @@ from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
 
 from ._context import Context, Matrix, Object, column_matrix, path_of
 from ._gprims import shapes_of_gprim
-from ._lights import emitted, is_normalized, light, light_input
+from ._lights import emitted, is_normalized, light
 from ._materials import Material, bound_material
 from ._meshes import parts_of_mesh
-from ._networks import luminance, product
+from ._networks import product
 
 PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded & Usd.PrimIsDefined & ~Usd.PrimIsAbstract)
 
@@ -120,7 +120,7 @@ class _Reader:
             p = (shape["mesh"]["positions"] @ self.context.stage_matrix(prim)[:3, :3].T)[shape["mesh"]["triangles"]]
             radiance = radiance / (np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum() / 2)
         color: Object = {"type": "rgb", "value": [float(x) for x in radiance]}
-        if material.emitter is not None and context_tints(self.context, prim):
+        if material.emitter is not None and _tints(self.context, prim):
             color = {"type": "scale", "value": product(material.emitter["radiance"], 1 / self.context.exposure), "scale": color}
         return {"type": "area", "radiance": color}
 
@@ -189,7 +189,7 @@ class _Reader:
                 target.shapes.update(copy.shapes)
 
 
-def context_tints(context: Context, prim: Any) -> bool:
+def _tints(context: Context, prim: Any) -> bool:
     """Whether the emission of a material tints the light of a mesh."""
     return str(context.get(prim, "light:materialSyncMode")) == "materialGlowTintsLight"
 
@@ -200,5 +200,3 @@ def _group(shapes: dict[str, Object]) -> Object:
         made["shape" if i == 0 else f"shape_{i + 1}"] = {**shape, "id": key}
     return made
 
-
-__all__ = ["add_prims", "light_input", "luminance"]
