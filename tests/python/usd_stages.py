@@ -41,7 +41,7 @@ def write(
 ) -> Path:
     """A file with a stage."""
     file = folder / name
-    text = textwrap.dedent(text).replace("}", "\n}")  # A line of its own, as the format wants it.
+    text = textwrap.dedent(text).replace("}", "\n}\n")  # Lines of their own, as the format wants them.
     file.write_text(f"#usda 1.0\n(\n    metersPerUnit = {unit}\n    upAxis = \"{up}\"\n{metadata}\n)\n{text}")
     return file
 

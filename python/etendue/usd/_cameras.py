@@ -67,7 +67,7 @@ def _sensor(context: Context, prim: Any) -> Object:
     film = _film(context, width / height)
     offsets = {
         "principal_point_offset_x": float(context.get(prim, "horizontalApertureOffset", 0)) / width,
-        "principal_point_offset_y": float(context.get(prim, "verticalApertureOffset", 0)) / height,
+        "principal_point_offset_y": -float(context.get(prim, "verticalApertureOffset", 0)) / (width * film["height"] / film["width"]),
     }
     if context.get(prim, "projection") == "orthographic":
         if any(offsets.values()):
