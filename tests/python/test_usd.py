@@ -35,7 +35,7 @@ def test_a_stage_and_its_xml_give_the_same_image(tmp_path: Path) -> None:
     expect_same(image(load(tmp_path, CAMERA + FLOOR + SUN)), image_of_xml(FLOOR_XML + SUN_XML))
 
 
-def test_a_stage_and_its_gltf_give_the_same_bits(tmp_path: Path) -> None:
+def test_a_stage_and_its_gltf_give_the_same_image(tmp_path: Path) -> None:
     positions = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0.5], [-1, 1, 0]], np.float32)
     triangles = np.array([0, 1, 2, 0, 2, 3], np.uint32)
     data = positions.tobytes() + triangles.tobytes()

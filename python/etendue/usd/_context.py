@@ -136,3 +136,8 @@ def unscaled(m: Matrix) -> Matrix | None:
     made[:3, 3] = m[:3, 3]
     return made
 
+
+
+def inverse(m: Matrix) -> Matrix:
+    """The inverse, as exact as the transform allows: the pseudo-inverse where it has none."""
+    return np.asarray(np.linalg.pinv(m) if abs(np.linalg.det(m)) < 1e-300 else np.linalg.inv(m), np.float64)

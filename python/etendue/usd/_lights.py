@@ -75,7 +75,8 @@ def _area_light(context: Context, prim: Any, shape: Object, area: float) -> Obje
 
 def _lengths(context: Context, prim: Any) -> NDArray[np.float64]:
     """The lengths of the axes of the light in units of the stage, by which areas are measured."""
-    return np.linalg.norm(context.stage_matrix(prim)[:3, :3], axis=0)
+    lengths: NDArray[np.float64] = np.linalg.norm(context.stage_matrix(prim)[:3, :3], axis=0)
+    return lengths
 
 
 def _extent(context: Context, prim: Any, name: str, default: float) -> float:
@@ -130,7 +131,7 @@ def _sphere(context: Context, prim: Any, to_scene: Matrix) -> Object:
 def _intensity(context: Context, prim: Any, area: float, visible_area: float) -> NDArray[np.float64]:
     """The radiant intensity of a light whose size is left out: of the area that is seen along its axis."""
     share = visible_area / area if is_normalized(context, prim) else visible_area
-    return emitted(context, prim) * share * context.unit**2
+    return np.asarray(emitted(context, prim) * share * context.unit**2)
 
 
 def _cylinder(context: Context, prim: Any, to_scene: Matrix) -> Object:

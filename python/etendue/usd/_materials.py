@@ -62,7 +62,9 @@ def _read(context: Context, bound: Any) -> Material:
 def _display_color(context: Context, prim: Any) -> Material:
     """A diffuse material of the primvars displayColor and displayOpacity."""
     mesh = prim.GetParent() if prim.IsA(UsdGeom.Subset) else prim
-    made, reflectance, opacity = Material(), None, None
+    made = Material()
+    reflectance: Any = None
+    opacity: Any = None
     color = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance("displayColor")
     value = color.Get(context.time) if color and color.HasValue() else None
     if value:

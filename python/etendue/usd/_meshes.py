@@ -211,6 +211,6 @@ def _arrays(context: Context, part: Part, mesh: _Mesh, corners: Integers) -> Obj
     for i, (key, values) in enumerate(attributes.items()):
         rows = values.rows[unique[:, i + 1]]
         if key in ("uvs", "second_uvs"):
-            rows = rows * np.float32([1, -1]) + np.float32([0, 1])  # Images begin with their upper row.
+            rows = rows * np.array([1, -1], np.float32) + np.array([0, 1], np.float32)  # Images begin with their upper row.
         made[key] = rows
     return made

@@ -66,7 +66,7 @@ def image_source(context: Context, prim: Any, asset: Any) -> Object | None:
 
 def normal_scale(context: Context, node: Any) -> float:
     """The scale of a normal map, from its scale and bias."""
-    scale, bias = (list(_value(context, node, name, default)) for name, default in (("scale", (1,) * 4), ("bias", (0,) * 4)))
+    scale, bias = (list(_value(context, node, name, default)) for name, default in (("scale", (1.0,) * 4), ("bias", (0.0,) * 4)))
     factor = scale[0] / 2
     if not np.allclose(scale[:3], [2 * factor, 2 * factor, 2]) or not np.allclose(bias[:3], [-factor, -factor, -1]):
         context.warn(node, f"normals with the scale {tuple(scale)} and the bias {tuple(bias)} are read as with (2, 2, 2, 1) "
@@ -86,7 +86,7 @@ def _value(context: Context, node: Any, name: str, default: Any = None) -> Any:
 
 def _scaled(context: Context, node: Any, texture: Object, channel: str) -> Object:
     """value * scale + bias, clamped by what uses it."""
-    scale, bias = (list(_value(context, node, name, default)) for name, default in (("scale", (1,) * 4), ("bias", (0,) * 4)))
+    scale, bias = (list(_value(context, node, name, default)) for name, default in (("scale", (1.0,) * 4), ("bias", (0.0,) * 4)))
     if channel != "rgb":
         i = "rgba".index(channel)
         s, b = float(scale[i]), float(bias[i])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
 
-from ._context import Context, Matrix, Object, column_matrix, path_of
+from ._context import Context, Matrix, Object, column_matrix, inverse, path_of
 from ._gprims import shapes_of_gprim
 from ._lights import emitted, is_normalized, light
 from ._materials import Material, bound_material
@@ -67,7 +67,7 @@ class _Reader:
             self.visit(child, target)
 
     def _is_seen(self, prim: Any) -> bool:
-        return self.context.get(prim, "visibility") != "invisible"
+        return str(self.context.get(prim, "visibility")) != "invisible"
 
     def _has_purpose(self, prim: Any) -> bool:
         imageable = UsdGeom.Imageable(prim)
@@ -132,7 +132,7 @@ class _Reader:
                str(UsdGeom.Imageable(prim).ComputePurpose()) if UsdGeom.Imageable(prim) else "")
         children = prim.GetFilteredChildren(PREDICATE)
         to_stage = self.context.stage_matrix(prim)
-        if not self._place_group(prim, key, children, np.linalg.inv(to_stage), target, path_of(prim), target.from_stage @ to_stage):
+        if not self._place_group(prim, key, children, inverse(to_stage), target, path_of(prim), target.from_stage @ to_stage):
             for child in children:
                 self.visit(child, target)
 
@@ -180,7 +180,7 @@ class _Reader:
             if not 0 <= number < len(prototypes) or not prototypes[number]:
                 context.fail(prim, f"protoIndices has the index {number} of {len(prototypes)} prototypes")
             prototype = prototypes[number]
-            to_group = np.linalg.inv(context.stage_matrix(prototype))
+            to_group = inverse(context.stage_matrix(prototype))
             placed = to_stage @ column_matrix(transforms[i])
             if not self._place_group(prim, (paths[number], "point"), [prototype], to_group, target, f"{path_of(prim)}[{i}]",
                                      target.from_stage @ placed):
