@@ -313,6 +313,29 @@ def test_unknown_prims_are_warnings(tmp_path: Path) -> None:
         "/Empty: a mesh without faces is left out"}
 
 
+def test_singular_transforms_are_left_out(tmp_path: Path) -> None:
+    """Animations hide things by a scale of zero."""
+    flat = 'float3 xformOp:scale = (0, 1, 1)\nuniform token[] xformOpOrder = ["xformOp:scale"]'
+    write(tmp_path, BALL % COLOR, 'defaultPrim = "Model"', name="ball.usda")
+    text = CAMERA + SUN + f"""
+        def Xform "X" {{ {flat}
+            def Sphere "Ball" {{}} }}
+        def "I" (references = @ball.usda@
+            instanceable = true) {{ {flat} }}
+        def PointInstancer "Many" {{ point3f[] positions = [(0, 0, 0), (1, 0, 0)]
+            float3[] scales = [(0, 0, 0), (1, 1, 1)]
+            int[] protoIndices = [0, 0]
+            rel prototypes = [</Many/Ball>]
+            def Sphere "Ball" {{}} }}
+        """
+    with pytest.warns(UserWarning) as notes:
+        d = et.load(write(tmp_path, text))
+    assert {str(n.message).split(": ", 1)[1] for n in notes} == {
+        "/X: its transform has no inverse: it is left out with what is below it", "/I: its transform has no inverse: it is left out",
+        "/Many: instances whose transforms have no inverse are left out"}
+    assert d.build().info()["instances"] == 1
+
+
 def test_bad_files(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="none.usda: there is no such file"):
         et.load(tmp_path / "none.usda")

@@ -67,6 +67,7 @@ def _sensor(context: Context, prim: Any) -> Object:
     film = _film(context, width / height)
     offsets = {
         "principal_point_offset_x": float(context.get(prim, "horizontalApertureOffset", 0)) / width,
+        # The height of the view follows from its width.
         "principal_point_offset_y": -float(context.get(prim, "verticalApertureOffset", 0)) / (width * film["height"] / film["width"]),
     }
     if context.get(prim, "projection") == "orthographic":

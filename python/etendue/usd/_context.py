@@ -128,9 +128,9 @@ def is_authored(prim: Any, name: str) -> bool:
 
 def unscaled(m: Matrix) -> Matrix | None:
     """The position and the directions of a transform without its scale; None where it has no inverse."""
-    rotation = Gf.Matrix4d(m.T.tolist())
-    if abs(np.linalg.det(m[:3, :3])) < 1e-300:
+    if is_singular(m):
         return None
+    rotation = Gf.Matrix4d(m.T.tolist())
     made = np.eye(4)
     made[:3, :3] = column_matrix(rotation.RemoveScaleShear())[:3, :3]
     made[:3, 3] = m[:3, 3]
@@ -139,5 +139,11 @@ def unscaled(m: Matrix) -> Matrix | None:
 
 
 def inverse(m: Matrix) -> Matrix:
-    """The inverse, as exact as the transform allows: the pseudo-inverse where it has none."""
-    return np.asarray(np.linalg.pinv(m) if abs(np.linalg.det(m)) < 1e-300 else np.linalg.inv(m), np.float64)
+    """The inverse of a transform."""
+    return np.asarray(np.linalg.inv(m), np.float64)
+
+
+def is_singular(m: Matrix) -> bool:
+    """Whether a transform has no inverse."""
+    determinant = float(np.linalg.det(m[:3, :3]))
+    return determinant == 0 or not np.isfinite(determinant)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdSkel
 
-from ._context import Context, Matrix, Object, column_matrix, inverse, path_of
+from ._context import Context, Matrix, Object, column_matrix, inverse, is_singular, path_of
 from ._gprims import shapes_of_gprim
 from ._lights import emitted, is_normalized, light
 from ._materials import Material, bound_material
@@ -38,7 +38,7 @@ def add_prims(context: Context) -> None:
     target = Target(context.root)
     for prim in context.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE):
         reader.visit(prim, target)
-    if not target.has_light() and not reader.has_light:
+    if not target.has_light():
         context.notes.append(f"{context.file}: there is no light: a white environment is added")
         target.shapes["emitter"] = {"type": "constant"}
     context.objects.update(reader.groups)
@@ -51,7 +51,6 @@ class _Reader:
         self.context = context
         self.groups: dict[str, Object] = {}
         self.made: dict[Any, str | None] = {}  # Keys of groups; None: of what cannot be one.
-        self.has_light = False
 
     def visit(self, prim: Any, target: Target) -> None:
         context = self.context
@@ -61,6 +60,9 @@ class _Reader:
             return self._point_instancer(prim, target)
         if prim.IsInstance() and not prim.IsA(UsdGeom.Gprim):
             return self._instance(prim, target)
+        if is_singular(context.stage_matrix(prim)):
+            context.warn(prim, "its transform has no inverse: it is left out with what is below it")
+            return
         if self._has_purpose(prim):
             self._add(prim, target)
         for child in prim.GetFilteredChildren(PREDICATE):
@@ -132,6 +134,9 @@ class _Reader:
                str(UsdGeom.Imageable(prim).ComputePurpose()) if UsdGeom.Imageable(prim) else "")
         children = prim.GetFilteredChildren(PREDICATE)
         to_stage = self.context.stage_matrix(prim)
+        if is_singular(to_stage):
+            self.context.warn(prim, "its transform has no inverse: it is left out")
+            return
         if not self._place_group(prim, key, children, inverse(to_stage), target, path_of(prim), target.from_stage @ to_stage):
             for child in children:
                 self.visit(child, target)
@@ -180,8 +185,11 @@ class _Reader:
             if not 0 <= number < len(prototypes) or not prototypes[number]:
                 context.fail(prim, f"protoIndices has the index {number} of {len(prototypes)} prototypes")
             prototype = prototypes[number]
-            to_group = inverse(context.stage_matrix(prototype))
             placed = to_stage @ column_matrix(transforms[i])
+            if is_singular(placed) or is_singular(context.stage_matrix(prototype)):
+                context.warn(prim, "instances whose transforms have no inverse are left out")
+                continue
+            to_group = inverse(context.stage_matrix(prototype))
             if not self._place_group(prim, (paths[number], "point"), [prototype], to_group, target, f"{path_of(prim)}[{i}]",
                                      target.from_stage @ placed):
                 copy = Target(target.from_stage @ placed @ to_group, suffix=f"{target.suffix}[{i}]")
