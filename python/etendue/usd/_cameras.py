@@ -65,10 +65,10 @@ def _sensor(context: Context, prim: Any) -> Object:
         if not value > 0:
             context.fail(prim, f"{name} is {value}, but must be positive")
     film = _film(context, width / height)
+    view_height = width * film["height"] / film["width"]
     offsets = {
         "principal_point_offset_x": float(context.get(prim, "horizontalApertureOffset", 0)) / width,
-        # The height of the view follows from its width.
-        "principal_point_offset_y": -float(context.get(prim, "verticalApertureOffset", 0)) / (width * film["height"] / film["width"]),
+        "principal_point_offset_y": -float(context.get(prim, "verticalApertureOffset", 0)) / view_height,
     }
     if context.get(prim, "projection") == "orthographic":
         if any(offsets.values()):

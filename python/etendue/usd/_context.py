@@ -83,7 +83,8 @@ class Context:
         return default if value is None else value
 
     def unpacked(self, image: Object) -> str:
-        """The name of a file with the bytes of an image, for parameters that cannot hold them. It exists as long as the process."""
+        """The name of a file with the bytes of an image, for parameters that cannot hold them. The file exists as long as the
+        process."""
         global _folder
         if _folder is None:
             _folder = tempfile.TemporaryDirectory(prefix="etendue-usd-")

@@ -122,7 +122,8 @@ def _revolve(profile: Matrix, normals: Matrix) -> Object:
     a, b, c, d = (x.reshape(-1) for x in (row + column, row + after, row + SEGMENTS + after, row + SEGMENTS + column))
     # Where a ring is a point, one of the two triangles has no area.
     rings = profile[:, 0]
-    triangles = np.concatenate([np.stack([a, b, c], 1)[rings[a // SEGMENTS] > 0], np.stack([a, c, d], 1)[rings[d // SEGMENTS] > 0]])
+    lower, upper = np.stack([a, b, c], 1)[rings[a // SEGMENTS] > 0], np.stack([a, c, d], 1)[rings[d // SEGMENTS] > 0]
+    triangles = np.concatenate([lower, upper])
     return {"positions": turned(profile), "normals": turned(normals), "triangles": triangles}
 
 

@@ -96,7 +96,8 @@ def _rect(context: Context, prim: Any, to_scene: Matrix) -> Object:
     area = width * x * height * y
     if _cone(context, prim) is not None:
         return _spot(context, prim, to_scene, area)
-    made = _area_light(context, prim, {"type": "rectangle", "to_world": to_scene @ _TURNED @ scale(width / 2, height / 2, 1)}, area)
+    to_world = to_scene @ _TURNED @ scale(width / 2, height / 2, 1)
+    made = _area_light(context, prim, {"type": "rectangle", "to_world": to_world}, area)
     asset = light_input(context, prim, "texture:file")
     image = image_source(context, prim, asset) if asset else None
     if image is not None:

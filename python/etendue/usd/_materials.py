@@ -109,8 +109,8 @@ def _surface(context: Context, shader: Any, model: Model) -> Material:
     if not transmits:
         bsdf = {"type": "twosided", "bsdf": bsdf}
     if pane:
-        bsdf = {"type": "blendbsdf", "weight": opacity, "bsdf": {"type": "thindielectric", "int_ior": parameters["eta"], "ext_ior": 1.0},
-                "bsdf_2": bsdf}
+        clear = {"type": "thindielectric", "int_ior": parameters["eta"], "ext_ior": 1.0}
+        bsdf = {"type": "blendbsdf", "weight": opacity, "bsdf": clear, "bsdf_2": bsdf}
     elif opacity != 1:
         bsdf = {"type": "mask", "opacity": opacity, "bsdf": bsdf}
     made.bsdf = bsdf

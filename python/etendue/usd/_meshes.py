@@ -142,8 +142,8 @@ def _subdivide(
         by_point = np.zeros((topology.count_of_points, v.rows.shape[1]))
         by_point[topology.points] = v.at_corners()
         columns.append(by_point)
-    surface = Surface(topology, np.concatenate(columns, 1), _creases(context, prim, topology), _sharp_points(context, prim, topology),
-                      np.arange(len(topology.counts)))
+    surface = Surface(topology, np.concatenate(columns, 1), _creases(context, prim),
+                      _sharp_points(context, prim, topology), np.arange(len(topology.counts)))
     other = {name: v for name, v in primvars.items() if name not in smooth}
     for _ in range(context.options.subdivision):
         other = {name: refine_corners(v, surface.topology) for name, v in other.items()}
@@ -156,7 +156,7 @@ def _subdivide(
     return _Mesh(surface.topology, surface.vertices[:, :3], surface.parents, smooth_normals(surface), made)
 
 
-def _creases(context: Context, prim: Any, topology: Topology) -> dict[tuple[int, int], float]:
+def _creases(context: Context, prim: Any) -> dict[tuple[int, int], float]:
     lengths = array(context.get(prim, "creaseLengths"), 1, np.int64)
     indices = array(context.get(prim, "creaseIndices"), 1, np.int64)
     sharpness = array(context.get(prim, "creaseSharpnesses"), 1)

@@ -2,9 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from pxr import UsdShade
-
 from ._context import Context, Object, rgb
+from ._shaders import source_of, value_of
 from ._textures import bitmap, is_image, normal_scale
 
 if TYPE_CHECKING:
@@ -80,11 +79,11 @@ class Inputs:
 
     def normal_map(self, name: str) -> Object | None:
         """The parameters of `normalmap`, None without a texture."""
-        source = self._source(self.shader, name)
+        source = source_of(self.shader, name)
         scale = 1.0
         if source is not None and source[0].GetShaderId() in ("ND_normalmap", "ND_normalmap_float"):
             scale = float(self._evaluate(source[0], "scale", 1.0, "r", 0))
-            source = self._source(source[0], "in")
+            source = source_of(source[0], "in")
         if source is None:
             return None
         node = source[0]
@@ -96,30 +95,11 @@ class Inputs:
         texture = bitmap(self.context, node, "rgb", self.material.coordinates, is_data=True)
         return None if texture is None else {"normalmap": texture, "scale": scale}
 
-    def _source(self, node: Any, name: str) -> tuple[Any, str] | None:
-        """The shader and its output that an input is connected to, through any interfaces of graphs."""
-        shader_input = node.GetInput(name)
-        if not shader_input:
-            return None
-        for attribute in shader_input.GetValueProducingAttributes():
-            prim = UsdShade.Shader(attribute.GetPrim())
-            if prim and UsdShade.Output.IsOutput(attribute):
-                return prim, UsdShade.Output(attribute).GetBaseName()
-        return None
-
-    def _value(self, node: Any, name: str, default: Any) -> Any:
-        shader_input = node.GetInput(name)
-        for attribute in shader_input.GetValueProducingAttributes() if shader_input else []:
-            value = attribute.Get(self.context.time)
-            if value is not None:
-                return value
-        return default
-
     def _evaluate(self, node: Any, name: str, default: Any, channel: str, depth: int) -> Any:
         """A number, a sequence of them, a text, or a texture."""
-        source = self._source(node, name)
+        source = source_of(node, name)
         if source is None:
-            return self._value(node, name, default)
+            return value_of(self.context, node, name, default)
         if depth > MOST_NODES:
             self.context.fail(node, "its inputs are connected in a loop")
         return self._node(source[0], source[1], default, channel, depth + 1)
@@ -136,7 +116,7 @@ class Inputs:
         if kind.startswith("ND_geomcolor"):
             return self._vertex("displayColor", channel)
         if base == "ND_constant":
-            return self._value(node, "value", default)
+            return value_of(self.context, node, "value", default)
         if kind.startswith("ND_convert_"):
             return self._evaluate(node, "in", default, channel, depth)
         if kind.startswith("ND_multiply_"):
@@ -155,10 +135,10 @@ class Inputs:
         return a * b
 
     def _primvar(self, node: Any, default: Any, channel: str) -> Any:
-        name = str(self._value(node, "varname", "") or self._value(node, "geomprop", ""))
+        name = str(value_of(self.context, node, "varname", "") or value_of(self.context, node, "geomprop", ""))
         if not name:
             self.context.warn(node, "names no primvar")
-            return self._value(node, "fallback", default)
+            return value_of(self.context, node, "fallback", default)
         return self._vertex(name, channel)
 
     def _vertex(self, name: str, channel: str) -> Any:

@@ -5,9 +5,10 @@ import struct
 from typing import Any
 
 import numpy as np
-from pxr import Ar, UsdShade
+from pxr import Ar
 
 from ._context import Context, Matrix, Object, rgb
+from ._shaders import source_of, value_of
 
 IMAGES = ("UsdUVTexture", "ND_UsdUVTexture", "ND_image", "ND_tiledimage")
 WRAPS = {"black": "zero", "useMetadata": "zero", "constant": "zero", "clamp": "clamp", "repeat": "repeat", "periodic": "repeat",
@@ -22,7 +23,7 @@ def is_image(kind: str | None) -> bool:
 def bitmap(context: Context, node: Any, channel: str, coordinates: list[str], is_data: bool) -> Object | None:
     """The texture of a node. `coordinates` are the primvars that the material uses already. None where the file is missing,
     with a warning."""
-    asset = _value(context, node, "file")
+    asset = value_of(context, node, "file")
     image = None if asset is None else image_source(context, node, asset)
     if image is None:
         return None
@@ -34,7 +35,8 @@ def bitmap(context: Context, node: Any, channel: str, coordinates: list[str], is
         made["channel"] = "opacity" if channel == "a" else channel
     is_preview = "UsdUVTexture" in node.GetShaderId()
     names = ("wrapS", "wrapT") if is_preview else ("uaddressmode", "vaddressmode")
-    u, v = (WRAPS.get(str(_value(context, node, name, "useMetadata" if is_preview else "periodic")), "repeat") for name in names)
+    default = "useMetadata" if is_preview else "periodic"
+    u, v = (WRAPS.get(str(value_of(context, node, name, default)), "repeat") for name in names)
     if u != "repeat":
         made["wrap_mode"] = u
     if v != u:
@@ -66,7 +68,7 @@ def image_source(context: Context, prim: Any, asset: Any) -> Object | None:
 
 def normal_scale(context: Context, node: Any) -> float:
     """The scale of a normal map, from its scale and bias."""
-    scale, bias = (list(_value(context, node, name, default)) for name, default in (("scale", (1.0,) * 4), ("bias", (0.0,) * 4)))
+    scale, bias = _scale_and_bias(context, node)
     factor = scale[0] / 2
     if not np.allclose(scale[:3], [2 * factor, 2 * factor, 2]) or not np.allclose(bias[:3], [-factor, -factor, -1]):
         context.warn(node, f"normals with the scale {tuple(scale)} and the bias {tuple(bias)} are read as with (2, 2, 2, 1) "
@@ -75,18 +77,14 @@ def normal_scale(context: Context, node: Any) -> float:
     return float(factor)
 
 
-def _value(context: Context, node: Any, name: str, default: Any = None) -> Any:
-    shader_input = node.GetInput(name)
-    for attribute in shader_input.GetValueProducingAttributes() if shader_input else []:
-        value = attribute.Get(context.time)
-        if value is not None:
-            return value
-    return default
+def _scale_and_bias(context: Context, node: Any) -> tuple[list[float], list[float]]:
+    """value * scale + bias, by channel."""
+    return list(value_of(context, node, "scale", (1.0,) * 4)), list(value_of(context, node, "bias", (0.0,) * 4))
 
 
 def _scaled(context: Context, node: Any, texture: Object, channel: str) -> Object:
     """value * scale + bias, clamped by what uses it."""
-    scale, bias = (list(_value(context, node, name, default)) for name, default in (("scale", (1.0,) * 4), ("bias", (0.0,) * 4)))
+    scale, bias = _scale_and_bias(context, node)
     if channel != "rgb":
         i = "rgba".index(channel)
         s, b = float(scale[i]), float(bias[i])
@@ -105,22 +103,23 @@ def _coordinates(context: Context, node: Any, known: list[str]) -> tuple[int, Ma
     is_preview = "UsdUVTexture" in node.GetShaderId()
     matrix = np.eye(3)
     if "tiledimage" in node.GetShaderId():
-        tiles, offset = (list(_value(context, node, name, d)) for name, d in (("uvtiling", (1, 1)), ("uvoffset", (0, 0))))
+        tiles, offset = (list(value_of(context, node, name, d)) for name, d in (("uvtiling", (1, 1)), ("uvoffset", (0, 0))))
         matrix = np.array([[tiles[0], 0, -offset[0]], [0, tiles[1], -offset[1]], [0, 0, 1]])
     at, name = node, "st" if is_preview else "texcoord"
     for _ in range(8):
-        source = _connected(at, name)
-        if source is None:
+        connected = source_of(at, name)
+        if connected is None:
             return _number(context, node, known, "st"), matrix
+        source, _ = connected
         kind = source.GetShaderId() or ""
         if kind in ("UsdTransform2d", "ND_UsdTransform2d"):
             matrix = matrix @ _transform_2d(context, source)
             at, name = source, "in"
         elif kind.startswith(("UsdPrimvarReader_float2", "ND_geompropvalue_vector2", "ND_UsdPrimvarReader_vector2")):
-            named = _value(context, source, "varname") or _value(context, source, "geomprop")
+            named = value_of(context, source, "varname") or value_of(context, source, "geomprop")
             return _number(context, node, known, str(named or "st")), matrix
         elif kind == "ND_texcoord_vector2":
-            index = int(_value(context, source, "index", 0))
+            index = int(value_of(context, source, "index", 0))
             return _number(context, node, known, "st" if index == 0 else f"st{index}"), matrix
         else:
             context.warn(source, f'the node "{kind}" is not supported: the texture coordinates are st')
@@ -128,20 +127,12 @@ def _coordinates(context: Context, node: Any, known: list[str]) -> tuple[int, Ma
     context.fail(node, "its texture coordinates are connected in a loop")
 
 
-def _connected(node: Any, name: str) -> Any:
-    shader_input = node.GetInput(name)
-    for attribute in shader_input.GetValueProducingAttributes() if shader_input else []:
-        if UsdShade.Output.IsOutput(attribute):
-            return UsdShade.Shader(attribute.GetPrim())
-    return None
-
-
 def _number(context: Context, node: Any, known: list[str], name: str) -> int:
     if name in known:
         return known.index(name)
     if len(known) == 2:
-        context.refuse(node, f"a material whose textures use more than two sets of texture coordinates ({known[0]}, {known[1]} and "
-                             f"{name}) is not supported")
+        context.refuse(node, "a material whose textures use more than two sets of texture coordinates "
+                             f"({known[0]}, {known[1]} and {name}) is not supported")
         return 0
     known.append(name)
     return len(known) - 1
@@ -149,8 +140,8 @@ def _number(context: Context, node: Any, known: list[str], name: str) -> int:
 
 def _transform_2d(context: Context, node: Any) -> Matrix:
     """in * scale, rotated counter-clockwise, + translation."""
-    angle = np.radians(float(_value(context, node, "rotation", 0)))
-    scale, move = (list(_value(context, node, name, d)) for name, d in (("scale", (1, 1)), ("translation", (0, 0))))
+    angle = np.radians(float(value_of(context, node, "rotation", 0)))
+    scale, move = (list(value_of(context, node, name, d)) for name, d in (("scale", (1, 1)), ("translation", (0, 0))))
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c * scale[0], -s * scale[1], move[0]], [s * scale[0], c * scale[1], move[1]], [0, 0, 1]])
 
@@ -169,7 +160,7 @@ def _is_raw(context: Context, node: Any, image: Object, is_data: bool) -> bool:
         file = node.GetInput("file")
         space = file.GetAttr().GetColorSpace() if file else ""
         return is_data or "srgb" not in str(space).lower()
-    space = str(_value(context, node, "sourceColorSpace", "auto"))
+    space = str(value_of(context, node, "sourceColorSpace", "auto"))
     return space == "raw" or (space != "sRGB" and not _is_srgb(image))
 
 

@@ -69,8 +69,8 @@ class _Writer:
                 if value.get("face_normals"):
                     self._line(depth, '<boolean name="face_normals" value="true"/>')
             elif "bytes" in value:
-                suffix = _SUFFIXES.get(value["bytes"][:4]) or _SUFFIXES.get(value["bytes"][:3]) or os.path.splitext(value["name"])[1]
-                self._line(depth, f'<string name="filename" value={quoteattr(self._file(suffix, value["bytes"]))}/>')
+                name_of_file = self._file(_suffix(value), value["bytes"])
+                self._line(depth, f'<string name="filename" value={quoteattr(name_of_file)}/>')
             elif value["type"] == "rgb":
                 self._line(depth, f'<rgb name="{name}" value="{_numbers(value["value"])}"/>')
             else:
@@ -98,13 +98,22 @@ class _Writer:
         return f"{self.folder}/{name}"
 
 
+def _suffix(image: Mapping[str, Any]) -> str:
+    """Of the file of an image, by its first bytes."""
+    for start, suffix in _SUFFIXES.items():
+        if image["bytes"].startswith(start):
+            return suffix
+    return os.path.splitext(str(image["name"]))[1]
+
+
 def _numbers(values: Any) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 
 def _ply(mesh: Mapping[str, Any]) -> bytes:
     """A binary PLY file of the arrays of a mesh."""
-    names = {"positions": "x y z", "normals": "nx ny nz", "uvs": "u v", "second_uvs": "second_u second_v", "colors": "r g b", "alphas": "a"}
+    names = {"positions": "x y z", "normals": "nx ny nz", "uvs": "u v", "second_uvs": "second_u second_v", "colors": "r g b",
+             "alphas": "a"}
     columns = [(names[key], np.asarray(mesh[key], "<f4").reshape(len(mesh["positions"]), -1)) for key in names if key in mesh]
     triangles = np.asarray(mesh["triangles"], "<i4")
     properties = [f"property float {n}" for text, _ in columns for n in text.split()]
