@@ -14,14 +14,25 @@ from ._etendue import Description
 Vector = tuple[float, float, float]
 
 
-def load(file: str | PathLike[str], defines: Mapping[str, object] = {}, *, lenient: bool = False) -> Description:
-    """Reads a scene file: .xml of Mitsuba 0.6 and 3, .pbrt of pbrt-v3 and v4, or .gltf and .glb of glTF 2.0.
+def load(
+    file: str | PathLike[str], defines: Mapping[str, object] = {}, *, lenient: bool = False, **usd: Any
+) -> Description:
+    """Reads a scene file: .xml of Mitsuba 0.6 and 3, .pbrt of pbrt-v3 and v4, .gltf and .glb of glTF 2.0, or .usd, .usda, .usdc
+    and .usdz of Universal Scene Description, for which the package usd-core must be installed.
 
     defines: values of the parameters of the scene ($name), like the option -D of the program.
     lenient: unknown elements are left out, with a warning in Description.warnings, instead of causing errors.
+    usd: for files of USD, the other arguments of etendue.usd.load(): variants, time, camera, purposes, subdivision.
 
     Raises RuntimeError if the file cannot be read, and SceneError, with the line, if its contents are not valid.
     """
+    if fspath(file).lower().endswith((".usd", ".usda", ".usdc", ".usdz")):
+        from . import usd as reader  # Needs a package that others can do without.
+        if defines:
+            raise ValueError("defines: scenes of USD have no parameters")
+        return reader.load(file, lenient=lenient, stacklevel=3, **usd)
+    if usd:
+        raise TypeError(f"{', '.join(usd)}: only for scenes of USD")
     return _etendue.load(fspath(file), {name: str(value) for name, value in defines.items()}, lenient)
 
 

@@ -1,0 +1,290 @@
+"""Materials of USD: UsdPreviewSurface and its textures, standard_surface and OpenPBR of MaterialX."""
+
+import re
+import zlib
+from pathlib import Path
+from struct import pack
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pxr", reason="usd-core is not installed")
+
+from usd_stages import CAMERA, expect_same, image, load, write
+
+import etendue as et
+
+SKY = 'def DomeLight "Sky" {}\n'
+QUAD = """def Mesh "Quad" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0, 1, 2, 3]
+    point3f[] points = [(-2, -1.5, 0), (2, -1.5, 0), (2, 1.5, 0), (-2, 1.5, 0)]
+    texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] ( interpolation = "faceVarying" )
+    texCoord2f[] primvars:st1 = [(0, 1), (1, 1), (1, 0), (0, 0)] ( interpolation = "vertex" )
+    uniform token subdivisionScheme = "none"
+    rel material:binding = </Paint>
+}
+"""
+
+
+def material(inputs: str, nodes: str = "", shader: str = "UsdPreviewSurface", outputs: str = "outputs:surface") -> str:
+    return QUAD + f"""def Material "Paint" {{ token {outputs}.connect = </Paint/Surface.outputs:out>
+        def Shader "Surface" {{ uniform token info:id = "{shader}"
+            {inputs}
+            token outputs:out }}
+        {nodes}
+    }}
+    """
+
+
+def principled(folder: Path, inputs: str, nodes: str = "", **other: str) -> dict[str, object]:
+    bsdf = load(folder, CAMERA + SKY + material(inputs, nodes, **other))["/Quad.bsdf"]
+    while bsdf["type"] != "principled":
+        bsdf = bsdf["bsdf"]
+    return bsdf
+
+
+def test_constants(tmp_path: Path) -> None:
+    p = principled(tmp_path, """color3f inputs:diffuseColor = (0.1, 0.2, 0.3)
+        float inputs:metallic = 0.25
+        float inputs:roughness = 0.75
+        float inputs:ior = 1.25
+        float inputs:clearcoat = 0.5
+        float inputs:clearcoatRoughness = 0.3""")
+    assert p["base_color"]["value"] == pytest.approx([0.1, 0.2, 0.3])
+    assert [p[n] for n in ("metallic", "roughness", "eta", "clearcoat")] == [0.25, 0.75, 1.25, 0.5]
+    # The gloss 0 is an α of 0.1, 1 one of 0.001; α is the square of the roughness.
+    assert p["clearcoat_gloss"] == pytest.approx((0.1 - 0.09) / 0.099)
+    plain = principled(tmp_path, "")
+    assert plain["base_color"]["value"] == pytest.approx([0.18] * 3) and plain["roughness"] == 0.5 and plain["eta"] == 1.5
+    assert load(tmp_path, CAMERA + SKY + material(""))["/Quad.bsdf"]["type"] == "twosided"
+
+
+def test_the_specular_workflow(tmp_path: Path) -> None:
+    p = principled(tmp_path, "int inputs:useSpecularWorkflow = 1\ncolor3f inputs:specularColor = (0.9, 0.6, 0.3)")
+    assert p["metallic"] == {"type": "specular_to_metallic", "output": "metallic", **{n: p["metallic"][n] for n in ("diffuse", "specular")}}
+    image(load(tmp_path, CAMERA + SKY + material("int inputs:useSpecularWorkflow = 1")))
+
+
+def test_opacity(tmp_path: Path) -> None:
+    def bsdf(inputs: str) -> dict[str, object]:
+        return load(tmp_path, CAMERA + SKY + material(inputs))["/Quad.bsdf"]
+
+    assert bsdf("float inputs:opacity = 0.25\nuniform token inputs:opacityMode = \"presence\"")["opacity"] == 0.25
+    assert bsdf("float inputs:opacity = 0.25\nfloat inputs:opacityThreshold = 0.5")["opacity"] == 0
+    assert bsdf("float inputs:opacity = 0.75\nfloat inputs:opacityThreshold = 0.5")["type"] == "twosided"
+    pane = bsdf("float inputs:opacity = 0.25")
+    assert (pane["type"], pane["weight"], pane["bsdf"]["type"]) == ("blendbsdf", 0.25, "thindielectric")
+
+
+def test_emission(tmp_path: Path) -> None:
+    seen = image(load(tmp_path, CAMERA + material("color3f inputs:emissiveColor = (2, 1, 0.5)")))
+    assert np.median(seen, axis=(0, 1)) == pytest.approx([2, 1, 0.5], rel=1e-3)
+
+
+# ---- Textures
+
+READER = 'def Shader "Reader" { uniform token info:id = "UsdPrimvarReader_float2"\nstring inputs:varname = "%s"\nfloat2 outputs:result }'
+
+
+def png(file: Path, rows: np.ndarray) -> None:
+    """An 8-bit image: grey, or three channels."""
+    height, width = rows.shape[:2]
+    kind = 2 if rows.ndim == 3 else 0
+    data = b"".join(b"\0" + row.tobytes() for row in rows.astype(np.uint8))
+
+    def chunk(name: bytes, body: bytes) -> bytes:
+        return pack(">I", len(body)) + name + body + pack(">I", zlib.crc32(name + body))
+
+    file.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)) +
+                     chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b""))
+
+
+FOUR = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [128, 128, 128]]])
+
+
+def texture(inputs: str = "", file: str = "four.png", primvar: str = "st", more: str = "") -> str:
+    return f"""def Shader "Image" {{ uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @{file}@
+        float2 inputs:st.connect = </Paint/Reader.outputs:result>
+        {inputs}
+        float3 outputs:rgb
+        float outputs:r
+        float outputs:a }}
+        {READER % primvar}
+        {more}"""
+
+
+EMISSIVE = "color3f inputs:emissiveColor.connect = </Paint/Image.outputs:rgb>\ncolor3f inputs:diffuseColor = (0, 0, 0)"
+GREY = ((128 / 255 + 0.055) / 1.055)**2.4
+
+
+def corners(folder: Path, nodes: str) -> np.ndarray:
+    """What the quarters of the quad emit, from the upper left one in rows."""
+    png(folder / "four.png", FOUR)
+    seen = image(load(folder, CAMERA + material(EMISSIVE, nodes)), 16, "path:max_depth=1")
+    return np.array([[seen[2, 2], seen[2, -3]], [seen[-3, 2], seen[-3, -3]]])
+
+
+@pytest.mark.parametrize("inputs, grey", [("", GREY), ('token inputs:sourceColorSpace = "sRGB"', GREY),
+                                          ('token inputs:sourceColorSpace = "raw"', 128 / 255)])
+def test_images_are_upright_and_srgb_by_default(tmp_path: Path, inputs: str, grey: float) -> None:
+    clamp = '\ntoken inputs:wrapS = "clamp"\ntoken inputs:wrapT = "clamp"'
+    expected = np.array(FOUR, float) / 255
+    expected[1, 1] = grey
+    assert corners(tmp_path, texture(inputs + clamp)) == pytest.approx(expected, abs=0.02)
+
+
+def test_scale_wrapping_and_the_choice_of_coordinates(tmp_path: Path) -> None:
+    clamp = 'token inputs:wrapS = "clamp"\ntoken inputs:wrapT = "clamp"\n'
+    red = corners(tmp_path, texture(clamp + "float4 inputs:scale = (0.5, 1, 2, 1)"))
+    assert red[0, 0] == pytest.approx([0.5, 0, 0], abs=0.02) and red[1, 0] == pytest.approx([0, 0, 2], abs=0.04)
+    upside_down = corners(tmp_path, texture(clamp, primvar="st1"))
+    assert upside_down[0, 0] == pytest.approx([0, 0, 1], abs=0.02)
+    png(tmp_path / "four.png", FOUR)
+    for mode, made in (("black", "zero"), ("useMetadata", "zero"), ("mirror", "mirror"), ("repeat", None)):
+        d = load(tmp_path, CAMERA + SKY + material(EMISSIVE, texture(f'token inputs:wrapS = "{mode}"\ntoken inputs:wrapT = "clamp"')))
+        bitmap = d["/Quad.emitter.radiance"]
+        assert bitmap.get("wrap_mode") == made and bitmap["wrap_mode_v"] == "clamp"
+
+
+def test_transform_2d(tmp_path: Path) -> None:
+    """A quarter turn of the coordinates, counter-clockwise: (s, t) → (1 - t, s)."""
+    transform = """def Shader "Transform" { uniform token info:id = "UsdTransform2d"
+        float2 inputs:in.connect = </Paint/Reader.outputs:result>
+        float inputs:rotation = 90
+        float2 inputs:translation = (1, 0)
+        float2 outputs:result }"""
+    nodes = texture('token inputs:wrapS = "clamp"\ntoken inputs:wrapT = "clamp"', more=transform)
+    nodes = nodes.replace("inputs:st.connect = </Paint/Reader", "inputs:st.connect = </Paint/Transform")
+    seen = corners(tmp_path, nodes)
+    # The lower left corner (0, 0) shows (1, 0), the lower right one of the image.
+    assert seen[1, 0] == pytest.approx([GREY] * 3, abs=0.02) and seen[1, 1] == pytest.approx([0, 1, 0], abs=0.02)
+    assert seen[0, 1] == pytest.approx([1, 0, 0], abs=0.02)
+
+
+def test_single_channels(tmp_path: Path) -> None:
+    png(tmp_path / "grey.png", np.array([[0, 128], [128, 255]]))
+    nodes = texture("float4 inputs:scale = (0.5, 1, 1, 1)\nfloat4 inputs:bias = (0.25, 0, 0, 0)", file="grey.png")
+    p = principled(tmp_path, "float inputs:roughness.connect = </Paint/Image.outputs:r>", nodes)
+    assert (p["roughness"]["type"], p["roughness"]["value0"], p["roughness"]["value1"]) == ("mix", 0.25, 0.75)
+    assert p["roughness"]["weight"]["raw"] is True and p["roughness"]["weight"]["channel"] == "r"
+    cut = load(tmp_path, CAMERA + SKY + material(
+        "float inputs:opacity.connect = </Paint/Image.outputs:a>\nfloat inputs:opacityThreshold = 0.5", texture(file="grey.png")))
+    assert cut["/Quad.bsdf.opacity"]["type"] == "threshold" and cut["/Quad.bsdf.opacity.value.channel"] == "opacity"
+
+
+def test_normal_maps(tmp_path: Path) -> None:
+    png(tmp_path / "normal.png", np.full((2, 2, 3), [128, 128, 255]))
+    connect = "normal3f inputs:normal.connect = </Paint/Image.outputs:rgb>"
+    standard = 'float4 inputs:scale = (2, 2, 2, 1)\nfloat4 inputs:bias = (-1, -1, -1, 0)\ntoken inputs:sourceColorSpace = "raw"'
+    d = load(tmp_path, CAMERA + SKY + material(connect, texture(standard, file="normal.png")))
+    assert d["/Quad.bsdf.bsdf"]["type"] == "normalmap" and d["/Quad.bsdf.bsdf.normalmap.raw"] is True
+    half = standard.replace("(2, 2, 2, 1)", "(1, 1, 2, 1)").replace("(-1, -1, -1, 0)", "(-0.5, -0.5, -1, 0)")
+    d = load(tmp_path, CAMERA + SKY + material(connect, texture(half, file="normal.png")))
+    assert d["/Quad.bsdf.bsdf.scale"] == 0.5
+    with pytest.warns(UserWarning, match=r"/Paint/Image: normals with the scale \(1.0, 1.0, 1.0, 1.0\)"):
+        et.load(write(tmp_path, CAMERA + SKY + material(connect, texture(file="normal.png"))))
+
+
+def test_primvars_as_colours(tmp_path: Path) -> None:
+    reader = 'def Shader "Color" { uniform token info:id = "UsdPrimvarReader_float3"\nstring inputs:varname = "tint"\nfloat3 outputs:result }'
+    text = material("color3f inputs:emissiveColor.connect = </Paint/Color.outputs:result>", reader)
+    text = text.replace("rel material", 'color3f[] primvars:tint = [(1, 0, 0), (0, 1, 0), (0, 1, 0), (1, 0, 0)] '
+                        '( interpolation = "vertex" )\n    rel material', 1)
+    seen = image(load(tmp_path, CAMERA + text), 16, "path:max_depth=1")
+    assert seen[6, 2, 0] > 0.7 and seen[6, -3, 1] > 0.7
+
+
+def test_interfaces_of_graphs(tmp_path: Path) -> None:
+    text = material("color3f inputs:diffuseColor.connect = </Paint.inputs:tint>")
+    text = text.replace('def Material "Paint" {', 'def Material "Paint" { color3f inputs:tint = (0.5, 0.25, 0.125)\n', 1)
+    assert load(tmp_path, CAMERA + SKY + text)["/Quad.bsdf.bsdf.base_color"]["value"] == [0.5, 0.25, 0.125]
+
+
+def test_packages_hold_their_textures(tmp_path: Path) -> None:
+    from pxr import UsdUtils
+    png(tmp_path / "four.png", FOUR)
+    et.write_image(tmp_path / "sky.exr", np.full((4, 8, 3), 0.5, np.float32))
+    dome = 'def DomeLight "Dome" { asset inputs:texture:file = @sky.exr@ }\n'
+    file = write(tmp_path, CAMERA + dome + material(EMISSIVE, texture()))
+    assert UsdUtils.CreateNewUsdzPackage(str(file), str(tmp_path / "scene.usdz"))
+    packed = et.load(tmp_path / "scene.usdz")
+    assert packed["/Quad.emitter.radiance"]["image"]["bytes"].startswith(b"\x89PNG")
+    expect_same(image(packed), image(et.load(file)), 1e-6)
+
+
+def test_missing_images_are_warnings(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="/Paint/Image: there is no image none.png"):
+        et.load(write(tmp_path, CAMERA + SKY + material(EMISSIVE, texture(file="none.png"))))
+    tiles = write(tmp_path, CAMERA + SKY + material(EMISSIVE, texture(file="four.<UDIM>.png")))
+    with pytest.raises(et.SceneError, match=re.escape("/Paint/Image: tiles of images (four.<UDIM>.png) are not supported")):
+        et.load(tiles)
+
+
+def test_unknown_shaders_are_warnings(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning) as notes:
+        et.load(write(tmp_path, CAMERA + SKY + material("", shader="PxrSurface")))
+    assert [str(n.message).split(": ", 1)[1] for n in notes] == [
+        '/Paint/Surface: the shader "PxrSurface" is not supported',
+        "/Paint: has no surface that is supported: the displayColor is used"]
+    with pytest.warns(UserWarning, match='/Paint/Noise: the node "ND_noise3d_float" is not supported'):
+        et.load(write(tmp_path, CAMERA + SKY + material(
+            "float inputs:roughness.connect = </Paint/Noise.outputs:out>",
+            'def Shader "Noise" { uniform token info:id = "ND_noise3d_float"\nfloat outputs:out }')))
+    with pytest.warns(UserWarning, match="/Paint/Surface: inputs:displacement has no effect"):
+        et.load(write(tmp_path, CAMERA + SKY + material("float inputs:displacement = 0.1")))
+
+
+# ---- MaterialX
+
+STANDARD = {"shader": "ND_standard_surface_surfaceshader", "outputs": "outputs:mtlx:surface"}
+OPEN_PBR = {"shader": "ND_open_pbr_surface_surfaceshader", "outputs": "outputs:mtlx:surface"}
+
+
+def test_standard_surface(tmp_path: Path) -> None:
+    p = principled(tmp_path, """float inputs:base = 0.5
+        color3f inputs:base_color = (0.8, 0.4, 0.2)
+        float inputs:metalness = 0.25
+        float inputs:specular_roughness = 0.3
+        float inputs:specular_IOR = 1.4
+        float inputs:coat = 1
+        float inputs:sheen = 0.5""", **STANDARD)
+    assert p["base_color"]["value"] == pytest.approx([0.4, 0.2, 0.1])
+    assert [p[n] for n in ("metallic", "roughness", "eta", "clearcoat", "sheen")] == pytest.approx([0.25, 0.3, 1.4, 1, 0.5])
+    glass = load(tmp_path, CAMERA + SKY + material(
+        "float inputs:transmission = 1\ncolor3f inputs:transmission_color = (0.5, 1, 0.5)", **STANDARD))["/Quad.bsdf"]
+    assert (glass["type"], glass["spec_trans"], glass["base_color"]["value"]) == ("principled", 1, [0.5, 1, 0.5])
+    lamp = load(tmp_path, CAMERA + material("float inputs:emission = 3\ncolor3f inputs:emission_color = (1, 0.5, 0)", **STANDARD))
+    assert lamp["/Quad.emitter.radiance"]["value"] == [3, 1.5, 0]
+
+
+def test_open_pbr(tmp_path: Path) -> None:
+    p = principled(tmp_path, "float inputs:base_metalness = 1\nfloat inputs:specular_weight = 0.5\nfloat inputs:coat_weight = 0.25",
+                   **OPEN_PBR)
+    assert [p[n] for n in ("metallic", "specular_weight", "clearcoat", "roughness")] == pytest.approx([1, 0.5, 0.25, 0.3])
+    cut = load(tmp_path, CAMERA + SKY + material("float inputs:geometry_opacity = 0.5", **OPEN_PBR))
+    assert cut["/Quad.bsdf.opacity"] == 0.5
+    image(cut)
+
+
+def test_nodes_of_materialx(tmp_path: Path) -> None:
+    png(tmp_path / "four.png", FOUR)
+    nodes = """def Shader "Image" { uniform token info:id = "ND_tiledimage_color3"
+            asset inputs:file = @four.png@ ( colorSpace = "srgb_texture" )
+            float2 inputs:uvtiling = (2, 3)
+            color3f outputs:out }
+        def Shader "Product" { uniform token info:id = "ND_multiply_color3"
+            color3f inputs:in1.connect = </Paint/Image.outputs:out>
+            color3f inputs:in2 = (0.5, 1, 1)
+            color3f outputs:out }"""
+    p = principled(tmp_path, "color3f inputs:base_color.connect = </Paint/Product.outputs:out>", nodes, **STANDARD)
+    assert p["base_color"]["type"] == "scale" and p["base_color"]["scale"]["value"] == [0.5, 1, 1]
+    bitmap = p["base_color"]["value"]
+    assert "raw" not in bitmap and np.diag(bitmap["to_uv"])[:2] == pytest.approx([2, 3])
+    image(load(tmp_path, CAMERA + SKY + material("color3f inputs:base_color.connect = </Paint/Product.outputs:out>", nodes, **STANDARD)))
+
+
+def test_inputs_without_effect_are_warnings(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="/Paint/Surface: inputs:thin_film_thickness has no effect"):
+        et.load(write(tmp_path, CAMERA + SKY + material("float inputs:thin_film_thickness = 300", **STANDARD)))
