@@ -57,16 +57,17 @@ class EtendueEngine(bpy.types.RenderEngine):
             description["sensor"]["sampler"] = sampler
             write_scene(description, {"type": settings.integrator, **changed_parameters(settings)}, self.destination)
         else:
-            self._trace(description, scene)
+            self._trace(description, depsgraph)
         for warning in reader.report.warnings:
             self.report({"WARNING"}, f"etendue: {warning}")
 
-    def _trace(self, description: dict[str, Any], scene: Any) -> None:
+    def _trace(self, description: dict[str, Any], depsgraph: Any) -> None:
         import etendue as et
 
         self.update_stats("", "Building the scene")
-        built, settings = et.load_dict(description).build(), scene.etendue
-        result = self.begin_result(0, 0, built.width, built.height)
+        built, scene = et.load_dict(description).build(), depsgraph.scene
+        settings = scene.etendue
+        result = self.begin_result(0, 0, built.width, built.height, layer=depsgraph.view_layer.name)
 
         def show(progress: et.Progress) -> bool:
             self.update_progress(progress.fraction or 0.0)
@@ -75,7 +76,7 @@ class EtendueEngine(bpy.types.RenderEngine):
             if not self.is_animation:
                 _fill(result, "Combined", _with_alpha(progress.image))
                 self.update_result(result)
-            return not self.test_break()
+            return not self.is_cancelled()
 
         try:
             image = et.render(
@@ -93,6 +94,10 @@ class EtendueEngine(bpy.types.RenderEngine):
         for warning in [*built.warnings, *image.warnings]:
             self.report({"WARNING"}, f"etendue: {warning}")
         self.end_result(result)
+
+    def is_cancelled(self) -> bool:
+        """Whether the user has cancelled the rendering; the passes so far are kept."""
+        return self.test_break()
 
     def view_update(self, context: Any, depsgraph: Any) -> None:
         if not hasattr(self, "viewport"):

@@ -1,16 +1,18 @@
 """Blender's Principled BSDF as a blend of etendue's models.
 
-The structure is Blender's: metal, or else glass, or else a dielectric coat over a diffuse base, under a clear coat. The
-diffuse base loses what the coat reflects toward the viewer, as in Blender: this is `roughplastic`.
+The structure is Blender's: metal, or else glass, or else a dielectric surface over a diffuse base, under a clear coat. In
+Blender the diffuse base loses what the rough surface reflects toward the viewer. Here it is that of `plastic`, which loses
+what a smooth surface reflects: `roughplastic` would lose light that is scattered between facets, too.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from .nodes import Output
 from .surfaces import Surface, dielectric, diffuse, mixed, reflecting, rough, weighted_sum, with_normal
-from .values import Value, Values, as_color, is_black, is_texture, mixture, parameter, product
+from .values import Value, Values, as_color, is_black, is_texture, parameter, product
 
 _LEFT_OUT = ("Subsurface Weight", "Sheen Weight", "Thin Film Thickness", "Diffuse Roughness", "Anisotropic Rotation")
 
@@ -30,17 +32,25 @@ def principled(node: Output, values: Values) -> Surface:
 
 
 def _plastic(node: Output, values: Values, color: Value, roughness: Value) -> Surface:
-    """A dielectric coat over a diffuse base; its reflectance at normal incidence is a multiple of that of the index."""
+    """A dielectric surface over a diffuse base; its reflectance at normal incidence is a multiple of that of the index."""
     level, ior = (values.constant(node.input(n), node) for n in ("Specular IOR Level", "IOR"))
     root = math.sqrt(min(((ior - 1) / (ior + 1)) ** 2 * 2 * max(level, 0.0), 0.98))
     tint = values.color(node.input("Specular Tint"))
     if root == 0 or is_black(tint):
         return diffuse(color)
-    parameters = rough(roughness, node, values)
-    parameters.update(int_ior=(1 + root) / (1 - root), ext_ior=1.0, diffuse_reflectance=parameter(color))
-    if tint != (1.0, 1.0, 1.0):
-        parameters["specular_reflectance"] = parameter(tint)
-    return Surface(reflecting({"type": "roughplastic" if "alpha" in parameters else "plastic", **parameters}))
+    eta, facets = (1 + root) / (1 - root), rough(roughness, node, values)
+    base = {"type": "plastic", "diffuse_reflectance": parameter(color), "int_ior": eta, "ext_ior": 1.0}
+    if not facets:
+        return Surface(reflecting({**base, "specular_reflectance": parameter(tint)}))
+    base = reflecting({**base, "specular_reflectance": 0.0})
+    return Surface(weighted_sum([(1.0, base), (1.0, _reflection(eta, facets, tint))]))
+
+
+def _reflection(eta: float, facets: dict[str, Any], tint: Value = 1.0) -> dict[str, Any]:
+    """The reflection of a dielectric surface alone, rough or, without parameters of facets, smooth."""
+    factors = {"diffuse_reflectance": 0.0, "glossy_reflectance": 0.0}
+    factors["glossy_reflectance" if facets else "specular_reflectance"] = parameter(tint)
+    return {"type": "lobesum", **facets, "eta": eta, **factors}
 
 
 def _metal(node: Output, values: Values, color: Value, roughness: Value) -> Surface:
@@ -70,10 +80,8 @@ def _coated(node: Output, values: Values, base: Surface) -> Surface:
     if as_color(node.input("Coat Tint").value) != (1.0, 1.0, 1.0) or node.input("Coat Tint").source():
         values.warn(node, "Coat Tint has no effect")
     ior, roughness = values.constant(node.input("Coat IOR"), node), values.number(node.input("Coat Roughness"))
-    lobe = "glossy" if (parameters := rough(roughness, node, values)) else "specular"
-    coat = {"type": "lobesum", **parameters, "eta": ior, "diffuse_reflectance": 0.0, "glossy_reflectance": 0.0,
-            f"{lobe}_reflectance": 1.0}
-    coated = with_normal(Surface(coat), node, values, "Coat Normal")
+    coat = Surface(_reflection(ior, rough(roughness, node, values)))
+    coated = with_normal(coat, node, values, "Coat Normal")
     base.bsdf = weighted_sum([(1 - weight * mean_reflectance(ior), base.bsdf), (weight, coated.bsdf)])
     return base
 
