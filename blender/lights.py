@@ -1,7 +1,7 @@
 """Lights. Blender gives their power in watts; with the energy P and the colour c:
 
     point, spot   I = c P / 4π, or a sphere of radius r with L = I / π r²
-    area          L = c P / 4A: a Lambertian emitter of radiance L emits π A L, so Blender's watts are π/4 of it
+    area          L = c P / π A: a Lambertian emitter of radiance L and area A emits π A L
     sun           E = c P, an irradiance
 """
 
@@ -95,7 +95,7 @@ def _area(light: Any, to_world: np.ndarray, color: Color, values: Values) -> dic
     height = light.size_y if light.shape in ("RECTANGLE", "ELLIPSE") else width
     axes = to_world[:3, :2] * (width, height)
     area = math.prod(np.linalg.norm(axes, axis=0)) * (math.pi / 4 if is_round else 1.0)
-    emitter = {"type": "area", "radiance": rgb(color, 1 / (4 * (area if _is_normalized(light) else 1.0)))}
+    emitter = {"type": "area", "radiance": rgb(color, 1 / (math.pi * (area if _is_normalized(light) else 1.0)))}
     size = np.diag([width / 2, height / 2, 1.0, 1.0])
     return {"type": "disk" if is_round else "rectangle", "to_world": to_world @ _TURN @ size, "emitter": emitter}
 

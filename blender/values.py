@@ -158,9 +158,9 @@ class Values:
             return None
         half = np.diag([scale / 2, scale / 2, 1.0, 1.0])  # etendue's unit square has two by two squares
         if node.socket.name == "Color":
-            colors = parameter(self.color(node.input("Color1"))), parameter(self.color(node.input("Color2")))
+            colors = parameter(self.color(node.input("Color2"))), parameter(self.color(node.input("Color1")))
         else:
-            colors = (1.0, 0.0)
+            colors = (0.0, 1.0)
         return {"type": "checkerboard", "color0": colors[0], "color1": colors[1], "to_uv": half @ placed[0]}
 
     def _ShaderNodeVertexColor(self, node: Output) -> Value | None:
