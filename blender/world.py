@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,6 @@ from .values import Values, as_color, is_texture, mapping_matrix
 
 # The middle of an image is at etendue's +z, and at Blender's +x; up is etendue's +y, and Blender's +z.
 _ENVIRONMENT = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-# Blender's model gives luminance in units of this many W/(m² sr), measured.
-_SKY_SCALE = 1.0
 
 
 def read_world(world: Any, values: Values) -> dict[str, Any] | None:
@@ -77,5 +74,5 @@ def _sky(node: Output, strength: float) -> dict[str, Any]:
         "turbidity": min(max(sky.turbidity, 1.0), 10.0),
         "albedo": rgb((sky.ground_albedo,) * 3),
         "sun_direction": [float(v) for v in sky.sun_direction],
-        "scale": strength * _SKY_SCALE,
+        "scale": strength,
     }

@@ -9,7 +9,6 @@ import pytest
 _ADDON = Path(__file__).parents[2] / "blender"
 _MISSING = [name for name in ("bpy", "etendue") if importlib.util.find_spec(name) is None]
 
-collect_ignore_glob = []
 if not _MISSING:
     spec = importlib.util.spec_from_file_location("etendue_addon", _ADDON / "__init__.py", submodule_search_locations=[str(_ADDON)])
     addon = sys.modules["etendue_addon"] = importlib.util.module_from_spec(spec)

@@ -29,14 +29,14 @@ class Studio:
     def camera(self, at, target):
         self.cam = self._add("Camera", bpy.data.cameras.new("Camera"))
         self.scene.camera = self.cam
-        self.cam.matrix_world = _looking(at, target)
+        self.cam.matrix_world = looking(at, target)
         return self.cam.data
 
     def light(self, kind, at=(0, 0, 2), target=(0, 0, 0), name="Light", **settings):
         data = bpy.data.lights.new(name, kind)
         for key, value in settings.items():
             setattr(data, key, value)
-        self._add(name, data).matrix_world = _looking(at, target)
+        self._add(name, data).matrix_world = looking(at, target)
         return data
 
     def world(self, color=(1, 1, 1), strength=1.0):
@@ -64,7 +64,8 @@ class Studio:
         tree = material.node_tree
         tree.nodes.clear()
         output, node = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new(node_type)
-        tree.links.new(node.outputs[0], output.inputs["Surface"])
+        if node.outputs:  # not of a group without a tree
+            tree.links.new(node.outputs[0], output.inputs["Surface"])
         for key, value in inputs.items():
             socket = node.inputs[key.replace("_", " ")]
             socket.default_value = (*value, 1) if isinstance(value, tuple) and len(socket.default_value) == 4 else value
@@ -106,7 +107,7 @@ class Studio:
         return thing
 
 
-def _looking(at, target):
+def looking(at, target):
     """The matrix of a camera or light at one point that looks to another one."""
     direction = Vector(target) - Vector(at)
     up = "Y" if abs(direction.normalized().z) < 0.999 else "X"

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from mathutils import Matrix
 
 LIGHTS = {
     "point": dict(kind="POINT", energy=100, shadow_soft_size=0),
@@ -42,7 +43,7 @@ def test_scaled_area_lights_keep_their_power(studio):
     studio.plane(material=gray(studio))
     studio.light("AREA", energy=100, size=0.5)
     light = studio.scene.objects["Light"]
-    light.matrix_world = light.matrix_world @ __import__("mathutils").Matrix.Diagonal((2, 1, 1, 1))
+    light.matrix_world = light.matrix_world @ Matrix.Diagonal((2, 1, 1, 1))
     assert studio.ratio() == pytest.approx(1, abs=0.02)
 
 
@@ -57,6 +58,18 @@ def test_constant_worlds(studio):
     studio.plane(material=gray(studio))
     studio.world((0.2, 0.5, 1), 1.5)
     assert studio.ratio() == pytest.approx(1, abs=0.02)
+
+
+def test_skies_of_hosek_and_wilkie(studio):
+    """Cycles converts spectra to colours in another way: 5 %."""
+    tree, background = studio.world()
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sky_type, sky.turbidity, sky.sun_direction = "HOSEK_WILKIE", 3, (0.5, 0.3, 0.8)
+    tree.links.new(sky.outputs[0], background.inputs["Color"])
+    studio.sphere(gray(studio), at=(0, 0, 0))
+    ours, reference = studio.render(), studio.render("CYCLES")
+    assert ours.mean() == pytest.approx(reference.mean(), rel=0.06)
+    assert ours[:, :32].mean() == pytest.approx(reference[:, :32].mean(), rel=0.06)
 
 
 def lit_by_an_image(studio, angles):

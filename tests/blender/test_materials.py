@@ -1,7 +1,7 @@
 """Nodes of materials against Cycles: means of a sphere within 2 % where the models are the same."""
 
 import pytest
-from studio import _looking
+from studio import looking
 
 PRINCIPLED = "ShaderNodeBsdfPrincipled"
 COLOR = (0.8, 0.4, 0.2)
@@ -28,7 +28,7 @@ NODES = {
 
 
 def lit(studio, light):
-    studio.cam.matrix_world = _looking((0, -3, 1.5), (0, 0, 1))
+    studio.cam.matrix_world = looking((0, -3, 1.5), (0, 0, 1))
     if light == "world":
         studio.world()
     elif light is not None:
