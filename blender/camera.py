@@ -78,5 +78,6 @@ def read_film(render: Any) -> dict[str, Any]:
     if render.use_border:
         left, right = int(render.border_min_x * width), int(render.border_max_x * width)
         bottom, top = int(render.border_min_y * height), int(render.border_max_y * height)
-        film.update(crop_offset_x=left, crop_offset_y=height - top, crop_width=max(right - left, 1), crop_height=max(top - bottom, 1))
+        film.update(crop_offset_x=left, crop_offset_y=height - top,
+                    crop_width=max(right - left, 1), crop_height=max(top - bottom, 1))
     return film

@@ -11,7 +11,7 @@ from .nodes import Input, Output, surface_output
 from .principled import principled
 from .report import Refused, Report
 from .surfaces import (BLACK, Surface, diffuse, dielectric, glossy, mixed, reflecting, rough, summed, with_normal)
-from .values import Values, as_color, is_black, is_texture, mixture, parameter, product
+from .values import Values, as_color, is_black, is_texture, parameter, product
 
 
 @dataclass

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 from .nodes import Output
-from .values import Color, Value, Values, is_black, is_texture, luminance, mixture, parameter, product
+from .values import Value, Values, is_black, is_texture, mixture, parameter, product
 
 SMOOTH = 0.01
 """Constant roughnesses below this one are mirrors or clear glass."""

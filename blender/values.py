@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from .images import ImageFiles
+from .mapping import mapping_matrix
 from .nodes import Input, Output
 from .report import Report
 
@@ -105,6 +105,18 @@ class Values:
             self.warn(node, f"{i.socket.name} cannot be a texture and is {i.value:.4g}")
             return i.value
         return value
+
+    def mapping(self, node: Output) -> np.ndarray:
+        """The matrix of a Mapping node, whose settings must be constant."""
+        kind, vectors = node.node.vector_type, []
+        for name in ("Location", "Rotation", "Scale"):
+            socket = node.node.inputs[name]
+            value = self.color(Input(socket, node.groups)) if socket.enabled else (0.0, 0.0, 0.0)
+            if is_texture(value):
+                self.warn(node, f"{name} cannot be a texture")
+                value = Input(socket).value
+            vectors.append(value)
+        return mapping_matrix(kind, *vectors)
 
     def _value(self, i: Input) -> Value:
         source = i.source()
@@ -251,8 +263,8 @@ class Values:
         if source.node.bl_idname == "ShaderNodeUVMap":
             return np.eye(4), self._uv_set(source.node.uv_map)
         if source.node.bl_idname == "ShaderNodeMapping":
-            inner, matrix = self._placement(source.input("Vector")), mapping_matrix(source, self)
-            return (matrix @ inner[0], inner[1]) if inner else None
+            inner = self._placement(source.input("Vector"))
+            return (self.mapping(source) @ inner[0], inner[1]) if inner else None
         self.warn(source, "only UV coordinates are supported")
         return None
 
@@ -262,31 +274,3 @@ class Values:
         if name not in self.uv_maps:
             self.uv_maps.append(name)
         return 1
-
-
-def mapping_matrix(node: Output, values: Values) -> np.ndarray:
-    """The transform of a Mapping node. It must be constant."""
-    location, angles, scale = (
-        as_color(v if not is_texture(v := values._value(node.input(n))) else node.input(n).value)
-        if node.node.vector_type in ("POINT", "TEXTURE") or n != "Location" else (0.0, 0.0, 0.0)
-        for n in ("Location", "Rotation", "Scale")
-    )
-    matrix = np.eye(4)
-    matrix[:3, :3] = _euler(angles)
-    is_inverse = node.node.vector_type == "TEXTURE"
-    if is_inverse:
-        move = np.eye(4)
-        move[:3, 3] = location
-        return np.linalg.inv(move @ matrix @ np.diag([*(s or 1e-8 for s in scale), 1.0]))
-    matrix = matrix @ np.diag([*scale, 1.0])
-    matrix[:3, 3] = location
-    return matrix
-
-
-def _euler(angles: Color) -> np.ndarray:
-    """The rotation about x, then y, then z."""
-    (sx, sy, sz), (cx, cy, cz) = (tuple(map(f, angles)) for f in (math.sin, math.cos))
-    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x

@@ -22,6 +22,7 @@ class Viewport:
 
     def __init__(self, engine: Any):
         self._engine = engine
+        self._folder = tempfile.TemporaryDirectory(prefix="etendue-")
         self._description: dict[str, Any] | None = None
         self._view: tuple[float, ...] | None = None
         self._image: np.ndarray | None = None
@@ -31,17 +32,11 @@ class Viewport:
     def update(self, context: Any, depsgraph: Any) -> None:
         """Reads the scene anew."""
         self._cancel()
-        with tempfile.TemporaryDirectory(prefix="etendue-") as folder:
-            try:
-                import etendue as et
-
-                self._description = SceneReader(depsgraph, Path(folder)).read(_sensor(context))
-                # The description is kept for other views; its images are read here, while their files are there.
-                self._scene = et.load_dict(self._description)
-                self._scene.build()
-            except (Refused, RuntimeError, ValueError, ImportError) as e:
-                self._description = None
-                self._engine.update_stats("etendue", str(e))
+        try:
+            self._description = SceneReader(depsgraph, Path(self._folder.name)).read(_sensor(context))
+        except (Refused, RuntimeError, ValueError) as e:
+            self._description = None
+            self._engine.update_stats("etendue", str(e))
         self._view = None
 
     def draw(self, context: Any, depsgraph: Any) -> None:
@@ -55,8 +50,11 @@ class Viewport:
 
     def _start(self, context: Any, settings: Any) -> None:
         self._cancel()
-        import etendue as et
-
+        try:
+            import etendue as et
+        except ImportError as e:
+            self._engine.update_stats("etendue", str(e))
+            return
         description = {**self._description, "sensor": _sensor(context)}
         method, samples = integrator_text(settings), settings.preview_samples
         self._stop = stop = threading.Event()
@@ -97,8 +95,9 @@ def _sensor(context: Any) -> dict[str, Any]:
     to_world = np.array(data.view_matrix.inverted()) @ _TURN
     film = {"type": "hdrfilm", "width": region.width, "height": region.height}
     if data.is_perspective:
-        return {"type": "perspective", "to_world": to_world, "fov": math.degrees(2 * math.atan(1 / window[0, 0])), "fov_axis": "x",
-                "principal_point_offset_x": window[0, 2] / 2, "principal_point_offset_y": -window[1, 2] / 2, "film": film}
+        fov = math.degrees(2 * math.atan(1 / window[0, 0]))
+        return {"type": "perspective", "to_world": to_world, "fov": fov, "fov_axis": "x", "film": film,
+                "principal_point_offset_x": window[0, 2] / 2, "principal_point_offset_y": -window[1, 2] / 2}
     half = 1 / window[0, 0]
     return {"type": "orthographic", "to_world": to_world @ np.diag([half, half, half, 1.0]), "film": film}
 

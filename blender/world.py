@@ -9,7 +9,7 @@ import numpy as np
 from .lights import rgb
 from .nodes import Output, surface_output
 from .report import Refused
-from .values import Values, as_color, is_texture, mapping_matrix
+from .values import Values, as_color, is_texture
 
 # The middle of an image is at etendue's +z, and at Blender's +x; up is etendue's +y, and Blender's +z.
 _ENVIRONMENT = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -54,7 +54,7 @@ def _image(node: Output, strength: float, values: Values) -> dict[str, Any] | No
         raise Refused(f"{values.where}: node {node.name} has the projection {node.node.projection}, which is not supported")
     rotation = np.eye(4)
     if vector is not None and vector.node.bl_idname == "ShaderNodeMapping":
-        rotation = mapping_matrix(vector, values)
+        rotation = values.mapping(vector)
         rotation[:3, 3] = 0
         if not np.allclose(rotation @ rotation.T, np.eye(4), atol=1e-5):
             values.warn(vector, "only its rotation has an effect")

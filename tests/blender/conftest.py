@@ -10,7 +10,8 @@ _ADDON = Path(__file__).parents[2] / "blender"
 _MISSING = [name for name in ("bpy", "etendue") if importlib.util.find_spec(name) is None]
 
 if not _MISSING:
-    spec = importlib.util.spec_from_file_location("etendue_addon", _ADDON / "__init__.py", submodule_search_locations=[str(_ADDON)])
+    spec = importlib.util.spec_from_file_location(
+        "etendue_addon", _ADDON / "__init__.py", submodule_search_locations=[str(_ADDON)])
     addon = sys.modules["etendue_addon"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(addon)
     addon.register()

@@ -1,6 +1,5 @@
 """Builds small scenes in Blender and renders them by Cycles and etendue."""
 
-import math
 from pathlib import Path
 
 import bpy

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 
-import etendue as et
-
 
 def blocks(image):
     """Means of 8 x 8 blocks, which are smooth enough to be compared."""
