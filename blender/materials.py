@@ -68,18 +68,23 @@ def _diffuse(node: Output, values: Values) -> Surface:
 def _glossy(node: Output, values: Values) -> Surface:
     color, roughness = values.color(node.input("Color")), values.number(node.input("Roughness"))
     anisotropy = values.constant(node.input("Anisotropy"), node)
-    return with_normal(glossy(color, rough(roughness, node, values, anisotropy)), node, values)
+    facets = rough(roughness, node, values, anisotropy)
+    bsdf = {"type": "roughconductor" if facets else "conductor", **facets, "specular_reflectance": parameter(color)}
+    return with_normal(glossy(bsdf, color, roughness, node), node, values)
 
 
 def _metallic(node: Output, values: Values) -> Surface:
     roughness = values.number(node.input("Roughness"))
     if node.node.fresnel_type == "F82":
-        bsdf = {"type": "principled", "metallic": 1.0, "roughness": roughness,
-                "base_color": parameter(values.color(node.input("Base Color")))}
-    else:
-        eta, k = (as_color(node.input(name).value) for name in ("IOR", "Extinction"))
-        bsdf = {"type": "roughconductor", **rough(roughness, node, values), "eta": parameter(eta), "k": parameter(k)}
-    return with_normal(Surface(reflecting(bsdf)), node, values)
+        values.warn(node, "Edge Tint has no effect")
+        color = values.color(node.input("Base Color"))
+        bsdf = {"type": "principled", "metallic": 1.0, "roughness": roughness, "base_color": parameter(color)}
+        return with_normal(glossy(bsdf, color, roughness, node), node, values)
+    eta, k = (as_color(node.input(name).value) for name in ("IOR", "Extinction"))
+    facets = rough(roughness, node, values)
+    bsdf = {"type": "roughconductor" if facets else "conductor", **facets, "eta": parameter(eta), "k": parameter(k)}
+    color = tuple(((n - 1) ** 2 + x * x) / ((n + 1) ** 2 + x * x) for n, x in zip(eta, k))
+    return with_normal(glossy(bsdf, color, roughness, node), node, values)
 
 
 def _glass(node: Output, values: Values) -> Surface:

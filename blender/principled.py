@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from .nodes import Output
-from .surfaces import Surface, dielectric, diffuse, mixed, reflecting, rough, weighted_sum, with_normal
+from .surfaces import Surface, dielectric, diffuse, glossy, mixed, reflecting, rough, weighted_sum, with_normal
 from .values import Value, Values, as_color, is_black, is_texture, parameter, product
 
 _LEFT_OUT = ("Subsurface Weight", "Sheen Weight", "Thin Film Thickness", "Diffuse Roughness", "Anisotropic Rotation")
@@ -59,7 +59,7 @@ def _metal(node: Output, values: Values, color: Value, roughness: Value) -> Surf
     anisotropy = values.constant(node.input("Anisotropic"), node)
     if anisotropy:
         parameters["anisotropic"] = anisotropy
-    return Surface(reflecting({"type": "principled", **parameters}))
+    return glossy({"type": "principled", **parameters}, color, roughness, node)
 
 
 def _glass(node: Output, values: Values, color: Value, roughness: Value) -> Surface:

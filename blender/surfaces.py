@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from .nodes import Output
 from .values import Value, Values, is_black, is_texture, mixture, parameter, product
 
 SMOOTH = 0.01
 """Constant roughnesses below this one are mirrors or clear glass."""
+
+_ALBEDOS = (1.0, 1.0, 0.994, 0.976, 0.940, 0.879, 0.797, 0.697, 0.588, 0.478, 0.377)
+"""Of white microfacets (GGX) with single scattering, averaged over directions, for the roughnesses 0, 0.1, ... 1."""
 
 
 @dataclass
@@ -56,10 +61,19 @@ def rough(roughness: Value, node: Output, values: Values, anisotropy: float = 0.
     return {**parameters, "alpha_u": product(alpha, across), "alpha_v": product(alpha, 1 / across)}
 
 
-def glossy(color: Value, roughness: dict[str, Any]) -> Surface:
-    """A mirror, smooth or rough."""
-    kind = "roughconductor" if roughness else "conductor"
-    return Surface(reflecting({"type": kind, **roughness, "specular_reflectance": parameter(color)}))
+def glossy(bsdf: dict[str, Any], color: Value, roughness: Value, node: Output) -> Surface:
+    """Microfacets that reflect this colour, on both sides. The distribution Multiscatter GGX adds what is scattered
+    several times between them, as a diffuse part [Kulla & Conty 2017] of the right albedo on average over directions.
+    """
+    single = reflecting(bsdf)
+    if node.node.distribution != "MULTI_GGX" or is_texture(roughness) or roughness < SMOOTH:
+        return Surface(single)
+    albedo = float(np.interp(roughness, np.linspace(0, 1, len(_ALBEDOS)), _ALBEDOS))
+    if is_texture(color):
+        color = product(color, color)
+    else:
+        color = tuple(c * c * albedo / (1 - c * (1 - albedo)) for c in color)
+    return Surface(weighted_sum([(1.0, single), (1 - albedo, diffuse(color).bsdf)]))
 
 
 def dielectric(ior: float, roughness: dict[str, Any]) -> dict[str, Any]:

@@ -151,9 +151,22 @@ def test_viewports_render_what_the_camera_sees(studio):
     assert image.mean() == pytest.approx(studio.render().mean(), rel=0.02)
 
 
-def test_the_zip_is_an_extension(tmp_path):
+_INSTALL = """
+import bpy
+import addon_utils
+addon_utils.enable("bl_pkg")
+bpy.ops.extensions.package_install_files(filepath={zip!r}, repo="user_default", enable_on_install=True)
+bpy.context.scene.render.engine = "ETENDUE"
+print("engine:", bpy.context.scene.render.engine)
+"""
+
+
+def test_the_zip_is_an_extension_that_blender_installs(tmp_path):
     subprocess.run([ROOT / "scripts/blender-addon"], check=True, capture_output=True)
-    with zipfile.ZipFile(ROOT / "out/etendue-blender.zip") as archive:
-        names = archive.namelist()
-    assert "blender_manifest.toml" in names and "__init__.py" in names
-    assert not [name for name in names if "test" in name or "cache" in name]
+    file = ROOT / "out/etendue-blender.zip"
+    with zipfile.ZipFile(file) as archive:
+        assert {"blender_manifest.toml", "__init__.py", "LICENSE"} <= set(archive.namelist())
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
+    code = _INSTALL.format(zip=str(file))
+    run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert "engine: ETENDUE" in run.stdout, run.stdout + run.stderr

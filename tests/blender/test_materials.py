@@ -1,5 +1,6 @@
 """Nodes of materials against Cycles: means of a sphere within 2 % where the models are the same."""
 
+import bpy
 import pytest
 from studio import looking
 
@@ -13,6 +14,10 @@ NODES = {
     "glossy Beckmann": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.5), "BECKMANN", "sun", 1),
     "glossy anisotropic": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.5, Anisotropy=0.5), "GGX", "world", 1),
     "mirror": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 1),
+    "metal F82": ("ShaderNodeBsdfMetallic", dict(Roughness=0.3), "GGX", "world", 1.026),
+    "refraction": ("ShaderNodeBsdfRefraction", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 0.895),
+    "rough diffuse": ("ShaderNodeBsdfDiffuse", dict(Color=COLOR, Roughness=0.5), None, "sun", 0.91),
+    "principled coat": (PRINCIPLED, dict(Base_Color=COLOR, Coat_Weight=1.0), "GGX", "world", 0.98),
     "glass": ("ShaderNodeBsdfGlass", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 1),
     "rough glass": ("ShaderNodeBsdfGlass", dict(Color=COLOR, Roughness=0.4), "GGX", "world", 1),
     "transparent": ("ShaderNodeBsdfTransparent", dict(Color=COLOR), None, "world", 1),
@@ -21,6 +26,8 @@ NODES = {
     "emission": ("ShaderNodeEmission", dict(Color=COLOR, Strength=2.0), None, None, 1),
     "principled": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "GGX", "world", 1),
     "principled metal": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.3, Metallic=1.0), "GGX", "sun", 1),
+    "principled metal, multiscatter": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Metallic=1.0), "MULTI_GGX", "world", 1),
+    "principled, multiscatter": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "MULTI_GGX", "world", 0.98),
     "principled glass": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.0, Transmission_Weight=1.0), "GGX", "world", 1),
     "principled alpha": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Alpha=0.5), "GGX", "world", 1),
     "principled emission": (PRINCIPLED, dict(Emission_Color=COLOR, Emission_Strength=2.0), "GGX", None, 1),
@@ -78,8 +85,6 @@ def test_mixtures_with_transparency_let_light_pass(studio):
 
 
 def test_nodes_in_groups_and_behind_reroutes(studio):
-    import bpy
-
     group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
     group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
     group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
