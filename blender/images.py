@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from .report import Refused
 
@@ -41,16 +44,36 @@ class ImageFiles:
         return str(file) if file.is_file() and file.suffix.lower() in _READABLE else None
 
     def _written(self, image: Any, where: str) -> str:
-        """A copy as PNG, or OpenEXR where values are floats, in the image's own colour space."""
-        if not image.has_data and image.size[0] * image.size[1] == 0:
+        """A copy in the image's own colour space: as PNG, or, where values are floats, as PFM, which has no alpha."""
+        (width, height), channels = image.size, image.channels
+        if width * height == 0:
             raise Refused(f'{where}: image "{image.name}" has no pixels, or its file is missing')
+        pixels = np.empty(width * height * channels, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        pixels = pixels.reshape(height, width, channels)
+        if channels == 1:
+            pixels = np.repeat(pixels, 3, axis=2)
         self._folder.mkdir(parents=True, exist_ok=True)
-        name = f"{len(self._files)}-{plain_name(image.name)}"
-        file = self._folder / (name + (".exr" if image.is_float else ".png"))
-        copy = image.copy()
-        try:
-            copy.file_format = "OPEN_EXR" if image.is_float else "PNG"
-            copy.save(filepath=str(file), save_copy=True)
-        finally:
-            bpy.data.images.remove(copy)
+        file = self._folder / f"{len(self._files)}-{plain_name(image.name)}{'.pfm' if image.is_float else '.png'}"
+        file.write_bytes(_pfm(pixels) if image.is_float else _png(pixels))
         return str(file)
+
+
+def _pfm(pixels: np.ndarray) -> bytes:
+    """A file of 32-bit colours; the first row is the lowest one, as in Blender."""
+    height, width = pixels.shape[:2]
+    return f"PF\n{width} {height}\n-1.0\n".encode("ascii") + pixels[..., :3].astype("<f4").tobytes()
+
+
+def _png(pixels: np.ndarray) -> bytes:
+    """A file of 8-bit colours, with alpha if there are four channels; the first row is the top one."""
+    height, width, channels = pixels.shape
+    codes = np.round(np.clip(pixels[::-1], 0, 1) * 255).astype(np.uint8).reshape(height, -1)
+    rows = np.hstack([np.zeros((height, 1), np.uint8), codes])  # each row begins with its filter, none
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 6 if channels == 4 else 2, 0, 0, 0)
+    end = chunk(b"IDAT", zlib.compress(rows.tobytes())) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + end

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .images import ImageFiles
-from .nodes import Input, Output, surface_output
+from .nodes import Input, Output, surface_output, tree_of
 from .principled import principled
 from .report import Refused, Report
 from .surfaces import (BLACK, Surface, diffuse, dielectric, glossy, mixed, reflecting, rough, summed, with_normal)
@@ -31,7 +31,7 @@ def read_material(material: Any, images: ImageFiles, report: Report) -> Material
     if material is None:
         return Material(reflecting({"type": "diffuse", "reflectance": 0.8}))
     values = Values(f'material "{material.name}"', images, report)
-    tree = material.node_tree if material.use_nodes else None
+    tree = tree_of(material)
     if tree is None:
         surface = diffuse(tuple(material.diffuse_color)[:3])
     else:

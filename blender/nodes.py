@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import bpy
+
 
 @dataclass(frozen=True)
 class Input:
@@ -87,3 +89,8 @@ def surface_output(tree: Any, kind: str) -> Output | None:
     nodes = nodes or [n for n in tree.nodes if n.bl_idname == kind]
     node = next((n for n in nodes if n.is_active_output), nodes[0] if nodes else None)
     return Output(node, None) if node else None
+
+
+def tree_of(owner: Any) -> Any:
+    """The node tree of a material or a world; None if its nodes are off, which Blender 5 does not have any more."""
+    return owner.node_tree if bpy.app.version >= (5, 0, 0) or owner.use_nodes else None

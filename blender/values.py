@@ -218,9 +218,10 @@ class Values:
         return tuple(max(c, 0.0) ** gamma for c in value)
 
     def _ShaderNodeMath(self, node: Output) -> Value | None:
-        operation, (a, b) = node.node.operation, [self.number(i) for i in node.inputs()[:2] * 2][:2]
+        operation = node.node.operation
         if operation not in _OPERATIONS or node.node.use_clamp:
             return None
+        a, b = (self.number(i) for i in node.inputs()[:2])
         if not is_texture(a) and not is_texture(b):
             return _OPERATIONS[operation](a, b)
         if operation == "MULTIPLY":

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .lights import rgb
-from .nodes import Output, surface_output
+from .nodes import Output, surface_output, tree_of
 from .report import Refused
 from .values import Values, as_color, is_texture
 
@@ -19,9 +19,10 @@ def read_world(world: Any, values: Values) -> dict[str, Any] | None:
     """The emitter of a world; None if it is black."""
     if world is None:
         return None
-    if not (world.use_nodes and world.node_tree):
+    tree = tree_of(world)
+    if tree is None:
         return _constant(tuple(world.color), 1.0)
-    output = surface_output(world.node_tree, "ShaderNodeOutputWorld")
+    output = surface_output(tree, "ShaderNodeOutputWorld")
     if output and output.input("Volume").source():
         values.report.warn(values.where, "volume has no effect")
     node = output.input("Surface").source() if output else None

@@ -42,7 +42,7 @@ class Studio:
         """A constant world; returns its tree and the background node."""
         world = bpy.data.worlds.new("World")
         self.scene.world = world
-        world.use_nodes = True
+        _use_nodes(world)
         node = next(n for n in world.node_tree.nodes if n.bl_idname == "ShaderNodeBackground")
         node.inputs["Color"].default_value, node.inputs["Strength"].default_value = (*color, 1), strength
         return world.node_tree, node
@@ -59,7 +59,7 @@ class Studio:
     def material(self, node_type, name="Material", **inputs):
         """A material whose surface is a new node with these inputs; returns the tree and the node."""
         material = bpy.data.materials.new(name)
-        material.use_nodes = True
+        _use_nodes(material)
         tree = material.node_tree
         tree.nodes.clear()
         output, node = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new(node_type)
@@ -111,3 +111,8 @@ def looking(at, target):
     direction = Vector(target) - Vector(at)
     up = "Y" if abs(direction.normalized().z) < 0.999 else "X"
     return Matrix.Translation(Vector(at)) @ direction.to_track_quat("-Z", up).to_matrix().to_4x4()
+
+
+def _use_nodes(owner):
+    if bpy.app.version < (5, 0, 0):
+        owner.use_nodes = True

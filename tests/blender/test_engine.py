@@ -57,12 +57,13 @@ def test_passes(studio):
     # The centre of the view is the origin, at a distance of √20 along the axis.
     assert seen["Depth"][23:25, 31:33].mean() == pytest.approx(np.sqrt(20), rel=0.01)
     assert seen["Depth"][0, 0] == pytest.approx(1e10)
-    # Depths are along the axis, not distances: at the lower edge, where the ray meets the plane z = 0.
-    axis = Vector((0, 2, -1)).normalized()
-    frame = [v for v in studio.cam.data.view_frame(scene=studio.scene)]
-    ray = studio.cam.matrix_world.to_3x3() @ Vector((0, min(v.y for v in frame) * (1 - 1 / 48), frame[0].z))
+    # Depths are along the axis, not distances: where the ray through row 36 and the left quarter meets the plane z = 0.
+    axis, frame = Vector((0, 2, -1)).normalized(), studio.cam.data.view_frame(scene=studio.scene)
+    low, left = min(v.y for v in frame), min(v.x for v in frame)
+    ray = studio.cam.matrix_world.to_3x3() @ Vector((left * (1 - 33 / 64), low * (73 / 48 - 1), frame[0].z))
     hit = ray * (2 / -ray.z)
-    assert seen["Depth"][47, 32] == pytest.approx(hit.dot(axis), rel=0.01)
+    assert abs(hit.length / hit.dot(axis) - 1) > 0.02
+    assert seen["Depth"][36, 16] == pytest.approx(hit.dot(axis), rel=0.01)
 
 
 def test_renderings_can_be_cancelled(studio, monkeypatch):

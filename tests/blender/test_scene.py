@@ -14,7 +14,8 @@ def blocks(image):
     return image.reshape(height // 8, 8, width // 8, 8, 3).mean(axis=(1, 3))
 
 
-def assert_same(studio, tolerance=0.02):
+def assert_same(studio, tolerance=0.035):
+    """The filters of the two renderers differ, and so do blocks with edges: by up to 3 %."""
     ours, reference = blocks(studio.render()), blocks(studio.render("CYCLES"))
     assert reference.std() > 0.01
     assert np.abs(ours - reference).max() < tolerance * reference.max(), np.abs(ours - reference).max() / reference.max()
@@ -52,6 +53,7 @@ def test_custom_normals(studio):
     plane.data.normals_split_custom_set([Vector((x, y, 3)).normalized() for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     # Not the world: in Cycles its light comes through the plane from behind.
     studio.light("SUN", energy=2, angle=0, at=(1, -2, 3))
+    studio.plane(material=diffuse(studio), at=(0, 0, -0.01))
     assert_same(studio)
 
 
@@ -73,13 +75,29 @@ def test_collections_are_instances_of_a_shapegroup(studio):
     assert kinds.count("instance") == 4 and kinds.count("shapegroup") == 1
 
 
+def test_instances_of_geometry_nodes(studio):
+    tree = bpy.data.node_groups.new("Rows", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    points, cube, copies = (tree.nodes.new(f"GeometryNode{n}") for n in ("MeshGrid", "MeshCube", "InstanceOnPoints"))
+    points.inputs["Size X"].default_value, points.inputs["Size Y"].default_value = 3, 2
+    cube.inputs["Size"].default_value = (0.4, 0.3, 0.5)
+    tree.links.new(points.outputs["Mesh"], copies.inputs["Points"])
+    tree.links.new(cube.outputs["Mesh"], copies.inputs["Instance"])
+    tree.links.new(copies.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    studio.plane().modifiers.new("Rows", "NODES").node_group = tree
+    studio.plane(material=diffuse(studio))
+    lamps(studio)
+    assert_same(studio)
+    assert [v["type"] for v in description(studio).values() if isinstance(v, dict)].count("instance") == 9
+
+
 def test_emitting_instances_are_meshes(studio):
     emitter, _, _ = studio.material("ShaderNodeEmission", "Lamp", Strength=5.0)
     first = studio.sphere(emitter, at=(-1, 0, 1), radius=0.2)
     second = studio._add("Second", first.data)
     second.location = (1, 0, 0.5)
     studio.plane(material=diffuse(studio))
-    assert_same(studio, 0.03)
+    assert_same(studio)
 
 
 def textured(studio, settings, mapping=None, kind="ShaderNodeTexImage"):
@@ -117,12 +135,30 @@ MAPPINGS = {
 @pytest.mark.parametrize("mapping", MAPPINGS)
 def test_images_lie_where_they_do_in_cycles(studio, mapping, extension):
     textured(studio, {"extension": extension}, MAPPINGS[mapping])
-    assert_same(studio, 0.03)
+    assert_same(studio)
+
+
+@pytest.mark.parametrize("source", ["packed", "generated", "file", "float file"])
+def test_images_are_read_wherever_they_are(studio, source):
+    texture = textured(studio, {})
+    if source == "generated":
+        values = list(texture.image.pixels)
+        texture.image = bpy.data.images.new("Other", 32, 32)
+        texture.image.pixels.foreach_set(values)
+    elif source != "packed":
+        file = studio.folder / ("image.exr" if source == "float file" else "image.png")
+        image = texture.image
+        if source == "float file":
+            image = studio.image(lambda u, v: (u, v, 0.2), is_float=True)
+            image.file_format = "OPEN_EXR"
+        image.save(filepath=str(file))
+        texture.image = bpy.data.images.load(str(file))
+    assert_same(studio)
 
 
 def test_checkerboards(studio):
     textured(studio, {}, kind="ShaderNodeTexChecker")
-    assert_same(studio, 0.03)
+    assert_same(studio)
 
 
 def test_second_uv_maps(studio):
@@ -136,7 +172,7 @@ def test_second_uv_maps(studio):
     node.uv_map = "Other"
     tree.links.new(node.outputs[0], texture.inputs["Vector"])
     assert mesh.uv_layers[0].active_render
-    assert_same(studio, 0.03)
+    assert_same(studio)
 
 
 @pytest.mark.parametrize("domain, kind", [("POINT", "FLOAT_COLOR"), ("CORNER", "BYTE_COLOR")])
@@ -219,7 +255,7 @@ def test_upright_images_and_pixels_that_are_not_square(studio):
     studio.scene.render.resolution_x, studio.scene.render.resolution_y = 64, 160
     studio.scene.render.resolution_percentage, studio.scene.render.pixel_aspect_x = 50, 2
     assert studio.render().shape == (80, 32, 3)
-    assert_same(studio, 0.03)
+    assert_same(studio)
 
 
 def test_borders(studio):
@@ -228,7 +264,7 @@ def test_borders(studio):
     render.use_border = render.use_crop_to_border = True
     render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.75, 0.5, 1
     assert studio.render().shape == (24, 32, 3)
-    assert_same(studio, 0.03)
+    assert_same(studio)
 
 
 def test_a_scene_without_a_camera_is_refused(studio):
