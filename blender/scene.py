@@ -42,6 +42,7 @@ class SceneReader:
         self._depsgraph = depsgraph
         self._images = ImageFiles(folder)
         self._materials: dict[str, Material] = {}
+        self._material_names: dict[str | None, str] = {}
         self._geometries: dict[Any, _Geometry] = {}
         self._objects: dict[str, Any] = {}
 
@@ -93,10 +94,12 @@ class SceneReader:
         return _Geometry(plain_name(thing.name), parts, names)
 
     def _material(self, material: Any) -> str:
-        name = "material-" + plain_name(material.name_full) if material else "default-material"
-        if name not in self._materials:
+        key = material.name_full if material else None
+        if key not in self._material_names:
+            name = self._new_name("material-" + plain_name(key) if key else "default-material")
             self._materials[name] = read_material(material, self._images, self.report)
-        return name
+            self._material_names[key] = name
+        return self._material_names[key]
 
     def _shapes(self, geometry: _Geometry) -> list[tuple[str, dict[str, Any]]]:
         """A mesh that occurs once, or emits, has its transform; others are groups with instances."""
@@ -116,7 +119,7 @@ class SceneReader:
             group = self._new_name("group-" + geometry.name)
             self._objects[group] = {"type": "shapegroup", **dict(grouped)}
             copy = {"type": "instance", "shapegroup": {"type": "ref", "id": group}}
-            shapes += [(geometry.name, {**copy, "to_world": to_world}) for to_world in geometry.transforms]
+            shapes += [("copy-" + geometry.name, {**copy, "to_world": to_world}) for to_world in geometry.transforms]
         return shapes
 
     def _new_name(self, name: str) -> str:

@@ -103,6 +103,15 @@ def test_nodes_in_groups_and_behind_reroutes(studio):
     assert ours == pytest.approx(studio.render("CYCLES").mean(axis=(0, 1)), rel=0.02)
 
 
+def test_names_that_differ_only_in_special_characters(studio):
+    lit(studio, "world")
+    for name, x, color in (("A.B", -0.6, (0.9, 0, 0)), ("A B", 0.6, (0, 0, 0.9))):
+        studio.sphere(studio.material("ShaderNodeBsdfDiffuse", name, Color=color)[0], at=(x, 0, 1), radius=0.5)
+    image = studio.render()
+    left, right = image[20:28, 20:26].mean(axis=(0, 1)), image[20:28, 38:44].mean(axis=(0, 1))
+    assert left[0] > 5 * left[2] and right[2] > 5 * right[0]
+
+
 def test_unknown_values_are_baked_with_a_warning(studio, capfd):
     material, tree, node = studio.material("ShaderNodeBsdfDiffuse", "Stone", Color=(0.5, 0.5, 0.5))
     noise = tree.nodes.new("ShaderNodeTexNoise")

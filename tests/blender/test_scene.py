@@ -50,7 +50,7 @@ def test_modifiers_smooth_and_flat_faces(studio):
 
 def test_custom_normals(studio):
     plane = studio.plane(3, diffuse(studio))
-    plane.data.normals_split_custom_set([Vector((x, y, 3)).normalized() for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    plane.data.normals_split_custom_set([Vector((x, y, 6)).normalized() for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     # Not the world: in Cycles its light comes through the plane from behind.
     studio.light("SUN", energy=2, angle=0, at=(1, -2, 3))
     studio.plane(material=diffuse(studio), at=(0, 0, -0.01))
