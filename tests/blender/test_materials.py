@@ -15,7 +15,7 @@ NODES = {
     "glossy anisotropic": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.5, Anisotropy=0.5), "GGX", "world", 1),
     "mirror": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 1),
     "metal F82": ("ShaderNodeBsdfMetallic", dict(Roughness=0.3), "GGX", "world", 1.026),
-    "refraction": ("ShaderNodeBsdfRefraction", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 0.895),
+    "refraction": ("ShaderNodeBsdfRefraction", dict(Color=(0.8, 0.8, 0.8), Roughness=0.0), "GGX", "world", 0.895),
     "rough diffuse": ("ShaderNodeBsdfDiffuse", dict(Color=COLOR, Roughness=0.5), None, "sun", 0.91),
     "principled coat": (PRINCIPLED, dict(Base_Color=COLOR, Coat_Weight=1.0), "GGX", "world", 0.98),
     "glass": ("ShaderNodeBsdfGlass", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 1),
