@@ -1,0 +1,45 @@
+"""The operator that writes the scene to a folder, for renderings by the program on other machines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import StringProperty
+
+from .engine import EtendueEngine
+
+
+class ExportEtendueScene(bpy.types.Operator):
+    """Write the scene as Mitsuba XML with PLY meshes, for the program etendue"""
+
+    bl_idname = "export_scene.etendue"
+    bl_label = "Export etendue scene"
+
+    directory: StringProperty(name="Folder", description="Receives scene.xml, meshes and textures", subtype="DIR_PATH")
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: Any) -> set[str]:
+        folder, scene = Path(bpy.path.abspath(self.directory)), context.scene
+        folder.mkdir(parents=True, exist_ok=True)
+        previous = scene.render.engine
+        EtendueEngine.destination = folder
+        scene.render.engine = EtendueEngine.bl_idname
+        try:
+            bpy.ops.render.render(scene=scene.name)
+        except RuntimeError as e:
+            self.report({"ERROR"}, str(e))
+            return {"CANCELLED"}
+        finally:
+            EtendueEngine.destination = None
+            scene.render.engine = previous
+        self.report({"INFO"}, f"{folder / 'scene.xml'} is written")
+        return {"FINISHED"}
+
+
+def menu(self: Any, context: Any) -> None:
+    self.layout.operator(ExportEtendueScene.bl_idname, text="etendue scene (.xml)")

@@ -1,0 +1,150 @@
+"""Materials: trees of shader nodes as etendue's BSDFs, with emission and opacity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from .images import ImageFiles
+from .nodes import Input, Output, surface_output, tree_of
+from .principled import principled
+from .report import Refused, Report
+from .surfaces import (BLACK, Surface, diffuse, dielectric, glossy, mixed, reflecting, rough, summed, with_normal)
+from .values import Values, as_color, is_black, is_texture, parameter, product
+
+
+@dataclass
+class Material:
+    """A material as etendue's shapes use it."""
+
+    bsdf: dict[str, Any]
+    emission: Any = None
+    """Radiance, a parameter of an area emitter; None without emission."""
+    uv_maps: list[str] = field(default_factory=list)
+    color_attribute: str | None = None
+    """See Values."""
+
+
+def read_material(material: Any, images: ImageFiles, report: Report) -> Material:
+    """A material of Blender; None is the default one."""
+    if material is None:
+        return Material(reflecting({"type": "diffuse", "reflectance": 0.8}))
+    values = Values(f'material "{material.name}"', images, report)
+    tree = tree_of(material)
+    if tree is None:
+        surface = diffuse(tuple(material.diffuse_color)[:3])
+    else:
+        output = surface_output(tree, "ShaderNodeOutputMaterial")
+        for name in ("Volume", "Displacement"):
+            if output and output.input(name).source():
+                report.warn(values.where, f"{name.lower()} has no effect")
+        surface = read_shader(output.input("Surface"), values) if output else BLACK
+    if len(values.uv_maps) > 1:
+        report.warn(values.where, f'only the UV map "{values.uv_maps[0]}" is used beside the active one')
+    emission = None if is_black(surface.emission) else parameter(surface.emission)
+    return Material(surface.masked(), emission, values.uv_maps, values.color_attribute)
+
+
+def read_shader(i: Input, values: Values) -> Surface:
+    """The surface that a shader input describes; black without a link."""
+    source = i.source()
+    if source is None or not source.socket.is_output:
+        return BLACK
+    read = _SHADERS.get(source.node.bl_idname)
+    if read is None:
+        raise Refused(f"{values.where}: node {source.name} is not supported")
+    return read(source, values)
+
+
+def _diffuse(node: Output, values: Values) -> Surface:
+    color, roughness = values.color(node.input("Color")), values.constant(node.input("Roughness"), node)
+    if roughness > 0:
+        bsdf = {"type": "orennayar", "reflectance": parameter(color), "sigma": math.degrees(roughness)}
+        return with_normal(Surface(reflecting(bsdf)), node, values)
+    return with_normal(diffuse(color), node, values)
+
+
+def _glossy(node: Output, values: Values) -> Surface:
+    color, roughness = values.color(node.input("Color")), values.number(node.input("Roughness"))
+    anisotropy = values.constant(node.input("Anisotropy"), node)
+    facets = rough(roughness, node, values, anisotropy)
+    bsdf = {"type": "roughconductor" if facets else "conductor", **facets, "specular_reflectance": parameter(color)}
+    return with_normal(glossy(bsdf, color, roughness, node), node, values)
+
+
+def _metallic(node: Output, values: Values) -> Surface:
+    roughness = values.number(node.input("Roughness"))
+    if node.node.fresnel_type == "F82":
+        values.warn(node, "Edge Tint has no effect")
+        color = values.color(node.input("Base Color"))
+        bsdf = {"type": "principled", "metallic": 1.0, "roughness": roughness, "base_color": parameter(color)}
+        return with_normal(glossy(bsdf, color, roughness, node), node, values)
+    eta, k = (as_color(node.input(name).value) for name in ("IOR", "Extinction"))
+    facets = rough(roughness, node, values)
+    bsdf = {"type": "roughconductor" if facets else "conductor", **facets, "eta": parameter(eta), "k": parameter(k)}
+    color = tuple(((n - 1) ** 2 + x * x) / ((n + 1) ** 2 + x * x) for n, x in zip(eta, k))
+    return with_normal(glossy(bsdf, color, roughness, node), node, values)
+
+
+def _glass(node: Output, values: Values) -> Surface:
+    color, roughness = parameter(values.color(node.input("Color"))), values.number(node.input("Roughness"))
+    ior = values.constant(node.input("IOR"), node)
+    bsdf = dielectric(ior, rough(roughness, node, values))
+    return with_normal(Surface({**bsdf, "specular_reflectance": color, "specular_transmittance": color}), node, values)
+
+
+def _refraction(node: Output, values: Values) -> Surface:
+    surface = _glass(node, values)
+    surface.bsdf["specular_reflectance"] = 0.0
+    return surface
+
+
+def _translucent(node: Output, values: Values) -> Surface:
+    color = parameter(values.color(node.input("Color")))
+    bsdf = {"type": "diffusetransmission", "reflectance": 0.0, "transmittance": color}
+    return with_normal(Surface(bsdf), node, values)
+
+
+def _transparent(node: Output, values: Values) -> Surface:
+    color = values.color(node.input("Color"))
+    if not is_texture(color) and len(set(color)) == 1:
+        return Surface(BLACK.bsdf, opacity=1 - min(color[0], 1.0))
+    # A pane with the index of refraction of air: light passes, with the colour.
+    pane = {"type": "thindielectric", "int_ior": 1.0, "ext_ior": 1.0, "specular_transmittance": parameter(color)}
+    return Surface(pane)
+
+
+def _subsurface(node: Output, values: Values) -> Surface:
+    values.warn(node, "light does not scatter below surfaces: it is diffuse")
+    return with_normal(diffuse(values.color(node.input("Color"))), node, values)
+
+
+def _emission(node: Output, values: Values) -> Surface:
+    return Surface(BLACK.bsdf, emission=product(values.color(node.input("Color")), values.number(node.input("Strength"))))
+
+
+def _mix(node: Output, values: Values) -> Surface:
+    a, b = (read_shader(i, values) for i in node.inputs()[1:3])
+    return mixed(values.number(node.inputs()[0]), a, b)
+
+
+def _add(node: Output, values: Values) -> Surface:
+    return summed(*(read_shader(i, values) for i in node.inputs()[:2]), node, values)
+
+
+_SHADERS = {
+    "ShaderNodeBsdfPrincipled": principled,
+    "ShaderNodeBsdfDiffuse": _diffuse,
+    "ShaderNodeBsdfAnisotropic": _glossy,
+    "ShaderNodeBsdfGlossy": _glossy,
+    "ShaderNodeBsdfMetallic": _metallic,
+    "ShaderNodeBsdfGlass": _glass,
+    "ShaderNodeBsdfRefraction": _refraction,
+    "ShaderNodeBsdfTranslucent": _translucent,
+    "ShaderNodeBsdfTransparent": _transparent,
+    "ShaderNodeSubsurfaceScattering": _subsurface,
+    "ShaderNodeEmission": _emission,
+    "ShaderNodeMixShader": _mix,
+    "ShaderNodeAddShader": _add,
+}

@@ -1,0 +1,131 @@
+"""A Blender scene as a description: nested dicts as et.load_dict() takes them, with meshes as arrays.
+
+Nothing here renders or imports etendue. engine.py builds the description in memory, and files.py writes it to a folder.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .camera import read_camera
+from .images import ImageFiles, plain_name
+from .lights import read_light
+from .materials import Material, read_material
+from .meshes import Arrays, read_parts
+from .report import Refused, Report
+from .values import Values
+from .world import read_world
+
+_GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+_IGNORED = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "LIGHT"}
+
+
+@dataclass
+class _Geometry:
+    """One evaluated geometry with its materials, and the transforms of all its copies."""
+
+    name: str
+    parts: list[tuple[int, Arrays]]
+    materials: list[str]
+    transforms: list[np.ndarray] = field(default_factory=list)
+
+
+class SceneReader:
+    """Reads an evaluated dependency graph; `folder` receives the files of packed and generated images."""
+
+    def __init__(self, depsgraph: Any, folder: Path):
+        self.report = Report()
+        self._depsgraph = depsgraph
+        self._images = ImageFiles(folder)
+        self._materials: dict[str, Material] = {}
+        self._material_names: dict[str | None, str] = {}
+        self._geometries: dict[Any, _Geometry] = {}
+        self._objects: dict[str, Any] = {}
+
+    def read(self, sensor: dict[str, Any] | None = None) -> dict[str, Any]:
+        """The description. `sensor`: instead of the scene's camera."""
+        scene = self._depsgraph.scene_eval
+        if sensor is None:
+            if scene.camera is None:
+                raise Refused("the scene has no camera")
+            sensor = read_camera(scene.camera.evaluated_get(self._depsgraph), scene, self.report)
+        self._read_world(scene.world)
+        for instance in self._depsgraph.object_instances:
+            self._read_instance(instance)
+        shapes = [shape for geometry in self._geometries.values() for shape in self._shapes(geometry)]
+        bsdfs = {name: material.bsdf for name, material in self._materials.items()}
+        self._objects.update((self._new_name(name), shape) for name, shape in shapes)
+        return {"type": "scene", "sensor": sensor, **bsdfs, **self._objects}
+
+    def _read_world(self, world: Any) -> None:
+        if world is not None:
+            emitter = read_world(world, Values(f'world "{world.name}"', self._images, self.report))
+            if emitter is not None:
+                self._objects["world"] = emitter
+
+    def _read_instance(self, instance: Any) -> None:
+        thing = instance.object
+        to_world = np.array(instance.matrix_world, dtype=float)
+        if thing.type == "LIGHT":
+            values = Values(f'light "{thing.name}"', self._images, self.report)
+            name = self._new_name("light-" + plain_name(thing.name))
+            self._objects[name] = read_light(thing.data, to_world, values)
+        elif thing.type in _GEOMETRY:
+            # The graph makes objects anew for each step, but not their data.
+            key = (thing.data.as_pointer(), tuple(s.material.name_full if s.material else "" for s in thing.material_slots))
+            if key not in self._geometries:
+                self._geometries[key] = self._read_geometry(thing)
+            self._geometries[key].transforms.append(to_world)
+        elif thing.type not in _IGNORED:
+            self.report.warn(f'object "{thing.name}"', f"objects of the type {thing.type} are left out")
+
+    def _read_geometry(self, thing: Any) -> _Geometry:
+        names = [self._material(slot.material) for slot in thing.material_slots] or [self._material(None)]
+        mesh = thing.to_mesh()
+        try:
+            parts = [] if mesh is None else read_parts(
+                mesh, [self._materials[name] for name in names], f'object "{thing.name}"', self.report)
+        finally:
+            thing.to_mesh_clear()
+        return _Geometry(plain_name(thing.name), parts, names)
+
+    def _material(self, material: Any) -> str:
+        key = material.name_full if material else None
+        if key not in self._material_names:
+            name = self._new_name("material-" + plain_name(key) if key else "default-material")
+            self._materials[name] = read_material(material, self._images, self.report)
+            self._material_names[key] = name
+        return self._material_names[key]
+
+    def _shapes(self, geometry: _Geometry) -> list[tuple[str, dict[str, Any]]]:
+        """A mesh that occurs once, or emits, has its transform; others are groups with instances."""
+        shapes, grouped = [], []
+        for index, arrays in geometry.parts:
+            material = geometry.materials[index]
+            mesh = {"type": "mesh", "mesh": arrays, "bsdf": {"type": "ref", "id": material}}
+            name = f"{geometry.name}-{index}"
+            emission = self._materials[material].emission
+            if emission is not None:
+                mesh["emitter"] = {"type": "area", "radiance": emission, "two_sided": True}
+            elif len(geometry.transforms) > 1:
+                grouped.append((name, mesh))
+                continue
+            shapes += [(name, {**mesh, "to_world": to_world}) for to_world in geometry.transforms]
+        if grouped:
+            group = self._new_name("group-" + geometry.name)
+            self._objects[group] = {"type": "shapegroup", **dict(grouped)}
+            copy = {"type": "instance", "shapegroup": {"type": "ref", "id": group}}
+            shapes += [("copy-" + geometry.name, {**copy, "to_world": to_world}) for to_world in geometry.transforms]
+        return shapes
+
+    def _new_name(self, name: str) -> str:
+        """The name, with a number if it is taken."""
+        taken, result = 1, name
+        while result in self._objects or result in self._materials:
+            taken += 1
+            result = f"{name}-{taken}"
+        return result

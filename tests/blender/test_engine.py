@@ -1,0 +1,173 @@
+"""The engine: passes, cancelling, errors, settings; and exported scenes rendered by the program."""
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+
+import etendue as et
+
+ROOT = Path(__file__).parents[2]
+
+
+def furnished(studio):
+    """A scene with an image, a group of instances, a lamp and glass."""
+    material, tree, node = studio.material("ShaderNodeBsdfPrincipled", "Wood 1.0", Roughness=0.4)
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = studio.image(lambda u, v: (u, v, 0.3))
+    tree.links.new(texture.outputs["Color"], node.inputs["Base Color"])
+    studio.plane(6, material)
+    first = studio.sphere(studio.material("ShaderNodeBsdfGlass", "Glass")[0], at=(-0.8, 0, 0.5), radius=0.5)
+    studio._add("Second", first.data).location = (0.8, 0, 0.5)
+    studio.sphere(studio.material("ShaderNodeEmission", "Lamp", Strength=8.0)[0], at=(0, 0.5, 2), radius=0.3)
+    studio.world((0.1, 0.2, 0.3))
+
+
+def test_passes(studio):
+    material, _, _ = studio.material("ShaderNodeBsdfDiffuse", Color=(0.8, 0.4, 0.2))
+    studio.plane(3, material)
+    studio.world()
+    layer = bpy.context.view_layer
+    layer.use_pass_normal = layer.use_pass_z = True
+    seen = {}
+    engine = sys.modules["etendue_addon.engine"]
+    original = engine._fill
+
+    def fill(result, name, image):
+        original(result, name, image)
+        found = result.layers[0].passes.find_by_name(name, "")
+        values = np.zeros(image.size, np.float32)
+        found.rect.foreach_get(values)
+        seen[name] = values.reshape(image.shape)[::-1]
+
+    engine._fill = fill
+    try:
+        combined = studio.render()
+    finally:
+        engine._fill = original
+    assert np.allclose(seen["Combined"][..., :3], combined) and (seen["Combined"][..., 3] == 1).all()
+    assert seen["Normal"][24, 32] == pytest.approx([0, 0, 1], abs=1e-4)
+    assert seen["Albedo"][24, 32] == pytest.approx([0.8, 0.4, 0.2], abs=1e-4)
+    # The centre of the view is the origin, at a distance of √20 along the axis.
+    assert seen["Depth"][23:25, 31:33].mean() == pytest.approx(np.sqrt(20), rel=0.01)
+    assert seen["Depth"][0, 0] == pytest.approx(1e10)
+    # Depths are along the axis, not distances: where the ray through row 36 and the left quarter meets the plane z = 0.
+    axis, frame = Vector((0, 2, -1)).normalized(), studio.cam.data.view_frame(scene=studio.scene)
+    low, left = min(v.y for v in frame), min(v.x for v in frame)
+    ray = studio.cam.matrix_world.to_3x3() @ Vector((left * (1 - 33 / 64), low * (73 / 48 - 1), frame[0].z))
+    hit = ray * (2 / -ray.z)
+    assert abs(hit.length / hit.dot(axis) - 1) > 0.02
+    assert seen["Depth"][36, 16] == pytest.approx(hit.dot(axis), rel=0.01)
+
+
+def test_renderings_can_be_cancelled(studio, monkeypatch):
+    furnished(studio)
+    engine = sys.modules["etendue_addon"].EtendueEngine
+    calls = []
+
+    # Blender asks its window; there is none.
+    monkeypatch.setattr(engine, "is_cancelled", lambda self: calls.append(None) or len(calls) >= 3)
+    studio.scene.etendue.samples = 100000
+    studio.render()
+    assert len(calls) == 3
+
+
+def test_the_time_ends_the_rendering(studio, monkeypatch):
+    furnished(studio)
+    seen = []
+    monkeypatch.setattr(et, "render", lambda *args, render=et.render, **kwargs: seen.append(render(*args, **kwargs)) or seen[0])
+    studio.scene.etendue.samples, studio.scene.etendue.time = 100000, 1
+    studio.render()
+    assert seen[0].stopped_by == "time" and seen[0].seconds < 5
+
+
+def test_integrators_and_their_parameters_come_from_the_tables():
+    settings, addon = bpy.context.scene.etendue, sys.modules["etendue_addon.settings"]
+    assert addon.integrators() == [p["name"] for p in et.plugins("integrator")]
+    settings.integrator, settings.depth = "upg+bdpt", 12
+    group = addon.group_of(settings, "upg+bdpt")
+    group.radius, group.guide = 0.05, "on"
+    assert addon.integrator_text(settings) == "upg+bdpt:max_depth=12,radius=0.05,guide=on"
+    for plugin in et.plugins("integrator"):
+        settings.integrator, settings.depth = plugin["name"], -1
+        if plugin["name"] != "upg+bdpt":
+            assert addon.integrator_text(settings) == plugin["name"]
+
+
+def test_seeds_change_the_noise_and_nothing_else(studio):
+    furnished(studio)
+    studio.scene.etendue.samples = 4
+    images = []
+    for seed in (0, 0, 1):
+        studio.scene.etendue.seed = seed
+        images.append(studio.render())
+    assert (images[0] == images[1]).all() and (images[0] != images[2]).any()
+
+
+def test_exported_scenes_give_the_same_image_in_the_program(studio, tmp_path):
+    program = os.environ.get("ETENDUE_PROGRAM")
+    if not program or not Path(program).exists():
+        pytest.skip("the program etendue is missing (ETENDUE_PROGRAM)")
+    furnished(studio)
+    for kind in ("SPOT", "AREA", "SUN"):
+        studio.light(kind, energy=1, name=kind)
+    ours, folder = studio.render(), tmp_path / "exported"
+    assert bpy.ops.export_scene.etendue(directory=str(folder)) == {"FINISHED"}
+    assert studio.scene.render.engine == "ETENDUE"
+    assert not [line for line in (folder / "scene.xml").read_text().splitlines() if str(tmp_path) in line]
+    image = tmp_path / "program.exr"
+    subprocess.run([program, "render", folder / "scene.xml", "-o", image], check=True, capture_output=True)
+    again = et.read_image(image)
+    assert again.mean() == pytest.approx(ours.mean(), rel=1e-3)
+    assert np.abs(again - ours).mean() < 1e-3 * ours.mean()
+
+
+def test_viewports_render_what_the_camera_sees(studio):
+    """Without a window there is no drawing; the sensor of a viewport is that of its matrices."""
+    from etendue_addon.viewport import _sensor
+
+    furnished(studio)
+
+    class Region:
+        width, height = 64, 48
+
+    class View:
+        is_perspective = True
+        view_matrix = studio.cam.matrix_world.inverted()
+        window_matrix = studio.cam.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=64, y=48)
+
+    class Context:
+        region, region_data = Region, View
+
+    from etendue_addon.scene import SceneReader
+
+    description = SceneReader(bpy.context.evaluated_depsgraph_get(), studio.folder).read(_sensor(Context))
+    image = et.render(et.load_dict(description).build(), "path", spp=16, progress=False).image
+    assert image.mean() == pytest.approx(studio.render().mean(), rel=0.02)
+
+
+_INSTALL = """
+import bpy
+import addon_utils
+addon_utils.enable("bl_pkg")
+bpy.ops.extensions.package_install_files(filepath={zip!r}, repo="user_default", enable_on_install=True)
+bpy.context.scene.render.engine = "ETENDUE"
+print("engine:", bpy.context.scene.render.engine)
+"""
+
+
+def test_the_zip_is_an_extension_that_blender_installs(tmp_path):
+    subprocess.run([ROOT / "scripts/blender-addon"], check=True, capture_output=True)
+    file = ROOT / "out/etendue-blender.zip"
+    with zipfile.ZipFile(file) as archive:
+        assert {"blender_manifest.toml", "__init__.py", "LICENSE"} <= set(archive.namelist())
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}
+    code = _INSTALL.format(zip=str(file))
+    run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert "engine: ETENDUE" in run.stdout, run.stdout + run.stderr

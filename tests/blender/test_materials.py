@@ -1,0 +1,132 @@
+"""Nodes of materials against Cycles: means of a sphere within 2 % where the models are the same."""
+
+import bpy
+import pytest
+from studio import looking
+
+PRINCIPLED = "ShaderNodeBsdfPrincipled"
+COLOR = (0.8, 0.4, 0.2)
+
+# name: node, inputs, distribution, light, and the ratio to Cycles where the models differ (docs/blender.md says why).
+NODES = {
+    "diffuse": ("ShaderNodeBsdfDiffuse", dict(Color=COLOR), None, "sun", 1),
+    "glossy GGX": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.5), "GGX", "sun", 1),
+    "glossy Beckmann": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.5), "BECKMANN", "sun", 1),
+    "glossy anisotropic": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.5, Anisotropy=0.5), "GGX", "world", 1),
+    "mirror": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 1),
+    "metal F82": ("ShaderNodeBsdfMetallic", dict(Roughness=0.3), "GGX", "world", 1.026),
+    "refraction": ("ShaderNodeBsdfRefraction", dict(Color=(0.8, 0.8, 0.8), Roughness=0.0), "GGX", "world", 0.895),
+    "rough diffuse": ("ShaderNodeBsdfDiffuse", dict(Color=COLOR, Roughness=0.5), None, "sun", 0.91),
+    "principled coat": (PRINCIPLED, dict(Base_Color=COLOR, Coat_Weight=1.0), "GGX", "world", 0.98),
+    "glass": ("ShaderNodeBsdfGlass", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 1),
+    "rough glass": ("ShaderNodeBsdfGlass", dict(Color=COLOR, Roughness=0.4), "GGX", "world", 1),
+    "transparent": ("ShaderNodeBsdfTransparent", dict(Color=COLOR), None, "world", 1),
+    "grey transparent": ("ShaderNodeBsdfTransparent", dict(Color=(0.5, 0.5, 0.5)), None, "world", 1),
+    "translucent": ("ShaderNodeBsdfTranslucent", dict(Color=COLOR), None, "back", 1),
+    "emission": ("ShaderNodeEmission", dict(Color=COLOR, Strength=2.0), None, None, 1),
+    "principled": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "GGX", "world", 1),
+    "principled metal": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.3, Metallic=1.0), "GGX", "sun", 1),
+    "principled metal, multiscatter": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Metallic=1.0), "MULTI_GGX", "world", 1),
+    "principled, multiscatter": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "MULTI_GGX", "world", 0.98),
+    "principled glass": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.0, Transmission_Weight=1.0), "GGX", "world", 1),
+    "principled alpha": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Alpha=0.5), "GGX", "world", 1),
+    "principled emission": (PRINCIPLED, dict(Emission_Color=COLOR, Emission_Strength=2.0), "GGX", None, 1),
+}
+
+
+def lit(studio, light):
+    studio.cam.matrix_world = looking((0, -3, 1.5), (0, 0, 1))
+    if light == "world":
+        studio.world()
+    elif light is not None:
+        studio.light("SUN", energy=3, angle=0, at={"sun": (1, -1, 3), "back": (0, 3, 1.5)}[light])
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_nodes_reflect_what_they_do_in_cycles(studio, name):
+    kind, inputs, distribution, light, expected = NODES[name]
+    material, _, node = studio.material(kind, **inputs)
+    if distribution:
+        node.distribution = distribution
+    studio.sphere(material)
+    lit(studio, light)
+    assert studio.ratio() == pytest.approx(expected, abs=0.02)
+
+
+def two_shaders(studio, mixer, second, factor=0.3):
+    """A plane whose material mixes or adds a diffuse node and another one; returns the other node."""
+    material, tree, node = studio.material(mixer)
+    first, other = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new(second)
+    first.inputs["Color"].default_value = (0.6, 0.3, 0.1, 1)
+    shaders = [s for s in node.inputs if s.type == "SHADER"]
+    tree.links.new(first.outputs[0], shaders[0])
+    tree.links.new(other.outputs[0], shaders[1])
+    if mixer == "ShaderNodeMixShader":
+        node.inputs[0].default_value = factor
+    studio.sphere(material)
+    lit(studio, "world")
+    return other
+
+
+@pytest.mark.parametrize("mixer", ["ShaderNodeMixShader", "ShaderNodeAddShader"])
+@pytest.mark.parametrize("second", ["ShaderNodeEmission", "ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfTranslucent"])
+def test_mixtures_and_sums(studio, mixer, second):
+    other = two_shaders(studio, mixer, second)
+    if hasattr(other, "distribution"):
+        other.distribution = "GGX"
+    other.inputs["Color"].default_value = (0.2, 0.2, 0.4, 1)
+    assert studio.ratio() == pytest.approx(1, abs=0.02)
+
+
+def test_mixtures_with_transparency_let_light_pass(studio):
+    two_shaders(studio, "ShaderNodeMixShader", "ShaderNodeBsdfTransparent")
+    studio.plane(material=studio.material("ShaderNodeBsdfDiffuse", "Ground")[0])
+    assert studio.ratio() == pytest.approx(1, abs=0.02)
+
+
+def test_nodes_in_groups_and_behind_reroutes(studio):
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    inside = group.nodes.new("NodeGroupInput"), group.nodes.new("ShaderNodeBsdfDiffuse"), group.nodes.new("NodeGroupOutput")
+    group.links.new(inside[0].outputs["Tint"], inside[1].inputs["Color"])
+    group.links.new(inside[1].outputs[0], inside[2].inputs["Shader"])
+    material, tree, node = studio.material("ShaderNodeGroup")
+    node.node_tree = group
+    reroute = tree.nodes.new("NodeReroute")
+    tree.links.new(node.outputs["Shader"], reroute.inputs[0])
+    tree.links.new(reroute.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    node.inputs["Tint"].default_value = (0.1, 0.6, 0.2, 1)
+    studio.sphere(material)
+    lit(studio, "world")
+    ours = studio.render().mean(axis=(0, 1))
+    assert ours == pytest.approx(studio.render("CYCLES").mean(axis=(0, 1)), rel=0.02)
+
+
+def test_names_that_differ_only_in_special_characters(studio):
+    lit(studio, "world")
+    for name, x, color in (("A.B", -0.6, (0.9, 0, 0)), ("A B", 0.6, (0, 0, 0.9))):
+        studio.sphere(studio.material("ShaderNodeBsdfDiffuse", name, Color=color)[0], at=(x, 0, 1), radius=0.5)
+    image = studio.render()
+    left, right = image[20:28, 20:26].mean(axis=(0, 1)), image[20:28, 38:44].mean(axis=(0, 1))
+    assert left[0] > 5 * left[2] and right[2] > 5 * right[0]
+
+
+def test_unknown_values_are_baked_with_a_warning(studio, capfd):
+    material, tree, node = studio.material("ShaderNodeBsdfDiffuse", "Stone", Color=(0.5, 0.5, 0.5))
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs["Color"], node.inputs["Color"])
+    studio.sphere(material)
+    lit(studio, "world")
+    with_noise = studio.render().mean()
+    said = "".join(capfd.readouterr())
+    assert 'material "Stone": node "Noise Texture" (ShaderNodeTexNoise): not supported; Color is (0.5, 0.5, 0.5)' in said
+    tree.nodes.remove(noise)
+    assert studio.render().mean() == with_noise
+
+
+def test_unknown_shaders_are_refused_by_name(studio):
+    studio.sphere(studio.material("ShaderNodeBsdfToon", "Cartoon")[0])
+    lit(studio, "world")
+    with pytest.raises(RuntimeError, match=r'material "Cartoon": node "Toon BSDF" \(ShaderNodeBsdfToon\) is not supported'):
+        studio.render()
