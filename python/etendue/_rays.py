@@ -113,6 +113,7 @@ def _rays(origins: ArrayLike, directions: ArrayLike, max_distance: ArrayLike) ->
         raise ValueError(
             f"origins, directions and max_distance do not fit together: their shapes are {o.shape}, {d.shape} and {t.shape}"
         ) from None
+    t = np.where(t > np.finfo(np.float32).max, np.inf, t)
     return lead, _rows(lead, o), _rows(lead, d), _column(lead, t)
 
 
@@ -127,7 +128,7 @@ def intersect(scene: Scene, origins: ArrayLike, directions: ArrayLike, max_dista
     numbers = [np.full(n, -1, dtype=np.int32) for _ in range(2)]
     hits = RayHits(t, nan(3), nan(3), nan(3), nan(2), *numbers, nan())
     _etendue.intersect_rays(scene, o, d, tmax, *(getattr(hits, field.name) for field in fields(hits)))
-    return RayHits(*(a.reshape(*lead, *a.shape[1:]) for a in (getattr(hits, field.name) for field in fields(hits))))
+    return RayHits(*(a.reshape((*lead, *a.shape[1:])) for a in (getattr(hits, field.name) for field in fields(hits))))
 
 
 def occluded(scene: Scene, origins: ArrayLike, directions: ArrayLike, max_distance: ArrayLike) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from . import _etendue
 from ._etendue import Description, Scene
 from ._html import auto_exposure, frame_of, image_html, table_html
 from ._integrator import Integrator
-from ._method import Method
+from ._method import Method, text_of
 from ._plots import axes_or_new
 from ._progress import harmless
 from ._scenes import SceneLike, built
@@ -23,8 +23,9 @@ from ._scenes import SceneLike, built
 Image = NDArray[np.float32]
 
 
-def _methods(methods: Method | Sequence[Method]) -> list[Method]:
-    return [methods] if isinstance(methods, (str, dict, Integrator)) else list(methods)
+def _methods(methods: Method | Sequence[Method]) -> list[str | Integrator]:
+    several = [methods] if isinstance(methods, (str, dict, Integrator)) else methods
+    return [text_of(method) if isinstance(method, dict) else method for method in several]
 
 
 def _status(progress: bool | None) -> tuple[Callable[[str], None] | None, Callable[[], None]]:

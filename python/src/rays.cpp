@@ -1,7 +1,5 @@
 // Rays by the array: their first hits, and whether they hit anything.
 
-#include <algorithm>
-
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>

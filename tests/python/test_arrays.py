@@ -83,7 +83,7 @@ def test_slices_and_other_orders_are_read_as_they_look() -> None:
         ({"vertices": "many"}, "dict: thing/vertices: expected"),
         ({"faces": FACES.astype(float)}, "dict: thing/faces: expected an array of shape (N, 3) of integers, found one of shape (2, 3) of "
                                          "float64"),
-        ({"faces": FACES + 2}, "5"),
+        ({"faces": FACES + 2}, "triangle 0 refers to vertex 4, but there are only 4"),
         ({"faces": FACES - 1}, "dict: thing/faces: -1 is no number of a vertex"),
         ({"normals": VERTICES[:3]}, "there are 3 normals, but 4 positions"),
         ({"uvs": VERTICES}, "dict: thing/uvs: expected an array of shape (N, 2)"),

@@ -56,6 +56,6 @@ def test_what_is_no_integrator(cornell: et.Scene) -> None:
     for wrong in ({}, {"max_depth": 3}, {"type": 3}):
         with pytest.raises(ValueError, match='an integrator as a dict needs a "type"'):
             et.render(cornell, wrong)
-    for other in (3, None, ["path"]):
+    for other in (3, ["path"]):
         with pytest.raises(TypeError, match="an integrator is a text such as"):
             et.render(cornell, other)  # type: ignore[arg-type]
