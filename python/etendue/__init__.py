@@ -25,7 +25,10 @@ from . import core
 from ._etendue import Description, Scene, SceneError, __version__
 from ._images import Diff, diff, read_image, tonemap, write_image
 from ._integrator import Integrator
+from ._job import Job, start
 from ._memory import limit_memory
+from ._method import integrator
+from ._rays import RayHits
 from ._render import FilmView, Progress, RenderError, Result, merge, render, resume
 from ._reports import CompareReport, VerifyReport, compare, verify
 from ._scenes import (load, load_dict, load_string, look_at, plugins, rotate, scale, translate)
@@ -34,8 +37,8 @@ from ._show import show
 SceneError.__module__ = "etendue"
 
 __all__ = [
-    "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Progress", "RenderError", "Result", "Scene",
-    "SceneError", "VerifyReport", "compare", "core", "diff", "limit_memory", "load", "load_dict", "load_string", "look_at",
-    "merge", "plugins", "read_image", "render", "resume", "rotate", "scale", "show", "tonemap", "translate", "verify",
-    "write_image",
+    "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Job", "Progress", "RayHits", "RenderError", "Result",
+    "Scene", "SceneError", "VerifyReport", "compare", "core", "diff", "integrator", "limit_memory", "load", "load_dict",
+    "load_string", "look_at", "merge", "plugins", "read_image", "render", "resume", "rotate", "scale", "show", "start",
+    "tonemap", "translate", "verify", "write_image",
 ]

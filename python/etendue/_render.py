@@ -15,7 +15,10 @@ from . import _etendue
 from ._etendue import Scene
 from ._html import image_html, png_of
 from ._integrator import Integrator
+from ._method import Method
+from ._plots import axes_or_new
 from ._progress import harmless
+from ._scenes import SceneLike, built
 
 Image = NDArray[np.float32]
 
@@ -69,7 +72,7 @@ class Progress:
 
     def save(self, file: str | PathLike[str]) -> None:
         """Writes the state of the rendering so far, an .etd file, from which resume() goes on."""
-        _check_checkpoint_name(file)
+        check_checkpoint_name(file)
         self._rendering.save_checkpoint(fspath(file))
 
 
@@ -99,8 +102,8 @@ class Result:
         self._aov_names = tuple(aovs)
         self._cache: dict[str, Any] = {}
         self.stopped_by = stopped_by
-        """Why the rendering ended: "samples", "time", "error", "interrupted" (Ctrl-C), "callback" (it returned False); of a
-        RenderError: "failure"; of merge(): "merged"."""
+        """Why the rendering ended: "samples", "time", "error", "interrupted" (Ctrl-C), "callback" (it returned False),
+        "stopped" (Job.stop); of a RenderError: "failure"; of merge(): "merged"."""
 
     def _cached(self, name: str, make: Callable[[], Any]) -> Any:
         if name not in self._cache:
@@ -122,6 +125,15 @@ class Result:
         """Radiance, linear RGB, shape (H, W, 3)."""
         image: Image = self._cached("image", self._rendering.image)
         return image
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """The image, for np.asarray(result) and plt.imshow(result)."""
+        image = self.image
+        if dtype is not None and np.dtype(dtype) != image.dtype:
+            if copy is False:
+                raise ValueError(f"the image is float32: as {np.dtype(dtype)} it has to be copied")
+            return image.astype(dtype)
+        return image.copy() if copy else image
 
     @property
     def variance(self) -> Image:
@@ -195,6 +207,26 @@ class Result:
         """95 % confidence interval of Result.error, dimensionless."""
         error = self._rendering.error()
         return None if error is None else (error[1], error[2])
+
+    def plot_convergence(self, ax: Any = None) -> Any:
+        """Plots the relative error (Result.error) over the time, beside the line of an error in proportion to the inverse of
+        the root of the time. Returns the Axes of matplotlib, which can be given as ax.
+
+            et.render(scene, "bdpt", spp=256).plot_convergence()
+
+        Raises RuntimeError for results of merge() and unpickled ones, which do not know their errors after fewer passes, and
+        ImportError without matplotlib.
+        """
+        errors = self._own("errors of fewer passes").errors()
+        if not errors:
+            raise RuntimeError(f"the error is not known after {self.passes} spp: render more")
+        ax = axes_or_new(ax)
+        seconds, error = np.array([e[1:] for e in errors]).T
+        ax.loglog(seconds, error, marker=".", label=self._rendering.integrator)
+        ax.loglog(seconds, error[-1] * np.sqrt(seconds[-1] / seconds), color="0.6", linestyle="--", label="1 / √time")
+        ax.set(xlabel="time [s]", ylabel="relative error")
+        ax.legend()
+        return ax
 
     @property
     def estimator(self) -> str:
@@ -305,8 +337,8 @@ class _Bar:
 
 
 def render(
-    scene: Scene,
-    integrator: str | Integrator = "",
+    scene: SceneLike,
+    integrator: Method = "",
     *,
     spp: int | None = None,
     time: float | None = None,
@@ -318,14 +350,19 @@ def render(
     threads: int = 0,
     aovs: Sequence[str] = (),
     techniques: bool | int = False,
+    sensor: int | str | None = None,
     callback: Callable[[Progress], object] | None = None,
     progress: bool | None = None,
     live: bool = False,
 ) -> Result:
     """Renders a scene. With the same seed, the image is bit-identical to that of the program.
 
-    integrator: a name with parameters, such as "upg+bdpt:max_depth=12"; "" for the integrator of the scene; or an
-        Integrator.
+        result = et.render("scenes/cornell.xml", "bdpt", spp=64)
+        result = et.render(scene, {"type": "path", "max_depth": 8}, time=10, aovs=["albedo"])
+
+    scene: a Scene, or a Description or file, which is built first.
+    integrator: a name with parameters, such as "upg+bdpt:max_depth=12"; the same as a dict or by integrator(); "" for the
+        integrator of the scene; or an Integrator.
     spp, time, error: limits: samples per pixel, seconds, relative error of the image (see Result.error). The first limit
         that is reached ends the rendering. Without a limit, the samples per pixel of the scene, or 64.
     seed: seed of all random numbers.
@@ -336,6 +373,7 @@ def render(
     threads: number of threads; 0 for one per core.
     aovs: auxiliary images to render: albedo, normal, depth, position, uv, variance.
     techniques: makes an image of each technique, for paths of at most this many edges; True: 6.
+    sensor: number (from 0) or name of the sensor, of files and Descriptions; None: the first. A Scene has one already.
     callback: called between passes with a Progress. If it returns False, the rendering ends. Exceptions that it raises
         are passed to the caller.
     progress: shows a progress bar of tqdm; None: in notebooks and on terminals, if tqdm is installed.
@@ -350,6 +388,28 @@ def render(
     passes before it. If it is the first pass, raises what the pass raised: a RuntimeError, a MemoryError, or the exception
     of an Integrator. Exceptions of signal handlers are passed to the caller.
     """
+    rendering = new_rendering(
+        scene, integrator, spp, time, error, seed, passes, sampler, filter_mode, threads, aovs, techniques, sensor
+    )
+    return run(rendering, aovs, callback, progress, live)
+
+
+def new_rendering(
+    scene: SceneLike,
+    integrator: Method,
+    spp: int | None,
+    time: float | None,
+    error: float | None,
+    seed: int,
+    passes: tuple[int, int] | None,
+    sampler: str,
+    filter_mode: str,
+    threads: int,
+    aovs: Sequence[str],
+    techniques: bool | int,
+    sensor: int | str | None,
+) -> _etendue.Rendering:
+    """A rendering before its first pass, with the arguments of render()."""
     _etendue.check_aovs(list(aovs))
     depth = 6 if techniques is True else int(techniques)
     first = 0
@@ -358,13 +418,14 @@ def render(
         if spp is not None or not 0 <= first < end:
             raise ValueError("passes must be two numbers with 0 <= first < second, without spp")
         spp = end - first
-    rendering = _etendue.Rendering(scene, integrator, spp, time, error, seed, sampler, filter_mode, threads, depth, first)
-    return _run(rendering, aovs, callback, progress, live)
+    return _etendue.Rendering(
+        built(scene, threads, sensor), integrator, spp, time, error, seed, sampler, filter_mode, threads, depth, first
+    )
 
 
 def resume(
     file: str | PathLike[str],
-    scene: Scene,
+    scene: SceneLike,
     integrator: Integrator | None = None,
     *,
     spp: int | None = None,
@@ -379,7 +440,7 @@ def resume(
     """Goes on from a checkpoint (Result.save, Progress.save) with the same bits as if the rendering had not been interrupted.
 
     file: an .etd file. It must be your own: what it has learned is used as it is.
-    scene: the same scene.
+    scene: the same scene, as for render(). If it has several sensors, a Scene with the same sensor.
     integrator: if it was one in Python, an object that is equal to what it was at the start.
     spp, time, error: limits, which count from the first pass. The others are those of render().
 
@@ -391,11 +452,11 @@ def resume(
     if integrator is None and " in Python, " in of["condition"]:
         raise ValueError(f"{fspath(file)}: expected integrator, an object like the {of['integrator']} that it was rendered by")
     rendering = _etendue.Rendering(
-        scene, of["integrator"] if integrator is None else integrator, spp, time, error, of["seed"], of["sampler"], of["filter_mode"], threads,
-        of["technique_depth"], of["first_pass"],
+        built(scene, threads), of["integrator"] if integrator is None else integrator, spp, time, error, of["seed"],
+        of["sampler"], of["filter_mode"], threads, of["technique_depth"], of["first_pass"],
     )
     rendering.resume(fspath(file))
-    return _run(rendering, aovs, callback, progress, live)
+    return run(rendering, aovs, callback, progress, live)
 
 
 def merge(parts: Iterable[str | PathLike[str] | bytes | Result]) -> Result:
@@ -413,22 +474,30 @@ def merge(parts: Iterable[str | PathLike[str] | bytes | Result]) -> Result:
     return Result(merged, "merged", ())
 
 
+def progress_of(rendering: _etendue.Rendering) -> Progress:
+    """The state after the last finished pass."""
+    now = rendering.now() or (0, 0.0, None, 0.0, None)
+    return Progress(*now, film=FilmView(rendering), _rendering=rendering)
+
+
 def _unpickled(partial: bytes, stopped_by: str) -> Result:
     return Result(_etendue.merge([partial]), stopped_by, ())
 
 
-def _check_checkpoint_name(file: str | PathLike[str]) -> None:
+def check_checkpoint_name(file: str | PathLike[str]) -> None:
     if not fspath(file).endswith(".etd"):
         raise ValueError(f"the name of a checkpoint must end with .etd, but is {fspath(file)!r}")
 
 
-def _run(
+def run(
     rendering: _etendue.Rendering,
     aovs: Sequence[str],
     callback: Callable[[Progress], object] | None,
     progress: bool | None,
     live: bool,
+    seconds_between: float = 0.0,
 ) -> Result:
+    """Renders all passes. The callback is called between them, if the last call was at least seconds_between before."""
     update_view: Callable[..., None] | None = None
     if live:
         from ._show import LiveView
@@ -436,16 +505,12 @@ def _run(
         update_view = harmless(LiveView().update)
 
     def between_passes() -> object:
-        now = rendering.now()
-        assert now is not None
         if update_view is not None:
             update_view(rendering.image())
-        if callback is None:
-            return None
-        return callback(Progress(*now, film=FilmView(rendering), _rendering=rendering))
+        return None if callback is None else callback(progress_of(rendering))
 
     wants_calls = callback is not None or live
-    interval = 0.0 if callback is not None else 0.5
+    interval = seconds_between if callback is not None else 0.5
     bar = _Bar(rendering, progress)
     try:
         stopped_by = rendering.run(harmless(bar.update), between_passes if wants_calls else None, interval)

@@ -15,22 +15,17 @@ from . import _etendue
 from ._etendue import Description, Scene
 from ._html import auto_exposure, frame_of, image_html, table_html
 from ._integrator import Integrator
+from ._method import Method, text_of
+from ._plots import axes_or_new
 from ._progress import harmless
-from ._scenes import load
+from ._scenes import SceneLike, built
 
-SceneLike = Scene | Description | str | PathLike[str]
-Method = str | Integrator
 Image = NDArray[np.float32]
 
 
-def _scene(scene: SceneLike, threads: int) -> Scene:
-    if isinstance(scene, Scene):
-        return scene
-    return (scene if isinstance(scene, Description) else load(scene)).build(threads=threads)
-
-
-def _methods(methods: Method | Sequence[Method]) -> list[Method]:
-    return [methods] if isinstance(methods, (str, Integrator)) else list(methods)
+def _methods(methods: Method | Sequence[Method]) -> list[str | Integrator]:
+    several = [methods] if isinstance(methods, (str, dict, Integrator)) else methods
+    return [text_of(method) if isinstance(method, dict) else method for method in several]
 
 
 def _status(progress: bool | None) -> tuple[Callable[[str], None] | None, Callable[[], None]]:
@@ -96,6 +91,35 @@ class CompareReport:
             for scene in self.data for method in scene["methods"] for run in method["runs"]
             for c in run["checkpoints"]
         ])
+
+    def plot(self, ax: Any = None, *, scene: int = 0, x: str = "seconds", y: str = "rel_mse") -> Any:
+        """Plots the errors of the methods on one scene, averaged over the runs, over the time or the samples. Returns the
+        Axes of matplotlib, which can be given as ax.
+
+        x: "seconds", or "spp", the samples per pixel. y: "rel_mse" (dimensionless) or "rmse" (units of radiance).
+
+            figure, (left, right) = plt.subplots(1, 2)
+            report.plot(left)
+            report.plot(right, x="spp")
+
+        Raises ImportError without matplotlib.
+        """
+        labels = {"seconds": "time [s]", "spp": "samples per pixel", "rel_mse": "relMSE", "rmse": "RMSE"}
+        for name, value, known in (("x", x, ("seconds", "spp")), ("y", y, ("rel_mse", "rmse"))):
+            if value not in known:
+                raise ValueError(f'{name} must be "{known[0]}" or "{known[1]}", but is {value!r}')
+        if not 0 <= scene < len(self.data):
+            raise IndexError(f"there is no scene {scene}: the report has {len(self.data)}")
+        ax = axes_or_new(ax)
+        for method in self.data[scene]["methods"]:
+            steps = list(zip(*(run["checkpoints"] for run in method["runs"])))
+            ax.loglog(
+                [np.mean([c[x] for c in step]) for step in steps], [np.mean([c["errors"][y] for c in step]) for step in steps],
+                marker=".", label=method["name"],
+            )
+        ax.set(xlabel=labels[x], ylabel=labels[y], title=Path(self.data[scene]["file"]).name)
+        ax.legend()
+        return ax
 
     def image(self, method: int = 0, scene: int = 0) -> Image:
         """Image of a method's first run: radiance, linear RGB, shape (H, W, 3)."""
@@ -224,7 +248,11 @@ def compare(
     """Compares methods at equal time (seconds) or equal samples per pixel (spp), like `etendue compare`. One of time and spp
     must be given.
 
-    scenes: one or several files, Descriptions or Scenes. methods: names with parameters, or Integrators.
+        report = et.compare("scenes/cornell.xml", ["path", "bdpt"], time=5)
+        report.frame()
+        report.plot()
+
+    scenes: one or several files, Descriptions or Scenes. methods: names with parameters, dicts, or Integrators.
     runs, seed: number of independent runs, which have consecutive seeds, and the first seed.
     sampler: "sobol" or "independent". threads: number of threads; 0 for one per core.
     paths: "all", or "inner" for those that join two sub-paths inside the scene (s >= 1 and t >= 2).
@@ -242,7 +270,7 @@ def compare(
     listener, end = _status(progress)
     try:
         comparisons, text = _etendue.compare(
-            [_scene(s, threads) for s in wanted], _methods(methods), time, spp, runs, seed, sampler, threads, techniques,
+            [built(s, threads) for s in wanted], _methods(methods), time, spp, runs, seed, sampler, threads, techniques,
             paths, lengths[0], lengths[1], reference_method, reference_time, reference_spp, [fspath(i) for i in images],
             fspath(references), listener,
         )
@@ -277,7 +305,9 @@ def verify(
     """Tests whether methods are unbiased, like `etendue verify`: compares means over independent runs with references by
     Welch's t-test.
 
-    methods: names with parameters, or Integrators. lengths determines max_depth, which must not be given.
+        et.verify("scenes/cornell.xml", ["bdpt", {"type": "upg+bdpt", "radius": 0.02}], spp=16).verdicts
+
+    methods: names with parameters, dicts, or Integrators. lengths determines max_depth, which must not be given.
     time: seconds for all runs of one method (30 if spp is not given); with detect, for the whole verification.
     spp: samples per pixel of one run.
     detect: renders until a relative error of this size, such as 0.005, would be found with 90 % probability: an error of
@@ -298,7 +328,7 @@ def verify(
     listener, end = _status(progress)
     try:
         text = _etendue.verify(
-            _scene(scene, threads), _methods(methods), spp, time, detect, lengths[0], lengths[1], runs, alpha,
+            built(scene, threads), _methods(methods), spp, time, detect, lengths[0], lengths[1], runs, alpha,
             list(against), tiles, seed, sampler, threads, listener,
         )
     finally:

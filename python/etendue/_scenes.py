@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _etendue
-from ._etendue import Description
+from ._etendue import Description, Scene
 
 Vector = tuple[float, float, float]
+SceneLike = Scene | Description | str | PathLike[str]
+"""A scene, or what one can be built from: a description or a file."""
 
 
 def load(
@@ -56,11 +58,38 @@ def load_dict(d: dict[str, Any], *, folder: str | PathLike[str] = ".") -> Descri
     are numbers, texts, sequences of 3 numbers, 4x4 arrays, {"type": "rgb", "value": ...} and {"type": "spectrum", ...}.
     Keys are names of parameters and objects. An object whose key is a category ("bsdf", "shape_2") has no name.
 
+        et.load_dict({
+            "type": "scene",
+            "sensor": {"type": "perspective", "to_world": et.look_at((0, 0, 4), (0, 0, 0))},
+            "light": {"type": "constant"},
+            "thing": {
+                "type": "mesh", "vertices": vertices, "faces": faces, "uvs": uvs,
+                "bsdf": {"type": "diffuse", "reflectance": {"type": "bitmap", "data": pixels}},
+            },
+        })
+
+    Arrays of a mesh have a row for each vertex: vertices (N, 3), normals (N, 3), uvs (N, 2), colors (N, 3); and faces
+    (M, 3), numbers of vertices from 0. Pixels have the shape (H, W) or (H, W, 3): those of uint8 are sRGB codes (linear with
+    "raw": True), floats are linear. The names of Mitsuba ("vertex_positions", ...) are known, too.
+
     folder: folder in which the files of the scene are searched.
 
     Raises SceneError, with the keys that lead to the place, if the dicts are not valid.
     """
     return _etendue.load_dict(d, fspath(folder))
+
+
+def built(scene: SceneLike, threads: int = 0, sensor: int | str | None = None) -> Scene:
+    """The scene itself, or that of a description or file."""
+    if isinstance(scene, Scene):
+        if sensor is not None:
+            raise ValueError("sensor is for files and Descriptions: a Scene has its sensor from Description.build(sensor=...)")
+        return scene
+    if isinstance(scene, (str, PathLike)):
+        scene = load(scene)
+    if not isinstance(scene, Description):
+        raise TypeError(f"a scene is a Scene, a Description or the name of a file, but found {type(scene).__name__}")
+    return scene.build(threads=threads, sensor=sensor)
 
 
 def _matrix(rows: list[Any]) -> NDArray[np.float64]:

@@ -66,7 +66,7 @@ using ImageArgument = nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_conti
 /// As Technique.strategy names it.
 const char* name_of(Strategy strategy);
 
-/// An integrator by name and parameters, or an object that etendue.Integrator is the base of.
+/// An integrator by name and parameters, as a text or a dict, or an object that etendue.Integrator is the base of.
 IntegratorSpec to_spec(const Scene& scene, nb::handle integrator);
 
 /// Runs tasks on a thread of their own, without the GIL, while the calling thread handles signals and callbacks.
@@ -118,6 +118,7 @@ void bind_description(nb::module_& m);
 void bind_render(nb::module_& m);
 void bind_reports(nb::module_& m);
 void bind_images(nb::module_& m);
+void bind_rays(nb::module_& m);
 void bind_techniques(nb::module_& m);
 void bind_sub_paths(nb::module_& m);
 void bind_integrators(nb::module_& m);

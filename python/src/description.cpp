@@ -12,6 +12,7 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 #include <nlohmann/json.hpp>
 
@@ -139,22 +140,30 @@ private:
             declare(key, index, path);
         add_to(parent, parent >= 0 && is_named ? key : "", index, path);
         const bool inside = in_emitter || category == "emitter";
+        nb::dict parts;
         for (const auto& [inner_key, inner] : d) {
             const std::string name = key_of(inner_key, path);
             if (name == "type" || name == "id") continue;
-            read_entry(index, name, inner, path + "/" + name, inside, depth + 1);
+            if (is_embedded_part(scene_.objects[size_t(index)], name))
+                parts[inner_key] = inner;
+            else
+                read_entry(index, name, inner, path + "/" + name, inside, depth + 1);
         }
+        if (parts.size() == 0) return;
+        const SceneObject& object = scene_.objects[size_t(index)];
+        for (const char* other : {embedded_parameter(object), "filename"})
+            if (object.find(other))
+                throw SceneError(at(path),
+                                 fmt::format("give {} or {}, not both",
+                                             quote(text((*parts.begin()).first)), quote(other)));
+        embed(scene_, index, parts, at(path));
     }
     void read_entry(int index, const std::string& name, nb::handle value, const std::string& path,
                     bool in_emitter, int depth) {
         SceneObject& object = scene_.objects[size_t(index)];
         const char* const embedded = embedded_parameter(object);
-        if (embedded && name == embedded && nb::isinstance<nb::dict>(value)) {
-            const int64_t number =
-                add_embedded(scene_, object, nb::borrow<nb::dict>(value), at(path));
-            object.params.push_back({name, number, at(path)});
-            return;
-        }
+        if (embedded && name == embedded && nb::isinstance<nb::dict>(value))
+            return embed(scene_, index, nb::borrow<nb::dict>(value), at(path));
         if (!is_value(value)) return read_child(index, name, value, path, in_emitter, depth);
         ValueContext context{object.category, name, {}, in_emitter, at(path)};
         if (const PluginInfo* info = find_plugin(object.category, object.type))
@@ -329,14 +338,24 @@ nb::object get(const SceneDescription& scene, const std::string& path) {
     if (at.parameter.empty())
         return at.object < 0 ? DictWriter(scene).scene()
                              : DictWriter(scene).object(at.object, at.parent < 0);
-    if (at.object >= 0)
-        if (const Param* p = scene.objects[size_t(at.object)].find(at.parameter)) {
-            const SceneObject& o = scene.objects[size_t(at.object)];
+    if (at.object >= 0) {
+        const SceneObject& o = scene.objects[size_t(at.object)];
+        if (const Param* p = o.find(at.parameter)) {
             const char* const embedded = embedded_parameter(o);
             return embedded && p->name == embedded ? embedded_to_python(scene, o, *p)
                                                    : to_python(p->value);
         }
+        if (nb::object part = embedded_part(scene, o, at.parameter); !part.is_none()) return part;
+    }
     fail_unknown(scene, path, at);
+}
+
+bool contains(const SceneDescription& scene, const std::string& path) {
+    const Place at = find(scene, path);
+    if (at.object < 0) return false;
+    const SceneObject& o = scene.objects[size_t(at.object)];
+    return at.parameter.empty() || o.find(at.parameter) ||
+           !embedded_part(scene, o, at.parameter).is_none();
 }
 
 void erase(SceneDescription& scene, const std::string& path) {
@@ -371,15 +390,13 @@ void check_name(const SceneDescription& scene, const std::string& path, const Pl
 void set_in(SceneDescription& scene, const std::string& path, nb::handle value) {
     const Place at = find(scene, path);
     const SourceLocation where{path, 0};
-    if (at.object >= 0 && !at.parameter.empty() && nb::isinstance<nb::dict>(value)) {
-        SceneObject& object = scene.objects[size_t(at.object)];
+    if (at.object >= 0 && !at.parameter.empty()) {
+        const SceneObject& object = scene.objects[size_t(at.object)];
         if (const char* embedded = embedded_parameter(object);
-            embedded && at.parameter == embedded) {
-            const int64_t number = add_embedded(scene, object, nb::borrow<nb::dict>(value), where);
-            std::erase_if(object.params, [&](const Param& p) { return p.name == at.parameter; });
-            object.params.push_back({at.parameter, number, where});
-            return;
-        }
+            embedded && at.parameter == embedded && nb::isinstance<nb::dict>(value))
+            return embed(scene, at.object, nb::borrow<nb::dict>(value), where);
+        if (is_embedded_part(object, at.parameter))
+            return embed(scene, at.object, with_part(scene, object, at.parameter, value), where);
     }
     if (!is_value(value)) {
         // An object: in the place of the old one, or added.
@@ -420,6 +437,9 @@ void set_in(SceneDescription& scene, const std::string& path, nb::handle value) 
     Param changed{target.parameter, to_value(value, context), where};
     if (at.parameter.empty())
         object.children.erase(object.children.begin() + std::ptrdiff_t(at.slot));
+    // An image is read from a file or from memory.
+    if (const char* embedded = embedded_parameter(object); embedded && changed.name == "filename")
+        std::erase_if(object.params, [&](const Param& p) { return p.name == embedded; });
     for (Param& p : object.params)
         if (p.name == changed.name) {
             p = std::move(changed);
@@ -465,11 +485,21 @@ std::vector<std::string> paths(const SceneDescription& scene) {
     return all;
 }
 
+/// A sensor as BuildOptions name it.
+struct SensorText {
+    std::string operator()(int number) const { return std::to_string(number); }
+    std::string operator()(const std::string& name) const {
+        if (name.empty()) throw nb::value_error("sensor must be a number or a name, but is empty");
+        return name;
+    }
+};
+
 ScenePtr build(const SceneDescription& description,
                const std::optional<std::pair<int, int>>& resolution,
                const std::optional<std::array<int, 4>>& crop, bool lenient, bool watertight,
-               int threads) {
+               int threads, const std::optional<std::variant<int, std::string>>& sensor) {
     BuildOptions options;
+    if (sensor) options.sensor = std::visit(SensorText{}, *sensor);
     options.threads = checked_threads(threads);
     options.lenient = lenient;
     options.accelerator.is_watertight = watertight;
@@ -525,6 +555,21 @@ nb::list matrix(const std::optional<Transform>& t) {
     return nb::cast<nb::list>(to_python(*t));
 }
 
+/// A view of a mapping, such as that of dict.items().
+nb::object view(const char* kind, nb::handle mapping) {
+    return nb::module_::import_("collections.abc").attr(kind)(mapping);
+}
+
+nb::str html(const char* function, nb::handle of) {
+    return nb::cast<nb::str>(nb::module_::import_("etendue._html").attr(function)(of));
+}
+
+nb::object rays(const char* query, nb::handle scene, nb::handle origins, nb::handle directions,
+                nb::handle max_distance) {
+    return nb::module_::import_("etendue._rays")
+        .attr(query)(scene, origins, directions, max_distance);
+}
+
 }  // namespace
 
 void bind_description(nb::module_& m) {
@@ -549,12 +594,32 @@ void bind_description(nb::module_& m) {
              "an unknown name or a value of the wrong type, and changes nothing then.")
         .def("__delitem__", &erase, "path"_a, "Removes a parameter or an object.")
         .def(
-            "__contains__",
-            [](const SceneDescription& d, const std::string& path) {
-                const std::vector<std::string> all = paths(d);
-                return std::find(all.begin(), all.end(), path) != all.end();
-            },
-            "path"_a, "Whether the description has a parameter or object of this path.")
+            "__iter__", [](const SceneDescription& d) { return nb::iter(nb::cast(paths(d))); },
+            nb::sig("def __iter__(self) -> collections.abc.Iterator[str]"),
+            "Iterates over paths().")
+        .def(
+            "__len__", [](const SceneDescription& d) { return paths(d).size(); },
+            "The number of paths().")
+        .def(
+            "keys", [](nb::handle self) { return view("KeysView", self); },
+            nb::sig("def keys(self) -> collections.abc.KeysView[str]"),
+            "The paths() as a view, like dict.keys().")
+        .def(
+            "values", [](nb::handle self) { return view("ValuesView", self); },
+            nb::sig("def values(self) -> collections.abc.ValuesView[object]"),
+            "What the paths() name, as a view, like dict.values().")
+        .def(
+            "items", [](nb::handle self) { return view("ItemsView", self); },
+            nb::sig("def items(self) -> collections.abc.ItemsView[str, object]"),
+            "The paths() with what they name, as a view, like dict.items().")
+        .def("_ipython_key_completions_", &paths)
+        .def("_repr_html_", [](nb::handle self) { return html("description_html", self); })
+        .def("__repr__",
+             [](const SceneDescription& d) {
+                 return fmt::format("<Description {}, {} objects>", d.file, d.objects.size());
+             })
+        .def("__contains__", &contains, "path"_a,
+             "Whether the description has a parameter or object of this path.")
         .def(
             "copy", [](const SceneDescription& d) { return d; },
             "A copy, a description to be edited on its own.")
@@ -576,15 +641,19 @@ void bind_description(nb::module_& m) {
         .def_prop_ro(
             "warnings", [](const SceneDescription& d) { return d.warnings; },
             "What was left out under lenient=True, one sentence each.")
-        .def("build", &build, "resolution"_a.none() = nb::none(), "crop"_a.none() = nb::none(),
-             "lenient"_a = false, "watertight"_a = false, "threads"_a = 0,
-             "Builds a Scene, which later edits do not change.\n\n"
-             "resolution: (width, height) of the image in pixels, instead of the scene's.\n"
-             "crop: (x, y, width, height) of the part to render, in pixels from the upper left "
-             "corner.\n"
-             "lenient: turns unknown plug-ins and parameters into warnings.\n"
-             "watertight: lets no ray pass between adjacent triangles; slower.\n"
-             "threads: number of threads; 0 for one per core.");
+        .def(
+            "build", &build, "resolution"_a.none() = nb::none(), "crop"_a.none() = nb::none(),
+            "lenient"_a = false, "watertight"_a = false, "threads"_a = 0,
+            "sensor"_a.none() = nb::none(),
+            "Builds a Scene, which later edits do not change.\n\n"
+            "resolution: (width, height) of the image in pixels, instead of the scene's.\n"
+            "crop: (x, y, width, height) of the part to render, in pixels from the upper left "
+            "corner.\n"
+            "lenient: turns unknown plug-ins and parameters into warnings.\n"
+            "watertight: lets no ray pass between adjacent triangles; slower.\n"
+            "threads: number of threads; 0 for one per core.\n"
+            "sensor: number (from 0) or name of the sensor; None: the first. See Scene.sensors.\n\n"
+            "    scene = description.build(resolution=(320, 240), sensor=1)");
 
     nb::class_<SceneHandle>(
         m, "Scene",
@@ -600,6 +669,20 @@ void bind_description(nb::module_& m) {
             "height", [](const SceneHandle& s) { return s.scene.film().crop_height; },
             "Height of the rendered part, in pixels.")
         .def_prop_ro(
+            "sensors", [](const SceneHandle& s) { return s.scene.sensor_names(); },
+            "Names of the sensors of the description: their ids, or their types.")
+        .def_prop_ro(
+            "sensor", [](const SceneHandle& s) { return s.scene.sensor_index(); },
+            "Number of the sensor that is rendered, an index into Scene.sensors.")
+        .def_prop_ro(
+            "shapes",
+            [](const SceneHandle& s) {
+                std::vector<std::string> names;
+                for (const SceneShape& shape : s.scene.shapes()) names.push_back(shape.name);
+                return names;
+            },
+            "Names of the shapes, their ids or their types, by the index that RayHits.shape has.")
+        .def_prop_ro(
             "warnings", [](const SceneHandle& s) { return warnings_of(s.scene); },
             "What may be wrong with the scene, one sentence each.")
         .def_prop_ro(
@@ -614,7 +697,50 @@ void bind_description(nb::module_& m) {
             "description", [](const SceneHandle& s) { return s.description; },
             "A copy of the description that the scene was built from.")
         .def("info", &info,
-             "Counts, memory in bytes and emitted power in watts, as `etendue info`.");
+             "Counts, memory in bytes and emitted power in watts, as `etendue info`.")
+        .def(
+            "ray_intersect",
+            [](nb::handle self, nb::handle origins, nb::handle directions,
+               nb::handle max_distance) {
+                return rays("intersect", self, origins, directions, max_distance);
+            },
+            "origins"_a, "directions"_a, "max_distance"_a = kInf,
+            nb::sig("def ray_intersect(self, origins: numpy.typing.ArrayLike, directions: "
+                    "numpy.typing.ArrayLike, max_distance: numpy.typing.ArrayLike = ...) -> "
+                    "etendue._rays.RayHits"),
+            "The first surfaces that rays hit, as RayHits.\n\n"
+            "    hits = scene.ray_intersect((0, 1, 5), directions)     # directions: shape (N, 3)\n"
+            "    nearest = hits.t.min()\n\n"
+            "origins: in scene units, shape (..., 3). directions: of any length except 0, of the "
+            "same "
+            "shape, or of one that NumPy broadcasts.\n"
+            "max_distance: longest distance in scene units, shape (...).\n\n"
+            "A ray that begins on a surface may hit it again because of rounding: "
+            "RayHits.origins() "
+            "moves its origin. Of surfaces that are partly transparent (bsdf \"mask\"), the ray "
+            "hits "
+            "the one that leaves at most half of the light. Other Python threads continue. Raises "
+            "ValueError for other shapes, and where a number is not finite.")
+        .def(
+            "occluded",
+            [](nb::handle self, nb::handle origins, nb::handle directions,
+               nb::handle max_distance) {
+                return rays("occluded", self, origins, directions, max_distance);
+            },
+            "origins"_a, "directions"_a, "max_distance"_a = kInf,
+            nb::sig("def occluded(self, origins: numpy.typing.ArrayLike, directions: "
+                    "numpy.typing.ArrayLike, max_distance: numpy.typing.ArrayLike = ...) -> "
+                    "numpy.typing.NDArray[numpy.bool_]"),
+            "Whether rays hit anything within max_distance, shape (...). The arguments are those "
+            "of "
+            "ray_intersect().")
+        .def("_repr_html_", [](nb::handle self) { return html("scene_html", self); })
+        .def("__repr__", [](const SceneHandle& s) {
+            const FilmGeometry& film = s.scene.film();
+            return fmt::format("<Scene {}, {} x {}, {} shapes, {} emitters>", s.scene.file(),
+                               film.crop_width, film.crop_height, s.scene.shapes().size(),
+                               s.scene.emitters().size());
+        });
 
     m.def(
         "load",

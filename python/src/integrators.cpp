@@ -187,11 +187,17 @@ IntegratorSpec python_spec(nb::handle integrator) {
 IntegratorSpec to_spec(const Scene& scene, nb::handle integrator) {
     if (nb::isinstance<nb::str>(integrator))
         return choose_integrator(scene, nb::cast<std::string>(integrator));
+    if (nb::isinstance<nb::dict>(integrator)) {
+        const auto text = nb::module_::import_("etendue._method").attr("text_of")(integrator);
+        return choose_integrator(scene, nb::cast<std::string>(text));
+    }
     if (nb::hasattr(integrator, "sample") && nb::hasattr(integrator, "counts") &&
         nb::hasattr(integrator, "traces_light_paths"))
         return python_spec(integrator);
-    throw nb::type_error("an integrator is a text such as \"bdpt:max_depth=8\", or an object of a "
-                         "class derived from etendue.Integrator");
+    throw nb::type_error(
+        "an integrator is a text such as \"bdpt:max_depth=8\", a dict such as "
+        "{\"type\": \"bdpt\", \"max_depth\": 8}, or an object of a class derived from "
+        "etendue.Integrator");
 }
 
 void bind_integrators(nb::module_& m) {
@@ -223,6 +229,9 @@ void bind_integrators(nb::module_& m) {
              "times factor.")
         .def("uniform", &Sample::uniform, "A random number in [0, 1).");
 
+    m.def(
+        "check_integrator",
+        [](const std::string& text) { make_integrator(IntegratorSpec::parse(text)); }, "text"_a);
     m.def(
         "counts",
         [](const ScenePtr& scene, nb::handle integrator) {

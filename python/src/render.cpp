@@ -116,6 +116,8 @@ public:
                 // Callbacks may stop the rendering by its error, and are told that of this pass.
                 const ErrorEstimate error = calls ? p.error() : recent.update(p);
                 if (error.valid) relative_error = error.relative_rms;
+                const std::scoped_lock lock(mutex_);
+                note(p.passes, p.seconds, error);
             } catch (const std::exception&) {
                 // The pass is made, though some of its figures may be missing.
             }
@@ -138,6 +140,7 @@ public:
         };
         try {
             background.run(render, [&] {
+                if (is_asked_to_end_) background.stop = background.drop = true;
                 if (!tick.is_none()) tick();
             });
         } catch (...) {
@@ -145,11 +148,15 @@ public:
             place_of_failure_ = background.task_failed ? renderer_.place_of_failure() : "";
             throw;
         }
-        stopped_by_ = asked_to_stop && !background.interrupted && reason == StopReason::Interrupted
-                          ? "callback"
-                          : to_string(reason);
+        stopped_by_ = to_string(reason);
+        if (reason == StopReason::Interrupted && !background.interrupted) {
+            if (asked_to_stop) stopped_by_ = "callback";
+            if (is_asked_to_end_) stopped_by_ = "stopped";
+        }
         return stopped_by_;
     }
+    /// Ends run(), which discards the current pass; or the next run(), if none runs. Any thread may call it.
+    void stop() { is_asked_to_end_ = true; }
 
     const SceneHandle& scene() const { return *scene_; }
     ScenePtr scene_pointer() const { return scene_; }
@@ -181,6 +188,12 @@ public:
     std::optional<Now> now() const {
         const std::scoped_lock lock(mutex_);
         return now_;
+    }
+
+    /// Passes, seconds and relative error, at numbers of passes of about equal ratio, and of the last one whose error is known.
+    std::vector<std::tuple<uint64_t, double, double>> errors() const {
+        const std::scoped_lock lock(mutex_);
+        return errors_;
     }
 
     nlohmann::json report() const {
@@ -222,6 +235,17 @@ private:
         return all;
     }
 
+    /// Keeps the error for errors(); with `mutex_`.
+    void note(uint64_t passes, double seconds, const ErrorEstimate& error) {
+        const size_t n = errors_.size();
+        if (!error.valid || (n > 0 && std::get<2>(errors_.back()) == error.relative_rms)) return;
+        constexpr double kRatio = 1.1;
+        if (n > 1 &&
+            double(std::get<0>(errors_[n - 1])) < kRatio * double(std::get<0>(errors_[n - 2])))
+            errors_.pop_back();
+        errors_.emplace_back(passes, seconds, error.relative_rms);
+    }
+
     ScenePtr scene_;
     RenderSettings settings_;
     std::string python_integrator_;  ///< What decides the samples of an integrator in Python.
@@ -229,7 +253,8 @@ private:
     Conditions conditions_;  ///< At the start: files may change later.
     mutable std::mutex mutex_;
     std::optional<Now> now_;
-    std::atomic<bool> is_running_{false};
+    std::vector<std::tuple<uint64_t, double, double>> errors_;
+    std::atomic<bool> is_running_{false}, is_asked_to_end_{false};
     std::atomic<std::thread::id> reader_{};  ///< The thread of a callback that runs.
     PassLog log_;
     std::string stopped_by_;
@@ -441,8 +466,10 @@ void bind_render(nb::module_& m) {
             "scene"_a, "integrator"_a, "spp"_a.none(), "time"_a.none(), "error"_a.none(), "seed"_a,
             "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a, "first_pass"_a)
         .def("run", &Rendering::run, "tick"_a.none(), "callback"_a.none(), "interval"_a)
+        .def("stop", &Rendering::stop)
         .def("now", &Rendering::now)
         .def_prop_ro("place_of_failure", &Rendering::place_of_failure)
+        .def("errors", &Rendering::errors)
         .def_prop_ro("scene", &Rendering::scene_pointer)
         .def_prop_ro("passes", &Rendering::passes)
         .def_prop_ro("seconds", [](const Rendering& r) { return r.renderer().seconds(); })

@@ -179,3 +179,68 @@ def test_the_viewer_maps_tones_as_the_library_does(tmp_path: Path) -> None:
         mine = np.array(codes).reshape(4, 5, 4)[:, :, :3]
         expected = et.tonemap(image, name, exposure=0.5).astype(int)  # type: ignore[arg-type]
         assert np.abs(mine - expected).max() <= 1
+
+
+def test_convergence_is_plotted(cornell: et.Scene) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    result = et.render(cornell, "bdpt", spp=64, progress=False)
+    axes = result.plot_convergence()
+    times, errors = axes.lines[0].get_data()
+    assert 10 < len(times) < 64 and (np.diff(times) > 0).all()
+    assert errors[-1] == pytest.approx(result.error) and times[-1] == pytest.approx(result.seconds)
+    assert axes.get_xscale() == axes.get_yscale() == "log" and axes.get_legend().texts[0].get_text().startswith("bdpt")
+    given = pyplot.figure().add_subplot()
+    assert et.render(cornell, "path", spp=4, progress=False).plot_convergence(given) is given
+    with pytest.raises(RuntimeError, match="the error is not known after 1 spp"):
+        et.render(cornell, "path", spp=1, progress=False).plot_convergence()
+    with pytest.raises(RuntimeError, match="merged results have no errors of fewer passes"):
+        et.merge([result]).plot_convergence()
+    with pytest.raises(TypeError, match="ax must be the Axes of a figure, but is str"):
+        result.plot_convergence("right")
+    pyplot.close("all")
+
+
+def test_comparisons_are_plotted(comparison: et.CompareReport) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    axes = comparison.plot()
+    assert [t.get_text() for t in axes.get_legend().texts] == ["path", "bdpt"]
+    method = comparison.data[0]["methods"][1]
+    last = [np.mean([run["checkpoints"][-1]["seconds"] for run in method["runs"]]),
+            np.mean([run["checkpoints"][-1]["errors"]["rel_mse"] for run in method["runs"]])]
+    np.testing.assert_allclose(np.array(axes.lines[1].get_data())[:, -1], last)
+    assert comparison.plot(axes, x="spp", y="rmse") is axes and axes.get_xlabel() == "samples per pixel"
+    with pytest.raises(ValueError, match=r'x must be "seconds" or "spp", but is \'time\''):
+        comparison.plot(x="time")
+    with pytest.raises(IndexError, match="there is no scene 7"):
+        comparison.plot(scene=7)
+    pyplot.close("all")
+
+
+def test_plots_without_matplotlib_say_what_is_missing(comparison: et.CompareReport, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ImportError, match="plots need matplotlib: pip install matplotlib"):
+        comparison.plot()
+
+
+def test_results_are_arrays_for_numpy(cornell: et.Scene) -> None:
+    result = et.render(cornell, "path", spp=2, progress=False)
+    assert np.asarray(result) is result.image
+    copy = np.array(result)
+    assert copy is not result.image and not np.shares_memory(copy, result.image)
+    np.testing.assert_array_equal(copy, result.image)
+    doubles = np.asarray(result, dtype=np.float64)
+    assert doubles.dtype == np.float64
+    np.testing.assert_array_equal(doubles, result.image)
+    assert np.mean(result) == result.image.mean()
+    with pytest.raises(ValueError, match="as float64 it has to be copied"):
+        result.__array__(np.float64, copy=False)

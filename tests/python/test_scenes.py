@@ -202,3 +202,73 @@ def test_paths_are_limited() -> None:
         groups[f"g{i}"] = {"type": "shapegroup", "a": before, "b": dict(before)}
     with pytest.raises(ValueError, match="more than 1000000 paths"):
         et.load_dict(groups).paths()
+
+
+def test_descriptions_are_mappings() -> None:
+    d = et.load_string(XML)
+    assert list(d) == list(d.keys()) == d.paths() and len(d) == len(d.paths())
+    assert d._ipython_key_completions_() == d.paths()  # type: ignore[attr-defined]
+    items = dict(d.items())
+    assert list(items) == d.paths() and items["ball.center"] == [0, 1, 0] and items["white"]["type"] == "diffuse"
+    assert list(d.values())[3] == items[d.paths()[3]]
+    for path in d:
+        assert path in d and path in d.keys()
+    for path in ("ball.radiu", "bal", "ball.center.x", "", "white.reflectance.type"):
+        assert path not in d
+
+
+def test_descriptions_and_scenes_show_themselves() -> None:
+    d = et.load_dict({**DICT, "<thing>": {"type": "mesh", "vertices": np.eye(3), "faces": [[0, 1, 2]]}})
+    # floor.bsdf and ball.bsdf.nested are the object "white".
+    objects = [p for p in d if isinstance(d[p], dict) and d[p].get("type", "rgb") != "rgb"]
+    assert repr(d) == f"<Description dict, {len(objects) - 2} objects>"
+    html = d._repr_html_()
+    assert "ball.bsdf.diffuse_reflectance" in html and "color0 = 0.25" in html and "reflectance = 0.8, 0.7, 0.6" in html
+    assert "&lt;thing&gt;" in html and "<thing>" not in html and "3 vertices, 1 triangles" in html
+    scene = d.build()
+    assert repr(scene) == "<Scene dict, 16 x 12, 5 shapes, 3 emitters>"
+    html = scene._repr_html_()
+    assert "16 x 12" in html and "<td>triangles</td><td>3</td>" in html and "perspective" in html
+    many = et.load_dict({"type": "scene", **{f"ball{i}": {"type": "sphere"} for i in range(300)}})
+    assert "ball199" in many._repr_html_() and "ball200" not in many._repr_html_() and "and others" in many._repr_html_()
+
+
+CAMERAS = {
+    **DICT,
+    "left": {**DICT["sensor"], "to_world": et.look_at((-3, 2, 7), (0, 1, 0))},  # type: ignore[dict-item]
+    "right": {**DICT["sensor"], "to_world": et.look_at((3, 2, 7), (0, 1, 0))},  # type: ignore[dict-item]
+}
+
+
+def test_sensors_are_chosen_by_number_or_name(program: str, tmp_path: Path) -> None:
+    d = et.load_dict(CAMERAS)
+    scenes = [d.build(sensor=i) for i in (None, 0, 1, np.int64(2), "right", "1")]
+    assert [s.sensor for s in scenes] == [0, 0, 1, 2, 2, 1]
+    assert scenes[0].sensors == ["perspective", "left", "right"]
+    images = [et.render(s, "path", spp=1, progress=False).image for s in scenes]
+    for i, chosen in enumerate(s.sensor for s in scenes):
+        for k, other in enumerate(s.sensor for s in scenes):
+            assert np.array_equal(images[i], images[k]) == (chosen == other)
+    np.testing.assert_array_equal(et.render(d, "path", spp=1, sensor="right", progress=False).image, images[3])
+    for wrong in (3, -1, "middle"):
+        with pytest.raises(et.SceneError, match=rf'there is no sensor "{wrong}" \(known: 0 to 2, or by name: perspective, left, right'):
+            d.build(sensor=wrong)
+    with pytest.raises(ValueError, match="is empty"):
+        d.build(sensor="")
+    with pytest.raises(ValueError, match=r"a Scene has its sensor from Description.build\(sensor=...\)"):
+        et.render(scenes[0], sensor=1)
+
+
+def test_files_and_descriptions_are_rendered_as_scenes_are(scenes: Path) -> None:
+    file = scenes / "cornell.xml"
+    d = et.load(file)
+    d["sensor.film.width"] = d["sensor.film.height"] = 8
+    image = et.render(d.build(), "path", spp=1, progress=False).image
+    np.testing.assert_array_equal(et.render(d, "path", spp=1, progress=False).image, image)
+    for name in file, str(file):
+        assert et.render(name, "path:max_depth=1", spp=1, progress=False).image.shape == (400, 400, 3)
+    with pytest.raises(RuntimeError, match="there is no such file"):
+        et.render("none.xml")
+    for wrong in (None, {}, 3):
+        with pytest.raises(TypeError, match="a scene is a Scene, a Description or the name of a file, but found"):
+            et.render(wrong)  # type: ignore[arg-type]

@@ -51,3 +51,20 @@ def densities(scene: et.Scene) -> float:
         value, pdf = v.eval((0, 1, 0))
         total += pdf + float(value[0])
     return total
+
+
+async def modern(file: str, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
+    d = et.load_dict({"type": "scene", "thing": {"type": "mesh", "vertices": vertices, "faces": faces}})
+    for path, value in d.items():
+        print(path, value)
+    method = et.integrator("upg+bdpt", max_depth=12)
+    with et.start(d, method, time=10) as job:
+        image: NDArray[np.float32] = job.image(timeout=5)
+        if job.progress.passes > 10:
+            job.stop()
+        result = await job
+    et.render(file, {"type": "path", "max_depth": 8}, spp=4, sensor="left").plot_convergence()
+    scene = d.build(sensor=1)
+    hits: et.RayHits = scene.ray_intersect((0, 0, 0), np.eye(3))
+    dark: NDArray[np.bool_] = scene.occluded(hits.origins((0, 1, 0)), (0, 1, 0), max_distance=5)
+    return float(np.asarray(result).mean() + image.mean() + hits.t[dark].sum()) + len(scene.shapes)

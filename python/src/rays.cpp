@@ -1,0 +1,100 @@
+// Rays by the array: their first hits, and whether they hit anything.
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "bindings.h"
+#include "system/threads.h"
+
+namespace etendue::python {
+namespace {
+
+template <class T, class... Shape>
+using Array = nb::ndarray<T, Shape..., nb::c_contig, nb::device::cpu>;
+template <class T>
+using Column = Array<T, nb::ndim<1>>;
+template <class T, int kColumns>
+using Rows = Array<T, nb::shape<-1, kColumns>>;
+
+Vec3 row(const Rows<const float, 3>& rows, size_t i) {
+    const float* v = rows.data() + 3 * i;
+    return {v[0], v[1], v[2]};
+}
+void set_row(const Rows<float, 3>& rows, size_t i, Vec3 v) {
+    float* const to = rows.data() + 3 * i;
+    to[0] = v.x, to[1] = v.y, to[2] = v.z;
+}
+
+/// Calls body(i) for each of n rays, by several threads and without the GIL.
+template <class Body>
+void for_each_ray(size_t n, const Body& body) {
+    use_threads();
+    const nb::gil_scoped_release no_gil;
+    constexpr size_t kGrain = 1024;
+    tbb::task_arena arena(thread_count(0));
+    arena.execute([&] {
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
+            for (size_t i = range.begin(); i < range.end(); ++i) body(i);
+        });
+    });
+}
+
+bool intersect(const Scene& scene, const Ray& ray, SurfaceHit& hit) {
+    // Masked surfaces let the ray pass as long as more than half of it is left.
+    return scene.intersect(ray, 0.5f, hit);
+}
+
+/// Of rays that hit nothing, the outputs stay as they are. All arrays have the same number of rows.
+void intersect_rays(const ScenePtr& handle, const Rows<const float, 3>& o,
+                    const Rows<const float, 3>& d, const Column<const float>& tmax,
+                    const Column<float>& t, const Rows<float, 3>& p, const Rows<float, 3>& ng,
+                    const Rows<float, 3>& ns, const Rows<float, 2>& uv,
+                    const Column<int32_t>& shape, const Column<int32_t>& primitive,
+                    const Column<float>& slack) {
+    const Scene& scene = handle->scene;
+    for_each_ray(t.size(), [&](size_t i) {
+        SurfaceHit hit;
+        if (!intersect(scene, {row(o, i), row(d, i), tmax.data()[i]}, hit)) return;
+        t.data()[i] = hit.t;
+        set_row(p, i, hit.geometry.p);
+        set_row(ng, i, hit.geometry.ng);
+        set_row(ns, i, hit.geometry.ns);
+        uv.data()[2 * i] = hit.geometry.uv.x;
+        uv.data()[2 * i + 1] = hit.geometry.uv.y;
+        shape.data()[i] = int32_t(hit.location.shape);
+        primitive.data()[i] = int32_t(hit.location.prim);
+        slack.data()[i] = hit.geometry.slack;
+    });
+}
+
+void occluded_rays(const ScenePtr& handle, const Rows<const float, 3>& o,
+                   const Rows<const float, 3>& d, const Column<const float>& tmax,
+                   const Column<bool>& occluded) {
+    const Scene& scene = handle->scene;
+    for_each_ray(occluded.size(), [&](size_t i) {
+        const Ray ray{row(o, i), row(d, i), tmax.data()[i]};
+        SurfaceHit hit;
+        occluded.data()[i] =
+            scene.has_masks() ? intersect(scene, ray, hit) : scene.accelerator().occluded(ray);
+    });
+}
+
+void offset_origins(const Rows<const float, 3>& p, const Rows<const float, 3>& ng,
+                    const Column<const float>& slack, const Rows<const float, 3>& d,
+                    const Rows<float, 3>& origins) {
+    for (size_t i = 0; i < slack.size(); ++i)
+        set_row(origins, i, offset_origin({row(p, i), row(ng, i), slack.data()[i]}, row(d, i)));
+}
+
+}  // namespace
+
+void bind_rays(nb::module_& m) {
+    using namespace nb::literals;
+    m.def("intersect_rays", &intersect_rays, "scene"_a, "o"_a, "d"_a, "tmax"_a, "t"_a, "p"_a,
+          "ng"_a, "ns"_a, "uv"_a, "shape"_a, "primitive"_a, "slack"_a);
+    m.def("occluded_rays", &occluded_rays, "scene"_a, "o"_a, "d"_a, "tmax"_a, "occluded"_a);
+    m.def("offset_origins", &offset_origins, "p"_a, "ng"_a, "slack"_a, "d"_a, "origins"_a);
+}
+
+}  // namespace etendue::python
