@@ -97,16 +97,16 @@ void image_info(const std::string& file, bool as_json) {
                          {"channels", image.channels},
                          {"denoised", is_denoised(image)},
                          {"attributes", nlohmann::json::object()}};
-        for (const auto& [name, value] : image.attributes)
-            std::visit([&](const auto& v) { j["attributes"][name] = v; }, value);
+        for (const auto& a : image.attributes)
+            std::visit([&](const auto& v) { j["attributes"][a.first] = v; }, a.second);
         fmt::print("{}", json_text(j));
         return;
     }
     fmt::print("{}{}\n  size      {} x {}\n  channels  {}\n", file,
                is_denoised(image) ? ": denoised image" : "", image.width, image.height,
                fmt::join(image.channels, ", "));
-    for (const auto& [name, value] : image.attributes)
-        std::visit([&](const auto& v) { fmt::print("  {}  {}\n", name, v); }, value);
+    for (const auto& a : image.attributes)
+        std::visit([&](const auto& v) { fmt::print("  {}  {}\n", a.first, v); }, a.second);
 }
 
 void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {

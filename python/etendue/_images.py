@@ -77,8 +77,11 @@ def denoise(image: Any, albedo: ImageLike | None = None, normal: ImageLike | Non
             raise ValueError("a Result has an albedo and normals of its own")
         of_result: Image = image.denoised()
         return of_result
-    guides = [None if guide is None else _pixels(guide) for guide in (albedo, normal)]
-    return _etendue.denoise(_pixels(image), *guides, threads, denoiser_library())
+
+    def pixels(guide: ImageLike | None) -> Image | None:
+        return None if guide is None else _pixels(guide)
+
+    return _etendue.denoise(_pixels(image), pixels(albedo), pixels(normal), threads, denoiser_library())
 
 
 def tonemap(

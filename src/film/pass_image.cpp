@@ -22,13 +22,15 @@ void for_one_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Ve
     const uint64_t bits =
         uint64_t(std::bit_cast<uint32_t>(point.x)) << 32 | std::bit_cast<uint32_t>(point.y);
     float left = to_unit_float(uint32_t(mix64(bits))) * sum;
-    bool is_used = false;
+    uint64_t chosen = 0;
+    float sign = 0;
     for_each_pixel(g, filter, point, [&](uint64_t pixel, float h) {
+        if (left < 0) return;
+        chosen = pixel;
+        sign = h;
         left -= std::abs(h);
-        if (is_used || left >= 0) return;
-        is_used = true;
-        use(pixel, std::copysign(sum, h));
     });
+    if (sign != 0) use(chosen, std::copysign(sum, sign));
 }
 
 }  // namespace

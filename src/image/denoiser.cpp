@@ -2,7 +2,11 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <initializer_list>
 #include <stdexcept>
+#include <system_error>
+#include <type_traits>
+#include <vector>
 
 #include <fmt/format.h>
 

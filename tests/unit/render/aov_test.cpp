@@ -26,8 +26,8 @@ const std::string kEye = sensor("0,0,3", "0,0,0", 5, "1");
 const std::string kWallBehind =
     rectangle("<scale value=\"9\"/><rotate y=\"1\" angle=\"180\"/><translate z=\"5\"/>",
               diffuse("0.5,0.25,0.8"));
-const std::string kWallInFront = rectangle("<scale value=\"9\"/><translate z=\"-2\"/>",
-                                           diffuse("0.5,0.25,0.8"));
+const std::string kWallInFront =
+    rectangle("<scale value=\"9\"/><translate z=\"-2\"/>", diffuse("0.5,0.25,0.8"));
 const std::string kMirror =
     "<bsdf type=\"conductor\"><string name=\"material\" value=\"none\"/><rgb "
     "name=\"specular_reflectance\" value=\"0.5,1,0.5\"/></bsdf>";
@@ -45,8 +45,9 @@ TEST(Aov, MirrorsShowWhatTheyReflectInTheirColour) {
 
 TEST(Aov, GlassShowsWhatIsBehindIt) {
     // A pane of a quarter of a unit, so that paths cross two surfaces. What it reflects is black.
-    const std::string glass = "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"2\" "
-                              "y=\"2\" z=\"0.125\"/></transform><bsdf type=\"dielectric\"/></shape>";
+    const std::string glass =
+        "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"2\" "
+        "y=\"2\" z=\"0.125\"/></transform><bsdf type=\"dielectric\"/></shape>";
     const std::vector<std::string> names{"denoise_albedo", "denoise_normal"};
     const auto v = middle(build(kEye + kWallInFront + glass), names);
     const float share = v[1].b;
