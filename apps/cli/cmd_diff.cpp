@@ -10,11 +10,13 @@
 
 #include "commands.h"
 #include "compare/error_json.h"
+#include "image/denoiser.h"
 #include "image/flip.h"
 #include "image/image_io.h"
 #include "image/metrics.h"
 #include "image/tonemap.h"
 #include "json_text.h"
+#include "messages.h"
 #include "output_checks.h"
 #include "system/output_file.h"
 
@@ -103,6 +105,10 @@ void DiffCommand::run() const {
         OutputFile::check(map);
     }
     const RgbImage x = read_rgb(image, layer), r = read_like(reference, x);
+    for (const std::string& file : {reference, reference2})
+        if (!file.empty() && is_denoised(read_image(file)))
+            print_warnings({fmt::format(
+                "{}: the image is denoised; the errors contain the bias of the denoiser", file)});
     const RgbImage r2 = reference2.empty() ? RgbImage() : read_like(reference2, x);
     const ImageErrors errors = image_errors(x.pixels, r.pixels, {r2.pixels, ignore_above});
     const bool flip_map = !map.empty() && map_metric == "flip";

@@ -1,9 +1,13 @@
+#include <algorithm>
+
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
 #include "guide_info.h"
+#include "image/denoiser.h"
+#include "image/image_io.h"
 #include "json_text.h"
 #include "math/content_hash.h"
 #include "render/checkpoint.h"
@@ -13,6 +17,10 @@
 
 namespace etendue {
 namespace {
+
+/// Of files that read_image() reads.
+constexpr const char* kImageExtensions[] = {".exr", ".png", ".jpg", ".jpeg", ".hdr",
+                                            ".pfm", ".tga", ".bmp", ".pgm",  ".ppm"};
 
 std::string mebibytes(size_t bytes) {
     return fmt::format("{:.1f} MiB", double(bytes) / (1 << 20));
@@ -75,8 +83,35 @@ void checkpoint_info(const std::string& file, bool as_json) {
     line("bits of the sums", bits);
 }
 
+bool is_image(const std::string& file) {
+    const std::string e = image_extension(file);
+    return std::ranges::any_of(kImageExtensions, [&](const char* known) { return e == known; });
+}
+
+void image_info(const std::string& file, bool as_json) {
+    const Image image = read_image(file);
+    if (as_json) {
+        nlohmann::json j{{"image", file},
+                         {"width", image.width},
+                         {"height", image.height},
+                         {"channels", image.channels},
+                         {"denoised", is_denoised(image)},
+                         {"attributes", nlohmann::json::object()}};
+        for (const auto& a : image.attributes)
+            std::visit([&](const auto& v) { j["attributes"][a.first] = v; }, a.second);
+        fmt::print("{}", json_text(j));
+        return;
+    }
+    fmt::print("{}{}\n  size      {} x {}\n  channels  {}\n", file,
+               is_denoised(image) ? ": denoised image" : "", image.width, image.height,
+               fmt::join(image.channels, ", "));
+    for (const auto& a : image.attributes)
+        std::visit([&](const auto& v) { fmt::print("  {}  {}\n", a.first, v); }, a.second);
+}
+
 void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
     if (SectionReader::is_one(options.file)) return checkpoint_info(options.file, as_json);
+    if (is_image(options.file)) return image_info(options.file, as_json);
     guide.check();
     SceneOptions loading = options;
     loading.threads = guide.threads;
@@ -149,7 +184,7 @@ void add_info_command(CLI::App& app) {
         bool json = false;
     };
     auto options = std::make_shared<Options>();
-    CLI::App& c = *app.add_subcommand("info", "Summarise a scene or a checkpoint");
+    CLI::App& c = *app.add_subcommand("info", "Summarise a scene, a checkpoint or an image");
     options->scene.add_to(c);
     options->guide.add_to(c);
     c.add_flag("--json", options->json, "Print JSON");

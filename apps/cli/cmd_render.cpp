@@ -18,6 +18,7 @@
 #include "commands.h"
 #include "description/fingerprint.h"
 #include "figures.h"
+#include "image/denoiser.h"
 #include "image/image_io.h"
 #include "interrupt.h"
 #include "json_text.h"
@@ -56,7 +57,7 @@ struct RenderCommand {
     double write_every = 60;
     unsigned grace = 20;
     int technique_depth = 6;
-    bool quiet = false;
+    bool denoise = false, quiet = false;
 
     void run() const;
 
@@ -70,6 +71,8 @@ private:
         Conditions conditions{};
         PassLog log{};
         std::vector<AovImage> layers{};  ///< Of the image, beside those of the renderer.
+        std::unique_ptr<Denoiser> denoiser{};
+        std::vector<AovImage> guides{};  ///< Of the denoiser.
     };
     std::unique_ptr<Job> make_job(const Ranks& ranks) const;
     void render(Job& job, const Ranks& ranks) const;
@@ -93,6 +96,14 @@ private:
     std::vector<std::string> write_outputs(const Renderer& renderer,
                                            const std::vector<AovImage>& layers,
                                            const nlohmann::json& report) const;
+    /// The file of --denoise: out.denoised.exr beside out.exr.
+    std::string denoised_file() const {
+        const std::filesystem::path image = output;
+        return std::filesystem::path(image)
+            .replace_extension(".denoised" + image.extension().string())
+            .string();
+    }
+    void write_denoised(const Job& job, const nlohmann::json& report) const;
     /// Writes the image elsewhere if it cannot be written to `output`.
     void write_image_somewhere(const Image& image, std::vector<std::string>& failures) const;
     /// Whether the image goes to a device or a pipe, which take it once.
@@ -214,6 +225,16 @@ void RenderCommand::check_options() const {
     refuse_same_file("image", output, "checkpoint", checkpoint_file());
     refuse_same_file("image", output, "statistics", stats);
     refuse_same_file("checkpoint", checkpoint_file(), "statistics", stats);
+    if (denoise) {
+        if (is_in_place())
+            throw std::runtime_error(fmt::format(
+                "--denoise writes a second image beside {}, which must therefore be a file",
+                output));
+        for (const auto& [name, file] : {std::pair{"scene", scene.file},
+                                         {"checkpoint", checkpoint_file()},
+                                         {"statistics", stats}})
+            refuse_same_file(name, file, "denoised image", denoised_file());
+    }
     check_image_extension(output);
     const auto folder = std::filesystem::path(output).parent_path();
     if (!folder.empty() && std::filesystem::exists(folder) &&
@@ -228,6 +249,7 @@ void RenderCommand::check_options() const {
 
 void RenderCommand::check_outputs() const {
     OutputFile::check(output);
+    if (denoise) OutputFile::check(denoised_file());
     if (!stats.empty()) OutputFile::check(stats);
     if (!checkpoint_file().empty()) OutputFile::check(checkpoint_file());
     if (!techniques.empty()) check_technique_folder(techniques);
@@ -338,6 +360,17 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
     return failures;
 }
 
+void RenderCommand::write_denoised(const Job& job, const nlohmann::json& report) const {
+    const auto begin = std::chrono::steady_clock::now();
+    write_image(denoised_file(), job.denoiser->denoise(image_with_layers(job.renderer->film(),
+                                                                         job.guides, false, report),
+                                                       job.settings.threads));
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+    if (!quiet)
+        message("{}: denoised in {} by {}\n", denoised_file(), format_seconds(taken.count()),
+                job.denoiser->name());
+}
+
 /// A failure of which all processes know. The first one reports it.
 struct CommonFailure : std::runtime_error {
     using std::runtime_error::runtime_error;
@@ -405,6 +438,9 @@ std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) 
     std::optional<CheckpointFile> earlier = earlier_checkpoint();
     const bool needs_conditions = !checkpoint_file().empty() || ranks.count() > 1;
     uint64_t fingerprint = 0;
+    // Without the library, all else would be in vain.
+    std::unique_ptr<Denoiser> denoiser;
+    if (denoise && is_first) denoiser = std::make_unique<Denoiser>();
     std::unique_ptr<Job> job(new Job{[&] {
         const SceneDescription description = read_scene(loading);
         if (needs_conditions) fingerprint = scene_fingerprint(description);
@@ -433,8 +469,12 @@ std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) 
                     format_seconds(renderer.seconds()));
     }
     // Before the passes, so that nothing that can fail stands between them and their image.
-    if (is_first)
-        job->layers = render_aovs(s, aovs, kAovSamples, job->settings.seed, job->settings.threads);
+    const auto layers = [&](const std::vector<std::string>& names) {
+        return render_aovs(s, names, kAovSamples, job->settings.seed, job->settings.threads);
+    };
+    if (is_first) job->layers = layers(aovs);
+    if (denoiser) job->guides = layers({"denoise_albedo", "denoise_normal"});
+    job->denoiser = std::move(denoiser);
     return job;
 }
 
@@ -543,6 +583,7 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
     }
     for (std::string& f : write_outputs(renderer, job.layers, report))
         failures.push_back(std::move(f));
+    if (job.denoiser) attempt(failures, [&] { write_denoised(job, report); });
 
     print_warnings(warnings(renderer.stats()));
     if (!failure.empty())
@@ -602,22 +643,27 @@ void add_render_command(CLI::App& app) {
     c.add_option("--seed", command->request.seed, "Seed of all random numbers")
         ->capture_default_str();
     FilterMode& filter_mode = command->request.filter_mode;
-    c.add_option_function<std::string>(
-         "--filter-mode",
-         [&filter_mode](const std::string& name) {
-             filter_mode = filter_mode_named(name, "--filter-mode");
-         },
-         "spread: an eye path contributes to all pixels that the filter reaches; sample: to "
-         "its own pixel, with a film point drawn from the filter")
-        ->default_str(to_string(filter_mode));
+    const CLI::Option* given_mode =
+        c.add_option_function<std::string>(
+             "--filter-mode",
+             [&filter_mode](const std::string& name) {
+                 filter_mode = filter_mode_named(name, "--filter-mode");
+             },
+             "spread: an eye path contributes to all pixels that the filter reaches; sample: to "
+             "its own pixel, with a film point drawn from the filter")
+            ->default_str(to_string(filter_mode));
     add_sampler_option(c, command->request.sampler,
                        "; with sobol the error estimate is an upper bound");
     c.add_option("--threads", command->request.threads, "Number of threads; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
     c.add_option("--aov", command->aovs,
-                 "Layers to add: albedo, normal, depth, position, uv, variance")
+                 "Layers to add: albedo, normal, depth, position, uv, denoise_albedo, "
+                 "denoise_normal, variance")
         ->delimiter(',');
+    c.add_flag("--denoise", command->denoise,
+               "Write a denoised image beside the other one, as out.denoised.exr; with it, the "
+               "filter mode is sample unless it is given");
     c.add_option("--techniques", command->techniques,
                  "Folder for the images of each technique (s,t), weighted and unweighted");
     c.add_option("--techniques-max-depth", command->technique_depth,
@@ -628,7 +674,11 @@ void add_render_command(CLI::App& app) {
                  "Show the image during rendering: tev, or tev://host:port");
     c.add_option("--stats", command->stats, "Write statistics to this JSON file");
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
-    c.callback([command] { command->run(); });
+    c.callback([command, given_mode] {
+        if (command->denoise && given_mode->count() == 0)
+            command->request.filter_mode = FilterMode::Sample;
+        command->run();
+    });
 }
 
 }  // namespace etendue

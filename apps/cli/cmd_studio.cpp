@@ -16,6 +16,7 @@
 
 #include "commands.h"
 #include "description/fingerprint.h"
+#include "image/denoiser.h"
 #include "image/image_io.h"
 #include "interrupt.h"
 #include "messages.h"
@@ -167,7 +168,10 @@ ApiOptions StudioCommand::api_options() const {
     options.token = make_token();
     options.scene_file = scene.file;
     options.output_folder = output;
-    if (!reference.empty()) options.reference = read_rgb(reference);
+    if (!reference.empty()) {
+        refuse_denoised_reference(reference, read_image(reference));
+        options.reference = read_rgb(reference);
+    }
     for (const std::string& host : hosts) {
         if (!is_host_name(host))
             throw std::runtime_error(fmt::format(

@@ -14,6 +14,7 @@ void add_convert_command(CLI::App& app);
 void add_compare_command(CLI::App& app);
 void add_diff_command(CLI::App& app);
 void add_tonemap_command(CLI::App& app);
+void add_denoise_command(CLI::App& app);
 void add_merge_command(CLI::App& app);
 void add_paths_command(CLI::App& app);
 void add_list_command(CLI::App& app);

@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
     add_compare_command(app);
     add_diff_command(app);
     add_tonemap_command(app);
+    add_denoise_command(app);
     add_paths_command(app);
     add_list_command(app);
     add_verify_command(app);

@@ -23,7 +23,7 @@ _check_cpu()
 
 from . import core
 from ._etendue import Description, Scene, SceneError, __version__
-from ._images import Diff, diff, read_image, tonemap, write_image
+from ._images import Diff, denoise, diff, read_image, tonemap, write_image
 from ._integrator import Integrator
 from ._job import Job, start
 from ._memory import limit_memory
@@ -38,7 +38,7 @@ SceneError.__module__ = "etendue"
 
 __all__ = [
     "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Job", "Progress", "RayHits", "RenderError", "Result",
-    "Scene", "SceneError", "VerifyReport", "compare", "core", "diff", "integrator", "limit_memory", "load", "load_dict",
-    "load_string", "look_at", "merge", "plugins", "read_image", "render", "resume", "rotate", "scale", "show", "start",
-    "tonemap", "translate", "verify", "write_image",
+    "Scene", "SceneError", "VerifyReport", "compare", "core", "denoise", "diff", "integrator", "limit_memory", "load",
+    "load_dict", "load_string", "look_at", "merge", "plugins", "read_image", "render", "resume", "rotate", "scale", "show",
+    "start", "tonemap", "translate", "verify", "write_image",
 ]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _etendue
+from ._denoiser_library import denoiser_library
 from ._html import image_html, table_html
 
 Image = NDArray[np.float32]
@@ -56,6 +57,31 @@ def write_image(file: str | PathLike[str], image: ArrayLike) -> None:
         _etendue.write_png(fspath(file), np.ascontiguousarray(image))
         return
     _etendue.write_image(fspath(file), _pixels(image))
+
+
+def denoise(image: Any, albedo: ImageLike | None = None, normal: ImageLike | None = None, *, threads: int = 0) -> Image:
+    """Removes the noise of an image by Intel Open Image Denoise. The result is radiance, shape (H, W, 3). It has a bias, so
+    that it is no reference and no evidence: see docs/denoising.md.
+
+    image: a Result, which should be rendered with filter_mode="sample", and whose auxiliary images are used; or an array of
+        radiance, shape (H, W, 3), or its file.
+    albedo: reflectance, in [0, 1], such as the auxiliary image denoise_albedo; of the same shape, or a file.
+    normal: normals, in [-1, 1], such as the auxiliary image denoise_normal; only with albedo.
+    threads: number of threads; 0 for one per core. A Result is denoised by as many as rendered it.
+
+    Raises RuntimeError if there is no library: `pip install etendue[denoise]` installs it, or ETENDUE_OIDN names it. Raises
+    ValueError if the sizes differ.
+    """
+    if hasattr(image, "denoised"):  # a Result
+        if albedo is not None or normal is not None:
+            raise ValueError("a Result has an albedo and normals of its own")
+        of_result: Image = image.denoised()
+        return of_result
+
+    def pixels(guide: ImageLike | None) -> Image | None:
+        return None if guide is None else _pixels(guide)
+
+    return _etendue.denoise(_pixels(image), pixels(albedo), pixels(normal), threads, denoiser_library())
 
 
 def tonemap(

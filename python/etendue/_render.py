@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _etendue
+from ._denoiser_library import denoiser_library
 from ._etendue import Scene
 from ._html import image_html, png_of
 from ._integrator import Integrator
@@ -254,13 +255,34 @@ class Result:
         stats: dict[str, Any] = self._cached("stats", lambda: json.loads(self._rendering.stats()))
         return stats
 
-    def save(self, file: str | PathLike[str]) -> None:
+    def denoised(self) -> Image:
+        """The image without its noise, and with a bias: radiance, shape (H, W, 3). See denoise()."""
+        self._warn_of_correlation()
+        denoised: Image = self._cached("denoised", lambda: self._rendering.denoised(denoiser_library()))
+        return denoised
+
+    def _warn_of_correlation(self) -> None:
+        if self._rendering.spreads:
+            warnings.warn(
+                "the filter mode is \"spread\": the errors of neighbouring pixels are correlated, and denoising leaves some "
+                "of them; render with filter_mode=\"sample\"",
+                stacklevel=3,
+            )
+
+    def save(self, file: str | PathLike[str], *, denoised: bool = False) -> None:
         """Writes the image, like `etendue render -o`. An .exr file also contains the auxiliary images and statistics. An
         .etd file is a checkpoint: resume() goes on from it, and merge() adds it to others. The sum that merge() made is
         not written to the file of a part, which could then not go on: RuntimeError.
+
+        denoised: writes Result.denoised() instead, like `etendue denoise`; the metadata of an .exr file say so.
         """
         if fspath(file).endswith(".etd"):
+            if denoised:
+                raise ValueError(f"a checkpoint is not denoised: {fspath(file)!r}")
             self._rendering.save_checkpoint(fspath(file))
+        elif denoised:
+            self._warn_of_correlation()
+            self._rendering.save_denoised(fspath(file), denoiser_library())
         else:
             self._rendering.save(fspath(file), list(self._aov_names))
 
@@ -371,7 +393,7 @@ def render(
     filter_mode: "spread": an eye path contributes to all pixels that the filter of the film reaches, and the errors of
         neighbouring pixels are correlated; "sample": to its own pixel alone, and errors are independent.
     threads: number of threads; 0 for one per core.
-    aovs: auxiliary images to render: albedo, normal, depth, position, uv, variance.
+    aovs: auxiliary images to render: albedo, normal, depth, position, uv, denoise_albedo, denoise_normal, variance.
     techniques: makes an image of each technique, for paths of at most this many edges; True: 6.
     sensor: number (from 0) or name of the sensor, of files and Descriptions; None: the first. A Scene has one already.
     callback: called between passes with a Progress. If it returns False, the rendering ends. Exceptions that it raises

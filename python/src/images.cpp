@@ -11,11 +11,13 @@
 #include "bindings.h"
 #include "compare/embedded_image.h"
 #include "compare/error_json.h"
+#include "image/denoiser.h"
 #include "image/flip.h"
 #include "image/image_io.h"
 #include "image/metrics.h"
 #include "image/tonemap.h"
 #include "system/output_file.h"
+#include "values.h"
 
 namespace etendue::python {
 namespace {
@@ -113,6 +115,29 @@ diff(const ImageArgument& image, const ImageArgument& reference,
             to_array(std::move(errors), width, height)};
 }
 
+/// `albedo` and `normal` guide the denoiser; normals alone do not.
+FloatArray denoise(const ImageArgument& image, const std::optional<ImageArgument>& albedo,
+                   const std::optional<ImageArgument>& normal, int threads,
+                   const std::string& library) {
+    std::vector<RgbLayer> layers{{"", pixels_of(image)}};
+    for (const auto& [name, guide] : {std::pair("albedo", &albedo), std::pair("normal", &normal)}) {
+        if (!*guide) continue;
+        check_same_size(image, **guide);
+        layers.push_back({name, pixels_of(**guide)});
+    }
+    if (normal && !albedo) throw nb::value_error("normal needs albedo");
+    const int width = int(image.shape(1)), height = int(image.shape(0));
+    checked_threads(threads);
+    use_threads();
+    std::vector<Rgb> pixels;
+    {
+        const nb::gil_scoped_release no_gil;
+        pixels =
+            rgb_pixels(Denoiser(library).denoise(layered_image(width, height, layers), threads));
+    }
+    return to_array(std::move(pixels), width, height);
+}
+
 FloatArray magma_colours(nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu> v) {
     std::vector<Rgb> out;
     out.reserve(v.size());
@@ -155,6 +180,8 @@ void bind_images(nb::module_& m) {
         "file"_a, "text"_a);
     m.def("diff", diff, "image"_a, "reference"_a, "reference2"_a.none(), "flip"_a,
           "ignore_above"_a);
+    m.def("denoise", denoise, "image"_a, "albedo"_a.none(), "normal"_a.none(), "threads"_a,
+          "library"_a);
     m.def("magma", magma_colours, "values"_a);
 }
 

@@ -19,6 +19,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bindings.h"
+#include "image/denoiser.h"
 #include "image/image_io.h"
 #include "math/statistics.h"
 #include "render/aov.h"
@@ -205,6 +206,14 @@ public:
         write_image(file, image_with_layers(renderer(), scene_->scene, settings_.seed,
                                             settings_.threads, aovs, report()));
     }
+    Image denoised(const std::string& library) const {
+        use_threads();
+        return Denoiser(library).denoise(
+            image_with_layers(renderer(), scene_->scene, settings_.seed, settings_.threads,
+                              {"denoise_albedo", "denoise_normal"}, report()),
+            settings_.threads);
+    }
+    bool spreads() const { return film().spreads(); }
     void save_checkpoint(const std::string& file) const {
         written_checkpoint(file, renderer(), scene_->scene, conditions_, settings_, log_)->commit();
     }
@@ -303,6 +312,14 @@ struct Merged {
                     file));
         of->write(file, totals);
     }
+    /// Without the auxiliary images, which need the scene.
+    Image denoised(const std::string& library) const {
+        use_threads();
+        return Denoiser(library).denoise(image_with_layers(film(), {}, false, of->report(totals)));
+    }
+    bool spreads() const {
+        return of->first().header().condition("filter mode") == to_string(FilterMode::Spread);
+    }
     const Film& film() const { return *totals.film; }
     int width() const { return film().geometry().crop_width; }
     int height() const { return film().geometry().crop_height; }
@@ -369,10 +386,31 @@ std::shared_ptr<Merged> merge(const nb::list& parts) {
     return std::make_shared<Merged>(std::move(files), std::move(names));
 }
 
+/// The methods of renderings and of their sums that denoise.
+template <class R>
+void bind_denoising(nb::class_<R>& c) {
+    using namespace nb::literals;
+    c.def_prop_ro("spreads", &R::spreads)
+        .def(
+            "denoised",
+            [](const R& r, const std::string& library) {
+                return image_of(r, [&] { return rgb_pixels(r.denoised(library)); });
+            },
+            "library"_a)
+        .def(
+            "save_denoised",
+            [](const R& r, const std::string& file, const std::string& library) {
+                check_image_extension(file);
+                write_image(file, r.denoised(library));
+            },
+            nb::call_guard<nb::gil_scoped_release>(), "file"_a, "library"_a);
+}
+
 void bind_merging(nb::module_& m) {
     using namespace nb::literals;
-    nb::class_<Merged>(m, "Merged")
-        .def_prop_ro("passes", [](const Merged& r) { return r.film().passes(); })
+    nb::class_<Merged> merged(m, "Merged");
+    bind_denoising(merged);
+    merged.def_prop_ro("passes", [](const Merged& r) { return r.film().passes(); })
         .def_prop_ro("seconds", [](const Merged& r) { return r.totals.seconds; })
         .def_prop_ro("estimator", [](const Merged& r) { return r.of->first().header().estimator; })
         .def_prop_ro("integrator",
@@ -444,7 +482,9 @@ void bind_merging(nb::module_& m) {
 void bind_render(nb::module_& m) {
     using namespace nb::literals;
     using Strings = std::vector<std::string>;
-    nb::class_<Rendering>(m, "Rendering")
+    nb::class_<Rendering> rendering(m, "Rendering");
+    bind_denoising(rendering);
+    rendering
         .def(
             "__init__",
             [](Rendering* self, ScenePtr scene, nb::handle integrator, std::optional<uint64_t> spp,

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "image/denoiser.h"
 #include "image/image_io.h"
 #include "math/content_hash.h"
 #include "render/warnings.h"
@@ -88,6 +89,7 @@ void write_reference(const Reference& r, const RenderStats& stats) {
 
 Reference read_reference(const std::string& file, const FilmGeometry& geometry) {
     const Image image = read_image(file);
+    refuse_denoised_reference(file, image);
     if (image.width != geometry.crop_width || image.height != geometry.crop_height)
         throw std::runtime_error(fmt::format(
             "reference {} has {} x {} pixels, but the scene is rendered with {} x {}", file,

@@ -1,10 +1,39 @@
 #include "film/pass_image.h"
 
+#include <bit>
+#include <cmath>
+
 #include <tbb/enumerable_thread_specific.h>
 
 #include "film/parallel_chunks.h"
+#include "math/hash.h"
 
 namespace etendue {
+namespace {
+
+/// Calls `use(pixel, factor)` for one of the pixels whose filter reaches `point`, drawn with probability |h| / Σ|h|. The
+/// factor is Σ|h| with the sign of h, so that each pixel receives h on average. The number that draws it is a hash of
+/// the point, which is random itself.
+template <class Use>
+void for_one_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point,
+                   const Use& use) {
+    float sum = 0;
+    for_each_pixel(g, filter, point, [&](uint64_t, float h) { sum += std::abs(h); });
+    const uint64_t bits =
+        uint64_t(std::bit_cast<uint32_t>(point.x)) << 32 | std::bit_cast<uint32_t>(point.y);
+    float left = to_unit_float(uint32_t(mix64(bits))) * sum;
+    uint64_t chosen = 0;
+    float sign = 0;
+    for_each_pixel(g, filter, point, [&](uint64_t pixel, float h) {
+        if (left < 0) return;
+        chosen = pixel;
+        sign = h;
+        left -= std::abs(h);
+    });
+    if (sign != 0) use(chosen, std::copysign(sum, sign));
+}
+
+}  // namespace
 
 void PassImage::begin(uint64_t light_paths, const SampleGrid* grid) {
     if (light_paths > 0 && !splats_)
@@ -20,8 +49,11 @@ void PassImage::add_splat(Vec2 point, Rgb value) {
         return;
     }
     value *= splat_scale_;
-    for_each_pixel(geometry_, filter_, point,
-                   [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); });
+    const auto add = [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); };
+    if (grid_ || !filter_.is_wide())
+        for_each_pixel(geometry_, filter_, point, add);
+    else
+        for_one_pixel(geometry_, filter_, point, add);
 }
 
 void PassImage::reject_if_not_finite(Rgb& value) {

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "image/denoiser.h"
 #include "image/image_io.h"
 
 namespace etendue {
@@ -52,6 +53,7 @@ double pixel_correlation(const Image& image, const std::vector<Rgb>& variance, c
 
 ReferenceImage read_reference_image(const std::string& path, const Scene& scene) {
     const Image image = read_image(path);
+    refuse_denoised_reference(path, image);
     const auto layers = image.layers();
     if (std::find(layers.begin(), layers.end(), "variance") == layers.end())
         throw std::runtime_error(fmt::format(

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -193,6 +194,35 @@ TEST(FilterModeSpread, AddsEverySampleToAllPixelsAround) {
                 ASSERT_NEAR(by_pixel[i], image[i].r, 1e-5) << f.name() << " " << i;
             }
         }
+}
+
+/// A splat goes to one pixel, on average by the weights of the filter; or to all pixels that it reaches.
+TEST(FilterModeSample, AddsASplatToOnePixel) {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> u(0, 1);
+    for (const ReconstructionFilter& f : all_filters()) {
+        if (!f.is_wide()) continue;
+        constexpr int kPasses = 4000;
+        constexpr FilmGeometry kSmall{12, 12, 0, 0, 12, 12};
+        Film film(kSmall, f, 1, FilterMode::Sample), spread(kSmall, f, 1, FilterMode::Spread);
+        ptrdiff_t touched = 0;
+        for (int pass = 0; pass < kPasses; ++pass) {
+            const Vec2 point{6 + u(random), 6 + u(random)};
+            for (Film* to : {&film, &spread}) {
+                to->begin_pass(1);
+                to->add_splat(point, Rgb(1));
+                to->end_pass();
+            }
+            if (pass == 0)
+                touched = std::ranges::count_if(film.image(), [](Rgb c) { return !c.is_zero(); });
+        }
+        EXPECT_EQ(touched, 1) << f.name();
+        const auto mean = film.image(), wanted = spread.image();
+        for (size_t i = 0; i < mean.size(); ++i)  // 6 σ, for weights of one sign
+            EXPECT_NEAR(mean[i].g, wanted[i].g,
+                        6 * std::sqrt((std::abs(wanted[i].g) + 0.002f) / kPasses))
+                << f.name() << " " << f.radius() << " " << i;
+    }
 }
 
 TEST(FilterModeSpread, CountsWhatIsNotFiniteOnce) {
