@@ -35,6 +35,10 @@ SceneDescription read_scene_file(const std::string& file, const ReadOptions& opt
         if (!options.defines.empty()) throw UnusedDefines("scenes of glTF have no parameters");
         return read(read_gltf);
     }
+    if (extension.starts_with(".usd"))
+        throw std::runtime_error(fmt::format("{}: stages of USD are read by the Python package: "
+                                             "python -m etendue.usd {} scene.xml",
+                                             file, file));
     throw std::runtime_error(
         fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3; "
                     ".pbrt, of pbrt-v3 and v4; .gltf and .glb)",

@@ -125,6 +125,12 @@ TEST_F(ConvertTest, ScenesForMitsuba3) {
     EXPECT_NE(xml.find("<integrator type=\"volpath\""), xml.npos);
 }
 
+TEST_F(ConvertTest, SaysHowStagesOfUsdAreRead) {
+    const ProgramResult r = run({"convert", write("stage.usda", "#usda 1.0\n"), "scene.xml"});
+    EXPECT_EQ(r.status, 1);
+    EXPECT_NE(r.errors.find("python -m etendue.usd"), std::string::npos) << r.errors;
+}
+
 TEST_F(ConvertTest, RefusesOutputsThatWouldDoHarm) {
     const std::string scene =
         write("scene.xml", R"(<scene version="3.0.0"><emitter type="constant"/>
