@@ -387,7 +387,7 @@ def test_import_takes_little_beside_numpy_and_reports_no_leaks_at_exit() -> None
         return {name.partition(".")[0] for name in run.stdout.split()}
 
     small = {"atexit", "base64", "binascii", "copy", "dataclasses", "errno", "fnmatch", "hashlib", "html", "ipaddress"}
-    small |= {"json", "ntpath", "pathlib", "urllib"}
+    small |= {"json", "ntpath", "pathlib", "threading", "urllib"}
     others = {name for name in packages("etendue") - packages("numpy") - small if not name.startswith("_")}
     assert others == {"etendue"}
 
