@@ -218,10 +218,7 @@ class Result:
         Raises RuntimeError for results of merge() and unpickled ones, which do not know their errors after fewer passes, and
         ImportError without matplotlib.
         """
-        errors = list(self._own("errors of fewer passes").errors())
-        # The error is estimated again after some of the passes only.
-        if self.error is not None and (not errors or errors[-1][0] < self.passes):
-            errors.append((self.passes, self.seconds, self.error))
+        errors = self._own("errors of fewer passes").errors()
         if not errors:
             raise RuntimeError(f"the error is not known after {self.passes} spp: render more")
         ax = axes_or_new(ax)

@@ -194,7 +194,7 @@ def test_convergence_is_plotted(cornell: et.Scene) -> None:
     assert errors[-1] == pytest.approx(result.error) and times[-1] == pytest.approx(result.seconds)
     assert axes.get_xscale() == axes.get_yscale() == "log" and axes.get_legend().texts[0].get_text().startswith("bdpt")
     given = pyplot.figure().add_subplot()
-    assert et.render(cornell, "path", spp=4, progress=False).plot_convergence(given) is given
+    assert et.render(cornell, "path", spp=16, progress=False).plot_convergence(given) is given
     with pytest.raises(RuntimeError, match="the error is not known after 1 spp"):
         et.render(cornell, "path", spp=1, progress=False).plot_convergence()
     with pytest.raises(RuntimeError, match="merged results have no errors of fewer passes"):
