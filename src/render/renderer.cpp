@@ -316,6 +316,19 @@ bool Renderer::sample_again(uint64_t index, Workspace& work, ContributionSink& s
     return true;
 }
 
+namespace {
+
+/// Number of samples whose eye paths are made in turns. Where the caches of a processor hold most of what rays and
+/// materials read, nothing waits for memory, and one after the other is faster.
+uint64_t walks_in_turn(const Scene& scene) {
+    constexpr size_t kCaches = size_t(16) << 20;
+    const Scene::Statistics& s = scene.statistics();
+    const size_t read = s.geometry_bytes + s.accelerator_bytes + s.texture_bytes;
+    return read > kCaches || scene.has_large_emitter_tables() ? kWalksInTurn : 1;
+}
+
+}  // namespace
+
 /// The paths of one pass.
 class Renderer::Pass {
 public:
@@ -346,13 +359,13 @@ public:
         r_.integrator_->trace(context());
         r_.kept_pass_ = passes_;
         const std::function<void()>& meanwhile = r_.settings_.meanwhile;
-        const uint64_t count = r_.film_.sample_count();
+        const uint64_t count = r_.film_.sample_count(), in_turn = walks_in_turn(r_.scene_);
         tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
             if (meanwhile) meanwhile();
             SamplesInTurn samples(*this, chunk);
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
-            for (uint64_t i = chunk * kChunk; i < end; i += kWalksInTurn)
-                samples.make(i, std::min(end, i + kWalksInTurn));
+            for (uint64_t i = chunk * kChunk; i < end; i += in_turn)
+                samples.make(i, std::min(end, i + in_turn));
         });
     }
 
@@ -382,32 +395,33 @@ private:
     class SamplesInTurn {
     public:
         SamplesInTurn(const Pass& pass, uint64_t chunk)
-            : pass_(pass), chunk_(chunk), work_(pass.workspace()), sink_(pass.receivers(work_)) {
-            samplers_.reserve(kWalksInTurn);
+            : pass_(pass), chunk_(chunk), work_(pass.workspace()), sink_(pass.receivers(work_)),
+              samplers_(kWalksInTurn, Sampler(pass.r_.settings_.sampler, pass.numbers_.seed)) {
             contexts_.reserve(kWalksInTurn);
+            work_.eye_paths.resize(kWalksInTurn);
         }
 
         /// Makes the samples begin … end-1.
         void make(uint64_t begin, uint64_t end) {
             const Integrator& integrator = *pass_.r_.integrator_;
-            samplers_.clear();
             contexts_.clear();
             for (uint64_t i = begin; i < end; ++i) {
-                Sampler& sampler =
-                    samplers_.emplace_back(pass_.r_.settings_.sampler, pass_.numbers_.seed);
+                Sampler& sampler = samplers_[size_t(i - begin)];
                 sampler.start(pass_.numbers_.pass, i);
                 contexts_.push_back(pass_.sample_context(i, chunk_, sampler, sink_));
             }
+            const bool is_one = contexts_.size() == 1;
             pass_.go_on();
             work_.stats.time_factor = 1;
-            work_.eye_paths.resize(kWalksInTurn);
-            integrator.trace_eye_paths(
-                contexts_, std::span(work_.eye_paths).first(contexts_.size()), work_.stats);
+            integrator.trace_eye_paths(contexts_,
+                                       is_one ? std::span(&work_.z, 1)
+                                              : std::span(work_.eye_paths).first(contexts_.size()),
+                                       work_.stats);
             for (size_t i = 0; i < contexts_.size(); ++i) {
                 const SampleContext& c = contexts_[i];
                 pass_.go_on();
                 work_.stats.time_factor = RenderStats::time_factor_of(c.index);
-                std::swap(work_.z, work_.eye_paths[i]);
+                if (!is_one) std::swap(work_.z, work_.eye_paths[i]);
                 sink_.begin(c.index, c.light_paths);
                 integrator.sample(c, work_);
                 sink_.end();
