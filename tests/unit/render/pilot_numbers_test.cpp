@@ -112,34 +112,6 @@ TEST(PilotNumbers, OfTheLightPathCountAreNotThoseOfAPass) {
     EXPECT_NE(of_pilot.variance(), of_pass.variance());
 }
 
-/// The mean number of vertices of a light path, by which connections to a cache are weighted, is not that of the paths in it:
-/// from seed to seed, the two vary independently.
-TEST(PilotNumbers, OfACacheAreNotThoseOfItsPaths) {
-    constexpr int kLightPaths = 8192, kSeeds = 40;
-    const Scene scene = build(front_camera(4) + room() + area_lamp());
-    Moments of_pilot, of_pass, differences;
-    for (int seed = 0; seed < kSeeds; ++seed) {
-        RenderSettings settings;
-        settings.integrator = IntegratorSpec::parse(
-            "bdpt:connections=cache,cache_draws=1,light_paths=" + std::to_string(kLightPaths));
-        settings.sampler = SamplerKind::Independent;
-        settings.seed = uint64_t(seed);
-        settings.spp = 1;
-        Renderer renderer(scene, settings);
-        renderer.run([](const Progress&) {}, std::atomic<bool>(false));
-        double vertices = 0;
-        for (const auto& [name, value] : renderer.integrator().figures())
-            if (name == "cached_vertices") vertices = value;
-        const double pilot = 1 / double(renderer.integrator().counts(scene, kLightPaths).connect),
-                     pass = vertices / kLightPaths;
-        of_pilot.add(pilot);
-        of_pass.add(pass);
-        differences.add(pilot - pass);
-    }
-    EXPECT_NEAR(of_pilot.mean(), of_pass.mean(), 0.05 * of_pass.mean());
-    EXPECT_GT(differences.variance(), 0.5 * (of_pilot.variance() + of_pass.variance()));
-}
-
 TEST(PilotNumbers, DifferByUse) {
     std::set<uint64_t> seeds;
     int count = 0;
