@@ -190,7 +190,7 @@ TEST_F(FileFaults, ASlowCheckpointTakesAHundredthOfTheTimeUnlessItsIntervalIsGiv
                              const Arguments& more) {
         Arguments all = {"-i", "path", "--threads", "1", "--stats", path("stats.json")};
         all.insert(all.end(), more.begin(), more.end());
-        const std::string image = what == "images" ? "faulty/a.exr" : "a.exr";
+        const std::string image = what == "images" ? "faulty/a.pfm" : "a.exr";
         const ProgramResult r = start_with(variables, render(image, all)).wait();
         EXPECT_EQ(r.status, 0) << r.errors;
         fs::remove(path("faulty/a.etd"));
@@ -202,9 +202,9 @@ TEST_F(FileFaults, ASlowCheckpointTakesAHundredthOfTheTimeUnlessItsIntervalIsGiv
     const int by_default = written("checkpoints", slow, {"--time", "600", "--checkpoint", file});
     EXPECT_GE(by_default, 1);
     EXPECT_LE(by_default, 3);
-    EXPECT_GE(written("checkpoints", slow,
+    EXPECT_GT(written("checkpoints", slow,
                       {"--time", "600", "--checkpoint", file, "--checkpoint-every", "6"}),
-              7);
+              by_default);
     // Each file takes 50 s of its clock or more, a hundredth of more than the whole time. Checkpoints come every 15 minutes
     // nevertheless, but images do not.
     const std::string slower = "ETENDUE_CLOCK=1000 ETENDUE_SLOW_WRITE=50";

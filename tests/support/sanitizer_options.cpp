@@ -17,8 +17,10 @@ const char* __tsan_default_suppressions() {
 }
 
 /// Embree frees not everything of a build that runs out of its memory. The name of the library is known without a
-/// symbolizer.
+/// symbolizer. A worker of TBB keeps the last observer that it has seen until it enters another arena, in memory that the
+/// sanitizer does not search.
 const char* __lsan_default_suppressions() {
-    return "leak:libembree3.so\n";
+    return "leak:libembree3.so\n"
+           "leak:tbb::detail::r1::observe\n";
 }
 }
