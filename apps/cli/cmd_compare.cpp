@@ -28,7 +28,7 @@ namespace etendue {
 namespace {
 
 struct CompareCommand {
-    std::vector<std::string> scenes, methods, references;
+    std::vector<std::string> scenes, methods, images, references;
     SceneOptions reading;
     std::string paths = "all", lengths = "1..", reference_method, report = "out/compare",
                 kept_references = "out/references";
@@ -90,6 +90,8 @@ void CompareCommand::check() const {
         (reference_seconds > 0 || reference_spp > 0 || !reference_method.empty()))
         throw std::runtime_error("--reference excludes --reference-time, --reference-spp and "
                                  "--reference-method, which apply to rendered references");
+    if (!images.empty() && scenes.size() > 1)
+        throw std::runtime_error("--images are those of one scene, but several are given");
     if (std::filesystem::exists(report) && !std::filesystem::is_directory(report))
         throw std::runtime_error(fmt::format("--report: {} is not a folder", report));
 }
@@ -111,6 +113,14 @@ CompareSettings CompareCommand::settings(const Scene& scene) const {
     s.runs = runs;
     s.shown = shown();
     s.technique_depth = technique_depth;
+    for (const std::string& given : images) {
+        const size_t equals = given.find('=');
+        if (equals == std::string::npos || equals == 0)
+            throw std::runtime_error(
+                fmt::format("--images must have the form NAME=FOLDER, but is \"{}\"", given));
+        s.images.push_back(
+            find_timed_images(given.substr(0, equals), given.substr(equals + 1), scene.film()));
+    }
     return s;
 }
 
@@ -178,7 +188,7 @@ CompareCommand::Job CompareCommand::load(size_t i) const {
     SceneDescription description = read_scene(options);
     Scene scene = build_scene(description, options);
     CompareSettings s = settings(scene);
-    check_methods(s.methods);
+    check_methods(s);
     if (references.empty()) {
         const RenderSettings how = reference_settings(scene, s.methods);
         if (s.shown.inner_only) check_inner_paths(scene, s.methods, how.integrator);
@@ -269,6 +279,9 @@ void add_compare_command(CLI::App& app) {
                  "Integrators with parameters: path 'bdpt:max_depth=8'; efficiencies are relative "
                  "to the first")
         ->required();
+    c.add_option("--images", command->images,
+                 "Images of another program, NAME=FOLDER: .exr or .pfm files whose names end with "
+                 "the rendering time, such as seed1-64spp-2.5s.exr; repeatable");
     c.add_option("--time", command->seconds, "Seconds that each method renders")
         ->check(must_be_above_0);
     c.add_option("--spp", command->spp, "Samples per pixel of each method, instead of --time")

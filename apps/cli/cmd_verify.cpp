@@ -21,6 +21,7 @@
 #include "render/render_request.h"
 #include "scene_options.h"
 #include "system/output_file.h"
+#include "verify/image_series.h"
 #include "verify/reference_image.h"
 #include "verify/report_json.h"
 #include "verify/verify.h"
@@ -32,6 +33,7 @@ struct VerifyCommand {
     SceneOptions scene;
     std::vector<std::string> methods{"path", "light", "bdpt"};
     std::vector<std::string> against{"path", "light"};
+    std::vector<std::string> images;
     std::string lengths = "1..8", detect, reference, json;
     uint64_t spp = 0;
     double seconds = 0;
@@ -39,6 +41,9 @@ struct VerifyCommand {
     bool quiet = false;
 
     void run();
+
+private:
+    void compare_images() const;
 };
 
 /// A share such as "0.5%" or "0.005", in [1e-4, 1).
@@ -211,14 +216,17 @@ void print_verdict(const VerifyReport& report, const MethodReport& m,
     fmt::print("\n\n");
 }
 
+void print_level(const VerifyReport& report, double alpha) {
+    fmt::print("{} comparisons with a joint probability of a false alarm of {}: each is tested at "
+               "{:.3g}\n\n",
+               report.tests, alpha, report.level);
+}
+
 void print_report(const VerifyReport& report, const Scene& scene, const VerifyOptions& options) {
     fmt::print("{}, {} x {} pixels, {} runs, sampler {}, against {}\n", scene.file(),
                scene.film().crop_width, scene.film().crop_height, options.runs,
                to_string(options.sampler), report.reference);
-    fmt::print("{} comparisons with a joint probability of a false alarm of {}: each is tested at "
-               "{:.3g}\n",
-               report.tests, options.alpha, report.level);
-    fmt::print("\n");
+    print_level(report, options.alpha);
     for (const MethodReport& m : report.methods) {
         fmt::print("{}, {} spp per run\n", m.method, m.spp);
         print_image(report, m);
@@ -233,7 +241,41 @@ void print_report(const VerifyReport& report, const Scene& scene, const VerifyOp
     }
 }
 
+void print_report(const VerifyReport& report, const ImageSeries& images, const ImageSeries& against,
+                  double alpha) {
+    const MethodReport& m = report.methods.front();
+    fmt::print("{} images ({}) against {} ({}), {} x {} pixels\n", images.count(), m.method,
+               against.count(), report.reference, images.width(), images.height());
+    print_level(report, alpha);
+    print_image(report, m);
+    switch (report.verdict(m)) {
+    case Verdict::Consistent:
+        fmt::print("  verdict: no difference of the expectations was found");
+        break;
+    case Verdict::Deviates:
+        fmt::print("  verdict: the expectations DIFFER, where marked above");
+        break;
+    case Verdict::Undecided:
+        fmt::print("  verdict: undecided, more images or more samples are needed");
+        break;
+    }
+    fmt::print("; {}\n", power(report.detectable(m)));
+}
+
+void VerifyCommand::compare_images() const {
+    if (!json.empty()) OutputFile::check(json);
+    ImageSeries ours(options.tiles), theirs(options.tiles);
+    ours.add_files(images);
+    theirs.add_files(against);
+    const VerifyReport report = verify_images(ours, theirs, options.alpha);
+    if (!json.empty()) write_file(json, json_text(to_json(report, ours, theirs, options.alpha)));
+    if (!quiet) print_report(report, ours, theirs, options.alpha);
+    if (report.verdict(report.methods.front()) == Verdict::Deviates)
+        throw std::runtime_error("the expectations of the images differ");
+}
+
 void VerifyCommand::run() {
+    if (!images.empty()) return compare_images();
     const PathSelection selected = parse_lengths(lengths, PathClass::kMostEdges);
     options.shortest = selected.shortest;
     options.longest = selected.longest;
@@ -282,12 +324,18 @@ void VerifyCommand::run() {
     if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
 }
 
+/// Options that apply to --images as well.
+constexpr std::string_view kOptionsOfImages[] = {"--against", "--alpha", "--tiles",
+                                                 "--json",    "--quiet", "--memory"};
+
 }  // namespace
 
 void add_verify_command(CLI::App& app) {
     auto command = std::make_shared<VerifyCommand>();
-    CLI::App& c = *app.add_subcommand("verify", "Test whether methods are unbiased");
+    CLI::App& c = *app.add_subcommand(
+        "verify", "Test whether methods are unbiased, or whether images have the same expectation");
     command->scene.add_to(c);
+    CLI::Option* scene = c.get_option("SCENE")->required(false);
     c.add_option("--methods", command->methods,
                  "Integrators with parameters, as for render -i, separated by spaces")
         ->capture_default_str();
@@ -316,6 +364,12 @@ void add_verify_command(CLI::App& app) {
                                  "Methods to compare with: the first one, and each other one on "
                                  "the classes of paths that it estimates much better")
                         ->capture_default_str();
+    CLI::Option* images =
+        c.add_option(
+             "--images", command->images,
+             "Instead of SCENE: test whether these independent images, .exr or .pfm files or "
+             "folders of them, have the same expectation as those of --against")
+            ->needs(against);
     c.add_option("--reference", command->reference,
                  "Reference image, an .exr with a layer \"variance\", instead of --against")
         ->excludes(against)
@@ -331,7 +385,17 @@ void add_verify_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
-    c.callback([command] { command->run(); });
+    c.callback([command, &c, images, scene] {
+        if (images->count() == 0 && scene->count() == 0)
+            throw CLI::RequiredError("SCENE, or --images with --against");
+        if (images->count() > 0)
+            for (const CLI::Option* o : c.get_options())
+                if (o->count() > 0 && o != images &&
+                    std::ranges::find(kOptionsOfImages, o->get_name()) ==
+                        std::end(kOptionsOfImages))
+                    throw CLI::ExcludesError("--images", o->get_name());
+        command->run();
+    });
 }
 
 }  // namespace etendue

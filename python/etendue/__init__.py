@@ -30,7 +30,7 @@ from ._memory import limit_memory
 from ._method import integrator
 from ._rays import RayHits
 from ._render import FilmView, Progress, RenderError, Result, merge, render, resume
-from ._reports import CompareReport, VerifyReport, compare, verify
+from ._reports import CompareReport, VerifyReport, compare, verify, verify_images
 from ._scenes import (load, load_dict, load_string, look_at, plugins, rotate, scale, translate)
 from ._show import show
 
@@ -40,5 +40,5 @@ __all__ = [
     "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Job", "Progress", "RayHits", "RenderError", "Result",
     "Scene", "SceneError", "VerifyReport", "compare", "core", "denoise", "diff", "integrator", "limit_memory", "load",
     "load_dict", "load_string", "look_at", "merge", "plugins", "read_image", "render", "resume", "rotate", "scale", "show",
-    "start", "tonemap", "translate", "verify", "write_image",
+    "start", "tonemap", "translate", "verify", "verify_images", "write_image",
 ]

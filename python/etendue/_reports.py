@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from . import _etendue
 from ._etendue import Description, Scene
 from ._html import auto_exposure, frame_of, image_html, table_html
+from ._images import _pixels
 from ._integrator import Integrator
 from ._method import Method, text_of
 from ._plots import axes_or_new
@@ -179,9 +180,9 @@ class VerifyReport:
             worst = min((t["p"] for t in tests), default=None)
             ratio = sum(t["method"] for t in tests) / sum(t["reference"] for t in tests) if tests else None
             rows.append({
-                "method": m["method"], "claims": m["estimator"], "verdict": m["verdict"], "spp": m["spp"],
+                "method": m["method"], "claims": m.get("estimator"), "verdict": m["verdict"], "spp": m.get("spp"),
                 "image_ratio": ratio, "image_p": worst, "detectable": m["detectable"].get("image"),
-                "out_of_reach": m["out_of_reach"], "too_rare": m["too_rare"], "slope": m.get("slope"),
+                "out_of_reach": m.get("out_of_reach"), "too_rare": m.get("too_rare"), "slope": m.get("slope"),
             })
         return rows
 
@@ -189,7 +190,8 @@ class VerifyReport:
         """One row for each method, as a pandas.DataFrame, or a list of dicts without pandas. All dimensionless:
         image_ratio is the ratio to the reference, image_p the smallest p-value of the three channels, detectable the smallest
         relative error of the image that would have been found with 90 % probability. out_of_reach and too_rare are shares
-        of the light, and slope is that of the logarithm of the error over the logarithm of the number of runs.
+        of the light, and slope is that of the logarithm of the error over the logarithm of the number of runs. Of images of
+        files or arrays, only verdict, image_ratio, image_p and detectable are known.
         """
         return frame_of(self._rows())
 
@@ -216,7 +218,7 @@ class VerifyReport:
 
     def __repr__(self) -> str:
         return "\n".join(
-            f"{r['method']}: {r['verdict']} (claims to be {r['claims']})"
+            f"{r['method']}: {r['verdict']}" + (f" (claims to be {r['claims']})" if r["claims"] else "")
             + ("" if r["image_ratio"] is None else f", image {r['image_ratio']:.4f} of the reference")
             for r in self._rows()
         )
@@ -242,6 +244,7 @@ def compare(
     reference_time: float | None = None,
     reference_spp: int | None = None,
     references: str | PathLike[str] = "out/references",
+    images: Mapping[str, str | PathLike[str]] | None = None,
     techniques: int = 5,
     progress: bool | None = None,
 ) -> CompareReport:
@@ -259,6 +262,9 @@ def compare(
     lengths: shortest and longest path shown in the images, in edges; None for no limit.
     reference: image files, one for each scene. Without them, references are rendered by reference_method (bdpt) in
         reference_time seconds (10 times time) or with reference_spp (16 times spp), and stored in the folder references.
+    images: images of other programs, as {name: folder}; they are shown and measured like methods. The name of each file,
+        .exr or .pfm, ends with its rendering time in seconds: seed1-64spp-2.5s.exr. Those that share what stands before
+        samples and time are of one run.
     techniques: longest path with technique images, in edges; 0: none.
     progress: shows a status line; None: on terminals.
 
@@ -266,13 +272,14 @@ def compare(
     so, and the report contains the others; if all fail, RuntimeError is raised.
     """
     wanted = [scenes] if isinstance(scenes, (Scene, Description, str, PathLike)) else list(scenes)
-    images = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
+    files = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
+    folders = [(name, fspath(folder)) for name, folder in (images or {}).items()]
     listener, end = _status(progress)
     try:
         comparisons, text = _etendue.compare(
             [built(s, threads) for s in wanted], _methods(methods), time, spp, runs, seed, sampler, threads, techniques,
-            paths, lengths[0], lengths[1], reference_method, reference_time, reference_spp, [fspath(i) for i in images],
-            fspath(references), listener,
+            paths, lengths[0], lengths[1], reference_method, reference_time, reference_spp, [fspath(f) for f in files],
+            fspath(references), folders, listener,
         )
     finally:
         end()
@@ -337,3 +344,31 @@ def verify(
     for reason in data["failures"]:
         warnings.warn(f"left out, since it failed: {reason}", RuntimeWarning, stacklevel=2)
     return VerifyReport(data)
+
+
+def verify_images(
+    images: Sequence[Any], against: Sequence[Any], *, alpha: float = 0.01, tiles: int = 4
+) -> VerifyReport:
+    """Tests whether two sets of independent images, of any programs, have the same expectation, like `etendue verify
+    --images`: compares the means of the image and of its tiles over the images by Welch's t-test.
+
+        ours = [et.render(scene, spp=16, seed=i, sampler="independent") for i in range(16)]
+        et.verify_images(ours, "mitsuba/").verdicts
+
+    images, against: each at least two images of the same size, with different seeds: files (.exr or .pfm), folders of
+        them, arrays of shape (H, W, 3), or Results.
+    alpha: probability of a false alarm in all comparisons together, from 1e-9 to 0.5.
+    tiles: number of tiles along each side of the image, 1 to 64.
+
+    The verdict is "undecided" where the images vary too much for a test. An error that is smaller than `detectable` in
+    frame(), or that stems from light too rare to be in the images, may remain unnoticed. Raises RuntimeError if an image
+    cannot be read, is not finite, has another size, or is given twice.
+    """
+    series = [
+        [
+            (fspath(image), None) if isinstance(image, (str, PathLike)) else (f"{name}[{i}]", _pixels(image))
+            for i, image in enumerate([given] if isinstance(given, (str, PathLike)) else given)
+        ]
+        for name, given in (("images", images), ("against", against))
+    ]
+    return VerifyReport(json.loads(_etendue.verify_images(*series, alpha, tiles)))

@@ -62,6 +62,8 @@ FloatArray to_array(Rgb c);
 
 /// The pixels of an array of shape (H, W, 3).
 using ImageArgument = nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+/// Raises ValueError where there are none, or too many.
+std::span<const Rgb> pixels_of(const ImageArgument& image);
 
 /// As Technique.strategy names it.
 const char* name_of(Strategy strategy);

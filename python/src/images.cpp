@@ -20,7 +20,6 @@
 #include "values.h"
 
 namespace etendue::python {
-namespace {
 
 std::span<const Rgb> pixels_of(const ImageArgument& image) {
     constexpr size_t kMost = 1u << 30;
@@ -29,6 +28,8 @@ std::span<const Rgb> pixels_of(const ImageArgument& image) {
         throw nb::value_error("the image is too large");
     return {reinterpret_cast<const Rgb*>(image.data()), image.shape(0) * image.shape(1)};
 }
+
+namespace {
 
 void check_same_size(const ImageArgument& a, const ImageArgument& b) {
     if (a.shape(0) != b.shape(0) || a.shape(1) != b.shape(1))

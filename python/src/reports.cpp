@@ -15,9 +15,11 @@
 #include "compare/comparison.h"
 #include "compare/default_reference.h"
 #include "compare/report.h"
+#include "image/radiance_file.h"
 #include "render/render_request.h"
 #include "system/failure.h"
 #include "values.h"
+#include "verify/image_series.h"
 #include "verify/report_json.h"
 #include "verify/verify.h"
 
@@ -68,6 +70,9 @@ PathSelection selection(int shortest, std::optional<int> longest, bool inner_onl
     return p;
 }
 
+/// Name and folder of timed images.
+using NamedFolders = std::vector<std::tuple<std::string, std::string>>;
+
 struct ComparisonList {
     std::vector<Comparison> all;
 };
@@ -80,7 +85,9 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
                         const nb::object& reference_method, std::optional<double> reference_time,
                         std::optional<uint64_t> reference_spp,
                         const std::vector<std::string>& references, const std::string& folder,
-                        const nb::object& listener) {
+                        const NamedFolders& images, const nb::object& listener) {
+    if (!images.empty() && scenes.size() > 1)
+        throw nb::value_error("images are those of one scene, but several are given");
     if (time.has_value() == spp.has_value())
         throw nb::value_error("give either time, in seconds, or spp: how long each method renders");
     check_above_0("time, spp, reference_time and reference_spp",
@@ -115,7 +122,9 @@ std::string compare_all(std::shared_ptr<ComparisonList>& out, const std::vector<
         s.runs = checked("runs", runs, 1, 10000);
         s.shown = selection(shortest, longest, paths == "inner");
         s.technique_depth = checked("techniques", technique_depth, 0, 16);
-        check_methods(s.methods);
+        for (const auto& [name, images_folder] : images)
+            s.images.push_back(find_timed_images(name, images_folder, scene->scene.film()));
+        check_methods(s);
         RenderSettings& r = job.reference;
         r.integrator = reference_method.is_none() ? reference_integrator(scene->scene, s.methods)
                                                   : to_spec(scene->scene, reference_method);
@@ -192,6 +201,25 @@ std::string verify_methods(const ScenePtr& scene, const nb::list& methods,
     return json_text(to_json(*report, scene->scene, options));
 }
 
+/// Files and folders, or names and pixels.
+using NamedImages = std::vector<std::tuple<std::string, nb::object>>;
+
+ImageSeries series_of(const NamedImages& images, int tiles) {
+    ImageSeries series(tiles);
+    for (const auto& [name, pixels] : images) {
+        if (pixels.is_none()) {
+            series.add_files({name});
+            continue;
+        }
+        const std::span<const Rgb> colours = pixels_of(nb::cast<ImageArgument>(pixels));
+        RgbImage image{int(nb::len(pixels[0])), int(nb::len(pixels)), {}};
+        image.pixels.assign(colours.begin(), colours.end());
+        check_finite(name, image);
+        series.add(name, image);
+    }
+    return series;
+}
+
 }  // namespace
 
 void bind_reports(nb::module_& m) {
@@ -227,18 +255,28 @@ void bind_reports(nb::module_& m) {
            std::optional<int> longest, const nb::object& reference_method,
            std::optional<double> reference_time, std::optional<uint64_t> reference_spp,
            const std::vector<std::string>& references, const std::string& folder,
-           const nb::object& listener) {
+           const NamedFolders& images, const nb::object& listener) {
             auto out = std::make_shared<ComparisonList>();
             std::string json =
                 compare_all(out, scenes, methods, time, spp, runs, seed, sampler, threads,
                             technique_depth, paths, shortest, longest, reference_method,
-                            reference_time, reference_spp, references, folder, listener);
+                            reference_time, reference_spp, references, folder, images, listener);
             return std::tuple{out, json};
         },
         "scenes"_a, "methods"_a, "time"_a.none(), "spp"_a.none(), "runs"_a, "seed"_a, "sampler"_a,
         "threads"_a, "technique_depth"_a, "paths"_a, "shortest"_a, "longest"_a.none(),
         "reference_method"_a.none(), "reference_time"_a.none(), "reference_spp"_a.none(),
-        "references"_a, "folder"_a, "listener"_a.none());
+        "references"_a, "folder"_a, "images"_a, "listener"_a.none());
+    m.def(
+        "verify_images",
+        [](const NamedImages& images, const NamedImages& against, double alpha, int tiles) {
+            if (!(alpha >= 1e-9 && alpha <= 0.5))
+                throw nb::value_error("alpha must lie between 1e-9 and 0.5");
+            checked("tiles", tiles, 1, 64);
+            const ImageSeries a = series_of(images, tiles), b = series_of(against, tiles);
+            return json_text(to_json(verify_images(a, b, alpha), a, b, alpha));
+        },
+        "images"_a, "against"_a, "alpha"_a, "tiles"_a);
     m.def(
         "verify",
         [](const ScenePtr& scene, const nb::list& methods, std::optional<uint64_t> spp,

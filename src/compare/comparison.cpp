@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <set>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "compare/memory.h"
 #include "image/flip.h"
+#include "image/radiance_file.h"
+#include "math/statistics.h"
 #include "render/warnings.h"
 #include "system/failure.h"
 
@@ -52,6 +56,28 @@ Run finished_run(const MethodRun& c, uint64_t seed, const Reference& reference) 
     run.checkpoints = c.checkpoints;
     run.uncorrected = image_errors(r.film().image(), reference.pixels);
     return run;
+}
+
+/// The images are read again, one at a time, since they may be many.
+Method measured(const TimedImages& images, const Reference& reference) {
+    Method m;
+    m.spec.name = images.name;
+    m.folder = images.folder;
+    for (const std::vector<TimedImages::File>& files : images.runs) {
+        Run run;
+        std::vector<Rgb> last;
+        for (const TimedImages::File& file : files) {
+            last = read_radiance(file.path).pixels;
+            run.checkpoints.push_back({file.spp, file.seconds, errors_of(last, reference)});
+        }
+        run.seed = m.runs.size();
+        run.spp = files.back().spp;
+        run.seconds = files.back().seconds;
+        run.uncorrected = image_errors(last, reference.pixels);
+        if (m.runs.empty()) m.image = std::move(last);
+        m.runs.push_back(std::move(run));
+    }
+    return m;
 }
 
 RenderSettings render_settings(const CompareSettings& s, const IntegratorSpec& integrator,
@@ -152,6 +178,21 @@ std::optional<PowerLaw> mean_slope(const Method& m, const Get& get, std::vector<
     return PowerLaw{mean(slopes), std::exp(log_factor / double(slopes.size())), points};
 }
 
+/// Relative standard error of the mean over the runs of the images' means; infinite where it is unknown.
+double error_of_mean(const Method& m) {
+    if (!m.folder.empty()) {
+        Moments ratios;
+        for (const Run& r : m.runs) ratios.add(r.errors().mean_ratio);
+        return ratios.count() > 1 && ratios.mean() > 0
+                   ? std::sqrt(ratios.squared_error()) / ratios.mean()
+                   : std::numeric_limits<double>::infinity();
+    }
+    double variance = 0;
+    for (const Run& r : m.runs)
+        variance += r.mean.mean > 0 ? sqr(r.mean.standard_error / r.mean.mean) : 0;
+    return std::sqrt(variance) / double(m.runs.size());
+}
+
 }  // namespace
 
 std::vector<std::string> Method::warnings() const {
@@ -168,6 +209,15 @@ void check_methods(const std::vector<MethodSpec>& methods) {
                 throw std::runtime_error(
                     fmt::format("method \"{}\" is given twice", methods[i].name));
     }
+}
+
+void check_methods(const CompareSettings& settings) {
+    check_methods(settings.methods);
+    std::set<std::string> names;
+    for (const MethodSpec& m : settings.methods) names.insert(m.name);
+    for (const TimedImages& images : settings.images)
+        if (!names.insert(images.name).second)
+            throw std::runtime_error(fmt::format("method \"{}\" is given twice", images.name));
 }
 
 void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& methods,
@@ -234,7 +284,7 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
         out.reference_mse = -noise.mse;
         out.reference_rel_mse = -noise.rel_mse;
     }
-    check_methods(settings.methods);
+    check_methods(settings);
     for (const MethodSpec& spec : settings.methods) out.methods.emplace_back().spec = spec;
 
     for (int index = 0; index < settings.runs && !interrupted.load(); ++index) {
@@ -268,13 +318,20 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
             m.peak_bytes = c.memory.peak_bytes();
         }
     }
+    for (const TimedImages& images : settings.images) {
+        progress(fmt::format("{}: errors", images.name));
+        const std::string failure =
+            failure_of([&] { out.methods.push_back(measured(images, reference)); });
+        if (!failure.empty())
+            out.failures.push_back(fmt::format("{} failed: {}", images.name, failure));
+    }
     for (Method& m : out.methods) {
         if (m.runs.empty()) continue;
         progress(fmt::format("{}: FLIP", m.name()));
         FlipResult flip = hdr_flip(m.image, reference.pixels, reference.width, reference.height);
         m.flip = flip.mean;
         m.flip_map = std::move(flip.map);
-        if (settings.technique_depth == 0 || interrupted.load()) continue;
+        if (settings.technique_depth == 0 || interrupted.load() || !m.folder.empty()) continue;
         progress(fmt::format("{}: technique images", m.name()));
         const std::string failure =
             failure_of([&] { render_techniques(scene, settings, m, interrupted); });
@@ -307,12 +364,9 @@ std::vector<MethodSummary> summarize(const Comparison& comparison) {
         s.mape = mean(of_runs(m, [](const Run& r) { return r.errors().mape; }));
         s.spike = mean(of_runs(m, [](const Run& r) { return r.errors().spike; }));
 
-        double variance = 0;
-        for (const Run& r : m.runs)
-            variance += r.mean.mean > 0 ? sqr(r.mean.standard_error / r.mean.mean) : 0;
-        s.mean_ratio = ratio_interval(
-            mean(of_runs(m, [](const Run& r) { return r.errors().mean_ratio; })),
-            std::sqrt(variance) / double(m.runs.size()), comparison.reference.mean_relative_error);
+        s.mean_ratio =
+            ratio_interval(mean(of_runs(m, [](const Run& r) { return r.errors().mean_ratio; })),
+                           error_of_mean(m), comparison.reference.mean_relative_error);
 
         std::vector<double> rmse_slopes, slopes;
         s.rmse_slope = mean_slope(

@@ -9,6 +9,7 @@
 
 #include "compare/error_statistics.h"
 #include "compare/reference.h"
+#include "compare/timed_images.h"
 #include "image/metrics.h"
 #include "render/renderer.h"
 
@@ -22,6 +23,7 @@ struct MethodSpec {
 
 struct CompareSettings {
     std::vector<MethodSpec> methods;
+    std::vector<TimedImages> images;  ///< Of other programs, after the methods.
     SamplerKind sampler = SamplerKind::Sobol;
     uint64_t seed = 0;    ///< Of the first run; the others have consecutive seeds.
     int threads = 0;      ///< 0: one per core.
@@ -52,6 +54,7 @@ struct Run {
 
 struct Method {
     MethodSpec spec;
+    std::string folder;  ///< Of the images of another program; empty where the method was rendered.
     Estimator estimator = Estimator::Unbiased;
     std::vector<Run> runs;
     // Of the first of them:
@@ -84,13 +87,15 @@ struct Comparison {
 using CompareProgress = std::function<void(const std::string& text)>;
 
 /// Renders the methods and evaluates them. If `interrupted` is set, evaluates the images rendered until then. A method
-/// whose rendering fails does not affect the others. Throws std::runtime_error where a method or its parameters do not
+/// whose rendering fails does not affect the others. Of images of other programs, memory, rays and techniques are unknown. Throws std::runtime_error where a method or its parameters do not
 /// exist, or all methods fail.
 Comparison compare(const Scene& scene, const Reference& reference, const CompareSettings& settings,
                    const CompareProgress& progress, const std::atomic<bool>& interrupted);
 
 /// Throws std::runtime_error where a method or its parameters do not exist, or two are the same.
 void check_methods(const std::vector<MethodSpec>& methods);
+/// The same, and where images have the name of a method or of others.
+void check_methods(const CompareSettings& settings);
 
 /// Throws std::runtime_error where the MIS weights of a method differ from those of the reference's method, since the
 /// means of their inner paths are different then.

@@ -83,11 +83,13 @@ Json to_json(const MethodSummary& s) {
 }
 
 Json to_json(const Method& m, const MethodSummary& summary) {
+    const bool is_rendered = m.folder.empty();
     Json runs = Json::array();
     for (const Run& r : m.runs) runs.push_back(to_json(r));
     return {{"name", m.name()},
-            {"integrator", m.spec.integrator.to_string()},
-            {"estimator", to_string(m.estimator)},
+            {"integrator", is_rendered ? Json(m.spec.integrator.to_string()) : Json()},
+            {"estimator", is_rendered ? Json(to_string(m.estimator)) : Json()},
+            {"folder", is_rendered ? Json() : Json(m.folder)},
             {"summary", to_json(summary)},
             {"flip", m.flip},
             {"peak_bytes", m.peak_bytes},

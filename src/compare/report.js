@@ -606,8 +606,8 @@ function download(canvas, name) {
 /// Columns of the table: name; value of a method; choice of the best value, format of the value, small text below it, and
 /// condition for the mark of doubtful values.
 const columns = [
-    ['spp', m => m.summary.spp, {show: v => large(v)}],
-    ['rays', m => m.summary.rays, {show: v => large(v)}],
+    ['spp', m => m.summary.spp, {show: v => v ? large(v) : '–'}],
+    ['rays', m => m.summary.rays, {show: v => v ? large(v) : '–'}],
     ['time', m => m.summary.seconds, {show: v => significant(v) + ' s'}],
     ['RMSE', m => m.summary.rmse, {best: Math.min}],
     ['relMSE', m => m.summary.rel_mse, {best: Math.min, small: m => m.summary.rel_mse_interval &&
@@ -616,8 +616,8 @@ const columns = [
     ['MAPE', m => m.summary.mape, {best: Math.min}],
     ['FLIP', m => m.flip, {best: Math.min}],
     ['mean ratio', m => m.summary.mean_ratio.value, {show: v => v.toFixed(4), doubtful: m =>
-        m.summary.mean_ratio.low_95 > 1 || m.summary.mean_ratio.high_95 < 1,
-        small: m => `± ${significant(m.summary.mean_ratio.high_95 - m.summary.mean_ratio.value, 2)}`}],
+        (m.summary.mean_ratio.low_95 ?? 1) > 1 || (m.summary.mean_ratio.high_95 ?? 1) < 1,
+        small: m => m.summary.mean_ratio.high_95 && `± ${significant(m.summary.mean_ratio.high_95 - m.summary.mean_ratio.value, 2)}`}],
     ['spike', m => m.summary.spike, {best: Math.min}],
     ['slope', m => m.summary.rel_mse_slope?.slope, {show: v => v?.toFixed(2) ?? '–',
         small: m => m.summary.rel_mse_slope_interval &&
@@ -632,7 +632,7 @@ function figuresTable(scene) {
     const head = element('tr', {}, [element('th', {textContent: 'method'}),
         ...columns.map(([name]) => element('th', {textContent: name}))]);
     const rows = scene.methods.map(m => element('tr', {}, [
-        element('td', {}, [m.name, element('small', {textContent: m.estimator})]),
+        element('td', {}, [m.name, element('small', {textContent: m.estimator ?? 'images'})]),
         ...columns.map(([, get, {best, show = significant, small, doubtful}]) => {
             const value = get(m), cell = element('td', {textContent: show(value)});
             const all = scene.methods.map(get).filter(Number.isFinite);

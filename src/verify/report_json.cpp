@@ -24,6 +24,17 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const WelchTest& t) {
     return j;
 }
 
+/// Adds the comparisons of image and tiles, and their power.
+void add_images(const VerifyReport& report, const MethodReport& m, nlohmann::ordered_json& j) {
+    j["untested_tiles"] = m.untested_tiles;
+    const Detectable detectable = report.detectable(m);
+    j["detectable"] = {{"lengths_not_tested", detectable.not_tested}};
+    if (detectable.image) j["detectable"]["image"] = *detectable.image;
+    if (detectable.length) j["detectable"]["length"] = *detectable.length;
+    for (const WelchTest& t : m.image) j["image"].push_back(to_json(report, t));
+    for (const WelchTest& t : m.tiles) j["tiles"].push_back(to_json(report, t));
+}
+
 nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m,
                                const VerifyOptions& options) {
     nlohmann::ordered_json j{{"method", m.method},
@@ -34,15 +45,10 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m
                              {"runaways", m.stats.runaways},
                              {"bounds_exceeded", m.stats.bounds_exceeded},
                              {"out_of_reach", m.out_of_reach},
-                             {"too_rare", m.too_rare},
-                             {"untested_tiles", m.untested_tiles}};
-    const Detectable detectable = report.detectable(m);
-    j["detectable"] = {{"lengths_not_tested", detectable.not_tested}};
-    if (detectable.image) j["detectable"]["image"] = *detectable.image;
-    if (detectable.length) j["detectable"]["length"] = *detectable.length;
-    if (options.detect) j["detectable"]["is_reached"] = detectable.reaches(*options.detect);
-    for (const WelchTest& t : m.image) j["image"].push_back(to_json(report, t));
-    for (const WelchTest& t : m.tiles) j["tiles"].push_back(to_json(report, t));
+                             {"too_rare", m.too_rare}};
+    add_images(report, m, j);
+    if (options.detect)
+        j["detectable"]["is_reached"] = report.detectable(m).reaches(*options.detect);
     for (const LengthReport& l : m.lengths) {
         j["lengths"].push_back(to_json(report, l.comparison));
         j["lengths"].back().update(nlohmann::ordered_json{{"edges", l.edges},
@@ -97,6 +103,24 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const Scene& scene,
     for (const MethodReport& m : report.methods)
         j["methods"].push_back(to_json(report, m, options));
     return j;
+}
+
+nlohmann::ordered_json to_json(const VerifyReport& report, const ImageSeries& images,
+                               const ImageSeries& against, double alpha) {
+    const MethodReport& m = report.methods.front();
+    nlohmann::ordered_json method{{"method", m.method}, {"verdict", to_string(report.verdict(m))}};
+    add_images(report, m, method);
+    return {{"width", images.width()},
+            {"height", images.height()},
+            {"reference", report.reference},
+            {"images", images.count()},
+            {"against", against.count()},
+            {"alpha", alpha},
+            {"tests", report.tests},
+            {"level", report.level},
+            {"failures", report.failures},
+            {"warnings", report.warnings},
+            {"methods", nlohmann::ordered_json::array({std::move(method)})}};
 }
 
 }  // namespace etendue

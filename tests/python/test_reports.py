@@ -244,3 +244,52 @@ def test_results_are_arrays_for_numpy(cornell: et.Scene) -> None:
     assert np.mean(result) == result.image.mean()
     with pytest.raises(ValueError, match="as float64 it has to be copied"):
         result.__array__(np.float64, copy=False)
+
+
+def test_images_of_other_programs_are_verified(cornell: et.Scene, tmp_path: Path) -> None:
+    def images(first: int) -> list[np.ndarray]:
+        return [et.render(cornell, spp=256, seed=first + i, sampler="independent", progress=False).image for i in range(8)]
+
+    ours, others = images(1), images(101)
+    report = et.verify_images(ours, others, tiles=2)
+    assert list(report.verdicts.values()) == ["agrees"]
+    assert "agrees" in repr(report) and "claims" not in repr(report)
+    row = report._rows()[0]
+    assert 0 < row["detectable"] < 0.3 and abs(row["image_ratio"] - 1) < row["detectable"]
+    (tmp_path / "folder").mkdir()
+    for i, image in enumerate(others):
+        et.write_image(tmp_path / "folder" / f"{i}.exr", np.minimum(image, 0.3))
+    assert list(et.verify_images(ours, tmp_path / "folder", tiles=2).verdicts.values()) == ["deviates"]
+
+
+def test_images_that_cannot_be_verified() -> None:
+    good = [np.full((4, 4, 3), 1 + 0.01 * i, np.float32) for i in range(4)]
+    other = [2 * image for image in good]
+    with pytest.raises(RuntimeError, match=r"images\[0\]: expected at least two independent images"):
+        et.verify_images(good[:1], other)
+    with pytest.raises(RuntimeError, match=r"has the same pixels as"):
+        et.verify_images(good, good)
+    with pytest.raises(RuntimeError, match=r"against\[1\]: pixel \(0, 0\) is \(nan"):
+        et.verify_images(good, [other[0], np.full((4, 4, 3), np.nan)])
+    with pytest.raises(RuntimeError, match="there is no such file or folder"):
+        et.verify_images(good, "none")
+    with pytest.raises(ValueError, match="shape"):
+        et.verify_images(good, [np.zeros((4, 4, 2))] * 2)
+    with pytest.raises(ValueError, match="tiles"):
+        et.verify_images(good, other, tiles=0)
+
+
+def test_compare_shows_images_of_other_programs(cornell: et.Scene, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    for i in range(3):
+        image = et.render(cornell, spp=4 << i, seed=i + 7, progress=False).image
+        et.write_image(tmp_path / "other" / f"{4 << i}spp-{2 ** i}s.exr", image)
+    report = et.compare(
+        cornell, ["path"], spp=4, reference_spp=32, references=tmp_path, techniques=0, progress=False,
+        images={"other": tmp_path / "other"},
+    )
+    row = report._rows()[1]
+    assert (row["method"], row["spp"], row["seconds"]) == ("other", 16, 4)
+    assert report.image(1).shape == report.reference().shape
+    with pytest.raises(RuntimeError, match="no .exr or .pfm file"):
+        et.compare(cornell, ["path"], spp=1, images={"x": tmp_path}, progress=False)
