@@ -18,11 +18,13 @@
 #include "interrupt.h"
 #include "messages.h"
 #include "number_checks.h"
+#include "option_groups.h"
 #include "path_lengths.h"
 #include "render/render_request.h"
 #include "scene_options.h"
 #include "system/failure.h"
 #include "system/output_file.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -78,20 +80,20 @@ private:
 
 void CompareCommand::check() const {
     if (seconds > 0 && spp > 0)
-        throw std::runtime_error(
+        throw UsageError(
             "--time and --spp exclude each other: compare at equal time or at equal samples");
     if (!(seconds > 0) && spp == 0)
-        throw std::runtime_error("expected --time or --spp, the limit of each method");
+        throw UsageError("expected --time or --spp, the limit of each method");
     if (!references.empty() && references.size() != scenes.size())
-        throw std::runtime_error(
+        throw UsageError(
             fmt::format("--reference needs one image per scene, but has {} for {} scenes",
                         references.size(), scenes.size()));
     if (!references.empty() &&
         (reference_seconds > 0 || reference_spp > 0 || !reference_method.empty()))
-        throw std::runtime_error("--reference excludes --reference-time, --reference-spp and "
-                                 "--reference-method, which apply to rendered references");
+        throw UsageError("--reference excludes --reference-time, --reference-spp and "
+                         "--reference-method, which apply to rendered references");
     if (!images.empty() && scenes.size() > 1)
-        throw std::runtime_error("--images are those of one scene, but several are given");
+        throw UsageError("--images are those of one scene, but several are given");
     if (std::filesystem::exists(report) && !std::filesystem::is_directory(report))
         throw std::runtime_error(fmt::format("--report: {} is not a folder", report));
 }
@@ -116,7 +118,7 @@ CompareSettings CompareCommand::settings(const Scene& scene) const {
     for (const std::string& given : images) {
         const size_t equals = given.find('=');
         if (equals == std::string::npos || equals == 0)
-            throw std::runtime_error(
+            throw UsageError(
                 fmt::format("--images must have the form NAME=FOLDER, but is \"{}\"", given));
         s.images.push_back(
             find_timed_images(given.substr(0, equals), given.substr(equals + 1), scene.film()));
@@ -274,7 +276,6 @@ void add_compare_command(CLI::App& app) {
     CLI::App& c = *app.add_subcommand(
         "compare", "Compare methods at equal time or equal samples, and write a report");
     c.add_option("SCENE", command->scenes, "Scene files (.xml, .pbrt, .gltf, .glb)")->required();
-    command->reading.add_reading_options(c);
     c.add_option("-m,--methods", command->methods,
                  "Integrators with parameters: path 'bdpt:max_depth=8'; efficiencies are relative "
                  "to the first")
@@ -320,6 +321,9 @@ void add_compare_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
+    command->reading.add_reading_options(c);
+    set_group(c, kForExperts,
+              {"--paths", "--lengths", "--references", "--techniques-max-depth", "--sampler"});
     c.callback([command] { command->run(); });
 }
 

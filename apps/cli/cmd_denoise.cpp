@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "commands.h"
+#include "display_options.h"
 #include "image/denoiser.h"
 #include "image/image_io.h"
 #include "messages.h"
@@ -18,6 +19,7 @@ namespace {
 
 struct DenoiseCommand {
     std::string input, output, albedo, normal;
+    DisplayOptions display;
     int threads = 0;
     bool quiet = false;
 
@@ -38,6 +40,7 @@ RgbImage DenoiseCommand::read_like(const std::string& file, const Image& image) 
 
 void DenoiseCommand::run() const {
     check_image_extension(output);
+    display.check();
     for (const std::string& file : {input, albedo, normal})
         refuse_same_file("image", file, "denoised image", output);
     OutputFile::check(output);
@@ -61,7 +64,7 @@ void DenoiseCommand::run() const {
             throw std::runtime_error(fmt::format("\"{}\": {}", input, e.what()));
         }
     };
-    write_image(output, denoised());
+    display.write(output, denoised());
     if (quiet) return;
     const bool is_guided = std::ranges::any_of(
         image.layers(), [](const std::string& l) { return l.ends_with("albedo"); });
@@ -84,6 +87,7 @@ void add_denoise_command(CLI::App& app) {
     CLI::Option* const albedo = c.add_option("--albedo", command->albedo,
                                              "Image of the reflectance, instead of the layers");
     c.add_option("--normal", command->normal, "Image of the normals, from -1 to 1")->needs(albedo);
+    command->display.add_to(c);
     c.add_option("--threads", command->threads, "Number of threads; 0: one per core")
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));

@@ -19,6 +19,7 @@
 #include "messages.h"
 #include "output_checks.h"
 #include "system/output_file.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -117,8 +118,7 @@ void DiffCommand::run() const {
         flip_result = is_hdr() ? hdr_flip(x.pixels, r.pixels, x.width, x.height)
                                : ldr_flip(x.pixels, r.pixels, x.width, x.height);
     if (flip_map && !flip_result)
-        throw std::runtime_error(
-            "--map with --map-metric flip cannot be combined with --flip none");
+        throw UsageError("--map with --map-metric flip cannot be combined with --flip none");
     // The file first, since standard output may have gone.
     if (!map.empty())
         write_map(flip_map ? flip_result->map

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "display_options.h"
 #include "figures.h"
 #include "image/image_io.h"
 #include "json_text.h"
@@ -16,6 +17,7 @@
 #include "render/warnings.h"
 #include "system/output_file.h"
 #include "technique_files.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -23,13 +25,15 @@ namespace {
 struct MergeCommand {
     std::vector<std::string> files;
     std::string output = "out.exr", techniques, stats;
+    DisplayOptions display;
     bool has_variance = false, quiet = false;
 
     void run() const {
         const bool is_image = std::filesystem::path(output).extension() != ".etd";
         if (is_image) check_image_extension(output);
+        display.check();
         if (!is_image && has_variance)
-            throw std::runtime_error(
+            throw UsageError(
                 fmt::format("--variance adds a layer to an image, but {} is none", output));
         refuse_same_file("sum", output, "statistics", stats);
         for (const std::string& file : files) {
@@ -53,7 +57,7 @@ struct MergeCommand {
         print_warnings(warnings(totals.stats));
         const nlohmann::json report = merging.report(totals);
         if (is_image)
-            write_image(output, image_with_layers(*totals.film, {}, has_variance, report));
+            display.write(output, image_with_layers(*totals.film, {}, has_variance, report));
         else
             merging.write(output, totals);
         if (!techniques.empty())
@@ -76,6 +80,7 @@ void add_merge_command(CLI::App& app) {
     c.add_option("-o,--output", command->output,
                  "Image to write (.exr, .pfm, .hdr or .png), or .etd: a file to merge again")
         ->capture_default_str();
+    command->display.add_to(c);
     c.add_flag("--variance", command->has_variance, "Add the layer \"variance\" to the image");
     c.add_option("--techniques", command->techniques,
                  "Folder for the images of each technique (s,t), weighted and unweighted");

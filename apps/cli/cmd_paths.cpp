@@ -8,6 +8,7 @@
 #include "output_checks.h"
 #include "scene_options.h"
 #include "system/output_file.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -38,7 +39,7 @@ void check_paths(const Scene& scene, const std::string& file) {
 
 void PathsCommand::run() {
     if (check.empty() == (count == 0))
-        throw std::runtime_error("paths: expected either --pick N or --check FILE");
+        throw UsageError("paths: expected either --pick N or --check FILE");
     if (count > 0 && (pixel.empty() || output.empty()))
         throw std::runtime_error("paths: --pick needs --pixel x,y and -o FILE");
     refuse_same_file("scene", scene.file, "paths", output);

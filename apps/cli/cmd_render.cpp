@@ -17,6 +17,7 @@
 
 #include "commands.h"
 #include "description/fingerprint.h"
+#include "display_options.h"
 #include "figures.h"
 #include "image/denoiser.h"
 #include "image/image_io.h"
@@ -24,6 +25,7 @@
 #include "json_text.h"
 #include "messages.h"
 #include "number_checks.h"
+#include "option_groups.h"
 #include "output_checks.h"
 #include "preview.h"
 #include "render/aov.h"
@@ -43,6 +45,7 @@
 #include "system/ranks.h"
 #include "system/section_file.h"
 #include "technique_files.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -52,6 +55,7 @@ struct RenderCommand {
     RenderRequest request;
     std::string output = "out.exr", techniques, preview, stats, checkpoint, resume, passes;
     std::vector<std::string> aovs;
+    DisplayOptions display;
     static constexpr double kCheckpointEvery = 60;
     std::optional<double> checkpoint_every;
     double write_every = 60;
@@ -212,13 +216,13 @@ private:
 void RenderCommand::check_options() const {
     const auto [first_pass, count] = pass_range();
     if (count > 0 && request.spp)
-        throw std::runtime_error(
+        throw UsageError(
             "--passes and --spp exclude each other: --passes says how many passes there are");
     RenderLimits limits = request;
     if (count > 0) limits.spp = count;
     check_limits(limits, first_pass);
     if (resume == kAuto && checkpoint.empty())
-        throw std::runtime_error("--resume auto requires --checkpoint, the file to resume from");
+        throw UsageError("--resume auto requires --checkpoint, the file to resume from");
     for (const auto& [name, file] :
          {std::pair{"image", output}, {"checkpoint", checkpoint_file()}, {"statistics", stats}})
         refuse_same_file("scene", scene.file, name, file);
@@ -236,6 +240,7 @@ void RenderCommand::check_options() const {
             refuse_same_file(name, file, "denoised image", denoised_file());
     }
     check_image_extension(output);
+    display.check();
     const auto folder = std::filesystem::path(output).parent_path();
     if (!folder.empty() && std::filesystem::exists(folder) &&
         !std::filesystem::is_directory(folder))
@@ -243,7 +248,7 @@ void RenderCommand::check_options() const {
     try {
         check_aovs(aovs);
     } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("--aov: {}", e.what()));
+        throw UsageError(fmt::format("--aov: {}", e.what()));
     }
 }
 
@@ -263,7 +268,7 @@ std::pair<uint64_t, uint64_t> RenderCommand::pass_range() const {
     const bool has_colon = a.ec == std::errc() && a.ptr != last && *a.ptr == ':';
     const auto b = has_colon ? std::from_chars(a.ptr + 1, last, end) : a;
     if (!has_colon || b.ec != std::errc() || b.ptr != last || end <= first)
-        throw std::runtime_error(fmt::format(
+        throw UsageError(fmt::format(
             "--passes must have the form A:B, for the passes A to B-1, but is \"{}\"", passes));
     return {first, end - first};
 }
@@ -319,7 +324,7 @@ bool attempt(std::vector<std::string>& failures, const Task& task) {
 void RenderCommand::write_image_somewhere(const Image& image,
                                           std::vector<std::string>& failures) const {
     namespace fs = std::filesystem;
-    if (attempt(failures, [&] { write_image(output, image); })) return;
+    if (attempt(failures, [&] { display.write(output, image); })) return;
     const std::string name =
         fmt::format("etendue-{}{}", ::getpid(), fs::path(output).extension().string());
     std::error_code error;
@@ -327,7 +332,7 @@ void RenderCommand::write_image_somewhere(const Image& image,
         const fs::path file = folder / name;
         std::vector<std::string> ignored;
         if (folder.empty() || fs::exists(file, error)) continue;
-        if (!attempt(ignored, [&] { write_image(file.string(), image); })) continue;
+        if (!attempt(ignored, [&] { display.write(file.string(), image); })) continue;
         failures.back() += fmt::format("; the image is in {}", file.string());
         return;
     }
@@ -340,7 +345,7 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
     const bool has_layers = has_variance || !layers.empty();
     const auto write_layers = [&] {
-        write_image(output, image_with_layers(renderer.film(), layers, has_variance, report));
+        display.write(output, image_with_layers(renderer.film(), layers, has_variance, report));
     };
     // The image alone needs the least memory and space. The one with layers replaces it, except in devices and pipes.
     if (is_in_place() && has_layers)
@@ -362,9 +367,10 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
 
 void RenderCommand::write_denoised(const Job& job, const nlohmann::json& report) const {
     const auto begin = std::chrono::steady_clock::now();
-    write_image(denoised_file(), job.denoiser->denoise(image_with_layers(job.renderer->film(),
-                                                                         job.guides, false, report),
-                                                       job.settings.threads));
+    display.write(
+        denoised_file(),
+        job.denoiser->denoise(image_with_layers(job.renderer->film(), job.guides, false, report),
+                              job.settings.threads));
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
     if (!quiet)
         message("{}: denoised in {} by {}\n", denoised_file(), format_seconds(taken.count()),
@@ -549,9 +555,10 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
                     last_checkpoint.begin(written_state());
                 });
                 write_if_due(images, goes_on, [&] {
-                    write_image(output, image_with_layers(
-                                            renderer.film(), job.layers, has_variance,
-                                            to_json(renderer, s, job.settings, "unfinished", log)));
+                    display.write(
+                        output,
+                        image_with_layers(renderer.film(), job.layers, has_variance,
+                                          to_json(renderer, s, job.settings, "unfinished", log)));
                 });
             },
             interrupts.stop, interrupts.drop));
@@ -603,7 +610,6 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
 void add_render_command(CLI::App& app) {
     auto command = std::make_shared<RenderCommand>();
     CLI::App& c = *app.add_subcommand("render", "Render a scene to an image");
-    command->scene.add_to(c);
     c.add_option("-o,--output", command->output, "Image to write: .exr, .pfm, .hdr or .png")
         ->capture_default_str();
     c.add_option(
@@ -674,6 +680,14 @@ void add_render_command(CLI::App& app) {
                  "Show the image during rendering: tev, or tev://host:port");
     c.add_option("--stats", command->stats, "Write statistics to this JSON file");
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
+    command->display.add_to(c);
+    command->scene.add_to(c);
+    set_group(
+        c, "Long renderings",
+        {"--checkpoint", "--checkpoint-every", "--resume", "--passes", "--write-every", "--grace"});
+    set_group(c, kForExperts,
+              {"--sampler", "--filter-mode", "--techniques", "--techniques-max-depth", "--preview",
+               "--stats"});
     c.callback([command, given_mode] {
         if (command->denoise && given_mode->count() == 0)
             command->request.filter_mode = FilterMode::Sample;

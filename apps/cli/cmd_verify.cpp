@@ -16,11 +16,13 @@
 #include "json_text.h"
 #include "messages.h"
 #include "number_checks.h"
+#include "option_groups.h"
 #include "output_checks.h"
 #include "path_lengths.h"
 #include "render/render_request.h"
 #include "scene_options.h"
 #include "system/output_file.h"
+#include "usage_error.h"
 #include "verify/image_series.h"
 #include "verify/reference_image.h"
 #include "verify/report_json.h"
@@ -54,7 +56,7 @@ double parse_share(const std::string& text, const char* option) {
     const std::string_view rest(end, size_t(begin + text.size() - end));
     if (rest == "%") value /= 100;
     if (error != std::errc() || !(rest.empty() || rest == "%") || !(value >= 1e-4 && value < 1))
-        throw std::runtime_error(fmt::format(
+        throw UsageError(fmt::format(
             "{} must be a share between 0.01% and 100%, such as 0.5% or 0.005, but is \"{}\"",
             option, text));
     return value;
@@ -281,7 +283,7 @@ void VerifyCommand::run() {
     options.longest = selected.longest;
     if (spp > 0) options.spp = spp;
     if (spp > 0 && seconds > 0 && detect.empty())
-        throw std::runtime_error("--time and --spp exclude each other, except with --detect");
+        throw UsageError("--time and --spp exclude each other, except with --detect");
     if (seconds > 0) options.seconds = seconds;
     if (!detect.empty()) options.detect = parse_share(detect, "--detect");
     refuse_same_file("scene", scene.file, "results", json);
@@ -334,8 +336,6 @@ void add_verify_command(CLI::App& app) {
     auto command = std::make_shared<VerifyCommand>();
     CLI::App& c = *app.add_subcommand(
         "verify", "Test whether methods are unbiased, or whether images have the same expectation");
-    command->scene.add_to(c);
-    CLI::Option* scene = c.get_option("SCENE")->required(false);
     c.add_option("--methods", command->methods,
                  "Integrators with parameters, as for render -i, separated by spaces")
         ->capture_default_str();
@@ -385,6 +385,9 @@ void add_verify_command(CLI::App& app) {
         ->capture_default_str()
         ->check(CLI::Range(0, 4096));
     c.add_flag("--quiet", command->quiet, "Print nothing but errors and warnings");
+    command->scene.add_to(c);
+    CLI::Option* scene = c.get_option("SCENE")->required(false);
+    set_group(c, kForExperts, {"--lengths", "--runs", "--alpha", "--tiles", "--sampler"});
     c.callback([command, &c, images, scene] {
         if (images->count() == 0 && scene->count() == 0)
             throw CLI::RequiredError("SCENE, or --images with --against");

@@ -56,7 +56,6 @@ bool is_scene_file(const std::string& word) {
 }
 
 std::string meant_command(const std::string& word, const std::vector<std::string>& commands) {
-    if (is_scene_file(word)) return fmt::format("etendue render {} -o image.exr", word);
     for (const OtherCommand& c : kOtherCommands)
         if (word == c.other) return fmt::format("etendue {}", c.name);
     const std::string near = nearest_name(word, commands);
@@ -110,8 +109,17 @@ std::string unknown_option(const CLI::App& command, const std::vector<std::strin
 
 }  // namespace
 
-std::vector<std::string> with_usual_words(std::vector<std::string> arguments) {
+std::vector<std::string> with_usual_words(const CLI::App& app, std::vector<std::string> arguments) {
     if (arguments.empty()) return arguments;
+    // A scene, before or after options, without a command.
+    const std::vector<std::string> commands = commands_of(app);
+    const auto is_command = [&](const std::string& a) {
+        return std::ranges::find(commands, a) != commands.end();
+    };
+    if (is_scene_file(arguments[0]) ||
+        (arguments[0].starts_with('-') && std::ranges::any_of(arguments, is_scene_file) &&
+         std::ranges::none_of(arguments, is_command)))
+        arguments.insert(arguments.begin(), "render");
     if (arguments[0] == "version") arguments[0] = "--version";
     if (arguments[0] == "help") {
         arguments.erase(arguments.begin());
@@ -129,9 +137,8 @@ std::string refusal(const CLI::App& app, const std::vector<std::string>& argumen
     const std::string& first = arguments[0];
     if (!first.starts_with('-') && std::ranges::find(commands, first) == commands.end()) {
         const std::string meant = meant_command(first, commands);
-        return fmt::format("there is no command \"{}\"{}", first,
-                           meant.empty() ? fmt::format("; there are: {} (see etendue --help)",
-                                                       fmt::join(commands, ", "))
+        return fmt::format("there is no command \"{}\"{} (see etendue --help)", first,
+                           meant.empty() ? fmt::format("; there are: {}", fmt::join(commands, ", "))
                                          : did_you_mean(meant));
     }
     if (first.starts_with('-')) {
@@ -150,11 +157,10 @@ std::string refusal(const CLI::App& app, const std::vector<std::string>& argumen
     if (unknown.empty()) return error + help;
     if (const std::string param = integrator_param(unknown); !param.empty())
         return fmt::format("{} has no option \"{}\"; it is a parameter of integrators: -i "
-                           "INTEGRATOR:{}=...",
-                           first, unknown, param);
-    const std::string meant = meant_option(command, unknown);
-    return fmt::format("{} has no option \"{}\"{}{}", first, unknown, did_you_mean(meant),
-                       meant.empty() ? help : "");
+                           "INTEGRATOR:{}=...{}",
+                           first, unknown, param, help);
+    return fmt::format("{} has no option \"{}\"{}{}", first, unknown,
+                       did_you_mean(meant_option(command, unknown)), help);
 }
 
 }  // namespace etendue

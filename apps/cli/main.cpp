@@ -13,6 +13,8 @@
 #include "hints.h"
 #include "interrupt.h"
 #include "messages.h"
+#include "option_groups.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -32,6 +34,9 @@ int run(CLI::App& app, const std::vector<std::string>& arguments) {
         return app.exit(e);
     } catch (const CLI::Error& e) {
         // One line that points to --help, instead of printing all of it.
+        message("etendue: {}\n", refusal(app, arguments, e.what()));
+        return 2;
+    } catch (const UsageError& e) {
         message("etendue: {}\n", refusal(app, arguments, e.what()));
         return 2;
     } catch (const std::exception&) {
@@ -58,21 +63,23 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", ETENDUE_VERSION);
     app.require_subcommand(1);
     add_render_command(app);
-    add_merge_command(app);
+    add_studio_command(app);
     add_info_command(app);
-    add_convert_command(app);
-    add_compare_command(app);
-    add_diff_command(app);
+    add_list_command(app);
     add_tonemap_command(app);
     add_denoise_command(app);
+    add_diff_command(app);
+    add_compare_command(app);
+    add_convert_command(app);
+    add_merge_command(app);
     add_paths_command(app);
-    add_list_command(app);
     add_verify_command(app);
-    add_studio_command(app);
-    app.footer(
-        "Methods and their parameters: etendue list integrator. Options of a command: etendue "
-        "COMMAND --help.");
-    const int status = run(app, with_usual_words({argv + 1, argv + argc}));
+    for (const char* name : {"convert", "merge", "paths", "verify"})
+        app.get_subcommand(name)->group(kForExperts);
+    app.footer("First picture: etendue SCENE -o picture.png --time 30. Methods and their "
+               "parameters: etendue list "
+               "integrators. Options of a command: etendue COMMAND --help.");
+    const int status = run(app, with_usual_words(app, {argv + 1, argv + argc}));
     errno = 0;
     if (is_output_complete() || status != 0) return status;
     message("etendue: cannot write to standard output{}\n",

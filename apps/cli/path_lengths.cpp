@@ -1,4 +1,5 @@
 #include "path_lengths.h"
+#include "usage_error.h"
 
 #include <charconv>
 #include <stdexcept>
@@ -29,7 +30,7 @@ PathSelection parse_lengths(const std::string& text, int most) {
             lengths.longest <= most)
             return lengths;
     }
-    throw std::runtime_error(
+    throw UsageError(
         fmt::format("--lengths must have the form {}, but is \"{}\"",
                     may_be_open ? "2..8, or 2.." : fmt::format("2..8, within 1..{}", most), text));
 }

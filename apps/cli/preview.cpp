@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "messages.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -55,7 +56,7 @@ Preview::Preview(const std::string& address, const std::string& image_name, int 
         host = rest.substr(0, colon);
         if (colon != std::string::npos) port = rest.substr(colon + 1);
     } else if (address != "tev") {
-        throw std::runtime_error(
+        throw UsageError(
             fmt::format("--preview must be tev or tev://host:port, but is \"{}\"", address));
     }
     addrinfo hints{}, *found = nullptr;

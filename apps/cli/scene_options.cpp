@@ -5,10 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "option_groups.h"
 #include "readers/scene_file.h"
 #include "render/render_request.h"
 #include "scene/builder.h"
 #include "system/memory_limit.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -29,7 +31,7 @@ std::vector<int> parse_integers(const std::string& text, char separator, size_t 
         ++at;
     }
     if (at != end || numbers.size() != count)
-        throw std::runtime_error(
+        throw UsageError(
             fmt::format("{} must have the form {}, but is \"{}\"", option, form, text));
     return numbers;
 }
@@ -57,6 +59,7 @@ void SceneOptions::add_reading_options(CLI::App& command) {
         .add_option("--memory", memory,
                     "Memory that the program may take, such as 4G (default: what is free)")
         ->type_name("SIZE");
+    set_group(command, kForExperts, {"--watertight", "--memory"});
     command.parse_complete_callback([this] {
         if (memory.empty())
             limit_memory_to_available();
@@ -72,8 +75,7 @@ SceneDescription read_scene(const SceneOptions& options) {
     for (const std::string& d : options.defines) {
         const size_t equals = d.find('=');
         if (equals == std::string::npos || equals == 0)
-            throw std::runtime_error(
-                fmt::format("-D must have the form name=value, but is \"{}\"", d));
+            throw UsageError(fmt::format("-D must have the form name=value, but is \"{}\"", d));
         read.defines[d.substr(0, equals)] = d.substr(equals + 1);
     }
     try {

@@ -211,8 +211,9 @@ ImageSeries series_of(const NamedImages& images, int tiles) {
             series.add_files({name});
             continue;
         }
-        const std::span<const Rgb> colours = pixels_of(nb::cast<ImageArgument>(pixels));
-        RgbImage image{int(nb::len(pixels[0])), int(nb::len(pixels)), {}};
+        const auto array = nb::cast<ImageArgument>(pixels);
+        const std::span<const Rgb> colours = pixels_of(array);
+        RgbImage image{int(array.shape(1)), int(array.shape(0)), {}};
         image.pixels.assign(colours.begin(), colours.end());
         check_finite(name, image);
         series.add(name, image);

@@ -127,17 +127,6 @@ std::string dumped(const Json& json, int indent) {
 
 // ------------------------------------------------------------------------------------------------------- pictures
 
-/// Exposure, in stops, that maps the 95th percentile of the luminance to 0.8; a multiple of 1/4.
-float auto_exposure(const std::vector<Rgb>& pixels) {
-    std::vector<float> values;
-    for (Rgb c : pixels)
-        if (is_finite(c)) values.push_back(luminance(c));
-    if (values.empty()) return 0;
-    const auto high = values.begin() + std::ptrdiff_t(0.95 * double(values.size() - 1));
-    std::nth_element(values.begin(), high, values.end());
-    return *high > 0 ? std::round(4 * std::log2(0.8f / *high)) / 4 : 0;
-}
-
 std::vector<Rgb> false_colours(const std::vector<float>& values) {
     std::vector<Rgb> out;
     for (float v : values) out.push_back(magma(v));

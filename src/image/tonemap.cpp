@@ -81,4 +81,14 @@ Rgb magma(float v) {
     return {channel(16), channel(8), channel(0)};
 }
 
+float auto_exposure(std::span<const Rgb> pixels) {
+    std::vector<float> values;
+    for (Rgb c : pixels)
+        if (is_finite(c)) values.push_back(luminance(c));
+    if (values.empty()) return 0;
+    const auto high = values.begin() + std::ptrdiff_t(0.95 * double(values.size() - 1));
+    std::nth_element(values.begin(), high, values.end());
+    return *high > 0 ? std::round(4 * std::log2(0.8f / *high)) / 4 : 0;
+}
+
 }  // namespace etendue

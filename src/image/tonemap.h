@@ -26,6 +26,9 @@ struct ToneMapping {
 /// Linear colours in [0, 1]; NaN stays NaN.
 std::vector<Rgb> tone_map(std::span<const Rgb> pixels, const ToneMapping& mapping);
 
+/// Exposure, in stops, that maps the 95th percentile of the luminance to 0.8; a multiple of 1/4. 0 for black images.
+float auto_exposure(std::span<const Rgb> pixels);
+
 /// The rational function of [Narkowicz 2016] at 0.6 x, the scale he recommends; clamped to [0, 1].
 float aces_curve(float x);
 /// The larger x that the unclamped aces_curve() maps to y in [0, 1).

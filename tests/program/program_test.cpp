@@ -126,25 +126,77 @@ TEST_F(ProgramTest, NamesTheCommandThatIsMeant) {
         EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
         EXPECT_TRUE(r.errors.starts_with("etendue: ")) << r.errors;
     };
-    refused({}, "expected a command: render, merge");
+    refused({}, "expected a command: render, studio");
     refused({"rendr", "a.xml"}, "there is no command \"rendr\"; did you mean \"etendue render\"?");
     refused({"Render", "a.xml"}, "did you mean \"etendue render\"?");
-    refused({"scene.xml"}, "did you mean \"etendue render scene.xml -o image.exr\"?");
-    refused({"scene.pbrt", "-o", "a.exr"},
-            "did you mean \"etendue render scene.pbrt -o image.exr\"?");
-    refused({"integrators"}, "did you mean \"etendue list\"?");
+    refused({"integrators"}, "did you mean \"etendue list\"? (see etendue --help)");
     refused({"view", "a.exr"}, "did you mean \"etendue studio\"?");
-    refused({"frobnicate"}, "there are: render, merge");
+    refused({"frobnicate"}, "there are: render, studio");
     refused({"-i", "bdpt", "render", "a.xml"}, "options follow the command: etendue render");
     refused({"render", "a.xml", "-o", "a.exr", "--samples", "4"}, "did you mean \"--spp\"?");
     refused({"render", "a.xml", "--outptu", "a.exr"}, "did you mean \"--output\"?");
     refused({"render", "a.xml", "-o", "a.exr", "--Time=3"}, "did you mean \"--time\"?");
-    refused({"render", "a.xml", "-o", "a.exr", "--max_depth", "3"}, "-i INTEGRATOR:max_depth=...");
+    refused({"render", "a.xml", "-o", "a.exr", "--max_depth", "3"},
+            "-i INTEGRATOR:max_depth=... (see etendue render --help)");
     refused({"render", "a.xml", "-o", "a.exr", "--width", "3"}, "did you mean \"--resolution\"?");
     refused({"render", "a.xml", "-o", "a.exr", "-x"},
             "render has no option \"-x\" (see etendue render --help)");
     refused({"compare", "a.xml", "--integrator", "path"}, "did you mean \"--methods\"?");
     refused({"render"}, "(see etendue render --help)");
+    refused({"-o", "a.exr"}, "(see etendue --help)");
+}
+
+/// Options that are known, but malformed or do not go together.
+TEST_F(ProgramTest, NamesTheHelpOfACommandThatIsUsedWrongly) {
+    const std::string s = scene.string();
+    for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+             {"render", s, "--resolution", "3"},
+             {"render", s, "--crop", "1,2"},
+             {"render", s, "-D", "x"},
+             {"render", s, "--passes", "3"},
+             {"render", s, "--passes", "0:4", "--spp", "4"},
+             {"render", s, "--aov", "colour"},
+             {"render", s, "--resume", "auto"},
+             {"render", s, "--exposure", "bright", "-o", "a.png"},
+             {"render", s, "--tone", "filmic"},
+             {"compare", s, "-m", "path"},
+             {"compare", s, "-m", "path", "--spp", "1", "--time", "1"},
+             {"compare", s, "-m", "path", "--spp", "1", "--images", "folder"},
+             {"verify", s, "--detect", "2"},
+             {"verify", s, "--lengths", "x"},
+             {"paths", s}}) {
+        SCOPED_TRACE(fmt::format("etendue {}", fmt::join(arguments, " ")));
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.status, 2);
+        EXPECT_TRUE(r.errors.ends_with(fmt::format(" (see etendue {} --help)\n", arguments[0])))
+            << r.errors;
+        EXPECT_EQ(std::count(r.errors.begin(), r.errors.end(), '\n'), 1) << r.errors;
+    }
+}
+
+TEST_F(ProgramTest, RendersASceneThatIsGivenWithoutACommand) {
+    for (const bool is_first : {true, false}) {
+        std::vector<std::string> arguments{"-o", image.string(), "--spp",
+                                           "1",  "--resolution", "4x4"};
+        arguments.insert(is_first ? arguments.begin() : arguments.end(), scene.string());
+        fs::remove(image);
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.status, 0) << r.errors;
+        EXPECT_TRUE(fs::exists(image));
+    }
+}
+
+TEST_F(ProgramTest, ShowsTheOptionsOfExpertsLast) {
+    const std::string help = run({"render", "--help"}).output;
+    const size_t experts = help.find("\nFor experts:");
+    ASSERT_NE(experts, std::string::npos) << help;
+    for (const char* option :
+         {"--output", "--integrator", "--spp", "--time", "--resolution", "--exposure"})
+        EXPECT_LT(help.find(option), experts) << option;
+    EXPECT_LT(help.find("\nLong renderings:"), experts);
+    for (const char* option : {"--filter-mode", "--sampler", "--watertight", "--memory"})
+        EXPECT_GT(help.find(option), experts) << option;
+    EXPECT_NE(run({"--help"}).output.find("\nFor experts:"), std::string::npos);
 }
 
 TEST_F(ProgramTest, KnowsUsualWords) {
@@ -328,6 +380,37 @@ TEST_F(ProgramTest, WritesEveryFormat) {
         EXPECT_EQ(written.width, 5) << name;
         EXPECT_EQ(written.height, 4) << name;
     }
+}
+
+/// What is written to a .png can be looked at, whatever the units of radiance are.
+TEST_F(ProgramTest, MapsWhatItWritesAsPng) {
+    const std::string cornell = (fs::path(ETENDUE_SOURCE_DIR) / "scenes/cornell.xml").string();
+    const auto file = [&](const char* name) { return (folder.path() / name).string(); };
+    const auto render = [&](const std::string& output, std::vector<std::string> more) {
+        more.insert(more.begin(), {"render", cornell, "-o", output, "--resolution", "24x24",
+                                   "--spp", "4", "--quiet"});
+        const ProgramResult r = run(more);
+        EXPECT_EQ(r.status, 0) << r.errors;
+    };
+    const auto same = [](const std::string& a, const std::string& b) {
+        return read_rgb(a).pixels == read_rgb(b).pixels;
+    };
+    render(file("a.exr"), {});
+    render(file("auto.png"), {});
+    ASSERT_EQ(run({"tonemap", file("a.exr"), file("tonemap.png"), "--exposure", "auto"}).status, 0);
+    EXPECT_TRUE(same(file("auto.png"), file("tonemap.png")));
+    render(file("plain.png"), {"--tone", "srgb", "--exposure", "0"});
+    write_image(file("copy.png"), read_image(file("a.exr")));
+    EXPECT_TRUE(same(file("plain.png"), file("copy.png")));
+    render(file("darker.png"), {"--tone", "srgb", "--exposure", "-3"});
+    EXPECT_FALSE(same(file("plain.png"), file("darker.png")));
+
+    // The exposure follows the brightness: a thousandth of the radiance gives the same picture, but for rounding.
+    RgbImage dark = read_rgb(file("a.exr"));
+    for (Rgb& c : dark.pixels) c *= 1.0f / 1024;
+    write_image(file("dark.exr"), rgb_image(dark.width, dark.height, dark.pixels));
+    ASSERT_EQ(run({"tonemap", file("dark.exr"), file("dark.png"), "--exposure", "auto"}).status, 0);
+    EXPECT_TRUE(same(file("dark.png"), file("auto.png")));
 }
 
 TEST_F(ProgramTest, DiffIgnoresTheCaseOfExtensions) {

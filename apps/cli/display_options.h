@@ -1,0 +1,36 @@
+#pragma once
+// How images are mapped for displays where a command writes a .png.
+
+#include <optional>
+#include <string>
+
+#include "image/image.h"
+#include "image/tonemap.h"
+
+namespace CLI {
+class App;
+}
+
+namespace etendue {
+
+struct DisplayOptions {
+    std::string op = "aces", exposure = "auto";
+    float white = 0;  ///< See ToneMapping.
+
+    /// Adds --tone and --exposure.
+    void add_to(CLI::App& command);
+    /// Adds --operator, --exposure with another default, and --white.
+    void add_to_tonemap(CLI::App& command);
+    /// Throws UsageError where they have no meaning.
+    void check() const { stops(); }
+
+    ToneMapping mapping(std::span<const Rgb> pixels) const;
+    /// Writes the image; a .png is mapped first.
+    void write(const std::string& path, const Image& image) const;
+
+private:
+    /// Empty for "auto".
+    std::optional<float> stops() const;
+};
+
+}  // namespace etendue
