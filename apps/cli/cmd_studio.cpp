@@ -23,6 +23,7 @@
 #include "render/scene_integrator.h"
 #include "scene_options.h"
 #include "session/session.h"
+#include "session/shared_slot.h"
 #include "studio/api.h"
 #include "studio/guard.h"
 #include "studio/server.h"
@@ -45,7 +46,7 @@ struct StudioCommand {
 private:
     void check_files() const;
     ApiOptions api_options() const;
-    LoadedScene load() const;
+    LoadedScene load(const SceneView& view) const;
     void print_urls(const Server& server, const std::string& token) const;
     void start_first_run(Session& session) const;
     void watch(Session& session, const Api& api, const std::atomic<bool>& stop) const;
@@ -219,10 +220,30 @@ void StudioCommand::watch(Session& session, const Api& api, const std::atomic<bo
     }
 }
 
-LoadedScene StudioCommand::load() const {
+/// Puts all sensors, one of which is used, where the camera is. A sensor that mirrors the image still does.
+void place_sensors(SceneDescription& description, const SceneView::Camera& camera) {
+    const auto to_world = Transform::look_at(camera.eye, camera.target, camera.up);
+    for (SceneObject& o : description.objects) {
+        if (o.category != "sensor" || !to_world) continue;
+        const Param* old = o.find("to_world");
+        const Transform* before = old ? old->as<Transform>() : nullptr;
+        const bool is_mirrored = before && before->determinant3() < 0;
+        Param placed{
+            "to_world",
+            SharedTransform(is_mirrored ? *to_world * Transform::scale({-1, 1, 1}) : *to_world),
+            o.where};
+        std::erase_if(o.params, [](const Param& p) { return p.name == "to_world"; });
+        o.params.push_back(std::move(placed));
+    }
+}
+
+LoadedScene StudioCommand::load(const SceneView& view) const {
     SceneOptions loading = scene;
     loading.threads = threads;
-    const SceneDescription description = read_scene(loading);
+    if (!view.sensor.empty()) loading.sensor = view.sensor;
+    if (view.crop) loading.crop = fmt::format("{}", fmt::join(*view.crop, ","));
+    SceneDescription description = read_scene(loading);
+    if (view.camera) place_sensors(description, *view.camera);
     const SceneSource source{.fingerprint = runs.empty() ? 0 : scene_fingerprint(description),
                              .lenient = loading.lenient,
                              .watertight = loading.watertight};
@@ -247,12 +268,16 @@ void StudioCommand::run() const {
     check_files();
     if (const std::string& i = first_run.integrator; !i.empty())
         make_integrator(IntegratorSpec::parse(i));
-    const ApiOptions options = api_options();
+    ApiOptions options = api_options();
+    SharedSlot<const SceneView> view(std::make_shared<const SceneView>());
+    options.set_view = [&](const SceneView& v) {
+        view.store(std::make_shared<const SceneView>(v));
+    };
 
     const Interrupts interrupts = catch_interrupts(grace);
     // Declared so that what calls others is destroyed before these.
     Server server(listen, port);
-    Session session([this] { return load(); }, threads, {.folder = runs});
+    Session session([this, &view] { return load(*view.load()); }, threads, {.folder = runs});
     Api api(session, options);
     const Server::Serving serving = server.start(api);
     try {

@@ -28,6 +28,7 @@ struct Session::Run : std::enable_shared_from_this<Session::Run> {
     SharedSlot<const Snapshot> snapshot;
     SharedSlot<const TechniqueSnapshot> techniques;
     SharedSlot<const SeedSeries> series{std::make_shared<const SeedSeries>()};
+    const std::shared_ptr<LargestPasses> largest = std::make_shared<LargestPasses>();
     std::atomic<bool> is_wanted{true}, wants_techniques{false};
     std::shared_ptr<const LoadedScene> loaded;  ///< Constant from the start on.
     const Scene& scene() const { return loaded->scene; }

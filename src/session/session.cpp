@@ -354,6 +354,8 @@ void Session::after_pass(Run& run, const Progress& p) {
                 s.history.push_back({p.passes, p.seconds, error});
         }
     }
+    if (const Film& film = run.renderer->film(); !film.has_groups() && !run.has_seeds())
+        run.largest->add(film.moments(), film.passes());
     run.log.add(p.seconds, p.renderer.stats().pairs);
     // The first picture does not wait. Long passes are shown unasked, so that saving need not wait for the next one.
     constexpr double kLong = 0.5;
@@ -654,6 +656,11 @@ std::shared_ptr<const TechniqueSnapshot> Session::techniques(int id) {
 std::shared_ptr<const SeedSeries> Session::seed_series(int id) const {
     const std::lock_guard lock(mutex_);
     return find(id)->series.load();
+}
+
+std::shared_ptr<const LargestPasses> Session::largest_passes(int id) const {
+    const std::lock_guard lock(mutex_);
+    return find(id)->largest;
 }
 
 void Session::replay_last(int id, uint64_t pixel, size_t most_paths,

@@ -16,6 +16,7 @@
 
 #include "render/render_request.h"
 #include "render/writing_pace.h"
+#include "session/largest_passes.h"
 #include "session/loaded_scene.h"
 #include "session/replay.h"
 #include "session/run_folder.h"
@@ -183,6 +184,8 @@ public:
     std::shared_ptr<const TechniqueSnapshot> techniques(int run);
     /// The finished renderings of a run with several seeds; empty for other runs.
     std::shared_ptr<const SeedSeries> seed_series(int run) const;
+    /// The brightest pass of each pixel. Nothing is known of runs with chains or several seeds.
+    std::shared_ptr<const LargestPasses> largest_passes(int run) const;
     /// Calls `done` in a thread of the session with the paths of a pixel, at most `most_paths`, or with an error. They are
     /// those of the last pass or, while its samples are traced, of the pass in flight, whose end is not waited for.
     void replay_last(int run, uint64_t pixel, size_t most_paths,

@@ -28,9 +28,9 @@ using nlohmann::json;
 struct PageFile {
     std::string_view path, type, text;
 };
-const std::array<PageFile, 10>& page_files() {
+const std::array<PageFile, 11>& page_files() {
     constexpr std::string_view kScript = "text/javascript; charset=utf-8";
-    static const std::array<PageFile, 10> files{{
+    static const std::array<PageFile, 11> files{{
         {"/", "text/html; charset=utf-8", kIndexHtml},
         {"/studio.css", "text/css; charset=utf-8", kStudioCss},
         {"/main.js", kScript, kMainJs},
@@ -41,6 +41,7 @@ const std::array<PageFile, 10>& page_files() {
         {"/space.js", kScript, kSpaceJs},
         {"/paths.js", kScript, kPathsJs},
         {"/inspector.js", kScript, kInspectorJs},
+        {"/histogram.js", kScript, kHistogramJs},
     }};
     return files;
 }
@@ -87,6 +88,7 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
     if (path == "/v1/state") return needs(is_get), done(state());
     if (path == "/v1/image") return needs(is_get), image(request, done);
     if (path == "/v1/pixel") return needs(is_get), done(pixel(request));
+    if (path == "/v1/worst") return needs(is_get), worst(request, done);
     if (path == "/v1/difference") return needs(is_get), difference(request, done);
     if (path == "/v1/gain") return needs(is_get), gain(request, done);
     if (path == "/v1/techniques") return needs(is_get), done(techniques(request));
@@ -187,6 +189,10 @@ Reply Api::state() {
             {"width", g.crop_width},
             {"height", g.crop_height},
             {"crop", {g.crop_x, g.crop_y}},
+            {"whole", {g.width, g.height}},
+            {"sensors", scene->sensor_names()},
+            {"sensor", scene->sensor_index()},
+            {"has_own_camera", view_.camera.has_value()},
             {"shapes", scene->shapes().size()},
             {"emitters", scene->emitters().size()},
             {"center", to_json(is_empty ? Vec3() : scene->bounds().center())},
@@ -246,6 +252,41 @@ RunRequest Api::run_request(const json& body) const {
     return request;
 }
 
+/// What the body does not name stays as it is; null takes it away.
+void Api::set_view(const json& body) {
+    if (!options_.set_view) throw ApiError(422, "the view cannot be changed here");
+    const std::shared_ptr<const Scene> scene = this->scene();
+    SceneView view = view_;
+    if (body.contains("sensor")) {
+        const int last = int(scene->sensor_names().size()) - 1;
+        view.sensor = std::to_string(integer(body, "sensor", 0, last));
+        view.crop = {};
+        view.camera = {};
+    }
+    if (body.contains("crop")) {
+        view.crop = {};
+        if (const json& crop = body["crop"]; !crop.is_null()) {
+            const FilmGeometry& g = scene->film();
+            const int x = int(integer(crop, "x", 0, g.width - 1)),
+                      y = int(integer(crop, "y", 0, g.height - 1));
+            view.crop = {x, y, int(integer(crop, "w", 1, g.width - x)),
+                         int(integer(crop, "h", 1, g.height - y))};
+        }
+    }
+    if (body.contains("camera")) {
+        view.camera = {};
+        if (const json& c = body["camera"]; !c.is_null()) {
+            view.camera = {to_vec(c.value("eye", json()), "eye"),
+                           to_vec(c.value("target", json()), "target"),
+                           to_vec(c.value("up", json()), "up")};
+            if (!Transform::look_at(view.camera->eye, view.camera->target, view.camera->up))
+                throw ApiError(422, "\"eye\", \"target\" and \"up\" are no view");
+        }
+    }
+    view_ = view;
+    options_.set_view(view);
+}
+
 /// A run is opened by the name of a file in the folder of kept runs; links are not followed.
 void Api::open(const json& body, const Done& done) {
     const std::string folder = session_.runs_folder(), name = text_of(body, "file");
@@ -275,6 +316,11 @@ void Api::run(const json& body, const Done& done) {
         session_.reload();
         return done(Reply::json("{}"));
     }
+    if (action == "view") {
+        set_view(body);
+        session_.reload();
+        return done(Reply::json("{}"));
+    }
     const int id = int(integer(body, "run", 1, INT32_MAX));
     if (action == "stop")
         session_.stop(id);
@@ -285,8 +331,8 @@ void Api::run(const json& body, const Done& done) {
     else if (action == "remove")
         session_.remove(id);
     else
-        throw ApiError(422, "\"action\" must be start, stop, continue, discard, remove, open, list "
-                            "or reload");
+        throw ApiError(422, "\"action\" must be start, stop, continue, discard, remove, open, "
+                            "list, view or reload");
     done(Reply::json(dump({{"run", id}})));
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 // The protocol between page and session, version 1: JSON, and binary images and geometry.
 
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -20,6 +22,16 @@
 
 namespace etendue {
 
+/// What of the scene is rendered, in place of what its file and the command line say.
+struct SceneView {
+    std::string sensor;                      ///< As BuildOptions has it; empty: as it was.
+    std::optional<std::array<int, 4>> crop;  ///< x, y, width and height, of the whole image.
+    struct Camera {
+        Vec3 eye, target, up;
+    };
+    std::optional<Camera> camera;  ///< Place and direction of the sensor.
+};
+
 struct ApiOptions {
     std::string token;
     std::string scene_file;
@@ -27,6 +39,8 @@ struct ApiOptions {
     std::optional<RgbImage> reference;  ///< Shown while it has the size of the image.
     /// By which the page may be asked for, beside localhost and addresses.
     std::vector<std::string> hosts;
+    /// Changes what is loaded from the next Session::reload() on; empty: nothing can be changed.
+    std::function<void(const SceneView&)> set_view = {};
 };
 
 class Api final : public Handler {
@@ -45,6 +59,9 @@ private:
 
     Reply state();
     Reply pixel(const Request& request);
+    /// The pixels that owe most to one pass, or the brightest pass of one pixel.
+    void worst(const Request& request, const Done& done);
+    void set_view(const nlohmann::json& body);
     void difference(const Request& request, const Done& done);
     void gain(const Request& request, const Done& done);
     Reply techniques(const Request& request);
@@ -72,6 +89,7 @@ private:
     Session& session_;
     const ApiOptions options_;
     std::string scene_folder_;
+    SceneView view_;
     double charged_ = 0;  ///< Processor time of the server's thread that was charged to snapshots.
 
     std::chrono::steady_clock::time_point looked_{};

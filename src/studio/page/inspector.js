@@ -17,6 +17,8 @@ export class Inspector {
         this.pixel = {x: 0, y: 0, run: 0};
         /** @type {any[]} */
         this.paths = [];
+        /** Of all contributions but splats. */
+        this.sum = [0, 0, 0];
         this.chosen = -1;
         /** Run of the paths; 0: there are none. */
         this.of = 0;
@@ -28,7 +30,7 @@ export class Inspector {
         this.message = element('p', {role: 'status'});
         this.list = element('div', {className: 'replayed', role: 'group', 'aria-label': 'Paths by contribution'});
         parent.append(this.place, element('div', {className: 'bar'}, [
-            element('button', {type: 'button', textContent: 'Trace again', onclick: () => this.replay()}),
+            element('button', {type: 'button', textContent: 'Trace again', onclick: () => { this.replay(); }}),
             element('label', {}, ['passes ', this.passes]), element('label', {title: 'Trace one pass of light paths for those that are splatted'}, [this.splats, ' splats']),
             element('label', {}, ['technique ', this.technique]),
             element('button', {type: 'button', textContent: 'Clear', onclick: () => this.clear()})]), this.message, this.list);
@@ -50,18 +52,37 @@ export class Inspector {
         this.fill();
     }
 
-    async replay() {
+    /**
+     * Traces one pass of the pixel again; with the splats of this pass where the paths from the eye are not what made the pixel bright.
+     * @param {number} pass @param {number} value Luminance of the pixel in this pass.
+     */
+    async replayPass(pass, value) {
+        this.splats.checked = false;
+        await this.replay(pass);
+        const luminance = (/** @type {number[]} */ v) => 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2];
+        if (this.of > 0 && this.message.className === '' && luminance(this.sum) < 0.5 * value) {
+            this.splats.checked = true;
+            await this.replay(pass);
+        }
+        if (this.paths.length === 0) return;
+        this.chosen = 0;
+        this.update();
+    }
+
+    /** @param {number} [pass] Only this pass. */
+    async replay(pass) {
         const request = ++this.request, {x, y, run} = this.pixel;
         this.of = run;
         this.message.className = '';
         // Methods that share light paths answer between two passes.
         this.message.textContent = 'tracing, or waiting for the end of the pass …';
         try {
-            const r = await this.server.post('/v1/replay', {x, y, run, passes: Number(this.passes.value), splats: this.splats.checked});
+            const r = await this.server.post('/v1/replay', {x, y, run, pass: pass ?? 0, passes: pass === undefined ? Number(this.passes.value) : 1, splats: this.splats.checked});
             if (request !== this.request) return;
             this.paths = r.paths;
+            this.sum = r.sum;
             const sum = r.sum.map((/** @type {number} */ v) => significant(v / Math.max(1, r.passes), 4)).join(', ');
-            this.message.textContent = `pixel (${x}, ${y}): ${r.paths.length} paths of ${r.is_last_pass ? 'one pass' : `${r.passes} passes`}${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
+            this.message.textContent = `pixel (${x}, ${y}): ${r.paths.length} paths of ${r.is_last_pass ? 'the last pass' : pass !== undefined ? `pass ${pass}` : `${r.passes} passes`}${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
                 + (r.light_paths ? `; ${r.light_paths} light paths` : '');
         } catch (e) {
             if (request !== this.request) return;

@@ -8,6 +8,7 @@ import {drawPlot} from './plot.js';
 import {Space} from './space.js';
 import {PathEditor} from './paths.js';
 import {Inspector} from './inspector.js';
+import {drawHistogram, exposureFor, histogramOf} from './histogram.js';
 
 /** @param {string} id @returns {any} */
 const at = id => document.getElementById(id);
@@ -136,6 +137,7 @@ function textOf(s, passes) {
 /** @param {0 | 1} place @param {import('./server.js').Picture | null} picture @param {string} text */
 function draw(place, picture, text) {
     view.show(place, picture);
+    if (place === 0) updateHistogram(picture);
     drawn[place] = text;
     label();
 }
@@ -158,6 +160,94 @@ function showIn(place, run, what) {
     updateRuns();
     // Another run has other techniques.
     if (place === 0 && tools.listed?.run !== run) updateViewOptions().catch(() => {});
+}
+
+/**
+ * Of the first picture.
+ * @type {import('./histogram.js').Histogram | null}
+ */
+let histogram = null;
+
+/** @param {import('./server.js').Picture | null} picture */
+function updateHistogram(picture) {
+    histogram = picture && histogramOf(picture);
+    view.white = histogram?.largest || 1;
+    showHistogram();
+}
+
+function showHistogram() {
+    if (pane !== 'image') return;
+    drawHistogram(at('histogram'), histogram, view.exposure);
+    const share = (/** @type {number} */ v) => v > 0 && v < 0.001 ? '< 0.1 %' : `${significant(100 * v, 2)} %`;
+    at('histogram-text').textContent = histogram ? `stops; white begins at the line. Largest ${significant(histogram.largest, 3)}, 95 % below ${significant(histogram.percentile, 3)}`
+        + (histogram.dark > 0 ? `, ${share(histogram.dark)} not above 0` : '') + (histogram.bad > 0 ? `, ${share(histogram.bad)} not finite` : '') : '';
+}
+
+// ---------------------------------------------------------------------------------------- worst pixels
+
+/**
+ * Traces again what made a pixel bright in its brightest pass.
+ * @param {any} worst As the program describes it.
+ */
+async function traceWorst({x, y, pass, value}) {
+    view.corner = null;
+    view.moveCursor(x, y);
+    showPane('paths');
+    inspector?.setPixel(x, y, shown[0].run);
+    await inspector?.replayPass(pass, value);
+}
+
+const percent = (/** @type {number} */ share) => `${Math.round(100 * share)} %`;
+
+/** Lists the pixels of the shown run that owe most to one pass. */
+async function listWorst() {
+    const run = shown[0].run, list = tools.worstList;
+    if (run === 0) return;
+    try {
+        const {passes, pixels} = await server.get(`/v1/worst?run=${run}&count=20`);
+        tools.worstText.textContent = pixels.length > 0 ? `run ${run}, ${passes} passes: what one pass made of the pixel` : `run ${run}: nothing is known, as of chains, of several seeds, and before the second pass`;
+        list.replaceChildren(...pixels.map((/** @type {any} */ w) => element('button', {type: 'button', textContent: `(${w.x}, ${w.y}) pass ${w.pass}: ${percent(w.share)}, luminance ${significant(w.value, 3)}`,
+            title: 'Trace its paths in this pass again', onclick: () => { traceWorst(w); }, onfocus: () => { view.corner = null; view.moveCursor(w.x, w.y); }})));
+    } catch (e) {
+        tools.worstText.textContent = /** @type {Error} */ (e).message;
+    }
+}
+
+// ---------------------------------------------------------------------------------------- what is rendered
+
+/**
+ * What follows when the scene is loaded with another view.
+ * @type {(() => Promise<any>) | null}
+ */
+let afterLoad = null;
+
+/**
+ * Has the program load the scene with another camera, region or sensor, and render it by the method that is shown.
+ * @param {any} change
+ */
+async function changeView(change) {
+    const run = runs.get(shown[0].run) ?? runs.get(newest());
+    await server.post('/v1/run', {action: 'view', ...change});
+    afterLoad = async () => {
+        // Files are named, not addressed.
+        const integrator = (run?.integrator ?? '').replace(/,?user_paths=[^,]*/, '');
+        await begin({action: 'start', integrator, ...(run?.sampler ? {sampler: run.sampler} : {})});
+        banner('image', '');
+    };
+}
+
+/** Renders the selected rectangle alone. */
+function renderRegion() {
+    const {x, y, w, h} = view.selected(), [cx, cy] = state.scene.crop;
+    if (w * h > 1) report(changeView({crop: {x: x + cx, y: y + cy, w, h}}));
+}
+
+async function savePicture() {
+    const png = await view.png();
+    if (!png) return;
+    const link = element('a', {href: URL.createObjectURL(png), download: `${(state?.scene_file ?? 'picture').replace(/\.[^.]*$/, '')}.png`});
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
 let pixelRequest = 0;
@@ -186,6 +276,12 @@ async function showPixel() {
     };
     await describePixel(shown[0]);
     await describePixel(shown[1]);
+    if (isPixel && shown[0].run > 0) {
+        const {pixel} = await server.get(`/v1/worst?run=${shown[0].run}&x=${x}&y=${y}`).catch(() => ({pixel: null}));
+        if (pixel) parts.push(element('div', {className: 'bar'}, [element('span', {className: 'soft', textContent: `brightest in pass ${pixel.pass}: ${percent(pixel.share)} of its sum`}),
+            element('button', {type: 'button', id: 'trace-brightest', textContent: 'Trace it', onclick: () => { traceWorst(pixel); }})]));
+    }
+    tools.region.disabled = w * h === 1;
     if (request === pixelRequest) at('pixel').replaceChildren(...parts);
     inspector?.setPixel(view.cursor[0], view.cursor[1], shown[0].run);
 }
@@ -211,7 +307,7 @@ function makeTools() {
     tools.exposureText = element('output', {textContent: '0'});
     tools.view = element('select', {id: 'view-choice', onfocus: () => updateViewOptions().catch(() => {}), onchange: () => showIn(0, shown[0].run || newest(), tools.view.value)});
     tools.mode = element('select', {id: 'mode', onchange: () => { view.mode = Number(tools.mode.value); view.redraw(); }},
-        ['colours', 'false colours', 'difference'].map((t, i) => element('option', {value: i, textContent: t})));
+        ['colours', 'false colours', 'relative difference', 'signed difference', 'squared difference'].map((t, i) => element('option', {value: i, textContent: t})));
     tools.against = element('select', {id: 'against', onchange: () => {
         const value = tools.against.value;
         if (value === 'reference') showIn(1, 0, 'reference');
@@ -220,11 +316,23 @@ function makeTools() {
     tools.wipe = number({id: 'wipe', min: 0, max: 1, step: 0.01, value: 0.5, oninput: () => { view.wipe = Number(tools.wipe.value); view.redraw(); }});
     tools.measure = element('button', {type: 'button', textContent: 'Measure', title: 'relMSE and FLIP of the two images', disabled: true, onclick: measure});
     tools.measured = element('output', {});
+    tools.tone = element('select', {id: 'tone', onchange: () => { view.tone = Number(tools.tone.value); view.redraw(); }},
+        ['sRGB', 'ACES', 'Reinhard'].map((t, i) => element('option', {value: i, textContent: t})));
+    tools.auto = element('button', {type: 'button', id: 'auto-exposure', textContent: 'Auto', title: 'The exposure that fits the image', onclick: () => { if (histogram) setExposure(exposureFor(histogram)); }});
+    tools.region = element('button', {type: 'button', id: 'render-region', textContent: 'Render region', title: 'Render the selected rectangle alone', disabled: true, onclick: renderRegion});
+    tools.whole = element('button', {type: 'button', id: 'render-whole', textContent: 'Render all', title: 'Render the whole image again', hidden: true, onclick: () => report(changeView({crop: null}))});
+    tools.camera = element('button', {type: 'button', id: 'file-camera', textContent: 'Camera of the file', title: 'Put the camera back', hidden: true, onclick: () => report(changeView({camera: null}))});
+    tools.sensor = element('select', {id: 'sensor', onchange: () => report(changeView({sensor: Number(tools.sensor.value)}))});
+    tools.sensorLabel = element('label', {hidden: true}, ['sensor ', tools.sensor]);
+    tools.worstText = element('p', {className: 'soft'});
+    tools.worstList = element('div', {className: 'replayed', role: 'group', 'aria-label': 'Pixels by what one pass made of them'});
+    at('worst').append(element('button', {type: 'button', id: 'find-worst', textContent: 'Find', onclick: () => { listWorst(); }}), tools.worstText, tools.worstList);
     const field = (/** @type {string} */ text, /** @type {any} */ input, /** @type {any[]} */ ...more) => element('label', {}, [`${text} `, input, ...more]);
-    at('view-tools').append(field('show', tools.view), field('exposure', tools.exposure, ' ', tools.exposureText), field('as', tools.mode),
+    at('view-tools').append(field('show', tools.view), field('exposure', tools.exposure, ' ', tools.exposureText), tools.auto, field('as', tools.mode), field('tone', tools.tone),
         field('compare with', tools.against), field('wipe', tools.wipe),
         element('button', {type: 'button', textContent: 'Flip', onclick: flip}), element('button', {type: 'button', textContent: 'Whole image', onclick: () => view.resetZoom()}),
-        tools.measure, tools.measured);
+        tools.measure, element('button', {type: 'button', id: 'save-picture', textContent: 'Save picture', title: 'The picture as it is shown, as a PNG file', onclick: () => { savePicture(); }}),
+        tools.region, tools.whole, tools.camera, tools.sensorLabel, tools.measured);
 }
 
 /** So many that scenes in any units can be seen. */
@@ -235,6 +343,7 @@ function setExposure(stops) {
     view.exposure = Math.min(Math.max(stops, -kMostStops), kMostStops);
     tools.exposure.value = view.exposure;
     tools.exposureText.textContent = String(view.exposure);
+    showHistogram();
     view.redraw();
 }
 
@@ -358,7 +467,20 @@ async function update() {
     }
     await updateViewOptions();
     updateRuns();
-    if (before > 0 && state.scene_version !== before) showOtherScene(state.scene);
+    if (state.scene) {
+        const {whole, width, height, sensors, sensor, has_own_camera: hasOwnCamera} = state.scene;
+        tools.whole.hidden = whole[0] === width && whole[1] === height;
+        tools.camera.hidden = !hasOwnCamera;
+        tools.sensorLabel.hidden = sensors.length < 2;
+        setOptions(tools.sensor, sensors.map((/** @type {string} */ name, /** @type {number} */ i) => [String(i), `${i}: ${name}`]), String(sensor));
+    }
+    if (state.load_error) afterLoad = null;
+    if (before > 0 && state.scene_version !== before) {
+        showOtherScene(state.scene);
+        const next = afterLoad;
+        afterLoad = null;
+        if (next) report(next());
+    }
 }
 
 /**
@@ -433,15 +555,17 @@ function showPane(name) {
         at(`tab-${p}`).tabIndex = p === name ? 0 : -1;
     }
     for (const id of ['editor-section', 'inspector-section']) at(id).hidden = name !== 'paths';
-    for (const id of ['plot-section', 'run-form']) at(id).hidden = name !== 'image';
+    for (const id of ['plot-section', 'run-form', 'histogram-section', 'worst-section']) at(id).hidden = name !== 'image';
     if (name === 'paths' && !space && state?.scene) {
         space = new Space(at('space'), at('space-tools'), at('space-label'), server, state.scene);
         editor = new PathEditor(at('editor'), space, server, {
             pixel: () => ({x: view.cursor[0], y: view.cursor[1]}), start: begin, runs: () => runs, fail: text => banner('editor', text, 'Dismiss', () => banner('editor', ''))});
+        space.tell.render = camera => { showPane('image'); report(changeView({camera})); };
         inspector = new Inspector(at('inspector'), space, server, editor);
         inspector.setPixel(view.cursor[0], view.cursor[1], shown[0].run);
         report(space.load());
     }
+    showHistogram();
     if (name === 'image') view.redraw();
     else space?.redraw();
 }

@@ -67,7 +67,7 @@ export class PathEditor {
                 element('label', {}, ['of edges ', this.length])]),
             element('div', {className: 'bar'}, [button('Render with and without', 'Two runs of mlt in turns, with several seeds each', () => this.run(() => this.compare()), 'render-both'),
                 element('label', {}, ['spp ', this.spp]), element('label', {}, ['seeds ', this.seeds])]), this.gain);
-        space.tell = {
+        space.tell = {...space.tell,
             click: (x, y) => { if (this.chosen >= 0) this.run(() => this.addPoint(x, y)); },
             press: (x, y) => this.choosePointAt(x, y),
             drag: (x, y) => {

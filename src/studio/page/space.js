@@ -113,13 +113,15 @@ export class Space {
         this.drawnTriangles = 0;
         /**
          * Called with a point under the pointer.
-         * @type {{click: (x: number, y: number) => void, drag: (x: number, y: number) => boolean, press: (x: number, y: number) => boolean, release: () => void}}
+         * @type {{click: (x: number, y: number) => void, drag: (x: number, y: number) => boolean, press: (x: number, y: number) => boolean, release: () => void,
+         *         render: (camera: {eye: Vec, target: Vec, up: Vec} | null) => void}}
          */
-        this.tell = {click: () => {}, drag: () => false, press: () => false, release: () => {}};
+        this.tell = {click: () => {}, drag: () => false, press: () => false, release: () => {}, render: () => {}};
         this.cutInput = element('input', {type: 'range', id: 'cut', min: 0, max: 1, step: 0.005, value: 0, oninput: () => { this.cut = Number(this.cutInput.value); this.redraw(); }});
         toolbar.append(
             element('button', {type: 'button', textContent: 'Camera', title: 'Look as the camera does', onclick: () => this.lookAsCamera()}),
             element('button', {type: 'button', textContent: 'From outside', title: 'Look from outside the scene', onclick: () => this.lookFromOutside()}),
+            element('button', {type: 'button', id: 'render-view', textContent: 'Render this view', title: 'Put the camera of the scene here, and render', onclick: () => this.tell.render({eye: this.eye(), target: add(this.eye(), this.forward()), up: [0, 1, 0]})}),
             element('label', {title: 'Leave out what is nearer than this'}, ['cut away ', this.cutInput]));
         this.lookAsCamera();
         const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});

@@ -14,7 +14,10 @@ uniform vec2 canvas, origin, size;          // pixels of the canvas; the image's
 uniform vec4 selected;                      // corner and size of the selected rectangle, in pixels of the image
 uniform vec2 extent;                        // the image in its pixels
 uniform float exposure, wipe, scaleFirst, scaleSecond;
-uniform int mode;      // 0 image, 1 false colours, 2 difference
+uniform int mode;      // 0 image, 1 false colours; of two pictures: 2 relative, 3 signed, 4 squared difference
+uniform int tone;      // 0 sRGB, 1 ACES, 2 Reinhard
+uniform float white;   // luminance that Reinhard maps to white, before the exposure
+uniform bool hasMarks; // whether the selection and the wipe are drawn
 uniform ivec2 grey;    // whether the pictures have one channel
 uniform bool hasSecond;
 out vec4 color;
@@ -35,6 +38,24 @@ vec3 heat(float x) {
     int i = int(min(floor(x), 4.0));
     return mix(c[i], c[i + 1], x - float(i));
 }
+// As the command tonemap does.
+vec3 toneMapped(vec3 v) {
+    v *= exp2(exposure);
+    if (tone == 1) {
+        vec3 x = 0.6 * max(v, vec3(0.0));
+        return (2.51 * x + 0.03) * x / ((2.43 * x + 0.59) * x + 0.14);
+    }
+    if (tone == 2) {
+        float y = max(luminance(v), 0.0), w = max(white * exp2(exposure), 1e-20);
+        return v * (1.0 + y / (w * w)) / (1.0 + y);
+    }
+    return v;
+}
+// Blue below zero, red above.
+vec3 signedColor(float x) {
+    x = clamp(x, -1.0, 1.0);
+    return x > 0.0 ? vec3(x, 0.35 * x * x, 0.05 * x) : vec3(-0.1 * x, -0.5 * x, -x);
+}
 void main() {
     vec2 p = vec2(gl_FragCoord.x, canvas.y - gl_FragCoord.y);
     vec2 at = (p - origin) / size;
@@ -43,17 +64,19 @@ void main() {
     vec3 b = hasSecond ? value(second, at, scaleSecond, grey.y) : a;
     bool shows = !hasSecond || at.x < wipe;
     vec3 v = shows ? a : b;
-    if (mode == 2) {
-        float mean = max(luminance(b), 1e-20);
-        color = vec4(heat(abs(luminance(a) - luminance(b)) / mean * exp2(exposure)), 1.0);
+    if (mode >= 2) {
+        float relative = (luminance(a) - luminance(b)) / max(luminance(b), 1e-20), x = relative * exp2(exposure);
+        vec3 c = mode == 3 ? signedColor(x) : heat(mode == 4 ? relative * x : abs(x));
+        color = vec4(c, 1.0);
     } else if (mode == 1) {
         color = vec4(heat((log2(max(luminance(v), 1e-20)) + exposure + 8.0) / 10.0), 1.0);
     } else {
-        color = vec4(srgb(v * exp2(exposure)), 1.0);
+        color = vec4(srgb(toneMapped(v)), 1.0);
     }
     if (any(isnan(v)) || any(isinf(v))) color = vec4(1.0, 0.0, 1.0, 1.0);
+    if (!hasMarks) return;
     float scale = size.x / extent.x;
-    if (hasSecond && mode != 2 && abs(at.x - wipe) * size.x < 1.0) color = vec4(1.0);
+    if (hasSecond && mode < 2 && abs(at.x - wipe) * size.x < 1.0) color = vec4(1.0);
     vec2 d = abs((at * extent - selected.xy - 0.5 * selected.zw) * scale) - 0.5 * selected.zw * scale;
     float edge = max(d.x, d.y);
     if (edge > 0.0 && edge < 2.0) color = vec4(edge < 1.0 ? vec3(0.0) : vec3(1.0), 1.0);
@@ -96,6 +119,9 @@ export class View {
         this.tell = tell;
         this.exposure = 0;
         this.mode = 0;
+        this.tone = 0;
+        /** Of the first picture: its largest luminance. */
+        this.white = 1;
         this.wipe = 0.5;
         this.isFlipped = false;
         /** Of the image. */
@@ -180,10 +206,26 @@ export class View {
         return [(x * devicePixelRatio - ox) / (s * this.width), (y * devicePixelRatio - oy) / (s * this.height)];
     }
 
-    draw() {
+    /**
+     * The picture that is shown, in its own size and without marks.
+     * @returns {Promise<Blob | null>}
+     */
+    png() {
+        const {canvas, zoom, center} = this;
+        [canvas.width, canvas.height] = [this.width, this.height];
+        [this.zoom, this.center] = [1, [0.5, 0.5]];
+        this.draw(false);
+        const png = new Promise(done => canvas.toBlob(done, 'image/png'));
+        [this.zoom, this.center] = [zoom, center];
+        // The browser has copied the pixels.
+        this.redraw();
+        return /** @type {Promise<Blob | null>} */ (png);
+    }
+
+    draw(hasMarks = true) {
         const gl = this.gl;
         if (!gl || this.canvas.clientWidth === 0) return;
-        fit(this.canvas);
+        if (hasMarks) fit(this.canvas);
         gl.viewport(0, 0, this.canvas.width, this.canvas.height);
         const [a, b] = this.isFlipped && this.pictures[1] ? [this.pictures[1], this.pictures[0]] : this.pictures;
         if (!a) {
@@ -214,6 +256,9 @@ export class View {
         gl.uniform1f(at('scaleFirst'), 2 ** a.picture.scale);
         gl.uniform1f(at('scaleSecond'), 2 ** (b ?? a).picture.scale);
         gl.uniform1i(at('mode'), this.mode);
+        gl.uniform1i(at('tone'), this.tone);
+        gl.uniform1f(at('white'), this.white);
+        gl.uniform1i(at('hasMarks'), hasMarks ? 1 : 0);
         gl.uniform2i(at('grey'), a.picture.channels === 1 ? 1 : 0, (b ?? a).picture.channels === 1 ? 1 : 0);
         gl.uniform1i(at('hasSecond'), b ? 1 : 0);
         gl.drawArrays(gl.TRIANGLES, 0, 3);

@@ -312,6 +312,65 @@ TEST_F(ApiTest, ExtremeRaysHaveAnswers) {
                   200);
 }
 
+TEST_F(ApiTest, NamesThePassThatMadeAPixelBright) {
+    open();
+    const int run = finished_run({{"integrator", "path:roulette=0"}, {"spp", 16}});
+    const std::string of = "/v1/worst?run=" + std::to_string(run);
+    const json worst = json::parse(get(of + "&count=5").body);
+    EXPECT_EQ(worst["passes"], 16);
+    ASSERT_EQ(worst["pixels"].size(), 5u);
+    for (const json& w : worst["pixels"]) {
+        const std::string pixel = "&x=" + w["x"].dump() + "&y=" + w["y"].dump();
+        EXPECT_EQ(json::parse(get(of + pixel).body)["pixel"], w);
+        const json replayed = json::parse(post("/v1/replay", {{"run", run},
+                                                              {"x", w["x"]},
+                                                              {"y", w["y"]},
+                                                              {"pass", w["pass"]},
+                                                              {"passes", 1}})
+                                              .body);
+        const auto sum = [&](int c) { return replayed["sum"][size_t(c)].get<float>(); };
+        EXPECT_NEAR(luminance(Rgb(sum(0), sum(1), sum(2))), w["value"].get<float>(),
+                    1e-3f * w["value"].get<float>());
+    }
+    EXPECT_EQ(get(of + "&x=16&y=0").status, 422);
+    EXPECT_EQ(get(of + "&count=0").status, 422);
+    EXPECT_EQ(get("/v1/worst?run=77").status, 422);
+    const int chains = finished_run({{"integrator", "pssmlt"}});
+    EXPECT_TRUE(json::parse(get("/v1/worst?run=" + std::to_string(chains)).body)["pixels"].empty());
+}
+
+TEST_F(ApiTest, ChangesWhatIsRendered) {
+    SceneView view;
+    ApiOptions options;
+    options.set_view = [&](const SceneView& v) { view = v; };
+    open(std::move(options));
+    const auto change = [&](const json& what) {
+        json body{{"action", "view"}};
+        body.update(what);
+        return post("/v1/run", body).status;
+    };
+    const uint64_t version = session->scene_version();
+    EXPECT_EQ(change({{"crop", {{"x", 2}, {"y", 3}, {"w", 4}, {"h", 5}}}}), 200);
+    EXPECT_EQ(view.crop, (std::array<int, 4>{2, 3, 4, 5}));
+    EXPECT_TRUE(wait_for([&] { return session->scene_version() > version; }));
+    EXPECT_EQ(change({{"camera", {{"eye", {0, 0, 3}}, {"target", {0, 0, 0}}, {"up", {0, 1, 0}}}}}),
+              200);
+    ASSERT_TRUE(view.camera);
+    EXPECT_EQ(view.camera->eye.z, 3);
+    EXPECT_TRUE(view.crop);
+    EXPECT_EQ(change({{"crop", nullptr}}), 200);
+    EXPECT_FALSE(view.crop);
+    EXPECT_TRUE(view.camera);
+    EXPECT_EQ(change({{"sensor", 0}}), 200);
+    EXPECT_FALSE(view.camera);
+    for (const json& wrong : {json{{"sensor", 1}}, json{{"crop", {{"x", 0}}}},
+                              json{{"crop", {{"x", 10}, {"y", 0}, {"w", 7}, {"h", 1}}}},
+                              json{{"crop", 3}}, json{{"camera", {{"eye", {0, 0, 3}}}}},
+                              json{{"camera",
+                                    {{"eye", {0, 0, 3}}, {"target", {0, 0, 3}}, {"up", {0, 1, 0}}}}}})
+        EXPECT_EQ(change(wrong), 422) << wrong;
+}
+
 TEST_F(ApiTest, KeptRunsAreListedAndOpened) {
     runs = (folder.path() / "runs").string();
     fs::create_directory(runs);
