@@ -6,6 +6,6 @@
 namespace etendue {
 
 extern const std::string_view kIndexHtml, kStudioCss, kMainJs, kServerJs, kViewJs, kControlsJs,
-    kPlotJs, kSpaceJs, kPathsJs, kInspectorJs;
+    kPlotJs, kSpaceJs, kPathsJs, kInspectorJs, kHistogramJs;
 
 }  // namespace etendue

@@ -473,6 +473,7 @@ async function update() {
         tools.camera.hidden = !hasOwnCamera;
         tools.sensorLabel.hidden = sensors.length < 2;
         setOptions(tools.sensor, sensors.map((/** @type {string} */ name, /** @type {number} */ i) => [String(i), `${i}: ${name}`]), String(sensor));
+        tools.sensor.value = String(sensor);
     }
     if (state.load_error) afterLoad = null;
     if (before > 0 && state.scene_version !== before) {

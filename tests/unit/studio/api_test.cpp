@@ -314,7 +314,7 @@ TEST_F(ApiTest, ExtremeRaysHaveAnswers) {
 
 TEST_F(ApiTest, NamesThePassThatMadeAPixelBright) {
     open();
-    const int run = finished_run({{"integrator", "path:roulette=0"}, {"spp", 16}});
+    const int run = finished_run({{"spp", 16}});
     const std::string of = "/v1/worst?run=" + std::to_string(run);
     const json worst = json::parse(get(of + "&count=5").body);
     EXPECT_EQ(worst["passes"], 16);
