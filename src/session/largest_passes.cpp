@@ -10,16 +10,17 @@ namespace etendue {
 void LargestPasses::add(std::span<const Film::Moments> moments, uint64_t passes) noexcept try {
     const std::lock_guard lock(mutex_);
     if (has_failed_) return;
-    const bool begins = passes == 1 || sums_.size() != moments.size();
-    if (begins || passes != seen_ + 1) {
+    bool is_known = passes != 1 && passes == seen_ + 1 && sums_.size() == moments.size();
+    if (!is_known) {
         // The rendering began, or goes on after passes that are unknown.
+        is_known = passes == 1;
         sums_.assign(moments.size(), 0);
         before_.clear();
         largest_.assign(moments.size(), 0);
         pass_.assign(moments.size(), 0);
         counted_ = 0;
     }
-    if (passes != 1 && counted_ == 0) {
+    if (!is_known) {
         for (size_t i = 0; i < moments.size(); ++i) sums_[i] = moments[i].luminance_sum();
         before_ = sums_;
     } else {
