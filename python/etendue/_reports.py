@@ -256,7 +256,7 @@ def compare(
         report.frame()
         report.plot()
 
-    scenes: one or several files, Descriptions or Scenes. methods: names with parameters, dicts, or Integrators.
+    scenes: one or several files, dicts, Descriptions or Scenes. methods: names with parameters, dicts, or Integrators.
     runs, seed: number of independent runs, which have consecutive seeds, and the first seed.
     sampler: "sobol" or "independent". threads: number of threads; 0 for one per core.
     paths: "all", or "inner" for those that join two sub-paths inside the scene (s >= 1 and t >= 2).
@@ -272,7 +272,7 @@ def compare(
     Ctrl-C ends the comparison; the report contains the results so far. If a scene or a method fails, a RuntimeWarning says
     so, and the report contains the others; if all fail, RuntimeError is raised.
     """
-    wanted = [scenes] if isinstance(scenes, (Scene, Description, str, PathLike)) else list(scenes)
+    wanted = [scenes] if isinstance(scenes, (Scene, Description, dict, str, PathLike)) else list(scenes)
     files = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
     folders = [(name, fspath(folder)) for name, folder in (images or {}).items()]
     spp, seed, reference_spp = count("spp", spp), count("seed", seed) or 0, count("reference_spp", reference_spp)
