@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _etendue
+from ._arguments import count, whole
 from ._denoiser_library import denoiser_library
 from ._etendue import Scene
 from ._html import image_html, png_of
@@ -433,6 +434,9 @@ def new_rendering(
 ) -> _etendue.Rendering:
     """A rendering before its first pass, with the arguments of render()."""
     _etendue.check_aovs(list(aovs))
+    spp, seed = count("spp", spp), count("seed", seed) or 0
+    if sensor is not None and not isinstance(sensor, str):
+        sensor = whole("sensor", sensor)
     depth = 6 if techniques is True else int(techniques)
     first = 0
     if passes is not None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _etendue
+from ._arguments import count
 from ._etendue import Description, Scene
 from ._html import auto_exposure, frame_of, image_html, table_html
 from ._integrator import Integrator
@@ -267,6 +268,7 @@ def compare(
     """
     wanted = [scenes] if isinstance(scenes, (Scene, Description, str, PathLike)) else list(scenes)
     images = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
+    spp, seed, reference_spp = count("spp", spp), count("seed", seed) or 0, count("reference_spp", reference_spp)
     listener, end = _status(progress)
     try:
         comparisons, text = _etendue.compare(
@@ -325,6 +327,7 @@ def verify(
     True; if there are none, KeyboardInterrupt is raised. Methods that fail are left out with a RuntimeWarning; if all fail,
     RuntimeError is raised.
     """
+    spp, seed = count("spp", spp), count("seed", seed) or 0
     listener, end = _status(progress)
     try:
         text = _etendue.verify(

@@ -1,7 +1,7 @@
 """Scenes: loading, transforms, plug-ins."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from typing import Any
 
@@ -51,7 +51,9 @@ def load_string(
     return _etendue.load_string(xml, {key: str(value) for key, value in defines.items()}, name, lenient)
 
 
-def load_dict(d: dict[str, Any], *, folder: str | PathLike[str] = ".") -> Description:
+def load_dict(
+    d: dict[str, Any], *, folder: str | PathLike[str] = ".", file: str | PathLike[str] = "dict", warnings: Sequence[str] = ()
+) -> Description:
     """Reads a scene from nested dicts in the format of mi.load_dict() of Mitsuba 3.
 
     Every object is a dict with a "type", the name of a plug-in; {"type": "ref", "id": ...} refers to another object. Values
@@ -73,10 +75,11 @@ def load_dict(d: dict[str, Any], *, folder: str | PathLike[str] = ".") -> Descri
     "raw": True), floats are linear. The names of Mitsuba ("vertex_positions", ...) are known, too.
 
     folder: folder in which the files of the scene are searched.
+    file, warnings: Description.file, which messages name, and Description.warnings, of a reader that has made the dicts.
 
     Raises SceneError, with the keys that lead to the place, if the dicts are not valid.
     """
-    return _etendue.load_dict(d, fspath(folder))
+    return _etendue.load_dict(d, fspath(folder), fspath(file), list(warnings))
 
 
 def built(scene: SceneLike, threads: int = 0, sensor: int | str | None = None) -> Scene:

@@ -19,9 +19,8 @@ from ._cameras import add_camera
 from ._context import Context, Options
 from ._stage import diagnostics, open_stage, time_code
 from ._traversal import add_prims
-from ._write import write_xml
 
-__all__ = ["load", "write_xml"]
+__all__ = ["load"]
 
 
 def load(
@@ -39,7 +38,7 @@ def load(
     lenient: what is refused otherwise, such as IES profiles or missing references, is left out with a warning.
     stacklevel: which caller warnings are attributed to, as in warnings.warn().
 
-    What has no effect is a UserWarning with the path of the prim. Raises RuntimeError if there is no such file, and SceneError,
+    What has no effect is a UserWarning with the path of the prim, and in Description.warnings. Raises RuntimeError if there is no such file, and SceneError,
     with the file and the path of the prim, if its contents are not valid or are not supported.
     """
     options = Options(dict(variants), time, camera, tuple(purposes), subdivision, lenient)
@@ -52,4 +51,4 @@ def load(
         add_prims(context)
     for note in notes:
         warnings.warn(note, stacklevel=stacklevel)
-    return load_dict({"type": "scene", **context.objects}, context.folder)
+    return load_dict({"type": "scene", **context.objects}, context.folder, name, notes)
