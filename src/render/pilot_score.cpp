@@ -93,7 +93,7 @@ private:
         double norm(size_t tile) const { return mu[tile] * mu[tile] + 0.01 * whole * whole; }
         /// V of a tile for a rendering of N images. Where the tile is dark, the light of the film is what spikes stand out from.
         double limit(size_t tile, double N) const {
-            return std::max(mu[tile], 0.1 * whole) * std::max(16.0, N) / 2;
+            return std::max(mu[tile], 0.1 * whole) * std::max(16.0, N);
         }
     };
     Means means(const Tiles& tiles) const {

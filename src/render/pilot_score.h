@@ -5,7 +5,7 @@
 // of a rendering of N such images is the mean over tiles of two parts, relative to µ² + 0.01 m² as in the errors of
 // `compare`; µ is the mean of the tile, and m that of the film.
 //
-// - Noise: the variance of an image between its pixels' values, divided by N. Of a difference d beyond V = µ max(16, N) / 2,
+// - Noise: the variance of an image between its pixels' values, divided by N. Of a difference d beyond V = µ max(16, N),
 //   only V |d| counts instead of d². Such a value would still stand out from the rendering as a spike: whether a pilot has
 //   met one is chance, and its square would decide the score. What counts is its energy, as if it were missing.
 // - Missing light: where the mean of a method certainly lies below that of another one, it lacks light that the other one

@@ -66,7 +66,7 @@ TEST(PilotScore, IsTheErrorOfTheWholeRendering) {
 
 /// Whether a pilot meets a value beyond V, whose square would decide the score, is chance. Its energy is not.
 TEST(PilotScore, CountsTheEnergyOfSpikesAndNotTheirSquares) {
-    constexpr double kHorizon = 40, kEnergy = 0.2;  // V = 20
+    constexpr double kHorizon = 20, kEnergy = 0.2;  // V = 20
     const auto noise = [&](double size) {
         double sum = 0;
         for (uint64_t seed = 0; seed < 16; ++seed)
@@ -92,9 +92,9 @@ TEST(PilotScore, OneSpikeDoesNotDecide) {
         });
     };
     const PilotImages other = images(12, 2, noisy(0.4));
-    // V is about 500: the square of the second one counts 64 times as much as that of the first, but 8 times as V |d|.
-    const double small = score({with_one(1000), other})[0].noise,
-                 large = score({with_one(8000), other})[0].noise,
+    // V is about 1000: the square of the second one counts 64 times as much as that of the first, but 8 times as V |d|.
+    const double small = score({with_one(2000), other})[0].noise,
+                 large = score({with_one(16000), other})[0].noise,
                  none = score({with_one(0), other})[0].noise;
     EXPECT_NEAR((large - none) / (small - none), 8, 1);
 }
