@@ -12,8 +12,8 @@ from . import _etendue
 from ._etendue import Description, Scene
 
 Vector = tuple[float, float, float]
-SceneLike = Scene | Description | str | PathLike[str]
-"""A scene, or what one can be built from: a description or a file."""
+SceneLike = Scene | Description | dict[str, Any] | str | PathLike[str]
+"""A scene, or what one can be built from: a description, a dict as load_dict() takes it, or a file."""
 
 
 def load(
@@ -75,7 +75,8 @@ def load_dict(
     "raw": True), floats are linear. The names of Mitsuba ("vertex_positions", ...) are known, too.
 
     folder: folder in which the files of the scene are searched.
-    file, warnings: Description.file, which messages name, and Description.warnings, of a reader that has made the dicts.
+    file: the name of the scene in messages and reports, Description.file.
+    warnings: Description.warnings, for readers of other formats.
 
     Raises SceneError, with the keys that lead to the place, if the dicts are not valid.
     """
@@ -86,12 +87,14 @@ def built(scene: SceneLike, threads: int = 0, sensor: int | str | None = None) -
     """The scene itself, or that of a description or file."""
     if isinstance(scene, Scene):
         if sensor is not None:
-            raise ValueError("sensor is for files and Descriptions: a Scene has its sensor from Description.build(sensor=...)")
+            raise ValueError("sensor is for files, dicts and Descriptions: a Scene has its sensor from Description.build(sensor=...)")
         return scene
     if isinstance(scene, (str, PathLike)):
         scene = load(scene)
+    if isinstance(scene, dict):
+        scene = load_dict(scene)
     if not isinstance(scene, Description):
-        raise TypeError(f"a scene is a Scene, a Description or the name of a file, but found {type(scene).__name__}")
+        raise TypeError(f"a scene is a Scene, a Description, a dict or the name of a file, but found {type(scene).__name__}")
     return scene.build(threads=threads, sensor=sensor)
 
 

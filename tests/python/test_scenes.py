@@ -355,6 +355,8 @@ def test_files_and_descriptions_are_rendered_as_scenes_are(scenes: Path) -> None
         assert et.render(name, "path:max_depth=1", spp=1, progress=False).image.shape == (400, 400, 3)
     with pytest.raises(RuntimeError, match="there is no such file"):
         et.render("none.xml")
-    for wrong in (None, {}, 3):
-        with pytest.raises(TypeError, match="a scene is a Scene, a Description or the name of a file, but found"):
+    as_dict = d.to_dict()
+    np.testing.assert_array_equal(et.render({**as_dict}, "path", spp=1, progress=False).image, image)
+    for wrong in (None, [], 3):
+        with pytest.raises(TypeError, match="a scene is a Scene, a Description, a dict or the name of a file, but found"):
             et.render(wrong)  # type: ignore[arg-type]

@@ -45,10 +45,12 @@ def load(
     name = fspath(file)
     notes: list[str] = []
     with diagnostics(name, notes):
-        stage = open_stage(name, options, notes)
+        stage, documents = open_stage(name, options, notes)
         context = Context(name, stage, time_code(stage, options), options, notes)
         add_camera(context)
         add_prims(context)
+    # USD says that it cannot open them.
+    notes = [note for note in notes if not any(f"{name}@" in note for name in documents)]
     for note in notes:
         warnings.warn(note, stacklevel=stacklevel)
     return load_dict({"type": "scene", **context.objects}, context.folder, name, notes)
