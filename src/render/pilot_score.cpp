@@ -163,23 +163,25 @@ private:
         constexpr double kDoubt = 0.01;  // over all tiles
         const Means m = means(tiles);
         if (!(m.whole > 0)) return;
-        std::vector<double> sums(methods_.size()), errors;
-        for (const PilotImages& of : methods_)
-            errors.push_back(
-                student_quantile(2 * kDoubt / tiles.count(), double(of.images.size()) - 1));
-        for (size_t t = 0; t < size_t(tiles.count()); ++t) {
-            double certain = 0;
-            for (size_t i = 0; i < methods_.size(); ++i)
-                certain = std::max(certain, m.by_method[i][t].low(errors[i]));
-            for (size_t i = 0; i < methods_.size(); ++i) {
-                const Estimate& own = m.by_method[i][t];
-                const double N = methods_[i].horizon,
-                             lacks = std::max(0.0, certain - own.low(-errors[i]));
-                sums[i] += m.limit(t, N) * lacks / (N * m.norm(t)) / double(tiles.count());
+        const auto count = size_t(tiles.count());
+        for (size_t i = 0; i < methods_.size(); ++i) {
+            std::vector<double> lacks(count);
+            for (size_t j = 0; j < methods_.size(); ++j) {
+                const size_t images =
+                    std::min(methods_[i].images.size(), methods_[j].images.size());
+                const double errors =
+                    student_quantile(2 * kDoubt / double(count), double(images) - 1);
+                for (size_t t = 0; t < count; ++t) {
+                    const Estimate &own = m.by_method[i][t], &other = m.by_method[j][t];
+                    lacks[t] = std::max(lacks[t], other.mean - own.mean -
+                                                      errors * std::hypot(own.error, other.error));
+                }
             }
+            const double N = methods_[i].horizon;
+            double sum = 0;
+            for (size_t t = 0; t < count; ++t) sum += m.limit(t, N) * lacks[t] / (N * m.norm(t));
+            scores[i].missing = std::max(scores[i].missing, sum / double(count));
         }
-        for (size_t i = 0; i < methods_.size(); ++i)
-            scores[i].missing = std::max(scores[i].missing, sums[i]);
     }
 
     size_t pixel(int x, int y) const { return size_t(y) * size_t(width_) + size_t(x); }

@@ -9,9 +9,9 @@
 //   only V |d| counts instead of d². Such a value would still stand out from the rendering as a spike: whether a pilot has
 //   met one is chance, and its square would decide the score. What counts is its energy, as if it were missing.
 // - Missing light: where the mean of a method certainly lies below that of another one, it lacks light that the other one
-//   has, and will find it in spikes. The difference δ of their confidence limits counts V δ, like the energy of spikes that
-//   were met. It is looked for in tiles, in groups of them, and in the whole film; the level with the largest sum counts. A
-//   limit holds with a probability of 99 % in all tiles of a level.
+//   has, and will find it in spikes. The lower limit δ of the difference counts V δ, like the energy of spikes that were
+//   met. It is looked for in tiles, in groups of them, and in the whole film; the level with the largest sum counts. The
+//   limits of two methods hold with a probability of 99 % in all tiles of a level.
 //
 // The images of chains are those of independent chains, so that the disagreement of chains is their noise. It depends on
 // the size of pixels: states that follow each other are near each other, in one large pixel, but in several small ones. If

@@ -14,6 +14,7 @@
 #include "render/pilot_score.h"
 #include "render/render_request.h"
 #include "test_scenes.h"
+#include "thread_ranks.h"
 
 namespace etendue::test {
 namespace {
@@ -94,6 +95,23 @@ TEST(MethodChoice, TheChosenTextGivesTheSameBits) {
     EXPECT_EQ(automatic.stats().rays(), given.stats().rays());
     // The time of pilots counts.
     EXPECT_GE(automatic.seconds(), automatic.settings().choice->seconds);
+}
+
+/// Chains cannot be shared.
+TEST(MethodChoice, ProcessesThatRenderTogetherChooseTheSameWithoutChains) {
+    const Scene scene = scene_of_project("ring.xml", 48, 36);
+    RenderSettings settings = settings_of(scene, "auto:chains=false", 4);
+    const std::string alone = with_chosen_method(scene, settings).integrator.to_string();
+    settings.integrator = choose_integrator(scene, "auto");
+    ThreadRanks::run(2, [&](const Ranks& ranks) {
+        RenderSettings own = settings;
+        own.ranks = &ranks;
+        own.threads = 1;
+        const RenderSettings chosen = with_chosen_method(scene, own);
+        EXPECT_EQ(chosen.integrator.to_string(), alone);
+        EXPECT_GT(chosen.choice->candidates.front().images, 0);
+        EXPECT_EQ(chosen.ranks, &ranks);
+    });
 }
 
 TEST(MethodChoice, PilotsTakeASmallPart) {

@@ -113,11 +113,11 @@ TEST(PilotScore, CountsMissingLight) {
         EXPECT_LT(scores[0].noise, scores[1].noise);
         EXPECT_GT(scores[0].missing, 10 * scores[1].noise);
         EXPECT_GT(scores[0].error(), 3 * scores[1].error());
-        EXPECT_LT(scores[1].missing, 0.05 * scores[1].noise);
+        EXPECT_LT(scores[1].missing, 0.1 * scores[1].noise);
     }
     // What is within the noise is not certain.
     const auto scores = score({images(9, 2, lacks(0.02, 2)), whole});
-    EXPECT_LT(scores[0].missing, 0.05 * scores[1].noise);
+    EXPECT_LT(scores[0].missing, 0.1 * scores[1].noise);
 }
 
 /// Spikes that one method has met raise its mean. The others lack nothing.
