@@ -11,11 +11,15 @@ struct EyeStart {
     Film::PixelSample at;
     SensorRay ray;
 
-    explicit EyeStart(const SampleContext& c) {
-        const Sensor& sensor = c.scene.sensor();
+    explicit EyeStart(const SampleContext& c)
+        : at(film_sample(c)),
+          ray(c.scene.sensor().sample_ray(
+              at.point, c.sampler.next_2d_if(c.scene.sensor().has_finite_lens()))) {}
+
+private:
+    static Film::PixelSample film_sample(const SampleContext& c) {
         c.sampler.seek(Stream::Eye, 0);
-        at = c.film_sample(c.sampler.next_2d_if(c.needs_film_number()));
-        ray = sensor.sample_ray(at.point, c.sampler.next_2d_if(sensor.has_finite_lens()));
+        return c.film_sample(c.sampler.next_2d_if(c.needs_film_number()));
     }
 };
 
@@ -23,9 +27,9 @@ struct EyeStart {
 
 void trace_eye_path(const WalkContext& walk, const SampleContext& c, SubPath& z) {
     const EyeStart start(c);
-    start_eye_path(walk, start.at, start.ray, c.sampler, z);
-    while (extend<TransportMode::Radiance>(walk, c.sampler, z)) {
-    }
+    Step step;
+    begin_eye_path(walk, start.at, start.ray, c.sampler, z, step);
+    walk_on<TransportMode::Radiance>(walk, c.sampler, z, step);
 }
 
 void trace_eye_paths(const WalkContext& walk, std::span<const SampleContext> c,

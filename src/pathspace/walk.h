@@ -96,6 +96,13 @@ bool extend(const WalkContext& walk, Sampler& sampler, SubPath& path) {
     return begin_step<mode>(walk, sampler, path, step) && end_step<mode>(walk, path, step);
 }
 
+/// Ends the step of a walk, and goes on with the walk to its end.
+template <TransportMode mode>
+void walk_on(const WalkContext& walk, Sampler& sampler, SubPath& path, Step& step) {
+    while (end_step<mode>(walk, path, step) && begin_step<mode>(walk, sampler, path, step)) {
+    }
+}
+
 /// One of several walks that are made in turns.
 struct WalkInTurn {
     Sampler* sampler;
@@ -105,7 +112,7 @@ struct WalkInTurn {
 /// As many as a worker makes in turns: enough that memory has come when it is read, and few enough that all of their vertices
 /// stay in the caches.
 inline constexpr size_t kWalksInTurn = 8;
-/// Ends the steps of at most kWalksInTurn walks, and goes on with them as extend() does until all have ended. While one of
+/// walk_on() for at most kWalksInTurn walks. While one of
 /// them computes, the memory that the others wait for comes: group prefetching [Chen et al. 2007].
 template <TransportMode mode>
 void walk_in_turns(const WalkContext& walk, std::span<WalkInTurn> walks);

@@ -90,12 +90,13 @@ float Scene::opacity(const SurfaceLocation& at) const {
     return opacity_of(shapes_[at.shape], surface(at));
 }
 
-/// Everything but the geometry.
-void Scene::locate(const RayHit& raw, SurfaceHit& hit) const {
-    hit.shape = &shapes_[raw.shape];
-    hit.location = raw;
-    hit.t = raw.t;
+/// Finds everything but the geometry; false where the ray leaves the scene.
+bool Scene::locate(const Ray& ray, SurfaceHit& hit) const {
+    if (!accelerator_.intersect(ray, hit.location)) return false;
+    hit.shape = &shapes_[hit.location.shape];
+    hit.t = hit.location.t;
     hit.has_geometry = false;
+    return true;
 }
 
 void Scene::complete(SurfaceHit& hit) const {
@@ -107,13 +108,11 @@ void Scene::complete(SurfaceHit& hit) const {
 
 template <class Stops, class Passes>
 Ray Scene::for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const {
-    RayHit raw;
     SurfaceHit hit;
     const float length_d = length(ray.d);
     float skipped =
         0;  // distance from the last surface to the ray's origin, which is offset from it
-    while (ray.tmax > 0 && accelerator_.intersect(ray, raw)) {
-        locate(raw, hit);
+    while (ray.tmax > 0 && locate(ray, hit)) {
         hit.t = hit.t * length_d + skipped;
         if (stops(hit)) return ray;
         complete(hit);
@@ -141,9 +140,7 @@ void Scene::prefetch_images(const SurfaceHit& hit) const {
 
 bool Scene::find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
     if (!has_masks_) {
-        RayHit raw;
-        const bool found = accelerator_.intersect(ray, raw);
-        if (found) locate(raw, hit);
+        const bool found = locate(ray, hit);
         if (passage.medium != kVacuum)
             passage.attenuation = attenuation(passage.medium, found ? hit.t : kInf);
         return found;

@@ -59,10 +59,15 @@ struct Passage {
 
 /// Intersection of a ray with the scene, at distance t.
 struct SurfaceHit {
-    SurfaceGeometry geometry;
+    /// Without the geometry, which Scene::complete() makes.
+    SurfaceHit() {}
+
+    union {
+        SurfaceGeometry geometry;
+    };
     bool has_geometry;  ///< Whether `geometry` is known, see Scene::find().
     const SceneShape* shape;
-    SurfaceLocation location;
+    RayHit location;  ///< As the ray tracer has it: its `t` is in units of the ray's direction.
     float t;
 };
 
@@ -176,7 +181,7 @@ public:
 
 private:
     friend class SceneBuilder;
-    void locate(const RayHit& raw, SurfaceHit& hit) const;
+    bool locate(const Ray& ray, SurfaceHit& hit) const;
     Ray segment(const RayEnd& a, const RayEnd& b) const;
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;

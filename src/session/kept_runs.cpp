@@ -28,13 +28,40 @@ RenderRequest request_of(const CheckpointHeader& header) {
     r.integrator = header.integrator;
     r.sampler = sampler_named(header.condition("sampler"), "its sampler");
     r.filter_mode = filter_mode_named(header.condition("filter mode"), "its filter mode");
-    r.seed = header.ranges.front().seed;
+    r.seed = header.ranges.front().seed;  // of the last of several
     r.first_pass = header.ranges.front().first;
     r.technique_depth = header.technique_depth;
     return r;
 }
 
+constexpr const char* kSeeds = "seeds";
+
 }  // namespace
+
+void Session::Run::save_seeds(SectionWriter& to) const {
+    to.begin(kSeeds);
+    to.put(status.request.seed);
+    to.put(uint8_t(is_counted));
+    seeds.save(to);
+    series.load()->save(to);
+}
+
+void Session::Run::load_seeds(SectionReader& from) {
+    const uint64_t pixels = scene().film().pixel_count();
+    auto loaded_series = std::make_shared<SeedSeries>();
+    from.open(kSeeds);
+    from.get(status.request.seed);
+    is_counted = from.get<uint8_t>() != 0;
+    seeds.load(from, pixels);
+    loaded_series->load(from, pixels);
+    from.finish();
+    const auto finished = size_t(status.finished_seeds);
+    if (size_t(seeds.count()) != finished || loaded_series->luminance.size() != finished ||
+        (is_counted && finished == 0))
+        from.fail("the seeds of the run are damaged");
+    from.close();
+    series.store(std::move(loaded_series));
+}
 
 // -- Writing, in the session's thread; files become durable in that of the writer.
 
@@ -45,7 +72,7 @@ void Session::wait_for_next_file(Run& run, double seconds) const {
 }
 
 void Session::keep(Run& run) noexcept {
-    if (!folder_ || !run.renderer || run.has_seeds() || run.passes() == 0) return;
+    if (!folder_ || !run.renderer || run.passes() == 0) return;
     const auto begin = std::chrono::steady_clock::now();
     try {
         write_state(run);
@@ -67,14 +94,17 @@ void Session::write_state(Run& run) {
     if (earlier.valid()) earlier.wait();
     RunStatus status;
     std::string name, version;
+    int file_seeds = 0;
     {
         const std::lock_guard lock(mutex_);
         status = run.status;
+        file_seeds = run.file_seeds;
         name = run.own_file;
         version = run.own_version;
     }
     const uint64_t passes = run.passes();
-    if (status.file_passes == passes && status.file_problem.empty()) return;
+    const int seeds = run.seeds.count();
+    if (status.file_passes == passes && file_seeds == seeds && status.file_problem.empty()) return;
     // What another program has written there in the meantime stays.
     const bool is_new = name.empty() || file_version(folder_->path_of(name)) != version;
     if (is_new) name = folder_->take_name(run.scene().file(), run.settings.integrator.name);
@@ -83,13 +113,14 @@ void Session::write_state(Run& run) {
         const std::shared_ptr<SectionWriter> file = written_checkpoint(
             path, *run.renderer, run.scene(), run.conditions, run.settings, run.log);
         save_record(status, *file);
+        if (run.has_seeds()) run.save_seeds(*file);
         const auto written = std::make_shared<std::promise<void>>();
         {
             const std::lock_guard lock(mutex_);
             run.file_written = written->get_future().share();
         }
         const auto finish = [this, kept = run.shared_from_this(), file, written, name, path, passes,
-                             is_new] {
+                             seeds, is_new] {
             std::string problem, version_of_file;
             try {
                 file->commit();
@@ -105,6 +136,7 @@ void Session::write_state(Run& run) {
                     if (s.file != name) ++kept_version_;
                     s.file = kept->own_file = name;
                     s.file_passes = passes;
+                    kept->file_seeds = seeds;
                     kept->own_version.swap(version_of_file);
                 }
                 s.file_problem.swap(problem);
@@ -189,15 +221,25 @@ std::shared_ptr<Session::Run> Session::load_run(const std::string& name) {
     const RenderStats& stats = run->totals ? run->totals->stats : run->renderer->stats();
     s.seconds = run->totals ? run->totals->seconds : run->renderer->seconds();
     s.rays_per_second = s.seconds > 0 ? double(stats.rays()) / s.seconds : 0;
+    const Film& film = run->totals ? *run->totals->film : run->renderer->film();
+    if (s.seeds > 1) {
+        run->load_seeds(file.sections());
+        if (run->is_counted) s.seconds = 0;
+        s.seconds += run->series.load()->total_seconds();
+        s.fraction = double(s.finished_seeds) / s.seeds;
+    } else {
+        s.error = arena.execute([&] { return film.error(); });
+        if (s.request.spp)
+            s.fraction = std::min(1.0, double(film.passes()) / double(*s.request.spp));
+    }
+    s.interval = interval_kind(s.estimator, s.request.sampler, film.has_groups(), s.seeds);
     s.passes = s.file_passes = s.opened_passes = run->passes();
-    s.error = arena.execute([&] { return run->film()->error(); });
-    s.interval = interval_kind(s.estimator, s.request.sampler, run->film()->has_groups(), 1);
-    if (s.request.spp) s.fraction = std::min(1.0, double(s.passes) / double(*s.request.spp));
     if (s.history.empty() && s.error.valid) s.history.push_back({s.passes, s.seconds, s.error});
     s.file = name;
     if (is_own) {
         run->own_file = name;
         run->own_version = file_version(folder_->path_of(name));
+        run->file_seeds = run->seeds.count();
     }
     wait_for_next_file(*run, 0);
     return run;

@@ -21,7 +21,8 @@ inline bool technique_images_fit(const Scene& scene, int depth) {
 struct Session::Run : std::enable_shared_from_this<Session::Run> {
     RunStatus status;  ///< Guarded by the session's mutex, as are these:
     std::string own_file,
-        own_version;  ///< Its file in the folder of runs, and that which it wrote.
+        own_version;     ///< Its file in the folder of runs, and that which it wrote.
+    int file_seeds = 0;  ///< The seeds that are finished in the file.
     std::shared_future<void> file_written;  ///< Of the last one that was begun.
 
     SharedSlot<const Snapshot> snapshot;
@@ -35,14 +36,20 @@ struct Session::Run : std::enable_shared_from_this<Session::Run> {
     bool has_seeds() const { return status.seeds > 1; }
     /// The film whose passes are not among `seeds`; nullptr if there is none.
     const Film* film() const {
+        if (is_counted) return nullptr;
         if (totals) return totals->film.get();
-        return renderer && !is_counted ? &renderer->film() : nullptr;
+        return renderer ? &renderer->film() : nullptr;
     }
     const TechniqueImages* technique_images() const {
         if (totals) return totals->techniques.get();
         return renderer && !has_seeds() ? renderer->techniques() : nullptr;
     }
     uint64_t passes() const { return seeds.passes() + (film() ? film()->passes() : 0); }
+
+    // The seeds that are finished, in a section of a checkpoint of the one under way.
+    void save_seeds(SectionWriter& to) const;
+    /// Throws std::runtime_error if they do not fit the scene or the record of the run.
+    void load_seeds(SectionReader& from);
 
     RenderSettings settings;
     std::unique_ptr<Integrator> integrator;  ///< Until the first renderer is made.

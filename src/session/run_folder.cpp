@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "session/run_record.h"
 #include "system/descriptor.h"
 #include "system/failure.h"
 
@@ -52,12 +53,16 @@ std::vector<KeptRun> RunFolder::list(const LoadedScene& scene) const {
         file.run.file = name;
         file.changed = at->last_write_time(unknown);
         try {
-            const CheckpointFile checkpoint(path_of(name));
+            CheckpointFile checkpoint(path_of(name));
             const CheckpointHeader& header = checkpoint.header();
             if (!is_of(header, scene.scene, scene.source)) continue;
             file.run.integrator = header.integrator;
             file.run.seed = header.ranges.front().seed;
-            file.run.passes = header.passes();
+            RunStatus record;
+            load_record(checkpoint.sections(), record);
+            file.run.seeds = record.seeds;
+            file.run.finished_seeds = record.finished_seeds;
+            file.run.passes = record.seeds > 1 ? record.passes : header.passes();
         } catch (...) {
             file.run.problem = caught();
         }

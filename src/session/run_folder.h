@@ -14,6 +14,7 @@ struct KeptRun {
     std::string file;  ///< Its name in the folder.
     std::string integrator;
     uint64_t seed = 0, passes = 0;
+    int seeds = 1, finished_seeds = 0;  ///< With several, `passes` are those of all of them.
     std::string problem;  ///< Why it cannot be read; then nothing else of it is known.
 };
 

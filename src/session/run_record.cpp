@@ -27,6 +27,11 @@ uint64_t passes_of(const json& value) {
         throw ImpossibleNumber();
     return value.get<uint64_t>();
 }
+int count_of(const json& value) {
+    constexpr int kMost = 1 << 20;
+    if (!value.is_number_unsigned() || value.get<uint64_t>() > kMost) throw ImpossibleNumber();
+    return value.get<int>();
+}
 
 }  // namespace
 
@@ -39,12 +44,15 @@ void save_record(const RunStatus& run, SectionWriter& to) {
         history.push_back({p.passes, p.seconds, p.error.relative_rms, p.error.low, p.error.high});
     for (const auto& [name, value] : run.figures)
         if (std::isfinite(value)) figures.push_back({name, value});
+    json record = {{"limits", limits},
+                   {"finished", run.state == RunState::Finished},
+                   {"history", history},
+                   {"figures", figures}};
+    if (run.seeds > 1)
+        record["seeds"] = {
+            {"all", run.seeds}, {"finished", run.finished_seeds}, {"passes", run.passes}};
     to.begin(kSection);
-    to.put(json{{"limits", limits},
-                {"finished", run.state == RunState::Finished},
-                {"history", history},
-                {"figures", figures}}
-               .dump(-1, ' ', false, json::error_handler_t::replace));
+    to.put(record.dump(-1, ' ', false, json::error_handler_t::replace));
 }
 
 bool load_record(SectionReader& from, RunStatus& run) {
@@ -61,6 +69,13 @@ bool load_record(SectionReader& from, RunStatus& run) {
         if (limits.contains("seconds")) run.request.seconds = positive(limits["seconds"]);
         if (limits.contains("error")) run.request.error = positive(limits["error"]);
         run.state = record.at("finished").get<bool>() ? RunState::Finished : RunState::Stopped;
+        if (record.contains("seeds")) {
+            const json& seeds = record["seeds"];
+            run.seeds = count_of(seeds.at("all"));
+            run.finished_seeds = count_of(seeds.at("finished"));
+            run.passes = passes_of(seeds.at("passes"));
+            if (run.seeds < 2 || run.finished_seeds > run.seeds) throw ImpossibleNumber();
+        }
         for (const json& p : record.at("history")) {
             const auto number = [&](size_t i) { return p.at(i).get<double>(); };
             run.history.push_back(

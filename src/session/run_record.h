@@ -6,7 +6,7 @@
 
 namespace etendue {
 
-/// Writes limits, history and figures.
+/// Writes limits, numbers of seeds, history and figures.
 void save_record(const RunStatus& run, SectionWriter& to);
 /// Reads them, and whether the run has finished or was stopped. False if the file has none, as that of another command.
 bool load_record(SectionReader& from, RunStatus& run);

@@ -84,6 +84,30 @@ void SeedSeries::add(Image image, double seconds_of_image,
     }
 }
 
+void SeedSeries::save(SectionWriter& to) const {
+    to.put(seconds);
+    for (const auto& image : luminance) to.put(*image);
+    to.put(uint64_t(figures.size()));
+    for (const auto& [name, mean] : figures) {
+        to.put(name);
+        to.put(mean);
+    }
+}
+
+void SeedSeries::load(SectionReader& from, uint64_t pixels) {
+    from.get(seconds);
+    for (size_t i = 0; i < seconds.size(); ++i) {
+        Image image;
+        from.get(image, pixels, "pixels");
+        luminance.push_back(std::make_shared<const Image>(std::move(image)));
+    }
+    for (auto left = from.get<uint64_t>(); left > 0; --left) {
+        std::string name;
+        from.get(name);
+        figures.emplace_back(std::move(name), from.get<double>());
+    }
+}
+
 SeedComparison compare(const SeedSeries& a, const SeedSeries& b) {
     SeedComparison c;
     c.a = method(a), c.b = method(b);

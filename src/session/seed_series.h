@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "system/section_file.h"
+
 namespace etendue {
 
 /// The finished renderings of a run with several seeds.
@@ -21,6 +23,9 @@ struct SeedSeries {
     /// Adds a rendering.
     void add(Image image, double seconds_of_image,
              const std::vector<std::pair<std::string, double>>& its_figures);
+    void save(SectionWriter& to) const;
+    /// `pixels`: of each image. Throws std::runtime_error if the file has another number of them.
+    void load(SectionReader& from, uint64_t pixels);
 };
 
 /// Two methods, `a` and `b`. The relative variance of an image is the mean over its pixels of its variance over the

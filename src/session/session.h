@@ -156,8 +156,7 @@ public:
     /// Waits until the current pass and all commands so far are finished, and the files of the runs are written.
     void settle();
 
-    // Runs are kept in the folder when they end or are stopped, and from time to time while they render; those with several
-    // seeds are not.
+    // Runs are kept in the folder when they end or are stopped, and from time to time while they render.
 
     /// The folder; empty if runs are not kept.
     std::string runs_folder() const { return folder_ ? folder_->path() : ""; }

@@ -115,4 +115,19 @@ void SeedMean::fill(const Film* film, Snapshot& to) const {
     });
 }
 
+void SeedMean::save(SectionWriter& to) const {
+    to.put(count_);
+    to.put(passes_);
+    to.put(moments_);
+}
+
+void SeedMean::load(SectionReader& from, uint64_t pixels) {
+    from.get(count_);
+    from.get(passes_);
+    from.get(moments_, count_ > 0 ? pixels : 0, "pixels");
+    const bool is_possible = count_ > 0 ? passes_ >= uint64_t(count_) && passes_ <= kMostPasses
+                                        : count_ == 0 && passes_ == 0;
+    if (!is_possible) from.fail("the seeds of the run are damaged");
+}
+
 }  // namespace etendue

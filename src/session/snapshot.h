@@ -13,6 +13,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "film/film.h"
+#include "system/section_file.h"
 
 namespace etendue {
 
@@ -59,11 +60,14 @@ public:
     uint64_t passes() const { return passes_; }
     /// Mean and variance of these images, and of `film`, which is one more that is not finished; nullptr: none.
     void fill(const Film* film, Snapshot& to) const;
+    void save(SectionWriter& to) const;
+    /// `pixels`: of each image. Throws std::runtime_error if the file has another number of them.
+    void load(SectionReader& from, uint64_t pixels);
 
 private:
     std::vector<Film::Moments> moments_;
     uint64_t passes_ = 0;
-    int count_ = 0;
+    int32_t count_ = 0;
 };
 
 /// Keeps the processor time of snapshots, and of sending them, at or below 2 % of the time of a rendering.

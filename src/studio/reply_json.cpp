@@ -76,10 +76,12 @@ json to_json(const KeptRun& run) {
     if (!is_file_name(run.file))
         return {{"file", run.file},
                 {"problem", "its name must have only letters, digits, '.', '_' and '-'"}};
-    return {{"file", run.file},
-            {"integrator", run.integrator},
-            {"seed", run.seed},
-            {"passes", run.passes}};
+    json j = {{"file", run.file},
+              {"integrator", run.integrator},
+              {"seed", run.seed},
+              {"passes", run.passes}};
+    if (run.seeds > 1) j["seeds"] = {run.finished_seeds, run.seeds};
+    return j;
 }
 
 json to_json(const RunStatus& s) {

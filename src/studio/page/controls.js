@@ -120,7 +120,7 @@ export class KeptList {
         this.title.textContent = `Kept runs: ${runs.length}`;
         this.rows.replaceChildren(...runs.map(run => element('div', {className: 'run'}, [
             element('div', {className: 'name', textContent: run.file}),
-            element('div', {className: run.problem ? 'figures error' : 'figures', textContent: run.problem ?? `${run.integrator}, seed ${run.seed}, ${run.passes} spp`}),
+            element('div', {className: run.problem ? 'figures error' : 'figures', textContent: run.problem ?? `${run.integrator}, ${run.seeds ? `${run.seeds[0]} of ${run.seeds[1]} seeds` : `seed ${run.seed}`}, ${run.passes} spp`}),
             run.problem ? null : element('div', {className: 'bar'}, [element('button', {type: 'button', textContent: 'Open', 'aria-label': `Open ${run.file}`, onclick: () => this.tell.open(run.file)})])])));
     }
 }

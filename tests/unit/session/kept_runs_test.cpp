@@ -215,12 +215,89 @@ TEST_F(KeptRuns, NeedAFolder) {
     EXPECT_EQ(session->status(finished(run_of("path", 2))).file, "");
     EXPECT_TRUE(fs::is_empty(folder.path()));
     EXPECT_THROW(session->open("test-path-1.etd", [](const Opened&) {}), std::runtime_error);
-    // Those with several seeds have no state that could be kept.
+}
+
+/// Opened in another session, a run with several seeds has the same images, and goes on with more seeds.
+TEST_F(KeptRuns, OfSeveralSeedsGoOn) {
+    RunRequest several = run_of("path", 4);
+    several.seeds = 3;
+    several.seed = 5;
+    session.emplace(kept_room, 1);
+    ASSERT_TRUE(wait_for([&] { return session->scene() != nullptr; }));
+    const int whole = finished(several);
+    const auto image = session->snapshot(whole);
+    const auto series = session->seed_series(whole);
+    ASSERT_EQ(series->luminance.size(), 3u);
+
     open_session();
-    RunRequest several = run_of("path", 2);
+    int run = finished(several);
+    for (const char* when : {"all seeds", "more seeds"}) {
+        SCOPED_TRACE(when);
+        const RunStatus before = session->status(run);
+        ASSERT_EQ(before.file_problem, "");
+        ASSERT_EQ(before.file_passes, before.passes);
+        const auto shown = session->snapshot(run);
+        open_session();
+        const auto is_kept = [&](const KeptRun& k) {
+            return k.file == before.file && k.seeds == before.seeds &&
+                   k.finished_seeds == before.finished_seeds && k.passes == before.passes;
+        };
+        ASSERT_TRUE(wait_for([&] {
+            const std::vector<KeptRun> kept = session->kept();
+            return std::any_of(kept.begin(), kept.end(), is_kept);
+        }));
+        const Opened opened = open(before.file);
+        ASSERT_EQ(opened.error, "");
+        run = opened.run;
+        const RunStatus after = session->status(run);
+        EXPECT_EQ(after.why_look_only, "");
+        EXPECT_EQ(after.request.seed, 5u);
+        EXPECT_EQ(after.seeds, before.seeds);
+        EXPECT_EQ(after.finished_seeds, before.finished_seeds);
+        EXPECT_EQ(after.passes, before.passes);
+        EXPECT_DOUBLE_EQ(after.seconds, before.seconds);
+        expect_equal(session->snapshot(run)->mean, shown->mean);
+        expect_equal(session->snapshot(run)->variance, shown->variance);
+        if (after.finished_seeds == 3) {
+            expect_equal(shown->mean, image->mean);
+            for (size_t i = 0; i < 3; ++i)
+                EXPECT_EQ(*session->seed_series(run)->luminance[i], *series->luminance[i]);
+        }
+        session->resume(run, {});
+        ASSERT_TRUE(wait_for([&] {
+            const RunStatus s = session->status(run);
+            return s.state == RunState::Finished && s.finished_seeds == s.seeds &&
+                   s.seeds == 2 * before.seeds;
+        }));
+        session->settle();
+    }
+    EXPECT_EQ(session->seed_series(run)->luminance.size(), 12u);
+}
+
+/// The state of the seed under way is kept, too.
+TEST_F(KeptRuns, GoOnWithinASeed) {
+    open_session();
+    RunRequest several = run_of("path", 1u << 30);
     several.seeds = 2;
-    EXPECT_EQ(session->status(finished(several)).file_problem, "");
-    EXPECT_TRUE(fs::is_empty(folder.path()));
+    const int run = session->start(several);
+    ASSERT_TRUE(wait_for([&] { return session->status(run).passes > 0; }));
+    session->stop(run);
+    ASSERT_TRUE(is_in(run, RunState::Stopped));
+    session->settle();
+    const RunStatus before = session->status(run);
+    open_session();
+    const Opened opened = open(before.file);
+    ASSERT_EQ(opened.error, "");
+    EXPECT_EQ(session->status(opened.run).passes, before.passes);
+    EXPECT_EQ(session->status(opened.run).finished_seeds, 0);
+    expect_equal(session->snapshot(opened.run)->mean, plain_image("path", before.passes));
+    session->resume(opened.run, {});
+    ASSERT_TRUE(wait_for([&] { return session->status(opened.run).passes > before.passes; }));
+    session->discard(opened.run);
+    ASSERT_TRUE(is_in(opened.run, RunState::Stopped));
+    session->settle();
+    const uint64_t passes = session->status(opened.run).passes;
+    expect_equal(session->snapshot(opened.run)->mean, plain_image("path", passes));
 }
 
 TEST_F(KeptRuns, ReplaceNoFilesOfOthers) {
