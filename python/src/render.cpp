@@ -271,6 +271,29 @@ private:
 };
 using RenderingPtr = std::shared_ptr<Rendering>;
 
+// An integrator in Python may refer to its rendering, for example by an exception that it keeps, whose traceback has the
+// frames of render(). Python's collector sees such cycles.
+
+int visit_integrator(PyObject* self, visitproc visit, void* arg) {
+    Py_VISIT(Py_TYPE(self));
+    if (!nb::inst_ready(self)) return 0;
+    if (const nb::object* o =
+            python_integrator(nb::inst_ptr<Rendering>(self)->settings().integrator))
+        Py_VISIT(o->ptr());
+    return 0;
+}
+
+int clear_integrator(PyObject* self) {
+    if (!nb::inst_ready(self)) return 0;
+    if (nb::object* o = python_integrator(nb::inst_ptr<Rendering>(self)->settings().integrator))
+        *o = nb::none();
+    return 0;
+}
+
+PyType_Slot kRenderingSlots[] = {{Py_tp_traverse, reinterpret_cast<void*>(visit_integrator)},
+                                 {Py_tp_clear, reinterpret_cast<void*>(clear_integrator)},
+                                 {0, nullptr}};
+
 constexpr const char* kTechniquesSignature =
     "def techniques(self) -> list[tuple[int, int, str, numpy.typing.NDArray[numpy.float32], "
     "numpy.typing.NDArray[numpy.float32]]]";
@@ -482,7 +505,7 @@ void bind_merging(nb::module_& m) {
 void bind_render(nb::module_& m) {
     using namespace nb::literals;
     using Strings = std::vector<std::string>;
-    nb::class_<Rendering> rendering(m, "Rendering");
+    nb::class_<Rendering> rendering(m, "Rendering", nb::type_slots(kRenderingSlots));
     bind_denoising(rendering);
     rendering
         .def(

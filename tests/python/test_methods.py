@@ -16,6 +16,7 @@ def test_keywords_make_the_text() -> None:
     text = et.integrator("upg", radius=1e-5, max_depth=8)
     assert text == "upg:radius=1e-05,max_depth=8"
     assert et.integrator("pm", radius=np.float32(0.5)) == "pm:radius=0.5"
+    assert et.integrator("path:max_depth=3", rr_depth=2) == "path:max_depth=3,rr_depth=2"
 
 
 @pytest.mark.parametrize(
