@@ -264,7 +264,7 @@ const auto name_of_seeds = [](const ::testing::TestParamInfo<SeedCase>& p) {
     return name_of_integrator({p.param.method, p.index});
 };
 INSTANTIATE_TEST_SUITE_P(Gem, ChainSeeds,
-                         ::testing::Values(SeedCase{"mmlt", 16, 0.02}, SeedCase{"mlt", 16, 0.02},
+                         ::testing::Values(SeedCase{"mmlt", 16, 0.035}, SeedCase{"mlt", 16, 0.035},
                                            SeedCase{"pssmlt", 16},
                                            SeedCase{"pssmlt:chains=32,groups=4", 24}),
                          name_of_seeds);
