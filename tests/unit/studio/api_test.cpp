@@ -322,12 +322,10 @@ TEST_F(ApiTest, NamesThePassThatMadeAPixelBright) {
     for (const json& w : worst["pixels"]) {
         const std::string pixel = "&x=" + w["x"].dump() + "&y=" + w["y"].dump();
         EXPECT_EQ(json::parse(get(of + pixel).body)["pixel"], w);
-        const json replayed = json::parse(post("/v1/replay", {{"run", run},
-                                                              {"x", w["x"]},
-                                                              {"y", w["y"]},
-                                                              {"pass", w["pass"]},
-                                                              {"passes", 1}})
-                                              .body);
+        const json replayed = json::parse(
+            post("/v1/replay",
+                 {{"run", run}, {"x", w["x"]}, {"y", w["y"]}, {"pass", w["pass"]}, {"passes", 1}})
+                .body);
         const auto sum = [&](int c) { return replayed["sum"][size_t(c)].get<float>(); };
         EXPECT_NEAR(luminance(Rgb(sum(0), sum(1), sum(2))), w["value"].get<float>(),
                     1e-3f * w["value"].get<float>());
@@ -363,11 +361,11 @@ TEST_F(ApiTest, ChangesWhatIsRendered) {
     EXPECT_TRUE(view.camera);
     EXPECT_EQ(change({{"sensor", 0}}), 200);
     EXPECT_FALSE(view.camera);
-    for (const json& wrong : {json{{"sensor", 1}}, json{{"crop", {{"x", 0}}}},
-                              json{{"crop", {{"x", 10}, {"y", 0}, {"w", 7}, {"h", 1}}}},
-                              json{{"crop", 3}}, json{{"camera", {{"eye", {0, 0, 3}}}}},
-                              json{{"camera",
-                                    {{"eye", {0, 0, 3}}, {"target", {0, 0, 3}}, {"up", {0, 1, 0}}}}}})
+    for (const json& wrong :
+         {json{{"sensor", 1}}, json{{"crop", {{"x", 0}}}},
+          json{{"crop", {{"x", 10}, {"y", 0}, {"w", 7}, {"h", 1}}}}, json{{"crop", 3}},
+          json{{"camera", {{"eye", {0, 0, 3}}}}},
+          json{{"camera", {{"eye", {0, 0, 3}}, {"target", {0, 0, 3}}, {"up", {0, 1, 0}}}}}})
         EXPECT_EQ(change(wrong), 422) << wrong;
 }
 
